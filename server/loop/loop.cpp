@@ -15,9 +15,9 @@
 
 #include "proto/frames.h"
 #include "server/database/shared_disk.h"
-#include "server/doors/doors.h"
 #include "server/loop/report_box.h"
 #include "server/loop/shown_web.h"
+#include "server/network/access.h"
 #include "server/network/network.h"
 
 namespace oblique::server {
@@ -49,17 +49,17 @@ class Loop::Parts final : public Outbox {
   explicit Parts(LoopSettings settings)
       : drain_(settings.drain),
         on_turn_(settings.on_turn),
-        doors_(settings.doors),
+        access_(settings.access),
         store_(path_on_own_disk(settings.database, settings.allow_network_disk)),
         writer_(store_, [this](std::vector<WriteReport> r) { written_.put(std::move(r)); }),
         queries_(settings.database, settings.queries,
                  [this](QueryReport r) { queried_.put(std::array{std::move(r)}); }),
         reader_([this](ReadReport r) { done_aside_.put(std::array{std::move(r)}); }),
         network_(settings.network),
-        workers_(network_.listen(doors_.address(), settings.worker_port,
-                                 doors_.guard(PortKeeper::Port::kWorkers))),
-        clients_(network_.listen(doors_.address(), settings.client_port,
-                                 doors_.guard(PortKeeper::Port::kClients))),
+        workers_(network_.listen(access_.address(), settings.worker_port,
+                                 access_.security(AccessControl::PortRole::kWorkers))),
+        clients_(network_.listen(access_.address(), settings.client_port,
+                                 access_.security(AccessControl::PortRole::kClients))),
         web_(web_of(settings)) {
     if (store_.is_new()) {
       spdlog::info("made the database {}: only its owner can read it (chmod lets others)",
@@ -67,7 +67,7 @@ class Loop::Parts final : public Outbox {
     }
     ServiceSettings service = std::move(settings.service);
     service.database_id = store_.database_id();
-    service.clients.access = name_of(doors_.access());
+    service.clients.access = name_of(access_.mode());
     service.last_study_id = store_.last_study_id();
     service.last_worker_id = store_.last_worker_id();
     // Above every number that an earlier run can have given, whatever the clock says.
@@ -100,10 +100,12 @@ class Loop::Parts final : public Outbox {
       take_reports();
       has_more = take_worker_messages();
       has_more = take_client_messages() || has_more || network_.has_more();
-      note_departures();
+      note_disconnects();
       if (Clock::now() >= next_tick) {
         service_->tick(now());
-        look_at_doors();
+        if (access_.refresh(now().steady_ms)) {
+          network_.admission_changed();
+        }
         show();
         tell_turn(drain_until_ ? LoopTurn::Stage::kDrains : LoopTurn::Stage::kRuns);
         next_tick = Clock::now() + kTick;
@@ -124,7 +126,7 @@ class Loop::Parts final : public Outbox {
   }
   bool is_busy(const std::string& identity) const override { return network_.is_busy(identity); }
   bool has_unheard(const std::string& identity) const override {
-    return network_.has_unheard(identity);
+    return network_.has_unread_input(identity);
   }
   bool to_client(const std::string& identity, const protocol::ClientReply& reply) override {
     return forward_to_client(identity, protocol::encode(reply));
@@ -146,15 +148,10 @@ class Loop::Parts final : public Outbox {
   void cancel_read(std::uint64_t ticket) override { reader_.cancel(ticket); }
   PeerCounts peer_counts() const override {
     PeerCounts counts;
-    for (const auto& [key, share] : network_.key_shares().all()) {
-      auto& of_key = counts.keys[share.holder->name];
-      of_key = {share.holder->role, of_key.connections + share.connections};
-    }
-    const RefusalCounts& refusals = network_.refusals();
+    const auto& refusals = network_.refusals();
     for (std::size_t cause = 0; cause < refusals.size(); ++cause) {
-      if (refusals.at(cause).count > 0) {
-        counts.refusals.emplace_back(name_of(static_cast<RefusalCause>(cause)),
-                                     refusals.at(cause).count);
+      if (refusals.at(cause) > 0) {
+        counts.refusals.emplace_back(name_of(static_cast<RefusalCause>(cause)), refusals.at(cause));
       }
     }
     return counts;
@@ -203,7 +200,7 @@ class Loop::Parts final : public Outbox {
         workers_, worker_traffic_,
         [this](const std::string& worker) { return service_->has_room_for(worker); },
         [this](const Incoming& incoming) {
-          service_->worker_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
+          service_->worker_frame(incoming.identity, incoming.body, now(), incoming.key);
         });
   }
 
@@ -213,7 +210,7 @@ class Loop::Parts final : public Outbox {
         clients_, client_traffic_,
         [this](const std::string& client) { return !network_.is_busy(client); },
         [this](const Incoming& incoming) {
-          service_->client_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
+          service_->client_frame(incoming.identity, incoming.body, now(), incoming.key);
         });
   }
 
@@ -222,7 +219,7 @@ class Loop::Parts final : public Outbox {
                      const Take& take) {
     const auto until = Clock::now() + kShareOfTurn;
     while (const auto incoming = network_.next(port, may_take)) {
-      traffic.received_bytes += incoming->message.body.size();
+      traffic.received_bytes += incoming->body.size();
       take(*incoming);
       if (Clock::now() >= until) {
         return true;
@@ -231,40 +228,24 @@ class Loop::Parts final : public Outbox {
     return false;
   }
 
-  /// What is not of one frame is passed on as a frame that no message has.
-  static std::string_view frame_of(const Incoming& incoming) {
-    return incoming.message.is_single ? std::string_view(incoming.message.body)
-                                      : std::string_view("\xff", 1);
-  }
-
   /// Nobody waits for queries of a client that has gone. A flood of ends becomes none of lines.
-  void note_departures() {
-    for (const Departure& departure : network_.take_departures()) {
-      service_->client_left(departure.identity);
-      if (departure.refused) {
-        note_refusal(departure, *departure.refused);
-      } else if (!departure.reason.empty() && std::has_single_bit(++ended_connections_)) {
-        spdlog::warn("a connection was ended: {} ({} ended so far)", departure.reason,
+  void note_disconnects() {
+    for (const Disconnect& disconnect : network_.take_disconnects()) {
+      service_->client_left(disconnect.identity);
+      if (disconnect.refused) {
+        note_refusal(disconnect, *disconnect.refused);
+      } else if (!disconnect.reason.empty() && std::has_single_bit(++ended_connections_)) {
+        spdlog::warn("a connection was ended: {} ({} ended so far)", disconnect.reason,
                      ended_connections_);
       }
     }
   }
 
-  void note_refusal(const Departure& departure, RefusalCause cause) {
+  void note_refusal(const Disconnect& disconnect, RefusalCause cause) {
     std::uint64_t& so_far = refused_.at(static_cast<std::size_t>(cause));
     if (std::has_single_bit(++so_far)) {
-      spdlog::warn("{} was refused: {} ({} refused so far: {})", departure.address,
-                   departure.reason, so_far, name_of(cause));
-    }
-  }
-
-  void look_at_doors() {
-    const Doors::News news = doors_.look(now().steady_ms);
-    for (const auto& line : news.lines) {
-      spdlog::log(line.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", line.text);
-    }
-    if (news.admission_changed) {
-      network_.admission_changed();
+      spdlog::warn("{} was refused: {} ({} refused so far: {})", disconnect.address,
+                   disconnect.reason, so_far, name_of(cause));
     }
   }
 
@@ -343,7 +324,7 @@ class Loop::Parts final : public Outbox {
   const std::chrono::milliseconds drain_;
   const std::function<void(const LoopTurn&)> on_turn_;
   std::optional<Clock::time_point> drain_until_;  ///< none: it does not drain
-  Doors doors_;
+  AccessControl access_;
   Store store_;
   ReportBox written_;
   ReportBox queried_;

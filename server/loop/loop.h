@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "server/doors/listening.h"
+#include "server/network/access.h"
 #include "server/network/network.h"
 #include "server/service/service.h"
 #include "server/web/web.h"
@@ -25,7 +25,7 @@ struct LoopTurn {
 struct LoopSettings {
   std::string database;              ///< file
   bool allow_network_disk = false;   ///< the file may lie on a network file system
-  DoorSettings doors;                ///< of both ports
+  AccessSettings access;             ///< to both ports
   std::string worker_port = "7601";  ///< "*": the system picks one
   std::string client_port = "7600";
   QueryPoolSettings queries;

@@ -2,20 +2,32 @@
 
 #include <string>
 
+#include <netinet/in.h>
+
 #include "proto/system/descriptor.h"
-#include "server/network/peer_address.h"
 
 namespace oblique::server {
 
-/// A TCP socket that takes connections, non-blocking.
+/// Where a peer connects from.
+struct PeerAddress {
+  PeerAddress() = default;
+  /// Of IPv6, or a sockaddr_in in the same place. IPv4 that an IPv6 socket gave
+  /// (::ffff:10.0.0.3) counts as IPv4.
+  explicit PeerAddress(sockaddr_in6 address);
+
+  std::string text;  ///< as 10.0.0.3:4711 or [::1]:4711
+  /// The IPv4 address, or the first 64 bits of an IPv6 address: one host can have all of the rest.
+  std::string source;
+};
+
+/// A non-blocking TCP socket that accepts connections.
 class Listener {
  public:
-  /// `address` is numeric, of IPv4 or IPv6, `port` a number or "*": the system picks one. At "::"
-  /// it listens for both. Throws std::runtime_error, naming the endpoint, when it cannot listen
-  /// there.
+  /// `address` is numeric, `port` a number or "*": the system picks one. At "::" it accepts IPv4
+  /// too. Throws std::runtime_error, with the endpoint, when it cannot listen there.
   Listener(const std::string& address, const std::string& port);
 
-  /// With the port that is really used, as tcp://127.0.0.1:7601 or tcp://[::1]:7601.
+  /// With the port in use, as tcp://127.0.0.1:7601 or tcp://[::1]:7601.
   const std::string& endpoint() const { return endpoint_; }
   int descriptor() const { return socket_.number(); }
 
@@ -23,8 +35,8 @@ class Listener {
     protocol::Descriptor socket;
     PeerAddress address;
   };
-  /// The next connection, non-blocking; its socket is not open when none waits or the system gives
-  /// none. Then `errno` says which.
+  /// The next connection, non-blocking. If none waits or the system refuses one, its socket is not
+  /// open and `errno` says why.
   Accepted accept() const;
 
  private:

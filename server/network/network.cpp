@@ -1,75 +1,236 @@
 #include "server/network/network.h"
 
-#include <poll.h>
-#include <sys/epoll.h>
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <iterator>
 #include <system_error>
 #include <utility>
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/uio.h>
+
+#include "proto/socket/limits.h"
+#include "server/network/zmtp.h"
 
 namespace oblique::server {
 namespace {
 
-/// Numbers below are of ports.
+static_assert(CurveSession::kAddedBytes == protocol::kSealBytes);
+
+/// Smaller numbers are of ports.
 constexpr std::uint64_t kFirstPeer = 16;
 /// For the database, its readers and the log.
 constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
-constexpr std::int64_t kLookInterval_ms = 500;
-/// Of handshakes with keys.
+constexpr std::size_t kReadBytes = 64 * 1024;
+constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
+
+// Handshakes with keys. A step costs as much as hundreds of messages.
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
-constexpr std::size_t kMostWaitingSteps = 64;
+constexpr std::size_t kMostPendingSteps = 64;
+/// Parts of `handshake_ms`, after which the oldest makes room for another, or, of one source, one
+/// of the newest. With half of the first, thousands of handshakes of one busy process fail.
+constexpr std::int64_t kPartOfOldest = 10;
+constexpr std::int64_t kPartOfNewest = 100;
+
 constexpr const char* kLeavesTooMuchUnread = "it leaves too much unread";
-constexpr const char* kNoRoom = "there are too many connections, and none that would make room";
+constexpr const char* kTooManyOfSource = "too many handshakes of its address are under way";
 
-bool has_something_to_take(const Zmtp& said) {
-  return said.has_message() || said.waiting_work() == Zmtp::Work::kSealedFrame;
+void set_option(int socket, int level, int option, int value) {
+  // This may fail for a peer that has left, which reading reports.
+  static_cast<void>(setsockopt(socket, level, option, &value, sizeof value));
 }
 
-bool is_waiting(const Zmtp& said) {
-  return said.has_message() || said.waiting_work() != Zmtp::Work::kNone;
+bool would_block() {
+  return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
 }
 
-/// Most connections for which the system gives descriptors.
-std::size_t most_descriptors() {
+/// How many connections the system's limit on descriptors allows.
+std::size_t most_connections() {
   rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 ||
-      limit.rlim_cur < kOtherDescriptors + kFewestConnections) {
-    return kFewestConnections;
-  }
-  return static_cast<std::size_t>(limit.rlim_cur) - kOtherDescriptors;
+  static_cast<void>(getrlimit(RLIMIT_NOFILE, &limit));
+  return std::max<std::size_t>(limit.rlim_cur, kOtherDescriptors + kFewestConnections) -
+         kOtherDescriptors;
 }
 
 }  // namespace
+
+// ---- One connection ---------------------------------------------------------------------------
+
+/// A TCP connection with its protocol: input that was not taken and output that was not sent.
+class Network::Connection {
+ public:
+  Connection(protocol::Descriptor socket, const PortSecurity* security)
+      : socket_(std::move(socket)), zmtp_(security) {
+    constexpr protocol::KeepAlive kKeepAlive;
+    const int fd = socket_.number();
+    set_option(fd, IPPROTO_TCP, TCP_NODELAY, 1);
+    set_option(fd, SOL_SOCKET, SO_KEEPALIVE, 1);
+    set_option(fd, IPPROTO_TCP, TCP_KEEPIDLE, kKeepAlive.idle_s);
+    set_option(fd, IPPROTO_TCP, TCP_KEEPINTVL, kKeepAlive.interval_s);
+    set_option(fd, IPPROTO_TCP, TCP_KEEPCNT, kKeepAlive.probes);
+    set_option(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, kKeepAlive.unacknowledged_ms);
+  }
+
+  const Zmtp& zmtp() const { return zmtp_; }
+  int descriptor() const { return socket_.number(); }
+  std::size_t unsent_bytes() const { return out_.size() - sent_; }
+  /// False once the peer accepts no more output. Its input may still be read.
+  bool can_send() const { return can_send_; }
+  bool has_pending_handshake() const {
+    return zmtp_.pending_step() == Zmtp::PendingStep::kHandshake;
+  }
+  /// A message, or a sealed frame that may be one.
+  bool has_input_to_take() const {
+    return zmtp_.has_message() || zmtp_.pending_step() == Zmtp::PendingStep::kSealedFrame;
+  }
+
+  /// Reads once. False when the connection has ended.
+  bool read() {
+    std::array<char, kReadBytes> bytes;
+    const std::size_t most = zmtp_.is_open() ? bytes.size() : kReadInHandshake_bytes;
+    const ssize_t count = ::recv(socket_.number(), bytes.data(), most, 0);
+    if (count < 0 && would_block()) {
+      return true;
+    }
+    if (count <= 0) {
+      return false;
+    }
+    zmtp_.receive({bytes.data(), static_cast<std::size_t>(count)});
+    send_answers();
+    return true;
+  }
+  std::string take_message() {
+    std::string message = zmtp_.take_message();
+    send_answers();
+    return message;
+  }
+  void run_step() {
+    zmtp_.run_step();
+    send_answers();
+  }
+  /// Sends what the protocol itself has to say, at first the greeting.
+  void send_answers() {
+    const std::string answers = zmtp_.take_answers();
+    if (can_send_ && !answers.empty()) {
+      out_ += answers;
+      flush();
+    }
+  }
+  void send(std::string_view body);
+  void flush();
+
+ private:
+  void stop_sending() {
+    can_send_ = false;
+    out_ = {};
+    sent_ = 0;
+  }
+
+  protocol::Descriptor socket_;
+  bool can_send_ = true;
+  Zmtp zmtp_;
+  std::string out_;
+  std::size_t sent_ = 0;  // of `out_`
+};
+
+/// Sends a message as far as the system takes it, and keeps the rest.
+void Network::Connection::send(std::string_view body) {
+  const std::string header = zmtp_.begin_message(body);
+  std::size_t taken = 0;
+  if (unsent_bytes() == 0) {
+    // sendmsg does not change what it is given.
+    std::array<iovec, 2> parts{{{const_cast<char*>(header.data()), header.size()},
+                                {const_cast<char*>(body.data()), body.size()}}};
+    msghdr message{};
+    message.msg_iov = parts.data();
+    message.msg_iovlen = parts.size();
+    const ssize_t count = ::sendmsg(socket_.number(), &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count < 0 && !would_block()) {
+      stop_sending();
+      return;
+    }
+    taken = static_cast<std::size_t>(std::max<ssize_t>(count, 0));
+  }
+  const std::size_t of_header = std::min(taken, header.size());
+  out_ += std::string_view(header).substr(of_header);
+  out_ += body.substr(taken - of_header);
+}
+
+void Network::Connection::flush() {
+  while (unsent_bytes() > 0) {
+    const ssize_t count =
+        ::send(socket_.number(), out_.data() + sent_, unsent_bytes(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count < 0 && !would_block()) {
+      stop_sending();
+      return;
+    }
+    if (count < 0) {
+      break;
+    }
+    sent_ += static_cast<std::size_t>(count);
+  }
+  if (unsent_bytes() == 0) {
+    out_ = {};
+    sent_ = 0;
+  } else if (sent_ > out_.size() / 2) {
+    out_.erase(0, std::exchange(sent_, 0));
+  }
+}
+
+struct Network::Peer {
+  Peer(Listener::Accepted accepted, const PortSecurity* security, Port at, std::int64_t now_ms)
+      : connection(std::move(accepted.socket), security),
+        address(std::move(accepted.address)),
+        port(at),
+        since_ms(now_ms),
+        last_input_ms(now_ms) {}
+
+  bool wants_input() const {
+    return !is_paused && !connection.has_input_to_take() && !connection.has_pending_handshake();
+  }
+  std::uint32_t wanted_events() const {
+    return (wants_input() ? EPOLLIN : 0U) | (connection.unsent_bytes() > 0 ? EPOLLOUT : 0U);
+  }
+
+  Connection connection;
+  PeerAddress address;
+  Port port;
+  std::int64_t since_ms;
+  std::int64_t last_input_ms;
+  bool is_queued = false;  // in its port's queue or in `pending_steps_`
+  bool is_paused = false;
+  bool is_in_handshake = true;
+  std::uint32_t watched_events = 0;  // 0: not in the epoll set
+  std::size_t held_in_bytes = 0;     // as counted in the sums
+  std::size_t waiting_out_bytes = 0;
+  std::shared_ptr<const KeyIdentity> key;
+};
+
+// ---- All connections --------------------------------------------------------------------------
 
 Network::Network(NetworkLimits limits)
     : limits_(limits), epoll_(epoll_create1(EPOLL_CLOEXEC)), last_number_(kFirstPeer) {
   if (!epoll_.is_open()) {
     throw std::system_error(errno, std::generic_category(), "epoll_create1");
   }
-  limits_.connections = std::min(limits_.connections, most_descriptors());
-  // One key never has so many that others find no room.
-  constexpr std::size_t kPartForOthers = 8;
-  limits_.connections_of_key = std::min(limits_.connections_of_key,
-                                        limits_.connections - limits_.connections / kPartForOthers);
+  limits_.connections = std::min(limits_.connections, most_connections());
 }
 
 Network::~Network() = default;
 
 Network::Port Network::listen(const std::string& address, const std::string& port,
-                              const std::optional<PortGuard>& guard) {
+                              const std::optional<PortSecurity>& security) {
   const Port number = ports_.size();
-  OpenPort opened{std::make_unique<Listener>(address, port), nullptr, nullptr, {}};
-  if (guard) {
-    opened.doorkeeper = guard->doorkeeper;
-    opened.guard = std::make_unique<PortGuard>(*guard);
-    opened.guard->doorkeeper =
-        std::make_shared<BoundedDoorkeeper>(guard->doorkeeper, shares_, limits_.connections_of_key);
-  }
+  OpenPort opened{std::make_unique<Listener>(address, port),
+                  security ? std::make_unique<PortSecurity>(*security) : nullptr};
   epoll_event event{EPOLLIN, {.u64 = number}};
   if (epoll_ctl(epoll_.number(), EPOLL_CTL_ADD, opened.listener->descriptor(), &event) != 0) {
     throw std::system_error(errno, std::generic_category(), "epoll_ctl");
@@ -78,16 +239,14 @@ Network::Port Network::listen(const std::string& address, const std::string& por
   return number;
 }
 
-// ---- What comes -------------------------------------------------------------------------------
-
-std::size_t Network::connections(Port port) const {
-  return static_cast<std::size_t>(
-      std::count_if(peers_.begin(), peers_.end(),
-                    [port](const auto& peer) { return peer.second->port == port; }));
+Network::Peer* Network::find(const std::string& identity) const {
+  Number number = 0;
+  std::from_chars(identity.data(), identity.data() + identity.size(), number);
+  const auto found = peers_.find(number);
+  return found == peers_.end() ? nullptr : found->second.get();
 }
 
 void Network::collect(std::int64_t now_ms) {
-  has_unopened_ = false;
   read_paused_again();
   std::array<epoll_event, 256> events;
   const int count = epoll_wait(epoll_.number(), events.data(), static_cast<int>(events.size()), 0);
@@ -99,82 +258,135 @@ void Network::collect(std::int64_t now_ms) {
       serve(event.data.u64, event.events, now_ms);
     }
   }
-  shake_hands();
-  accept_again(now_ms);
-  end_the_largest();
-  if (now_ms >= next_look_ms_) {
-    next_look_ms_ = now_ms + kLookInterval_ms;
-    end_unfinished_handshakes(now_ms);
+  run_handshakes();
+  for (Port port = 0; port < ports_.size(); ++port) {
+    if (!ports_[port].is_accepting && !must_newcomers_wait(now_ms)) {
+      set_accepting(port, true);
+    }
+  }
+  end_largest();
+  while (!handshakes_.empty() &&
+         now_ms - peers_.at(*handshakes_.begin())->since_ms > limits_.handshake_ms) {
+    end(*handshakes_.begin(), "it does not finish its handshake", RefusalCause::kTooSlow);
   }
 }
 
+bool Network::has_more() const {
+  return !pending_steps_.empty() ||
+         std::any_of(ports_.begin(), ports_.end(), [this](const OpenPort& port) {
+           return !port.paused.empty() && !is_full(port);
+         });
+}
+
+// ---- New connections --------------------------------------------------------------------------
+
 void Network::accept_all(Port port, std::int64_t now_ms) {
   constexpr std::size_t kMostAtATime = 64;
-  // No more than can be let in: a crowd waits in the system, where nobody is turned away.
-  const bool has_keys = ports_[port].guard != nullptr;
-  const std::size_t most = has_keys ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
+  // No more than can be admitted in a turn: a crowd, as after a restart, waits in the system.
+  const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
   std::size_t taken = 0;
   for (std::size_t i = 0;
-       i < kMostAtATime && taken < most && handshakes_.size() < kMostWaitingSteps; ++i) {
+       i < kMostAtATime && taken < most && pending_steps_.size() < kMostPendingSteps; ++i) {
     if (must_newcomers_wait(now_ms)) {
-      let_newcomers_wait(port);
+      set_accepting(port, false);
       return;
     }
     Listener::Accepted accepted = ports_[port].listener->accept();
     if (!accepted.socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {
-        make_room(port, now_ms);
+        make_room_for_connection(port, now_ms);
       }
       return;
     }
-    if (has_keys && !has_room_for(accepted.address, now_ms)) {
+    if (!make_room(port, accepted.address, now_ms)) {
+      count_refusal(RefusalCause::kBound);
       continue;
     }
     ++taken;
-    if (strangers_.size() >= limits_.handshakes) {
-      end_oldest_handshake();
-    }
-    if (peers_.size() < limits_.connections || make_room(port, now_ms)) {
-      accept(port, std::move(accepted), now_ms);
-    } else {
-      count_refusal(RefusalCause::kBound, accepted.address.text(), kNoRoom);
-    }
+    ++ports_[port].connections;
+    const Number number = ++last_number_;
+    auto& peer = peers_[number];
+    peer = std::make_unique<Peer>(std::move(accepted), ports_[port].security.get(), port, now_ms);
+    handshakes_.insert(number);
+    handshakes_of_[peer->address.source].insert(number);
+    peer->connection.send_answers();
+    settle(number, *peer);
   }
 }
 
-void Network::accept(Port port, Listener::Accepted accepted, std::int64_t now_ms) {
-  const Number number = ++last_number_;
-  auto peer = std::make_unique<Peer>(std::move(accepted), ports_[port].guard.get());
-  peer->port = port;
-  peer->since_ms = peer->last_heard_ms = now_ms;
-  Peer& stored = *peers_.emplace(number, std::move(peer)).first->second;
-  strangers_.insert(number);
-  strangers_of_[stored.address.source()].insert(number);
-  watch(number, stored, EPOLL_CTL_ADD);
-  stored.connection.greet();
-  settle(number, stored);
+/// There are as many handshakes as may be, and the oldest has not had its time. It is not ended: it
+/// would come again at once, and nobody of a slow crowd would ever be admitted.
+bool Network::must_newcomers_wait(std::int64_t now_ms) const {
+  return handshakes_.size() >= limits_.handshakes &&
+         !has_had(*handshakes_.begin(), kPartOfOldest, now_ms);
 }
 
-/// For one more at that port. Ends the oldest of those who have not said who they are; where there
-/// are no keys, else the connection that has said nothing for longest. Nobody who has shown a key
-/// makes room for a stranger. False when there is none.
-bool Network::make_room(Port port, std::int64_t now_ms) {
+bool Network::has_had(Number handshake, std::int64_t part, std::int64_t now_ms) const {
+  return now_ms - peers_.at(handshake)->since_ms >= limits_.handshake_ms / part;
+}
+
+void Network::set_accepting(Port port, bool is_accepting) {
+  ports_[port].is_accepting = is_accepting;
+  epoll_event event{is_accepting ? EPOLLIN : 0U, {.u64 = port}};
+  epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
+}
+
+/// Ends connections where one more would exceed a bound. False if the new one is to be refused.
+bool Network::make_room(Port port, const PeerAddress& address, std::int64_t now_ms) {
+  if (ports_[port].security && !make_room_at_source(address, now_ms)) {
+    return false;
+  }
+  if (handshakes_.size() >= limits_.handshakes) {
+    end_oldest_handshake();
+  }
+  return peers_.size() < limits_.connections || make_room_for_connection(port, now_ms);
+}
+
+/// Of one source. A newcomer does not wait in the system, where it would keep those of other
+/// sources waiting. The oldest handshake is ended once it has had its time, else one of the newest:
+/// most finish even if all are slow, and a fast peer is soon admitted beside many that never
+/// finish.
+bool Network::make_room_at_source(const PeerAddress& address, std::int64_t now_ms) {
+  constexpr std::size_t kPartForNewest = 8;
+  const auto found = handshakes_of_.find(address.source);
+  if (found == handshakes_of_.end() || found->second.size() < limits_.handshakes_of_source) {
+    return true;
+  }
+  const std::set<Number>& handshakes = found->second;
+  const auto newest = static_cast<std::ptrdiff_t>(handshakes.size() / kPartForNewest);
+  const Number oldest = *handshakes.begin();
+  const Number one_of_newest = *std::prev(handshakes.end(), newest + 1);
+  if (has_had(oldest, kPartOfOldest, now_ms)) {
+    end(oldest, kTooManyOfSource, RefusalCause::kBound);
+  } else if (has_had(one_of_newest, kPartOfNewest, now_ms)) {
+    end(one_of_newest, kTooManyOfSource, RefusalCause::kBound);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+/// Ends the oldest handshake; without keys, if there is none, the connection that was silent for
+/// longest. A peer with a key never makes room. False if no connection may be ended.
+bool Network::make_room_for_connection(Port port, std::int64_t now_ms) {
   if (end_oldest_handshake()) {
     return true;
   }
-  if (ports_[port].guard) {
+  if (ports_[port].security) {
     return false;
   }
   const auto quietest =
       std::min_element(peers_.begin(), peers_.end(), [](const auto& left, const auto& right) {
-        return left.second->last_heard_ms < right.second->last_heard_ms;
+        return left.second->last_input_ms < right.second->last_input_ms;
       });
-  if (quietest == peers_.end() || now_ms - quietest->second->last_heard_ms < limits_.active_ms) {
+  if (quietest == peers_.end() || now_ms - quietest->second->last_input_ms < limits_.active_ms) {
     return false;
   }
-  end(quietest->first, "it was silent for longest, and there are too many connections");
+  end(quietest->first, "there are too many connections, and it was silent for longest");
   return true;
 }
+
+// ---- Input ------------------------------------------------------------------------------------
 
 void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
   const auto found = peers_.find(number);
@@ -183,33 +395,27 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
   }
   Peer& peer = *found->second;
   Connection& connection = peer.connection;
-  if ((events & EPOLLOUT) != 0) {
+  const bool has_hung_up = (events & (EPOLLHUP | EPOLLERR)) != 0;
+  if (has_hung_up || (events & EPOLLOUT) != 0) {
     connection.flush();
   }
-  const bool has_ended = (events & (EPOLLHUP | EPOLLERR)) != 0;
-  if (has_something_to_take(connection.said())) {
-    if (has_ended) {
-      peer.is_ending = true;
-      epoll_ctl(epoll_.number(), EPOLL_CTL_DEL, connection.descriptor(), nullptr);
+  if (has_hung_up && connection.has_pending_handshake()) {
+    end_peer_that_left(number, peer);
+    return;
+  }
+  if (has_hung_up || (events & EPOLLIN) != 0) {
+    if (peer.wants_input() && !has_hung_up && !peer.is_in_handshake && is_full(ports_[peer.port])) {
+      peer.is_paused = true;
+      ports_[peer.port].paused.push_back(number);
     }
-  } else if (!has_ended && (events & EPOLLIN) != 0 && !peer.is_stranger &&
-             is_full(ports_[peer.port])) {
-    peer.last_heard_ms = now_ms;
-    peer.is_paused = true;
-    ports_[peer.port].paused.push_back(number);
-  } else if (has_ended || (events & EPOLLIN) != 0) {
-    peer.last_heard_ms = now_ms;
-    const bool shakes_hands = connection.said().waiting_work() == Zmtp::Work::kHandshake;
-    if (shakes_hands || connection.read() == Connection::Read::kEnd) {
-      end_who_has_left(number, peer);
+    peer.last_input_ms = now_ms;
+    if (!peer.wants_input()) {
+      watch(number, peer, peer.wanted_events());
+    } else if (!connection.read()) {
+      end_peer_that_left(number, peer);
       return;
-    }
-    if (!connection.said().fault().empty()) {
-      end_faulty(number, peer);
+    } else if (!examine(number, peer)) {
       return;
-    }
-    if (peer.is_stranger && connection.said().is_open()) {
-      let_in(number, peer);
     }
   }
   settle(number, peer);
@@ -218,95 +424,115 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
   }
 }
 
-/// A few of the steps that wait: each costs as much as hundreds of messages of those who are in.
-void Network::shake_hands() {
-  for (std::size_t steps = 0; steps < kStepsATurn && !handshakes_.empty();) {
-    const Number number = handshakes_.front();
-    handshakes_.pop_front();
+/// Runs some of the pending steps, so that peers that are connected are served in between.
+void Network::run_handshakes() {
+  for (std::size_t steps = 0; steps < kStepsATurn && !pending_steps_.empty();) {
+    const Number number = pending_steps_.front();
+    pending_steps_.pop_front();
     const auto found = peers_.find(number);
     if (found == peers_.end()) {
       continue;
     }
     ++steps;
     Peer& peer = *found->second;
-    peer.stands_in_line = false;
-    peer.connection.do_work();
-    if (!peer.connection.said().fault().empty()) {
-      end_faulty(number, peer);
-      continue;
+    peer.is_queued = false;
+    peer.connection.run_step();
+    if (examine(number, peer)) {
+      settle(number, peer);
     }
-    if (peer.connection.said().is_open()) {
-      let_in(number, peer);
-    }
-    settle(number, peer);
   }
 }
 
-void Network::let_in(Number number, Peer& peer) {
-  handshake_is_over(number, peer);
-  peer.holder = peer.connection.said().holder();
-  if (peer.holder) {
-    peer.share = &shares_.join(peer.connection.said().key(), peer.holder);
-    peer.share->held_in_bytes += peer.held_in_bytes;
-    peer.share->waiting_out_bytes += peer.waiting_out_bytes;
+/// After input: notices that a handshake is done and ends a connection with a fault. False if the
+/// connection was ended.
+bool Network::examine(Number number, Peer& peer) {
+  const Zmtp& zmtp = peer.connection.zmtp();
+  if (peer.is_in_handshake && zmtp.is_open()) {
+    handshake_ended(number, peer);
+    peer.key = zmtp.identity();
+  }
+  if (!zmtp.fault().empty()) {
+    end(number, zmtp.fault(), peer.is_in_handshake ? std::optional(zmtp.cause()) : std::nullopt);
+    return false;
+  }
+  return true;
+}
+
+void Network::handshake_ended(Number number, Peer& peer) {
+  if (!std::exchange(peer.is_in_handshake, false)) {
+    return;
+  }
+  handshakes_.erase(number);
+  const auto of_source = handshakes_of_.find(peer.address.source);
+  of_source->second.erase(number);
+  if (of_source->second.empty()) {
+    handshakes_of_.erase(of_source);
   }
 }
 
-/// What it holds, in the sums.
+/// After any change of a peer: updates the sums, its place in a queue and the awaited events. The
+/// input of a peer whose message waits is watched until the system reports some: most messages are
+/// taken before, and two system calls are saved.
+void Network::settle(Number number, Peer& peer) {
+  const Connection& connection = peer.connection;
+  count(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
+  if (!peer.is_queued && connection.has_input_to_take()) {
+    ports_[peer.port].queue.push_back(number);
+    peer.is_queued = true;
+  } else if (!peer.is_queued && connection.has_pending_handshake()) {
+    pending_steps_.push_back(number);
+    peer.is_queued = true;
+  }
+  watch(number, peer, peer.wanted_events() | (peer.watched_events & EPOLLIN));
+}
+
 void Network::count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
   held_in_bytes_ += held_in_bytes - peer.held_in_bytes;
   ports_[peer.port].held_in_bytes += held_in_bytes - peer.held_in_bytes;
   waiting_out_bytes_ += waiting_out_bytes - peer.waiting_out_bytes;
-  if (peer.share != nullptr) {
-    peer.share->held_in_bytes += held_in_bytes - peer.held_in_bytes;
-    peer.share->waiting_out_bytes += waiting_out_bytes - peer.waiting_out_bytes;
-    a_key_has_too_much_ = a_key_has_too_much_ ||
-                          peer.share->held_in_bytes > limits_.held_in_bytes_of_key ||
-                          peer.share->waiting_out_bytes > limits_.waiting_out_bytes_of_key;
-  }
   peer.held_in_bytes = held_in_bytes;
   peer.waiting_out_bytes = waiting_out_bytes;
 }
 
-/// After anything happened to a peer: its sums, its place in the line, what is awaited of it.
-void Network::settle(Number number, Peer& peer) {
-  Connection& connection = peer.connection;
-  const Zmtp& said = connection.said();
-  count(peer, connection.held_in_bytes(), connection.waiting_out_bytes());
-  if (!peer.stands_in_line && is_waiting(said)) {
-    peer.stands_in_line = true;
-    (has_something_to_take(said) ? ports_[peer.port].line : handshakes_).push_back(number);
+/// A hung-up connection is reported again and again while it is in the set, so a peer of which no
+/// event is wanted is taken out.
+void Network::watch(Number number, Peer& peer, std::uint32_t events) {
+  if (events == peer.watched_events) {
+    return;
   }
-  if (!connection.can_send()) {
-    depart(number, peer, "", std::nullopt);
-  }
-  if (!peer.is_ending) {
-    watch(number, peer, EPOLL_CTL_MOD);
+  const int operation = peer.watched_events == 0 ? EPOLL_CTL_ADD
+                        : events == 0            ? EPOLL_CTL_DEL
+                                                 : EPOLL_CTL_MOD;
+  peer.watched_events = events;
+  epoll_event event{events, {.u64 = number}};
+  epoll_ctl(epoll_.number(), operation, peer.connection.descriptor(), &event);
+}
+
+void Network::read_paused_again() {
+  for (OpenPort& port : ports_) {
+    if (port.paused.empty() || is_full(port)) {
+      continue;
+    }
+    for (const Number number : std::exchange(port.paused, {})) {
+      if (const auto found = peers_.find(number); found != peers_.end()) {
+        found->second->is_paused = false;
+        settle(number, *found->second);
+      }
+    }
   }
 }
 
-/// A peer whose turn has not come yet is read no further.
-void Network::watch(Number number, Peer& peer, int operation) {
-  const Connection& connection = peer.connection;
-  const std::uint32_t events = (is_waiting(connection.said()) || peer.is_paused ? 0U : EPOLLIN) |
-                               (connection.waiting_out_bytes() > 0 ? EPOLLOUT : 0U);
-  if (operation == EPOLL_CTL_MOD && events == peer.watched_events) {
-    return;
-  }
-  peer.watched_events = events;
-  epoll_event event{events, {.u64 = number}};
-  epoll_ctl(epoll_.number(), operation, connection.descriptor(), &event);
+bool Network::has_unread_input(const std::string& identity) const {
+  const Peer* const peer = find(identity);
+  return peer != nullptr && (peer->is_queued || peer->is_paused);
 }
 
 std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {
-  // Of sealed frames that turn out to be no messages.
-  constexpr std::size_t kMostOpened = 64;
-  std::deque<Number>& line = ports_[port].line;
+  std::deque<Number>& queue = ports_[port].queue;
   std::size_t declined = 0;
-  std::size_t opened = 0;
-  while (declined < line.size() && opened < kMostOpened) {
-    const Number number = line.front();
-    line.pop_front();
+  while (declined < queue.size()) {
+    const Number number = queue.front();
+    queue.pop_front();
     const auto found = peers_.find(number);
     if (found == peers_.end()) {
       continue;
@@ -314,41 +540,27 @@ std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {
     Peer& peer = *found->second;
     std::string identity = std::to_string(number);
     if (!may_take(identity)) {
-      line.push_back(number);
+      queue.push_back(number);
       ++declined;
       continue;
     }
-    peer.connection.do_work();
+    peer.connection.run_step();
     std::optional<Incoming> incoming;
-    if (peer.connection.said().has_message()) {
-      incoming = {std::move(identity), peer.connection.take_message(), peer.holder};
-    } else {
-      ++opened;
+    if (peer.connection.zmtp().has_message()) {
+      incoming = {std::move(identity), peer.connection.take_message(), peer.key};
     }
-    peer.stands_in_line = false;
-    if (peer.is_ending) {
-      read_to_the_end(number, peer);
-    } else if (!is_waiting(peer.connection.said()) && !peer.connection.said().fault().empty()) {
-      end_faulty(number, peer);
-    } else {
+    peer.is_queued = false;
+    if (examine(number, peer)) {
       settle(number, peer);
     }
     if (incoming) {
       return incoming;
     }
   }
-  has_unopened_ = has_unopened_ || (opened > 0 && !line.empty());
   return std::nullopt;
 }
 
-// ---- What goes --------------------------------------------------------------------------------
-
-Network::Peer* Network::find(const std::string& identity) const {
-  Number number = 0;
-  std::from_chars(identity.data(), identity.data() + identity.size(), number);
-  const auto found = peers_.find(number);
-  return found == peers_.end() ? nullptr : found->second.get();
-}
+// ---- Output -----------------------------------------------------------------------------------
 
 Delivery Network::send(const std::string& identity, std::string_view body) {
   Peer* const peer = find(identity);
@@ -384,7 +596,7 @@ void Network::flush(std::chrono::milliseconds longest) {
     std::vector<pollfd> waiting;
     for (const auto& [number, peer] : peers_) {
       peer->connection.flush();
-      if (peer->connection.waiting_out_bytes() > 0) {
+      if (peer->connection.unsent_bytes() > 0) {
         waiting.push_back({peer->connection.descriptor(), POLLOUT, 0});
       }
     }
@@ -393,6 +605,87 @@ void Network::flush(std::chrono::milliseconds longest) {
     }
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
     poll(waiting.data(), waiting.size(), static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+  }
+}
+
+// ---- Ends -------------------------------------------------------------------------------------
+
+void Network::end(Number number, const std::string& reason, std::optional<RefusalCause> cause) {
+  const auto found = peers_.find(number);
+  Peer& peer = *found->second;
+  if (cause) {
+    count_refusal(*cause);
+  }
+  disconnects_.push_back(
+      {std::to_string(number), reason, cause, reason.empty() ? "" : peer.address.text});
+  count(peer, 0, 0);
+  --ports_[peer.port].connections;
+  handshake_ended(number, peer);
+  peers_.erase(found);
+}
+
+/// A peer that sees another mechanism than its own in the server's greeting leaves without a
+/// message, often in the middle of its own greeting.
+void Network::end_peer_that_left(Number number, const Peer& peer) {
+  if (peer.connection.zmtp().is_greeting()) {
+    end(number,
+        "it left at the server's greeting: it may have no key while this server requires one, or "
+        "use one while this server runs without keys",
+        RefusalCause::kOtherMechanism);
+  } else {
+    end(number, "");
+  }
+}
+
+std::vector<Disconnect> Network::take_disconnects() {
+  return std::exchange(disconnects_, {});
+}
+
+/// Ends the connections that hold most, until the sums of all are within their bounds.
+void Network::end_largest() {
+  const auto end_while = [this](const std::size_t& sum, std::size_t bound, std::size_t Peer::*bytes,
+                                const char* reason) {
+    while (sum > bound) {
+      const auto largest =
+          std::max_element(peers_.begin(), peers_.end(), [&](const auto& left, const auto& right) {
+            return (*left.second).*bytes < (*right.second).*bytes;
+          });
+      end(largest->first, reason);
+    }
+  };
+  end_while(held_in_bytes_, limits_.held_in_bytes, &Peer::held_in_bytes,
+            "all connections together hold too much, and it holds most");
+  end_while(waiting_out_bytes_, limits_.all_waiting_out_bytes, &Peer::waiting_out_bytes,
+            "all connections together leave too much unread, and it leaves most");
+}
+
+/// False if none is under way.
+bool Network::end_oldest_handshake() {
+  if (handshakes_.empty()) {
+    return false;
+  }
+  end(*handshakes_.begin(), "there are too many connections, and its handshake is the oldest",
+      RefusalCause::kBound);
+  return true;
+}
+
+void Network::admission_changed() {
+  std::vector<std::pair<Number, Refusal>> refused;
+  for (const auto& [number, peer] : peers_) {
+    if (!peer->key) {
+      continue;
+    }
+    const Authenticator& authenticator = *ports_[peer->port].security->authenticator;
+    AuthResult result = authenticator.authenticate(peer->connection.zmtp().key());
+    if (auto* const refusal = std::get_if<Refusal>(&result)) {
+      refused.emplace_back(number, std::move(*refusal));
+    } else {
+      peer->key = std::get<std::shared_ptr<const KeyIdentity>>(std::move(result));
+    }
+  }
+  for (const auto& [number, refusal] : refused) {
+    const bool was_removed = refusal.cause == RefusalCause::kUnknownKey;
+    end(number, refusal.reason, was_removed ? RefusalCause::kRevokedKey : refusal.cause);
   }
 }
 

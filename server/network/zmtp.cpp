@@ -1,43 +1,106 @@
 #include "server/network/zmtp.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "proto/frames.h"
-#include "server/network/curve/bytes.h"
 
 namespace oblique::server {
 namespace {
 
-/// A sound peer's READY has some 50 bytes, its INITIATE some 300, and 255 more with an identity.
+constexpr std::size_t kMechanismAt = 12;
+constexpr std::size_t kMechanismBytes = 20;
+constexpr std::size_t kAsServerAt = 32;
+constexpr unsigned char kMajorVersion = 3;
+constexpr std::size_t kLongestShortFrame = 255;
+/// A normal READY has about 50 bytes, an INITIATE 300, and up to 255 more with an identity.
 constexpr std::uint64_t kLongestCommand = 4096;
-constexpr std::size_t kLongestPingContext = 16;
-constexpr std::size_t kPingTimeToLiveBytes = 2;
+constexpr const char* kCutOff = "its properties are cut off";
 
 unsigned char byte_at(std::string_view bytes, std::size_t index) {
   return static_cast<unsigned char>(bytes[index]);
 }
 
+std::string header_of(std::size_t body_bytes, unsigned flags) {
+  if (body_bytes <= kLongestShortFrame) {
+    return {static_cast<char>(flags), static_cast<char>(body_bytes)};
+  }
+  return static_cast<char>(flags | kFrameLong) + big_endian_of(body_bytes);
+}
+
+/// The server's properties in READY.
+std::string own_properties() {
+  return "\x0bSocket-Type" + std::string("\0\0\0\x06", 4) + "ROUTER";
+}
+
+/// Why a peer with these properties is refused; empty if it is not.
+std::string validate_properties(std::string_view properties) {
+  constexpr std::size_t kLengthBytes = 4;
+  constexpr std::array<std::string_view, 2> kAllowed{"DEALER", "ROUTER"};
+  std::string_view socket_type;
+  while (!properties.empty()) {
+    const std::size_t name_bytes = byte_at(properties, 0);
+    if (properties.size() < 1 + name_bytes + kLengthBytes) {
+      return kCutOff;
+    }
+    const std::string_view name = properties.substr(1, name_bytes);
+    const auto value_bytes =
+        static_cast<std::size_t>(number_of(properties.substr(1 + name_bytes, kLengthBytes)));
+    properties.remove_prefix(1 + name_bytes + kLengthBytes);
+    if (properties.size() < value_bytes) {
+      return kCutOff;
+    }
+    if (name == "Socket-Type") {
+      socket_type = properties.substr(0, value_bytes);
+    }
+    properties.remove_prefix(value_bytes);
+  }
+  return std::find(kAllowed.begin(), kAllowed.end(), socket_type) == kAllowed.end()
+             ? "its socket is not of a type that works with a ROUTER"
+             : "";
+}
+
 }  // namespace
+
+std::string greeting_of(std::string_view mechanism) {
+  constexpr char kMinorVersion = 1;
+  std::string bytes(kGreetingBytes, '\0');
+  bytes[0] = '\xff';
+  bytes[9] = '\x7f';
+  bytes[10] = static_cast<char>(kMajorVersion);
+  bytes[11] = kMinorVersion;
+  bytes[kAsServerAt] = mechanism == "NULL" ? '\0' : '\1';
+  return bytes.replace(kMechanismAt, mechanism.size(), mechanism);
+}
+
+std::string message_header(std::size_t body_bytes) {
+  return header_of(body_bytes, 0);
+}
+
+std::string command_frame(std::string_view name, std::string_view data) {
+  std::string bytes = header_of(1 + name.size() + data.size(), kFrameCommand);
+  bytes += static_cast<char>(name.size());
+  return bytes.append(name).append(data);
+}
 
 struct Zmtp::Header {
   std::size_t bytes;
   std::uint64_t body_bytes;
-  bool more;
   bool is_command;
 };
 
-Zmtp::Zmtp(const PortGuard* guard)
-    : curve_(guard == nullptr ? nullptr : std::make_unique<CurvePeer>(*guard)),
-      answers_(greeting_of(guard == nullptr ? "NULL" : "CURVE")) {}
+Zmtp::Zmtp(const PortSecurity* security)
+    : curve_(security == nullptr ? nullptr : std::make_unique<CurveHandshake>(*security)),
+      answers_(greeting_of(security == nullptr ? "NULL" : "CURVE")) {}
 
 void Zmtp::receive(std::string_view bytes) {
   buffer_ += bytes;
   advance();
 }
 
-ZmtpMessage Zmtp::take_message() {
-  ZmtpMessage message = std::move(*message_);
+std::string Zmtp::take_message() {
+  std::string message = std::move(*message_);
   message_.reset();
   advance();
   return message;
@@ -47,33 +110,34 @@ std::string Zmtp::take_answers() {
   return std::exchange(answers_, {});
 }
 
-std::string Zmtp::header_or_sealed(std::string_view body) {
+std::string Zmtp::begin_message(std::string_view& body) {
   if (!curve_) {
-    return zmtp_header(body.size());
+    return message_header(body.size());
   }
-  std::string frame = zmtp_header(CurveTraffic::kAddedBytes + body.size());
-  frame.reserve(frame.size() + CurveTraffic::kAddedBytes + body.size());
-  curve_->traffic().seal(body, false, frame);
+  std::string frame = message_header(CurveSession::kAddedBytes + body.size());
+  frame.reserve(frame.size() + CurveSession::kAddedBytes + body.size());
+  curve_->session().seal(body, frame);
+  body = {};
   return frame;
 }
 
-std::shared_ptr<const KeyHolder> Zmtp::holder() const {
-  return curve_ ? curve_->holder() : nullptr;
+std::shared_ptr<const KeyIdentity> Zmtp::identity() const {
+  return curve_ ? curve_->identity() : nullptr;
 }
 
 void Zmtp::fail(RefusalCause cause, std::string reason) {
   fault_ = {cause, std::move(reason)};
   if (curve_ && state_ == State::kHandshake) {
     const std::string_view code = error_code(cause);
-    answers_ += command_of("ERROR", std::string(1, static_cast<char>(code.size())).append(code));
+    answers_ += command_frame("ERROR", std::string(1, static_cast<char>(code.size())).append(code));
   }
 }
 
 void Zmtp::advance() {
   constexpr std::size_t kCompactFrom = 64 * 1024;
   constexpr std::size_t kKeptCapacity = 4 * 1024;
-  while (fault_.reason.empty() && !message_ && work_ == Work::kNone &&
-         (state_ == State::kGreeting ? take_greeting() : discard() && take_frame())) {
+  while (fault_.reason.empty() && !message_ && pending_step_ == PendingStep::kNone &&
+         (state_ == State::kGreeting ? take_greeting() : take_frame())) {
   }
   if (begin_ == buffer_.size()) {
     begin_ = 0;
@@ -86,56 +150,34 @@ void Zmtp::advance() {
   }
 }
 
-/// True when it was taken whole. A stranger is noticed at its first bytes.
+/// True when it has come whole. A wrong byte is a fault at once.
 bool Zmtp::take_greeting() {
   const std::string_view bytes = pending();
-  const auto differs = [&](std::size_t at, auto&& is_right) {
+  const auto is_wrong = [&](std::size_t at, auto&& is_right) {
     return bytes.size() > at && !is_right(byte_at(bytes, at));
   };
-  if (differs(0, [](unsigned byte) { return byte == 0xffU; }) ||
-      differs(9, [](unsigned byte) { return byte == 0x7fU; }) ||
-      differs(10, [](unsigned byte) { return byte >= kOldestVersion; })) {
-    fail(RefusalCause::kFaulty, "it does not speak ZMTP 3");
+  if (is_wrong(0, [](unsigned byte) { return byte == 0xffU; }) ||
+      is_wrong(9, [](unsigned byte) { return byte == 0x7fU; }) ||
+      is_wrong(10, [](unsigned byte) { return byte >= kMajorVersion; })) {
+    fail(RefusalCause::kFaulty, "it does not use ZMTP 3");
     return false;
   }
   if (bytes.size() < kGreetingBytes) {
     return false;
   }
-  if (bytes.substr(kMechanismAt, kMechanismBytes) != padded_mechanism(curve_ ? "CURVE" : "NULL")) {
-    fail(RefusalCause::kOtherMechanism, curve_ ? "it has no key, and one is needed here"
-                                               : "it asks for keys, and the server has none");
+  const std::string own = greeting_of(curve_ ? "CURVE" : "NULL");
+  if (bytes.substr(kMechanismAt, kMechanismBytes) != own.substr(kMechanismAt, kMechanismBytes)) {
+    fail(RefusalCause::kOtherMechanism, curve_
+                                            ? "it has no key, and this server requires one"
+                                            : "it uses a key, and this server runs without keys");
     return false;
   }
   begin_ += kGreetingBytes;
   state_ = State::kHandshake;
   if (!curve_) {
-    answers_ += command_of("READY", own_properties());
+    answers_ += command_frame("READY", own_properties());
   }
   return true;
-}
-
-/// Drops what has come of a frame that is not kept; false while some of it is still to come.
-bool Zmtp::discard() {
-  const std::size_t dropped =
-      static_cast<std::size_t>(std::min<std::uint64_t>(discard_bytes_, pending().size()));
-  begin_ += dropped;
-  discard_bytes_ -= dropped;
-  if (discard_bytes_ > 0) {
-    return false;
-  }
-  if (!curve_ && in_multipart_ && !more_follow_) {
-    in_multipart_ = false;
-    message_ = ZmtpMessage{{}, false};
-    return false;
-  }
-  return true;
-}
-
-std::uint64_t Zmtp::longest(const Header& header) const {
-  if (curve_ && state_ == State::kOpen) {
-    return protocol::kMaxFrameBytes + CurveTraffic::kAddedBytes;
-  }
-  return header.is_command ? kLongestCommand : protocol::kMaxFrameBytes;
 }
 
 std::optional<Zmtp::Header> Zmtp::next_header() {
@@ -146,48 +188,52 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
     return std::nullopt;
   }
   const unsigned flags = byte_at(bytes, 0);
-  const bool is_long = (flags & kFrameLong) != 0;
-  Header header{is_long ? kLongBytes : kShortBytes, 0, (flags & kFrameMore) != 0,
-                (flags & kFrameCommand) != 0};
-  // What is sealed says inside whether more follows.
-  if (flags > (kFrameMore | kFrameLong | kFrameCommand) ||
-      (header.more && (header.is_command || curve_))) {
-    fail(RefusalCause::kFaulty, "it sends a frame of no known kind");
+  if (flags > (kFrameMore | kFrameLong | kFrameCommand)) {
+    fail(RefusalCause::kFaulty, "it sends a frame of an unknown kind");
     return std::nullopt;
   }
+  if ((flags & kFrameMore) != 0) {
+    fail(RefusalCause::kFaulty, "it sends a message of several frames");
+    return std::nullopt;
+  }
+  Header header{(flags & kFrameLong) != 0 ? kLongBytes : kShortBytes, 0,
+                (flags & kFrameCommand) != 0};
   if (bytes.size() < header.bytes) {
     return std::nullopt;
   }
   header.body_bytes = number_of(bytes.substr(1, header.bytes - 1));
-  if (header.body_bytes > longest(header)) {
-    fail(RefusalCause::kFaulty,
-         "it sends a frame of " + std::to_string(header.body_bytes) + " bytes");
+  // An encrypted message may come as a command.
+  const bool is_message = !header.is_command || (curve_ && is_open());
+  const std::uint64_t longest =
+      is_message ? protocol::kMaxFrameBytes + (curve_ ? CurveSession::kAddedBytes : 0)
+                 : kLongestCommand;
+  if (header.body_bytes > longest) {
+    fail(RefusalCause::kFaulty, "it sends a frame of " + std::to_string(header.body_bytes) +
+                                    " bytes; the limit is " + std::to_string(longest));
     return std::nullopt;
   }
   return header;
 }
 
+/// True when a frame was taken and the next one may be.
 bool Zmtp::take_frame() {
   const std::optional<Header> header = next_header();
   if (!header) {
     return false;
   }
-  if (!header->is_command && state_ == State::kHandshake) {
+  if (!header->is_command && !is_open()) {
     fail(RefusalCause::kFaulty, "it sends a message before the handshake is done");
     return false;
   }
-  if (!header->is_command && !curve_ && (header->more || in_multipart_)) {
-    begin_ += header->bytes;
-    discard_bytes_ = header->body_bytes;
-    more_follow_ = header->more;
-    in_multipart_ = true;
-    return true;
+  if (header->is_command && is_open() && !curve_) {
+    fail(RefusalCause::kFaulty, "it sends a command after the handshake, as ZMTP heartbeats are");
+    return false;
   }
   if (pending().size() - header->bytes < header->body_bytes) {
     return false;
   }
   if (curve_) {
-    work_ = state_ == State::kHandshake ? Work::kHandshake : Work::kSealedFrame;
+    pending_step_ = is_open() ? PendingStep::kSealedFrame : PendingStep::kHandshake;
     return false;
   }
   const std::string_view body =
@@ -195,29 +241,35 @@ bool Zmtp::take_frame() {
   if (header->is_command) {
     take_command(body);
   } else {
-    message_ = ZmtpMessage{std::string(body), true};
+    message_ = std::string(body);
   }
   begin_ += header->bytes + body.size();
   return true;
 }
 
-void Zmtp::do_work() {
-  if (work_ == Work::kNone) {
+void Zmtp::run_step() {
+  if (pending_step_ == PendingStep::kNone) {
     return;
   }
   const Header header = *next_header();
   const std::string_view body =
       pending().substr(header.bytes, static_cast<std::size_t>(header.body_bytes));
-  if (work_ == Work::kHandshake) {
+  if (pending_step_ == PendingStep::kHandshake) {
     take_command(body);
   } else {
-    take_sealed(body);
+    message_ = curve_->session().open(body);
+    if (!message_) {
+      fail(RefusalCause::kFaulty,
+           "it sends a frame that is not encrypted with its keys, is not new, or is no message of "
+           "one frame");
+    }
   }
   begin_ += header.bytes + body.size();
-  work_ = Work::kNone;
+  pending_step_ = PendingStep::kNone;
   advance();
 }
 
+/// A command of the handshake.
 void Zmtp::take_command(std::string_view body) {
   const std::size_t name_bytes = body.empty() ? 0 : byte_at(body, 0);
   if (name_bytes == 0 || body.size() < 1 + name_bytes) {
@@ -226,84 +278,31 @@ void Zmtp::take_command(std::string_view body) {
   }
   const std::string_view name = body.substr(1, name_bytes);
   const std::string_view data = body.substr(1 + name_bytes);
-  if (state_ == State::kHandshake) {
-    take_handshake(name, data);
-  } else if (name == "PING") {
-    answer_ping(data);
-  }  // others are for other kinds of sockets
-}
-
-void Zmtp::take_handshake(std::string_view name, std::string_view data) {
   if (curve_) {
-    take_curve_step(name, data);
+    CurveHandshake::Outcome outcome = curve_->take(name, data);
+    if (auto* const refusal = std::get_if<Refusal>(&outcome)) {
+      fail(refusal->cause, std::move(refusal->reason));
+    } else if (const auto& answer = std::get<std::string>(outcome); !curve_->is_done()) {
+      answers_ += command_frame("WELCOME", answer);
+    } else if (take_properties(answer)) {
+      answers_ += command_frame("READY", curve_->session().ready(own_properties()));
+    }
   } else if (name == "READY") {
     take_properties(data);
   } else {
-    fail(RefusalCause::kFaulty, "it does not say READY");
+    fail(RefusalCause::kFaulty, "its handshake does not begin with READY");
   }
 }
 
-void Zmtp::take_curve_step(std::string_view name, std::string_view data) {
-  CurvePeer::Outcome outcome = curve_->take(name, data);
-  if (auto* const refusal = std::get_if<Refusal>(&outcome)) {
-    fail(refusal->cause, std::move(refusal->reason));
-    return;
+/// Opens the connection. False if the properties are refused.
+bool Zmtp::take_properties(std::string_view properties) {
+  std::string fault = validate_properties(properties);
+  if (!fault.empty()) {
+    fail(RefusalCause::kFaulty, std::move(fault));
+    return false;
   }
-  const std::string& said = std::get<std::string>(outcome);
-  if (!curve_->is_admitted()) {
-    answers_ += command_of("WELCOME", said);
-    return;
-  }
-  take_properties(said);
-  if (is_open()) {
-    answers_ += command_of("READY", curve_->traffic().ready(own_properties()));
-  }
-}
-
-void Zmtp::take_properties(std::string_view properties) {
-  std::string objection = objection_to_properties(properties);
-  if (objection.empty()) {
-    state_ = State::kOpen;
-  } else {
-    fail(RefusalCause::kFaulty, std::move(objection));
-  }
-}
-
-void Zmtp::take_sealed(std::string_view message) {
-  std::optional<OpenedFrame> frame = curve_->traffic().open(message);
-  if (!frame) {
-    fail(RefusalCause::kFaulty, "it sends what is not sealed with its keys, or was said before");
-  } else if (frame->is_command && frame->body.size() > kLongestCommand) {
-    fail(RefusalCause::kFaulty,
-         "it sends a command of " + std::to_string(frame->body.size()) + " bytes");
-  } else if (frame->is_command) {
-    take_command(frame->body);
-  } else if (frame->more) {
-    in_multipart_ = true;
-  } else if (std::exchange(in_multipart_, false)) {
-    message_ = ZmtpMessage{{}, false};
-  } else {
-    message_ = ZmtpMessage{std::move(frame->body), true};
-  }
-}
-
-/// Earlier releases' sockets find out by PING whether the server lives.
-void Zmtp::answer_ping(std::string_view arguments) {
-  if (arguments.size() < kPingTimeToLiveBytes) {
-    fail(RefusalCause::kFaulty, "its PING is cut off");
-    return;
-  }
-  answer("PONG", arguments.substr(kPingTimeToLiveBytes, kLongestPingContext));
-}
-
-void Zmtp::answer(std::string_view name, std::string_view data) {
-  if (!curve_) {
-    answers_ += command_of(name, data);
-    return;
-  }
-  const std::string body = std::string(1, static_cast<char>(name.size())).append(name).append(data);
-  answers_ += zmtp_header(CurveTraffic::kAddedBytes + body.size());
-  curve_->traffic().seal(body, true, answers_);
+  state_ = State::kOpen;
+  return true;
 }
 
 }  // namespace oblique::server

@@ -99,11 +99,6 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
   add("all-waiting-out-bytes", network.all_waiting_out_bytes, kOneMessage, kMostBytes,
       "What waits to go out to all peers");
   add("handshakes", network.handshakes, 1, kMost, "Connections that have not said who they are");
-  add("connections-of-key", network.connections_of_key, 1, kMost, "Connections of one key");
-  add("held-in-bytes-of-key", network.held_in_bytes_of_key, kOneMessage, kMostBytes,
-      "Messages of one key that have not come whole or were not taken");
-  add("waiting-out-bytes-of-key", network.waiting_out_bytes_of_key, kOneMessage, kMostBytes,
-      "What waits to go out to the connections of one key");
   // Results on their way to the disk.
   LedgerLimits& ledger = service.ledger;
   add("unstored-messages-of-worker", ledger.most_messages_of_worker, 1, kMost,

@@ -151,15 +151,15 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->type_name("FILE");
   app.add_flag("--allow-network-disk", loop.allow_network_disk,
                "Take a database on a network file system, where a second machine could damage it");
-  app.add_option("--listen", loop.doors.listen,
+  app.add_option("--listen", loop.access.listen,
                  "Address to listen on, * for all; beyond loopback only with --keys or --insecure")
       ->type_name("ADDRESS");
-  app.add_option("--keys", loop.doors.keys,
+  app.add_option("--keys", loop.access.keys,
                  "Key file of the server, as `oblique keygen` makes it; the list of keys to let "
                  "in, authorized_keys.toml, lies beside it")
       ->type_name("FILE")
       ->envname("OBLIQUE_KEYS");
-  app.add_flag("--insecure", loop.doors.insecure, "Let in whoever reaches the ports, unencrypted");
+  app.add_flag("--insecure", loop.access.insecure, "Let in whoever reaches the ports, unencrypted");
   constexpr double kLargestPort = 65535;
   const CLI::Validator port = oblique::protocol::number_between(0, kLargestPort);
   app.add_option("--worker-port", options.worker_port, "Port for workers; 0: the system picks one")
@@ -197,7 +197,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
       throw std::runtime_error("--worker-port and --client-port are both " +
                                std::to_string(options.worker_port) + ": they must differ");
     }
-    (void)oblique::server::address_to_bind(loop.doors);
+    (void)oblique::server::address_to_bind(loop.access);
     loop.web = options.http.settings();
   } catch (const std::runtime_error& error) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());

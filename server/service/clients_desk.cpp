@@ -328,10 +328,6 @@ void ClientsDesk::add_keys(protocol::WorkersReply& reply) const {
     refusals.set_peers(count);
   }
   std::map<std::string, protocol::KeyStatus> keys;
-  for (const auto& [name, connected] : peers.keys) {
-    keys[name].set_role(std::string(protocol::name_of(connected.role)));
-    keys[name].set_connections(connected.connections);
-  }
   for (const auto& [name, share] : at_.open.shares()) {
     keys[name].set_open_studies(share.studies);
     keys[name].set_open_points(share.points);

@@ -127,10 +127,6 @@ void add_peers(MetricText& out, const Snapshot& now) {
 }
 
 void add_keys(MetricText& out, const Snapshot& now) {
-  out.family("oblique_key_connections", kGauge, "Connections of the keys that are in.");
-  for (const KeyNumbers& key : now.keys) {
-    out.sample(key.connections, {{"key", key.name}, {"role", name_of(key.role)}});
-  }
   out.family("oblique_key_studies_open", kGauge, "Studies of a key that are not done.");
   for (const auto& [key, open] : now.open_by_key) {
     out.sample(open.studies, {{"key", key}});
@@ -138,12 +134,6 @@ void add_keys(MetricText& out, const Snapshot& now) {
   out.family("oblique_key_points_open", kGauge, "Points of these that have no result.");
   for (const auto& [key, open] : now.open_by_key) {
     out.sample(open.points, {{"key", key}});
-  }
-  out.family("oblique_key_held_bytes", kGauge, "Bytes of these that wait here.");
-  for (const KeyNumbers& key : now.keys) {
-    const std::string_view role = name_of(key.role);
-    out.sample(key.held_in_bytes, {{"key", key.name}, {"role", role}, {"direction", "in"}});
-    out.sample(key.waiting_out_bytes, {{"key", key.name}, {"role", role}, {"direction", "out"}});
   }
 }
 

@@ -69,24 +69,6 @@ void count_studies(const Service& service, std::int64_t now_ms, bool for_page, S
   }
 }
 
-/// One name has one entry, as Prometheus wants it, though a key that was replaced may still be in.
-std::vector<KeyNumbers> keys_of(const Network& network) {
-  std::map<std::pair<std::string, protocol::Role>, KeyNumbers> by_name;
-  for (const auto& [key, share] : network.key_shares().all()) {
-    KeyNumbers& numbers = by_name[{share.holder->name, share.holder->role}];
-    numbers.name = share.holder->name;
-    numbers.role = share.holder->role;
-    numbers.connections += share.connections;
-    numbers.held_in_bytes += share.held_in_bytes;
-    numbers.waiting_out_bytes += share.waiting_out_bytes;
-  }
-  std::vector<KeyNumbers> keys;
-  for (auto& [name, numbers] : by_name) {
-    keys.push_back(std::move(numbers));
-  }
-  return keys;
-}
-
 void count_peers(const SnapshotSources& sources, Snapshot& snapshot) {
   const Network& network = sources.network;
   snapshot.held_in_bytes = network.held_in_bytes();
@@ -94,10 +76,7 @@ void count_peers(const SnapshotSources& sources, Snapshot& snapshot) {
   snapshot.clients = {network.connections(sources.client_port), sources.client_traffic};
   snapshot.workers = {network.connections(sources.worker_port), sources.worker_traffic};
   snapshot.connections_ended = sources.connections_ended;
-  for (std::size_t i = 0; i < kRefusalCauses; ++i) {
-    snapshot.refusals.at(i) = network.refusals().at(i).count;
-  }
-  snapshot.keys = keys_of(network);
+  snapshot.refusals = network.refusals();
 }
 
 }  // namespace

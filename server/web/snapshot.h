@@ -39,15 +39,6 @@ struct PortNumbers {
   PortTraffic traffic;
 };
 
-/// What the connections of one key have together.
-struct KeyNumbers {
-  std::string name;
-  protocol::Role role{};
-  std::uint64_t connections = 0;
-  std::uint64_t held_in_bytes = 0;
-  std::uint64_t waiting_out_bytes = 0;
-};
-
 /// What the holder of a key has submitted that is not done.
 struct OpenNumbers {
   std::uint64_t studies = 0;
@@ -91,7 +82,6 @@ struct Snapshot {
   PortNumbers workers;
   std::uint64_t connections_ended = 0;
   std::array<std::uint64_t, kRefusalCauses> refusals{};  ///< by cause
-  std::vector<KeyNumbers> keys;                          ///< that are connected, by name
   std::uint64_t bad_frames = 0;
   QueryCounts queries;
 

@@ -24,7 +24,6 @@
 
 #include "server/network/network.h"
 #include "tests/server/network/curve_client.h"
-#include "tests/server/network/list_doorkeeper.h"
 
 namespace oblique::server {
 namespace {
@@ -51,8 +50,8 @@ class TurnedNetwork {
  public:
   using Take = std::function<void(Network&, const Incoming&)>;
   explicit TurnedNetwork(Take take) : take_(std::move(take)) {
-    doorkeeper_->admit(own_.public_key, "bench");
-    network_.listen("127.0.0.1", "*", PortGuard(server_, doorkeeper_));
+    authenticator_->add(own_.public_key, "bench");
+    network_.listen("127.0.0.1", "*", PortSecurity{server_, authenticator_});
     network_.listen("127.0.0.1", "*");
     thread_ = std::thread([this] { turn(); });
   }
@@ -72,7 +71,7 @@ class TurnedNetwork {
   const protocol::KeyPair& own() const { return own_; }
   const protocol::CurveKey& server_key() const { return server_.public_key; }
   /// Connections that have gone, and those that are there. Only when it has stopped.
-  std::uint64_t accepted() const { return departed_ + network_.connections(); }
+  std::uint64_t accepted() const { return disconnected_ + network_.connections(); }
 
  private:
   void turn() {
@@ -88,19 +87,19 @@ class TurnedNetwork {
           take_(network_, *incoming);
         }
       }
-      departed_ += network_.take_departures().size();
+      disconnected_ += network_.take_disconnects().size();
     }
     cpu_s_ = thread_cpu_s() - before_s;
   }
 
   protocol::KeyPair server_ = protocol::made_key_pair();
   protocol::KeyPair own_ = protocol::made_key_pair();
-  std::shared_ptr<ListDoorkeeper> doorkeeper_ = std::make_shared<ListDoorkeeper>();
+  std::shared_ptr<ListAuthenticator> authenticator_ = std::make_shared<ListAuthenticator>();
   Network network_{{}};
   Take take_;
   std::atomic<bool> is_stopped_ = false;
   double cpu_s_ = 0.0;
-  std::uint64_t departed_ = 0;
+  std::uint64_t disconnected_ = 0;
   std::thread thread_;
 };
 
@@ -109,21 +108,21 @@ class TurnedNetwork {
 void be_unknown(const TurnedNetwork& server) {
   RawPeer peer(server.endpoint(0));
   CurveClient client(protocol::made_key_pair(), server.server_key());
-  peer.send(curve_greeting() + zmtp_command("HELLO", client.hello()));
+  peer.send(curve_greeting() + command_frame("HELLO", client.hello()));
   std::string heard;
   constexpr std::size_t kWelcomeEnds = kGreetingBytes + 170;
   while (heard.size() < kWelcomeEnds) {
     heard += peer.receive();
   }
   client.take_welcome(std::string_view(heard).substr(kGreetingBytes + 10));
-  peer.send(command_of("INITIATE", client.initiate()));
+  peer.send(command_frame("INITIATE", client.initiate()));
   peer.await_end();
 }
 
 void be_astray(const TurnedNetwork& server) {
   RawPeer peer(server.endpoint(0));
   CurveClient client(server.own(), server.own().public_key);
-  peer.send(curve_greeting() + zmtp_command("HELLO", client.hello()));
+  peer.send(curve_greeting() + command_frame("HELLO", client.hello()));
   peer.await_end();
 }
 
@@ -179,7 +178,7 @@ zmq::socket_t connected(zmq::context_t& context, const TurnedNetwork& server, bo
 Cost measure_messages(std::size_t bytes, bool has_keys, int count) {
   constexpr int kUnderWay = 64;
   TurnedNetwork server([](Network& network, const Incoming& incoming) {
-    network.send(incoming.identity, incoming.message.body);
+    network.send(incoming.identity, incoming.body);
   });
   zmq::context_t context;
   zmq::socket_t socket = connected(context, server, has_keys);
@@ -217,7 +216,7 @@ void messages() {
 void say_hello_without_end(const TurnedNetwork& server, const std::atomic<bool>& is_over) {
   constexpr std::size_t kAtATime = 200;
   CurveClient client(protocol::made_key_pair(), server.server_key());
-  const std::string hello = curve_greeting() + zmtp_command("HELLO", client.hello());
+  const std::string hello = curve_greeting() + command_frame("HELLO", client.hello());
   std::deque<std::unique_ptr<RawPeer>> peers;
   while (!is_over) {
     try {
@@ -234,7 +233,7 @@ void say_hello_without_end(const TurnedNetwork& server, const std::atomic<bool>&
 
 void measure_flood(bool is_flooded) {
   TurnedNetwork server([](Network& network, const Incoming& incoming) {
-    network.send(incoming.identity, incoming.message.body);
+    network.send(incoming.identity, incoming.body);
   });
   zmq::context_t context;
   zmq::socket_t socket = connected(context, server, true);

@@ -9,13 +9,13 @@
 namespace oblique::server {
 namespace {
 
-void say_pieces(Zmtp& zmtp, std::string_view input) {
+void send_pieces(Zmtp& zmtp, std::string_view input) {
   while (!input.empty() && zmtp.fault().empty()) {
-    static_cast<void>(say(zmtp, next_piece(input)));
+    static_cast<void>(send(zmtp, next_piece(input)));
   }
 }
 
-/// An INITIATE that is sound but for what the input changes: nobody may get in by it.
+/// A valid INITIATE with the changes that the input makes: it must not be admitted.
 void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   be_welcomed(zmtp, client);
   const std::string sound = client.initiate();
@@ -24,44 +24,44 @@ void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
     const std::size_t at = static_cast<std::size_t>(number_of(input.substr(0, 2))) % data.size();
     data[at] = static_cast<char>(data[at] ^ input[2]);
   }
-  static_cast<void>(say(zmtp, command_of("INITIATE", data)));
+  static_cast<void>(send(zmtp, command_frame("INITIATE", data)));
   if (zmtp.is_open() != (data == sound)) {
     std::abort();
   }
 }
 
-/// Properties as the input has them, under a sound seal.
-void say_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
+/// The input as properties in a valid INITIATE.
+void send_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   constexpr std::size_t kMost = 3500;
   be_welcomed(zmtp, client);
   client.properties = input.substr(0, kMost);
-  static_cast<void>(say(zmtp, command_of("INITIATE", client.initiate())));
+  static_cast<void>(send(zmtp, command_frame("INITIATE", client.initiate())));
 }
 
 }  // namespace
 }  // namespace oblique::server
 
-/// What a connection brings. The first byte says to which port, and how much of it is sound.
+/// The bytes of one connection. The first one chooses the port, and how much is valid.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace oblique::server;
-  static const Guarded guarded;
+  static const KeyedPort port;
   std::string_view input(reinterpret_cast<const char*>(data), size);
   if (input.empty()) {
     return 0;
   }
   const unsigned way = static_cast<unsigned char>(input.front()) % 4U;
   input.remove_prefix(1);
-  Zmtp zmtp(way == 0 ? nullptr : &guarded.guard);
-  CurveClient client(guarded.own, guarded.server.public_key);
+  Zmtp zmtp(way == 0 ? nullptr : &port.security);
+  CurveClient client(port.own, port.server.public_key);
   switch (way) {
     case 2:
       change_initiate(zmtp, client, input);
       break;
     case 3:
-      say_properties(zmtp, client, input);
+      send_properties(zmtp, client, input);
       break;
     default:
-      say_pieces(zmtp, input);
+      send_pieces(zmtp, input);
   }
   return 0;
 }

@@ -9,24 +9,23 @@
 
 #include "server/network/zmtp.h"
 #include "tests/server/network/curve_client.h"
-#include "tests/server/network/list_doorkeeper.h"
 
 namespace oblique::server {
 
-/// A port with keys, and one who is admitted there.
-struct Guarded {
+/// A port with keys, and a peer that is admitted there.
+struct KeyedPort {
   protocol::KeyPair server = protocol::made_key_pair();
   protocol::KeyPair own = protocol::made_key_pair();
-  std::shared_ptr<ListDoorkeeper> doorkeeper = std::make_shared<ListDoorkeeper>();
-  PortGuard guard{server, doorkeeper};
-  Guarded() { doorkeeper->admit(own.public_key, "fuzz"); }
+  std::shared_ptr<ListAuthenticator> authenticator = std::make_shared<ListAuthenticator>();
+  PortSecurity security{server, authenticator};
+  KeyedPort() { authenticator->add(own.public_key, "fuzz"); }
 };
 
-inline std::string say(Zmtp& zmtp, std::string_view bytes) {
+inline std::string send(Zmtp& zmtp, std::string_view bytes) {
   constexpr std::size_t kMuch = std::size_t{1} << 20U;
   zmtp.receive(bytes);
-  while (zmtp.has_message() || zmtp.waiting_work() != Zmtp::Work::kNone) {
-    zmtp.do_work();
+  while (zmtp.has_message() || zmtp.pending_step() != Zmtp::PendingStep::kNone) {
+    zmtp.run_step();
     if (zmtp.has_message()) {
       static_cast<void>(zmtp.take_message());
     }
@@ -48,7 +47,7 @@ inline std::string_view next_piece(std::string_view& input) {
 
 inline void be_welcomed(Zmtp& zmtp, CurveClient& client) {
   static_cast<void>(zmtp.take_answers());
-  const std::string welcome = say(zmtp, curve_greeting() + zmtp_command("HELLO", client.hello()));
+  const std::string welcome = send(zmtp, curve_greeting() + command_frame("HELLO", client.hello()));
   if (!client.take_welcome(std::string_view(welcome).substr(10))) {
     std::abort();
   }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "server/network/curve/doorkeeper.h"
+#include "server/network/authenticator.h"
 #include "server/network/delivery.h"
 #include "server/query/query_pool.h"
 #include "server/service/outbox/request_reader.h"
@@ -65,15 +65,8 @@ class ToClients {
   void reply_error(const Client& client, const std::string& message);
 };
 
-/// Connections of one key.
-struct KeyConnections {
-  protocol::Role role;
-  std::uint64_t connections = 0;
-};
-
-/// Who is connected and who was turned away.
+/// Who was turned away.
 struct PeerCounts {
-  std::map<std::string, KeyConnections> keys;                     ///< by name
   std::vector<std::pair<std::string, std::uint64_t>> refusals{};  ///< causes with how many peers
 };
 

@@ -127,8 +127,7 @@ void add_headers(MHD_Response* response, const HttpAnswer& answer) {
 }
 
 std::string host_of(const PeerAddress& address) {
-  const std::string text = address.text();
-  return text.substr(0, text.rfind(':'));
+  return address.text.substr(0, address.text.rfind(':'));
 }
 
 std::vector<bool> who_is_gone(const std::vector<int>& descriptors) {

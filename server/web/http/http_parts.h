@@ -6,7 +6,7 @@
 
 #include <microhttpd.h>
 
-#include "server/network/peer_address.h"
+#include "server/network/listener.h"
 #include "server/web/http/http_message.h"
 #include "server/web/http/request_rules.h"
 

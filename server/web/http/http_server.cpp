@@ -130,8 +130,11 @@ class HttpServer::Parts {
       const int descriptor = accepted.socket.release();
       accepted_host_ = host_of(accepted.address);
       make_room_for(accepted_host_);
+      sockaddr_in6 from{};
+      socklen_t bytes = sizeof from;
+      ::getpeername(descriptor, reinterpret_cast<sockaddr*>(&from), &bytes);
       // It is closed there whether it was taken or not.
-      MHD_add_connection(daemon_, descriptor, accepted.address.system(), accepted.address.bytes());
+      MHD_add_connection(daemon_, descriptor, reinterpret_cast<sockaddr*>(&from), bytes);
       MHD_run(daemon_);  // so that it counts, and those that made room do not
     }
   }

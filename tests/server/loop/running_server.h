@@ -38,8 +38,9 @@ class RunningServer {
  public:
   explicit RunningServer(const std::string& database, QueueSettings queue = {},
                          NetworkLimits network = {}, ClientsDeskSettings clients = {},
-                         const DoorSettings& doors = {}, const std::optional<WebSettings>& web = {})
-      : loop_(settings(database, queue, network, clients, doors, web)) {
+                         const AccessSettings& access = {},
+                         const std::optional<WebSettings>& web = {})
+      : loop_(settings(database, queue, network, clients, access, web)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
   ~RunningServer() { stop(); }
@@ -62,10 +63,11 @@ class RunningServer {
  private:
   static LoopSettings settings(const std::string& database, QueueSettings queue,
                                NetworkLimits network, const ClientsDeskSettings& clients,
-                               const DoorSettings& doors, const std::optional<WebSettings>& web) {
+                               const AccessSettings& access,
+                               const std::optional<WebSettings>& web) {
     LoopSettings settings;
     settings.web = web;
-    settings.doors = doors;
+    settings.access = access;
     settings.service.clients = clients;
     settings.network = network;
     settings.queries.queue = queue;

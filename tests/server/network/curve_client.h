@@ -1,21 +1,42 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 
-#include "server/network/curve/bytes.h"
-#include "server/network/curve/secret.h"
-#include "server/network/zmtp_words.h"
+#include "server/network/curve.h"
 #include "tests/server/network/raw_peer.h"
 
 namespace oblique::server {
 
+/// Admits the keys that were added.
+class ListAuthenticator final : public Authenticator {
+ public:
+  void add(const protocol::CurveKey& key, const std::string& name) {
+    keys_[key] = std::make_shared<const KeyIdentity>(KeyIdentity{name, protocol::Role::kWorker});
+  }
+  void revoke(const protocol::CurveKey& key) { keys_.erase(key); }
+
+  AuthResult authenticate(const protocol::CurveKey& key) const override {
+    const auto found = keys_.find(key);
+    if (found == keys_.end()) {
+      return Refusal{RefusalCause::kUnknownKey, "its key is not authorized"};
+    }
+    return found->second;
+  }
+
+ private:
+  std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>> keys_;
+};
+
 inline std::string text_of_key(const protocol::CurveKey& key) {
-  return {reinterpret_cast<const char*>(key.data()), key.size()};
+  return {key.begin(), key.end()};
 }
 
 inline std::string curve_greeting() {
@@ -23,8 +44,8 @@ inline std::string curve_greeting() {
   return bytes.replace(12, 5, "CURVE");
 }
 
-/// The client's end of CURVE by hand (rfc.zeromq.org 26), so that a test can say what no library
-/// says: change what it has, and what it says changes.
+/// The client's end of CURVE (rfc.zeromq.org 26). A test that changes its fields makes it send what
+/// no library sends.
 struct CurveClient {
   CurveClient(const protocol::KeyPair& own_keys, const protocol::CurveKey& servers_key)
       : own(own_keys), server(servers_key) {}
@@ -33,28 +54,25 @@ struct CurveClient {
   protocol::CurveKey server;
   protocol::KeyPair brief = protocol::made_key_pair();  // C', c'
   std::uint64_t nonce = 1;                              // of the next command
-  std::string properties = zmtp_ready("DEALER").substr(8);
+  std::string properties = zmtp_properties("DEALER");
 
   // From WELCOME on.
   protocol::CurveKey servers_brief{};  // S'
   std::string cookie;
 
-  // What the vouch says and by which key, unless a test says otherwise.
+  // For a wrong vouch.
   std::optional<protocol::CurveKey> vouched_brief = {};
   std::optional<protocol::CurveKey> vouched_server = {};
   std::optional<protocol::SecretKey> vouching_secret = {};
 
-  std::string next_number() {
-    const auto number = big_endian_of(nonce++);
-    return {number.data(), number.size()};
-  }
+  std::string next_number() { return big_endian_of(nonce++); }
 
   static std::string box(std::string_view text, const CurveNonce& nonce_bytes,
                          const protocol::CurveKey& to, const protocol::SecretKey& from) {
     std::string sealed(kMacBytes + text.size(), '\0');
     if (crypto_box_easy(raw(sealed.data()), raw(text), text.size(), nonce_bytes.data(), to.data(),
                         from.data()) != 0) {
-      throw std::runtime_error("nothing can be sealed with that key");
+      throw std::runtime_error("that key cannot encrypt");
     }
     return sealed;
   }
@@ -69,7 +87,7 @@ struct CurveClient {
     return text;
   }
 
-  /// HELLO's data.
+  /// HELLO without its name.
   std::string hello() {
     std::string data("\1\0", 2);
     data.append(72, '\0');
@@ -79,7 +97,7 @@ struct CurveClient {
     return data += box(std::string(64, '\0'), curve_nonce("CurveZMQHELLO---", number), server,
                        brief.secret_key);
   }
-  /// Takes WELCOME's data; false when it is not for this client.
+  /// Takes WELCOME without its name; false if it is not for this client.
   bool take_welcome(std::string_view data) {
     const auto text = opened(data.substr(16), curve_nonce("WELCOME-", data.substr(0, 16)), server,
                              brief.secret_key);
@@ -90,7 +108,7 @@ struct CurveClient {
     cookie = text->substr(32);
     return true;
   }
-  /// INITIATE's data.
+  /// INITIATE without its name.
   std::string initiate() {
     const std::string vouch_nonce(16, 'v');
     std::string text = text_of_key(own.public_key) + vouch_nonce;
@@ -103,7 +121,7 @@ struct CurveClient {
     return cookie + number +
            box(text, curve_nonce("CurveZMQINITIATE", number), servers_brief, brief.secret_key);
   }
-  /// A frame, sealed; `flags` are those inside: 1 more, 2 command.
+  /// An encrypted frame with these flags inside: 1 more, 2 command.
   std::string sealed(std::string_view body, unsigned flags = 0) {
     const std::string number = next_number();
     const std::string text = static_cast<char>(flags) + std::string(body);
@@ -111,7 +129,7 @@ struct CurveClient {
         "\x07MESSAGE" + number +
         box(text, curve_nonce("CurveZMQMESSAGEC", number), servers_brief, brief.secret_key));
   }
-  /// What a MESSAGE of the server says, its flags first; nothing when it is not for this client.
+  /// The flags and the body in a MESSAGE of the server; nothing if it is not for this client.
   std::optional<std::string> opened_message(std::string_view message) const {
     return opened(message.substr(16), curve_nonce("CurveZMQMESSAGES", message.substr(8, 8)),
                   servers_brief, brief.secret_key);

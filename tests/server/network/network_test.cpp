@@ -1,6 +1,7 @@
-// The network against raw TCP connections, turned by hand.
+// The network and its bounds, against raw TCP connections without keys.
 #include "server/network/network.h"
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,68 +9,50 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/server/network/raw_peer.h"
-#include "tests/server/network/turning.h"
+#include "tests/server/network/network_fixture.h"
 
 namespace oblique::server {
 namespace {
 
 using testing::HasSubstr;
 
-class NetworkTest : public testing::Test {
+class NetworkTest : public NetworkFixture {
  protected:
-  explicit NetworkTest(NetworkLimits limits = {}) : network_(limits) {
-    network_.listen("127.0.0.1", "*");
-    network_.listen("127.0.0.1", "*");
-  }
+  explicit NetworkTest(NetworkLimits limits = {}) : NetworkFixture(limits) {}
 
-  std::unique_ptr<RawPeer> peer(Network::Port port = 0) {
-    auto peer = std::make_unique<RawPeer>(network_.endpoint(port));
-    peer->shake_hands();
-    return peer;
+  Incoming next() { return NetworkFixture::next(open_); }
+  /// The identity of a peer that has sent a message, which is taken.
+  std::string identity_of(RawPeer& peer) {
+    peer.send(zmtp_frame("hello"));
+    return next().identity;
   }
-  /// Turns until `done`; a network that never gets there fails the test.
-  template <typename Done>
-  void turn_until(const Done& done) {
-    ASSERT_TRUE(server::turn_until(network_, now_ms_, done));
-  }
-  Incoming next(Network::Port port = 0) {
-    std::optional<Incoming> incoming;
-    network_.collect(now_ms_);
-    turn_until([&] { return (incoming = network_.next(port, anybody)).has_value(); });
-    return incoming ? std::move(*incoming) : Incoming{};
-  }
-  static bool anybody(const std::string&) { return true; }
-
-  std::int64_t now_ms_ = 1000;
-  Network network_;
 };
 
 TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
-  const auto flood = peer();
+  const auto flood = open_peer();
   for (int i = 0; i < 1000; ++i) {
     flood->send(zmtp_frame("flood"));
   }
-  EXPECT_EQ(next().message.body, "flood");
-  RawPeer modest(network_.endpoint(0));
+  EXPECT_EQ(next().body, "flood");
+  RawPeer modest(network_.endpoint(open_));
   // In one packet, so that all of it has come when the server answers with its own READY.
   modest.send(zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("first") + zmtp_frame("second"));
-  std::size_t heard = 0;
-  turn_until([&] {
-    heard += modest.receive_what_is_there().size();
-    return heard > zmtp_greeting().size();
+  std::size_t received = 0;
+  run_until([&] {
+    received += modest.receive_what_is_there().size();
+    return received > kGreetingBytes;
   });
   std::vector<std::string> bodies;
   while (bodies.size() < 200 && (bodies.empty() || bodies.back() != "second")) {
-    bodies.push_back(next().message.body);
+    bodies.push_back(next().body);
   }
   const auto first = std::find(bodies.begin(), bodies.end(), "first");
   ASSERT_NE(first, bodies.end());
   EXPECT_LE(std::find(first, bodies.end(), "second") - first, 2);
 }
 
-TEST_F(NetworkTest, APeerThatIsNotServedIsReadNoFurther) {
-  const auto flood = peer();
+TEST_F(NetworkTest, APeerWhoseMessageIsNotTakenIsNotRead) {
+  const auto flood = open_peer();
   const std::string frame = zmtp_frame(std::string(1 << 20, 'x'));
   std::size_t sent = 0;
   for (int i = 0; i < 300; ++i) {
@@ -78,74 +61,95 @@ TEST_F(NetworkTest, APeerThatIsNotServedIsReadNoFurther) {
     EXPECT_LT(network_.held_in_bytes(), 4U << 20U);
   }
   EXPECT_LT(sent, 64U << 20U);
-  EXPECT_EQ(network_.next(0, [](const std::string&) { return false; }), std::nullopt);
-  EXPECT_EQ(network_.next(1, anybody), std::nullopt);
-}
-
-TEST(ManyPeers, ThatDeliverMoreThanIsTakenAreReadNoFurtherAndLoseNothing) {
-  constexpr std::size_t kPause = 1'000'000;
-  constexpr std::size_t kMessage = 60'000;
-  constexpr int kPeers = 40;
-  Network network({.held_in_bytes = 3'000'000, .held_in_to_pause_bytes = kPause});
-  const Network::Port port = network.listen("127.0.0.1", "*");
-  std::vector<std::unique_ptr<RawPeer>> peers;
-  std::size_t sent = 0;
-  for (int i = 0; i < kPeers; ++i) {
-    peers.push_back(std::make_unique<RawPeer>(network.endpoint(port)));
-    peers.back()->send(zmtp_greeting() + zmtp_ready("DEALER"));
-    sent += zmtp_frame(std::string(kMessage, 'x')).size();
-    peers.back()->send(zmtp_frame(std::string(kMessage, 'x')));
-  }
-  const auto anyone = [](const std::string&) { return true; };
-  std::size_t most = 0;
-  const auto see = [&] { return most = std::max(most, network.held_in_bytes()); };
-  // Nothing is taken before so much is held.
-  EXPECT_TRUE(turn_until(network, 0, [&] { return see() >= kPause; }));
-  for (int turn = 0; turn < 100; ++turn) {
-    network.collect(0);
-    see();
-  }
-  int taken = 0;
-  EXPECT_TRUE(turn_until(network, 0, [&] {
-    see();
-    taken += network.next(port, anyone) ? 1 : 0;
-    return taken == kPeers;
-  }));
-  EXPECT_TRUE(network.take_departures().empty());
-  EXPECT_LT(most, kPause + 4 * kMessage);
-  EXPECT_GT(sent, 2 * kPause);
+  EXPECT_EQ(network_.next(open_, [](const std::string&) { return false; }), std::nullopt);
+  EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
 }
 
 TEST_F(NetworkTest, WhatAPeerSentBeforeItLeftIsTaken) {
-  auto leaving = peer();
+  const auto leaving = open_peer();
   leaving->send(zmtp_frame("first") + zmtp_frame("second") + zmtp_frame("last"));
-  leaving.reset();
-  EXPECT_EQ(next().message.body, "first");
-  EXPECT_EQ(next().message.body, "second");
+  leaving->reset();
+  EXPECT_EQ(next().body, "first");
+  EXPECT_EQ(next().body, "second");
   const Incoming last = next();
-  EXPECT_EQ(last.message.body, "last");
-  turn_until([&] { return network_.connections() == 0; });
+  EXPECT_EQ(last.body, "last");
+  run_until([&] { return network_.connections() == 0; });
   EXPECT_EQ(network_.send(last.identity, "late"), Delivery::kGone);
   EXPECT_EQ(network_.held_in_bytes(), 0U);
 }
 
-TEST_F(NetworkTest, APeerIsToldOfOnceWhenItHasGone) {
-  auto leaving = peer();
-  leaving->send(zmtp_frame("hello"));
-  const std::string identity = next().identity;
+TEST_F(NetworkTest, MoreThanOneReadThatAPeerSentBeforeItLeftIsTaken) {
+  auto leaving = open_peer();
+  std::size_t received = 0;  // what it left unread would cut off what it sends
+  run_until([&] {
+    received += leaving->receive_what_is_there().size();
+    return received == kGreetingBytes + zmtp_ready("ROUTER").size();
+  });
+  const std::string body(40'000, 'x');
+  for (int i = 0; i < 5; ++i) {
+    leaving->send(zmtp_frame(body));
+  }
   leaving.reset();
-  turn_until([&] { return network_.connections() == 0; });
-  const auto departures = network_.take_departures();
-  ASSERT_EQ(departures.size(), 1U);
-  EXPECT_EQ(departures[0].identity, identity);
-  EXPECT_EQ(departures[0].reason, "");
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(next().body, body);
+  }
+  run_until([&] { return network_.connections() == 0; });
 }
 
-TEST_F(NetworkTest, WhoSpeaksAnotherProtocolIsMadeToLeave) {
-  RawPeer stranger(network_.endpoint(0));
+TEST_F(NetworkTest, TheEndOfAConnectionIsReportedOnce) {
+  const auto leaving = open_peer();
+  const std::string identity = identity_of(*leaving);
+  leaving->reset();
+  run_until([&] { return network_.connections() == 0; });
+  const auto disconnects = network_.take_disconnects();
+  ASSERT_EQ(disconnects.size(), 1U);
+  EXPECT_EQ(disconnects[0].identity, identity);
+  EXPECT_EQ(disconnects[0].reason, "");
+}
+
+TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected) {
+  RawPeer stranger(network_.endpoint(open_));
   stranger.send("GET / HTTP/1.1\r\n\r\n");
-  turn_until([&] { return !network_.take_departures().empty(); });
+  RawPeer in_parts(network_.endpoint(open_));
+  in_parts.shake_hands();
+  in_parts.send(zmtp_frame("part", true));
+  std::size_t ended = 0;
+  run_until([&] { return (ended += network_.take_disconnects().size()) == 2; });
+  EXPECT_EQ(refused(RefusalCause::kFaulty), 1U) << "the other one was admitted before";
   stranger.await_end();
+  in_parts.await_end();
+}
+
+class PausingNetworkTest : public NetworkTest {
+ protected:
+  static constexpr std::size_t kPause = 1'000'000;
+  PausingNetworkTest()
+      : NetworkTest({.held_in_bytes = 3'000'000, .held_in_to_pause_bytes = kPause}) {}
+};
+
+TEST_F(PausingNetworkTest, PeersThatSendMoreThanIsTakenAreNotReadAndLoseNothing) {
+  constexpr std::size_t kMessage = 60'000;
+  constexpr int kPeers = 40;
+  std::vector<std::unique_ptr<RawPeer>> peers;
+  for (int i = 0; i < kPeers; ++i) {
+    peers.push_back(open_peer());
+    peers.back()->send(zmtp_frame(std::string(kMessage, 'x')));
+  }
+  std::size_t most = 0;
+  const auto update_most = [&] { return most = std::max(most, network_.held_in_bytes()); };
+  run_until([&] { return update_most() >= kPause; });
+  for (int turn = 0; turn < 100; ++turn) {
+    network_.collect(now_ms_);
+    update_most();
+  }
+  int taken = 0;
+  run_until([&] {
+    update_most();
+    taken += network_.next(open_, anybody) ? 1 : 0;
+    return taken == kPeers;
+  });
+  EXPECT_TRUE(network_.take_disconnects().empty());
+  EXPECT_LT(most, kPause + 4 * kMessage);
 }
 
 class TightNetworkTest : public NetworkTest {
@@ -158,50 +162,32 @@ class TightNetworkTest : public NetworkTest {
                                          .handshake_ms = 100,
                                          .active_ms = 50};
   TightNetworkTest() : NetworkTest(kLimits) {}
+
+  const std::string reply_ = std::string(1'000'000, 'r');
 };
 
-TEST_F(TightNetworkTest, APeerThatReadsNothingIsBusyAndThenMadeToLeave) {
-  const auto idle = peer();
-  idle->send(zmtp_frame("ask"));
-  const std::string identity = next().identity;
-  const std::string reply(1'000'000, 'r');
+TEST_F(TightNetworkTest, APeerThatReadsNothingIsBusyAndThenDisconnected) {
+  const auto idle = open_peer();
+  const std::string identity = identity_of(*idle);
   bool was_busy = false;
   Delivery delivery = Delivery::kSent;
   for (int i = 0; i < 100 && delivery != Delivery::kGone; ++i) {
-    delivery = network_.send(identity, reply);
+    delivery = network_.send(identity, reply_);
     was_busy = was_busy || (delivery == Delivery::kBusy && network_.is_busy(identity));
     EXPECT_LT(network_.waiting_out_bytes(), 11'100'000U);
   }
   EXPECT_TRUE(was_busy);
   EXPECT_EQ(delivery, Delivery::kGone);
-  EXPECT_THAT(network_.take_departures().at(0).reason, HasSubstr("unread"));
+  EXPECT_THAT(network_.take_disconnects().at(0).reason, HasSubstr("unread"));
   EXPECT_EQ(network_.waiting_out_bytes(), 0U);
 }
 
-TEST_F(TightNetworkTest, APeerThatReadsNoAnswersToItsPingsIsMadeToLeave) {
-  const auto silent = peer();
-  std::string pings;
-  for (int i = 0; i < 1000; ++i) {
-    pings += zmtp_ping(std::string(16, 'p'));
+TEST_F(TightNetworkTest, APeerThatReadsAgainIsNoLongerBusy) {
+  const auto slow = open_peer();
+  const std::string identity = identity_of(*slow);
+  while (network_.send(identity, reply_) != Delivery::kBusy) {
   }
-  bool has_left = false;
-  for (int i = 0; i < 100'000 && !has_left; ++i) {
-    silent->flood(pings);
-    network_.collect(now_ms_);
-    EXPECT_LT(network_.waiting_out_bytes(), 11'000'000U);
-    has_left = !network_.take_departures().empty();
-  }
-  EXPECT_TRUE(has_left);
-}
-
-TEST_F(TightNetworkTest, APeerThatReadsAgainIsBusyNoMore) {
-  const auto slow = peer();
-  slow->send(zmtp_frame("ask"));
-  const std::string identity = next().identity;
-  const std::string reply(1'000'000, 'r');
-  while (network_.send(identity, reply) != Delivery::kBusy) {
-  }
-  turn_until([&] {
+  run_until([&] {
     static_cast<void>(slow->receive());
     return network_.waiting_out_bytes() == 0;
   });
@@ -209,82 +195,76 @@ TEST_F(TightNetworkTest, APeerThatReadsAgainIsBusyNoMore) {
   EXPECT_EQ(network_.send(identity, "and on"), Delivery::kSent);
 }
 
-TEST_F(TightNetworkTest, TogetherPeersLeaveNoMoreUnreadThanAllMay) {
+TEST_F(TightNetworkTest, TheSumOfUnreadOutputIsBounded) {
   std::vector<std::unique_ptr<RawPeer>> peers;
   std::vector<std::string> identities;
   for (int i = 0; i < 3; ++i) {
-    peers.push_back(peer());
-    peers.back()->send(zmtp_frame("ask"));
-    identities.push_back(next().identity);
+    peers.push_back(open_peer());
+    identities.push_back(identity_of(*peers.back()));
   }
-  const std::string reply(1'000'000, 'r');
   for (int i = 0; i < 13; ++i) {
     for (const std::string& identity : identities) {
-      network_.send(identity, reply);
+      network_.send(identity, reply_);
     }
     network_.collect(now_ms_);
     EXPECT_LE(network_.waiting_out_bytes(), kLimits.all_waiting_out_bytes);
   }
-  EXPECT_FALSE(network_.take_departures().empty());
+  EXPECT_FALSE(network_.take_disconnects().empty());
 }
 
-TEST_F(TightNetworkTest, TogetherPeersHoldNoMoreThanAllMayAndTheLargestGoes) {
-  const auto modest = peer();
+TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected) {
+  const auto modest = open_peer();
   modest->send(zmtp_frame(std::string(1000, 'm')));
-  const auto greedy = peer();
-  greedy->send(zmtp_header(16'000'000) + std::string(100'000, 'g'));
-  turn_until([&] {
+  const auto greedy = open_peer();
+  greedy->send(message_header(16'000'000) + std::string(100'000, 'g'));
+  run_until([&] {
     greedy->send_what_fits(std::string(100'000, 'g'));
     EXPECT_LE(network_.held_in_bytes(), kLimits.held_in_bytes);
-    return !network_.take_departures().empty();
+    return !network_.take_disconnects().empty();
   });
-  EXPECT_EQ(network_.connections(), 1U);
-  EXPECT_EQ(next().message.body, std::string(1000, 'm'));
+  EXPECT_EQ(network_.connections(open_), 1U);
+  EXPECT_EQ(next().body, std::string(1000, 'm'));
 }
 
-TEST_F(TightNetworkTest, TheQuietestConnectionMakesRoomAndAStormFindsNone) {
-  const auto quiet = peer();
-  quiet->send(zmtp_frame("quiet"));
-  const std::string identity = next().identity;
+TEST_F(TightNetworkTest, TheQuietestConnectionMakesRoomUnlessAllWereActiveJustNow) {
+  const auto quiet = open_peer();
+  const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> at_work;
-  for (const char* name : {"second", "third", "fourth"}) {
-    at_work.push_back(peer());
-    at_work.back()->send(zmtp_frame(name));
-    EXPECT_EQ(next().message.body, name);
+  for (int i = 0; i < 3; ++i) {
+    at_work.push_back(open_peer());
+    identity_of(*at_work.back());
   }
   EXPECT_EQ(network_.connections(), 3U);
   EXPECT_EQ(network_.send(identity, "late"), Delivery::kGone);
-  // All of them have just spoken.
-  RawPeer refused(network_.endpoint(0));
-  constexpr auto kBound = static_cast<std::size_t>(RefusalCause::kBound);
-  turn_until([&] { return network_.refusals().at(kBound).count == 1; });
+  RawPeer newcomer(network_.endpoint(open_));
+  run_until([&] { return refused(RefusalCause::kBound) == 1; });
   EXPECT_EQ(network_.connections(), 3U);
-  EXPECT_EQ(refused.receive(), "");
+  EXPECT_EQ(newcomer.receive(), "");
 }
 
-TEST_F(TightNetworkTest, StrangersMakeRoomForEachOtherAndNotWhoIsAtWork) {
-  const auto quiet = peer();
-  quiet->send(zmtp_frame("quiet"));
-  const std::string identity = next().identity;
+TEST_F(TightNetworkTest, NewHandshakesReplaceEachOtherAndNoAdmittedPeer) {
+  const auto quiet = open_peer();
+  const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> storm;
   for (int i = 0; i < 30; ++i) {
-    storm.push_back(std::make_unique<RawPeer>(network_.endpoint(0)));
+    storm.push_back(std::make_unique<RawPeer>(network_.endpoint(open_)));
     network_.collect(now_ms_);
   }
-  std::size_t departures = 0;
-  turn_until([&] { return (departures += network_.take_departures().size()) == 28U; });
+  std::size_t ended = 0;
+  run_until([&] { return (ended += network_.take_disconnects().size()) == 28U; });
   EXPECT_EQ(network_.connections(), 3U);
   EXPECT_EQ(network_.send(identity, "still there"), Delivery::kSent);
 }
 
-TEST_F(TightNetworkTest, AHandshakeThatIsNotFinishedEndsTheConnection) {
-  RawPeer silent(network_.endpoint(0));
-  turn_until([&] { return network_.connections() == 1; });
+TEST_F(TightNetworkTest, ASlowHandshakeEndsTheConnection) {
+  RawPeer silent(network_.endpoint(open_));
+  run_until([&] { return network_.connections() == 1; });
   now_ms_ += 1000;
   network_.collect(now_ms_);
   EXPECT_EQ(network_.connections(), 0U);
+  EXPECT_EQ(refused(RefusalCause::kTooSlow), 1U);
 }
 
 }  // namespace

@@ -14,58 +14,40 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include "server/network/zmtp.h"
 #include "tests/support/hang_limit.h"
 
 namespace oblique::server {
 
-// ---- ZMTP by hand, so that a test can say what no library says
-// ------------------------------------
-
 inline std::string zmtp_greeting() {
   std::string bytes("\xff\0\0\0\0\0\0\0\0\x7f\x03\x01NULL", 16);
-  bytes.resize(64, '\0');
+  bytes.resize(kGreetingBytes, '\0');
   return bytes;
 }
 
-/// A message of that body, or with `more` a part of one.
+/// A message, or with `more` a part of one.
 inline std::string zmtp_frame(std::string_view body, bool more = false) {
-  std::string bytes;
-  if (body.size() < 256) {
-    bytes += static_cast<char>(more ? 1 : 0);
-    bytes += static_cast<char>(body.size());
-  } else {
-    bytes += static_cast<char>(more ? 3 : 2);
-    for (int shift = 56; shift >= 0; shift -= 8) {
-      bytes += static_cast<char>(static_cast<std::uint64_t>(body.size()) >> shift & 0xffU);
-    }
-  }
-  return bytes += body;
+  std::string bytes = message_header(body.size()).append(body);
+  bytes[0] = static_cast<char>(static_cast<unsigned>(bytes[0]) | (more ? kFrameMore : 0U));
+  return bytes;
 }
 
-/// A command of at most 255 bytes.
-inline std::string zmtp_command(std::string_view name, std::string_view data) {
-  std::string bytes = "\x04";
-  bytes += static_cast<char>(1 + name.size() + data.size());
-  bytes += static_cast<char>(name.size());
-  return (bytes += name) += data;
+inline std::string zmtp_properties(std::string_view socket_type) {
+  return "\x0bSocket-Type" + std::string("\0\0\0", 3) + static_cast<char>(socket_type.size()) +
+         std::string(socket_type);
 }
-
 inline std::string zmtp_ready(std::string_view socket_type) {
-  std::string property = "\x0bSocket-Type";
-  property += std::string("\0\0\0", 3);
-  property += static_cast<char>(socket_type.size());
-  return zmtp_command("READY", property += socket_type);
+  return command_frame("READY", zmtp_properties(socket_type));
+}
+inline std::string zmtp_ping() {
+  return command_frame("PING", std::string("\0\0context", 9));
 }
 
-inline std::string zmtp_ping(std::string_view context) {
-  return zmtp_command("PING", std::string("\0\0", 2).append(context));
-}
-
-/// A TCP connection to a server that does what it is told to and nothing else.
+/// A TCP connection to a server, without a protocol.
 class RawPeer {
  public:
-  /// To an endpoint as tcp://127.0.0.1:7601, from an IPv4 address of this machine. A connection
-  /// that the server ends makes `send` throw.
+  /// To an endpoint as tcp://127.0.0.1:7601, from an IPv4 address of this machine. After the server
+  /// has ended the connection `send` throws.
   explicit RawPeer(const std::string& endpoint, const char* source = "127.0.0.1")
       : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
     sockaddr_in address{};
@@ -107,7 +89,7 @@ class RawPeer {
     const ssize_t sent = ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return sent < 0 ? 0 : static_cast<std::size_t>(sent);
   }
-  /// Sends what the server takes at once of `frames`, then of what was left of them, and so on.
+  /// Sends what the server takes at once of `frames`, then of their rest, and so on.
   void flood(const std::string& frames) {
     if (left_.empty()) {
       left_ = frames;
@@ -115,20 +97,15 @@ class RawPeer {
     left_.erase(0, send_what_fits(left_));
   }
   /// Reads once; empty when the server has ended the connection.
-  std::string receive() {
+  std::string receive(int flags = 0) {
     std::string bytes(65536, '\0');
-    const ssize_t count = ::recv(socket_, bytes.data(), bytes.size(), 0);
+    const ssize_t count = ::recv(socket_, bytes.data(), bytes.size(), flags);
     bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
     return bytes;
   }
   /// Reads what has come already, which may be nothing.
-  std::string receive_what_is_there() {
-    std::string bytes(65536, '\0');
-    const ssize_t count = ::recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT);
-    bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
-    return bytes;
-  }
-  /// Ends the connection as the system does for a killed process that left something unread.
+  std::string receive_what_is_there() { return receive(MSG_DONTWAIT); }
+  /// Ends the connection as the system does for a killed process that left input unread.
   void reset() {
     const linger at_once{1, 0};
     setsockopt(socket_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);

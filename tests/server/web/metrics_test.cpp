@@ -21,7 +21,6 @@ Snapshot full_snapshot() {
   snapshot.points_open = 1000;
   snapshot.thread_s_per_point = 0.6;
   snapshot.listed = {{"paper \"μ\"", 1, 2, 3, 4, 0.5}, {"b", 0, 0, 0, 1, 0.0}};
-  snapshot.keys = {{"lab", protocol::Role::kWorker, 2, 3, 4}};
   snapshot.open_by_key["lab"] = {2, 30};
   snapshot.batch_s = Histogram({1.0, 2.0});
   snapshot.batch_s.observe(1.5);
@@ -82,8 +81,6 @@ TEST(Metrics, ShowWhatTheSnapshotHas) {
       value_of(metrics, "oblique_study_points", {{"study", "paper \"μ\""}, {"state", "leased"}}),
       3.0);
   EXPECT_EQ(value_of(metrics, "oblique_peers_refused_total", {{"cause", "unknown key"}}), 7.0);
-  EXPECT_EQ(value_of(metrics, "oblique_key_connections", {{"key", "lab"}, {"role", "worker"}}),
-            2.0);
   EXPECT_EQ(value_of(metrics, "oblique_key_studies_open", {{"key", "lab"}}), 2.0);
   EXPECT_EQ(value_of(metrics, "oblique_key_points_open", {{"key", "lab"}}), 30.0);
   EXPECT_EQ(value_of(metrics, "oblique_batch_duration_seconds_sum"), 1.5);

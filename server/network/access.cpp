@@ -1,0 +1,243 @@
+#include "server/network/access.h"
+
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <system_error>
+#include <utility>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
+#include "proto/keys/key_file.h"
+#include "proto/system/descriptor.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::server {
+namespace {
+
+/// "localhost" and "*" as numeric addresses; other text is unchanged.
+std::string numeric(const std::string& address) {
+  if (address == "localhost") {
+    return "127.0.0.1";
+  }
+  if (address == "*") {
+    const protocol::Descriptor v6(::socket(AF_INET6, SOCK_STREAM | SOCK_CLOEXEC, IPPROTO_TCP));
+    return v6.is_open() ? "::" : "0.0.0.0";
+  }
+  return address;
+}
+
+/// Nothing for text that is not a numeric address.
+std::optional<bool> is_loopback(const std::string& address) {
+  in_addr v4{};
+  in6_addr v6{};
+  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) {
+    return (ntohl(v4.s_addr) >> 24U) == 127;
+  }
+  // A link-local address may name its interface, as fe80::1%eth0.
+  if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &v6) == 1) {
+    return IN6_IS_ADDR_LOOPBACK(&v6);
+  }
+  return std::nullopt;
+}
+
+AccessMode mode_of(const AccessSettings& settings) {
+  if (!settings.keys.empty()) {
+    return AccessMode::kKeys;
+  }
+  return settings.insecure ? AccessMode::kInsecure : AccessMode::kLoopback;
+}
+
+protocol::KeyPair read_server_key(const std::string& path) {
+  protocol::KeyFile key = protocol::read_key_file(path);
+  if (key.role != protocol::Role::kServer) {
+    throw solver::InputError(fmt::format(
+        "{} is the key of a {}: a server needs its own, as DIR/server.key of `oblique keygen DIR`, "
+        "by --keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS",
+        path, name_of(key.role)));
+  }
+  return std::move(key.pair);
+}
+
+using Keys = std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>>;
+
+/// The names of those `keys` that `others` lack or list otherwise, after `title`; else empty.
+std::string names_of_others(const char* title, const Keys& keys, const Keys& others) {
+  std::string names;
+  for (const auto& [key, identity] : keys) {
+    const auto other = others.find(key);
+    if (other == others.end() || *other->second != *identity) {
+      names += fmt::format("{}{} ({})", names.empty() ? title : ", ", identity->name,
+                           name_of(identity->role));
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+std::string_view name_of(AccessMode mode) {
+  constexpr std::array<std::string_view, 3> kNames{"loopback", "keys", "insecure"};
+  return kNames.at(static_cast<std::size_t>(mode));
+}
+
+std::string address_to_bind(const AccessSettings& settings) {
+  if (!settings.keys.empty() && settings.insecure) {
+    throw solver::InputError(
+        "--keys and --insecure exclude each other: with --keys every peer needs a key, with "
+        "--insecure none does");
+  }
+  std::string address = numeric(settings.listen);
+  const std::optional<bool> is_local = is_loopback(address);
+  if (!is_local) {
+    throw solver::InputError(fmt::format(
+        "--listen {} is not an address: give a numeric one of this machine, as 127.0.0.1 or ::1, "
+        "or * for all of them",
+        protocol::visible(settings.listen)));
+  }
+  if (!*is_local && mode_of(settings) == AccessMode::kLoopback) {
+    throw solver::InputError(fmt::format(
+        "--listen {} is refused: other machines can reach that address, and there are no keys. "
+        "Make keys with `oblique keygen DIR` and give --keys DIR/server.key, or give --insecure to "
+        "admit every peer; without either, only loopback is allowed, as 127.0.0.1 or ::1",
+        settings.listen));
+  }
+  return address;
+}
+
+class KeyList {
+ public:
+  /// Throws solver::InputError when the list cannot be read.
+  explicit KeyList(std::string path) : path_(std::move(path)), keys_(read()) {}
+
+  /// Reads the file again if it may have changed. True if the keys have.
+  bool reload();
+  /// Null if the key is not listed.
+  std::shared_ptr<const KeyIdentity> find(const protocol::CurveKey& key) const {
+    const auto found = keys_.find(key);
+    return found == keys_.end() ? nullptr : found->second;
+  }
+  /// For the log.
+  std::string text() const { return fmt::format("admits the {} keys of {}", keys_.size(), path_); }
+
+ private:
+  using Time = std::filesystem::file_time_type;
+  Keys read() const {
+    Keys keys;
+    const protocol::AuthorizedKeys listed = protocol::read_authorized_keys(path_);
+    for (const auto& key : listed.all()) {
+      keys.emplace(key.public_key,
+                   std::make_shared<const KeyIdentity>(KeyIdentity{key.name, key.role}));
+    }
+    return keys;
+  }
+
+  std::string path_;
+  Keys keys_;
+  Time written_ = Time::min();
+  std::string fault_;  // why the list could not be read the last time; empty if it could
+};
+
+bool KeyList::reload() {
+  // File systems record times in steps of up to a second or two: a second change may not show.
+  constexpr std::chrono::seconds kStep{2};
+  std::error_code missing;
+  const Time written = std::filesystem::last_write_time(path_, missing);
+  const bool is_recent = written > Time::clock::now() - kStep;
+  if (std::exchange(written_, written) == written && !is_recent && fault_.empty()) {
+    return false;
+  }
+  try {
+    Keys keys = read();
+    if (keys.empty() && !keys_.empty() && is_recent) {
+      return false;  // an editor may have emptied the file before it writes
+    }
+    const bool had_fault = !std::exchange(fault_, {}).empty();
+    keys.swap(keys_);
+    const std::string changes =
+        names_of_others("; new: ", keys_, keys) + names_of_others("; revoked: ", keys, keys_);
+    if (had_fault || !changes.empty()) {
+      spdlog::info("{}{}", text(), changes);
+    }
+    return !changes.empty();
+  } catch (const solver::InputError& error) {
+    if (std::exchange(fault_, error.what()) != error.what()) {
+      spdlog::warn("keys that were listed before remain admitted: {}", fault_);
+    }
+    return false;
+  }
+}
+
+namespace {
+
+/// Admits the listed keys whose role is for its port.
+class RoleFilter final : public Authenticator {
+ public:
+  RoleFilter(std::shared_ptr<const KeyList> list, AccessControl::PortRole port)
+      : list_(std::move(list)), port_(port) {}
+
+  AuthResult authenticate(const protocol::CurveKey& public_key) const override {
+    auto identity = list_->find(public_key);
+    if (!identity) {
+      return Refusal{RefusalCause::kUnknownKey,
+                     fmt::format("its key {} is not listed", protocol::z85(public_key))};
+    }
+    const bool is_worker = identity->role == protocol::Role::kWorker;
+    if (is_worker != (port_ == AccessControl::PortRole::kWorkers)) {
+      return Refusal{
+          RefusalCause::kOtherRole,
+          fmt::format("its key \"{}\" has the role {}, and this port is for {}", identity->name,
+                      name_of(identity->role), is_worker ? "clients" : "workers")};
+    }
+    return identity;
+  }
+
+ private:
+  std::shared_ptr<const KeyList> list_;
+  AccessControl::PortRole port_;
+};
+
+}  // namespace
+
+AccessControl::AccessControl(const AccessSettings& settings)
+    : address_(address_to_bind(settings)), mode_(mode_of(settings)) {
+  if (mode_ == AccessMode::kKeys) {
+    server_ = read_server_key(settings.keys);
+    list_ = std::make_shared<KeyList>(protocol::authorized_keys_beside(settings.keys));
+    spdlog::info("{}; its own public key is {}", list_->text(), protocol::z85(server_.public_key));
+  }
+}
+
+std::optional<PortSecurity> AccessControl::security(PortRole port) const {
+  if (!list_) {
+    return std::nullopt;
+  }
+  return PortSecurity{server_, std::make_shared<const RoleFilter>(list_, port)};
+}
+
+bool AccessControl::refresh(std::int64_t now_ms) {
+  constexpr std::int64_t kRefreshInterval_ms = 500;
+  constexpr std::int64_t kWarningInterval_ms = 600'000;
+  if (mode_ == AccessMode::kInsecure && now_ms >= next_warning_ms_) {
+    next_warning_ms_ = now_ms + kWarningInterval_ms;
+    spdlog::warn(
+        "INSECURE: every machine that reaches {} can submit, cancel and read studies and store "
+        "false results, and all traffic is plain text, because the server was started with "
+        "--insecure. `oblique keygen` makes keys",
+        address_);
+  }
+  if (!list_ || now_ms < next_refresh_ms_) {
+    return false;
+  }
+  next_refresh_ms_ = now_ms + kRefreshInterval_ms;
+  return list_->reload();
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,142 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <variant>
+
+#include <sodium.h>
+
+#include "server/network/authenticator.h"
+
+// The server's end of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium: commands and frames
+// as bytes, no socket.
+namespace oblique::server {
+
+inline constexpr std::size_t kKeyBytes = std::tuple_size_v<protocol::CurveKey>;
+inline constexpr std::size_t kMacBytes = crypto_box_MACBYTES;
+inline constexpr std::size_t kCounterBytes = 8;       ///< of a nonce that counts
+inline constexpr std::size_t kRandomNonceBytes = 16;  ///< of a nonce that is random
+
+// Bytes as libsodium takes them.
+inline const std::uint8_t* raw(std::string_view bytes) {
+  return reinterpret_cast<const std::uint8_t*>(bytes.data());
+}
+inline std::uint8_t* raw(char* bytes) {
+  return reinterpret_cast<std::uint8_t*>(bytes);
+}
+
+using CurveNonce = std::array<std::uint8_t, crypto_box_NONCEBYTES>;
+
+/// `prefix` and `rest` have 24 bytes together.
+inline CurveNonce curve_nonce(std::string_view prefix, std::string_view rest) {
+  CurveNonce nonce;
+  std::copy(rest.begin(), rest.end(), std::copy(prefix.begin(), prefix.end(), nonce.begin()));
+  return nonce;
+}
+
+inline std::uint64_t number_of(std::string_view big_endian) {
+  std::uint64_t value = 0;
+  for (const char byte : big_endian) {
+    value = value << 8U | static_cast<std::uint8_t>(byte);
+  }
+  return value;
+}
+
+inline std::string big_endian_of(std::uint64_t value) {
+  std::string bytes(kCounterBytes, '\0');
+  for (auto byte = bytes.rbegin(); byte != bytes.rend(); ++byte, value >>= 8U) {
+    *byte = static_cast<char>(value & 0xffU);
+  }
+  return bytes;
+}
+
+/// Secret bytes of one connection, wiped at the end. They are not locked in memory: thousands of
+/// connections would exceed the system's limit.
+template <std::size_t kBytes>
+class Secret {
+ public:
+  Secret() = default;
+  Secret(const Secret&) = default;
+  Secret& operator=(const Secret&) = default;
+  ~Secret() { wipe(); }
+
+  void wipe() { sodium_memzero(bytes_.data(), bytes_.size()); }
+  const std::uint8_t* data() const { return bytes_.data(); }
+  std::uint8_t* data() { return bytes_.data(); }
+
+ private:
+  std::array<std::uint8_t, kBytes> bytes_{};
+};
+
+/// Encrypts and decrypts after the handshake. The counters of each direction only grow, so that no
+/// message is accepted twice or out of order.
+class CurveSession {
+ public:
+  /// Bytes that MESSAGE adds to a frame's body: name, counter, MAC and flags.
+  static constexpr std::size_t kAddedBytes = 33;
+
+  CurveSession(const Secret<kKeyBytes>& shared_key, std::uint64_t received_counter)
+      : key_(shared_key), received_counter_(received_counter) {}
+
+  /// READY without its name, with these properties. Called once, before any other function.
+  std::string ready(std::string_view properties);
+  /// Appends a MESSAGE with that body to `out`.
+  void seal(std::string_view body, std::string& out);
+  /// The body of a MESSAGE. Nothing unless it is from this peer, new, and a message of one frame.
+  std::optional<std::string> open(std::string_view message);
+
+ private:
+  Secret<kKeyBytes> key_;
+  std::uint64_t received_counter_;
+  std::uint64_t sent_counter_ = 0;
+};
+
+/// The server's part of one handshake: HELLO, then INITIATE, each once. Between the two it keeps
+/// only the key of the cookie, which carries the rest, so that no command of one connection is of
+/// use on another.
+class CurveHandshake {
+ public:
+  /// `security` must outlive this.
+  explicit CurveHandshake(const PortSecurity& security) : security_(security) {}
+
+  /// For HELLO the data of WELCOME; for INITIATE the peer's properties; or why it is refused.
+  using Outcome = std::variant<std::string, Refusal>;
+  /// Takes a command's name and the data after it. Costs about 0.1 ms.
+  Outcome take(std::string_view command, std::string_view data);
+  /// The peer has proved to hold an admitted key. The functions below need it.
+  bool is_done() const { return session_.has_value(); }
+  const std::shared_ptr<const KeyIdentity>& identity() const { return identity_; }
+  const protocol::CurveKey& key() const { return key_; }
+  CurveSession& session() { return *session_; }
+
+ private:
+  enum class Step { kHello, kInitiate, kNone };
+
+  Outcome take_hello(std::string_view hello);
+  Outcome take_initiate(std::string_view initiate);
+  std::string welcome(std::string_view peers_key, const Secret<kKeyBytes>& hello_key);
+  bool is_vouched(std::string_view vouch, const protocol::CurveKey& client_key,
+                  const std::uint8_t* brief_key, const std::uint8_t* own_brief_secret) const;
+
+  const PortSecurity& security_;
+  Step next_ = Step::kHello;
+  Secret<kKeyBytes> cookie_key_;
+  std::uint64_t hello_counter_ = 0;
+  std::shared_ptr<const KeyIdentity> identity_;
+  protocol::CurveKey key_{};
+  std::optional<CurveSession> session_;
+};
+
+/// The text of ERROR: "400" if the key is not admitted, "500" if the peer has a wrong public key of
+/// the server or breaks the protocol, "300" if it may try later. Sockets of libzmq 4.3.4 report
+/// these three to their programs, and nothing longer.
+std::string_view error_code(RefusalCause cause);
+
+}  // namespace oblique::server
