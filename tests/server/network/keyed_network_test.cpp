@@ -164,10 +164,6 @@ TEST_F(CrowdTest, AllOfACrowdAreAdmittedAndNobodyIsRefused) {
 
 TEST_F(CrowdTest, SoAreAllOfASlowCrowdWhoseLaterPartWaitsInTheSystem) {
   run_until([&] { return network_.connections() == kMost; });
-  for (int turn = 0; turn < 100; ++turn) {
-    network_.collect(now_ms_);
-  }
-  EXPECT_EQ(network_.connections(), kMost);
   admit_all();
 }
 
@@ -215,25 +211,8 @@ TEST_F(CrowdOfOneAddressTest, TheOldestMakesRoomOnceItHasHadItsTime) {
 
 class TightKeyedNetworkTest : public KeyedNetworkTest {
  protected:
-  TightKeyedNetworkTest()
-      : KeyedNetworkTest({.connections = 7, .handshake_ms = 100, .handshakes = 5}) {}
+  TightKeyedNetworkTest() : KeyedNetworkTest({.connections = 7, .handshake_ms = 100}) {}
 };
-
-TEST_F(TightKeyedNetworkTest, AtTheBoundOfHandshakesTheOldestMakesRoom) {
-  const auto in = admitted();
-  std::vector<std::unique_ptr<KeyedPeer>> newcomers;
-  for (std::size_t i = 0; i < 8; ++i) {
-    newcomers.push_back(with_server_key());
-    now_ms_ += 10;
-    run_until([&] {
-      return network_.connections() == std::min<std::size_t>(i + 2, 6) &&
-             refused(RefusalCause::kBound) == std::max<std::size_t>(i, 4) - 4;
-    });
-  }
-  newcomers.back()->say_hello();
-  take_welcome(*newcomers.back());
-  expect_message(*in);
-}
 
 TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
   std::vector<std::unique_ptr<KeyedPeer>> peers;

@@ -100,16 +100,14 @@ class LibzmqPeersTest : public NetworkFixture {
 
 TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
   const auto worker = worker_dealer();
-  const std::string body = "hello" + std::string(1000, 'x');
-  worker->send(body);
+  worker->send("hello");
   const Incoming incoming = next(keyed_);
-  EXPECT_EQ(incoming.body, body);
+  EXPECT_EQ(incoming.body, "hello");
   ASSERT_NE(incoming.key, nullptr);
   EXPECT_EQ(incoming.key->name, "anna");
   EXPECT_EQ(incoming.key->role, protocol::Role::kWorker);
-  for (const std::size_t bytes :
-       {std::size_t{0}, std::size_t{1}, std::size_t{222}, std::size_t{223}, std::size_t{255},
-        std::size_t{256}, std::size_t{100'000}, std::size_t{protocol::kMaxFrameBytes}}) {
+  for (const std::size_t bytes : std::initializer_list<std::size_t>{
+           0, 1, 222, 223, 255, 256, 100'000, protocol::kMaxFrameBytes}) {
     const std::string reply(bytes, 'r');
     EXPECT_NE(network_.send(incoming.identity, reply), Delivery::kGone);
     EXPECT_EQ(reply_to(*worker), reply);
@@ -118,38 +116,25 @@ TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
   }
 }
 
-TEST_F(LibzmqPeersTest, AKeyThatIsNotAuthorizedIsRefusedAndItsSocketReportsIt) {
-  const auto stranger = dealer(protocol::made_key_pair(), server_.public_key);
-  EXPECT_EQ(failure_of(*stranger), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));
-  run_until([&] { return network_.connections() == 0; });
+TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
+  const protocol::KeyPair stranger = protocol::made_key_pair();
+  EXPECT_EQ(failure_of(*dealer(stranger, server_.public_key)),
+            std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));
+  EXPECT_EQ(failure_of(*dealer(worker_, stranger.public_key)),
+            std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 500));
   EXPECT_EQ(refused(RefusalCause::kUnknownKey), 1U);
-  const auto disconnects = network_.take_disconnects();
-  ASSERT_EQ(disconnects.size(), 1U);
-  EXPECT_EQ(disconnects[0].refused, RefusalCause::kUnknownKey);
-  EXPECT_THAT(disconnects[0].address, HasSubstr("127.0.0.1:"));
-}
-
-TEST_F(LibzmqPeersTest, AWrongKeyOfTheServerIsRefusedAndItsSocketReportsIt) {
-  const auto astray = dealer(worker_, protocol::made_key_pair().public_key);
-  EXPECT_EQ(failure_of(*astray), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 500));
   EXPECT_EQ(refused(RefusalCause::kWrongServerKey), 1U);
-}
 
-TEST_F(LibzmqPeersTest, APeerWithoutAKeyIsRefusedWhereOneIsRequiredAndReportsWhy) {
+  const std::pair other_mechanism(ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL,
+                                  ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH);
   Dealer plain(context_);
   plain.socket().connect(network_.endpoint(keyed_));
-  EXPECT_EQ(failure_of(plain), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL,
-                                         ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH));
-  run_until([&] { return refused(RefusalCause::kOtherMechanism) == 1; });
-}
-
-TEST_F(LibzmqPeersTest, APeerWithAKeyIsRefusedWhereTheServerHasNoneAndReportsWhy) {
+  EXPECT_EQ(failure_of(plain), other_mechanism);
   Dealer keyed(context_);
   keyed.use_keys(worker_, server_.public_key);
   keyed.socket().connect(network_.endpoint(open_));
-  EXPECT_EQ(failure_of(keyed), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL,
-                                         ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH));
-  run_until([&] { return refused(RefusalCause::kOtherMechanism) == 1; });
+  EXPECT_EQ(failure_of(keyed), other_mechanism);
+  run_until([&] { return refused(RefusalCause::kOtherMechanism) == 2; });
 }
 
 TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAtOnceWithAllThatItSent) {
