@@ -105,7 +105,9 @@ class Network {
   /// Connections that ended since the last call.
   std::vector<Disconnect> take_disconnects();
   std::size_t connections() const { return peers_.size(); }
-  std::size_t connections(Port port) const { return ports_.at(port).connections; }
+  std::size_t connections(Port port) const {
+    return port < ports_.size() ? ports_[port].connections : 0;
+  }
   /// Memory for messages that are incomplete or were not taken.
   std::size_t held_in_bytes() const { return held_in_bytes_; }
   /// Unsent output of all peers.
