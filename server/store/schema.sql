@@ -4,17 +4,17 @@
 
 -- One row. Workers compare database_id with that of the database for which they keep results.
 CREATE TABLE about (
-  database_id   TEXT NOT NULL,              -- random, set when the file is created
-  starts        INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
-  last_study_id INTEGER NOT NULL DEFAULT 0, -- highest number of a deleted study; numbers are never reused
-  has_orphans   INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
+  database_id TEXT NOT NULL,              -- random, set when the file is created
+  starts      INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
+  has_orphans INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
 ) STRICT;
 
 CREATE TABLE studies (
-  study_id     INTEGER PRIMARY KEY,  -- number of the study
+  study_id     INTEGER PRIMARY KEY AUTOINCREMENT CHECK (study_id BETWEEN 1 AND 1000000000000), -- number of the study; never reused
   name         TEXT NOT NULL UNIQUE, -- name of the study
   recipe       BLOB NOT NULL,        -- oblique.protocol.Recipe, serialised: point i is a function of it
-  points       INTEGER NOT NULL,     -- number of point numbers, filtered ones included
+  points       INTEGER NOT NULL CHECK (points > 0), -- number of point numbers, filtered ones included
+  errors       INTEGER NOT NULL,     -- 1: the recipe requests estimated errors
   state        TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- running, paused, cancelled or done
   created_at   TEXT NOT NULL,        -- UTC, ISO 8601
   changed_at   TEXT NOT NULL,        -- when `state` was last set
@@ -23,7 +23,7 @@ CREATE TABLE studies (
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, `completed_ranges` must be made again
   left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` leaves out
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results in other studies has not ended
-  checksum     INTEGER               -- CRC-32 of study_id, name, recipe, points and created_at
+  checksum     INTEGER               -- CRC-32 of study_id, recipe, points, errors and created_at; NULL after a change by hand
 ) STRICT;
 
 -- Every parameter except H, mu and e; one row for each distinct model that has results. The columns are the
@@ -48,7 +48,8 @@ CREATE TABLE models (
   dt_fall     REAL NOT NULL,       -- step in the fall, s; 0: chosen by the integrator
   -- Canonical text of all parameters; proto/recipe/README.md defines it byte by byte.
   definition  TEXT NOT NULL UNIQUE,
-  tolerance   REAL NOT NULL        -- relative error allowed by automatic steps
+  tolerance   REAL NOT NULL,       -- relative error allowed by automatic steps
+  checksum    INTEGER              -- CRC-32 of the other columns, model_id excepted; NULL after a change by hand
 ) STRICT;
 
 -- One row for each session in which a worker delivered a result.

@@ -12,7 +12,6 @@
 #include "server/maintenance/backup.h"
 #include "server/maintenance/check.h"
 #include "server/maintenance/merge.h"
-#include "server/maintenance/salvage.h"
 #include "server/maintenance/study_changes_offline.h"
 #include "tests/server/maintenance/maintenance_fixture.h"
 
