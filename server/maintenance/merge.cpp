@@ -48,17 +48,6 @@ StudyRow study_in(const Statement& row) {
   return {row.number(0), row.text(1), StudyTable(row.text(2), row.number(3))};
 }
 
-Growth growth_of(const StudyRow& known, const StudyRow& study) {
-  if (known.table.is_of_the_recipe_of(study.table)) {
-    return {Growth::Kind::kSame, {}};
-  }
-  try {
-    return known.table.growth_to(study.table);
-  } catch (const std::runtime_error& error) {
-    return {Growth::Kind::kOther, error.what()};
-  }
-}
-
 /// The source, attached to the connection of the target as `source`.
 class Attached {
  public:
@@ -164,7 +153,7 @@ class SourceMerge {
         return add(study, name);
       }
       const StudyRow known = study_in(find);
-      const Growth growth = growth_of(known, study);
+      const Growth growth = known.table.growth_to(study.table);
       if (growth.kind != Growth::Kind::kOther) {
         return unite(study, known, growth);
       }
@@ -345,7 +334,7 @@ Merged Merger::merge(const std::string& source, const MergeSettings& settings,
     throw MergeRefused(fmt::format("{} was not merged: {}", source, error.what()));
   } catch (const StorageGone&) {
     throw;
-  } catch (const StorageError& error) {
+  } catch (const std::runtime_error& error) {
     throw StorageError(fmt::format("{} was not merged: {}", source, error.what()));
   }
   return merged;
