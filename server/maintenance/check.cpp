@@ -117,8 +117,10 @@ class StudyCheck {
       const StudyTable table = read_table();
       check_completed(table, check_rows(table));
     }
-    append_some(study_faults_);
-    append_some(row_faults_);
+    for (const auto* faults : {&study_faults_, &row_faults_}) {
+      const auto count = static_cast<std::ptrdiff_t>(std::min(faults->size(), kMostOfAKind));
+      found_.faults.insert(found_.faults.end(), faults->begin(), faults->begin() + count);
+    }
     if (without_checksum_ > 0) {
       found_.remarks.push_back(
           fmt::format("{} of {} results have no checksum: a flipped bit in them may not be found",
@@ -129,12 +131,6 @@ class StudyCheck {
  private:
   void add_fault(const std::string& fault) {
     study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
-  }
-
-  void append_some(const std::vector<std::string>& faults) {
-    const std::size_t count = std::min(faults.size(), kMostOfAKind);
-    found_.faults.insert(found_.faults.end(), faults.begin(),
-                         faults.begin() + static_cast<std::ptrdiff_t>(count));
   }
 
   /// Checks for values that no server stores; they could keep a server from starting, or could not
