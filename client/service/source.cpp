@@ -8,7 +8,7 @@
 #include "client/service/database_rows.h"
 #include "proto/text.h"
 #include "proto/wire/chunk_writer.h"
-#include "server/database/database_in_use.h"
+#include "server/database/database_file.h"
 #include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 

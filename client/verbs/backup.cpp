@@ -10,7 +10,6 @@
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "server/maintenance/backup.h"
-#include "server/maintenance/salvage.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

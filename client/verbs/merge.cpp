@@ -15,8 +15,7 @@
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
-#include "server/database/database_in_use.h"
-#include "server/database/shared_disk.h"
+#include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/merge.h"
 #include "worker/solver/model/errors.h"
@@ -65,10 +64,7 @@ std::vector<std::string> judged_sources(const MergeFlags& flags) {
       sources.push_back(source);
     }
   }
-  if (const std::string objection = server::objection_to_shared_disk(flags.target.file);
-      !objection.empty() && !flags.allow_network_disk) {
-    throw server::StorageError(objection);
-  }
+  server::path_on_own_disk(flags.target.file, flags.allow_network_disk);
   return sources;
 }
 

@@ -1,11 +1,11 @@
 #include "server/database/open_for_reading.h"
 
-#include <array>
 #include <filesystem>
-#include <string_view>
 #include <system_error>
 
 #include <unistd.h>
+
+#include "server/database/database_file.h"
 
 namespace oblique::server {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr int kBusyTimeout_ms = 5000;
 
 /// SQLite's result code for a first read.
-int look_at(sqlite3* database) {
+int first_read(sqlite3* database) {
   return sqlite3_exec(database, "PRAGMA schema_version", nullptr, nullptr, nullptr);
 }
 
@@ -23,31 +23,33 @@ bool lacks_files(int code) {
   return kind == SQLITE_CANTOPEN || kind == SQLITE_READONLY;
 }
 
-bool can_write_beside(const std::string& path) {
-  const auto folder = std::filesystem::absolute(path).parent_path();
-  return ::access(folder.c_str(), W_OK) == 0;
-}
-
+/// The path as a URI of SQLite, in which only these letters have a meaning.
 std::string as_uri(const std::string& path) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~/";
-  constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string uri = "file:";
   for (const char letter : std::filesystem::absolute(path).string()) {
-    if (kPlain.find(letter) != std::string_view::npos) {
-      uri += letter;
-    } else {
-      const auto byte = static_cast<unsigned char>(letter);
-      uri += {'%', kDigits[byte >> 4U], kDigits[byte & 0xfU]};
-    }
+    uri += letter == '%'   ? "%25"
+           : letter == '?' ? "%3f"
+           : letter == '#' ? "%23"
+                           : std::string(1, letter);
   }
   return uri;
 }
 
+bool has_bytes(const std::string& file) {
+  std::error_code none;
+  return std::filesystem::file_size(file, none) > 0 && !none;
+}
+
+void check_exists(const std::string& path) {
+  check_path(path);
+  if (!std::filesystem::exists(path)) {
+    throw StorageError("there is no database " + path);
+  }
+}
+
 /// Opens a database without files beside it; the index of the log is in memory.
 DatabaseHandle open_alone(const std::string& path) {
-  std::error_code no_log;
-  const bool has_log = std::filesystem::file_size(path + "-wal", no_log) > 0 && !no_log;
+  const bool has_log = has_bytes(path + "-wal");
   // SQLite ignores the log of an immutable database. With a log, the database is opened without
   // locks and in exclusive mode, in which SQLite keeps the index of the log in memory.
   DatabaseHandle database =
@@ -63,33 +65,24 @@ DatabaseHandle open_alone(const std::string& path) {
 }  // namespace
 
 OpenedForReading open_for_reading(const std::string& path) {
-  check_path(path);
-  if (!std::filesystem::exists(path)) {
-    throw StorageError("there is no database " + path);
-  }
+  check_exists(path);
   OpenedForReading opened{open_database(path, SQLITE_OPEN_READONLY), {}};
   sqlite3_busy_timeout(opened.database.get(), kBusyTimeout_ms);
-  if (lacks_files(look_at(opened.database.get())) && !can_write_beside(path)) {
+  const auto folder = std::filesystem::absolute(path).parent_path();
+  if (lacks_files(first_read(opened.database.get())) && ::access(folder.c_str(), W_OK) != 0) {
     opened.database = open_alone(path);
     opened.remark = path +
-                    " lies where nothing can be written: it is read as it stands, without "
-                    "regard to a server that may write to it from another machine or user";
+                    " is in a folder without write access: it is read as it is, and changes that "
+                    "another machine or user makes meanwhile are not seen";
   }
   return opened;
 }
 
 DatabaseHandle open_without_traces(const std::string& path) {
-  check_path(path);
-  if (!std::filesystem::exists(path)) {
-    throw StorageError("there is no database " + path);
-  }
-  const auto has_bytes = [&path](const char* ending) {
-    std::error_code none;
-    return std::filesystem::file_size(path + ending, none) > 0 && !none;
-  };
-  if (has_bytes("-wal") && has_bytes("-shm")) {
+  check_exists(path);
+  if (has_bytes(path + "-wal") && has_bytes(path + "-shm")) {
     DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
-    if (!lacks_files(look_at(database.get()))) {
+    if (!lacks_files(first_read(database.get()))) {
       return database;
     }
   }

@@ -1,10 +1,11 @@
 #include "server/database/sqlite.h"
 
+#include <array>
+#include <bit>
 #include <cerrno>
+#include <new>
 
-#include <sys/stat.h>
-
-#include "proto/small_file.h"
+#include <zlib.h>
 
 namespace oblique::server {
 namespace {
@@ -20,25 +21,84 @@ constexpr const char* kWayOut =
 
 /// Throws the exception for a statement that failed with this code.
 [[noreturn]] void fail(sqlite3* database, int code, std::string reason) {
-  if (is_failed_sync(code)) {
-    throw_failed_sync(database);
-  }
+  check_sync(database, code);
   if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
     reason += kWayOut;
   }
   throw StorageError("the database failed: " + reason);
 }
 
-}  // namespace
-
-bool is_failed_sync(int code) {
-  return code == SQLITE_IOERR_FSYNC || code == SQLITE_IOERR_DIR_FSYNC;
+/// Appends a word, least significant byte first.
+void append_word(std::string& bytes, char type, std::uint64_t word) {
+  std::array<char, 9> added{type};
+  for (std::size_t i = 1; i < added.size(); ++i) {
+    added[i] = static_cast<char>(word & 0xffU);
+    word >>= 8U;
+  }
+  bytes.append(added.data(), added.size());
 }
 
-void throw_failed_sync(sqlite3* database) {
-  const char* path = sqlite3_db_filename(database, "main");
-  throw StorageGone(std::string("the disk failed to store what was written to ") +
-                    (path != nullptr ? path : "the database") + kAfterFailedSync);
+void append_value(std::string& bytes, sqlite3_value* value) {
+  switch (const int type = sqlite3_value_type(value); type) {
+    case SQLITE_INTEGER:
+      append_word(bytes, 'i', static_cast<std::uint64_t>(sqlite3_value_int64(value)));
+      break;
+    case SQLITE_FLOAT: {
+      const double real = sqlite3_value_double(value);
+      // SQLite may store a zero without its sign.
+      append_word(bytes, 'r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
+      break;
+    }
+    case SQLITE_TEXT:
+    case SQLITE_BLOB: {
+      const void* data = sqlite3_value_blob(value);
+      const auto size = static_cast<std::size_t>(sqlite3_value_bytes(value));
+      append_word(bytes, type == SQLITE_TEXT ? 't' : 'b', size);
+      bytes.append(size == 0 ? "" : static_cast<const char*>(data), size);
+      break;
+    }
+    default:
+      bytes += 'n';
+  }
+}
+
+void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
+  auto& bytes = *static_cast<std::string*>(sqlite3_user_data(context));  // keeps its capacity
+  bytes.clear();
+  try {
+    for (int i = 0; i < count; ++i) {
+      append_value(bytes, values[i]);
+    }
+  } catch (const std::bad_alloc&) {
+    sqlite3_result_error_nomem(context);
+    return;
+  }
+  const auto sum =
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size()));
+  sqlite3_result_int64(context, static_cast<sqlite3_int64>(sum));
+}
+
+void add_row_checksum(sqlite3* database) {
+  auto bytes = std::make_unique<std::string>();
+  constexpr int kAnyNumber = -1;
+  // SQLite owns the object from here on, also when this fails.
+  const int code = sqlite3_create_function_v2(
+      database, "row_checksum", kAnyNumber, SQLITE_UTF8 | SQLITE_DETERMINISTIC, bytes.release(),
+      row_checksum, nullptr, nullptr,
+      [](void* object) { delete static_cast<std::string*>(object); });
+  if (code != SQLITE_OK) {
+    throw StorageError(std::string("no checksums can be computed: ") + sqlite3_errmsg(database));
+  }
+}
+
+}  // namespace
+
+void check_sync(sqlite3* database, int code) {
+  if (code == SQLITE_IOERR_FSYNC || code == SQLITE_IOERR_DIR_FSYNC) {
+    const char* path = sqlite3_db_filename(database, "main");
+    throw StorageGone(std::string("the disk failed to store what was written to ") +
+                      (path != nullptr ? path : "the database") + kAfterFailedSync);
+  }
 }
 
 DatabaseHandle open_database(const std::string& path, int flags) {
@@ -56,6 +116,7 @@ DatabaseHandle open_database(const std::string& path, int flags) {
     throw StorageError("cannot open the database " + path + ": " +
                        (raw != nullptr ? sqlite3_errmsg(raw) : sqlite3_errstr(code)));
   }
+  add_row_checksum(raw);
   return database;
 }
 
@@ -83,14 +144,6 @@ void Statement::check(int code) const {
   }
 }
 
-void Statement::bind(int index, std::int64_t value) {
-  check(sqlite3_bind_int64(statement_.get(), index, value));
-}
-
-void Statement::bind(int index, std::uint64_t value) {
-  bind(index, static_cast<std::int64_t>(value));
-}
-
 void Statement::bind(int index, double value) {
   check(sqlite3_bind_double(statement_.get(), index, value));
 }
@@ -105,29 +158,14 @@ void Statement::bind_lasting(int index, std::string_view text) {
                             SQLITE_UTF8));
 }
 
-void Statement::bind_blob(int index, std::string_view bytes) {
-  check(sqlite3_bind_blob64(statement_.get(), index, bytes.data(), bytes.size(), SQLITE_TRANSIENT));
-}
-
-void Statement::bind_null(int index) {
-  check(sqlite3_bind_null(statement_.get(), index));
+void Statement::bind(int index, Blob blob) {
+  check(sqlite3_bind_blob64(statement_.get(), index, blob.bytes.data(), blob.bytes.size(),
+                            SQLITE_TRANSIENT));
 }
 
 void Statement::bind_column(int index, const Statement& row, int column) {
   check(sqlite3_bind_value(statement_.get(), index,
                            sqlite3_column_value(row.statement_.get(), column)));
-}
-
-int Statement::columns() const {
-  return sqlite3_column_count(statement_.get());
-}
-
-int Statement::type(int column) const {
-  return sqlite3_column_type(statement_.get(), column);
-}
-
-bool Statement::is_null(int column) const {
-  return type(column) == SQLITE_NULL;
 }
 
 bool Statement::step() {
@@ -151,18 +189,6 @@ void Statement::run() {
 void Statement::reset() {
   sqlite3_reset(statement_.get());
   sqlite3_clear_bindings(statement_.get());
-}
-
-double Statement::real(int column) const {
-  return sqlite3_column_double(statement_.get(), column);
-}
-
-std::int64_t Statement::integer(int column) const {
-  return sqlite3_column_int64(statement_.get(), column);
-}
-
-std::string Statement::text(int column) const {
-  return std::string(bytes(column));
 }
 
 std::string_view Statement::bytes(int column) const {
@@ -237,14 +263,6 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
                        "solve its studies again into a new file");
   }
   return DatabaseKind::kOurs;
-}
-
-void check_path(const std::string& path) {
-  struct stat about {};
-  if (::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
-    throw StorageError(path + " is " + protocol::kind_of_file(about.st_mode) +
-                       ": a database is a regular file");
-  }
 }
 
 }  // namespace oblique::server

@@ -1,12 +1,11 @@
 #pragma once
 
+#include <concepts>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <type_traits>
 
 #include <sqlite3.h>
 
@@ -27,10 +26,9 @@ class StorageGone : public StorageError {
   using StorageError::StorageError;
 };
 
-/// Whether the extended result code is that of a failed fsync.
-bool is_failed_sync(int code);
-/// Throws StorageGone, which names the file of the connection.
-[[noreturn]] void throw_failed_sync(sqlite3* database);
+/// Throws StorageGone, which names the file of the connection, if the extended result code is that
+/// of a failed fsync.
+void check_sync(sqlite3* database, int code);
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }
@@ -38,6 +36,12 @@ struct CloseDatabase {
 using DatabaseHandle = std::unique_ptr<sqlite3, CloseDatabase>;
 
 /// Opens `path` with SQLITE_OPEN_... `flags`. Throws StorageError.
+///
+/// The connection has the SQL function `row_checksum(value, ...)`: the CRC-32, as zlib computes it,
+/// of its arguments. The bytes of a value are its type and contents. NULL: 'n'. Integer: 'i' and
+/// eight bytes, least significant first. Real: 'r' and the eight bytes of the double in the same
+/// order; negative zero as zero. Text or blob: 't' or 'b', the length in eight bytes, and its
+/// bytes.
 DatabaseHandle open_database(const std::string& path, int flags);
 
 /// Runs statements that return no rows. Throws StorageError.
@@ -54,14 +58,15 @@ class Statement {
   /// Throws StorageError when `sql` does not compile.
   Statement(sqlite3* database, std::string_view sql);
 
-  void bind(int index, std::int64_t value);
-  void bind(int index, std::uint64_t value);
   void bind(int index, double value);  ///< a NaN is stored as NULL
   void bind(int index, std::string_view text);
-  /// The same without a copy: the text must stay in place until the statement is reset.
+  void bind(int index, Blob blob);
+  template <std::integral Integer>
+  void bind(int index, Integer value) {
+    check(sqlite3_bind_int64(statement_.get(), index, static_cast<std::int64_t>(value)));
+  }
+  /// A text without a copy: it must stay in place until the statement is reset.
   void bind_lasting(int index, std::string_view text);
-  void bind_blob(int index, std::string_view bytes);
-  void bind_null(int index);
   /// Binds the value of column `column` of `row`, with its type.
   void bind_column(int index, const Statement& row, int column);
 
@@ -69,7 +74,7 @@ class Statement {
   template <class... Values>
   void bind_all(const Values&... values) {
     int index = 0;
-    (bind_value(++index, values), ...);
+    (bind(++index, values), ...);
   }
 
   /// Advances: true when there is a row. Throws StorageError.
@@ -79,12 +84,15 @@ class Statement {
   /// Makes the statement ready to run again. Bindings are cleared.
   void reset();
 
-  int columns() const;
-  int type(int column) const;  ///< SQLITE_INTEGER and so on
-  bool is_null(int column) const;
-  std::int64_t integer(int column) const;
-  double real(int column) const;
-  std::string text(int column) const;  ///< bytes of a text or blob
+  int columns() const { return sqlite3_column_count(statement_.get()); }
+  bool is_null(int column) const { return type(column) == SQLITE_NULL; }
+  /// SQLITE_INTEGER and so on.
+  int type(int column) const { return sqlite3_column_type(statement_.get(), column); }
+  std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+  std::uint64_t number(int column) const { return static_cast<std::uint64_t>(integer(column)); }
+  double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+  /// The bytes of a text or blob.
+  std::string text(int column) const { return std::string(bytes(column)); }
   /// The same without a copy, valid until the next call of `step` or `reset`.
   std::string_view bytes(int column) const;
 
@@ -93,16 +101,6 @@ class Statement {
     void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
   };
   void check(int code) const;
-  template <class Value>
-  void bind_value(int index, const Value& value) {
-    if constexpr (std::is_integral_v<Value>) {
-      bind(index, static_cast<std::int64_t>(value));
-    } else if constexpr (std::is_same_v<Value, Blob>) {
-      bind_blob(index, value.bytes);
-    } else {
-      bind(index, value);
-    }
-  }
 
   sqlite3* database_;
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
@@ -134,15 +132,12 @@ class Transaction {
 
 /// Values of PRAGMA application_id and PRAGMA user_version in our databases.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
-inline constexpr std::int32_t kSchemaVersion = 11;
+inline constexpr std::int32_t kSchemaVersion = 12;
 
 enum class DatabaseKind { kEmpty, kOurs };
 
 /// Whether an open database is empty or ours. Throws StorageError, which names the reason, for a
 /// foreign file or another schema. `path` is for the messages.
 DatabaseKind identify(sqlite3* database, const std::string& path);
-
-/// Throws StorageError when `path` exists and is not a regular file.
-void check_path(const std::string& path);
 
 }  // namespace oblique::server

@@ -14,7 +14,7 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/frames.h"
-#include "server/database/shared_disk.h"
+#include "server/database/database_file.h"
 #include "server/loop/report_box.h"
 #include "server/loop/shown_web.h"
 #include "server/network/access.h"
@@ -73,7 +73,7 @@ class Loop::Parts final : public Outbox {
     // Above every number that an earlier run can have given, whatever the clock says.
     service.scheduler.first_lease_id = store_.count_start() << 40U;
     service_.emplace(std::move(service), *this, store_.studies(), now());
-    for (const auto& sentence : store_.left_out()) {
+    for (const auto& sentence : store_.skipped()) {
       spdlog::warn("{}", sentence);
     }
   }

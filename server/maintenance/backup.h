@@ -1,8 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
-#include "server/database/draft_file.h"
+#include "server/database/database_file.h"
 
 namespace oblique::server {
 
@@ -16,5 +17,18 @@ void back_up(const std::string& from, const std::string& to);
 /// if `from` was read in an unusual way (open_for_reading), else an empty text. Throws as `back_up`
 /// does; `to` is the name of the copy in error messages.
 std::string copy_into(const DraftFile& draft, const std::string& from, const std::string& to);
+
+/// Counts of what could be read of a damaged database.
+struct Salvaged {
+  std::uint64_t studies = 0;
+  std::uint64_t results = 0;
+  std::uint64_t unreadable_places = 0;  ///< number of gaps: damaged pages or bad values
+};
+
+/// Makes a sound database `to` from the readable rows of `from`. After an unreadable place at most
+/// as many readable rows are skipped as were lost. Points without a row are open, and a server
+/// solves them again. `from` is not changed; no server may use it. Throws StorageError when `to`
+/// exists or `from` cannot be opened, std::runtime_error when `to` cannot be written.
+Salvaged salvage(const std::string& from, const std::string& to);
 
 }  // namespace oblique::server

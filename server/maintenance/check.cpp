@@ -1,25 +1,20 @@
 #include "server/maintenance/check.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cstdint>
 #include <iterator>
-#include <map>
 #include <optional>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
-#include <nlohmann/json.hpp>
 
 #include "proto/recipe/canonical.h"
+#include "proto/recipe/point_inputs.h"
 #include "proto/recipe/written/study_name.h"
 #include "proto/recipe/written/study_priority.h"
 #include "server/database/open_for_reading.h"
-#include "server/database/row_checksum.h"
 #include "server/store/completed_ranges.h"
-#include "server/store/recipe_check.h"
 #include "server/store/result_rows.h"
 #include "server/store/schema.h"
 #include "server/study/study_table.h"
@@ -38,88 +33,59 @@ void append(std::vector<std::string>& to, sqlite3* database, const std::string& 
   }
 }
 
-void append(std::vector<std::string>& to, const std::vector<std::string>& faults) {
-  to.insert(to.end(), faults.begin(),
-            faults.begin() + static_cast<std::ptrdiff_t>(std::min(faults.size(), kMostOfAKind)));
-}
+/// Compares rows of one study with its recipe. Fast for rows in the order of their points.
+class RecipeCheck {
+ public:
+  /// The columns that `fault_of` reads, as a list for SQL. A row must begin with them.
+  static constexpr const char* kColumns = "point, model_id, H, mu, e";
 
-/// A statement without its comments and spaces; quoted parts stay as they are.
-std::string without_comments(std::string_view sql) {
-  std::string rest;
-  for (std::size_t i = 0; i < sql.size(); ++i) {
-    if (sql[i] == '\'' || sql[i] == '"' || sql[i] == '`' || sql[i] == '[') {
-      const std::size_t end = std::min(sql.find(sql[i] == '[' ? ']' : sql[i], i + 1), sql.size());
-      rest += sql.substr(i, end + 1 - i);
-      i = end;
-    } else if (sql.substr(i, 2) == "--") {
-      i = std::min(sql.find('\n', i), sql.size());
-    } else if (std::isspace(static_cast<unsigned char>(sql[i])) == 0) {
-      rest += sql[i];
+  /// Both must outlive this.
+  RecipeCheck(sqlite3* database, const protocol::PointTable& table)
+      : table_(table), definition_(database, "SELECT definition FROM models WHERE model_id = ?") {}
+
+  /// The first difference between the current row and the recipe, as a part of a sentence; empty if
+  /// they agree. Compares the point, H, mu, e and the model, with the tolerance for values that
+  /// another machine computed (proto/recipe/point_inputs.h).
+  std::string fault_of(const Statement& row) {
+    if (row.number(0) >= table_.size()) {  // negative numbers are large
+      return "the study has no such point";
     }
-  }
-  return rest;
-}
-
-/// A table with another definition could compute values without end, or accept values that no
-/// server stores.
-std::vector<std::string> faults_of_tables(sqlite3* database) {
-  std::vector<std::string> faults;
-  Statement find(database,
-                 "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ? COLLATE NOCASE");
-  for (const TableDefinition& table : our_tables()) {
-    find.bind(1, table.name);
-    const bool is_there = find.step();
-    if (!is_there || without_comments(find.text(0)) != without_comments(table.sql)) {
-      faults.push_back(fmt::format(
-          "the table {} is {}: `oblique backup --salvage` makes a file "
-          "that has it, with all rows that can be read",
-          table.name,
-          is_there ? "not as servers make it" : "missing, and no server starts on this file"));
-    }
-    find.reset();
-  }
-  return faults;
-}
-
-/// The first column that differs from the model's definition; empty: none.
-std::string differing_column(const Statement& row, const solver::ModelParameters& model) {
-  if (row.text(2) != nlohmann::json(model.lengths_m).dump()) {
-    return "lengths_m";
-  }
-  int column = 3;
-  for (const auto& key : solver::model_keys()) {
-    const bool agrees = key.name == "integrator"
-                            ? row.text(column) == solver::integrator_name(model.integrator)
-                            : row.is_null(column) || row.real(column) == key.get(model);
-    if (!agrees) {
-      return std::string(key.name);
-    }
-    ++column;
-  }
-  return {};
-}
-
-std::vector<std::string> faults_of_models(sqlite3* database) {
-  std::vector<std::string> faults;
-  std::string columns = "model_id, definition, lengths_m";
-  for (const auto& key : solver::model_keys()) {
-    columns += ", " + std::string(key.name);
-  }
-  Statement rows(database, "SELECT " + columns + " FROM models");
-  while (faults.size() < kMostOfAKind && rows.step()) {
-    try {
-      const std::string column = differing_column(rows, protocol::model_of_canonical(rows.text(1)));
-      if (!column.empty()) {
-        faults.push_back(
-            fmt::format("model {}: {} is not that of its definition", rows.integer(0), column));
+    const protocol::Point point = table_.point(row.number(0));
+    int column = 2;
+    for (const auto& [key, value] :
+         {std::pair("H", point.H_m), {"mu", point.mu}, {"e", point.e_star}}) {
+      if (!protocol::is_close(row.real(column), value)) {
+        return fmt::format("{} is {:.17g}, and {:.17g} in the recipe", key, row.real(column),
+                           value);
       }
-    } catch (const std::runtime_error& error) {
-      faults.push_back(fmt::format("model {}: its definition cannot be read: {}", rows.integer(0),
-                                   error.what()));
+      ++column;
+    }
+    const std::pair models{point.model, row.integer(1)};
+    if (models != equal_models_) {
+      if (!agrees(table_.model(point.model), row.integer(1))) {
+        return "its model is not that of the recipe";
+      }
+      equal_models_ = models;
+    }
+    return {};
+  }
+
+ private:
+  bool agrees(const solver::ModelParameters& model, std::int64_t model_id) {
+    definition_.reset();
+    definition_.bind_all(model_id);
+    try {
+      return definition_.step() &&
+             protocol::is_close(protocol::model_of_canonical(definition_.text(0)), model);
+    } catch (const std::runtime_error&) {  // the definition is damaged
+      return false;
     }
   }
-  return faults;
-}
+
+  const protocol::PointTable& table_;
+  Statement definition_;
+  std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};  // of the recipe, and its row
+};
 
 /// Checks studies one after the other, each with all its rows in one pass.
 class StudyCheck {
@@ -127,11 +93,11 @@ class StudyCheck {
   StudyCheck(sqlite3* database, Diagnosis& found)
       : database_(database),
         found_(found),
-        noted_(noted_points(database)),
         studies_(database, fmt::format("SELECT study_id, name, recipe, points, state, priority,"
                                        " max(length(created_at), length(changed_at)),"
-                                       " checksum <> {}, left_out FROM studies ORDER BY study_id",
-                                       study_checksum_sql())),
+                                       " checksum <> {}, left_out, counted FROM studies"
+                                       " ORDER BY study_id",
+                                       kStudyChecksum)),
         rows_(database, fmt::format("SELECT {}, checksum IS NULL, coalesce({},"
                                     " CASE WHEN model_id NOT IN (SELECT model_id FROM models)"
                                     " THEN 'its model does not exist'"
@@ -145,18 +111,19 @@ class StudyCheck {
     while (studies_.step()) {
       name_ = studies_.text(1);
       if (studies_.integer(7) != 0) {
-        add_fault("its number, name, recipe or size is not the one that was stored");
+        add_fault("its number, recipe or size is not the one that was stored");
       }
       check_terms();
       const StudyTable table = read_table();
-      const IntervalSet points = check_rows(table);
-      check_completed(table, points);
+      check_completed(table, check_rows(table));
     }
-    append(found_.faults, study_faults_);
-    append(found_.faults, row_faults_);
+    for (const auto* faults : {&study_faults_, &row_faults_}) {
+      const auto count = static_cast<std::ptrdiff_t>(std::min(faults->size(), kMostOfAKind));
+      found_.faults.insert(found_.faults.end(), faults->begin(), faults->begin() + count);
+    }
     if (without_checksum_ > 0) {
       found_.remarks.push_back(
-          fmt::format("{} of {} results have no checksum: a flipped bit in them may go unseen",
+          fmt::format("{} of {} results have no checksum: a flipped bit in them may not be found",
                       without_checksum_, all_rows_));
     }
   }
@@ -182,7 +149,7 @@ class StudyCheck {
 
   /// The table of the study; its points are computed if the recipe can be read.
   StudyTable read_table() {
-    StudyTable table(studies_.text(2), static_cast<std::uint64_t>(studies_.integer(3)));
+    StudyTable table(studies_.text(2), studies_.number(3));
     try {
       (void)table.get();
     } catch (const std::runtime_error& error) {
@@ -202,7 +169,7 @@ class StudyCheck {
     }
     rows_.bind(1, studies_.integer(0));
     while (rows_.step()) {
-      points.insert(static_cast<std::uint64_t>(rows_.integer(0)));
+      points.insert(rows_.number(0));
       ++all_rows_;
       without_checksum_ += rows_.integer(kNoChecksum) != 0 ? 1U : 0U;
       std::string fault = rows_.text(kFault);
@@ -221,9 +188,10 @@ class StudyCheck {
   /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can
   /// make a point completed without a row.
   void check_completed(const StudyTable& table, const IntervalSet& rows) {
-    const auto& noted = noted_[static_cast<std::uint64_t>(studies_.integer(0))];
-    const IntervalSet& completed = noted ? *noted : rows;
-    if (!noted) {
+    const bool is_counted = studies_.integer(9) != 0;
+    const IntervalSet completed =
+        is_counted ? completed_points(database_, studies_.number(0)) : rows;
+    if (!is_counted) {
       found_.remarks.push_back(fmt::format(
           "study {}: another program deleted results; they are counted when a server starts",
           name_));
@@ -233,7 +201,7 @@ class StudyCheck {
     const bool has_filter = table.is_made() && table->has_filter();
     if (rows.size() + without_row.size() != completed.size() ||
         (!without_row.empty() && !has_filter) ||
-        (noted && without_row.size() != static_cast<std::uint64_t>(studies_.integer(8)))) {
+        (is_counted && without_row.size() != studies_.number(8))) {
       add_fault(fmt::format(
           "completed_ranges has {} points and results {}, and they are not the same. UPDATE "
           "studies SET counted = 0 WHERE study_id = {} makes the next server count them",
@@ -249,7 +217,6 @@ class StudyCheck {
 
   sqlite3* database_;
   Diagnosis& found_;
-  std::map<std::uint64_t, std::optional<IntervalSet>> noted_;
   Statement studies_;
   Statement rows_;
   std::string name_;  // of the current study
@@ -288,7 +255,13 @@ std::string row_fault_sql() {
 
 Diagnosis diagnose_contents(sqlite3* database) {
   Diagnosis found;
-  found.faults = faults_of_tables(database);
+  // A table with another definition could compute values without end.
+  for (const std::string& table : differing_tables(database)) {
+    found.faults.push_back(fmt::format(
+        "the table {} is missing or has other columns, and no server starts on this file: `oblique "
+        "backup --salvage` makes a file with all rows that can be read",
+        table));
+  }
   if (!found.faults.empty()) {
     return found;  // the other checks need all tables
   }
@@ -299,7 +272,10 @@ Diagnosis diagnose_contents(sqlite3* database) {
                        " (SELECT study_id FROM studies UNION SELECT study_id FROM deletions)",
                        table));
   }
-  append(found.faults, faults_of_models(database));
+  append(found.faults, database,
+         fmt::format("SELECT 'model ' || model_id || ': it is not the one that was stored'"
+                     " FROM models WHERE checksum <> {}",
+                     model_checksum_sql()));
   append(found.remarks, database,
          "SELECT count(*) || ' results of deleted studies are left; the next server deletes them'"
          " FROM results WHERE study_id IN (SELECT study_id FROM deletions) HAVING count(*) > 0");
@@ -318,24 +294,15 @@ Diagnosis diagnose(const std::string& path) {
   if (!found.faults.empty()) {
     return found;  // damaged pages make every other answer meaningless
   }
-  add_row_checksum(database);
   execute(database, "BEGIN");  // so that rows and counts agree while a server writes
   for (const std::string& view : missing_views(database)) {
     found.faults.push_back(
         fmt::format("the view {} is missing: the next server on this file creates it", view));
   }
-  for (const std::string& trigger : other_triggers(database)) {
-    found.faults.push_back(fmt::format(
-        "the trigger {} is not ours: no server works on this file until it is dropped", trigger));
-  }
   Diagnosis contents = diagnose_contents(database);
   std::move(contents.faults.begin(), contents.faults.end(), std::back_inserter(found.faults));
   std::move(contents.remarks.begin(), contents.remarks.end(), std::back_inserter(found.remarks));
   return found;
-}
-
-std::vector<std::string> find_faults(const std::string& path) {
-  return diagnose(path).faults;
 }
 
 }  // namespace oblique::server

@@ -1,7 +1,6 @@
 #include "server/maintenance/study_changes_offline.h"
 
-#include <optional>
-#include <string_view>
+#include <chrono>
 #include <thread>
 
 #include <spdlog/fmt/fmt.h>
@@ -9,44 +8,43 @@
 #include "proto/recipe/checks.h"
 #include "proto/recipe/written/study_name.h"
 #include "server/database/open_for_reading.h"
-#include "server/database/sqlite.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
 namespace {
 
-/// Number of rows that are deleted in one transaction.
-constexpr std::size_t kRowsAtOnce = 4096;
-std::string gone_from(const std::string& path) {
-  return fmt::format("the study is no longer in {}", path);
+/// The recipe of a study. Throws StudyRefused when there is no such study.
+std::string recipe_bytes(const std::string& path, std::uint64_t study_id) {
+  const OpenedForReading opened = open_stored(path);
+  Statement find(opened.database.get(), "SELECT recipe FROM studies WHERE study_id = ?");
+  find.bind_all(study_id);
+  if (!find.step()) {
+    throw StudyRefused(fmt::format("the study is no longer in {}", path));
+  }
+  return find.text(0);
 }
 
-/// The store of the database that has this study.
-class StoreWithStudy {
- public:
-  StoreWithStudy(const std::string& path, std::uint64_t study_id) {
-    (void)open_stored(path);  // throws if there is no file, which the store would create
-    store_.emplace(path);
-    database_ = open_database(path, SQLITE_OPEN_READONLY);
-    Statement find(database_.get(), "SELECT 1 FROM studies WHERE study_id = ?");
-    find.bind(1, study_id);
-    if (!find.step()) {
-      throw StudyRefused(gone_from(path));
+/// Deletes the rows of deleted studies. False when readers prevent it for 3 seconds.
+bool clear_all_away(Store& store, const RowsDeleted& deleted) {
+  constexpr std::size_t kRowsAtOnce = 4096;
+  constexpr std::chrono::milliseconds kPause{100};
+  constexpr int kMostPauses = 30;
+  for (int pauses = 0; pauses < kMostPauses;) {
+    switch (store.clear_away(kRowsAtOnce)) {
+      case ClearedAway::kAll:
+        return true;
+      case ClearedAway::kPart:
+        pauses = 0;
+        deleted(store.cleared_rows());
+        break;
+      case ClearedAway::kMustWait:
+        ++pauses;
+        std::this_thread::sleep_for(kPause);
+        break;
     }
   }
-
-  Store& store() { return *store_; }
-  bool has_study_named(const std::string& name) {
-    Statement find(database_.get(), "SELECT 1 FROM studies WHERE name = ?");
-    find.bind(1, std::string_view(name));
-    return find.step();
-  }
-  void commit(const Change& change) { store_->commit({&change, 1}); }
-
- private:
-  std::optional<Store> store_;
-  DatabaseHandle database_;
-};
+  return false;
+}
 
 }  // namespace
 
@@ -54,52 +52,33 @@ void rename_study(const std::string& path, std::uint64_t study_id, const std::st
   if (const std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
     throw StudyRefused(objection);
   }
-  StoreWithStudy at(path, study_id);
-  if (at.has_study_named(name)) {
+  (void)recipe_bytes(path, study_id);
+  Store store(path);
+  Statement find(store.connection(), "SELECT 1 FROM studies WHERE name = ?");
+  find.bind_all(name);
+  if (find.step()) {
     throw StudyRefused(fmt::format(
         "there is a study called \"{}\" in {} already: choose another name", name, path));
   }
-  at.commit(RenameStudy{study_id, name});
-  at.store().merge_log();
+  find.reset();
+  const Change change = RenameStudy{study_id, name};
+  store.commit({&change, 1});
+  store.merge_log();
 }
 
 bool delete_study(const std::string& path, std::uint64_t study_id, const RowsDeleted& deleted) {
-  StoreWithStudy at(path, study_id);
-  at.commit(DeleteStudy{study_id});
-  return clear_all_away(at.store(), [&] { deleted(at.store().cleared_rows()); }) &&
-         at.store().merge_log();
-}
-
-bool clear_all_away(Storage& storage, const std::function<void()>& part_is_done,
-                    const Patience& patience) {
-  for (int waits = 0; waits < patience.waits;) {
-    switch (storage.clear_away(kRowsAtOnce)) {
-      case ClearedAway::kAll:
-        return true;
-      case ClearedAway::kPart:
-        waits = 0;
-        part_is_done();
-        break;
-      case ClearedAway::kMustWait:
-        ++waits;
-        std::this_thread::sleep_for(patience.pause);
-        break;
-    }
-  }
-  return false;
+  (void)recipe_bytes(path, study_id);
+  Store store(path);
+  const Change change = DeleteStudy{study_id};
+  store.commit({&change, 1});
+  return clear_all_away(store, deleted) && store.merge_log();
 }
 
 protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id) {
-  const OpenedForReading opened = open_stored(path);
-  Statement find(opened.database.get(), "SELECT recipe FROM studies WHERE study_id = ?");
-  find.bind(1, study_id);
-  if (!find.step()) {
-    throw StudyRefused(gone_from(path));
-  }
   protocol::Recipe recipe;
-  if (!protocol::parse_recipe(find.bytes(0), recipe)) {
+  if (!protocol::parse_recipe(recipe_bytes(path, study_id), recipe)) {
     throw StorageError(fmt::format(
-        "the recipe of the study cannot be read: `oblique check --db {}` tells more", path));
+        "the recipe of the study cannot be read: `oblique check --db {}` names all faults", path));
   }
   return recipe;
 }

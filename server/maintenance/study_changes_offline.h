@@ -1,13 +1,11 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <stdexcept>
 #include <string>
 
 #include "proto/oblique.pb.h"
-#include "server/store/changes.h"
 
 // Changes of a study in a database that no server uses. All functions except `stored_recipe` lock
 // the database as a server does. All throw StorageError.
@@ -31,17 +29,6 @@ using RowsDeleted = std::function<void(std::uint64_t rows)>;
 /// merged, because another program keeps reading the database. Throws StudyRefused when there is no
 /// study of that number.
 bool delete_study(const std::string& path, std::uint64_t study_id, const RowsDeleted& deleted);
-
-/// How often, and how long each time, to wait for readers of the database.
-struct Patience {
-  int waits = 30;
-  std::chrono::milliseconds pause{100};
-};
-
-/// Deletes the rows of deleted studies, and calls `part_is_done` after each part. False when
-/// readers prevented it for longer than `patience`. Throws as `Storage::commit` does.
-bool clear_all_away(Storage& storage, const std::function<void()>& part_is_done,
-                    const Patience& patience = {});
 
 /// The recipe of a study. Only reads; a server may use the database. Throws StudyRefused when there
 /// is no study of that number.

@@ -11,7 +11,6 @@
 #include "server/scheduler/points/study_points.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/study/interval_set.h"
-#include "server/study/point_attempts.h"
 
 // What the scheduler is told, and what it wants done.
 namespace oblique::server {

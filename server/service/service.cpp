@@ -37,14 +37,14 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
                                   traces_}) {
   for (StoredStudy& study : studies) {
     states_.restore(study, now.steady_ms);
-    if (!study.settled.empty()) {
+    if (!study.completed.empty()) {
       known_.note_source(study.study_id);
     }
-    known_.restore(study.study_id, study.taken);
+    known_.restore(study.study_id, study.reused);
     const std::string& name = states_.record(study.study_id).name;
     const bool waits = !settings.only_study.empty() && name != settings.only_study;
     const bool seeks = study.reuses && !waits;
-    feed(StudyAdded{study.study_id, study.table, std::move(study.settled), study.failures.size(),
+    feed(StudyAdded{study.study_id, study.table, std::move(study.completed), study.failures.size(),
                     study.state == StudyState::kCancelled,
                     study.state == StudyState::kPaused || waits, study.priority,
                     study.solver_version, std::move(study.attempts), seeks, study.left_out},

@@ -1,110 +1,74 @@
 #include "server/store/completed_ranges.h"
 
 #include <algorithm>
-#include <limits>
-#include <stdexcept>
-#include <utility>
 
 namespace oblique::server {
 namespace {
 
-std::uint64_t number(const Statement& row, int column) {
-  return static_cast<std::uint64_t>(row.integer(column));
+Interval interval_in(const Statement& row) {
+  return {row.number(0), row.number(0) + row.number(1)};
 }
 
-IntervalSet all_points_with_row(sqlite3* database, std::uint64_t study_id) {
-  constexpr auto kLast = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  return points_with_row(database, study_id, {0, kLast});
-}
+}  // namespace
 
-IntervalSet all_ranges(sqlite3* database, std::uint64_t study_id) {
+IntervalSet completed_points(sqlite3* database, std::uint64_t study_id) {
   IntervalSet found;
   Statement ranges(database,
                    "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
                    " ORDER BY first_point");
   ranges.bind_all(study_id);
   while (ranges.step()) {
-    found.insert(number(ranges, 0), number(ranges, 0) + number(ranges, 1));
+    const Interval range = interval_in(ranges);
+    found.insert(range.begin, range.end);
   }
   return found;
 }
 
-IntervalSet without(IntervalSet points, const IntervalSet& others) {
-  others.for_each([&](const Interval& range) { points.erase(range.begin, range.end); });
-  return points;
+void count_completed_points(sqlite3* database) {
+  // Consecutive points have the same difference of point and row number.
+  execute(database, R"sql(
+    DELETE FROM completed_ranges WHERE study_id IN (SELECT study_id FROM studies WHERE NOT counted);
+    INSERT INTO completed_ranges (study_id, first_point, points)
+      SELECT study_id, min(point), count(*) FROM
+        (SELECT study_id, point,
+                point - row_number() OVER (PARTITION BY study_id ORDER BY point) AS run
+         FROM results WHERE study_id IN (SELECT study_id FROM studies WHERE NOT counted))
+      GROUP BY study_id, run;
+    UPDATE studies SET counted = 1, left_out = 0 WHERE NOT counted;
+  )sql");
 }
 
-/// The points in `points` that the study's filter leaves out; none if its recipe cannot be read.
-IntervalSet left_out_of(const StudyTable& table, const IntervalSet& points) {
-  IntervalSet found;
-  try {
-    if (points.empty() || !table->has_filter()) {
-      return found;
-    }
-  } catch (const std::runtime_error&) {
-    return found;
+void update_counts_and_state(sqlite3* database, std::uint64_t study_id) {
+  constexpr const char* kCompleted =
+      "(SELECT coalesce(sum(points), 0) FROM main.completed_ranges WHERE study_id = ?1)";
+  const std::string completed = kCompleted;
+  for (const std::string& sql :
+       {"UPDATE main.studies SET left_out = " + completed +
+            " - (SELECT count(*) FROM main.results WHERE study_id = ?1) WHERE study_id = ?1",
+        std::string("DELETE FROM main.reused_points WHERE study_id = ?1"),
+        // `reused_from` is STUDY/POINT, and the name of a study may contain slashes.
+        std::string("INSERT INTO main.reused_points (study_id, source, points) SELECT ?1,"
+                    " substr(reused_from, 1, length(rtrim(reused_from, '0123456789')) - 1) AS src,"
+                    " count(*) FROM main.results WHERE study_id = ?1 AND reused_from IS NOT NULL"
+                    " GROUP BY src"),
+        "UPDATE main.studies SET state = CASE state WHEN 'done' THEN 'running' ELSE 'done' END,"
+        " changed_at = strftime('%Y-%m-%dT%H:%M:%fZ', 'now')"
+        " WHERE study_id = ?1 AND (state = 'done') <> (points = " +
+            completed + ")"}) {
+    execute_with(database, sql, study_id);
   }
-  points.for_each([&](const Interval& range) {
-    const std::uint64_t end = std::min(range.end, table->size());
-    for (std::uint64_t begin = range.begin; begin < end;) {
-      const std::uint64_t left_in = table->first_left_in(begin, end);
-      found.insert(begin, left_in);
-      begin = left_in + 1;
-    }
-  });
-  return found;
-}
-
-}  // namespace
-
-IntervalSet points_with_row(sqlite3* database, std::uint64_t study_id, const Interval& points) {
-  IntervalSet found;
-  Interval run{0, 0};
-  Statement rows(database,
-                 "SELECT point FROM results WHERE study_id = ? AND point >= ? AND point < ?"
-                 " ORDER BY point");
-  rows.bind_all(study_id, points.begin, points.end);
-  while (rows.step()) {
-    const std::uint64_t point = number(rows, 0);
-    if (point != run.end) {
-      found.insert(run.begin, run.end);
-      run.begin = point;
-    }
-    run.end = point + 1;
-  }
-  found.insert(run.begin, run.end);
-  return found;
-}
-
-std::map<std::uint64_t, std::optional<IntervalSet>> noted_points(sqlite3* database) {
-  std::map<std::uint64_t, std::optional<IntervalSet>> found;
-  Statement studies(database, "SELECT study_id FROM studies");
-  while (studies.step()) {
-    found[number(studies, 0)] = noted_points_of(database, number(studies, 0));
-  }
-  return found;
-}
-
-std::optional<IntervalSet> noted_points_of(sqlite3* database, std::uint64_t study_id) {
-  Statement study(database, "SELECT 1 FROM studies WHERE study_id = ? AND counted");
-  study.bind_all(study_id);
-  if (!study.step()) {
-    return std::nullopt;
-  }
-  return all_ranges(database, study_id);
 }
 
 CompletedRanges::CompletedRanges(sqlite3* database)
-    : database_(database),
-      before_(database,
+    : before_(database,
               "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
               " AND first_point BETWEEN 0 AND ? ORDER BY first_point DESC LIMIT 1"),
-      take_out_(database,
-                "DELETE FROM completed_ranges WHERE study_id = ? AND first_point BETWEEN ? AND ?"
-                " RETURNING first_point + points"),
       between_(database,
                "SELECT first_point, points FROM completed_ranges WHERE study_id = ?"
                " AND first_point BETWEEN ? AND ?"),
+      take_out_(database,
+                "DELETE FROM completed_ranges WHERE study_id = ? AND first_point BETWEEN ? AND ?"
+                " RETURNING first_point + points"),
       put_(database, "INSERT OR REPLACE INTO completed_ranges VALUES (?, ?, ?)") {}
 
 /// The last range that begins at or before the point.
@@ -112,7 +76,7 @@ std::optional<Interval> CompletedRanges::range_before(std::uint64_t study_id, st
   std::optional<Interval> range;
   before_.bind_all(study_id, point);
   if (before_.step()) {
-    range = Interval{number(before_, 0), number(before_, 0) + number(before_, 1)};
+    range = interval_in(before_);
   }
   before_.reset();
   return range;
@@ -124,7 +88,7 @@ std::uint64_t CompletedRanges::take_out(std::uint64_t study_id, std::uint64_t fi
   std::uint64_t end = 0;
   take_out_.bind_all(study_id, first, last);
   while (take_out_.step()) {
-    end = std::max(end, number(take_out_, 0));
+    end = std::max(end, take_out_.number(0));
   }
   take_out_.reset();
   return end;
@@ -154,26 +118,22 @@ IntervalSet CompletedRanges::overlapping(std::uint64_t study_id, const Interval&
       before && before->end > points.begin) {
     found.insert(before->begin, before->end);
   }
-  Statement& rows = between_;
-  rows.bind_all(study_id, points.begin, points.end - 1);
-  while (rows.step()) {
-    found.insert(number(rows, 0), number(rows, 0) + number(rows, 1));
+  between_.bind_all(study_id, points.begin, points.end - 1);
+  while (between_.step()) {
+    const Interval range = interval_in(between_);
+    found.insert(range.begin, range.end);
   }
-  rows.reset();
+  between_.reset();
   return found;
 }
 
 IntervalSet CompletedRanges::open_points(std::uint64_t study_id, const IntervalSet& points) {
   IntervalSet open = points;
-  const auto added = gathered_.find(study_id);
-  points.for_each([&](const Interval& range) {
-    open = without(std::move(open), overlapping(study_id, range));
-    if (added != gathered_.end()) {
-      for (const Interval& part : added->second.within(range.begin, range.end)) {
-        open.erase(part.begin, part.end);
-      }
-    }
-  });
+  const auto erase = [&open](const Interval& range) { open.erase(range.begin, range.end); };
+  points.for_each([&](const Interval& range) { overlapping(study_id, range).for_each(erase); });
+  if (const auto added = gathered_.find(study_id); added != gathered_.end()) {
+    added->second.for_each(erase);
+  }
   return open;
 }
 
@@ -190,39 +150,6 @@ void CompletedRanges::remove(std::uint64_t study_id, const IntervalSet& points) 
       }
     }
   });
-}
-
-bool CompletedRanges::is_counted(std::uint64_t study_id) {
-  Statement query(database_, "SELECT 1 FROM studies WHERE study_id = ? AND counted");
-  query.bind_all(study_id);
-  return query.step();
-}
-
-void CompletedRanges::set_counted(std::uint64_t study_id) {
-  execute_with(database_, "UPDATE studies SET counted = 1 WHERE study_id = ?", study_id);
-}
-
-void CompletedRanges::count_again(std::uint64_t study_id, const StudyTable& table) {
-  const IntervalSet with_row = all_points_with_row(database_, study_id);
-  // Evaluating the filter takes time, so it is evaluated only for points without a row.
-  const IntervalSet rest = without(all_ranges(database_, study_id), with_row);
-  replace(study_id, with_row, left_out_of(table, rest));
-}
-
-void CompletedRanges::count_again(std::uint64_t study_id, const IntervalSet& left_out) {
-  const IntervalSet with_row = all_points_with_row(database_, study_id);
-  replace(study_id, with_row, without(left_out, with_row));
-}
-
-void CompletedRanges::replace(std::uint64_t study_id, const IntervalSet& with_row,
-                              const IntervalSet& left_out) {
-  execute_with(database_, "DELETE FROM completed_ranges WHERE study_id = ?", study_id);
-  execute_with(database_, "UPDATE studies SET left_out = ?2 WHERE study_id = ?1", study_id,
-               left_out.size());
-  for (const IntervalSet* points : {&with_row, &left_out}) {
-    points->for_each([&](const Interval& range) { write(study_id, range); });
-  }
-  set_counted(study_id);
 }
 
 }  // namespace oblique::server

@@ -8,6 +8,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
+#include "proto/recipe/canonical.h"
+#include "proto/result_message.h"
 #include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
@@ -22,6 +24,7 @@ struct Columns {
   std::vector<std::string_view> all;
   std::vector<std::string_view> outputs;
   std::vector<std::string_view> required_outputs;
+  std::vector<std::string_view> model{"definition", "lengths_m"};
 };
 
 Columns make_columns() {
@@ -44,6 +47,9 @@ Columns make_columns() {
   columns.all.assign(kInputs.begin(), kInputs.end());
   columns.all.insert(columns.all.end(), columns.outputs.begin(), columns.outputs.end());
   columns.all.insert(columns.all.end(), kOrigin.begin(), kOrigin.end());
+  for (const solver::ParameterKey& key : solver::model_keys()) {
+    columns.model.push_back(key.name);
+  }
   return columns;
 }
 
@@ -68,15 +74,27 @@ void write_json(std::string& text, const List& list, const Numbers& numbers_of) 
   text = "[";
   for (const auto& element : list) {
     text += text.size() > 1 ? ",[" : "[";
-    bool is_first = true;
     for (const double number : numbers_of(element)) {
-      text += is_first ? "" : ",";
+      text += text.back() == '[' ? "" : ",";
       append(text, number);
-      is_first = false;
     }
     text += ']';
   }
   text += ']';
+}
+
+/// A statement with a parameter for each column, which adds the checksum. It does nothing if the
+/// table has a row of this key.
+std::string insert_sql(std::string_view table, std::span<const std::string_view> columns,
+                       std::string_view key) {
+  std::string marks;
+  for (std::size_t i = 1; i <= columns.size(); ++i) {
+    marks += fmt::format("{}?{}", i == 1 ? "" : ", ", i);
+  }
+  return fmt::format(
+      "INSERT INTO {0} ({1}, checksum) VALUES ({2}, row_checksum({2}))"
+      " ON CONFLICT ({3}) DO NOTHING",
+      table, fmt::join(columns, ", "), marks, key);
 }
 
 bool ft_peaks_equal_those_of_peaks(const solver::CaseResult& result) {
@@ -100,79 +118,57 @@ std::span<const std::string_view> required_outputs() {
   return columns().required_outputs;
 }
 
+std::span<const std::string_view> model_columns() {
+  return columns().model;
+}
+
 std::string result_checksum_sql() {
   return fmt::format("row_checksum({})", fmt::join(result_columns(), ", "));
 }
 
-std::string study_checksum_sql() {
-  return "row_checksum(study_id, name, recipe, points, created_at)";
+std::string model_checksum_sql() {
+  return fmt::format("row_checksum({})", fmt::join(model_columns(), ", "));
 }
 
 ResultInsert::ResultInsert(sqlite3* database)
-    : database_(database), insert_(database, [] {
-        std::string marks = "?";  // the checksum
-        for (std::size_t i = 0; i < result_columns().size(); ++i) {
-          marks += ", ?";
-        }
-        // A point that has a row keeps it; any other conflict is an error.
-        return fmt::format(
-            "INSERT INTO results ({}, checksum) VALUES ({})"
-            " ON CONFLICT (study_id, point) DO NOTHING",
-            fmt::join(result_columns(), ", "), marks);
-      }()) {}
+    // A point that has a row keeps it; any other conflict is an error.
+    : insert_(database, insert_sql("results", result_columns(), "study_id, point")) {}
 
-void ResultInsert::put(std::string_view text) {
-  insert_.bind_lasting(next_++, text);
-  checksum_.add(text);
-}
-
-template <class Number>
-requires std::is_arithmetic_v<Number>
-void ResultInsert::put(Number value) {
-  insert_.bind(next_++, value);
-  checksum_.add(value);
-}
-
-void ResultInsert::put_null() {
-  ++next_;
-  checksum_.add_null();
-}
-
-bool ResultInsert::run(const ResultRow& row) {
+void ResultInsert::run(const AddResults& change, const protocol::PointResult& result,
+                       const protocol::Point& inputs, std::int64_t model_id) {
   insert_.reset();
-  checksum_.clear();
-  next_ = 1;
-  put(static_cast<std::int64_t>(row.study_id));
-  put(static_cast<std::int64_t>(row.point));
-  put(row.model_id);
-  put(row.inputs.H_m);
-  put(row.inputs.mu);
-  put(row.inputs.e_star);
-  if (row.result != nullptr) {
-    put_null();
-    put_fields<double>(*row.result);
-    put_fields<std::int64_t>(*row.result);
-    put_fields<std::string>(*row.result);
-    put_lists(*row.result);
+  insert_.bind_all(change.study_id, result.point(), model_id, inputs.H_m, inputs.mu, inputs.e_star);
+  next_ = 7;
+  if (result.error().empty()) {
+    outputs_ = protocol::from_message(result);
+    ++next_;  // no error
+    put_outputs(outputs_);
+    put_lists(outputs_);
   } else {
-    put(row.error);
-    std::ranges::for_each(output_columns(), [this](std::string_view) { put_null(); });
+    put(result.error());
+    next_ += static_cast<int>(output_columns().size());
   }
-  row.worker_id != 0 ? put(static_cast<std::int64_t>(row.worker_id)) : put_null();
-  put(std::int64_t{row.attempt});
-  put(row.solved_at);
-  put_null();  // reused_from
-  insert_.bind(next_, std::int64_t{checksum_.sum()});
-  insert_.run();
-  return sqlite3_changes(database_) > 0;
+  if (change.worker_id != 0) {
+    put(change.worker_id);
+  } else {
+    ++next_;
+  }
+  put(change.attempt);
+  put(change.solved_at);
+  insert_.run();  // parameters without a value are NULL
 }
 
-template <class T>
-void ResultInsert::put_fields(const solver::CaseResult& result) {
-  solver::for_each_stored<T>([&](const solver::ResultField&, const solver::Member<T>& member) {
-    const T* const value = member.of(result);
-    value != nullptr ? put(*value) : put_null();
-  });
+void ResultInsert::put_outputs(const solver::CaseResult& result) {
+  const auto put_field = [&](const solver::ResultField&, const auto& member) {
+    if (const auto* const value = member.of(result); value != nullptr) {
+      put(*value);
+    } else {
+      ++next_;
+    }
+  };
+  solver::for_each_stored<double>(put_field);
+  solver::for_each_stored<std::int64_t>(put_field);
+  solver::for_each_stored<std::string>(put_field);
 }
 
 void ResultInsert::put_lists(const solver::CaseResult& result) {
@@ -182,7 +178,7 @@ void ResultInsert::put_lists(const solver::CaseResult& result) {
   });
   put(peaks);
   if (ft_peaks_equal_those_of_peaks(result)) {
-    put_null();
+    ++next_;
   } else {
     write_json(ft_peaks, result.ft_peaks, [](const solver::TangentialPeak& peak) {
       return std::array{peak.t_s, peak.ft_N};
@@ -201,7 +197,7 @@ void ResultInsert::put_lists(const solver::CaseResult& result) {
   });
   put(stick_intervals);
   if (result.reaction_peaks.empty()) {
-    put_null();
+    ++next_;
   } else {
     write_json(reaction_peaks, result.reaction_peaks, [](const solver::ReactionPeak& peak) {
       return std::array{peak.t_s, peak.force_N};
@@ -210,38 +206,40 @@ void ResultInsert::put_lists(const solver::CaseResult& result) {
   }
 }
 
-std::string insert_model_sql() {
-  // The other columns are called as the model keys.
-  std::string names = "definition, lengths_m";
-  std::string marks = "?, ?";
-  for (const auto& key : solver::model_keys()) {
-    names += ", " + std::string(key.name);
-    marks += ", ?";
-  }
-  return "INSERT INTO models (" + names + ") VALUES (" + marks +
-         ") ON CONFLICT (definition) DO NOTHING";
+ModelRows::ModelRows(sqlite3* database)
+    : find_(database, "SELECT model_id FROM models WHERE definition = ?"),
+      insert_(database, insert_sql("models", model_columns(), "definition")) {}
+
+std::int64_t ModelRows::find(const solver::ModelParameters& model) {
+  return find(protocol::canonical_model(model));
 }
 
-void bind_model(Statement& insert, const solver::ModelParameters& model,
-                std::string_view definition) {
-  insert.reset();
-  insert.bind(1, definition);
-  insert.bind(2, nlohmann::json(model.lengths_m).dump());
+std::int64_t ModelRows::find(std::string_view definition) {
+  find_.bind_all(definition);
+  const std::int64_t model_id = find_.step() ? find_.integer(0) : 0;
+  find_.reset();
+  return model_id;
+}
+
+std::int64_t ModelRows::find_or_insert(const solver::ModelParameters& model) {
+  const std::string definition = protocol::canonical_model(model);
+  insert_.reset();
+  insert_.bind_all(definition, nlohmann::json(model.lengths_m).dump());
   int index = 3;
-  for (const auto& key : solver::model_keys()) {
+  for (const solver::ParameterKey& key : solver::model_keys()) {
     const double value = key.get(model);
-    const bool whole = key.name == "links" || key.name == "elements_per_link";
     if (key.name == "integrator") {
-      insert.bind(index, solver::integrator_name(model.integrator));
-    } else if (whole) {
-      insert.bind(index, static_cast<std::int64_t>(value));
+      insert_.bind(index, solver::integrator_name(model.integrator));
+    } else if (key.name == "links" || key.name == "elements_per_link") {
+      insert_.bind(index, static_cast<std::int64_t>(value));
     } else if (key.name != "length" ||
-               std::count(model.lengths_m.begin(), model.lengths_m.end(), value) ==
-                   static_cast<std::ptrdiff_t>(model.lengths_m.size())) {
-      insert.bind(index, value);
+               std::ranges::count(model.lengths_m, value) == std::ssize(model.lengths_m)) {
+      insert_.bind(index, value);
     }
     ++index;
   }
+  insert_.run();
+  return find(definition);
 }
 
 }  // namespace oblique::server

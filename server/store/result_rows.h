@@ -5,11 +5,11 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
+#include <vector>
 
 #include "proto/recipe/point_table.h"
-#include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
+#include "server/store/changes.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
 
@@ -22,24 +22,14 @@ std::span<const std::string_view> result_columns();
 std::span<const std::string_view> output_columns();
 /// The outputs that every solved row has.
 std::span<const std::string_view> required_outputs();
+/// The columns of `models`, except the number and the checksum.
+std::span<const std::string_view> model_columns();
 
-/// An SQL expression over the columns of `results` for the checksum of a row (row_checksum.h).
+/// SQL expressions for the checksum of a row, over the columns of the table.
 std::string result_checksum_sql();
-/// The same for `studies`.
-std::string study_checksum_sql();
-
-/// A row of `results`. Objects that it refers to must live until it is inserted.
-struct ResultRow {
-  std::uint64_t study_id;
-  std::uint64_t point;
-  std::int64_t model_id;
-  protocol::Point inputs;
-  const solver::CaseResult* result;  ///< nullptr: it failed
-  std::string_view error;            ///< why it failed
-  std::uint64_t worker_id;           ///< 0: NULL
-  std::uint32_t attempt;
-  std::string_view solved_at;  ///< UTC, ISO 8601
-};
+std::string model_checksum_sql();
+inline constexpr const char* kStudyChecksum =
+    "row_checksum(study_id, recipe, points, errors, created_at)";
 
 /// Inserts rows into `results`, with their checksums.
 class ResultInsert {
@@ -47,31 +37,41 @@ class ResultInsert {
   /// The connection must outlive this.
   explicit ResultInsert(sqlite3* database);
 
-  /// Inserts the row unless its point has one, and returns whether it did. Any other conflict is an
-  /// error. Throws StorageError.
-  bool run(const ResultRow& row);
+  /// Inserts the row of a result of `change` unless its point has one. `inputs` are those with
+  /// which it was solved. Throws StorageError, also for a row that breaks a rule of the table.
+  void run(const AddResults& change, const protocol::PointResult& result,
+           const protocol::Point& inputs, std::int64_t model_id);
 
  private:
-  void put(std::string_view text);
+  void put(std::string_view text) { insert_.bind_lasting(next_++, text); }
   template <class Number>
   requires std::is_arithmetic_v<Number>
-  void put(Number value);
-  void put_null();
-  template <class T>
-  void put_fields(const solver::CaseResult& result);
+  void put(Number value) { insert_.bind(next_++, value); }
+  void put_outputs(const solver::CaseResult& result);
   void put_lists(const solver::CaseResult& result);
 
-  sqlite3* database_;
   Statement insert_;
-  RowChecksum checksum_;
+  solver::CaseResult outputs_;        // kept to reuse its memory
   int next_ = 0;                      // number of the next parameter
   std::array<std::string, 5> lists_;  // texts of the lists; kept to reuse their memory
 };
 
-/// A statement that inserts a model unless one has the same definition, the model's canonical text
-/// (proto/recipe/canonical.h). `bind_model` binds its parameters.
-std::string insert_model_sql();
-void bind_model(Statement& insert, const solver::ModelParameters& model,
-                std::string_view definition);
+/// The rows of `models`, found by the model's canonical text (proto/recipe/canonical.h).
+class ModelRows {
+ public:
+  /// The connection must outlive this.
+  explicit ModelRows(sqlite3* database);
+
+  /// The number of the model's row; 0: there is none. Throws StorageError.
+  std::int64_t find(const solver::ModelParameters& model);
+  /// The same; inserts the row if there is none.
+  std::int64_t find_or_insert(const solver::ModelParameters& model);
+
+ private:
+  std::int64_t find(std::string_view definition);
+
+  Statement find_;
+  Statement insert_;
+};
 
 }  // namespace oblique::server

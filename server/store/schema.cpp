@@ -1,67 +1,52 @@
 #include "server/store/schema.h"
 
-#include <algorithm>
+#include <map>
 #include <random>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/text.h"
 #include "server/store/schema_sql.h"
 
 namespace oblique::server {
 namespace {
 
-/// A row of `sqlite_schema`.
-struct SchemaObject {
-  std::string type;
-  std::string name;
-  std::string table;  ///< of an index or trigger
-  std::string sql;
-
-  bool operator==(const SchemaObject&) const = default;
-};
-
-std::vector<SchemaObject> objects_of(sqlite3* database) {
-  std::vector<SchemaObject> objects;
-  Statement list(database,
-                 "SELECT type, name, tbl_name, sql FROM sqlite_schema"
-                 " WHERE sql IS NOT NULL ORDER BY rowid");
-  while (list.step()) {
-    objects.push_back({list.text(0), list.text(1), list.text(2), list.text(3)});
-  }
-  return objects;
+/// What SQLite reports of a table: its kind and its columns, except defaults and checks.
+std::string description(sqlite3* database, const std::string& table) {
+  Statement text(database,
+                 "SELECT (SELECT type || wr || strict FROM pragma_table_list"
+                 " WHERE schema = 'main' AND name = ?1) || group_concat("
+                 "name || ' ' || type || ' ' || \"notnull\" || pk || hidden)"
+                 " FROM pragma_table_xinfo(?1, 'main')");
+  text.bind_all(table);
+  return text.step() ? text.text(0) : "";
 }
 
-const std::vector<SchemaObject>& our_objects() {
-  static const std::vector<SchemaObject> kObjects = [] {
+/// The tables of this schema by name, with their descriptions, and its views.
+struct Objects {
+  std::map<std::string, std::string> tables;
+  std::vector<std::string> views;
+};
+
+const Objects& our_objects() {
+  static const Objects kObjects = [] {
     const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
     execute(database.get(), kSchemaSql);
     execute(database.get(), kViewsSql);
-    return objects_of(database.get());
+    Objects objects;
+    Statement list(database.get(),
+                   "SELECT type, name FROM sqlite_schema WHERE type IN ('table', 'view')"
+                   " AND name NOT LIKE 'sqlite_%'");
+    while (list.step()) {
+      const std::string name = list.text(1);
+      if (list.text(0) == "view") {
+        objects.views.push_back(name);
+      } else {
+        objects.tables[name] = description(database.get(), name);
+      }
+    }
+    return objects;
   }();
   return kObjects;
-}
-
-std::vector<std::string> missing(sqlite3* database, const std::string& type) {
-  std::vector<std::string> absent;
-  Statement find(database,
-                 "SELECT 1 FROM sqlite_schema WHERE type = ? AND name = ? COLLATE NOCASE");
-  for (const SchemaObject& object : our_objects()) {
-    if (object.type != type) {
-      continue;
-    }
-    find.bind(1, type);
-    find.bind(2, object.name);
-    if (!find.step()) {
-      absent.push_back(object.name);
-    }
-    find.reset();
-  }
-  return absent;
-}
-
-bool is_ours(const SchemaObject& object) {
-  return std::ranges::find(our_objects(), object) != our_objects().end();
 }
 
 std::string random_id() {
@@ -80,65 +65,38 @@ void create_tables(sqlite3* database) {
   execute(database, kSchemaSql);
   execute(database, fmt::format("PRAGMA application_id = {}", kApplicationId));
   execute(database, fmt::format("PRAGMA user_version = {}", kSchemaVersion));
-  Statement about(database, "INSERT INTO about (database_id) VALUES (?)");
-  about.bind(1, random_id());
-  about.run();
+  execute_with(database, "INSERT INTO about (database_id) VALUES (?)", random_id());
   transaction.commit();
 }
 
 void create_views(sqlite3* database) {
   Transaction transaction(database);
-  // While the trigger was missing, rows may have been deleted without notice.
-  const auto objects = objects_of(database);
-  const bool had_our_trigger = std::ranges::any_of(objects, [](const SchemaObject& object) {
-    return object.type == "trigger" && is_ours(object);
-  });
   execute(database, kViewsSql);
-  if (!had_our_trigger) {  // no foreign trigger is left that could run with this
-    execute(database, "UPDATE studies SET counted = 0");
-  }
   transaction.commit();
 }
 
-const std::vector<TableDefinition>& our_tables() {
-  static const std::vector<TableDefinition> kTables = [] {
-    std::vector<TableDefinition> tables;
-    for (const SchemaObject& object : our_objects()) {
-      if (object.type == "table") {
-        tables.push_back({object.name, object.sql});
-      }
+std::vector<std::string> differing_tables(sqlite3* database) {
+  std::vector<std::string> names;
+  for (const auto& [table, columns] : our_objects().tables) {
+    if (description(database, table) != columns) {
+      names.push_back(table);
     }
-    return tables;
-  }();
-  return kTables;
-}
-
-std::vector<std::string> missing_tables(sqlite3* database) {
-  return missing(database, "table");
+  }
+  return names;
 }
 
 std::vector<std::string> missing_views(sqlite3* database) {
-  return missing(database, "view");
-}
-
-std::vector<std::string> other_triggers(sqlite3* database) {
-  constexpr std::size_t kLongestName = 80;
-  std::vector<std::string> found;
-  for (const SchemaObject& object : objects_of(database)) {
-    if (object.type == "trigger" && !is_ours(object)) {
-      found.push_back(protocol::visible(protocol::shortened(object.name, kLongestName)));
+  std::vector<std::string> names;
+  Statement find(database,
+                 "SELECT 1 FROM sqlite_schema WHERE type = 'view' AND name = ? COLLATE NOCASE");
+  for (const std::string& view : our_objects().views) {
+    find.bind_all(view);
+    if (!find.step()) {
+      names.push_back(view);
     }
+    find.reset();
   }
-  return found;
-}
-
-std::string last_study_id_sql() {
-  std::string numbers = "SELECT last_study_id AS number FROM about";
-  for (const std::string_view table :
-       {"studies", "results", "completed_ranges", "retries", "deletions", "reused_points"}) {
-    numbers += fmt::format(" UNION ALL SELECT max(study_id) FROM {}", table);
-  }
-  return "(SELECT coalesce(max(number), 0) FROM (" + numbers + "))";
+  return names;
 }
 
 }  // namespace oblique::server

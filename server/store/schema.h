@@ -11,28 +11,21 @@ namespace oblique::server {
 void create_tables(sqlite3* database);
 
 /// Creates the views and the trigger of this schema again, and its indices where they were dropped.
-/// Objects with other names stay. If the trigger was missing, rows may have been deleted without
-/// notice, so all studies are marked to be counted again. Throws StorageError, for example if a
-/// table has the name of a view.
+/// Objects with other names stay. Throws StorageError, for example if a table has the name of a
+/// view.
 void create_views(sqlite3* database);
 
-/// A table of this schema and the statement that creates it.
-struct TableDefinition {
-  std::string name;
-  std::string sql;  ///< as in `sqlite_schema`
-};
-const std::vector<TableDefinition>& our_tables();
+/// The tables of this schema that the database lacks or has with other columns. Throws
+/// StorageError.
+std::vector<std::string> differing_tables(sqlite3* database);
 
-/// The tables, and the views, of this schema that the database lacks. Throws StorageError.
-std::vector<std::string> missing_tables(sqlite3* database);
+/// The views of this schema that the database lacks. Throws StorageError.
 std::vector<std::string> missing_views(sqlite3* database);
 
-/// Names of triggers that are not in this schema, or that have another text there. They would run
-/// with each change of the writer and might never end. Throws StorageError.
-std::vector<std::string> other_triggers(sqlite3* database);
-
-/// An SQL expression for the highest study number in any table; 0: none. Rows of a study whose row
-/// in `studies` was deleted by hand count too.
-std::string last_study_id_sql();
+/// An SQL expression for the highest study number that was ever given; 0: none. Rows of a study
+/// whose row in `studies` was deleted by hand count too.
+inline constexpr const char* kLastStudyId =
+    "max((SELECT coalesce(max(seq), 0) FROM main.sqlite_sequence),"
+    " (SELECT coalesce(max(study_id), 0) FROM main.results))";
 
 }  // namespace oblique::server

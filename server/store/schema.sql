@@ -4,17 +4,17 @@
 
 -- One row. Workers compare database_id with that of the database for which they keep results.
 CREATE TABLE about (
-  database_id   TEXT NOT NULL,              -- random, set when the file is created
-  starts        INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
-  last_study_id INTEGER NOT NULL DEFAULT 0, -- highest number of a deleted study; numbers are never reused
-  has_orphans   INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
+  database_id TEXT NOT NULL,              -- random, set when the file is created
+  starts      INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
+  has_orphans INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
 ) STRICT;
 
 CREATE TABLE studies (
-  study_id     INTEGER PRIMARY KEY,  -- number of the study
+  study_id     INTEGER PRIMARY KEY AUTOINCREMENT CHECK (study_id BETWEEN 1 AND 1000000000000), -- number of the study; never reused
   name         TEXT NOT NULL UNIQUE, -- name of the study
   recipe       BLOB NOT NULL,        -- oblique.protocol.Recipe, serialised: point i is a function of it
-  points       INTEGER NOT NULL,     -- number of point numbers, filtered ones included
+  points       INTEGER NOT NULL CHECK (points > 0), -- number of point numbers, filtered ones included
+  errors       INTEGER NOT NULL,     -- 1: the recipe requests estimated errors
   state        TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- running, paused, cancelled or done
   created_at   TEXT NOT NULL,        -- UTC, ISO 8601
   changed_at   TEXT NOT NULL,        -- when `state` was last set
@@ -23,7 +23,7 @@ CREATE TABLE studies (
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, `completed_ranges` must be made again
   left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` leaves out
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results in other studies has not ended
-  checksum     INTEGER               -- CRC-32 of study_id, name, recipe, points and created_at
+  checksum     INTEGER               -- CRC-32 of study_id, recipe, points, errors and created_at; NULL after a change by hand
 ) STRICT;
 
 -- Every parameter except H, mu and e; one row for each distinct model that has results. The columns are the
@@ -48,7 +48,8 @@ CREATE TABLE models (
   dt_fall     REAL NOT NULL,       -- step in the fall, s; 0: chosen by the integrator
   -- Canonical text of all parameters; proto/recipe/README.md defines it byte by byte.
   definition  TEXT NOT NULL UNIQUE,
-  tolerance   REAL NOT NULL        -- relative error allowed by automatic steps
+  tolerance   REAL NOT NULL,       -- relative error allowed by automatic steps
+  checksum    INTEGER              -- CRC-32 of the other columns, model_id excepted; NULL after a change by hand
 ) STRICT;
 
 -- One row for each session in which a worker delivered a result.
@@ -72,49 +73,17 @@ CREATE TABLE results (
   e                REAL NOT NULL, -- coefficient of restitution
   status           TEXT GENERATED ALWAYS AS (CASE WHEN error IS NULL THEN 'solved' ELSE 'failed' END) VIRTUAL, -- solved or failed
   error            TEXT,          -- why it failed; NULL: solved
-  fall_time_s      REAL,
-  impact_x_m       REAL,
-  vt_in_m_s        REAL,
-  vn_in_m_s        REAL,
-  duration_s       REAL,
-  fn_peak_N        REAL,
-  ft_peak_N        REAL,
-  major_peak_1_N   REAL,
-  major_peak_2_N   REAL,
-  major_peak_3_N   REAL,
-  major_peak_1_t_s REAL,
-  major_peak_2_t_s REAL,
-  major_peak_3_t_s REAL,
-  impulse_n_Ns     REAL,
-  impulse_t_Ns     REAL,
-  slide_m          REAL,
-  vt_out_m_s       REAL,
-  vn_out_m_s       REAL,
-  mode             TEXT,
-  major_mode       TEXT,
-  margin           REAL,
-  margin_event     TEXT,
-  stick_total_s    REAL,
-  kinetic_in_J     REAL,
-  friction_J       REAL,
-  restitution_J    REAL,
-  kinetic_change_J REAL,
-  strain_change_J  REAL,
-  gravity_change_J REAL,
-  exchanged_J      REAL,
-  closure          REAL,
-  mode_same        INTEGER,
-  fn_peak_error    REAL,
-  ft_peak_error    REAL,
-  duration_error   REAL,
-  stick_total_error REAL,
-  slide_error      REAL,
-  impulse_n_error  REAL,
-  impulse_t_error  REAL,
-  v_out_error      REAL,
-  dt_s             REAL,
-  steps            INTEGER,
-  wall_s           REAL,
+  fall_time_s REAL, impact_x_m REAL, vt_in_m_s REAL, vn_in_m_s REAL, duration_s REAL,
+  fn_peak_N REAL, ft_peak_N REAL,
+  major_peak_1_N REAL, major_peak_2_N REAL, major_peak_3_N REAL,
+  major_peak_1_t_s REAL, major_peak_2_t_s REAL, major_peak_3_t_s REAL,
+  impulse_n_Ns REAL, impulse_t_Ns REAL, slide_m REAL, vt_out_m_s REAL, vn_out_m_s REAL,
+  mode TEXT, major_mode TEXT, margin REAL, margin_event TEXT, stick_total_s REAL,
+  kinetic_in_J REAL, friction_J REAL, restitution_J REAL, kinetic_change_J REAL, strain_change_J REAL,
+  gravity_change_J REAL, exchanged_J REAL, closure REAL,
+  mode_same INTEGER, fn_peak_error REAL, ft_peak_error REAL, duration_error REAL, stick_total_error REAL,
+  slide_error REAL, impulse_n_error REAL, impulse_t_error REAL, v_out_error REAL,
+  dt_s REAL, steps INTEGER, wall_s REAL,
   peaks            TEXT,          -- [[t_s, fn_N, ft_N, major], ...]
   ft_peaks         TEXT,          -- [[t_s, ft_N], ...]; NULL of a solved point: t_s and ft_N of `peaks`
   phases           TEXT,          -- [t1_s, ...]: end of each phase; compression first, then in turn

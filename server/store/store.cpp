@@ -1,15 +1,11 @@
 #include "server/store/store.h"
 
 #include <algorithm>
-#include <optional>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/canonical.h"
 #include "proto/recipe/point_inputs.h"
-#include "proto/result_message.h"
-#include "server/database/row_checksum.h"
-#include "server/store/result_rows.h"
 #include "server/store/schema.h"
 
 namespace oblique::server {
@@ -17,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMostCachedModels = 65536;
 /// Instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
-constexpr int kStepsBetweenLooks = 1000;
+constexpr int kStepsBetweenInterrupts = 1000;
 
 /// Whether the change must survive a loss of power. Results need not: they can be solved again.
 bool is_lasting(const Change& change) {
@@ -28,76 +24,52 @@ bool is_lasting(const Change& change) {
 
 }  // namespace
 
-/// Prepared statements for batches of results.
-struct Store::Statements {
-  explicit Statements(sqlite3* database)
-      : find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
-        find_model(database, "SELECT model_id FROM models WHERE definition = ?"),
-        add_model(database, insert_model_sql()),
-        add_result(database) {}
-
-  Statement find_study;
-  Statement find_model;
-  Statement add_model;
-  ResultInsert add_result;
-};
-
-Store::Store(const std::string& path) {
-  check_path(path);
-  files_ = std::make_unique<DatabaseFiles>(path);
-  database_ = open_database(path, SQLITE_OPEN_READWRITE);
+Store::Store(const std::string& path)
+    : file_(path), database_(open_database(path, SQLITE_OPEN_READWRITE)) {
+  sqlite3* const database = database_.get();
   sqlite3_progress_handler(
-      database_.get(), kStepsBetweenLooks,
+      database, kStepsBetweenInterrupts,
       [](void* interrupted) {
         return static_cast<std::atomic<bool>*>(interrupted)->load() ? 1 : 0;
       },
       &interrupted_);
-  add_row_checksum(database_.get());
+  // Those of other programs might never end. Our trigger is for other programs only.
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   // Overwriting deleted rows with zeros would write many pages.
-  execute(database_.get(), "PRAGMA secure_delete = OFF");
-  // Applies to a new file only. Rows waste less space in pages of this size than in smaller ones.
-  execute(database_.get(), "PRAGMA page_size = 8192");
-  log_ = std::make_unique<WriteAheadLog>(database_.get());
-  const DatabaseKind kind = identify(database_.get(), path);
-  if (Statement journal(database_.get(), "PRAGMA journal_mode = WAL");
+  execute(database, "PRAGMA secure_delete = OFF");
+  // Applies to a new file only. Rows waste less space in pages of this size than in others.
+  execute(database, "PRAGMA page_size = 8192");
+  log_ = std::make_unique<WriteAheadLog>(database);
+  const DatabaseKind kind = identify(database, path);
+  if (Statement journal(database, "PRAGMA journal_mode = WAL");
       !journal.step() || journal.text(0) != "wal") {
     throw StorageError("the file system of " + path + " cannot hold a write-ahead log");
   }
-  execute(database_.get(), "PRAGMA synchronous = FULL");
+  execute(database, "PRAGMA synchronous = FULL");
   log_->rewrite();
   if (kind == DatabaseKind::kEmpty) {
-    create_tables(database_.get());
+    create_tables(database);
   }
   prepare_schema(path);
   if (kind == DatabaseKind::kEmpty) {
     log_->merge();  // a new file is a complete database from the start
   }
-  deletion_ = std::make_unique<StudyDeletion>(database_.get());
-  in_transaction(true, [this] { deletion_->remove_orphans(); });
-  statements_ = std::make_unique<Statements>(database_.get());
-  ranges_ = std::make_unique<CompletedRanges>(database_.get());
-  reuse_ = std::make_unique<ResultReuse>(database_.get(), *ranges_);
+  in_transaction(true, [this] {
+    count_completed_points(database_.get());
+    remove_orphans();
+  });
+  statements_ = std::make_unique<Statements>(database);
+  ranges_ = std::make_unique<CompletedRanges>(database);
 }
 
-/// Creates the views, and refuses a file whose tables or triggers are not those of this schema.
+/// Creates the views, and refuses a file that lacks a table or has it with other columns.
 void Store::prepare_schema(const std::string& path) {
-  // A view in place of a table could return rows without end.
-  if (const auto missing = missing_tables(database_.get()); !missing.empty()) {
-    throw StorageError(fmt::format("{} lacks the table {}: `oblique check --db {}` tells more",
-                                   path, fmt::join(missing, " and "), path));
-  }
-  // Checked before `create_views`, which may change rows. A trigger with the name of ours is
-  // replaced there.
-  auto triggers = other_triggers(database_.get());
-  std::erase(triggers, "row_deleted");
-  if (!triggers.empty()) {
-    constexpr std::size_t kMostNames = 10;
-    const std::size_t count = triggers.size();
-    triggers.resize(std::min(count, kMostNames));
+  if (const auto tables = differing_tables(database_.get()); !tables.empty()) {
     throw StorageError(fmt::format(
-        "{} has {} triggers that are not ours, and would run with each change of its rows: {}{}. "
-        "Drop them, as with DROP TRIGGER in the program sqlite3",
-        path, count, fmt::join(triggers, ", "), count > kMostNames ? " and more" : ""));
+        "{} lacks the table {} or has it with other columns: `oblique backup SAVED.db --db {} "
+        "--salvage` makes a file with all rows that can be read",
+        path, fmt::join(tables, " and "), path));
   }
   try {
     create_views(database_.get());
@@ -113,7 +85,7 @@ void Store::prepare_schema(const std::string& path) {
 
 Store::~Store() {
   try {
-    files_->check();
+    file_.check();
     if (!sync_failed_) {
       log_->delete_on_close();
     }
@@ -165,39 +137,95 @@ void Store::commit(std::span<const Change> changes) {
     ranges_->forget();
     throw;
   }
-  files_->check();  // throws if the transaction went into a file that is no longer at the path
+  file_.check();  // throws if the transaction went into a file that is no longer at the path
+  guard_syncs([this] { log_->shorten(); });
+}
+
+void Store::write(const std::function<void()>& work) {
+  in_transaction(true, work);
+  file_.check();
   guard_syncs([this] { log_->shorten(); });
 }
 
 bool Store::merge_log() {
-  files_->check();
+  file_.check();
   bool is_merged = false;
   guard_syncs([&] { is_merged = log_->merge(); });
   return is_merged;
 }
 
+// ---- Deletion -----------------------------------------------------------------------------------
+
+void Store::add(const DeleteStudy& change) {
+  for (const char* sql :
+       {"INSERT OR IGNORE INTO deletions (study_id) VALUES (?1)",
+        "DELETE FROM retries WHERE study_id = ?1", "DELETE FROM reused_points WHERE study_id = ?1",
+        "DELETE FROM studies WHERE study_id = ?1", "UPDATE about SET has_orphans = 1 WHERE ?1"}) {
+    execute_with(database_.get(), sql, change.study_id);
+  }
+}
+
 ClearedAway Store::clear_away(std::size_t most) {
-  if (!deletion_->has_rows()) {
+  const std::uint64_t study = number("SELECT coalesce(min(study_id), 0) FROM deletions");
+  if (study == 0) {
     return ClearedAway::kAll;
   }
   guard_syncs([this] { log_->shorten(); });
   if (log_->is_held_long()) {
     return ClearedAway::kMustWait;
   }
+  const auto delete_some = [&](const char* sql, std::size_t rows) {
+    execute_with(database_.get(), sql, study, rows);
+    return static_cast<std::size_t>(sqlite3_changes(database_.get()));
+  };
+  std::size_t results = 0;
   // Without a sync: rows that a loss of power restores are deleted again.
-  in_transaction(false, [&] { deletion_->delete_rows(most); });
-  files_->check();
+  in_transaction(false, [&] {
+    results = delete_some(
+        "DELETE FROM results WHERE study_id = ?1 AND point IN"
+        " (SELECT point FROM results WHERE study_id = ?1 ORDER BY point LIMIT ?2)",
+        most);
+    const std::size_t ranges = delete_some(
+        "DELETE FROM completed_ranges WHERE study_id = ?1 AND first_point IN (SELECT first_point"
+        " FROM completed_ranges WHERE study_id = ?1 ORDER BY first_point LIMIT ?2)",
+        most - results);
+    if (results + ranges < most) {
+      execute_with(database_.get(), "DELETE FROM deletions WHERE study_id = ?", study);
+    }
+  });
+  cleared_rows_ += results;
+  file_.check();
   return ClearedAway::kPart;
 }
 
+/// Deletes models and workers without rows, once all rows of deleted studies are gone. Reads all
+/// rows of the file then. Done at a start only, before any model or worker is in use.
+void Store::remove_orphans() {
+  if (number("SELECT has_orphans AND NOT EXISTS (SELECT 1 FROM deletions) FROM about") == 0) {
+    return;
+  }
+  execute(database_.get(), R"sql(
+    CREATE TEMP TABLE used AS SELECT DISTINCT model_id, worker_id FROM results;
+    DELETE FROM models WHERE model_id NOT IN (SELECT model_id FROM used);
+    DELETE FROM workers WHERE worker_id NOT IN (SELECT worker_id FROM used WHERE worker_id IS NOT NULL);
+    DROP TABLE used;
+    UPDATE about SET has_orphans = 0;
+  )sql");
+}
+
+// ---- Other changes ------------------------------------------------------------------------------
+
 void Store::add(const AddStudy& change) {
+  protocol::Recipe recipe;
+  recipe.ParseFromString(change.table.recipe_bytes());
   execute_with(database_.get(),
-               "INSERT INTO studies (study_id, name, recipe, points, state, created_at, changed_at,"
-               " priority, submitted_by, reuses, checksum)"
-               " VALUES (?1, ?2, ?3, ?4, 'running', ?5, ?5, ?6, nullif(?7, ''), ?8,"
-               " row_checksum(?1, ?2, ?3, ?4, ?5))",
+               "INSERT INTO studies (study_id, name, recipe, points, errors, state, created_at,"
+               " changed_at, priority, submitted_by, reuses, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, ?5, 'running', ?6, ?6, ?7, nullif(?8, ''), ?9,"
+               " row_checksum(?1, ?3, ?4, ?5, ?6))",
                change.study_id, change.name, Blob{change.table.recipe_bytes()}, change.table.size(),
-               change.created_at, change.priority, change.submitted_by, change.reuses);
+               recipe.errors(), change.created_at, change.priority, change.submitted_by,
+               change.reuses);
 }
 
 void Store::add(const SetPriority& change) {
@@ -210,7 +238,6 @@ void Store::add(const ForgetFailures& change) {
     return;
   }
   ranges_->flush();
-  const bool was_counted = ranges_->is_counted(change.study_id);
   // Consecutive failed points of one attempt have the same difference of point and row number.
   Statement note(database_.get(),
                  "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
@@ -229,14 +256,11 @@ void Store::add(const ForgetFailures& change) {
     note.run();
     forget.bind_all(change.study_id, interval.begin, interval.end);
     while (forget.step()) {
-      forgotten.insert(static_cast<std::uint64_t>(forget.integer(0)));
+      forgotten.insert(forget.number(0));
     }
     forget.reset();
   });
   ranges_->remove(change.study_id, forgotten);
-  if (was_counted) {  // the trigger has counted these deletions as those of another program
-    ranges_->set_counted(change.study_id);
-  }
   execute_with(database_.get(),
                "UPDATE studies SET state = 'running', changed_at = ?2"
                " WHERE study_id = ?1 AND state = 'done'",
@@ -247,17 +271,19 @@ void Store::add(const GrowStudy& change) {
   execute_with(database_.get(),
                "UPDATE studies SET recipe = ?2, points = ?3, state = 'running', changed_at = ?4,"
                " priority = ?5, reuses = reuses OR ?6,"
-               " checksum = row_checksum(study_id, name, ?2, ?3, created_at) WHERE study_id = ?1",
+               " checksum = row_checksum(study_id, ?2, ?3, errors, created_at) WHERE study_id = ?1",
                change.study_id, Blob{change.table.recipe_bytes()}, change.table.size(),
                change.changed_at, change.priority, change.reuses);
 }
 
 void Store::add(const RenameStudy& change) {
-  execute_with(database_.get(),
-               "UPDATE studies SET name = ?2,"
-               " checksum = row_checksum(study_id, ?2, recipe, points, created_at)"
-               " WHERE study_id = ?1",
-               change.study_id, change.name);
+  execute_with(database_.get(), "UPDATE studies SET name = ?2 WHERE study_id = ?1", change.study_id,
+               change.name);
+}
+
+void Store::add(const EndReuse& change) {
+  execute_with(database_.get(), "UPDATE studies SET reuses = 0 WHERE study_id = ?",
+               change.study_id);
 }
 
 void Store::add(const SetStudyState& change) {
@@ -278,23 +304,9 @@ void Store::add(const AddResults& change) {
   if (!has_study(change.study_id)) {
     return;
   }
-  solver::CaseResult outputs;
   for (const protocol::PointResult& result : change.results) {
-    const protocol::Point point = protocol::inputs_of(result, *change.table);
-    const bool is_solved = result.error().empty();
-    if (is_solved) {
-      outputs = protocol::from_message(result);
-    }
-    const ResultRow row{.study_id = change.study_id,
-                        .point = result.point(),
-                        .model_id = stored_model(change, point.model),
-                        .inputs = point,
-                        .result = is_solved ? &outputs : nullptr,
-                        .error = result.error(),
-                        .worker_id = change.worker_id,
-                        .attempt = change.attempt,
-                        .solved_at = change.solved_at};
-    statements_->add_result.run(row);
+    const protocol::Point inputs = protocol::inputs_of(result, *change.table);
+    statements_->add_result.run(change, result, inputs, stored_model(change, inputs.model));
     ranges_->add(change.study_id, result.point());  // also if it already had a row
   }
   if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
@@ -316,23 +328,14 @@ bool Store::has_study(std::uint64_t study_id) {
 
 /// The row of `models` that has model number `model` of the study. Inserts it if there is none.
 std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
-  const std::pair key{change.study_id, model};
-  if (const auto known = models_.find(key); known != models_.end()) {
-    return known->second;
-  }
-  const solver::ModelParameters parameters = change.table->model(model);
-  const std::string definition = protocol::canonical_model(parameters);
-  bind_model(statements_->add_model, parameters, definition);
-  statements_->add_model.run();
-  Statement& find = statements_->find_model;
-  find.bind(1, definition);
-  const std::int64_t id = find.step() ? find.integer(0) : 0;
-  find.reset();
   if (models_.size() >= kMostCachedModels) {
     models_.clear();
   }
-  models_.emplace(key, id);
-  return id;
+  const auto [known, is_new] = models_.emplace(std::pair{change.study_id, model}, 0);
+  if (is_new) {
+    known->second = statements_->models.find_or_insert(change.table->model(model));
+  }
+  return known->second;
 }
 
 }  // namespace oblique::server

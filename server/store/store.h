@@ -8,15 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
 #include "server/store/completed_ranges.h"
-#include "server/store/database_files.h"
-#include "server/store/result_reuse.h"
-#include "server/store/study_deletion.h"
+#include "server/store/result_rows.h"
 #include "server/store/write_ahead_log.h"
 #include "server/study/interval_set.h"
-#include "server/study/point_attempts.h"
 
 namespace oblique::server {
 
@@ -29,13 +27,13 @@ struct StoredStudy {
   std::string created_at;
   std::int32_t priority = 0;
   std::string solver_version;  ///< of its results; empty: there are none
-  IntervalSet settled;         ///< completed points
+  IntervalSet completed;
   IntervalSet failures;        ///< completed points that failed
   PointAttempts attempts{};    ///< of failed points, and of those whose failure `retry` removed
   std::string submitted_by{};  ///< name of the key; empty: without keys
   bool reuses = false;         ///< the lookup of results in other studies has not ended
   std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out
-  std::map<std::string, std::uint64_t> taken{};  ///< number of reused results by source study
+  std::map<std::string, std::uint64_t> reused{};  ///< number of reused results by source study
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store can have a file open; other
@@ -50,28 +48,33 @@ class Store final : public Storage {
   ~Store() override;
 
   void commit(std::span<const Change> changes) override;
-  void check() override { files_->check(); }
+  void check() override { file_.check(); }
   bool merge_log() override;
   void interrupt() override { interrupted_ = true; }
   ClearedAway clear_away(std::size_t most) override;
   /// Number of rows that `clear_away` has deleted.
-  std::uint64_t cleared_rows() const { return deletion_->rows(); }
+  std::uint64_t cleared_rows() const { return cleared_rows_; }
+
+  /// Runs `work` in a transaction of its own, which is made durable; rolls it back if `work`
+  /// throws. Throws as `commit` does.
+  void write(const std::function<void()>& work);
+  /// The connection, for programs that change the file without a server. Triggers and views of the
+  /// file are disabled in it.
+  sqlite3* connection() const { return database_.get(); }
 
   /// Whether the file was created.
-  bool is_new() const { return files_->were_made(); }
+  bool is_new() const { return file_.is_new(); }
 
   /// Sets the length of the write-ahead log [pages] from which on it is copied into the database.
   void checkpoint_at(int pages) { log_->shorten_at(pages); }
 
-  /// All studies in the order of their numbers, with their completed points. Rows are counted again
-  /// where another program deleted some. Throws StorageError, also for a recipe that cannot be
-  /// read, a number below 1, and a study whose rows are not those of its recipe.
+  /// All studies in the order of their numbers, with their completed points. Throws StorageError,
+  /// also for a study whose number, recipe or size is not the one that was stored.
   std::vector<StoredStudy> studies();
   /// A sentence about each study that `studies` skipped because this version does not accept it.
-  const std::vector<std::string>& left_out() const { return left_out_; }
+  const std::vector<std::string>& skipped() const { return skipped_; }
 
-  /// Highest number given to a study or worker so far, in any table; 0 when there is none. Throws
-  /// StorageError when no study can have a higher one.
+  /// Highest number given to a study or worker so far; 0 when there is none. Throws StorageError.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
 
@@ -91,34 +94,44 @@ class Store final : public Storage {
   void add(const ForgetFailures& change);
   void add(const GrowStudy& change);
   void add(const RenameStudy& change);
-  void add(const DeleteStudy& change) { deletion_->remove(change.study_id); }
-  void add(const ReuseResults& change) { reuse_->run(change); }
-  void add(const EndReuse& change) { reuse_->end(change); }
+  void add(const DeleteStudy& change);
+  void add(const ReuseResults& change);
+  void add(const EndReuse& change);
   void add(const AddWorker& change);
   void add(const AddResults& change);
   void prepare_schema(const std::string& path);
   /// Runs `work` and records a failed sync.
   void guard_syncs(const std::function<void()>& work);
-  /// Runs `work` in a transaction that is rolled back if `work` throws.
   void in_transaction(bool full_sync, const std::function<void()>& work);
+  void remove_orphans();
   bool has_study(std::uint64_t study_id);
   std::int64_t stored_model(const AddResults& change, std::uint64_t model);
-  std::uint64_t highest(const std::string& sql);
-  PointsOfStudies completed_points();
+  std::uint64_t number(const std::string& sql);
 
-  std::unique_ptr<DatabaseFiles> files_;   // must outlive the connection
+  ServerFile file_;                        // must outlive the connection
   std::atomic<bool> interrupted_ = false;  // must outlive the connection
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
-  std::unique_ptr<StudyDeletion> deletion_;
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<CompletedRanges> ranges_;
-  std::unique_ptr<ResultReuse> reuse_;
   // Cache: rows of `models` by study and model number. Cleared when large or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> models_;
+  std::uint64_t cleared_rows_ = 0;
   bool full_sync_ = true;
   bool sync_failed_ = false;
-  std::vector<std::string> left_out_;
+  std::vector<std::string> skipped_;
+};
+
+/// Prepared statements for batches of results.
+struct Store::Statements {
+  explicit Statements(sqlite3* database)
+      : find_study(database, "SELECT 1 FROM studies WHERE study_id = ?"),
+        models(database),
+        add_result(database) {}
+
+  Statement find_study;
+  ModelRows models;
+  ResultInsert add_result;
 };
 
 }  // namespace oblique::server

@@ -58,9 +58,7 @@ void WriteAheadLog::rewrite() {
 
 int WriteAheadLog::checkpoint(int mode, int* in_log, int* copied) {
   const int code = sqlite3_wal_checkpoint_v2(database_, "main", mode, in_log, copied);
-  if (is_failed_sync(code)) {
-    throw_failed_sync(database_);
-  }
+  check_sync(database_, code);
   return code;
 }
 

@@ -7,7 +7,7 @@ namespace oblique::server {
 /// Makes the checkpoints of an open database, because SQLite ignores a failed automatic one.
 ///
 /// After a failed sync Linux marks the unwritten pages as clean, and a later sync succeeds without
-/// having stored them. If the power fails after a checkpoint of such a log, the database could have
+/// having stored them. If the power fails during a checkpoint of such a log, the database may have
 /// only part of a transaction. So each failed sync throws StorageGone, which ends the server, and
 /// the next server writes the whole log again before any change.
 class WriteAheadLog {

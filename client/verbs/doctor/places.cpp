@@ -5,29 +5,19 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "server/database/database_in_use.h"
+#include "server/database/database_file.h"
 #include "server/database/open_for_reading.h"
-#include "server/database/shared_disk.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::client::doctor {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string type_of_file_system(const std::filesystem::path& folder) {
-  std::ifstream file("/proc/self/mountinfo");
-  const std::string mounts(std::istreambuf_iterator<char>(file), {});
-  const std::string type = server::file_system_of(folder.string(), mounts);
-  return type.empty() ? "unknown" : type;
-}
 
 std::uint64_t size_of(const std::string& file) {
   std::error_code error;
@@ -94,7 +84,7 @@ Findings examine_disk(const std::string& file) {
         fmt::format("There is no folder {}: a database cannot be in it.", folder.string()));
     return found;
   }
-  const std::string type = type_of_file_system(folder);
+  const std::string type = server::file_system_of(folder.string());
   found.add("file_system", "file system", type, type);
   const std::uint64_t free = std::uint64_t{disk.f_bavail} * disk.f_frsize;
   const std::uint64_t total = std::uint64_t{disk.f_blocks} * disk.f_frsize;

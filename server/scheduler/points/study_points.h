@@ -12,7 +12,6 @@
 #include "server/scheduler/points/loss_history.h"
 #include "server/scheduler/points/point_order.h"
 #include "server/study/interval_set.h"
-#include "server/study/point_attempts.h"
 #include "server/study/study_table.h"
 
 namespace oblique::server {

@@ -33,7 +33,7 @@ void StudyStates::set_state(StudyId id, Study& study, StudyState state) {
 }
 
 void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
-  const bool lacks_rows = stored.settled.size() < stored.table.size();
+  const bool lacks_rows = stored.completed.size() < stored.table.size();
   const StudyState state =
       stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state;
   add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.priority,

@@ -13,7 +13,6 @@
 #include "server/store/changes.h"
 #include "server/store/store.h"
 #include "server/study/interval_set.h"
-#include "server/study/point_attempts.h"
 #include "server/study/study_table.h"
 
 namespace oblique::server {

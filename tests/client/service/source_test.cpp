@@ -13,7 +13,7 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "server/database/database_in_use.h"
+#include "server/database/database_file.h"
 #include "server/store/store.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/temporary_folder.h"

@@ -14,7 +14,6 @@
 
 #include "server/maintenance/backup.h"
 #include "server/maintenance/check.h"
-#include "server/maintenance/salvage.h"
 #include "server/query/reader.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
@@ -109,7 +108,7 @@ TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
   EXPECT_EXIT(as_stranger([&] {
                 back_up(file, copy);
                 return Reader(file).study_status("a").at(0).solved() == 3 &&
-                       find_faults(file).empty() && rows_of(copy) == 3 &&
+                       diagnose(file).faults.empty() && rows_of(copy) == 3 &&
                        salvage(file, saved).results == 3;
               }),
               testing::ExitedWithCode(0), "");

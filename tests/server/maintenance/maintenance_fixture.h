@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/maintenance/check.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
@@ -22,6 +23,10 @@ inline std::shared_ptr<const protocol::PointTable> filtered_table(const std::str
   protocol::Recipe recipe = table_of(10)->recipe();
   recipe.mutable_blocks(0)->set_where(where);
   return std::make_shared<const protocol::PointTable>(recipe);
+}
+
+inline std::vector<std::string> find_faults(const std::string& path) {
+  return diagnose(path).faults;
 }
 
 /// The first page of a table.

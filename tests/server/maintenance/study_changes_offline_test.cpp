@@ -62,38 +62,6 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   EXPECT_THROW(delete_study(path_, 1, [](auto) {}), StudyRefused);
 }
 
-/// Can clear something away so many times; before each it must wait so often.
-class SlowStorage final : public Storage {
- public:
-  SlowStorage(int parts, int waits) : parts_(parts), waits_(waits) {}
-
-  void commit(std::span<const Change> /*changes*/) override {}
-  ClearedAway clear_away(std::size_t /*most*/) override {
-    if (waited_++ < waits_) {
-      return ClearedAway::kMustWait;
-    }
-    waited_ = 0;
-    return parts_-- > 0 ? ClearedAway::kPart : ClearedAway::kAll;
-  }
-
- private:
-  int parts_;
-  int waits_;
-  int waited_ = 0;
-};
-
-TEST(ClearAllAway, WaitsForThoseWhoReadAsLongAsItGoesOnAndNotForEver) {
-  const Patience patience{.waits = 5, .pause = std::chrono::milliseconds(0)};
-  int parts = 0;
-  const auto count = [&] { ++parts; };
-  SlowStorage goes_on(100, 4);
-  EXPECT_TRUE(clear_all_away(goes_on, count, patience));
-  EXPECT_EQ(parts, 100);
-  SlowStorage stands(100, 1'000'000'000);
-  EXPECT_FALSE(clear_all_away(stands, count, patience));
-  EXPECT_EQ(parts, 100);
-}
-
 TEST_F(OfflineStudyTest, AMissingDatabaseIsNotMade) {
   EXPECT_THROW(rename_study(copy_, 1, "b"), StorageError);
   EXPECT_FALSE(std::filesystem::exists(copy_));
@@ -113,9 +81,7 @@ TEST_F(OfflineStudyTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
   }
   {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-    Statement update(database.get(), "UPDATE studies SET recipe = ?");
-    update.bind_blob(1, bytes);
-    update.run();
+    execute_with(database.get(), "UPDATE studies SET recipe = ?", Blob{bytes});
   }
   EXPECT_THROW(stored_recipe(path_, 1), StorageError);
   EXPECT_THAT(find_faults(path_), testing::Contains(HasSubstr("more than a recipe may have")));

@@ -223,11 +223,11 @@ TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
   ServiceSettings settings;
   settings.solver_version = "1.0";
   StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
-  source.settled = IntervalSet(0, 5);
+  source.completed = IntervalSet(0, 5);
   StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   pending.reuses = true;
-  pending.taken = {{"a", 3}};
-  pending.settled = IntervalSet(0, 3);
+  pending.reused = {{"a", 3}};
+  pending.completed = IntervalSet(0, 3);
   service_.reset();
   service_.emplace(settings, outbox_, std::vector<StoredStudy>{source, pending}, now_);
   EXPECT_THAT(parts(), ElementsAre(0));

@@ -58,47 +58,19 @@ TEST_F(CompletedRangesTest, RetriedFailuresLeaveTheirRangeAndTheStudyStaysCounte
   EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
 }
 
-TEST_F(CompletedRangesTest, RowsDeletedByHandAreOpenAfterTheNextStart) {
-  const auto study = study_of(9);
-  commit({study, worker(1), solved(study, {0, 1, 2, 3, 4, 5, 6, 7, 8}),
-          SetStudyState{1, StudyState::kDone, "now"}});
-  close();
-  by_hand("DELETE FROM results WHERE point IN (3, 4)");
-  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0"));
-  IntervalSet left(0, 9);
-  left.erase(3, 5);
-  EXPECT_EQ(store().studies().at(0).settled, left);
-  EXPECT_THAT(ranges(), ElementsAre("0+3", "5+4"));
-  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
-}
-
-TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsStayMarkedBesideItsOwnDeletions) {
-  const auto study = study_of(9);
-  commit({study, worker(1), solved(study, {0, 1, 2, 3}), failed(study, {8})});
-  by_hand("DELETE FROM results WHERE point = 1");
-  commit({ForgetFailures{1, IntervalSet(8, 9), "now"}});
-  commit({solved(study, {5})});
-  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0"));
-  EXPECT_EQ(store().studies().at(0).settled.size(), 4U);
-  EXPECT_THAT(ranges(), ElementsAre("0+1", "2+2", "5+1"));
-}
-
-TEST_F(CompletedRangesTest, AreReadAsTheyAreWrittenAndNotForStudiesToBeCountedAgain) {
+TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsAreOpenAfterTheNextStart) {
   const auto study = study_of(9);
   const auto other = study_of(9, 2, "b");
-  commit({study, other, worker(1), solved(study, {0, 1, 4}), solved(other, {7})});
-  by_hand("DELETE FROM results WHERE study_id = 2");
-  IntervalSet points(0, 2);
-  points.insert(4);
-  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-  const auto all = noted_points(database.get());
-  EXPECT_EQ(all.size(), 2U);
-  EXPECT_EQ(all.at(1), points);
-  EXPECT_EQ(all.at(2), std::nullopt);
-  EXPECT_EQ(noted_points_of(database.get(), 1), points);
-  EXPECT_EQ(noted_points_of(database.get(), 2), std::nullopt);
-  EXPECT_EQ(noted_points_of(database.get(), 3), std::nullopt);
-  EXPECT_EQ(points_with_row(database.get(), 1, {1, 9}).size(), 2U);
+  commit({study, other, worker(1), solved(study, {0, 1, 2, 3}), failed(study, {8}),
+          solved(other, {0, 1})});
+  by_hand("DELETE FROM results WHERE study_id = 1 AND point = 1");
+  commit({ForgetFailures{1, IntervalSet(8, 9), "now"}});
+  commit({solved(study, {5})});
+  EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0", "1"));
+  close();
+  EXPECT_EQ(store().studies().at(0).completed.size(), 4U);
+  EXPECT_THAT(ranges(), ElementsAre("0+1", "2+2", "5+1"));
+  EXPECT_EQ(store().studies().at(1).completed, IntervalSet(0, 2));
 }
 
 /// The ranges of a study in an open database.
@@ -169,25 +141,22 @@ TEST(CompletedRanges, RandomChangesLeaveThePointsOfASetInTheFewestRanges) {
   }
 }
 
-TEST_F(CompletedRangesTest, PointsThatAConditionLeavesOutStayCompletedWhenRowsAreCountedAgain) {
+TEST_F(CompletedRangesTest, PointsThatAFilterLeavesOutAreExaminedAgainWhenRowsAreCountedAgain) {
   AddStudy study = study_of(10);
   protocol::Recipe recipe = study.table->recipe();
   recipe.mutable_blocks(0)->set_where("mu > 0.4");
   study.table = std::make_shared<const protocol::PointTable>(recipe);
   AddResults some = solved(study, {4, 5, 8});
-  some.left_out.insert(0, 3);
-  AddResults only_ranges = solved(study, {});
-  only_ranges.left_out.insert(3);
+  some.left_out.insert(0, 4);
   commit({study, worker(1), some});
-  commit({only_ranges});
   EXPECT_THAT(ranges(), ElementsAre("0+6", "8+1"));
-  EXPECT_EQ(store().studies().at(0).settled.size(), 7U);
+  close();
+  EXPECT_EQ(store().studies().at(0).completed.size(), 7U);
   EXPECT_EQ(store().studies().at(0).left_out, 4U);
   close();
   by_hand("DELETE FROM results WHERE point = 5");
-  EXPECT_EQ(store().studies().at(0).settled.size(), 6U);
-  EXPECT_EQ(store().studies().at(0).left_out, 4U);
-  EXPECT_THAT(ranges(), ElementsAre("0+5", "8+1"));
+  EXPECT_EQ(store().studies().at(0).left_out, 0U);
+  EXPECT_THAT(ranges(), ElementsAre("4+1", "8+1"));
 }
 
 TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
@@ -208,9 +177,7 @@ TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
 TEST_F(CompletedRangesTest, APointThatHadARowAlreadyIsCompletedByItsResult) {
   const auto study = study_of(10);
   commit({study, worker(1), solved(study, {3, 4})});
-  close();
   by_hand("DELETE FROM completed_ranges");
-  EXPECT_TRUE(store().studies().at(0).settled.empty());
   commit({solved(study, {4})});
   EXPECT_THAT(ranges(), ElementsAre("4+1"));
 }

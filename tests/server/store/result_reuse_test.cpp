@@ -1,6 +1,4 @@
 // Rows of other studies that are reused, as the store looks them up and copies them.
-#include "server/store/result_reuse.h"
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -82,11 +80,6 @@ class SamePointsTest : public ResultReuseTest {
     solve(1, points_, 10);
   }
   IntervalSet reused() { return reuse_part(2, points_).points; }
-  static IntervalSet all_but_the_third() {
-    IntervalSet points(0, 10);
-    points.erase(3, 4);
-    return points;
-  }
 
   Table points_ = table_of(10);
 };
@@ -98,8 +91,8 @@ TEST_F(SamePointsTest, SoundRowsAreCopiedAndCountedByTheirOrigin) {
   EXPECT_EQ(outcome.probes, 10U);
   EXPECT_EQ(outcome.next_point, std::nullopt);
   const StoredStudy study = store().studies().at(1);
-  EXPECT_EQ(study.settled, IntervalSet(0, 10));
-  EXPECT_THAT(study.taken, ElementsAre(Pair("a", 10)));
+  EXPECT_EQ(study.completed, IntervalSet(0, 10));
+  EXPECT_THAT(study.reused, ElementsAre(Pair("a", 10)));
 }
 
 TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInItsStudyItsPointAndWhereItCameFrom) {
@@ -119,19 +112,20 @@ TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInItsStudyItsPointAndWhereIt
   EXPECT_EQ(copies(2)[3], "a/3") << "the name when it was copied";
 }
 
-TEST_F(SamePointsTest, ARowThatWasEditedByHandIsNotCopied) {
-  by_hand("UPDATE results SET slide_m = slide_m + 1 WHERE study_id = 1 AND point = 3");
-  EXPECT_EQ(reused(), all_but_the_third());
-}
-
-TEST_F(SamePointsTest, ARowWithoutAChecksumIsNotCopied) {
-  by_hand("UPDATE results SET checksum = NULL WHERE study_id = 1 AND point = 3");
-  EXPECT_EQ(reused(), all_but_the_third());
-}
-
-TEST_F(SamePointsTest, RowsOfAnotherSolverVersionAreNotCopied) {
-  by_hand("UPDATE workers SET solver_version = '1.0b' WHERE worker_id = 1");
-  EXPECT_EQ(reused(), IntervalSet());
+TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfADeletedStudy) {
+  const std::vector<std::pair<std::string, Interval>> changes{
+      {"UPDATE results SET slide_m = slide_m + 1 WHERE point = 3", {3, 4}},
+      {"UPDATE results SET checksum = NULL WHERE point = 4", {4, 5}},
+      {"UPDATE workers SET solver_version = '1.0b' WHERE worker_id = 1", {0, 10}}};
+  IntervalSet expected(0, 10);
+  std::uint64_t id = 3;
+  for (const auto& [change, lost] : changes) {
+    by_hand(change);
+    expected.erase(lost.begin, lost.end);
+    add(id, "another", points_);
+    EXPECT_EQ(reuse_part(id, points_).points, expected) << change;
+    commit({DeleteStudy{id++}});
+  }
 }
 
 TEST_F(SamePointsTest, PointsThatAreCompletedWithoutARowGetNone) {
@@ -148,24 +142,13 @@ TEST_F(SamePointsTest, ALookupThatEndedIsNotedInTheStudy) {
   EXPECT_FALSE(store().studies().at(2).reuses);
 }
 
-TEST_F(SamePointsTest, RowsOfADeletedStudyAreNotCopied) {
-  commit({DeleteStudy{1}});
-  EXPECT_EQ(reused(), IntervalSet());
-}
-
 TEST_F(SamePointsTest, ADeletedStudyGetsNoRows) {
   commit({DeleteStudy{2}});
   EXPECT_EQ(reused(), IntervalSet());
   EXPECT_THAT(copies(2), IsEmpty());
 }
 
-TEST_F(SamePointsTest, WhereSeveralStudiesHaveAResultItIsCopiedFromTheFirst) {
-  add(3, "c", points_);
-  EXPECT_EQ(reused(), IntervalSet(0, 10));
-  EXPECT_THAT(reuse_part(3, points_).origins, ElementsAre(Pair("a", 10)));
-}
-
-TEST_F(ResultReuseTest, PartsFollowEachOtherAndPassOverSettledPoints) {
+TEST_F(ResultReuseTest, PartsFollowEachOtherAndSkipCompletedPoints) {
   const Table points = table_of(10'000);
   add(1, "a", points);
   add(2, "b", points);
@@ -195,8 +178,7 @@ TEST_F(ResultReuseTest, AModelThatNoRowHasCostsOneProbe) {
   EXPECT_EQ(outcome.next_point, std::nullopt);
 }
 
-// ---- Random studies against a lookup in a map
-// ----------------------------------------------------
+// ---- Random studies against a lookup in a map ---------------------------------------------------
 
 /// Few values of each key, so that studies share points, some of them twice.
 protocol::Block random_block(std::mt19937& random) {
@@ -275,9 +257,9 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
     reused += expected.size();
     // What is left is solved in part. A copy comes behind its source, so it is never the first.
     AddResults rest = results(study, points, kWorker);
-    const IntervalSet settled = store().studies().back().settled;
+    const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
-      if (points->is_left_in(number) && !settled.contains(number) && random() % 2 == 0) {
+      if (points->is_left_in(number) && !completed.contains(number) && random() % 2 == 0) {
         rest.results.push_back(solved_point(number));
         solved.emplace(inputs_of(*points, number), fmt::format("study {}/{}", study, number));
       }

@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 #include <spdlog/fmt/fmt.h>
 
-#include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"
 #include "server/store/result_rows.h"
 #include "server/store/store.h"
@@ -72,7 +71,6 @@ class StoreFixture : public testing::Test {
   /// The rows of a query, the values of each separated by '|'.
   std::vector<std::string> rows(const std::string& sql) const {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    add_row_checksum(database.get());
     Statement statement(database.get(), sql);
     std::vector<std::string> found;
     while (statement.step()) {
@@ -95,11 +93,12 @@ class StoreFixture : public testing::Test {
         found.push_back(line);
       }
     }
-    for (const auto& [table, checksum] : {std::pair("results", result_checksum_sql()),
-                                          std::pair("studies", study_checksum_sql())}) {
+    for (const auto& [table, checksum] :
+         {std::pair("results", result_checksum_sql()), std::pair("models", model_checksum_sql()),
+          std::pair("studies", std::string(kStudyChecksum))}) {
       for (const std::string& row :
-           rows(fmt::format("SELECT study_id FROM {} WHERE checksum IS NOT {}", table, checksum))) {
-        found.push_back(fmt::format("a row of {} of study {}", table, row));
+           rows(fmt::format("SELECT * FROM {} WHERE checksum IS NOT {}", table, checksum))) {
+        found.push_back(fmt::format("a row of {}: {}", table, row));
       }
     }
     return found;

@@ -1,14 +1,11 @@
 #include "server/store/store.h"
 
-#include <atomic>
 #include <filesystem>
 #include <fstream>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/model_message.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {
@@ -34,7 +31,7 @@ TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
   IntervalSet completed(0, 2);
   completed.insert(5);
   completed.insert(7);
-  EXPECT_EQ(studies[0].settled, completed);
+  EXPECT_EQ(studies[0].completed, completed);
   EXPECT_EQ(studies[0].failures, IntervalSet(7, 8));
   EXPECT_EQ(studies[0].state, StudyState::kRunning);
   EXPECT_EQ(studies[0].solver_version, "0.1");
@@ -43,32 +40,24 @@ TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
   EXPECT_EQ(store().database_id(), identity);
 }
 
-TEST_F(StoreTest, AStatementThatNeverEndsCanBeInterrupted) {
-  store();
-  by_hand(
-      "CREATE TRIGGER endless AFTER INSERT ON studies BEGIN"
-      " SELECT count(*) FROM (WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
-      " SELECT i FROM n); END;");
-  std::thread writer([&] {
-    EXPECT_THAT([&] { commit({study_of(1)}); },
-                testing::ThrowsMessage<StorageError>(HasSubstr("interrupted")));
-  });
+TEST_F(StoreTest, AnInterruptEndsALongStatement) {
+  const auto study = study_of(100);
+  commit({study, worker(1)});
+  AddResults change = results_of(study, {});
+  for (std::uint64_t point = 0; point < 100; ++point) {
+    change.results.push_back(solved_point(point));
+  }
   store().interrupt();
-  writer.join();
+  EXPECT_THAT([&] { commit({change}); },
+              testing::ThrowsMessage<StorageError>(HasSubstr("interrupted")));
 }
 
-TEST_F(StoreTest, AnEmptyDatabaseHasNoStudies) {
+TEST_F(StoreTest, AnEmptyDatabaseHasAnIdentityAndCountsStarts) {
   EXPECT_THAT(store().studies(), IsEmpty());
   EXPECT_EQ(store().last_study_id(), 0U);
   EXPECT_EQ(store().last_worker_id(), 0U);
-}
-
-TEST_F(StoreTest, TwoDatabasesHaveDifferentIdentities) {
-  EXPECT_NE(Store(path_).database_id(), Store(folder_.file("other.db")).database_id());
-}
-
-TEST_F(StoreTest, EachStartIsCounted) {
   EXPECT_EQ(store().count_start(), 1U);
+  EXPECT_NE(store().database_id(), Store(folder_.file("other.db")).database_id());
   close();
   EXPECT_EQ(store().count_start(), 2U);
 }
@@ -86,16 +75,12 @@ TEST_F(StoreTest, AFailedTransactionKeepsNothing) {
   const auto study = study_of(3);
   EXPECT_THROW(commit({study, study_of(3, 2, "a")}), StorageError);
   EXPECT_THAT(store().studies(), IsEmpty());
-  commit({study, solved(study, {0})});
-  EXPECT_EQ(store().studies().at(0).settled.size(), 1U);
-}
-
-TEST_F(StoreTest, ModelsAreForgottenWithTheTransactionThatBroughtThem) {
-  const auto study = study_of(3);
   commit({study, worker(1)});
   EXPECT_THROW(commit({solved(study, {0}), study_of(3, 2, "a")}), StorageError);
   commit({solved(study, {0})});
-  EXPECT_THAT(rows("SELECT 1 FROM results JOIN models USING (model_id)"), ElementsAre("1"));
+  EXPECT_EQ(store().studies().at(0).completed.size(), 1U);
+  EXPECT_THAT(rows("SELECT 1 FROM results JOIN models USING (model_id)"), ElementsAre("1"))
+      << "the model was rolled back, too";
 }
 
 TEST_F(StoreTest, TheStateOfAStudyIsKept) {
@@ -110,24 +95,21 @@ TEST_F(StoreTest, TheStateOfAStudyIsKept) {
   EXPECT_THAT(rows("SELECT DISTINCT changed_at FROM studies"), ElementsAre("later"));
 }
 
-TEST_F(StoreTest, AStudyWhoseNameIsNotUtf8IsLeftOutAndNamed) {
+TEST_F(StoreTest, AStudyWhoseNameIsNotUtf8IsSkipped) {
   commit({study_of(3), study_of(3, 2, "b")});
   close();
   by_hand("UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 1");
   const auto studies = store().studies();
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].name, "b");
-  EXPECT_THAT(store().left_out(), ElementsAre(HasSubstr("study 1 is left as it is")));
+  EXPECT_THAT(store().skipped(), ElementsAre(HasSubstr("its name is not UTF-8")));
 }
 
 TEST_F(StoreTest, TheSubmitterOfAStudyIsKeptByTheNameOfTheKey) {
   auto with_key = study_of(10);
   with_key.submitted_by = "alice";
   commit({with_key, study_of(10, 2, "b")});
-  close();
-  const auto studies = store().studies();
-  EXPECT_EQ(studies.at(0).submitted_by, "alice");
-  EXPECT_EQ(studies.at(1).submitted_by, "");
+  EXPECT_EQ(store().studies().at(0).submitted_by, "alice");
   EXPECT_THAT(rows("SELECT submitted_by IS NULL FROM studies"), ElementsAre("0", "1"));
 }
 
@@ -233,7 +215,7 @@ TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("another program"), HasSubstr("recipes")));
 }
 
-TEST_F(StoreTest, AStudyThatThisVersionDoesNotTakeIsLeftOutAndNamedAndTheOthersAreThere) {
+TEST_F(StoreTest, AStudyThatThisVersionDoesNotAcceptIsSkippedAndNamed) {
   commit({study_of(10, 1, "too elastic"), study_of(10, 2, "b")});
   close();
   // Other versions may take an e that this one cannot solve.
@@ -244,108 +226,50 @@ TEST_F(StoreTest, AStudyThatThisVersionDoesNotTakeIsLeftOutAndNamedAndTheOthersA
   e.add_values(1e-4);
   {
     const auto database = open_database(path_, SQLITE_OPEN_READWRITE);
-    Statement update(database.get(), "UPDATE studies SET recipe = ? WHERE study_id = 1");
-    const std::string bytes = recipe.SerializeAsString();
-    update.bind_blob(1, bytes);
-    update.run();
+    execute_with(database.get(),
+                 "UPDATE studies SET recipe = ?, checksum = NULL WHERE study_id = 1",
+                 Blob{recipe.SerializeAsString()});
   }
   const auto studies = store().studies();
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].name, "b");
-  EXPECT_THAT(store().left_out(),
+  EXPECT_THAT(store().skipped(),
               ElementsAre(AllOf(HasSubstr("too elastic"), HasSubstr("e = 0.0001"))));
 }
 
 TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
   commit({study_of(3)});
   close();
-  by_hand("UPDATE studies SET recipe = x'ff'");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check`")));
+  by_hand("UPDATE studies SET recipe = x'ff', checksum = NULL");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check")));
 }
 
-TEST_F(StoreTest, CompletedPointsOfAStudyWithAConditionMayLackRows) {
-  protocol::Recipe recipe = table_of(5)->recipe();
-  recipe.mutable_blocks(0)->set_where("mu > 0.3");
-  const AddStudy study{1, "a", std::make_shared<const protocol::PointTable>(recipe), "now"};
-  commit({study, worker(1), solved(study, {2, 3, 4})});
+TEST_F(StoreTest, ANumberIsNeverGivenToAnotherStudy) {
+  const auto study = study_of(5, 2);
+  commit({study, solved(study, {0}), study_of(5, 3, "b")});
   close();
-  by_hand("UPDATE completed_ranges SET first_point = 0, points = 5");
-  EXPECT_EQ(store().studies().at(0).settled, IntervalSet(0, 5));
+  by_hand("DELETE FROM studies");
+  EXPECT_EQ(store().last_study_id(), 3U);
+  by_hand("UPDATE results SET study_id = 7");
+  EXPECT_EQ(store().last_study_id(), 7U) << "its rows would become those of the new study";
 }
 
-/// Two studies, both done; the second has other points.
-class NumbersByHandTest : public StoreFixture {
- protected:
-  NumbersByHandTest() {
-    const auto first = study_of(2, 1, "first");
-    const auto second = study_of(5, 2, "second");
-    commit({first, second, worker(1), solved(first, {0, 1}), solved(second, {0, 1, 2, 3, 4})});
-    close();
+TEST_F(StoreTest, AStudyThatWasChangedByHandIsRefusedWithTheRemedy) {
+  commit({study_of(2, 1, "first"), study_of(5, 2, "second")});
+  close();
+  for (const char* change :
+       {"study_id = 3", "points = 6", "recipe = x'ff'", "errors = 1", "created_at = ''"}) {
+    const std::string where = " WHERE name = 'second'";
+    by_hand("CREATE TABLE before AS SELECT * FROM studies" + where);
+    by_hand(std::string("UPDATE studies SET ") + change + where);
+    EXPECT_THAT(refusal(), AllOf(HasSubstr("(\"second\")"), HasSubstr("SET checksum = NULL")))
+        << change;
+    by_hand("DELETE FROM studies" + where +
+            "; INSERT INTO studies SELECT * FROM before; DROP TABLE before");
+    EXPECT_EQ(refusal(), "it opened");
   }
-  std::uint64_t last_study_id() const { return Store(path_).last_study_id(); }
-};
-
-TEST_F(NumbersByHandTest, ANumberThatAnyTableNamesIsNotGivenToAnotherStudy) {
-  by_hand("DELETE FROM studies WHERE study_id = 2");
-  EXPECT_EQ(last_study_id(), 2U) << "its results are there";
-  by_hand("DELETE FROM results WHERE study_id = 2");
-  EXPECT_EQ(last_study_id(), 2U) << "completed_ranges names it";
-  by_hand("DELETE FROM completed_ranges WHERE study_id = 2");
-  EXPECT_EQ(last_study_id(), 1U);
-  by_hand("INSERT INTO retries VALUES (3, 0, 1, 1, 'now')");
-  EXPECT_EQ(last_study_id(), 3U);
-  by_hand("INSERT INTO reused_points VALUES (4, 'gone', 1)");
-  EXPECT_EQ(last_study_id(), 4U);
-  by_hand("INSERT INTO deletions VALUES (5)");
-  EXPECT_EQ(last_study_id(), 5U);
-  by_hand("UPDATE about SET last_study_id = 6");
-  EXPECT_EQ(last_study_id(), 6U);
-}
-
-TEST_F(NumbersByHandTest, AStudyWithTheResultsOfAnotherIsRefusedByNameAndWithTheWayOut) {
-  EXPECT_EQ(refusal(), "it opened");
-  by_hand("DELETE FROM studies WHERE study_id = 1; UPDATE studies SET study_id = 1");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("study \"second\""), HasSubstr("`oblique check")))
-      << "the rows of the first one, which was deleted";
-}
-
-TEST_F(NumbersByHandTest, AStudyWithTheResultsOfALongerOneIsRefused) {
-  commit({study_of(1, 3, "third")});  // its point is the first one of the second study
-  close();
-  by_hand(
-      "DELETE FROM studies WHERE study_id = 2; UPDATE studies SET study_id = 2 WHERE study_id = 3");
-  EXPECT_THAT(refusal(), HasSubstr("point 1: the study has no such point"));
-}
-
-TEST_F(NumbersByHandTest, AStudyWithTheResultsOfAnotherModelIsRefused) {
-  solver::ModelParameters other = solver::preset("paper");
-  other.E_Pa *= 2.0;
-  protocol::Recipe recipe = table_of(5)->recipe();
-  *recipe.mutable_model() = protocol::to_message(other);
-  commit({AddStudy{3, "third", std::make_shared<const protocol::PointTable>(recipe), "now"}});
-  close();
-  by_hand(
-      "DELETE FROM studies WHERE study_id = 2; UPDATE studies SET study_id = 2 WHERE study_id = 3");
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("study \"third\""), HasSubstr("model")));
-}
-
-TEST_F(NumbersByHandTest, AStudyWhoseRowsMovedToAnotherNumberIsRefused) {
-  by_hand("UPDATE results SET study_id = 7 WHERE study_id = 2");
-  EXPECT_THAT(refusal(), HasSubstr("its row is gone"));
-}
-
-TEST_F(NumbersByHandTest, ANumberBelow1IsRefusedByTheNameOfItsStudy) {
-  for (const char* number : {"0", "-1"}) {
-    by_hand(std::string("UPDATE studies SET study_id = ") + number + " WHERE name = 'second'");
-    EXPECT_THAT(refusal(),
-                AllOf(HasSubstr(std::string("study \"second\" has the number ") + number),
-                      HasSubstr("`oblique check`")));
-  }
-}
-
-TEST_F(NumbersByHandTest, TheHighestNumberThatThereIsLeavesNoneForAnotherStudy) {
-  by_hand("UPDATE studies SET study_id = 9223372036854775807 WHERE name = 'second'");
-  EXPECT_THAT(refusal(), HasSubstr("no number is left"));
+  EXPECT_THROW(by_hand("UPDATE studies SET study_id = 0"), StorageError);
+  EXPECT_THROW(by_hand("UPDATE studies SET study_id = 9223372036854775807"), StorageError);
 }
 
 }  // namespace

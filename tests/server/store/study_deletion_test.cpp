@@ -23,24 +23,23 @@ class StudyDeletionTest : public StoreFixture {
     close();
     store();
   }
-  /// A study called by its number, all of whose points are solved by that worker.
-  static std::vector<Change> solved_study(std::uint64_t id, const StudyTable& table,
-                                          std::uint64_t worker_id) {
-    return {AddStudy{id, "study " + std::to_string(id), table, "2024-01-01T00:00:00.000Z", {}},
-            worker(worker_id), all_results_of(id, table, worker_id)};
-  }
   static AddResults all_results_of(std::uint64_t id, const StudyTable& table,
-                                   std::uint64_t worker) {
-    AddResults results{id, table.get(), worker, "0.1", "avx2", 1, "2024-01-01T00:00:01.000Z", {}};
+                                   std::uint64_t worker_id) {
+    AddResults results{id, table.get(), worker_id, "0.1", "avx2", 1, "then", {}};
     for (std::uint64_t point = 0; point < table.size(); ++point) {
       results.results.push_back(solved_point(point));
     }
     return results;
   }
-  std::int64_t rows_of(std::uint64_t id) const {
-    return number("SELECT count(*) FROM results WHERE study_id = " + std::to_string(id));
+  /// A study called by its number, all of whose points are solved by the worker of that number.
+  void add_solved(std::uint64_t id, const StudyTable& table) {
+    commit({AddStudy{id, "study " + std::to_string(id), table, "created"}, worker(id),
+            all_results_of(id, table, id)});
   }
-  /// Steps until all is cleared away; how many that took.
+  std::int64_t rows_in(const std::string& from) const {
+    return number("SELECT count(*) FROM " + from);
+  }
+  /// Number of steps until all is cleared away.
   int clear_all(std::size_t most) {
     int steps = 1;
     while (store().clear_away(most) != ClearedAway::kAll) {
@@ -50,47 +49,36 @@ class StudyDeletionTest : public StoreFixture {
   }
 };
 
-/// Three points, and so many further ones.
-std::shared_ptr<const protocol::PointTable> grown_table(std::uint64_t further) {
-  protocol::Recipe all = table_of(3)->recipe();
-  *all.add_blocks() = table_of(further)->recipe().blocks(0);
-  return std::make_shared<const protocol::PointTable>(all);
-}
-
-TEST_F(StudyDeletionTest, AStudyThatGrowsHasItsRowsAndFurtherPointsAndRuns) {
-  commit(solved_study(1, table_of(3), 1));
+TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndARightChecksum) {
+  add_solved(1, table_of(3));
+  protocol::Recipe grown = table_of(3)->recipe();
+  *grown.add_blocks() = table_of(2)->recipe().blocks(0);
   commit({SetStudyState{1, StudyState::kDone, "then"}});
-  commit({GrowStudy{1, grown_table(2), 2, "now"}});
+  commit({GrowStudy{1, std::make_shared<const protocol::PointTable>(grown), 2, "now"},
+          RenameStudy{1, "another name"}});
   reopen();
   const auto study = store().studies().at(0);
+  EXPECT_EQ(study.name, "another name");
   EXPECT_EQ(study.table.size(), 5U);
   EXPECT_EQ(study.state, StudyState::kRunning);
-  EXPECT_EQ(study.settled, IntervalSet(0, 3));
+  EXPECT_EQ(study.completed, IntervalSet(0, 3));
   EXPECT_EQ(study.priority, 2);
-  EXPECT_EQ(study.created_at, "2024-01-01T00:00:00.000Z");
-}
-
-TEST_F(StudyDeletionTest, TheChecksumsOfStudiesThatGrewOrWereRenamedAreRight) {
-  commit(solved_study(1, table_of(3), 1));
-  commit({GrowStudy{1, grown_table(4), {}, "now"}, RenameStudy{1, "another name"}});
-  reopen();
-  EXPECT_EQ(store().studies().at(0).name, "another name");
+  EXPECT_EQ(study.created_at, "created");
   EXPECT_THAT(faults(), IsEmpty());
 }
 
 TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
-  commit(solved_study(1, table_of(100), 1));
-  commit(solved_study(2, table_of(50), 2));
+  add_solved(1, table_of(100));
+  add_solved(2, table_of(50));
   commit({DeleteStudy{1}});
   EXPECT_THAT(store().studies(), SizeIs(1));
-  EXPECT_EQ(number("SELECT count(*) FROM runs"), 50);
-  EXPECT_EQ(rows_of(1), 100);
+  EXPECT_EQ(rows_in("runs"), 50);
   EXPECT_EQ(store().clear_away(10), ClearedAway::kPart);
-  EXPECT_EQ(rows_of(1), 90);
+  EXPECT_EQ(rows_in("results WHERE study_id = 1"), 90);
   EXPECT_GT(clear_all(10), 9);
-  EXPECT_EQ(rows_of(1), 0);
-  EXPECT_EQ(rows_of(2), 50);
-  EXPECT_EQ(number("SELECT count(*) FROM completed_ranges WHERE study_id = 1"), 0);
+  EXPECT_EQ(rows_in("results WHERE study_id = 1"), 0);
+  EXPECT_EQ(rows_in("results WHERE study_id = 2"), 50);
+  EXPECT_EQ(rows_in("completed_ranges WHERE study_id = 1"), 0);
   EXPECT_EQ(store().cleared_rows(), 100U);
   EXPECT_EQ(store().clear_away(10), ClearedAway::kAll);
 }
@@ -98,8 +86,8 @@ TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
 TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinues) {
   for (int steps = 0; steps < 8; ++steps) {
     const std::uint64_t id = static_cast<std::uint64_t>(2 * steps + 1);
-    commit(solved_study(id, table_of(20), id));
-    commit(solved_study(id + 1, table_with_k(1e7 + steps, 20), id + 1));
+    add_solved(id, table_of(20));
+    add_solved(id + 1, table_with_k(1e7 + steps, 20));
     commit({DeleteStudy{id + 1}});
     for (int step = 0; step < steps; ++step) {
       (void)store().clear_away(4);
@@ -107,18 +95,18 @@ TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinues) {
     reopen();
     EXPECT_THAT(faults(), IsEmpty()) << "after step " << steps;
     clear_all(4);
-    EXPECT_EQ(number("SELECT count(*) FROM results"), 20 * (steps + 1));
+    EXPECT_EQ(rows_in("results"), 20 * (steps + 1));
     reopen();
-    EXPECT_EQ(number("SELECT count(*) FROM models"), 1);
-    EXPECT_EQ(number("SELECT count(*) FROM workers"), steps + 1);
-    EXPECT_EQ(number("SELECT count(*) FROM deletions"), 0);
+    EXPECT_EQ(rows_in("models"), 1);
+    EXPECT_EQ(rows_in("workers"), steps + 1);
+    EXPECT_EQ(rows_in("deletions"), 0);
     EXPECT_EQ(store().last_study_id(), id + 1);
   }
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(StudyDeletionTest, ItsNumberIsNeverGivenAgainAndItsNameIsFreeAtOnce) {
-  commit(solved_study(1, table_of(5), 1));
+TEST_F(StudyDeletionTest, ItsNameIsFreeAtOnceAndItsNumberIsNeverGivenAgain) {
+  add_solved(1, table_of(5));
   commit({DeleteStudy{1}, AddStudy{2, "study 1", table_of(4), "now"}});
   EXPECT_EQ(store().studies().at(0).table.size(), 4U);
   commit({DeleteStudy{2}});
@@ -127,79 +115,59 @@ TEST_F(StudyDeletionTest, ItsNumberIsNeverGivenAgainAndItsNameIsFreeAtOnce) {
   EXPECT_EQ(store().last_study_id(), 2U);
 }
 
-TEST_F(StudyDeletionTest, LateResultsOfADeletedStudyAreDropped) {
-  commit(solved_study(1, table_of(5), 1));
+TEST_F(StudyDeletionTest, LateChangesOfADeletedStudyAreDropped) {
+  add_solved(1, table_of(5));
   commit({DeleteStudy{1}, all_results_of(1, table_of(5), 1)});
   clear_all(100);
-  commit({all_results_of(1, table_of(5), 1), SetStudyState{1, StudyState::kDone, "now"}});
-  IntervalSet failed(0, 5);
-  commit({ForgetFailures{1, failed, "now"}});
-  EXPECT_EQ(rows_of(1), 0);
+  commit({all_results_of(1, table_of(5), 1), SetStudyState{1, StudyState::kDone, "now"},
+          ForgetFailures{1, IntervalSet(0, 5), "now"}});
+  EXPECT_EQ(rows_in("results"), 0);
   EXPECT_THAT(store().studies(), IsEmpty());
 }
 
 TEST_F(StudyDeletionTest, ADeletionThatIsRolledBackDeletesNothing) {
-  commit(solved_study(1, table_of(5), 1));
+  add_solved(1, table_of(5));
   EXPECT_THROW(commit({DeleteStudy{1}, AddStudy{2, "b", table_of(1), "now"},
                        AddStudy{3, "b", table_of(1), "now"}}),
                StorageError);
-  (void)store().clear_away(100);
   clear_all(100);
   EXPECT_THAT(store().studies(), SizeIs(1));
-  EXPECT_EQ(rows_of(1), 5);
-  commit({GrowStudy{1, table_of(6), {}, "now"}});
-  AddResults late = all_results_of(1, table_of(6), 1);
-  commit({late});
-  EXPECT_EQ(rows_of(1), 6) << "it is not taken for deleted";
+  commit({GrowStudy{1, table_of(6), {}, "now"}, all_results_of(1, table_of(6), 1)});
+  EXPECT_EQ(rows_in("results"), 6) << "later results are stored";
 }
 
 TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRowsAreGone) {
-  commit(solved_study(1, table_with_k(1e7, 20), 1));
-  commit(solved_study(2, table_with_k(2e7, 20), 2));
-  commit(solved_study(3, table_with_k(2e7, 20), 3));
+  add_solved(1, table_with_k(1e7, 20));
+  add_solved(2, table_with_k(2e7, 20));
+  add_solved(3, table_with_k(2e7, 20));
   commit({DeleteStudy{1}, DeleteStudy{2}});
   reopen();
-  EXPECT_EQ(number("SELECT count(*) FROM models"), 2) << "rows are left";
+  EXPECT_EQ(rows_in("models"), 2) << "rows are left";
   clear_all(7);
-  EXPECT_EQ(number("SELECT count(*) FROM models"), 2) << "they may come into use again";
-  EXPECT_EQ(number("SELECT count(*) FROM workers"), 3);
+  EXPECT_EQ(rows_in("models"), 2) << "they may come into use again";
   reopen();
-  EXPECT_EQ(number("SELECT count(*) FROM models"), 1);
-  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
-  EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id)"), 20);
+  EXPECT_EQ(rows_in("models"), 1);
+  EXPECT_EQ(rows_in("workers"), 1);
+  EXPECT_EQ(rows_in("results JOIN models USING (model_id)"), 20);
   EXPECT_EQ(number("SELECT has_orphans FROM about"), 0);
-  commit(solved_study(4, table_with_k(1e7, 3), 4));
-  EXPECT_EQ(number("SELECT count(*) FROM results JOIN models USING (model_id) WHERE k = 1e7"), 3)
+  add_solved(4, table_with_k(1e7, 3));
+  EXPECT_EQ(rows_in("results JOIN models USING (model_id) WHERE k = 1e7"), 3)
       << "a model that was deleted comes again";
 }
 
-TEST_F(StudyDeletionTest, AStepDoesNotReadTheStudiesThatEarlierStepsDeleted) {
-  for (std::uint64_t id = 1; id <= 5; ++id) {
-    commit(solved_study(id, table_of(10), id));
-  }
-  commit({DeleteStudy{1}, DeleteStudy{2}, DeleteStudy{3}, DeleteStudy{4}, DeleteStudy{5}});
-  for (std::int64_t left = 5; left > 0; --left) {
-    EXPECT_EQ(number("SELECT count(*) FROM deletions"), left);
-    EXPECT_EQ(store().clear_away(100), ClearedAway::kPart);
-  }
-  EXPECT_EQ(store().clear_away(100), ClearedAway::kAll);
-  EXPECT_EQ(number("SELECT count(*) FROM results"), 0);
-}
-
 TEST_F(StudyDeletionTest, AModelOfADeletedStudyMayBeUsedBeforeTheNextStart) {
-  commit(solved_study(1, table_with_k(1e7, 5), 1));
+  add_solved(1, table_with_k(1e7, 5));
   commit({DeleteStudy{1}});
   clear_all(100);
-  commit(
-      {AddStudy{2, "b", table_with_k(1e7, 5), "now"}, all_results_of(2, table_with_k(1e7, 5), 1)});
+  add_solved(2, table_with_k(1e7, 5));
   reopen();
-  EXPECT_EQ(number("SELECT count(*) FROM runs"), 5);
-  EXPECT_EQ(number("SELECT count(*) FROM workers"), 1);
+  EXPECT_EQ(rows_in("runs"), 5);
+  EXPECT_EQ(rows_in("workers"), 1);
 }
 
 TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
-  commit(solved_study(1, table_of(2000), 1));
-  commit(solved_study(2, table_of(2000), 2));
+  add_solved(1, table_of(2000));
+  add_solved(2, table_of(2000));
   store().checkpoint_at(1);
   const DatabaseHandle reader = open_database(path_, SQLITE_OPEN_READONLY);
   execute(reader.get(), "BEGIN");
@@ -214,7 +182,7 @@ TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
   first.reset();
   execute(reader.get(), "COMMIT");
   clear_all(500);
-  EXPECT_EQ(rows_of(1), 0);
+  EXPECT_EQ(rows_in("results WHERE study_id = 1"), 0);
 }
 
 }  // namespace

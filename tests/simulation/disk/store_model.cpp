@@ -100,7 +100,7 @@ bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
       if (study.failures.contains(point)) {
         contents.rows[change.study_id].erase(point);
         study.failures.erase(point);
-        study.settled.erase(point);
+        study.completed.erase(point);
         changes = true;
       }
     }
@@ -118,16 +118,16 @@ bool StoreModel::apply(const AddResults& change, Contents& contents) {
     if (!contents.rows[change.study_id].emplace(result.point(), std::move(row)).second) {
       throw Violation("point " + std::to_string(result.point()) + " was stored twice");
     }
-    study.settled.insert(result.point());
+    study.completed.insert(result.point());
     if (!result.error().empty()) {
       study.failures.insert(result.point());
     }
   }
   change.left_out.for_each([&](const server::Interval& points) {
-    if (!study.settled.within(points.begin, points.end).empty()) {
+    if (!study.completed.within(points.begin, points.end).empty()) {
       throw Violation("a filter leaves out points that were settled before");
     }
-    study.settled.insert(points.begin, points.end);
+    study.completed.insert(points.begin, points.end);
     study.left_out += points.end - points.begin;
   });
   return true;
@@ -231,7 +231,7 @@ bool StoreModel::Contents::operator==(const Found& found) const {
                       const server::StoredStudy& here = entry.second;
                       return here.study_id == there.study_id && here.name == there.name &&
                              here.state == there.state && here.created_at == there.created_at &&
-                             here.priority == there.priority && here.settled == there.settled &&
+                             here.priority == there.priority && here.completed == there.completed &&
                              here.failures == there.failures && here.left_out == there.left_out &&
                              here.table->recipe().SerializeAsString() ==
                                  there.table->recipe().SerializeAsString();
@@ -242,7 +242,7 @@ std::string StoreModel::Contents::description() const {
   std::string text = std::to_string(last_worker_id) + " workers";
   for (const auto& [id, study] : studies) {
     text += ", " + study.name + " " + server::state_name(study.state) + " with " +
-            std::to_string(study.settled.size()) + " points";
+            std::to_string(study.completed.size()) + " points";
   }
   return text;
 }

@@ -1,6 +1,8 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -54,6 +56,35 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
              [&] { return database.number("SELECT count(*)" + rows_of_study) == 2000; });
   EXPECT_EQ(database.number("SELECT count(DISTINCT point)" + rows_of_study), 2000);
   EXPECT_EQ(status_of(folder, server).find("takes no results"), std::string::npos);
+  EXPECT_EQ(run_oblique(folder, {"check", "--db", file}).exit_code, 0);
+}
+
+TEST(FailedSyncTest, AServerEndsWithOneAndTheNextOneRecovers) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("failing.db");
+  // LD_PRELOAD ends a path at a space or colon, which that of the build folder may have.
+  const std::string library = folder.file("failing_sync.so");
+  std::filesystem::create_symlink(OBLIQUE_FAILING_SYNC, library);
+  const std::string mark = folder.file("fails");
+  const auto submit = [&](const Server& server, const std::string& name) {
+    return run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e",
+                                "1", "--name", name, "--server", server.client_url()});
+  };
+  {
+    Server server(folder, file, {{"LD_PRELOAD", library}, {"OBLIQUE_FAIL_SYNC", mark}});
+    ASSERT_EQ(submit(server, "before").exit_code, 0);
+    std::ofstream(mark).put('x');
+    EXPECT_NE(submit(server, "lost").exit_code, 0) << "it is not durable";
+    EXPECT_EQ(server.process().wait(), 1);
+    EXPECT_NE(server.process().err().find("the disk failed to store"), std::string::npos)
+        << server.process().err();
+  }
+  Server next(folder, file);
+  EXPECT_EQ(submit(next, "after").exit_code, 0);
+  Worker worker(folder, next.worker_url());
+  for (const char* study : {"before", "after"}) {
+    EXPECT_EQ(run_oblique(folder, {"watch", study, "--server", next.client_url()}).exit_code, 0);
+  }
   EXPECT_EQ(run_oblique(folder, {"check", "--db", file}).exit_code, 0);
 }
 

@@ -75,8 +75,9 @@ TEST_F(ComparisonTest, OfDatabasesSeesWhatMustNotDifferAndNothingElse) {
            "UPDATE results SET point = 5000" + one,
            "DELETE FROM results WHERE point = (SELECT max(point) FROM results)",
            "UPDATE studies SET state = 'paused'", "UPDATE models SET dt = 1 WHERE model_id = 2",
-           "INSERT INTO studies (study_id, name, recipe, points, state, created_at, changed_at,"
-           " priority) SELECT 2, 'another', recipe, points, state, '', '', priority"
+           "INSERT INTO studies (study_id, name, recipe, points, errors, state, created_at,"
+           " changed_at, priority)"
+           " SELECT 2, 'another', recipe, points, errors, state, '', '', priority"
            " FROM studies"}) {
     EXPECT_NE(difference_after(change), "") << change;
   }

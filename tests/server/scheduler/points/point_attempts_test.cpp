@@ -1,4 +1,4 @@
-#include "server/study/point_attempts.h"
+#include "server/study/interval_set.h"
 
 #include <map>
 #include <random>

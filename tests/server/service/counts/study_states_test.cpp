@@ -24,7 +24,7 @@ StoredStudy stored(StudyState state, std::uint64_t settled) {
   study.name = "a";
   study.table = table_of(10);
   study.state = state;
-  study.settled = IntervalSet(0, settled);
+  study.completed = IntervalSet(0, settled);
   return study;
 }
 

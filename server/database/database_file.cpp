@@ -1,0 +1,187 @@
+#include "server/database/database_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/vfs.h>
+#include <unistd.h>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/small_file.h"
+#include "proto/system/descriptor.h"
+#include "server/database/sqlite.h"
+
+namespace oblique::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr mode_t kOwnerOnly = 0600;
+
+struct FileSystem {
+  unsigned long type;  // f_type of statfs(2)
+  std::string_view name;
+  bool is_shared;  // between machines
+};
+
+// sshfs and similar programs are FUSE, so all of FUSE counts as shared.
+constexpr std::array kFileSystems{
+    FileSystem{0xef53, "ext4", false},      FileSystem{0x58465342, "xfs", false},
+    FileSystem{0x9123683e, "btrfs", false}, FileSystem{0x01021994, "tmpfs", false},
+    FileSystem{0x858458f6, "ramfs", false}, FileSystem{0x794c7630, "overlay", false},
+    FileSystem{0x6969, "nfs", true},        FileSystem{0xff534d42, "cifs", true},
+    FileSystem{0xfe534d42, "smb2", true},   FileSystem{0x65735546, "fuse", true},
+    FileSystem{0x00c36400, "ceph", true},   FileSystem{0x0bd00bd0, "lustre", true},
+    FileSystem{0x5346414f, "afs", true}};
+
+/// The f_type of the file system of `path`, or of the nearest folder above that exists; 0: unknown.
+unsigned long type_of(const std::string& path) {
+  std::error_code error;
+  fs::path place = fs::weakly_canonical(fs::absolute(path), error);
+  struct statfs found {};
+  while (::statfs(place.c_str(), &found) != 0) {
+    if (!place.has_relative_path()) {
+      return 0;
+    }
+    place = place.parent_path();
+  }
+  return static_cast<unsigned long>(found.f_type);
+}
+
+const FileSystem* known_file_system(unsigned long type) {
+  const auto* const found = std::ranges::find(kFileSystems, type, &FileSystem::type);
+  return found == kFileSystems.end() ? nullptr : found;
+}
+
+/// The lock of a server: a byte that SQLite does not lock.
+struct flock servers_lock() {
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = off_t{1} << 62;
+  lock.l_len = 1;
+  return lock;
+}
+
+}  // namespace
+
+void check_path(const std::string& path) {
+  struct stat about {};
+  if (::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
+    throw StorageError(path + " is " + protocol::kind_of_file(about.st_mode) +
+                       ": a database is a regular file");
+  }
+}
+
+std::string file_system_of(const std::string& path) {
+  const unsigned long type = type_of(path);
+  const FileSystem* const known = known_file_system(type);
+  return known != nullptr ? std::string(known->name)
+         : type == 0      ? "unknown"
+                          : fmt::format("{:#x}", type);
+}
+
+std::string objection_to_shared_disk(const std::string& path) {
+  const FileSystem* const known = known_file_system(type_of(path));
+  if (known == nullptr || !known->is_shared) {
+    return {};
+  }
+  return fmt::format(
+      "{} is on a network file system ({}), where two machines could write at once and damage the "
+      "database: name a file on a local disk, or pass --allow-network-disk if no other machine "
+      "uses it",
+      path, known->name);
+}
+
+const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk) {
+  const std::string objection = objection_to_shared_disk(path);
+  if (!objection.empty() && !allows_network_disk) {
+    throw StorageError(objection);
+  }
+  return path;
+}
+
+bool is_in_use(const std::string& path) {
+  const protocol::Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct flock lock = servers_lock();
+  return ::fcntl(file.number(), F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+}
+
+ServerFile::ServerFile(const std::string& path) : path_(fs::absolute(path).string()) {
+  check_path(path);
+  file_ = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
+  if (file_ < 0 && errno == ENOENT) {
+    file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnerOnly);
+    is_new_ = file_ >= 0;
+  }
+  if (file_ < 0 || ::fstat(file_, &opened_) != 0) {
+    throw StorageError("cannot open the database " + path +
+                       " for writing: " + std::strerror(errno));
+  }
+  struct flock lock = servers_lock();
+  if (::fcntl(file_, F_OFD_SETLK, &lock) != 0) {
+    ::close(file_);
+    throw StorageError(
+        "another server, `oblique run` or `oblique view` already uses the database " + path +
+        ": wait for it, or name another database");
+  }
+}
+
+ServerFile::~ServerFile() {
+  ::close(file_);
+}
+
+void ServerFile::check() const {
+  struct stat found {};
+  const bool exists = ::stat(path_.c_str(), &found) == 0;
+  if (exists && found.st_dev == opened_.st_dev && found.st_ino == opened_.st_ino) {
+    return;
+  }
+  // Other errors, such as a folder without search permission, do not mean that the file is gone.
+  if (exists || errno == ENOENT || errno == ENOTDIR || errno == ESTALE) {
+    throw StorageGone(fmt::format(
+        "the file {} was {} while the server worked on it: nothing more is stored, and the server "
+        "ends. Put the file back, or a copy, and start the server again; workers that still run "
+        "have kept what is not stored",
+        path_, exists ? "replaced" : "deleted or renamed"));
+  }
+}
+
+DraftFile::DraftFile(std::string path) : path_(std::move(path)) {
+  remove();
+  const protocol::Descriptor file(
+      ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly));
+  if (file.number() < 0) {
+    throw StorageError("cannot write " + path_ + ": " + std::strerror(errno));
+  }
+}
+
+void DraftFile::keep_as(const std::string& name) const {
+  const protocol::Descriptor file(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
+  std::error_code error;
+  if (file.number() >= 0 && ::fsync(file.number()) == 0) {
+    fs::rename(path_, name, error);
+  } else {
+    error = std::error_code(errno, std::generic_category());
+  }
+  if (error) {
+    throw StorageError("cannot write " + name + ": " + error.message());
+  }
+}
+
+void DraftFile::remove() const {
+  std::error_code ignored;
+  for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+    fs::remove(path_ + suffix, ignored);
+  }
+}
+
+}  // namespace oblique::server
