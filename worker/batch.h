@@ -22,11 +22,10 @@ class Batch {
   /// `number` counts this worker's batches: lease numbers may come again, these do not. Batches of
   /// a higher priority are solved first.
   Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Range>& ranges,
-        std::shared_ptr<const protocol::PointTable> points, std::int32_t priority = 0);
+        std::shared_ptr<const protocol::PointTable> points);
 
   std::uint64_t number() const { return number_; }
   std::uint64_t study_id() const { return study_id_; }
-  std::int32_t priority() const { return priority_; }
   const protocol::PointTable& points() const { return *points_; }
 
   std::uint64_t size() const { return size_; }
@@ -51,7 +50,6 @@ class Batch {
   std::vector<Run> runs_;  ///< by position; up to the position of the next one
   std::uint64_t size_ = 0;
   std::shared_ptr<const protocol::PointTable> points_;
-  std::int32_t priority_;
 };
 
 /// The ranges of a message; nothing unless each has points, all of a study of `study_points`, and

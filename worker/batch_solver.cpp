@@ -100,16 +100,11 @@ Progress& BatchSolver::progress_of(const Batch& batch) {
       .first->second;
 }
 
-/// That of the highest priority among those with points that no thread took, the first of several.
+/// The first batch with points that no thread took.
 BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
-  auto next = open_.end();
-  for (auto batch = open_.begin(); batch != open_.end(); ++batch) {
-    const bool has_points = !batch->dropped && batch->given < batch->batch.size();
-    if (has_points && (next == open_.end() || batch->batch.priority() > next->batch.priority())) {
-      next = batch;
-    }
-  }
-  return next;
+  return std::find_if(open_.begin(), open_.end(), [](const OpenBatch& open) {
+    return !open.dropped && open.given < open.batch.size();
+  });
 }
 
 void BatchSolver::work(const std::stop_token& stop) {
@@ -159,8 +154,7 @@ std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop
   return std::nullopt;
 }
 
-/// Takes the next part of the batch, in which a filter may leave nothing. False when none is left,
-/// or another batch comes first.
+/// Takes the next part of the batch, of which a filter may keep nothing. False when none is left.
 bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   hand_on(task);
@@ -170,7 +164,7 @@ bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
     task.busy_since = Clock::now();
   }
   const std::uint64_t left = open.batch.size() - open.given;
-  if (open.dropped || stop.stop_requested() || left == 0 || next_batch() != task.batch) {
+  if (open.dropped || stop.stop_requested() || left == 0) {
     return false;
   }
   const std::uint64_t count = solver::points_of_task(left, thread_count_);

@@ -18,11 +18,9 @@
 
 namespace oblique::worker {
 
-/// Solves batches, those of the highest priority first, of these in the order in which they were
-/// added, on threads of its own, so that solving never holds up heartbeats. Points that a filter
-/// leaves out are named and not solved. The threads take each batch apart into tasks, each one
-/// point or a few, and meet in a lock once a task: then they leave it for one of a higher priority,
-/// and come back to it.
+/// Solves batches in the order in which they were added, on threads of its own, so that solving
+/// never delays heartbeats. Points that a filter leaves out are named and not solved. The threads
+/// split each batch into tasks of one point or a few and take a lock once a task.
 class BatchSolver {
  public:
   /// Gives the position in the batch of the next point to solve; nothing when there is none.

@@ -278,7 +278,7 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   backoff_ms_ = 0;
-  const Batch taken(next_batch_++, batch.study_id(), *ranges, study->second, batch.priority());
+  const Batch taken(next_batch_++, batch.study_id(), *ranges, study->second);
   held_[taken.number()] = {batch.study_id(), batch.lease_id(), batch.attempt(), taken.size()};
   leaving_.note_work(now_ms_);
   leaving_.note_batch({batch.study_id(), taken.size()});

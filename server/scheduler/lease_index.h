@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/scheduler/points/study_points.h"
+#include "server/scheduler/study_points.h"
 
 namespace oblique::server {
 

@@ -1,9 +1,28 @@
 #include "server/scheduler/scheduler.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace oblique::server {
+namespace {
+
+/// Longest gap between two ticks that counts as silence of the workers. In a longer one it was the
+/// server that did not run, and the workers' messages still wait to be read.
+constexpr std::int64_t kLongestTick_ms = 1000;
+
+/// Weight of the newest message in a worker's pace.
+constexpr double kPaceWeight = 0.5;
+/// Weight of all earlier messages in the pace of all workers.
+constexpr double kPaceFades = 0.98;
+/// Longer times a point are not believed.
+constexpr double kLongestPoint_s = 86'400.0;
+
+}  // namespace
 
 std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   now_ms_ = std::max(now_ms_, now_ms);
@@ -16,6 +35,11 @@ std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
 
 void Scheduler::on(const DispatchHeld& event) {
   held_ = event.held;
+}
+
+Scheduler::Study* Scheduler::find_study(StudyId id) {
+  const auto found = studies_.find(id);
+  return found == studies_.end() ? nullptr : &found->second;
 }
 
 // ---- Studies ----------------------------------------------------------------------------------
@@ -36,26 +60,25 @@ void Scheduler::on(const StudyAdded& event) {
 }
 
 void Scheduler::on(const StudyHeld& event) {
-  const auto found = studies_.find(event.study);
-  if (found == studies_.end() || found->second.held == event.held) {
+  Study* const study = find_study(event.study);
+  if (study == nullptr || study->held == event.held) {
     return;
   }
-  found->second.held = event.held;
-  found->second.served = least_served(event.study);
+  study->held = event.held;
+  study->served = least_served(event.study);
   requeue(event.study);
 }
 
 void Scheduler::on(const PointsTaken& event) {
-  const auto found = studies_.find(event.study);
-  if (found == studies_.end()) {
+  Study* const study = find_study(event.study);
+  if (study == nullptr) {
     return;
   }
-  Study& study = found->second;
-  const std::uint64_t settled = study.points.settle_unsolved(event.points);
-  if (settled > 0 && study.solver_version.empty()) {
-    study.solver_version = event.solver_version;
+  const std::uint64_t settled = study->points.settle_unsolved(event.points);
+  if (settled > 0 && study->solver_version.empty()) {
+    study->solver_version = settings_.solver_version;
   }
-  for (const LeaseId id : study.leases.all()) {
+  for (const LeaseId id : study->leases.all()) {
     release_if_answered(id);
   }
   finish_if_complete(event.study);
@@ -63,13 +86,13 @@ void Scheduler::on(const PointsTaken& event) {
 }
 
 void Scheduler::on(const StudyCancelled& event) {
-  const auto found = studies_.find(event.study);
-  if (found == studies_.end() || found->second.cancelled || found->second.finished) {
+  Study* const study = find_study(event.study);
+  if (study == nullptr || study->cancelled || study->finished) {
     return;
   }
-  found->second.cancelled = true;
+  study->cancelled = true;
   end_all_leases(event.study);
-  found->second.points.rest(false);
+  study->points.rest(false);
   requeue(event.study);
   withdraw(event.study);
 }
@@ -93,67 +116,64 @@ void Scheduler::withdraw(StudyId study) {
 }
 
 void Scheduler::on(const StudyPaused& event) {
-  const auto found = studies_.find(event.study);
-  if (found != studies_.end() && !found->second.cancelled && !found->second.finished) {
-    found->second.paused = true;
+  Study* const study = find_study(event.study);
+  if (study != nullptr && !study->cancelled && !study->finished) {
+    study->paused = true;
     requeue(event.study);
   }
 }
 
 void Scheduler::on(const StudyReopened& event) {
-  const auto found = studies_.find(event.study);
-  if (found != studies_.end() && !found->second.is_open()) {
-    found->second.cancelled = false;
-    found->second.paused = false;
-    found->second.served = least_served(event.study);
+  Study* const study = find_study(event.study);
+  if (study != nullptr && !is_open(*study)) {
+    study->cancelled = false;
+    study->paused = false;
+    study->served = least_served(event.study);
     requeue(event.study);
   }
 }
 
 void Scheduler::on(const PriorityChanged& event) {
-  const auto found = studies_.find(event.study);
-  if (found == studies_.end()) {
+  Study* const study = find_study(event.study);
+  if (study == nullptr) {
     return;
   }
-  Study& study = found->second;
-  study.priority = event.priority;
-  study.served = least_served(event.study);
+  study->priority = event.priority;
+  study->served = least_served(event.study);
   requeue(event.study);
 }
 
 void Scheduler::on(const FailuresForgotten& event) {
-  const auto found = studies_.find(event.study);
-  if (found == studies_.end()) {
+  Study* const study = find_study(event.study);
+  if (study == nullptr) {
     return;
   }
-  Study& study = found->second;
-  study.failed -= std::min(study.failed, study.points.reopen(event.points));
-  study.points.count_attempts(event.attempts);
-  study.overlaps = !study.leases.empty();  // the lease that a point failed in may still be there
-  if (study.leases.empty() && !study.points.has_results()) {
-    study.solver_version.clear();
+  study->failed -= std::min(study->failed, study->points.reopen(event.points));
+  study->points.count_attempts(event.attempts);
+  study->overlaps = !study->leases.empty();  // the lease that a point failed in may still be there
+  if (study->leases.empty() && !study->points.has_results()) {
+    study->solver_version.clear();
   }
-  if (study.finished && !study.points.is_complete()) {
-    study.finished = false;
-    study.served = least_served(event.study);
+  if (study->finished && !study->points.is_complete()) {
+    study->finished = false;
+    study->served = least_served(event.study);
   }
   requeue(event.study);
 }
 
 void Scheduler::on(const StudyGrown& event) {
-  const auto found = studies_.find(event.study);
-  if (found == studies_.end() || event.table.size() <= found->second.points.size()) {
+  Study* const study = find_study(event.study);
+  if (study == nullptr || event.table.size() <= study->points.size()) {
     return;
   }
-  Study& study = found->second;
-  const bool was_open = study.is_open();
-  study.points.grow(event.table);
-  study.cancelled = false;
-  study.paused = false;
-  study.finished = false;
-  if (!was_open || study.priority != event.priority) {
-    study.priority = event.priority;
-    study.served = least_served(event.study);
+  const bool was_open = is_open(*study);
+  study->points.grow(event.table);
+  study->cancelled = false;
+  study->paused = false;
+  study->finished = false;
+  if (!was_open || study->priority != event.priority) {
+    study->priority = event.priority;
+    study->served = least_served(event.study);
   }
   requeue(event.study);
 }
@@ -171,7 +191,7 @@ void Scheduler::on(const StudyRemoved& event) {
   processes_.forget_study(event.study);
   queue_.put(event.study, {});
   studies_.erase(event.study);
-  wake_all();  // suspect points of it may have kept some from others
+  ready_workers_.unpark_all();  // suspect points of it may have kept some from others
 }
 
 /// Where a study begins that opens now: level with the one served least, so that it neither waits
@@ -180,12 +200,21 @@ double Scheduler::least_served(StudyId but) const {
   return queue_.least_served(but).value_or(0.0);
 }
 
+/// The study has no results, or of the solver version of the workers.
+bool Scheduler::is_current(const Study& study) const {
+  return study.solver_version.empty() || study.solver_version == settings_.solver_version;
+}
+
+bool Scheduler::is_open(const Study& study) const {
+  return !study.cancelled && !study.paused && !study.finished && !study.held && is_current(study);
+}
+
 StudyQueue::Place Scheduler::place_of(const Study& study) const {
   const bool has_free = study.points.has_free();
-  if (!study.is_open() || !(has_free || study.has_suspect())) {
+  if (!is_open(study) || !(has_free || study.has_suspect())) {
     return {};
   }
-  return {has_free, study.has_suspect(), study.priority, study.served, study.solver_version};
+  return {has_free, study.has_suspect(), study.priority, study.served};
 }
 
 void Scheduler::requeue(StudyId id) {
@@ -193,12 +222,9 @@ void Scheduler::requeue(StudyId id) {
   const StudyQueue::Place before = known == nullptr ? StudyQueue::Place{} : *known;
   const StudyQueue::Place place = place_of(studies_.at(id));
   queue_.put(id, place);
-  // Of free points there may be more now, for whom they are and before what; suspect ones stop some
-  // workers.
-  if ((place.has_free && (!before.has_free || place.solver_version != before.solver_version ||
-                          place.priority > before.priority)) ||
-      place.has_suspect != before.has_suspect) {
-    wake_all();
+  // Suspect points stop some workers.
+  if ((place.has_free && !before.has_free) || place.has_suspect != before.has_suspect) {
+    ready_workers_.unpark_all();
   }
 }
 
@@ -213,16 +239,346 @@ void Scheduler::finish_if_complete(StudyId id) {
   }
 }
 
+// ---- Workers ----------------------------------------------------------------------------------
+
+void Scheduler::on(const WorkerJoined& event) {
+  if (workers_.contains(event.worker)) {
+    return;
+  }
+  Worker worker{};
+  worker.threads = std::max(event.threads, 1U);
+  worker.last_heard_ms = now_ms_;
+  worker.process = processes_.join(event.process, event.worker);
+  threads_ += worker.threads;
+  const ProcessNumber process = worker.process;
+  workers_.emplace(event.worker, std::move(worker));
+  if (!event.process.empty()) {
+    for (const WorkerId earlier : std::set<WorkerId>(processes_.at(process).workers)) {
+      if (earlier != event.worker) {
+        remove_worker(earlier, WorkerEnd::kReplaced);
+        effects_.emplace_back(DropWorker{earlier, "its process has a new connection"});
+      }
+    }
+  }
+  take_back_losses(process);
+  ready_workers_.unpark_all();
+}
+
+Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
+  const auto found = workers_.find(worker);
+  if (found == workers_.end()) {
+    return nullptr;
+  }
+  found->second.last_heard_ms = now_ms_;
+  ready_workers_.unpark(worker);
+  return &found->second;
+}
+
+void Scheduler::on(const CreditGiven& event) {
+  if (Worker* worker = heard_from(event.worker)) {
+    const std::uint32_t room = settings_.max_credit - worker->credit;
+    worker->credit += std::min(event.batches, room);
+    if (worker->credit > 0) {
+      ready_workers_.add(event.worker);
+    }
+  }
+}
+
+void Scheduler::on(const HeartbeatReceived& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  // A lease that the worker still does not name when a batch must long have reached it never did.
+  const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
+  if (worker->probe != 0 && !held.contains(worker->probe) &&
+      now_ms_ - *worker->probed_ms > settings_.lost_after_ms) {
+    worker->probe = 0;
+  }
+  std::vector<LeaseId> strayed;
+  for (const LeaseId id : worker->leases) {
+    if (!held.contains(id) && now_ms_ - leases_.at(id).granted_ms > settings_.lost_after_ms) {
+      strayed.push_back(id);
+    }
+  }
+  for (const LeaseId id : strayed) {
+    end_lease(id, std::nullopt);
+  }
+}
+
+void Scheduler::on(const BatchesReturned& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  for (const LeaseId lease : event.leases) {
+    if (worker->leases.contains(lease)) {
+      end_lease(lease, std::nullopt);
+    } else if (lease == worker->probe) {
+      worker->probe = 0;
+    }
+  }
+}
+
+void Scheduler::on(const WorkerLeft& event) {
+  remove_worker(event.worker, WorkerEnd::kLeft);
+}
+
+void Scheduler::on(const WorkerUnreachable& event) {
+  const auto found = workers_.find(event.worker);
+  if (found == workers_.end()) {
+    return;
+  }
+  for (const LeaseId lease : event.unsent) {
+    if (found->second.leases.contains(lease)) {
+      end_lease(lease, std::nullopt);
+    }
+  }
+  remove_worker(event.worker, WorkerEnd::kLost);
+  effects_.emplace_back(DropWorker{event.worker, event.reason});
+}
+
+void Scheduler::on(const Tick&) {
+  const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
+  last_tick_ms_ = now_ms_;
+  ready_workers_.unpark_all();  // time has passed
+  fail_condemned();
+  std::vector<WorkerId> lost;
+  for (auto& [id, worker] : workers_) {
+    if (gap_ms > kLongestTick_ms) {
+      worker.last_heard_ms = std::min(now_ms_, worker.last_heard_ms + gap_ms - kLongestTick_ms);
+      worker.stored_ms = std::min(now_ms_, worker.stored_ms + gap_ms - kLongestTick_ms);
+    }
+    if (held_) {  // results may wait to be taken
+      worker.stored_ms = now_ms_;
+    }
+    if (now_ms_ - worker.last_heard_ms > settings_.lost_after_ms) {
+      lost.push_back(id);
+    }
+  }
+  for (const WorkerId id : lost) {
+    const std::int64_t silent_ms = now_ms_ - workers_.at(id).last_heard_ms;
+    remove_worker(id, WorkerEnd::kLost);
+    effects_.emplace_back(DropWorker{id, "silent for " + std::to_string(silent_ms) + " ms"});
+  }
+  end_stalled();
+}
+
+void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
+  const auto found = workers_.find(id);
+  if (found == workers_.end()) {
+    return;
+  }
+  const ProcessNumber process = found->second.process;
+  note_end(found->second, how);
+  std::optional<Loss> loss;
+  const std::set<LeaseId> leases = found->second.leases;
+  if (how == WorkerEnd::kLost) {
+    loss = Loss{process, is_proven(found->second) && leases.size() == 1};
+  }
+  for (const LeaseId lease : leases) {
+    end_lease(lease, loss);
+  }
+  ready_workers_.remove(id);
+  set_draining(found->second, false);
+  threads_ -= found->second.threads;
+  workers_.erase(found);
+  processes_.leave(process, id);
+  ready_workers_.unpark_all();
+}
+
+void Scheduler::on(const WorkerBusy& event) {
+  const auto found = workers_.find(event.worker);
+  if (found != workers_.end()) {
+    found->second.is_busy = event.is_busy;
+    set_draining(found->second, found->second.draining && !event.is_busy);
+    ready_workers_.unpark(event.worker);
+  }
+}
+
+// ---- Leases and results ------------------------------------------------------------------------
+
+void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
+  const Lease lease = leases_.at(id);
+  leases_.erase(id);
+  Worker& worker = workers_.at(lease.worker);
+  worker.leases.erase(id);
+  worker.paces.at(lease.study).held_points -= lease.batch.points;
+  ready_workers_.unpark(lease.worker);
+  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
+    twin->second.twin = 0;
+  }
+  Study& study = studies_.at(lease.study);
+  study.leases.erase(id, lease.batch);
+  const std::vector<Interval> held = held_by(lease);
+  if (loss) {
+    note_loss(lease, held, *loss);
+  } else if (!held.empty()) {
+    study.points.give_back(held, lease.batch.attempts + 1, lease.batch.losses, now_ms_);
+  }
+  if (study.leases.empty()) {
+    study.overlaps = false;
+    if (!study.points.has_results()) {
+      study.solver_version.clear();
+    }
+  }
+  requeue(lease.study);
+}
+
+/// Points that are leased by this lease, which has ended, and by no other.
+std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
+  const Study& study = studies_.at(lease.study);
+  const auto leased = study.points.leased_set().within(lease.batch.first_place, lease.batch.end());
+  if (!study.overlaps || leased.empty()) {
+    return leased;
+  }
+  IntervalSet held;
+  for (const Interval& interval : leased) {
+    held.insert(interval.begin, interval.end);
+  }
+  for (const LeaseId id : study.leases.near(lease.batch)) {
+    const Batch& other = leases_.at(id).batch;
+    held.erase(other.first_place, other.end());
+  }
+  return held.within(lease.batch.first_place, lease.batch.end());
+}
+
+bool Scheduler::has_open_points(const Lease& lease) const {
+  const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
+  return !leased.within(lease.batch.first_place, lease.batch.end()).empty();
+}
+
+/// A batch whose points were all answered by others is nobody's work any more.
+void Scheduler::release_if_answered(LeaseId id) {
+  const auto lease = leases_.find(id);
+  if (lease != leases_.end() && !has_open_points(lease->second)) {
+    effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
+    end_lease(id, std::nullopt);
+  }
+}
+
+void Scheduler::on(const ResultsReceived& event) {
+  Worker* worker = heard_from(event.worker);
+  if (worker == nullptr) {
+    return;
+  }
+  if (names_other_points(event)) {
+    remove_worker(event.worker, WorkerEnd::kLost);
+    effects_.emplace_back(
+        DropWorker{event.worker, "it says that a filter leaves out points which it was not given"});
+    return;
+  }
+  StoreResults store{event.worker, event.study, event.sequence, {}};
+  const auto study = studies_.find(event.study);
+  if (study != studies_.end() && is_current(study->second)) {
+    for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
+      if (study->second.points.receive(event.outcomes[i].point)) {
+        store.accepted.push_back(i);
+      }
+    }
+    if (!store.accepted.empty() && study->second.solver_version.empty()) {
+      study->second.solver_version = settings_.solver_version;
+    }
+    // Of a lease that has ended since others name them again.
+    if (worker->leases.contains(event.lease)) {
+      store.left_out = study->second.points.receive(event.left_out);
+    }
+    if (!store.accepted.empty() || !store.left_out.empty()) {
+      worker->stored_ms = now_ms_;
+    }
+    requeue(event.study);
+    learn_pace(*worker, event);
+  }
+  note_answers(*worker, event, !store.accepted.empty());
+  effects_.emplace_back(std::move(store));
+  const auto lease = leases_.find(event.lease);
+  if (lease == leases_.end() || lease->second.worker != event.worker ||
+      lease->second.study != event.study) {
+    return;
+  }
+  const LeaseId twin = lease->second.twin;
+  if (event.batch_done) {
+    const bool is_solved = is_proven(*worker) && !has_open_points(lease->second);
+    worker->solved_batches += is_solved ? 1U : 0U;
+    batch_s_.observe(1e-3 * static_cast<double>(now_ms_ - lease->second.granted_ms));
+    // Points of a finished batch that got no answer count as lost, or a worker that never answers
+    // them would take them for ever.
+    end_lease(event.lease, Loss{kNobody, is_proven(*worker) && worker->leases.size() == 1});
+  }
+  release_if_answered(twin);
+}
+
+/// A lease of the worker does not have all the points that the message says a filter leaves out.
+bool Scheduler::names_other_points(const ResultsReceived& event) const {
+  const auto lease = leases_.find(event.lease);
+  if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {
+    return false;
+  }
+  const StudyPoints& points = studies_.at(lease->second.study).points;
+  const Batch& batch = lease->second.batch;
+  // So many are not even looked up: that could take long.
+  if (event.left_out.size() > batch.points || lease->second.study != event.study ||
+      !points.may_leave_out(event.left_out)) {
+    return true;
+  }
+  const IntervalSet places = points.order().places(event.left_out);
+  return places.front().begin < batch.first_place || places.back().end > batch.end();
+}
+
+void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
+  const auto solved = static_cast<double>(event.outcomes.size());
+  const double points = solved + static_cast<double>(event.left_out.size());
+  if (points == 0.0 || !std::isfinite(event.busy_s) || event.busy_s <= 0.0 ||
+      event.busy_s / points > kLongestPoint_s) {
+    return;
+  }
+  // Time and points by themselves: the first points of a model come with its fall, which says
+  // little of those that follow.
+  const auto learn = [&event](double& busy_s, double& number, double newest) {
+    const double weight = number > 0.0 ? kPaceWeight : 1.0;
+    busy_s += weight * (event.busy_s - busy_s);
+    number += weight * (newest - number);
+  };
+  Pace& known = worker.paces[event.study];
+  learn(known.busy_s, known.points, points);
+  // A message that only names left-out points says nothing of the time that a solved one takes.
+  if (solved > 0.0) {
+    learn(known.solved_busy_s, known.solved, solved);
+    pace_s_ = kPaceFades * pace_s_ + event.busy_s;
+    pace_points_ = kPaceFades * pace_points_ + solved;
+  }
+}
+
+void Scheduler::on(const ResultsStored& event) {
+  const auto study = studies_.find(event.study);
+  const auto worker = workers_.find(event.worker);
+  if (study != studies_.end()) {
+    for (const PointOutcome& outcome : event.outcomes) {
+      if (study->second.points.settle(outcome.point)) {
+        study->second.failed += outcome.failed ? 1U : 0U;
+        if (worker != workers_.end()) {
+          worker->second.solved_points += outcome.failed ? 0U : 1U;
+        }
+      }
+    }
+    study->second.points.settle(event.left_out);
+    finish_if_complete(event.study);
+    requeue(event.study);
+  }
+  if (worker != workers_.end()) {
+    effects_.emplace_back(AcknowledgeResults{event.worker, event.sequence});
+  }
+}
+
 // ---- Views of the state -----------------------------------------------------------------------
 
 StudyCounts Scheduler::study(StudyId id) const {
   const Study& study = studies_.at(id);
-  const bool lacks_worker = study.has_work() && !workers_.empty() &&
-                            !study.solver_version.empty() &&
-                            !versions_.contains(study.solver_version);
   const PointCounts counts = points(id);
-  return {counts.points, counts.solved(), counts.failed,        counts.left_out,
-          counts.leased, study.cancelled, study.solver_version, lacks_worker};
+  return {counts.points,        counts.solved(),
+          counts.failed,        counts.left_out,
+          counts.leased,        study.cancelled,
+          study.solver_version, !is_current(study) && counts.open() > 0};
 }
 
 PointCounts Scheduler::points(StudyId id) const {

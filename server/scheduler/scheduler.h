@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "server/scheduler/lease_index.h"
-#include "server/scheduler/points/study_points.h"
-#include "server/scheduler/ready_line.h"
+#include "server/scheduler/ready_queue.h"
 #include "server/scheduler/scheduler_events.h"
+#include "server/scheduler/study_points.h"
 #include "server/scheduler/study_queue.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/study/histogram.h"
@@ -30,7 +30,7 @@ struct StudyCounts {
   std::uint64_t leased;
   bool cancelled;
   std::string solver_version;  ///< that its results have; empty while there are none
-  bool lacks_worker;           ///< points wait, and no worker has that version
+  bool is_of_other_solver;     ///< points are open, and the server has another version
 };
 
 /// The points of a study by where they are; costs nothing to ask for.
@@ -139,11 +139,9 @@ class Scheduler {
     bool held = false;
     bool overlaps = false;  ///< a point of it may be under several of these leases
 
-    bool is_open() const { return !cancelled && !paused && !finished && !held; }
     bool has_suspect() const {
       return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
     }
-    bool has_work() const { return is_open() && (points.has_free() || has_suspect()); }
   };
   struct Lease {
     WorkerId worker;
@@ -151,8 +149,7 @@ class Scheduler {
     Batch batch;
     bool alone;  ///< of suspect points: its worker gets nothing beside it
     std::int64_t granted_ms;
-    LeaseId twin = 0;           ///< of another worker, for what is left of the same batch; 0: none
-    std::int32_t priority = 0;  ///< of the study, when this was granted
+    LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
   };
   /// How a worker gets on with a study.
   struct Pace {
@@ -170,13 +167,11 @@ class Scheduler {
   };
   struct Worker {
     std::uint32_t threads;
-    std::string solver_version;
     std::uint32_t credit = 0;
     bool is_busy = false;   ///< gets nothing
     bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
     ProcessNumber process = kNobody;
     LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
-    LeaseId ahead = 0;                        ///< that it has not asked for; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
     std::int64_t last_heard_ms;
     std::int64_t stored_ms = 0;      ///< when it last stored a point, or began to hold batches
@@ -211,6 +206,7 @@ class Scheduler {
   void on(const Tick& event);
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
+  Study* find_study(StudyId id);
   void end_all_leases(StudyId id);
   void withdraw(StudyId id);
   Worker* heard_from(WorkerId worker);
@@ -226,6 +222,7 @@ class Scheduler {
   void end_stalled();
   std::int64_t longest_stall_ms(const Worker& worker, std::map<StudyId, double>& paces) const;
   void finish_if_complete(StudyId id);
+  bool is_open(const Study& study) const;
   StudyQueue::Place place_of(const Study& study) const;
   /// To be called after every change of a study or its points.
   void requeue(StudyId id);
@@ -237,34 +234,26 @@ class Scheduler {
   void fail_condemned();
   bool is_proven(const Worker& worker) const;
   bool is_set_aside(const Worker& worker) const;
-  bool is_longest_proven(const Worker& worker, const Study& study) const;
-  void standing_of_processes_changed();
+  bool is_longest_proven(const Worker& worker) const;
   bool probe(WorkerId id, Worker& worker);
   void check_losses() const;
   void check_lines() const;
 
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
-  LeaseId serve_free(WorkerId id, Worker& worker, StudyId study);
-  void serve_ahead();
-  bool may_get_ahead(const Worker& worker, StudyId study) const;
-  void wake_all();
   bool serve_suspect(WorkerId id, Worker& worker);
   std::optional<Standing> suspect_for(const Study& study, const Worker& worker) const;
   bool serve_straggler(WorkerId id, Worker& worker);
   bool is_straggling(const Lease& lease, const Worker& helper) const;
-  static bool admits(const Study& study, const Worker& worker);
-  StudyId next_free_study(const Worker& worker) const;
+  bool is_current(const Study& study) const;
   double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
   void set_draining(Worker& worker, bool is_draining);
   double target_s() const;
-  Portion portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
-  void fill_lanes(Portion& wanted, const StudyPoints& points, std::uint32_t threads,
+  BatchSize portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
+  void fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
   LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch, bool alone);
-  void note_priority(std::int32_t priority, bool is_leased);
-  void queue(WorkerId id, const Worker& worker);
 
   /// A point that is to fail, unless it is condemned no more.
   struct Condemned {
@@ -281,14 +270,9 @@ class Scheduler {
   StudyQueue queue_;  // of the studies that have something to hand out
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
-  ReadyLine ready_workers_;                         // with credit
-  ReadyLine full_workers_;                          // without, and with nothing that came ahead
-  std::map<std::int32_t, std::size_t> priorities_;  // leases by priority
-  std::map<std::string, std::size_t> versions_;     // workers by solver version
-  std::size_t draining_ = 0;                        // workers
+  ReadyQueue ready_workers_;  // with credit
+  std::size_t draining_ = 0;  // workers
   std::uint64_t looks_ = 0;
-  // By solver version, of its workers, and of all under the empty one; emptied when it may change.
-  mutable std::map<std::string, std::optional<std::int64_t>> longest_proven_since_ms_;
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;

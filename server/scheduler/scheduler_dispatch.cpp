@@ -15,57 +15,19 @@ void Scheduler::dispatch() {
     // Another worker looks first each time, in case this one may have no straggler there is.
     ready_workers_.rotate();
   }
-  while (ready_workers_.has_awake() && has_work()) {
-    const WorkerId id = ready_workers_.first_awake();
+  while (ready_workers_.has_active() && has_work()) {
+    const WorkerId id = ready_workers_.first_active();
     Worker& worker = workers_.at(id);
     ++looks_;
     if (!serve(id, worker)) {
-      ready_workers_.rest(id);
+      ready_workers_.park(id);
       continue;
     }
     ready_workers_.remove(id);
-    queue(id, worker);
-  }
-  serve_ahead();
-}
-
-/// A study that comes before all that a worker holds does not wait until some of that has ended:
-/// the worker gets a batch of it at once, besides what it asked for, and the next when that one has
-/// ended.
-void Scheduler::serve_ahead() {
-  const auto is_urgent = [this] {
-    const auto highest = queue_.highest_priority();
-    return highest && !priorities_.empty() && *highest > priorities_.begin()->first;
-  };
-  while (full_workers_.has_awake() && is_urgent()) {
-    const WorkerId id = full_workers_.first_awake();
-    Worker& worker = workers_.at(id);
-    ++looks_;
-    const StudyId study = next_free_study(worker);
-    worker.ahead = may_get_ahead(worker, study) ? serve_free(id, worker, study) : 0;
-    if (worker.ahead != 0) {
-      full_workers_.remove(id);
-    } else {
-      full_workers_.rest(id);
+    if (worker.credit > 0) {
+      ready_workers_.add(id);
     }
   }
-}
-
-bool Scheduler::may_get_ahead(const Worker& worker, StudyId study) const {
-  const bool is_sound = !worker.is_busy && !worker.draining && worker.probe == 0 &&
-                        is_proven(worker) && !is_set_aside(worker) &&
-                        next_suspect_study(worker) == 0;
-  return is_sound && study != 0 && !worker.leases.empty() &&
-         std::ranges::all_of(worker.leases, [&](LeaseId id) {
-           const Lease& lease = leases_.at(id);
-           return !lease.alone && lease.priority < studies_.at(study).priority;
-         });
-}
-
-/// Something has changed for all workers.
-void Scheduler::wake_all() {
-  ready_workers_.wake_all();
-  full_workers_.wake_all();
 }
 
 bool Scheduler::serve(WorkerId id, Worker& worker) {
@@ -84,7 +46,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     set_draining(worker, false);
   } else if (!is_proven(worker)) {
     // It may have nothing else by which to show that it is fit for them.
-    if (worker.leases.empty() && next_free_study(worker) == 0) {
+    if (worker.leases.empty() && queue_.next_free() == 0) {
       return probe(id, worker);
     }
   } else if (worker.leases.empty()) {
@@ -97,23 +59,16 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (worker.leases.size() >= settings_.newcomer_batches + worker.solved_batches) {
     return false;
   }
-  const StudyId study = next_free_study(worker);
+  const StudyId study = queue_.next_free();
   if (study == 0) {
     return seeks_stragglers_ && serve_straggler(id, worker);
   }
-  serve_free(id, worker, study);
-  return true;
-}
-
-/// Free points of the study, of which there are some. @returns the lease
-LeaseId Scheduler::serve_free(WorkerId id, Worker& worker, StudyId study) {
-  const Portion wanted = portion_for(worker, study, true);
-  const auto batch = studies_.at(study).points.take(wanted);
-  const LeaseId lease = grant(id, worker, study, *batch, false);
-  // What ended before says nothing of how much the worker can do.
+  const BatchSize wanted = portion_for(worker, study, true);
+  grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
+  // A batch that ended early with its run of points says nothing of the worker's capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
-  return lease;
+  return true;
 }
 
 bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
@@ -121,7 +76,7 @@ bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
   Study& study = studies_.at(id_of_study);
   set_draining(worker, false);
   // The sooner these are known to be sound, the better: its lanes may stay empty.
-  const Portion wanted = portion_for(worker, id_of_study, false);
+  const BatchSize wanted = portion_for(worker, id_of_study, false);
   if (const auto batch = study.points.take(*suspect_for(study, worker), wanted)) {
     grant(id, worker, id_of_study, *batch, true);
   }
@@ -160,7 +115,7 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   const Study& study = studies_.at(lease.study);
   const std::int64_t age_ms = now_ms_ - lease.granted_ms;
   if (lease.twin != 0 || lease.alone || !lease.batch.losses.empty() ||
-      age_ms < settings_.straggler_after_ms || !study.is_open() || !admits(study, helper) ||
+      age_ms < settings_.straggler_after_ms || !is_open(study) ||
       study.points.leased_set().within(lease.batch.first_place, lease.batch.end()).empty()) {
     return false;
   }
@@ -179,19 +134,10 @@ bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
   return true;
 }
 
-/// The results of a study come from one solver version.
-bool Scheduler::admits(const Study& study, const Worker& worker) {
-  return study.solver_version.empty() || study.solver_version == worker.solver_version;
-}
-
-StudyId Scheduler::next_free_study(const Worker& worker) const {
-  return queue_.next_free(worker.solver_version);
-}
-
 StudyId Scheduler::next_suspect_study(const Worker& worker) const {
   const auto& suspects = queue_.with_suspects();
   const auto found = std::find_if(suspects.begin(), suspects.end(), [&](StudyId study) {
-    return admits(studies_.at(study), worker) && suspect_for(studies_.at(study), worker);
+    return suspect_for(studies_.at(study), worker).has_value();
   });
   return found == suspects.end() ? 0 : *found;
 }
@@ -204,7 +150,7 @@ std::optional<Standing> Scheduler::suspect_for(const Study& study, const Worker&
   if (points.has(Standing::kAccused) &&
       (!is_proven(worker) ||
        now_ms_ - points.returned_ms(Standing::kAccused) >= settings_.longest_proven_within_ms ||
-       is_longest_proven(worker, study))) {
+       is_longest_proven(worker))) {
     return Standing::kAccused;
   }
   return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
@@ -218,7 +164,7 @@ void Scheduler::set_draining(Worker& worker, bool is_draining) {
     ++draining_;
   } else {
     --draining_;
-    ready_workers_.wake_all();  // another one may have to
+    ready_workers_.unpark_all();  // another one may have to
   }
 }
 
@@ -229,7 +175,7 @@ double Scheduler::target_s() const {
 }
 
 /// How many points the worker should get of the study.
-Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lanes) const {
+BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lanes) const {
   const auto known = worker.paces.find(id);
   const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
   std::uint64_t points = settings_.first_batch_points * worker.threads;
@@ -252,7 +198,7 @@ Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lane
   const std::uint64_t shares = settings_.tail_batches_per_thread * threads_;
   const std::uint64_t fair =
       studies_.at(id).points.free() / std::max<std::uint64_t>(shares, 1) * worker.threads;
-  Portion wanted{std::max<std::uint64_t>(std::min(points, std::max(fair, fewest)), 1)};
+  BatchSize wanted{std::max<std::uint64_t>(std::min(points, std::max(fair, fewest)), 1)};
   if (pace.last_end != 0) {
     wanted.follows = pace.last_end;
   }
@@ -264,7 +210,7 @@ Portion Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lane
 }
 
 /// More points, or models, where a batch would leave lanes empty and take nearly as long.
-void Scheduler::fill_lanes(Portion& wanted, const StudyPoints& points, std::uint32_t threads,
+void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);
   const bool has_models = points.has_models();
@@ -308,12 +254,11 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   const double counted_s = std::clamp(takes_s, target_s(), settings_.lanes_batch_s + target_s());
   served.served += counted_s / target_s();
   if (served.solver_version.empty()) {
-    served.solver_version = worker.solver_version;
+    served.solver_version = settings_.solver_version;
   }
   worker.stored_ms = worker.leases.empty() ? now_ms_ : worker.stored_ms;
   const LeaseId lease = next_lease_++;
-  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0, served.priority});
-  note_priority(served.priority, true);
+  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_});
   served.leases.insert(lease, batch);
   worker.leases.insert(lease);
   worker.credit -= std::min(worker.credit, 1U);
@@ -321,22 +266,13 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
-  SendBatch send{id, study, {}, batch.attempts + 1, lease, served.priority};
+  SendBatch send{id, study, {}, batch.attempts + 1, lease};
   for (const Interval& places : served.points.leased_set().within(batch.first_place, batch.end())) {
     const auto points = served.points.order().points(places);
     send.points.insert(send.points.end(), points.begin(), points.end());
   }
   effects_.emplace_back(std::move(send));
   return lease;
-}
-
-/// A lease of that priority begins or ends.
-void Scheduler::note_priority(std::int32_t priority, bool is_leased) {
-  std::size_t& leases = priorities_[priority];
-  leases = is_leased ? leases + 1 : leases - 1;
-  if (leases == 0) {
-    priorities_.erase(priority);
-  }
 }
 
 }  // namespace oblique::server

@@ -106,12 +106,6 @@ void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   }
 }
 
-/// Who has proven itself, is set aside or is there at all may be another now.
-void Scheduler::standing_of_processes_changed() {
-  longest_proven_since_ms_.clear();
-  wake_all();
-}
-
 /// What the message says of the worker's process.
 void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted) {
   WorkerProcess& process = processes_.at(worker.process);
@@ -144,7 +138,7 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
     ++process.losses;
   }
   if (process.proven_since_ms.has_value() != was_proven || process.lost_in_a_row != lost_before) {
-    standing_of_processes_changed();
+    ready_workers_.unpark_all();
   }
 }
 
@@ -172,7 +166,7 @@ void Scheduler::end_stalled() {
     }
   }
   if (any_stalled) {
-    standing_of_processes_changed();
+    ready_workers_.unpark_all();
   }
 }
 
@@ -215,17 +209,13 @@ bool Scheduler::is_set_aside(const Worker& worker) const {
           now_ms_ - vanished_ms_.front() <= settings_.newcomers_watched_ms);
 }
 
-/// Of those that may get points of the study.
-bool Scheduler::is_longest_proven(const Worker& worker, const Study& study) const {
+/// Of the workers that are not set aside none has been proven for longer.
+bool Scheduler::is_longest_proven(const Worker& worker) const {
   const auto since_ms = processes_.at(worker.process).proven_since_ms;
-  const auto [longest, is_new] = longest_proven_since_ms_.try_emplace(study.solver_version);
-  for (auto other = is_new ? workers_.begin() : workers_.end(); other != workers_.end(); ++other) {
-    const auto other_ms = processes_.at(other->second.process).proven_since_ms;
-    if (other_ms && !is_set_aside(other->second) && admits(study, other->second)) {
-      longest->second = std::min(*other_ms, longest->second.value_or(*other_ms));
-    }
-  }
-  return since_ms && (!longest->second || *since_ms <= *longest->second);
+  return since_ms && std::ranges::none_of(workers_, [&](const auto& entry) {
+           const auto other_ms = processes_.at(entry.second.process).proven_since_ms;
+           return other_ms && *other_ms < *since_ms && !is_set_aside(entry.second);
+         });
 }
 
 /// Hands the worker a point that all sound workers solve, if it was not just given one.

@@ -14,7 +14,7 @@ void StudyQueue::put(StudyId study, const Place& place) {
     places_.erase(known);
   }
   if (place.has_free) {
-    free_[place.solver_version].insert(rank_of(study, place));
+    free_.insert(rank_of(study, place));
     by_served_.emplace(place.served, study);
   }
   if (place.has_suspect) {
@@ -27,34 +27,14 @@ void StudyQueue::put(StudyId study, const Place& place) {
 
 void StudyQueue::take_out(StudyId study, const Place& place) {
   if (place.has_free) {
-    const auto ranks = free_.find(place.solver_version);
-    ranks->second.erase(rank_of(study, place));
-    if (ranks->second.empty()) {
-      free_.erase(ranks);
-    }
+    free_.erase(rank_of(study, place));
     by_served_.erase({place.served, study});
   }
   suspects_.erase(study);
 }
 
-StudyQueue::StudyId StudyQueue::next_free(const std::string& solver_version) const {
-  const Rank* best = nullptr;
-  for (const std::string& version : {std::string(), solver_version}) {
-    const auto ranks = free_.find(version);
-    if (ranks != free_.end() && (best == nullptr || *ranks->second.begin() < *best)) {
-      best = &*ranks->second.begin();
-    }
-  }
-  return best == nullptr ? 0 : std::get<StudyId>(*best);
-}
-
-std::optional<std::int64_t> StudyQueue::highest_priority() const {
-  std::optional<std::int64_t> highest;
-  for (const auto& [version, ranks] : free_) {
-    const std::int64_t priority = -std::get<0>(*ranks.begin());
-    highest = std::max(highest.value_or(priority), priority);
-  }
-  return highest;
+StudyQueue::StudyId StudyQueue::next_free() const {
+  return free_.empty() ? 0 : std::get<StudyId>(*free_.begin());
 }
 
 std::optional<double> StudyQueue::least_served(StudyId but) const {

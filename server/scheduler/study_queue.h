@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <string>
 #include <tuple>
 #include <utility>
 
@@ -22,8 +21,7 @@ class StudyQueue {
     bool has_free = false;     ///< points that any worker may get
     bool has_suspect = false;  ///< points that are leased alone
     std::int32_t priority = 0;
-    double served = 0.0;           ///< batches handed out
-    std::string solver_version{};  ///< of the workers that it is for; empty: of all
+    double served = 0.0;  ///< batches handed out
 
     bool operator==(const Place&) const = default;
   };
@@ -32,10 +30,8 @@ class StudyQueue {
   void put(StudyId study, const Place& place);
 
   bool empty() const { return places_.empty(); }
-  /// The study whose free points a worker with this solver gets next; 0: none.
-  StudyId next_free(const std::string& solver_version) const;
-  /// The highest priority of studies with free points; nothing: there are none.
-  std::optional<std::int64_t> highest_priority() const;
+  /// The study of which the next batch is; 0: none.
+  StudyId next_free() const;
   /// The least `served` of the studies with free points, without the one named.
   std::optional<double> least_served(StudyId but) const;
   /// The studies with suspect points, the oldest first.
@@ -52,8 +48,8 @@ class StudyQueue {
   void take_out(StudyId study, const Place& place);
 
   std::map<StudyId, Place> places_;
-  std::map<std::string, std::set<Rank>, std::less<>> free_;  // by solver version
-  std::set<std::pair<double, StudyId>> by_served_;           // those with free points
+  std::set<Rank> free_;                             // those with free points
+  std::set<std::pair<double, StudyId>> by_served_;  // the same
   std::set<StudyId> suspects_;
 };
 

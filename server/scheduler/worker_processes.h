@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "server/scheduler/points/loss_history.h"
+#include "server/scheduler/loss_history.h"
 
 namespace oblique::server {
 

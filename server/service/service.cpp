@@ -8,11 +8,20 @@
 #include "proto/result_message.h"
 
 namespace oblique::server {
+namespace {
+
+SchedulerSettings scheduler_settings(const ServiceSettings& settings) {
+  SchedulerSettings scheduler = settings.scheduler;
+  scheduler.solver_version = settings.solver_version;
+  return scheduler;
+}
+
+}  // namespace
 
 Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<StoredStudy> studies,
                  Instant now)
     : outbox_(outbox),
-      scheduler_(settings.scheduler),
+      scheduler_(scheduler_settings(settings)),
       ledger_(settings.ledger, outbox),
       known_(settings.solver_version),
       bad_frames_(outbox),

@@ -72,7 +72,7 @@ void Service::stored(const ReuseWrite& write, Instant now) {
   const ReusedResults& part = *write.outcome;
   const std::optional<std::uint64_t> next = known_.add_part(id, part, now.steady_ms);
   if (!part.points.empty()) {
-    feed(PointsTaken{id, part.points, known_.solver_version()}, now);
+    feed(PointsTaken{id, part.points}, now);
     known_.note_source(id);
     changes_.recount(id);
   }

@@ -23,12 +23,12 @@ std::string what_it_waits_for(StudyId id, const StudySources& sources, const Stu
     return fmt::format("known points to be taken over from other studies, {} so far",
                        taken.points());
   }
+  if (counts.is_of_other_solver) {
+    return fmt::format("a server with solver version {}, that of its results",
+                       counts.solver_version);
+  }
   if (counts.leased == 0 && sources.scheduler.sets_all_aside()) {
     return "a worker";
-  }
-  if (counts.lacks_worker) {
-    return fmt::format("a worker with solver version {}, that of its results",
-                       counts.solver_version);
   }
   const QuietWorkers quiet = sources.scheduler.quiet_workers(id, now.steady_ms);
   if (counts.leased > 0 && quiet.quiet_ms >= kQuietAfter_ms) {

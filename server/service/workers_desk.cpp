@@ -29,19 +29,6 @@ std::string plain(const std::string& text) {
   return kept;
 }
 
-/// By what the process of a worker is known again, or an empty text: by the id that it has drawn,
-/// or by the name that older workers have when they are given no other one, HOST:PID.
-std::string process_of(const protocol::WorkerHello& hello) {
-  if (!hello.process_id().empty()) {
-    return "id " + protocol::shortened(hello.process_id(), kLongestWorkerText);
-  }
-  const std::string& name = hello.name();
-  const std::size_t colon = name.rfind(':');
-  const bool ends_in_number = colon != std::string::npos && colon > 0 && colon + 1 < name.size() &&
-                              name.find_first_not_of("0123456789", colon + 1) == std::string::npos;
-  return ends_in_number ? "name " + protocol::shortened(name, kLongestWorkerText) : std::string();
-}
-
 /// The points that a filter leaves out; nothing where the message has no ranges of points.
 std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   IntervalSet points;
@@ -177,7 +164,6 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
        now);
   workers_.emplace(id, worker);
   ids_[identity] = id;
-  tell_of_version(id, now);
   if (settings_.is_insecure) {
     notice_to(id,
               "the server runs with --insecure: whoever reaches it can use it, and what is sent "
@@ -188,15 +174,17 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
     stopping.mutable_stopping();
     network_.to_worker(identity, stopping);
   }
-  heard.events.emplace_back(WorkerJoined{id, worker.threads, worker.solver_version,
-                                         process_of(hello), !hello.process_id().empty()});
+  heard.events.emplace_back(WorkerJoined{id, worker.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
 }
 
 /// Says why, if there is a reason.
 bool WorkersDesk::refuse(const std::string& identity, const protocol::WorkerHello& hello) {
   std::string reason = protocol::objection_to_worker(hello);
-  if (reason.empty() && hello.solver_version().empty()) {
-    reason = "it does not say which version its solver has";
+  if (reason.empty() && hello.solver_version() != settings_.solver_version) {
+    reason = fmt::format(
+        "its solver has version {}, the server's {}: results of a study must come from one "
+        "version; install the server's release of oblique there",
+        plain(hello.solver_version()), settings_.solver_version);
   }
   if (reason.empty()) {
     return false;
@@ -222,19 +210,6 @@ bool WorkersDesk::welcome(WorkerId id, const WorkerRecord& worker) {
   welcome.set_database_id(settings_.database_id);
   welcome.set_takes_back(true);
   return network_.to_worker(worker.identity, reply) != Delivery::kGone;
-}
-
-void WorkersDesk::tell_of_version(WorkerId worker, Instant now) {
-  const WorkerRecord& record = workers_.at(worker);
-  if (record.solver_version == settings_.solver_version) {
-    return;
-  }
-  const std::string text = fmt::format(
-      "worker {}: its solver has version {}, the server's {}: studies with results of another "
-      "version than its own go to other workers",
-      worker, record.solver_version, settings_.solver_version);
-  note(Severity::kWarning, text, now);
-  notice_to(worker, text);
 }
 
 void WorkersDesk::results(WorkerId worker, protocol::Results message, Heard& heard) {

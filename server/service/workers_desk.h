@@ -106,7 +106,6 @@ class WorkersDesk {
   void results(WorkerId worker, protocol::Results results, Heard& heard);
   void oversized(const std::string& identity, Heard& heard);
   void give_up(WorkerId worker, const std::string& why, Heard& heard);
-  void tell_of_version(WorkerId worker, Instant now);
   void notice_to(WorkerId worker, const std::string& text);
   void forget(WorkerId worker);
   /// `lease`: of the batch that the message is; 0: it is none.

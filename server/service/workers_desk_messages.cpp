@@ -30,7 +30,6 @@ void WorkersDesk::send(const SendBatch& batch) {
   fields.set_study_id(batch.study);
   fields.set_attempt(batch.attempt);
   fields.set_lease_id(batch.lease);
-  fields.set_priority(batch.priority);
   std::uint64_t reached = 0;
   for (const Interval& range : batch.points) {
     fields.add_ranges(static_cast<std::int64_t>(range.begin - reached));

@@ -31,12 +31,11 @@ protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) {
 }
 
 SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer,
-                                 Killers killers, std::string solver_version, bool leaves)
+                                 Killers killers, bool leaves)
     : world_(world),
       network_(network),
       peer_(peer),
       killers_(std::move(killers)),
-      solver_version_(std::move(solver_version)),
       leaves_(leaves),
       ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)),
       ms_per_fall_(world.chance(0.3) ? world.between(5, 50) : 0) {}
@@ -44,7 +43,7 @@ SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t p
 void SimulatedWorker::start() {
   protocol::WorkerHello hello;
   protocol::say_protocol(hello);
-  hello.set_solver_version(solver_version_);
+  hello.set_solver_version("1");
   hello.set_threads(1);
   ++life_;
   hello.set_process_id(std::to_string(peer_) + " in life " + std::to_string(life_));

@@ -31,8 +31,7 @@ class SimulatedWorker {
   /// `peer` is its number in the network. A model's first point takes some of them longer than the
   /// others. One that `leaves` has now and then a time by which it
   /// is gone; another one comes then.
-  SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers,
-                  std::string solver_version, bool leaves);
+  SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers, bool leaves);
 
   /// The process, if there is one, dies; another one starts after a while. The first one starts so
   /// too.
@@ -41,7 +40,6 @@ class SimulatedWorker {
   void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   void stop();
 
-  const std::string& solver_version() const { return solver_version_; }
   /// The results of that message of the socket, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const;
   bool holds_nothing() const { return batches_.empty(); }
@@ -67,7 +65,6 @@ class SimulatedWorker {
   Network& network_;
   std::uint64_t peer_;
   Killers killers_;
-  std::string solver_version_;
   bool leaves_;
   std::int64_t ms_per_point_;
   std::int64_t ms_per_fall_;

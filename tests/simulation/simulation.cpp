@@ -98,8 +98,7 @@ class Simulation {
     const std::int64_t count = world_.between(settings_.storms ? 2 : 1, 5);
     for (std::int64_t i = 0; i < count; ++i) {
       workers_.push_back(std::make_unique<SimulatedWorker>(
-          world_, workers_network_, static_cast<std::uint64_t>(i), killers_,
-          !settings_.storms && world_.chance(0.2) ? "2" : "1", !settings_.storms));
+          world_, workers_network_, static_cast<std::uint64_t>(i), killers_, !settings_.storms));
       workers_.back()->restart(world_.between(0, 3000));
     }
   }
@@ -251,12 +250,9 @@ class Simulation {
     const auto link = workers_network_.link_of(identity);
     for (const auto& worker : workers_) {
       const auto* results = worker->sent(link, sequence);
-      // What a worker of another solver version solved is acknowledged, for it is not wanted.
-      // What is of a deleted study is not wanted either.
+      // Results of a deleted study are acknowledged and not stored.
       if (results == nullptr || results->study_id() == server::kProbeStudy ||
-          disk_.model().study(results->study_id()) == nullptr ||
-          server_.service().scheduler().study(results->study_id()).solver_version !=
-              worker->solver_version()) {
+          disk_.model().study(results->study_id()) == nullptr) {
         continue;
       }
       for (const auto& result : results->results()) {

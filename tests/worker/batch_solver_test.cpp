@@ -22,8 +22,8 @@ namespace {
 
 /// Of a study in which nothing is left out.
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
-            std::uint64_t study_id = 7, std::int32_t priority = 0) {
-  return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000), priority};
+            std::uint64_t study_id = 7) {
+  return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000)};
 }
 
 /// Of a study of a thousand points with mu from 0 to 999.
@@ -120,23 +120,6 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
   EXPECT_TRUE(progress[0].batch_done);
   EXPECT_EQ(progress[1].results.size(), 2U);
   EXPECT_TRUE(solver_.collect().empty());
-}
-
-TEST_F(BatchSolverTest, ABatchOfAHigherPriorityComesBeforeWhatIsLeftOfOneThatWasBegun) {
-  solver_.add(batch(1, 0, 1000));
-  gate_.wait_begun(1);
-  solver_.add(batch(2, 0, 3, 8, 1));
-  const int of_a_task = static_cast<int>(solver::points_of_task(1000, 1));
-  gate_.open(of_a_task + 3);
-  wait_batches_ended(1);
-  const auto progress = solver_.collect();
-  ASSERT_EQ(progress.size(), 2U);
-  EXPECT_FALSE(progress[0].batch_done);
-  EXPECT_EQ(progress[1].batch, 2U);
-  EXPECT_TRUE(progress[1].batch_done);
-  gate_.open(1000);
-  wait_batches_ended(2);
-  EXPECT_EQ(progress[0].results.size() + points_of_one_batch(solver_.collect()).size(), 1000U);
 }
 
 TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {

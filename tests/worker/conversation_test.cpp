@@ -22,12 +22,9 @@ TEST_F(ConversationTest, AWelcomedWorkerAsksForTwoBatches) {
 
 TEST_F(ConversationTest, ABatchIsSolvedWithTheRecipeOfItsStudy) {
   join();
-  auto message = batch_message(7, 31, 90, 10);
-  message.mutable_batch()->set_priority(-3);
-  receive(message);
+  receive(batch_message(7, 31, 90, 10));
   const auto solves = effects_of<Solve>();
   ASSERT_EQ(solves.size(), 1U);
-  EXPECT_EQ(solves[0].batch.priority(), -3);
   EXPECT_EQ(solves[0].batch.study_id(), 7U);
   EXPECT_EQ(solves[0].batch.point_at(0), 90U);
   EXPECT_EQ(solves[0].batch.size(), 10U);

@@ -47,7 +47,7 @@ class SchedulerBench {
 
   /// A connection of that process, as `join`.
   std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
-    auto effects = feed(WorkerJoined{worker, 1, {}, process, true});
+    auto effects = feed(WorkerJoined{worker, 1, process});
     append(effects, feed(CreditGiven{worker, credit}));
     return effects;
   }

@@ -11,20 +11,17 @@ namespace {
 
 constexpr WorkerId kWorkers = 1000;
 
-/// A thousand workers that ask for batches of a study that none of them may solve.
+/// A thousand workers that ask for batches, of which there are none.
 class IdleCrowd : public testing::Test {
  protected:
   IdleCrowd() {
     for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
-      scheduler_.handle(WorkerJoined{worker, 1, "2"}, now_ms_);
+      scheduler_.handle(WorkerJoined{worker, 1}, now_ms_);
       scheduler_.handle(CreditGiven{worker, 2}, now_ms_);
     }
-    add(1, "1");
   }
-  std::vector<Effect> add(StudyId study, const std::string& solver_version) {
-    StudyAdded event{study, table_of(100), IntervalSet(0, 1)};
-    event.solver_version = solver_version;
-    return scheduler_.handle(event, now_ms_);
+  std::vector<Effect> add_study() {
+    return scheduler_.handle(StudyAdded{2, table_of(100), IntervalSet(0, 1)}, now_ms_);
   }
 
   Scheduler scheduler_{SchedulerSettings{}};
@@ -41,24 +38,23 @@ TEST_F(IdleCrowd, AMessageOfOneWorkerMakesTheServerLookAtNoOther) {
 }
 
 TEST_F(IdleCrowd, AsSoonAsThereIsSomethingItIsHandedOut) {
-  EXPECT_EQ(only<SendBatch>(add(2, "2")).size(), 99U) << "a point each, while there are any";
+  EXPECT_EQ(only<SendBatch>(add_study()).size(), 99U) << "a point each, while there are any";
   scheduler_.check_invariants();
 }
 
 TEST_F(IdleCrowd, TheFirstThatAskedIsServedFirstHoweverOftenItFoundNothing) {
   scheduler_.handle(HeartbeatReceived{500, {}}, now_ms_);
-  EXPECT_EQ(only<SendBatch>(add(2, "2")).at(0).worker, 1U);
+  EXPECT_EQ(only<SendBatch>(add_study()).at(0).worker, 1U);
 }
 
 TEST_F(IdleCrowd, PointsOfAWorkerThatLeavesGoToOneThatWaitsAtOnce) {
-  const auto batches = only<SendBatch>(add(2, "2"));
+  const auto batches = only<SendBatch>(add_study());
   const auto effects = scheduler_.handle(WorkerLeft{batches.at(0).worker}, now_ms_);
   ASSERT_GE(only<SendBatch>(effects).size(), 1U);
   EXPECT_NE(only<SendBatch>(effects)[0].worker, batches[0].worker);
 }
 
 TEST_F(IdleCrowd, APausedStudyThatGoesOnIsHandedOutAtOnce) {
-  scheduler_.handle(StudyPaused{1}, now_ms_);
   StudyAdded paused{2, table_of(100), {}};
   paused.paused = true;
   EXPECT_TRUE(only<SendBatch>(scheduler_.handle(paused, now_ms_)).empty());

@@ -23,17 +23,13 @@ TEST(SchedulerTaken, NothingOfAStudyThatIsHeldIsHandedOut) {
   EXPECT_THAT(only<SendBatch>(bench.feed(StudyHeld{1, false})), Not(IsEmpty()));
 }
 
-TEST(SchedulerTaken, WhatIsTakenIsNotHandedOutAndBelongsToItsVersion) {
+TEST(SchedulerTaken, WhatIsTakenIsNotHandedOut) {
   SchedulerBench bench;
   bench.feed(held_study(10));
-  bench.feed(PointsTaken{1, IntervalSet(2, 10), "2.0"});
+  bench.feed(PointsTaken{1, IntervalSet(2, 10)});
   EXPECT_EQ(bench.scheduler.study(1).solved, 8U);
-  EXPECT_EQ(bench.scheduler.study(1).solver_version, "2.0");
   bench.feed(StudyHeld{1, false});
-  bench.feed(WorkerJoined{1, 1, "1.0"});
-  EXPECT_THAT(only<SendBatch>(bench.feed(CreditGiven{1, 4})), IsEmpty());
-  bench.feed(WorkerJoined{2, 1, "2.0"});
-  const auto batches = only<SendBatch>(bench.feed(CreditGiven{2, 4}));
+  const auto batches = bench.join(1, 4);
   ASSERT_THAT(batches, Not(IsEmpty()));
   EXPECT_LE(batches.back().first_point() + batches.back().count(), 2U);
 }
@@ -41,9 +37,8 @@ TEST(SchedulerTaken, WhatIsTakenIsNotHandedOutAndBelongsToItsVersion) {
 TEST(SchedulerTaken, AStudyOfWhichAllIsTakenIsFinished) {
   SchedulerBench bench;
   bench.feed(held_study(10));
-  bench.feed(PointsTaken{1, IntervalSet(0, 5), "2.0"});
-  EXPECT_THAT(only<StudyFinished>(bench.feed(PointsTaken{1, IntervalSet(5, 10), "2.0"})),
-              SizeIs(1));
+  bench.feed(PointsTaken{1, IntervalSet(0, 5)});
+  EXPECT_THAT(only<StudyFinished>(bench.feed(PointsTaken{1, IntervalSet(5, 10)})), SizeIs(1));
   bench.feed(StudyHeld{1, false});
   EXPECT_THAT(bench.join(1, 4), IsEmpty());
 }
@@ -51,12 +46,12 @@ TEST(SchedulerTaken, AStudyOfWhichAllIsTakenIsFinished) {
 TEST(SchedulerTaken, PointsThatAreOutAreTakenAllTheSameAndTheirBatchIsWithdrawn) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(1000), {}});
-  bench.feed(WorkerJoined{1, 1, "2.0"});
+  bench.feed(WorkerJoined{1, 1});
   const auto batches = only<SendBatch>(bench.feed(CreditGiven{1, 2}));
   ASSERT_THAT(batches, SizeIs(2));
   const auto& second = batches[1];
   const IntervalSet taken(second.first_point(), second.first_point() + second.count() + 5);
-  const auto released = only<ReleaseBatch>(bench.feed(PointsTaken{1, taken, "2.0"}));
+  const auto released = only<ReleaseBatch>(bench.feed(PointsTaken{1, taken}));
   ASSERT_THAT(released, SizeIs(1));
   EXPECT_EQ(released[0].lease, second.lease);
   bench.feed(WorkerLeft{1});
@@ -81,7 +76,7 @@ TEST(SchedulerTaken, SuspectPointsAreTakenToo) {
     bench.join(worker, 4);
     bench.feed(WorkerUnreachable{worker});
   }
-  EXPECT_THAT(only<StudyFinished>(bench.feed(PointsTaken{1, IntervalSet(0, 3), "2.0"})), SizeIs(1));
+  EXPECT_THAT(only<StudyFinished>(bench.feed(PointsTaken{1, IntervalSet(0, 3)})), SizeIs(1));
 }
 
 }  // namespace

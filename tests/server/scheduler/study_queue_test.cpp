@@ -16,34 +16,26 @@ using Place = StudyQueue::Place;
 
 TEST(StudyQueueTest, TheHighestPriorityComesFirstThenTheOneServedLeastThenTheOldest) {
   StudyQueue queue;
-  queue.put(1, {true, false, 0, 5.0, ""});
-  queue.put(2, {true, false, 0, 3.0, ""});
-  queue.put(3, {true, false, 0, 3.0, ""});
-  EXPECT_EQ(queue.next_free("1.0"), 2U);
-  queue.put(4, {true, false, 1, 99.0, ""});
-  EXPECT_EQ(queue.next_free("1.0"), 4U);
+  queue.put(1, {true, false, 0, 5.0});
+  queue.put(2, {true, false, 0, 3.0});
+  queue.put(3, {true, false, 0, 3.0});
+  EXPECT_EQ(queue.next_free(), 2U);
+  queue.put(4, {true, false, 1, 99.0});
+  EXPECT_EQ(queue.next_free(), 4U);
   queue.put(4, {});
-  EXPECT_EQ(queue.next_free("1.0"), 2U);
+  EXPECT_EQ(queue.next_free(), 2U);
 }
 
 TEST(StudyQueueTest, AStudyWithNothingToHandOutIsNowhere) {
   StudyQueue queue;
-  queue.put(1, {true, true, 0, 1.0, ""});
-  queue.put(1, {false, true, 0, 1.0, ""});
-  EXPECT_EQ(queue.next_free(""), 0U);
+  queue.put(1, {true, true, 0, 1.0});
+  queue.put(1, {false, true, 0, 1.0});
+  EXPECT_EQ(queue.next_free(), 0U);
   EXPECT_EQ(queue.with_suspects().count(1), 1U);
   queue.put(1, {});
   EXPECT_TRUE(queue.empty());
   EXPECT_EQ(queue.find(1), nullptr);
   EXPECT_FALSE(queue.least_served(2).has_value());
-}
-
-TEST(StudyQueueTest, AWorkerGetsStudiesOfItsSolverAndThoseOfNone) {
-  StudyQueue queue;
-  queue.put(1, {true, false, 0, 0.0, "0.9"});
-  queue.put(2, {true, false, 0, 1.0, ""});
-  EXPECT_EQ(queue.next_free("0.9"), 1U);
-  EXPECT_EQ(queue.next_free("1.0"), 2U);
 }
 
 TEST(StudyQueueTest, TheLeastServedIsTheMinimumWhateverWasPutBefore) {
@@ -52,7 +44,7 @@ TEST(StudyQueueTest, TheLeastServedIsTheMinimumWhateverWasPutBefore) {
   std::vector<Place> places(50);
   for (int change = 0; change < 5000; ++change) {
     const std::size_t study = random() % places.size();
-    places[study] = {random() % 2 == 0, false, 0, static_cast<double>(random() % 20), ""};
+    places[study] = {random() % 2 == 0, false, 0, static_cast<double>(random() % 20)};
     queue.put(study + 1, places[study]);
     double least = 1e9;
     std::size_t first = 0;
@@ -62,7 +54,7 @@ TEST(StudyQueueTest, TheLeastServedIsTheMinimumWhateverWasPutBefore) {
         first = i + 1;
       }
     }
-    ASSERT_EQ(queue.next_free("1.0"), first);
+    ASSERT_EQ(queue.next_free(), first);
     ASSERT_EQ(queue.least_served(0).value_or(1e9), least);
   }
 }

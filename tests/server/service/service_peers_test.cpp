@@ -23,28 +23,27 @@ WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver
   return message;
 }
 
-TEST_F(ServiceTest, AWorkerWithAnotherSolverIsWelcomedAndToldBothVersions) {
-  hello("worker", "0.9");
-  ASSERT_TRUE(last_message().has_notice());
-  EXPECT_THAT(last_message().notice().text(), HasSubstr("0.9"));
-  EXPECT_THAT(last_message().notice().text(), HasSubstr("1.0"));
-  EXPECT_EQ(service_->scheduler().workers(), 1U);
+TEST_F(ServiceTest, AWorkerWithAnotherSolverIsRefusedAndToldBothVersions) {
+  worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
+  EXPECT_THAT(last_message().refused().reason(), AllOf(HasSubstr("0.9"), HasSubstr("1.0")));
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
-TEST_F(ServiceTest, AStudyBegunWithAnotherSolverWaitsAndSaysForWhat) {
-  request(submit_request("a"));
-  write_all();
-  hello();
-  credit(1);
-  answer_batch(1000);
-  worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
-  credit(1);
-  EXPECT_FALSE(last_message().has_batch());
+TEST_F(ServiceTest, AStudyWithResultsOfAnotherSolverWaitsAndSaysForWhat) {
+  StoredStudy stored{};
+  stored.study_id = 1;
+  stored.name = "a";
+  stored.table = table_of(2);
+  stored.settled = IntervalSet(0, 1);
+  stored.solver_version = "0.9";
+  ServiceSettings settings;
+  settings.solver_version = "1.0";
+  service_.emplace(settings, outbox_, std::vector<StoredStudy>{stored}, now_);
   ClientRequest status;
   status.set_protocol_version(protocol::kProtocolVersion);
   status.mutable_status();
   request(status);
-  EXPECT_THAT(last_reply().status().studies(0).waits_for(), HasSubstr("solver version 1.0"));
+  EXPECT_THAT(last_reply().status().studies(0).waits_for(), HasSubstr("solver version 0.9"));
 }
 
 TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
@@ -62,9 +61,6 @@ TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
   status.mutable_status();
   request(status);
   EXPECT_EQ(last_reply().status().studies(0).priority(), 7);
-  hello();
-  credit(1);
-  EXPECT_EQ(last_message().batch().priority(), 7);
   again.mutable_submit()->set_priority(8);
   request(again);
   write_all("the disk is full");

@@ -65,19 +65,6 @@ TEST_F(ProcessesTest, AProcessOnANewConnectionGetsAtOnceWhatItHeldOnTheOldOne) {
   EXPECT_TRUE(last_message().has_hello_again()) << "the old connection is nobody's any more";
 }
 
-TEST_F(ProcessesTest, AWorkerThatDrewNoIdIsKnownByItsNameIfThatHasAProcessNumber) {
-  request(submit_request("a", 100));
-  write_all();
-  for (const char* name : {"box:12", "lab"}) {
-    hello_as("first", "", name);
-    solve_and_leave("first");
-    hello_as("second", "", name);
-    const bool is_known = name == std::string("box:12");
-    EXPECT_EQ(workers().workers(0).proven(), is_known) << name;
-    solve_and_leave("second");
-  }
-}
-
 TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
   request(submit_request("a", 100));
   write_all();

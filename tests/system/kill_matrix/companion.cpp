@@ -1,7 +1,6 @@
 #include "tests/system/kill_matrix/companion.h"
 
 #include <chrono>
-#include <cstdint>
 #include <vector>
 
 #include "tests/system/storms/pretended_worker.h"
@@ -11,14 +10,11 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenHeartbeats{200};
 
-/// Says that it lives, and holds what batches it gets, until it is told to stop.
-void accompany(const std::stop_token& stop, const std::string& server_url,
-               const std::string& solver_version, std::uint32_t batches) {
+/// Sends heartbeats and holds a batch until it is told to stop.
+void accompany(const std::stop_token& stop, const std::string& server_url) {
   PretendedWorker peer(server_url);
-  peer.hello(solver_version, "companion");
-  if (batches > 0) {
-    peer.credit(batches);
-  }
+  peer.hello(worker_solver_version(), "companion");
+  peer.credit(1);
   std::vector<std::uint64_t> leases;
   while (!stop.stop_requested()) {
     const auto message = peer.receive(kBetweenHeartbeats);
@@ -37,11 +33,8 @@ void accompany(const std::stop_token& stop, const std::string& server_url,
 }  // namespace
 
 Companion::Companion(const std::string& point, const std::string& server_url) {
-  const bool gets_notice = point.ends_with(":notice");
-  if (gets_notice || point.ends_with(":release")) {
-    thread_ = std::jthread([=](const std::stop_token& stop) {
-      accompany(stop, server_url, gets_notice ? "0" : worker_solver_version(), gets_notice ? 0 : 1);
-    });
+  if (point.ends_with(":release")) {
+    thread_ = std::jthread([=](const std::stop_token& stop) { accompany(stop, server_url); });
   }
 }
 

@@ -61,8 +61,6 @@ constexpr std::array kMatrix{
     // Those of the server. A companion is there to whom it sends what workers seldom get.
     Entry{kApart, kServer, "before-send:release", SIGKILL, 1},
     Entry{kApart, kServer, "after-send:release", SIGSTOP, 1},
-    Entry{kApart, kServer, "before-send:notice", SIGKILL, 1},
-    Entry{kApart, kServer, "after-send:notice", SIGSTOP, 1},
     Entry{kApart, kServer, "before-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "time", SIGSTOP, 1500},
     Entry{kApart, kServer, "after-receive:submit", SIGKILL, 1},

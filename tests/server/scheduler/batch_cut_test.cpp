@@ -1,4 +1,4 @@
-#include "server/scheduler/points/batch_cut.h"
+#include "server/scheduler/study_points.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -22,7 +22,7 @@ PointTable mixed_table() {
        {range("k", 1e7, 2e7, 40), listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})}}));
 }
 
-std::uint64_t cut(const Interval& free, const Portion& wanted) {
+std::uint64_t cut(const Interval& free, const BatchSize& wanted) {
   return end_of_batch(mixed_table(), PointOrder{}, free, wanted);
 }
 

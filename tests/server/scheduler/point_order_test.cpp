@@ -1,4 +1,4 @@
-#include "server/scheduler/points/point_order.h"
+#include "server/scheduler/point_order.h"
 
 #include <algorithm>
 #include <cstdint>

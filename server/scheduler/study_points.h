@@ -8,13 +8,30 @@
 #include <span>
 #include <vector>
 
-#include "server/scheduler/points/batch_cut.h"
-#include "server/scheduler/points/loss_history.h"
-#include "server/scheduler/points/point_order.h"
+#include "server/scheduler/loss_history.h"
+#include "server/scheduler/point_order.h"
 #include "server/study/interval_set.h"
 #include "server/study/study_table.h"
 
 namespace oblique::server {
+
+/// How many points a worker wants under one lease.
+struct BatchSize {
+  std::uint64_t points;           ///< about as many: the batch ends with a group if one ends near
+  std::uint64_t groups = 1;       ///< at least as many groups, if `most_points` has room for them
+  std::uint64_t most_points = 0;  ///< limit for one whole group more, or for `groups`; 0: `points`
+  /// Falls that the worker solves side by side: the size of groups if the study is arranged now. 0:
+  /// it must not be, for leases are of places.
+  std::uint64_t falls = 0;
+  /// The place at which the worker's last batch ended. The rest of that batch's last group, whose
+  /// falls the worker has solved, comes first.
+  std::optional<std::uint64_t> follows{};
+};
+
+/// The place at which the batch that begins with the places `free` ends. A batch has one point at
+/// least, and one at most when one is wanted.
+std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& order,
+                           const Interval& free, const BatchSize& wanted);
 
 /// Points that are handed out together, under one lease: a run of places (PointOrder), without some
 /// that were settled before.
@@ -55,9 +72,9 @@ class StudyPoints {
   /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
   /// that are left of the group that `wanted` follows, then groups of which nothing was taken yet,
   /// then the second half of what is left of the last. Nothing when there are none.
-  std::optional<Batch> take(const Portion& wanted);
+  std::optional<Batch> take(const BatchSize& wanted);
   /// The same out of the returned ones of that standing.
-  std::optional<Batch> take(Standing standing, const Portion& wanted);
+  std::optional<Batch> take(Standing standing, const BatchSize& wanted);
   /// The condemned point if it came back at `until_ms` or before, else nothing.
   std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
 
@@ -141,7 +158,7 @@ class StudyPoints {
   template <typename Map>
   void move_all(const Map& map);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
-  std::uint64_t lease_fresh(const Interval& free, const Portion& wanted);
+  std::uint64_t lease_fresh(const Interval& free, const BatchSize& wanted);
   std::optional<Interval> fresh_near(std::uint64_t end, std::uint64_t run_end, std::uint64_t enough,
                                      std::uint64_t taken) const;
   bool erase_from(Returned& intervals, std::uint64_t point);

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/scheduler/points/study_points.h"
+#include "server/scheduler/study_points.h"
 #include "tests/server/scheduler/scheduler_bench.h"
 #include "tests/support/recipes.h"
 
@@ -22,18 +22,18 @@ IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
   return points;
 }
 
-StudyPoints points_of(std::uint64_t numbers, IntervalSet settled) {
+StudyPoints points_without(std::uint64_t numbers, IntervalSet settled) {
   return {StudyTable(table_of(numbers)), std::move(settled), 0, LossLimits{}};
 }
 
-Batch taken(StudyPoints& points, const Portion& wanted) {
+Batch taken(StudyPoints& points, const BatchSize& wanted) {
   const auto batch = points.take(wanted);
   points.check_invariants();
   return batch.value();
 }
 
 TEST(ScatteredPointsTest, ABatchGoesOnBehindSettledPointsUntilItHasWhatIsWanted) {
-  StudyPoints points = points_of(100, every(2, 100));
+  StudyPoints points = points_without(100, every(2, 100));
   const Batch batch = taken(points, {8});
   EXPECT_EQ(batch.first_place, 1U);
   EXPECT_EQ(batch.end(), 16U);
@@ -43,7 +43,7 @@ TEST(ScatteredPointsTest, ABatchGoesOnBehindSettledPointsUntilItHasWhatIsWanted)
 }
 
 TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGap) {
-  StudyPoints points = points_of(1000, [] {
+  StudyPoints points = points_without(1000, [] {
     IntervalSet settled(0, 3);
     settled.insert(5, 8);
     return settled;
@@ -52,7 +52,7 @@ TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGa
   points.reopen(IntervalSet(0, 8));
   EXPECT_EQ(taken(points, {8}).end(), 3U) << "3 and 4 are still out";
 
-  StudyPoints sparse = points_of(1000, [] {
+  StudyPoints sparse = points_without(1000, [] {
     IntervalSet settled(3, 500);
     settled.insert(505, 520);
     return settled;
