@@ -34,7 +34,7 @@ TEST_F(ServiceTest, AStudyWithResultsOfAnotherSolverWaitsAndSaysForWhat) {
   stored.study_id = 1;
   stored.name = "a";
   stored.table = table_of(2);
-  stored.settled = IntervalSet(0, 1);
+  stored.completed = IntervalSet(0, 1);
   stored.solver_version = "0.9";
   ServiceSettings settings;
   settings.solver_version = "1.0";
