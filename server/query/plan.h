@@ -6,6 +6,7 @@
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
+#include "server/query/query_rules.h"
 
 namespace oblique::server {
 
@@ -19,17 +20,17 @@ struct PlannedColumn {
 
 /// The statement that answers a query about a study.
 struct Plan {
-  std::string statement;  ///< a SELECT
+  std::string sql;            ///< a SELECT
+  StatementHandle statement;  ///< the same, prepared
   std::vector<PlannedColumn> columns;
 };
 
-/// Plans the answer to `question`. `database` must have kNumberFunction. Throws solver::InputError
-/// for a wrong query, which names the flag or the column and what is allowed, and StorageError if
-/// the database cannot be read.
-Plan plan(sqlite3* database, protocol::StudyQuery question);
+/// Plans the answer to `question`. `database` must have passed restrict_to_reading. Throws
+/// solver::InputError for a wrong query, which names the flag or the column and what is allowed;
+/// StorageError or QueryError if the database cannot be read.
+Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
-/// A hint to append to SQLite's message about `sql` if an unknown name is in double quotes, because
-/// a text in single quotes may have been meant; else empty.
-std::string quotes_hint(const std::string& message, std::string_view sql);
+/// The error for a study that does not exist, with the nearest name.
+std::string no_such_study(sqlite3* database, const std::string& name);
 
 }  // namespace oblique::server

@@ -7,7 +7,6 @@
 
 #include "proto/frames.h"
 #include "server/query/query_rules.h"
-#include "server/query/reader_program.h"
 
 namespace oblique::server {
 namespace {
@@ -118,15 +117,21 @@ void QueryPool::stop() {
 }
 
 void QueryPool::run() {
-  while (true) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (stopping_) {
-        break;
-      }
-    }
+  const auto is_stopping = [this] {
+    const std::lock_guard lock(mutex_);
+    return stopping_;
+  };
+  while (!is_stopping()) {
     try {
-      turn();
+      take_requests();
+      for (Slot& slot : slots_) {
+        read(slot);
+        check_deadline(slot);
+      }
+      std::erase_if(slots_, [](const Slot& slot) { return slot.process == nullptr; });
+      while (start_next()) {
+      }
+      wait();
     } catch (const std::exception&) {
       // For example std::bad_alloc. The next turn continues.
       std::this_thread::sleep_for(kRetryPause);
@@ -139,17 +144,6 @@ void QueryPool::run() {
     }
   }
   slots_.clear();
-}
-
-void QueryPool::turn() {
-  take_requests();
-  for (Slot& slot : slots_) {
-    read(slot);
-    check_deadline(slot);
-  }
-  std::erase_if(slots_, [](const Slot& slot) { return slot.process == nullptr; });
-  start_queries();
-  wait();
 }
 
 /// Waits for input from a process, a call from another thread, or a deadline.
@@ -177,71 +171,63 @@ void QueryPool::take_requests() {
     taken = std::exchange(taken_, {});
   }
   for (const auto& request : taken) {
-    const std::uint64_t ticket = request.first;
-    const std::uint64_t chunks = request.second;
-    Slot* const slot = slot_of(ticket);
-    if (chunks == kCancelled) {
-      forget(ticket);
-      std::erase_if(slots_, [&](const Slot& each) { return each.ticket == ticket; });
-    } else if (slot != nullptr && chunks > slot->taken) {
-      const bool waited = slot->waits_for_client();
-      slot->taken = chunks;
-      if (waited) {
-        slot->deadline_ms = settings_.now_ms() + slot->time_limit_ms;
+    if (request.second == kCancelled) {
+      forget(request.first);
+      std::erase_if(slots_, [&](const Slot& slot) { return slot.ticket == request.first; });
+      continue;
+    }
+    for (Slot& slot : slots_) {
+      if (slot.ticket == request.first && request.second > slot.taken) {
+        const bool waited = slot.waits_for_client();
+        slot.taken = request.second;
+        slot.deadline_ms = waited ? settings_.now_ms() + slot.time_limit_ms : slot.deadline_ms;
       }
     }
   }
 }
 
-void QueryPool::start_queries() {
-  while (true) {
-    std::optional<QueryJob> job;
-    {
-      const std::lock_guard lock(mutex_);
-      job = queue_.start_next();
-    }
-    if (!job) {
-      return;
-    }
-    start(*job);
+/// Starts the next query that may run. False: there is none.
+bool QueryPool::start_next() {
+  std::optional<QueryJob> job;
+  {
+    const std::lock_guard lock(mutex_);
+    job = queue_.start_next();
   }
-}
-
-void QueryPool::start(const QueryJob& job) {
+  if (!job) {
+    return false;
+  }
   try {
-    Slot& slot = idle_slot();
-    slot.process->ask(protocol::encode(job.request));
-    slot.ticket = job.ticket;
-    slot.time_limit_ms = time_limit_of(job.request);
-    slot.deadline_ms = settings_.now_ms() + slot.time_limit_ms;
-    slot.answer_ends_ms = settings_.now_ms() + settings_.longest_answer_ms;
-    slot.given = 0;
-    slot.taken = 0;
-    report_({QueryReport::Kind::kBegun, job.ticket, {}});
+    auto slot = std::ranges::find(slots_, std::uint64_t{0}, &Slot::ticket);
+    if (slot == slots_.end()) {
+      slots_.push_back({std::make_unique<ReaderProcess>(settings_.reader_program, database_)});
+      slot = slots_.end() - 1;
+    }
+    slot->process->ask(protocol::encode(job->request));
+    slot->ticket = job->ticket;
+    slot->time_limit_ms = time_limit_of(job->request);
+    slot->deadline_ms = settings_.now_ms() + slot->time_limit_ms;
+    slot->answer_ends_ms = settings_.now_ms() + settings_.longest_answer_ms;
+    slot->given = 0;
+    slot->taken = 0;
+    report_({QueryReport::Kind::kBegun, job->ticket, {}});
   } catch (const std::exception& error) {
-    forget(job.ticket);
-    std::erase_if(slots_, [&](const Slot& slot) { return slot.ticket == job.ticket; });
+    forget(job->ticket);
+    std::erase_if(slots_, [&](const Slot& slot) { return slot.ticket == job->ticket; });
     report_(
-        {QueryReport::Kind::kAnswered, job.ticket,
+        {QueryReport::Kind::kAnswered, job->ticket,
          encoded_error(std::string("no process can be started for the query: ") + error.what())});
   }
-}
-
-QueryPool::Slot& QueryPool::idle_slot() {
-  if (Slot* idle = slot_of(0); idle != nullptr) {
-    return *idle;
-  }
-  slots_.push_back({std::make_unique<ReaderProcess>(settings_.reader_program, database_)});
-  return slots_.back();
+  return true;
 }
 
 /// Reports the received frames, up to kChunksAhead more than the client has taken.
 void QueryPool::read(Slot& slot) {
-  while (slot.process != nullptr && !slot.waits_for_client()) {
+  while (!slot.waits_for_client()) {
     auto frame = slot.process->read();
-    if (!frame && slot.process->is_broken()) {
-      fail(slot, "the process that ran the query " + slot.process->end() +
-                     ": it may have needed more memory than there is");
+    if (slot.process->is_broken() || (frame && slot.ticket == 0)) {
+      fail(slot,
+           "the process that ran the query has ended: it may have needed more memory than there "
+           "is");
       return;
     }
     if (!frame) {
@@ -259,18 +245,18 @@ void QueryPool::read(Slot& slot) {
 }
 
 void QueryPool::check_deadline(Slot& slot) {
-  if (slot.process == nullptr || slot.ticket == 0) {
+  const std::int64_t now_ms = settings_.now_ms();
+  if (slot.ticket == 0 || (now_ms < slot.deadline_ms && now_ms < slot.answer_ends_ms)) {
     return;
   }
-  const std::int64_t now_ms = settings_.now_ms();
-  if (now_ms >= slot.deadline_ms && slot.waits_for_client()) {
-    fail(slot, "the answer was ended in the middle: its client took no rows for " +
-                   std::to_string(settings_.patience_ms / 1000) + " s. Write it to a file first");
-  } else if (now_ms >= slot.deadline_ms) {
-    fail(slot, took_too_long(slot.time_limit_ms));
-  } else if (now_ms >= slot.answer_ends_ms) {
+  if (now_ms < slot.deadline_ms) {
     fail(slot, "the answer took more than " + std::to_string(settings_.longest_answer_ms / 1000) +
                    " s in all: narrow it, as with WHERE or LIMIT, or read the file with --db");
+  } else if (slot.waits_for_client()) {
+    fail(slot, "the answer was ended in the middle: its client took no rows for " +
+                   std::to_string(settings_.patience_ms / 1000) + " s. Write it to a file first");
+  } else {
+    fail(slot, took_too_long(slot.time_limit_ms));
   }
 }
 
@@ -283,17 +269,10 @@ void QueryPool::finish(Slot& slot, std::string reply) {
 
 /// Answers the query of the slot, if any, with an error, and ends the process.
 void QueryPool::fail(Slot& slot, const std::string& message) {
+  slot.process.reset();
   if (slot.ticket != 0) {
     finish(slot, encoded_error(message));
   }
-  slot.process.reset();
-}
-
-/// The slot that runs the query with that ticket, or for ticket 0 an idle one; nullptr: none.
-QueryPool::Slot* QueryPool::slot_of(std::uint64_t ticket) {
-  const auto found = std::find_if(slots_.begin(), slots_.end(),
-                                  [&](const Slot& slot) { return slot.ticket == ticket; });
-  return found == slots_.end() ? nullptr : &*found;
 }
 
 void QueryPool::forget(std::uint64_t ticket) {

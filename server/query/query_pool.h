@@ -73,7 +73,7 @@ struct QueryReport {
 };
 
 struct QueryPoolSettings {
-  /// Program of the reader processes (reader_program.h); the default is this program.
+  /// Program of the reader processes (reader_process.h); the default is this program.
   std::string reader_program = "/proc/self/exe";
   QueueSettings queue;
   /// A client that takes none of kChunksAhead chunks for this time loses its answer.
@@ -129,17 +129,13 @@ class QueryPool {
   };
 
   void run();
-  void turn();
   void wait();
   void take_requests();
-  void start_queries();
-  void start(const QueryJob& job);
+  bool start_next();
   void read(Slot& slot);
   void check_deadline(Slot& slot);
   void finish(Slot& slot, std::string reply);
   void fail(Slot& slot, const std::string& message);
-  Slot* slot_of(std::uint64_t ticket);
-  Slot& idle_slot();
   void forget(std::uint64_t ticket);
 
   const std::string database_;

@@ -8,7 +8,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/database/sqlite.h"
-#include "server/query/plan.h"
 #include "server/query/sql_functions.h"
 
 namespace oblique::server {
@@ -155,14 +154,6 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   return statement;
 }
 
-void throw_failure(sqlite3* database, int code) {
-  const QueryError error = failure(database, code);
-  if (static_cast<int>(static_cast<unsigned>(code) & 0xffU) == kWrongArgument) {
-    throw StatementError(error.what());
-  }
-  throw error;
-}
-
 QueryError failure(sqlite3* database, int code) {
   switch (static_cast<unsigned>(code) & 0xffU) {
     case SQLITE_NOMEM: {
@@ -177,6 +168,18 @@ QueryError failure(sqlite3* database, int code) {
     default:
       return QueryError(std::string("the query failed: ") + sqlite3_errmsg(database));
   }
+}
+
+std::string missing_name(std::string_view message, std::string_view begin) {
+  const auto at = message.find(begin);
+  return std::string(at == std::string_view::npos ? "" : message.substr(at + begin.size()));
+}
+
+std::string quotes_hint(std::string_view message, std::string_view sql) {
+  const std::string wrong = missing_name(message, "no such column: ");
+  return wrong.empty() || sql.find('"' + wrong + '"') == std::string_view::npos
+             ? ""
+             : "; in double quotes stands the name of a column, in single quotes a text";
 }
 
 }  // namespace oblique::server

@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <sqlite3.h>
 
@@ -67,8 +68,12 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql);
 /// The error for a client after a call on `database` returned `code`.
 QueryError failure(sqlite3* database, int code);
 
-/// Throws the error of a statement that failed while it ran: StatementError for a wrong argument of
-/// one of our functions, else QueryError.
-[[noreturn]] void throw_failure(sqlite3* database, int code);
+/// The name that SQLite did not find, if `message` contains `begin`, as "no such column: "; else
+/// empty.
+std::string missing_name(std::string_view message, std::string_view begin);
+
+/// A hint to append to SQLite's message about `sql` if an unknown name is in double quotes, because
+/// a text in single quotes may have been meant; else empty.
+std::string quotes_hint(std::string_view message, std::string_view sql);
 
 }  // namespace oblique::server

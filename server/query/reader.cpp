@@ -4,7 +4,6 @@
 #include <chrono>
 #include <utility>
 
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "server/database/open_for_reading.h"
 #include "server/query/plan.h"
@@ -67,20 +66,11 @@ class TimeLimit {
   Clock::time_point start_ = Clock::now();
 };
 
-/// Length of `size` bytes as x'0F..'.
-std::uint64_t hexadecimal_bytes(std::uint64_t size) {
-  return 2 * size + 3;
-}
-
-/// Copies a text or blob. False when it is longer than `most_bytes`; nothing is copied then.
-bool copy_bytes(sqlite3* database, sqlite3_stmt* statement, int column, std::uint64_t most_bytes,
+/// Copies a text or blob; bytes that are not UTF-8 as x'0F..'.
+void copy_bytes(sqlite3* database, sqlite3_stmt* statement, int column,
                 protocol::ChunkWriter& rows) {
   const bool is_text = sqlite3_column_type(statement, column) == SQLITE_TEXT;
-  // The size of a zeroblob is known before its bytes are allocated.
-  const auto size = static_cast<std::uint64_t>(sqlite3_column_bytes(statement, column));
-  if ((is_text ? size : hexadecimal_bytes(size)) > most_bytes) {
-    return false;
-  }
+  const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement, column));
   const void* data = sqlite3_column_blob(statement, column);
   if (data == nullptr && size > 0) {
     throw failure(database, SQLITE_NOMEM);
@@ -88,13 +78,9 @@ bool copy_bytes(sqlite3* database, sqlite3_stmt* statement, int column, std::uin
   const std::string_view bytes(size == 0 ? "" : static_cast<const char*>(data), size);
   if (is_text && protocol::is_utf8(bytes)) {
     rows.text(bytes);
-    return true;
+  } else {
+    rows.text(hexadecimal(bytes));
   }
-  if (hexadecimal_bytes(size) > most_bytes) {
-    return false;
-  }
-  rows.text(hexadecimal(bytes));
-  return true;
 }
 
 }  // namespace
@@ -104,22 +90,23 @@ Answer::Answer(sqlite3* database, const protocol::QueryRequest& request, const Q
     : database_(database), limits_(limits), interrupted_(interrupted) {
   sqlite3_limit(database_, SQLITE_LIMIT_LENGTH, static_cast<int>(limits_.max_value_bytes));
   const TimeLimit time(database_, interrupted_, limits_.time_limit_ms);
-  std::string sql = request.sql();
+  std::vector<std::string> names;
   if (request.has_question()) {
     Plan planned = plan(database_, request.question());
-    sql = std::move(planned.statement);
+    statement_ = std::move(planned.statement);
     for (PlannedColumn& column : planned.columns) {
+      names.push_back(std::move(column.name));
       units_.push_back(std::move(column.unit));
     }
-  }
-  statement_ = prepare_query(database_, sql);
-  std::vector<std::string> names;
-  for (int i = 0; i < sqlite3_column_count(statement_.get()); ++i) {
-    const char* name = sqlite3_column_name(statement_.get(), i);
-    if (name == nullptr) {
-      throw failure(database_, SQLITE_NOMEM);
+  } else {
+    statement_ = prepare_query(database_, request.sql());
+    for (int i = 0; i < sqlite3_column_count(statement_.get()); ++i) {
+      const char* name = sqlite3_column_name(statement_.get(), i);
+      names.emplace_back(name == nullptr ? "" : name);
     }
-    names.push_back(protocol::is_utf8(name) ? std::string(name) : hexadecimal(name));
+  }
+  for (std::string& name : names) {
+    name = protocol::is_utf8(name) ? name : hexadecimal(name);
   }
   rows_.emplace(std::move(names));
 }
@@ -152,7 +139,7 @@ bool Answer::step() {
                                   : took_too_long(limits_.time_limit_ms));
   }
   if (code != SQLITE_ROW && code != SQLITE_DONE) {
-    throw_failure(database_, code);
+    throw failure(database_, code);
   }
   return code == SQLITE_ROW;
 }
@@ -160,8 +147,6 @@ bool Answer::step() {
 void Answer::copy_row() {
   const std::uint64_t before = rows_->bytes();
   for (int i = 0; i < sqlite3_column_count(statement_.get()); ++i) {
-    const std::uint64_t used = rows_->bytes() - before;
-    const std::uint64_t left = limits_.max_row_bytes - std::min(limits_.max_row_bytes, used);
     switch (sqlite3_column_type(statement_.get(), i)) {
       case SQLITE_INTEGER:
         rows_->integer(sqlite3_column_int64(statement_.get(), i));
@@ -173,12 +158,13 @@ void Answer::copy_row() {
         rows_->null();
         break;
       default:
-        if (!copy_bytes(database_, statement_.get(), i, left, *rows_)) {
-          throw QueryError("one row alone has more than the " +
-                           std::to_string(limits_.max_row_bytes) +
-                           " bytes of a reply, blobs counted twice: select less of it, as with "
-                           "substr() or length()");
-        }
+        copy_bytes(database_, statement_.get(), i, *rows_);
+    }
+    // Each value is bounded by max_value_bytes.
+    if (rows_->bytes() - before > limits_.max_row_bytes) {
+      throw QueryError("one row alone has more than the " + std::to_string(limits_.max_row_bytes) +
+                       " bytes of a reply, blobs counted twice: select less of it, as with "
+                       "substr() or length()");
     }
   }
   rows_->end_row();
@@ -187,7 +173,7 @@ void Answer::copy_row() {
 std::string hexadecimal(std::string_view bytes) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string text = "x'";
-  text.reserve(hexadecimal_bytes(bytes.size()));
+  text.reserve(2 * bytes.size() + 3);
   for (const char c : bytes) {
     const auto byte = static_cast<unsigned char>(c);
     text += kDigits[byte >> 4U];
@@ -222,17 +208,6 @@ protocol::QueryReply Reader::query(const std::string& sql, const QueryLimits& li
 
 Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& limits) {
   return {database_.get(), request, limits, interrupted_};
-}
-
-/// " (did you mean `x`?)" with the study whose name is nearest, or an empty text.
-std::string Reader::nearest_study(const std::string& name) {
-  constexpr std::size_t kMostCompared = 10'000;
-  Statement list(database_.get(), "SELECT name FROM studies");
-  std::vector<std::string> names;
-  while (names.size() < kMostCompared && list.step()) {
-    names.push_back(list.text(0));
-  }
-  return protocol::did_you_mean(name, std::vector<std::string_view>(names.begin(), names.end()));
 }
 
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
@@ -274,7 +249,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {
-    throw QueryError("there is no study called \"" + name + "\"" + nearest_study(name));
+    throw QueryError(no_such_study(database_.get(), name));
   }
   return found;
 }

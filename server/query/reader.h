@@ -73,8 +73,6 @@ class Reader {
   void interrupt() { interrupted_ = true; }
 
  private:
-  std::string nearest_study(const std::string& name);
-
   DatabaseHandle database_;
   std::string remark_;
   std::atomic<bool> interrupted_ = false;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -8,9 +8,29 @@
 
 namespace oblique::server {
 
-/// A child process that answers one query at a time; see reader_program.h. It is killed when this
-/// is destroyed and when the thread that created this ends. Only `end` and the destructor wait for
-/// its end, and only for a short time.
+/// Descriptor by which a reader process receives queries and sends answers.
+inline constexpr int kReaderChannel = 3;
+
+/// Argument that makes oblique-server a reader process: `oblique-server --read FILE`.
+inline constexpr const char* kReadMode = "--read";
+
+/// Precedes each frame on the channel. A query is one frame, an encoded QueryRequest. Its answer is
+/// one frame or more, each an encoded ClientReply without request_id.
+struct FrameHead {
+  std::uint32_t length;
+  std::uint32_t is_last;  ///< 1 in the last frame of an answer
+};
+
+/// Encodes a ClientReply with an error.
+std::string encoded_error(const std::string& message, bool wrong_request = false);
+
+/// Main function of a reader process: answers queries on the database at `path` one after another,
+/// until the channel is closed. First limits its own memory and files. Is killed when the thread
+/// that started it ends. Returns the exit code.
+int run_reader_program(const std::string& path);
+
+/// A reader process, as the server sees it. It is killed when this is destroyed and when the thread
+/// that created this ends.
 class ReaderProcess {
  public:
   /// Starts `program` for the database at `path`. Throws std::system_error.
@@ -29,7 +49,7 @@ class ReaderProcess {
   /// Sends and receives as many bytes as possible without waiting. Returns the next frame of the
   /// answer once it is complete. The process blocks while its frames are not read.
   std::optional<Frame> read();
-  /// Whether the process has closed its end or sent invalid bytes. Set by `read`.
+  /// Whether the process has closed its end or sent a frame that is too long. Set by `read`.
   bool is_broken() const { return is_broken_; }
 
   /// To be polled for `events()` before the next `read`.
@@ -37,23 +57,15 @@ class ReaderProcess {
   short events() const;
 
   void kill();
-  /// Kills the process if needed and waits for its end. Returns a clause such as "ended with exit
-  /// code 3".
-  std::string end();
 
  private:
-  bool send_some();
   bool receive_some();
-  bool is_gone();
 
   int channel_ = -1;
   pid_t pid_ = -1;
-  bool is_gone_ = false;
-  int status_ = 0;  ///< as returned by waitpid, after the process ended
   bool is_broken_ = false;
-  bool is_asked_ = false;  ///< a query was sent whose answer has not ended
-  std::string out_;        ///< bytes to send
-  std::string in_;         ///< received bytes of frames that were not returned yet
+  std::string out_;  ///< bytes to send
+  std::string in_;   ///< received bytes of frames that were not returned yet
 };
 
 }  // namespace oblique::server

@@ -8,12 +8,9 @@
 
 namespace oblique::server {
 
-/// The error code of a statement that passes one of these functions a wrong argument.
-inline constexpr int kWrongArgument = SQLITE_MISMATCH;
-
 /// Adds to `database` kNumberFunction and the aggregate functions median(x), percentile(x, p),
-/// variance(x), stddev(x) and corr(x, y). They ignore NULL; other values than numbers are an error.
-/// The first two need 8 bytes per row, which count for SQLite's memory limit. Throws StorageError.
+/// stddev(x) and corr(x, y). They ignore NULL; other values than numbers are an error. The first
+/// two need 8 bytes per row. Throws StorageError.
 void add_functions(sqlite3* database);
 
 /// A function of one text that returns the double nearest to the decimal in it.
@@ -31,8 +28,5 @@ struct SqlFunction {
   bool keeps_unit = false;   ///< its value has the unit of its first argument
 };
 std::span<const SqlFunction> sql_functions();
-
-/// The function of that name, in any case; nullptr: none.
-const SqlFunction* find_sql_function(std::string_view name);
 
 }  // namespace oblique::server

@@ -12,7 +12,6 @@
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "server/query/columns.h"
-#include "server/query/question.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/parameters.h"
 

@@ -233,11 +233,10 @@ TEST(SameRows, APlanGivesTheRowsThatSqliteGivesWithoutIt) {
           question.where(), question.order().empty() ? "point" : question.order(),
           question.has_limit() ? static_cast<std::int64_t>(question.limit()) : -1);
       const auto planned = plan(database.get(), question);
-      ASSERT_EQ(first_numbers(database.get(), planned.statement),
-                first_numbers(database.get(), brute))
-          << planned.statement << '\n'
+      ASSERT_EQ(first_numbers(database.get(), planned.sql), first_numbers(database.get(), brute))
+          << planned.sql << '\n'
           << brute;
-      const int is_narrow = is_narrowed(recipe, question, planned.statement) ? 1 : 0;
+      const int is_narrow = is_narrowed(recipe, question, planned.sql) ? 1 : 0;
       ++of_all;
       narrowed_of_all += is_narrow;
       of_filtered += has_filter(recipe) ? 1 : 0;
