@@ -30,7 +30,7 @@
 #include "proto/program/usage.h"
 #include "server/loop/loop.h"
 #include "server/program/limits.h"
-#include "server/query/reader_process.h"
+#include "server/query/reader_program.h"
 #include "server/web/http_options.h"
 #include "worker/solver/model/version.h"
 

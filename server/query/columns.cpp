@@ -1,8 +1,8 @@
 #include "server/query/columns.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <variant>
 
@@ -10,7 +10,7 @@
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/keys.h"
-#include "server/query/sql_functions.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 
@@ -19,28 +19,26 @@ namespace {
 
 using protocol::CellKind;
 
-struct RowColumn {
-  std::string_view name;
-  std::string_view meaning;
-  CellKind values = CellKind::kText;
-  bool is_stored = true;
-};
-
-constexpr std::array<RowColumn, 12> kRowColumns{{
-    {"study", "name of the study"},
-    {"study_id", "its number in the database", CellKind::kInteger},
-    {"point", "number of the point in its study, from 0", CellKind::kInteger},
-    {"model_id", "number of the model in the database", CellKind::kInteger},
-    {"status", "solved or failed"},
-    {"error", "why it failed"},
-    {"worker_id", "number of the worker that solved it", CellKind::kInteger},
-    {"worker_name", "that worker's name", CellKind::kText, false},
-    {"instruction_set", "vector instructions that it used", CellKind::kText, false},
-    {"attempt", "number of the lease under which it was solved", CellKind::kInteger},
-    {"solved_at", "when the result arrived (UTC)"},
-    {"reused_from",
-     "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point"},
-}};
+std::vector<Column> row_columns() {
+  return {
+      {"study", "", "row", "", "name of the study", CellKind::kText, true},
+      {"study_id", "", "row", "", "its number in the database", CellKind::kInteger, true},
+      {"point", "", "row", "", "number of the point in its study, from 0", CellKind::kInteger,
+       true},
+      {"model_id", "", "row", "", "number of the model in the database", CellKind::kInteger, true},
+      {"status", "", "row", "", "solved or failed", CellKind::kText, true},
+      {"error", "", "row", "", "why it failed", CellKind::kText, true},
+      {"worker_id", "", "row", "", "number of the worker that solved it", CellKind::kInteger, true},
+      {"worker_name", "", "row", "", "that worker's name"},
+      {"instruction_set", "", "row", "", "vector instructions that it used"},
+      {"attempt", "", "row", "", "number of the lease under which it was solved",
+       CellKind::kInteger, true},
+      {"solved_at", "", "row", "", "when the result arrived (UTC)", CellKind::kText, true},
+      {"reused_from", "", "row", "",
+       "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point",
+       CellKind::kText, true},
+  };
+}
 
 /// Whether the view `runs` shows the list in another form than the table `results` has.
 bool is_remade_by_view(const solver::ResultList& list) {
@@ -78,7 +76,7 @@ void add_inputs(std::vector<Column>& columns) {
                        key.name == "integrator" ? CellKind::kText
                        : is_whole               ? CellKind::kInteger
                                                 : CellKind::kReal,
-                       is_stored, "runs." + name});
+                       is_stored});
   };
   for (const auto& key : solver::point_keys()) {
     add(key, std::string(key.name), true);
@@ -87,9 +85,8 @@ void add_inputs(std::vector<Column>& columns) {
     const auto* output = solver::find_result_column(key.name);
     add(key, output == nullptr ? std::string() : place_in_json(*output), false);
     if (key.name == "length") {
-      columns.push_back({"lengths_m", "m", "input", "",
-                         "length of each link, from the pin outwards; each > 0", CellKind::kText,
-                         false, "runs.lengths_m"});
+      columns.push_back(
+          {"lengths_m", "m", "input", "", "length of each link, from the pin outwards; each > 0"});
     }
   }
 }
@@ -108,14 +105,13 @@ void add_outputs(std::vector<Column>& columns) {
                            : CellKind::kText,
                        part != nullptr ? !is_remade_by_view(*part->list)
                                        : field.sent_with != solver::SentWith::kWorker,
-                       part != nullptr ? list_sql(*part) : fmt::format("runs.{}", field.column)});
+                       part != nullptr ? list_sql(*part) : std::string()});
   }
   // Lists that `solve --json` shows in another form.
   for (const auto* list : solver::result_lists()) {
     if (solver::find_result_column(list->column) == nullptr) {
       columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
-                         std::string(list->meaning), CellKind::kText, !is_remade_by_view(*list),
-                         fmt::format("runs.{}", list->column)});
+                         std::string(list->meaning), CellKind::kText, !is_remade_by_view(*list)});
     }
   }
 }
@@ -150,9 +146,9 @@ const std::vector<Column>& all_columns() {
     std::vector<Column> columns;
     add_inputs(columns);
     add_outputs(columns);
-    for (const RowColumn& column : kRowColumns) {
-      columns.push_back({std::string(column.name), "", "row", "", std::string(column.meaning),
-                         column.values, column.is_stored, fmt::format("runs.{}", column.name)});
+    std::ranges::move(row_columns(), std::back_inserter(columns));
+    for (Column& column : columns) {
+      column.sql = column.sql.empty() ? "runs." + column.name : column.sql;
     }
     return columns;
   }();

@@ -1,6 +1,7 @@
 #include "server/query/plan.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdint>
 #include <functional>
@@ -16,8 +17,6 @@
 #include "proto/suggestion.h"
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
-#include "server/query/point_ranges.h"
-#include "server/query/sql_functions.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/result_fields.h"
@@ -28,18 +27,15 @@ namespace {
 using solver::InputError;
 using Names = std::set<std::string, std::less<>>;
 
-constexpr const char* kSelect = "--select";
-constexpr const char* kWhere = "--where";
-constexpr const char* kGroup = "--group";
-constexpr const char* kOrder = "--order";
-
-/// The parts of a query, as written or in SQLite's form.
-struct Parts {
-  std::string select;
-  std::string where;
-  std::string group;
-  std::string order;
+/// A part of a query and the keyword before it.
+struct Part {
+  const char* flag;
+  const char* keyword;
+  std::string written;
+  std::string sql{};  ///< as SQLite reads it
 };
+/// What is selected, the condition, the group and the order, as in a SELECT.
+using Parts = std::array<Part, 4>;
 
 /// Tokens that are replaced by an expression over a column: peaks[0].fn_N, peaks[0],
 /// fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from 0, as `seq` of the views
@@ -83,15 +79,9 @@ std::string phase_sql(int index, std::size_t member) {
 Element indexed(SqlTokens tokens) {
   const std::string name(tokens[0].text);
   if (!is_list_column(name)) {
-    std::vector<std::string_view> lists;
-    for (const Column& column : all_columns()) {
-      if (is_list_column(column.name)) {
-        lists.push_back(column.name);
-      }
-    }
-    throw InputError(
-        fmt::format("{0}{1} is not allowed: {0} is no list{2}; `oblique columns` lists elements",
-                    name, tokens[1].text, protocol::did_you_mean(name, lists)));
+    throw InputError(fmt::format(
+        "{0}{1} is not allowed: {0} is no list; `oblique columns` lists elements of lists", name,
+        tokens[1].text));
   }
   const int index = index_in(name, tokens[1].text);
   const std::string path = fmt::format("$[{}{}]", index < 0 ? "#" : "", index);
@@ -139,14 +129,10 @@ Element element_at(SqlTokens tokens) {
       4, "major_mode", fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-/// Whether SQLite 3.40 might read the number at the beginning of `tokens` as another double than
-/// the nearest one. Before PRECEDING and FOLLOWING only a plain number may stand.
-bool is_decimal(SqlTokens tokens) {
-  const bool is_frame_offset =
-      tokens.size() > 1 && (is_word(tokens[1], "preceding") || is_word(tokens[1], "following"));
-  return tokens[0].kind == SqlToken::Kind::kLiteral && !is_frame_offset &&
-         tokens[0].text.find_first_of(".eE") != std::string_view::npos &&
-         decimal_number(tokens[0].text);
+/// Whether SQLite 3.40 might read a number as another double than the nearest one.
+bool is_decimal(const SqlToken& token) {
+  return token.kind == SqlToken::Kind::kLiteral && decimal_number(token.text) &&
+         token.text.find_first_of(".eE") != std::string_view::npos;
 }
 
 /// `tokens` as SQLite reads them. Adds the columns that they name, and all other names, to `names`.
@@ -154,27 +140,20 @@ std::string in_sqlite(SqlTokens tokens, Names& names) {
   std::string result;
   const char* copied = text_over(tokens).data();
   for (std::size_t i = 0; i < tokens.size(); ++i) {
-    const Element element = element_at(tokens.subspan(i));
-    const bool is_replaced = element.tokens > 0 || is_decimal(tokens.subspan(i));
-    if (is_replaced) {
-      result.append(copied, tokens[i].text.begin());
-      result += element.tokens > 0 ? element.sql
-                                   : fmt::format("{}('{}')", kNumberFunction, tokens[i].text);
-      i += std::max<std::size_t>(element.tokens, 1) - 1;
-      copied = tokens[i].text.end();
+    Element element = element_at(tokens.subspan(i));
+    if (element.tokens == 0 && is_decimal(tokens[i])) {
+      element = {1, {}, fmt::format("{}('{}')", kNumberFunction, tokens[i].text), {}};
     }
     if (element.tokens > 0) {
       names.insert(element.column);
+      result.append(copied, tokens[i].text.begin()) += element.sql;
+      i += element.tokens - 1;
+      copied = tokens[i].text.end();
     } else if (tokens[i].is_name()) {
       names.insert(name_of(tokens[i]));
     }
   }
-  return result.append(copied, text_over(tokens).end());
-}
-
-std::string in_sqlite(std::string_view text, Names& names) {
-  const auto tokens = sql_tokens(text);
-  return tokens.empty() ? std::string() : in_sqlite(tokens, names);
+  return tokens.empty() ? result : result.append(copied, text_over(tokens).end());
 }
 
 const SqlFunction* function_at(SqlTokens tokens, std::size_t i) {
@@ -202,28 +181,32 @@ bool is_aggregate(SqlTokens tokens, std::size_t i) {
          (!compares || sql_items(arguments_of(tokens, i)).size() == 1);
 }
 
+bool has_aggregate(SqlTokens tokens) {
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    if (is_aggregate(tokens, i)) {
+      return true;
+    }
+    const bool is_subquery =
+        tokens[i].is_sign("(") && i + 1 < tokens.size() && is_word(tokens[i + 1], "select");
+    i = is_subquery ? closing_bracket(tokens, i) : i;
+  }
+  return false;
+}
+
+bool has_window(SqlTokens tokens) {
+  return std::ranges::any_of(tokens, [](const SqlToken& token) { return is_word(token, "over"); });
+}
+
 /// Throws InputError for an item of a grouped row (or of the one row of all points) that has no
 /// aggregate, but a column that is not in --group: SQL would take its value from any point.
-void check_grouped(const Parts& written) {
-  const auto selected = sql_tokens(written.select);
-  const auto has_aggregate = [](SqlTokens tokens) {
-    for (std::size_t i = 0; i < tokens.size(); ++i) {
-      if (is_aggregate(tokens, i)) {
-        return true;
-      }
-      const bool is_subquery =
-          tokens[i].is_sign("(") && i + 1 < tokens.size() && is_word(tokens[i + 1], "select");
-      i = is_subquery ? closing_bracket(tokens, i) : i;
-    }
-    return false;
-  };
-  const bool has_window =
-      std::ranges::any_of(selected, [](const SqlToken& token) { return is_word(token, "over"); });
-  if (has_window || (written.group.empty() && !has_aggregate(selected))) {
+void check_grouped(const Part& select, const Part& group) {
+  const auto selected = sql_tokens(select.written);
+  if (has_window(selected) || (group.written.empty() && !has_aggregate(selected))) {
     return;
   }
   Names keys;
-  (void)in_sqlite(written.group, keys);
+  const auto group_tokens = sql_tokens(group.written);
+  (void)in_sqlite(group_tokens, keys);
   for (const SqlTokens item : sql_items(selected)) {
     const bool is_all = item.size() == 1 && item[0].is_sign("*");
     const bool has_key_as_alias =
@@ -234,7 +217,7 @@ void check_grouped(const Parts& written) {
     });
     if (is_all || (column != item.end() && !has_key_as_alias && !has_aggregate(item))) {
       throw InputError(not_allowed(
-          kSelect, written.select,
+          select.flag, select.written,
           fmt::format(
               "{0} has many values in {1}; use an aggregate, as avg({0}), or add it to "
               "--group",
@@ -263,44 +246,35 @@ std::string unit_of(SqlTokens tokens) {
                                                : std::string();
 }
 
-/// What is selected, column by column.
-struct Selection {
-  bool is_distinct = false;
+/// The selected columns, and the SQL expression of each. `*` becomes all columns.
+std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns(SqlTokens tokens,
+                                                                                 Names& names) {
+  std::vector<PlannedColumn> columns;
   std::vector<std::string> sql;
-  std::vector<PlannedColumn> columns;  ///< with names as written
-};
-
-Selection selection_of(const std::string& select, Names& names) {
-  Selection selection;
-  const auto all_tokens = sql_tokens(select);
-  SqlTokens tokens = all_tokens;
-  if (tokens.size() > 1 && is_word(tokens[0], "distinct")) {
-    selection.is_distinct = true;
-    tokens = tokens.subspan(1);
-  }
   for (const SqlTokens item : sql_items(tokens)) {
     if (item.size() != 1 || !item[0].is_sign("*")) {
-      selection.sql.push_back(item.empty() ? std::string() : in_sqlite(item, names));
-      selection.columns.push_back({std::string(text_over(item)), unit_of(item)});
+      columns.push_back({std::string(text_over(item)), unit_of(item)});
+      sql.push_back(in_sqlite(item, names));
       continue;
     }
     for (const bool is_row : {true, false}) {
       for (const Column& column : all_columns()) {
         if ((column.kind == "row") == is_row) {
-          selection.sql.push_back(column.name);
-          selection.columns.push_back({column.name, unit_of_column(column.name)});
+          columns.push_back({column.name, unit_of_column(column.name)});
+          sql.push_back(column.name);
           names.insert(column.name);
         }
       }
     }
   }
-  return selection;
+  return {std::move(columns), std::move(sql)};
 }
 
 struct QueriedStudy {
   std::string name;
   std::int64_t study_id = 0;
-  protocol::Recipe recipe{};  ///< without blocks if it cannot be read or has too few points
+  std::uint64_t points = 0;
+  protocol::Recipe recipe{};  ///< without blocks if it cannot be read
 };
 
 QueriedStudy find_study(sqlite3* database, const std::string& name) {
@@ -309,59 +283,23 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   if (!study.step()) {
     throw InputError(no_such_study(database, name));
   }
-  QueriedStudy found{name, study.integer(0)};
-  try {
-    if (!protocol::parse_recipe(study.bytes(2), found.recipe) ||
-        points_of(found.recipe) < static_cast<std::uint64_t>(study.integer(1))) {
-      found.recipe.Clear();
-    }
-  } catch (const InputError&) {
-    found.recipe.Clear();  // it has more points than a study may have
+  QueriedStudy found{name, study.integer(0), static_cast<std::uint64_t>(study.integer(1))};
+  if (!protocol::parse_recipe(study.bytes(2), found.recipe)) {
+    found.recipe.Clear();
   }
   return found;
 }
 
-/// The points whose rows are read: a table to join with, and a condition.
-struct ReadPoints {
-  std::string join{};
-  std::string condition = "1";
+/// The rows of a study as a table, of points that contain all that meet a condition.
+struct Rows {
+  std::string sql;
   bool are_sorted = false;  ///< rows come by rising point without ORDER BY
 };
 
-ReadPoints points_to_read(const QueriedStudy& study, const std::string& where) {
-  // SQLite does not choose the index of failed points, because it cannot estimate that they are
-  // few.
-  if (wants_only_failed(where)) {
-    return {.condition = fmt::format("runs.point IN (SELECT point FROM results INDEXED BY "
-                                     "failed_points WHERE study_id = {} AND error IS NOT NULL)",
-                                     study.study_id)};
-  }
-  const auto ranges = point_ranges(study.recipe, where);
-  if (study.recipe.blocks().empty()) {
-    return {};
-  }
-  if (ranges.size() < 2) {
-    // A condition on all points would keep SQLite from looking up those that the user's names.
-    const bool are_all = points_in(ranges) == points_of(study.recipe);
-    return {.condition = ranges.empty() ? "0"
-                         : are_all      ? "1"
-                                   : fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first,
-                                                 ranges[0].last)};
-  }
-  // SQLite reads a JSON list faster than it compiles VALUES. It reads the ranges of a cross join
-  // one after another, and the rows of each by their key.
-  std::string list;
-  for (const PointRange& range : ranges) {
-    list += fmt::format("{}\"{}\":{}", list.empty() ? "" : ",", range.first, range.last);
-  }
-  return {fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list),
-          "runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value", true};
-}
-
-/// The rows of a study with the columns in `names`. They come from the table `results` if it has
-/// all of these, because looking up the model and worker of each row is slow. No condition of the
-/// user can reach another study.
-std::string rows_of(const QueriedStudy& study, const ReadPoints& points, const Names& names) {
+/// The rows with the columns in `names`. They come from the table `results` if it has all of these,
+/// because looking up the model and worker of each row is slow. No condition of the user can reach
+/// another study.
+Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& names) {
   std::string selected = "runs.point AS point";
   bool are_stored = true;
   for (const Column& column : all_columns()) {
@@ -379,78 +317,84 @@ std::string rows_of(const QueriedStudy& study, const ReadPoints& points, const N
                      "AND stored.point = runs.point)",
         kStoredPhases);
   }
-  return fmt::format("(SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {}) AS picked",
-                     selected, points.join, are_stored ? "results" : "runs", study.study_id,
-                     points.condition);
+  const auto ranges = point_ranges(study.recipe, where);
+  std::string join;
+  std::string condition;
+  if (study.recipe.blocks().empty() || points_in(ranges) == study.points) {
+    condition = "1";  // a range would keep SQLite from looking up points that the user names
+  } else if (ranges.size() < 2) {
+    condition = ranges.empty()
+                    ? "0"
+                    : fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
+  } else {
+    // SQLite reads a JSON list faster than it compiles VALUES. It reads the ranges of a cross join
+    // one after another, and the rows of each by their key.
+    for (const PointRange& range : ranges) {
+      join += fmt::format("{}\"{}\":{}", join.empty() ? "" : ",", range.first, range.last);
+    }
+    join = fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", join);
+    condition = "runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
+  }
+  return {fmt::format("(SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {}) AS picked",
+                      selected, join, are_stored ? "results" : "runs", study.study_id, condition),
+          ranges.size() > 1};
 }
 
-/// Parts of a statement after SELECT and FROM.
-std::string clauses(const std::string& where, const std::string& group, const std::string& order) {
-  const auto clause = [](const char* keyword, const std::string& text) {
-    return text.empty() ? std::string() : fmt::format(" {} {}", keyword, text);
-  };
-  return clause("WHERE", where) + clause("GROUP BY", group) + clause("ORDER BY", order);
+/// The statement of the first of the parts of a query.
+std::string statement_of(std::span<const Part> parts, const std::string& rows) {
+  std::string sql = fmt::format("{} {} FROM {}", parts[0].keyword, parts[0].sql, rows);
+  for (const Part& part : parts.subspan(1)) {
+    sql += part.sql.empty() ? std::string() : fmt::format(" {} {}", part.keyword, part.sql);
+  }
+  return sql;
 }
 
 /// A hint about a column or function that SQLite did not find; empty for other messages.
 std::string name_hint(const std::string& message) {
-  std::string wrong = missing_name(message, "no such column: ");
-  const bool is_column = !wrong.empty();
-  wrong = is_column ? wrong : missing_name(message, "no such function: ");
-  if (wrong.empty()) {
+  const auto colon = message.rfind(": ");
+  if (!message.starts_with("no such ") || colon == std::string::npos) {
     return {};
   }
   std::vector<std::string_view> names;  // without brackets
   const auto columns = columns_and_functions();
   for (const Column& column : columns) {
-    if (is_column || column.kind == "function") {
-      names.push_back(std::string_view(column.name).substr(0, column.name.find('(')));
-    }
+    names.push_back(std::string_view(column.name).substr(0, column.name.find('(')));
   }
-  return protocol::did_you_mean(wrong, names) + "; `oblique columns` lists all";
+  return protocol::did_you_mean(message.substr(colon + 2), names) +
+         "; `oblique columns` lists columns and functions, and a text stands in single quotes";
 }
 
 /// Throws InputError for a statement that SQLite refuses. Names the flag of the first part without
 /// which SQLite takes it: a message about the whole statement may quote what the user did not
 /// write.
-[[noreturn]] void refuse(sqlite3* database, const Parts& written, const Parts& parts,
-                         const std::string& rows) {
-  const std::string begin = fmt::format("SELECT {} FROM {}", parts.select, rows);
-  const struct {
-    const char* flag;
-    const std::string& text;
-    std::string sql;
-  } tries[] = {{kSelect, written.select, begin},
-               {kWhere, written.where, begin + clauses(parts.where, "", "")},
-               {kGroup, written.group, begin + clauses("", parts.group, "")},
-               {kOrder, written.order, begin + clauses("", parts.group, parts.order)}};
-  for (const auto& [flag, text, sql] : tries) {
+[[noreturn]] void refuse(sqlite3* database, const Parts& parts, const std::string& rows) {
+  for (std::size_t count = 1; count <= parts.size(); ++count) {
+    const Part& last = parts[count - 1];
     try {
-      (void)prepare_query(database, sql);
-    } catch (const StatementError&) {
-      const std::string reason = sqlite3_errmsg(database);
+      (void)prepare_query(database, statement_of(std::span(parts).first(count), rows));
+    } catch (const StatementError& error) {
       throw InputError(
-          not_allowed(flag, text, reason + name_hint(reason) + quotes_hint(reason, sql)));
+          not_allowed(last.flag, last.written, error.what() + name_hint(error.what())));
     }
   }
-  throw InputError(fmt::format("the query is wrong: {}", sqlite3_errmsg(database)));
+  throw InputError("the query is too long");
 }
 
 /// The parts of `question`, with default columns if it selects none. Throws InputError, which names
 /// the flag.
 Parts parts_of(const protocol::StudyQuery& question, const protocol::Recipe& recipe) {
-  Parts parts{fmt::format("{}", fmt::join(question.select(), ", ")), question.where(),
-              question.group(), question.order()};
-  if (parts.select.empty()) {
-    parts.select = parts.group.empty() ? fmt::format("{}", fmt::join(usual_columns(recipe), ", "))
-                                       : parts.group + ", count(*)";
+  std::string select = fmt::format("{}", fmt::join(question.select(), ", "));
+  if (select.empty()) {
+    select = question.group().empty() ? fmt::format("{}", fmt::join(usual_columns(recipe), ", "))
+                                      : question.group() + ", count(*)";
   }
-  for (const auto& [flag, text] : {std::pair(kSelect, &parts.select),
-                                   {kWhere, &parts.where},
-                                   {kGroup, &parts.group},
-                                   {kOrder, &parts.order}}) {
-    if (!text->empty()) {
-      check_sql_part(flag, *text);
+  Parts parts{{{"--select", "SELECT", std::move(select)},
+               {"--where", "WHERE", question.where()},
+               {"--group", "GROUP BY", question.group()},
+               {"--order", "ORDER BY", question.order()}}};
+  for (const Part& part : parts) {
+    if (!part.written.empty()) {
+      check_sql_part(part.flag, part.written);
     }
   }
   return parts;
@@ -472,41 +416,39 @@ std::string no_such_study(sqlite3* database, const std::string& name) {
 
 Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   const QueriedStudy study = find_study(database, question.study());
-  const Parts written = parts_of(question, study.recipe);
-  check_grouped(written);
+  Parts parts = parts_of(question, study.recipe);
+  auto& [select, where, group, order] = parts;
+  check_grouped(select, group);
   Names names;
-  Selection selection = selection_of(written.select, names);
-  const Parts parts{
-      fmt::format("{}{}", selection.is_distinct ? "DISTINCT " : "", fmt::join(selection.sql, ", ")),
-      in_sqlite(written.where, names), in_sqlite(written.group, names),
-      in_sqlite(written.order, names)};
+  for (Part* part : {&where, &group, &order}) {
+    const auto tokens = sql_tokens(part->written);
+    part->sql = in_sqlite(tokens, names);
+  }
+  const auto tokens = sql_tokens(select.written);
+  const bool is_distinct = tokens.size() > 1 && is_word(tokens[0], "distinct");
+  auto [columns, columns_sql] =
+      selected_columns(SqlTokens(tokens).subspan(is_distinct ? 1 : 0), names);
+  select.sql = fmt::format("{}{}", is_distinct ? "DISTINCT " : "", fmt::join(columns_sql, ", "));
   if (names.contains("E")) {
     throw InputError("E is no column, and SQL would take it for e: write e, or E_Pa");
   }
-  const ReadPoints points = points_to_read(study, written.where);
-  const std::string rows = rows_of(study, points, names);
-  // A window function sorts the rows.
-  const bool needs_no_order = points.are_sorted && parts.group.empty() && !names.contains("OVER") &&
-                              !names.contains("over");
-  Plan plan{fmt::format("SELECT {} FROM {}", parts.select, rows), {nullptr, nullptr}, {}};
-  plan.sql += clauses(parts.where.empty() ? "" : fmt::format("({})", parts.where), parts.group,
-                      !parts.order.empty()   ? parts.order
-                      : !parts.group.empty() ? parts.group
-                      : needs_no_order       ? ""
-                                             : "picked.point");
+  const Rows rows = rows_of(study, where.written, names);
+  if (order.sql.empty() && (!group.sql.empty() || !rows.are_sorted || has_window(tokens))) {
+    order.sql = group.sql.empty() ? "picked.point" : group.sql;
+  }
+  Plan plan{statement_of(parts, rows.sql), {nullptr, nullptr}, std::move(columns)};
   if (question.has_limit()) {
     plan.sql += fmt::format(" LIMIT {}", std::min<std::uint64_t>(question.limit(), INT64_MAX));
   }
   try {
     plan.statement = prepare_query(database, plan.sql);
   } catch (const StatementError&) {
-    refuse(database, written, parts, rows);
+    refuse(database, parts, rows.sql);
   }
   // SQLite names a column by its alias or else by its text, which may have been replaced.
-  plan.columns = std::move(selection.columns);
   for (std::size_t i = 0; i < plan.columns.size(); ++i) {
     const char* name = sqlite3_column_name(plan.statement.get(), static_cast<int>(i));
-    if (name != nullptr && name != selection.sql[i]) {
+    if (name != nullptr && name != columns_sql[i]) {
       plan.columns[i].name = name;
     }
   }

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <sqlite3.h>
@@ -14,8 +16,6 @@ namespace oblique::server {
 struct PlannedColumn {
   std::string name;
   std::string unit;  ///< SI; empty: a pure number, a text, or unknown
-
-  bool operator==(const PlannedColumn&) const = default;
 };
 
 /// The statement that answers a query about a study.
@@ -32,5 +32,22 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
 /// The error for a study that does not exist, with the nearest name.
 std::string no_such_study(sqlite3* database, const std::string& name);
+
+/// Consecutive points, both ends included.
+struct PointRange {
+  std::uint64_t first;
+  std::uint64_t last;
+
+  bool operator==(const PointRange&) const = default;
+};
+
+/// Ranges in rising order, disjoint, that contain every point of `recipe` that meets `condition`.
+/// They may contain other points. Only comparisons of an axis of a product block
+/// with numbers (=, <, <=, >, >=, BETWEEN) that AND joins are used. A range of an axis is one value
+/// wider at each end, because another machine may round a value differently. `condition` must have
+/// passed check_sql_part; empty: all points.
+std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
+
+std::uint64_t points_in(const std::vector<PointRange>& ranges);
 
 }  // namespace oblique::server

@@ -1,4 +1,4 @@
-#include "server/query/point_ranges.h"
+#include "server/query/plan.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,12 +7,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "server/query/columns.h"
-#include "server/query/sql_functions.h"
 #include "server/query/sql_text.h"
 
 namespace oblique::server {
@@ -23,10 +21,13 @@ using Ranges = std::vector<PointRange>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// More ranges are merged into one, because the statement would be long and slow to start.
 constexpr std::size_t kMostRanges = 20'000;
-/// Finding the first row of a range costs about as much as reading this many rows.
-constexpr std::uint64_t kRowsARange = 3;
 /// Conditions in more nested brackets than this are ignored.
 constexpr int kDeepest = 50;
+
+/// The range from the first point of `ranges`, which are not empty, to the last.
+Ranges hull(const Ranges& ranges) {
+  return {{ranges.front().first, ranges.back().last}};
+}
 
 struct Interval {
   double low = -kInfinity;
@@ -54,8 +55,7 @@ void restrict_column(Intervals& intervals, SqlTokens column, std::optional<doubl
   }
 }
 
-/// Reads `column BETWEEN number AND number`, `column < number`, `number < column` and so on.
-/// Ignores other conditions.
+/// Reads `column BETWEEN number AND number`, `column < number` and so on. Ignores other conditions.
 void add_condition(Intervals& intervals, SqlTokens tokens) {
   if (tokens.size() > 2 && is_word(tokens[1], "between")) {
     const auto middle =
@@ -66,35 +66,27 @@ void add_condition(Intervals& intervals, SqlTokens tokens) {
     }
     return;
   }
-  const auto is = [](const SqlToken& token, std::string_view a, std::string_view b) {
-    return token.is_sign(a) || token.is_sign(b);
-  };
-  const auto sign = std::ranges::find_if(tokens, [&](const SqlToken& token) {
-    return is(token, "<", "<=") || is(token, ">", ">=") || is(token, "=", "==");
-  });
-  if (sign == tokens.end()) {
+  const bool is_comparison = tokens.size() > 2 && tokens[1].kind == SqlToken::Kind::kSign;
+  const auto number = is_comparison ? number_in(tokens.subspan(2)) : std::nullopt;
+  if (!number) {
     return;
   }
-  SqlTokens left(tokens.begin(), sign);
-  SqlTokens right(sign + 1, tokens.end());
-  bool is_below = is(*sign, "<", "<=");
-  bool is_above = is(*sign, ">", ">=");
-  if (number_in(left)) {
-    std::swap(left, right);
-    std::swap(is_below, is_above);
-  }
-  if (const auto number = number_in(right)) {
-    restrict_column(intervals, left, is_below ? -kInfinity : *number,
-                    is_above ? kInfinity : *number);
+  const std::string_view sign = tokens[1].text;
+  if (sign == "=" || sign == "==") {
+    restrict_column(intervals, tokens.first(1), number, number);
+  } else if (sign == "<" || sign == "<=") {
+    restrict_column(intervals, tokens.first(1), -kInfinity, number);
+  } else if (sign == ">" || sign == ">=") {
+    restrict_column(intervals, tokens.first(1), number, kInfinity);
   }
 }
 
-/// Adds to `all` the conditions that `tokens` join with AND. Adds none if it cannot separate them.
-void add_conjuncts(SqlTokens tokens, int depth, std::vector<SqlTokens>& all) {
+/// Adds the conditions that `tokens` join with AND. Adds none if it cannot separate them.
+void add_conjuncts(SqlTokens tokens, int depth, Intervals& intervals) {
   const bool is_in_brackets =
       !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;
   if (is_in_brackets && depth < kDeepest) {
-    add_conjuncts(tokens.subspan(1, tokens.size() - 2), depth + 1, all);
+    add_conjuncts(tokens.subspan(1, tokens.size() - 2), depth + 1, intervals);
     return;
   }
   std::vector<SqlTokens> parts;
@@ -116,19 +108,13 @@ void add_conjuncts(SqlTokens tokens, int depth, std::vector<SqlTokens>& all) {
     }
   }
   if (parts.empty()) {
-    all.push_back(tokens);
+    add_condition(intervals, tokens);
     return;
   }
   parts.push_back(tokens.subspan(begin));
   for (const SqlTokens part : parts) {
-    add_conjuncts(part, depth, all);
+    add_conjuncts(part, depth, intervals);
   }
-}
-
-std::vector<SqlTokens> conjuncts_of(SqlTokens tokens) {
-  std::vector<SqlTokens> all;
-  add_conjuncts(tokens, 0, all);
-  return all;
 }
 
 /// The interval to which an axis is restricted; nullptr: none, or the column depends on other axes.
@@ -199,40 +185,12 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   return ranges;
 }
 
-/// The part of `ranges` whose numbers lie in `interval`.
-Ranges clipped(const Ranges& ranges, const Interval& interval) {
-  Ranges left;
-  for (const PointRange& range : ranges) {
-    const double first = std::max(static_cast<double>(range.first), interval.low);
-    const double last = std::min(static_cast<double>(range.last), interval.high);
-    if (first <= last) {
-      left.push_back({static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(last)});
-    }
-  }
-  return left;
-}
-
 }  // namespace
-
-std::vector<PointRange> hull(const std::vector<PointRange>& ranges) {
-  return {{ranges.front().first, ranges.back().last}};
-}
-
-bool wants_only_failed(std::string_view condition) {
-  const auto tokens = sql_tokens(condition);
-  const auto parts = conjuncts_of(tokens);
-  return std::ranges::any_of(parts, [](SqlTokens part) {
-    return part.size() == 4 && is_word(part[0], "error") && is_word(part[1], "is") &&
-           is_word(part[2], "not") && is_word(part[3], "null");
-  });
-}
 
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition) {
   const auto tokens = sql_tokens(condition);
   Intervals intervals;
-  for (const SqlTokens part : conjuncts_of(tokens)) {
-    add_condition(intervals, part);
-  }
+  add_conjuncts(tokens, 0, intervals);
   Ranges ranges;
   std::uint64_t points = 0;
   for (const protocol::Block& block : recipe.blocks()) {
@@ -248,24 +206,7 @@ std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string
     }
     points += protocol::points_of_block(block);
   }
-  if (const auto numbers = intervals.find("point"); numbers != intervals.end()) {
-    ranges = clipped(ranges, numbers->second);
-  }
-  const bool are_worth_it = points_in(ranges) + kRowsARange * ranges.size() <= points - points / 10;
-  return ranges.size() > 1 && !are_worth_it ? hull(ranges) : ranges;
-}
-
-std::uint64_t points_of(const protocol::Recipe& recipe) {
-  std::uint64_t points = 0;
-  for (const protocol::Block& block : recipe.blocks()) {
-    // An axis without values is not valid, and its points cannot be counted.
-    if (std::any_of(block.axes().begin(), block.axes().end(),
-                    [](const auto& axis) { return protocol::axis_size(axis) == 0; })) {
-      return 0;
-    }
-    points += protocol::points_of_block(block);
-  }
-  return points;
+  return ranges;
 }
 
 std::uint64_t points_in(const std::vector<PointRange>& ranges) {

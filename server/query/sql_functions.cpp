@@ -1,4 +1,4 @@
-#include "server/query/sql_functions.h"
+#include "server/query/sql_text.h"
 
 #include <algorithm>
 #include <array>
@@ -18,12 +18,6 @@
 namespace oblique::server {
 namespace {
 
-/// The numbers of a group, and the percentage that is asked for.
-struct Numbers {
-  std::vector<double> values;
-  double percent;
-};
-
 /// Means, sums of squared differences from them and the sum of their products, without cancellation
 /// (Welford 1962).
 struct Moments {
@@ -35,61 +29,54 @@ struct Moments {
   double products;
 };
 
-/// The object that SQLite keeps for the group, at first with zeros; nullptr: there is no memory.
-/// With `bytes` 0 it is not created, and nullptr: the group has no row.
+/// The object that SQLite keeps for the group, at first with zeros; nullptr ends the statement,
+/// because there is no memory. With `bytes` 0 it is not created, and nullptr: the group has no row.
 template <class T>
 T* state_of(sqlite3_context* context, int bytes = sizeof(T)) {
-  return static_cast<T*>(sqlite3_aggregate_context(context, bytes));
+  auto* const state = static_cast<T*>(sqlite3_aggregate_context(context, bytes));
+  if (state == nullptr && bytes > 0) {
+    sqlite3_result_error_nomem(context);
+  }
+  return state;
 }
 
 /// Whether the value is a number. NULL is not; other values end the statement.
 bool is_number(sqlite3_context* context, sqlite3_value* value) {
   const int type = sqlite3_value_type(value);
   if (type == SQLITE_TEXT || type == SQLITE_BLOB) {
-    sqlite3_result_error(context, "median, percentile, stddev and corr take numbers", -1);
+    sqlite3_result_error(context, "median, stddev and corr take numbers", -1);
   }
   return type == SQLITE_INTEGER || type == SQLITE_FLOAT;
 }
 
-/// Adds the first argument. The second one is the percentage; without it 50.
-void percentile_step(sqlite3_context* context, int count, sqlite3_value** arguments) {
-  constexpr double kHalf = 50.0;
-  const double percent = count < 2 ? kHalf : sqlite3_value_double(arguments[1]);
+/// The numbers of a group; SQLite keeps a pointer to them.
+using Numbers = std::vector<double>;
+
+void median_step(sqlite3_context* context, int, sqlite3_value** arguments) {
   auto** const numbers = state_of<Numbers*>(context);
-  if (numbers == nullptr) {
-    sqlite3_result_error_nomem(context);
+  if (numbers == nullptr || !is_number(context, arguments[0])) {
     return;
   }
-  const bool is_percentage =
-      (count < 2 || is_number(context, arguments[1])) && percent >= 0.0 && percent <= 100.0;
-  if (!is_percentage || (*numbers != nullptr && (*numbers)->percent != percent)) {
-    sqlite3_result_error(context,
-                         "percentile(x, p) takes one percentage p from 0 to 100 for all rows", -1);
-  } else if (is_number(context, arguments[0])) {
-    try {
-      *numbers = *numbers == nullptr ? new Numbers{{}, percent} : *numbers;
-      (*numbers)->values.push_back(sqlite3_value_double(arguments[0]));
-    } catch (const std::bad_alloc&) {
-      sqlite3_result_error_nomem(context);
-    }
+  try {
+    *numbers = *numbers == nullptr ? new Numbers : *numbers;
+    (*numbers)->push_back(sqlite3_value_double(arguments[0]));
+  } catch (const std::bad_alloc&) {
+    sqlite3_result_error_nomem(context);
   }
 }
 
-/// Returns the percentile, interpolated linearly between the two nearest numbers. SQLite also calls
-/// this when the statement fails.
-void percentile_final(sqlite3_context* context) {
+/// Returns the median. SQLite also calls this when the statement fails.
+void median_final(sqlite3_context* context) {
   auto** const state = state_of<Numbers*>(context, 0);
   const std::unique_ptr<Numbers> numbers(state == nullptr ? nullptr : *state);
-  if (numbers == nullptr || numbers->values.empty()) {
+  if (numbers == nullptr || numbers->empty()) {
     return;
   }
-  auto& values = numbers->values;
-  const double place = numbers->percent / 100.0 * static_cast<double>(values.size() - 1);
-  const auto lower = values.begin() + static_cast<std::ptrdiff_t>(place);
-  std::nth_element(values.begin(), lower, values.end());
-  const double part = place - std::floor(place);
-  const double upper = part > 0.0 ? *std::min_element(lower + 1, values.end()) : *lower;
-  sqlite3_result_double(context, part > 0.0 ? *lower * (1.0 - part) + upper * part : *lower);
+  const auto middle = numbers->begin() + static_cast<std::ptrdiff_t>(numbers->size() / 2);
+  std::nth_element(numbers->begin(), middle, numbers->end());
+  const bool has_one_middle = numbers->size() % 2 == 1;
+  const double below = has_one_middle ? *middle : *std::max_element(numbers->begin(), middle);
+  sqlite3_result_double(context, 0.5 * below + 0.5 * *middle);
 }
 
 /// Adds the pair of the first and the last argument.
@@ -97,11 +84,7 @@ void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_valu
   sqlite3_value* const x = arguments[0];
   sqlite3_value* const y = arguments[count_of_arguments - 1];
   auto* const moments = state_of<Moments>(context);
-  if (moments == nullptr) {
-    sqlite3_result_error_nomem(context);
-    return;
-  }
-  if (!is_number(context, x) || !is_number(context, y)) {
+  if (moments == nullptr || !is_number(context, x) || !is_number(context, y)) {
     return;
   }
   ++moments->count;
@@ -144,11 +127,9 @@ void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
   }
 }
 
-constexpr std::array<SqlFunction, 17> kFunctions{{
+constexpr std::array<SqlFunction, 15> kFunctions{{
     {"median", "median(x)",
      "the middle value; half way between the two middle ones of an even number", true, true},
-    {"percentile", "percentile(x, p)",
-     "the value that p percent lie below, between neighbours in proportion", true, true},
     {"stddev", "stddev(x)", "standard deviation of a sample (n - 1)", true, true},
     {"corr", "corr(x, y)",
      "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out", true},
@@ -163,7 +144,6 @@ constexpr std::array<SqlFunction, 17> kFunctions{{
     {"abs", "abs(x)", "of one value", false, true},
     {"total", "", "", true, true},
     {"group_concat", "", "", true},
-    {"string_agg", "", "", true},
     {"json_group_array", "", "", true},
     {"json_group_object", "", "", true},
 }};
@@ -178,8 +158,7 @@ void add_functions(sqlite3* database) {
       throw StorageError(fmt::format("no function {}: {}", name, sqlite3_errmsg(database)));
     }
   };
-  add("median", 1, nullptr, &percentile_step, &percentile_final);
-  add("percentile", 2, nullptr, &percentile_step, &percentile_final);
+  add("median", 1, nullptr, &median_step, &median_final);
   add("stddev", 1, nullptr, &moments_step, &stddev_final);
   add("corr", 2, nullptr, &moments_step, &corr_final);
   add(kNumberFunction, 1, &nearest_double, nullptr, nullptr);

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+struct sqlite3;
 
 namespace oblique::server {
 
@@ -50,5 +53,25 @@ std::string not_allowed(std::string_view flag, std::string_view text, std::strin
 /// without changing the statement around it: every bracket and quote is closed, there is no
 /// comment, parameter or semicolon, and no clause begins outside brackets. SQLite checks the rest.
 void check_sql_part(std::string_view flag, std::string_view text);
+
+/// A function of one text that returns the double nearest to the decimal in it.
+inline constexpr std::string_view kNumberFunction = "nearest_double";
+
+/// The double nearest to a decimal such as .5 or 1e-3; none for other texts.
+std::optional<double> decimal_number(std::string_view text);
+
+/// A function that queries may use, ours or SQLite's.
+struct SqlFunction {
+  std::string_view name;
+  std::string_view form;     ///< for listings; empty: it is not listed
+  std::string_view meaning;  ///< one line
+  bool aggregates = false;   ///< one value from many rows; for min and max with one argument
+  bool keeps_unit = false;   ///< its value has the unit of its first argument
+};
+std::span<const SqlFunction> sql_functions();
+
+/// Adds to `database` kNumberFunction and the aggregate functions median(x), stddev(x) and
+/// corr(x, y). They ignore NULL; other values than numbers are an error. Throws StorageError.
+void add_functions(sqlite3* database);
 
 }  // namespace oblique::server
