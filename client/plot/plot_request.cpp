@@ -14,7 +14,6 @@
 namespace oblique::client::plot {
 
 void check(const PlotRequest& request) {
-  using server::SqlPart;
   const std::vector<std::pair<const char*, const std::string*>> texts{
       {"--map", &request.map},
       {"--lines", &request.lines},
@@ -26,11 +25,11 @@ void check(const PlotRequest& request) {
       {"--colour", &request.colour}};
   for (const auto& [flag, text] : texts) {
     if (!text->empty()) {
-      server::check_sql_part(flag, *text, SqlPart::kColumns);
+      server::check_sql_part(flag, *text);
     }
   }
   if (!request.where.empty()) {
-    server::check_sql_part("--where", request.where, SqlPart::kCondition);
+    server::check_sql_part("--where", request.where);
   }
   if (!request.scatter.empty() && names_in(request.scatter).size() != 2) {
     throw solver::InputError(fmt::format(

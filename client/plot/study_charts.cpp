@@ -17,9 +17,7 @@ namespace {
 
 /// Of whole lists hardly two are alike; their elements can be counted.
 void refuse_list(const std::string& column) {
-  const auto& lists = server::lists_of_queries();
-  if (std::any_of(lists.begin(), lists.end(),
-                  [&](const server::ListColumn& list) { return list.name == column; })) {
+  if (server::is_list_column(column)) {
     throw solver::InputError(
         fmt::format("--histogram {0}: its values are lists; take an element, as {0}[0]", column));
   }

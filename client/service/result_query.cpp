@@ -1,39 +1,24 @@
 #include "client/service/result_query.h"
 
+#include <utility>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
-namespace {
-
-using server::check_sql_part;
-using server::SqlPart;
-
-constexpr const char* kWhere = "--where";
-constexpr const char* kSelect = "--select";
-constexpr const char* kGroup = "--group";
-constexpr const char* kOrder = "--order";
-
-}  // namespace
-
 void check(const ResultQuery& query) {
   if (query.limit && *query.limit < 0) {
     throw solver::InputError(
         fmt::format("--limit {} is not allowed: it must be >= 0", *query.limit));
   }
-  if (!query.select.empty()) {
-    check_sql_part(kSelect, query.select, SqlPart::kColumns);
-  }
-  if (!query.where.empty()) {
-    check_sql_part(kWhere, query.where, SqlPart::kCondition);
-  }
-  if (!query.group.empty()) {
-    check_sql_part(kGroup, query.group, SqlPart::kGroup);
-  }
-  if (!query.order.empty()) {
-    check_sql_part(kOrder, query.order, SqlPart::kOrder);
+  for (const auto& [flag, text] :
+       {std::pair("--select", query.select), std::pair("--where", query.where),
+        std::pair("--group", query.group), std::pair("--order", query.order)}) {
+    if (!text.empty()) {
+      server::check_sql_part(flag, text);
+    }
   }
 }
 

@@ -46,10 +46,10 @@ std::vector<std::string> comparisons_with_modes(std::string_view where) {
   std::vector<std::string> found;
   for (std::size_t i = 0; i + 2 < tokens.size(); ++i) {
     const std::string column = tokens[i].is_name() ? server::name_of(tokens[i]) : "";
-    const std::size_t value = tokens[i + 2].is_sign('=') ? i + 3 : i + 2;
-    if ((column == "mode" || column == "major_mode") && tokens[i + 1].is_sign('=') &&
-        value < tokens.size() && tokens[value].text.starts_with('\'')) {
-      found.push_back(fmt::format("{} = {}", column, tokens[value].text));
+    const bool is_equal = tokens[i + 1].is_sign("=") || tokens[i + 1].is_sign("==");
+    if ((column == "mode" || column == "major_mode") && is_equal &&
+        tokens[i + 2].text.starts_with('\'')) {
+      found.push_back(fmt::format("{} = {}", column, tokens[i + 2].text));
     }
   }
   return found;

@@ -15,8 +15,8 @@ constexpr const char* kSqlExamples = R"(Examples:
   oblique sql "SELECT * FROM peaks WHERE study_id = 1 AND major" --format csv
   oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
 
-One statement that only reads, in SQLite's SQL with median(x), percentile(x, p), stddev(x),
-variance(x) and corr(x, y) beside its functions. What `oblique query` alone knows is written otherwise here:
+One statement that only reads, in SQLite's SQL with median(x), stddev(x) and corr(x, y)
+beside its functions. What `oblique query` alone knows is written otherwise here:
   peaks[0].fn_N           peaks ->> '$[0][1]', or the views peaks, phases, stick_intervals and
                           reaction_peaks
   count_mode('SC SR')     count(*) FILTER (WHERE major_mode = 'SC SR'))";

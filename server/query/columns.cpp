@@ -1,15 +1,16 @@
 #include "server/query/columns.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <string_view>
+#include <iterator>
+#include <optional>
 #include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/query/elements.h"
-#include "server/query/sql_functions.h"
+#include "proto/recipe/axes.h"
+#include "proto/recipe/keys.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 
@@ -18,27 +19,31 @@ namespace {
 
 using protocol::CellKind;
 
-struct Described {
-  std::string_view name;
-  std::string_view meaning;
-  CellKind values = CellKind::kText;
-};
+std::vector<Column> row_columns() {
+  return {
+      {"study", "", "row", "", "name of the study", CellKind::kText, true},
+      {"study_id", "", "row", "", "its number in the database", CellKind::kInteger, true},
+      {"point", "", "row", "", "number of the point in its study, from 0", CellKind::kInteger,
+       true},
+      {"model_id", "", "row", "", "number of the model in the database", CellKind::kInteger, true},
+      {"status", "", "row", "", "solved or failed", CellKind::kText, true},
+      {"error", "", "row", "", "why it failed", CellKind::kText, true},
+      {"worker_id", "", "row", "", "number of the worker that solved it", CellKind::kInteger, true},
+      {"worker_name", "", "row", "", "that worker's name"},
+      {"instruction_set", "", "row", "", "vector instructions that it used"},
+      {"attempt", "", "row", "", "number of the lease under which it was solved",
+       CellKind::kInteger, true},
+      {"solved_at", "", "row", "", "when the result arrived (UTC)", CellKind::kText, true},
+      {"reused_from", "", "row", "",
+       "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point",
+       CellKind::kText, true},
+  };
+}
 
-constexpr std::array<Described, 12> kRowColumns{{
-    {"study", "name of the study"},
-    {"study_id", "its number in the database", CellKind::kInteger},
-    {"point", "number of the point in its study, from 0", CellKind::kInteger},
-    {"model_id", "number of the model in the database", CellKind::kInteger},
-    {"status", "solved or failed"},
-    {"error", "why it failed"},
-    {"worker_id", "number of the worker that solved it", CellKind::kInteger},
-    {"worker_name", "that worker's name"},
-    {"instruction_set", "vector instructions that it used"},
-    {"attempt", "number of the lease under which it was solved", CellKind::kInteger},
-    {"solved_at", "when the result arrived (UTC)"},
-    {"reused_from",
-     "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point"},
-}};
+/// Whether the view `runs` shows the list in another form than the table `results` has.
+bool is_remade_by_view(const solver::ResultList& list) {
+  return list.column == "phases" || list.column == "ft_peaks";
+}
 
 /// An SQL expression over the columns of `runs` for the list `part`. Numbers keep their digits.
 std::string list_sql(const solver::ListPart& part) {
@@ -47,8 +52,7 @@ std::string list_sql(const solver::ListPart& part) {
     return list;
   }
   const auto index_of = [&](std::string_view member) {
-    const auto& members = part.list->members;
-    return std::find(members.begin(), members.end(), member) - members.begin();
+    return std::ranges::find(part.list->members, member) - part.list->members.begin();
   };
   return fmt::format(
       "CASE WHEN {0} IS NOT NULL THEN (SELECT json_group_array(item.value -> {1}) "
@@ -62,23 +66,24 @@ std::string place_in_json(const solver::ResultField& field) {
                              : std::string(field.group) + '.' + std::string(field.name);
 }
 
-Column input(const solver::ParameterKey& key, std::string place) {
-  return {std::string(key.name), std::string(key.unit), "input", std::move(place),
-          fmt::format("{}; {}", key.meaning, key.allowed)};
-}
-
 void add_inputs(std::vector<Column>& columns) {
+  const auto add = [&](const solver::ParameterKey& key, std::string place, bool is_stored) {
+    const bool is_whole = key.is_allowed(2.0) && !key.is_allowed(2.5);
+    const std::string name = column_of_key(key.name);
+    columns.push_back({name, std::string(key.unit), "input", std::move(place),
+                       fmt::format("{}; {}{}", key.meaning, key.allowed,
+                                   name == key.name ? "" : " (E on flags and in study files)"),
+                       key.name == "integrator" ? CellKind::kText
+                       : is_whole               ? CellKind::kInteger
+                                                : CellKind::kReal,
+                       is_stored});
+  };
   for (const auto& key : solver::point_keys()) {
-    columns.push_back(input(key, std::string(key.name)));
+    add(key, std::string(key.name), true);
   }
   for (const auto& key : solver::model_keys()) {
     const auto* output = solver::find_result_column(key.name);
-    auto column = input(key, output == nullptr ? std::string() : place_in_json(*output));
-    column.name = column_of_key(key.name);
-    if (column.name != key.name) {
-      column.meaning += " (E on flags and in study files)";
-    }
-    columns.push_back(std::move(column));
+    add(key, output == nullptr ? std::string() : place_in_json(*output), false);
     if (key.name == "length") {
       columns.push_back(
           {"lengths_m", "m", "input", "", "length of each link, from the pin outwards; each > 0"});
@@ -88,21 +93,46 @@ void add_inputs(std::vector<Column>& columns) {
 
 void add_outputs(std::vector<Column>& columns) {
   for (const auto& field : solver::result_fields()) {
-    if (solver::find_model_key(field.column) == nullptr) {
-      columns.push_back({std::string(field.column), std::string(field.unit), "output",
-                         place_in_json(field), std::string(field.meaning)});
+    if (solver::find_model_key(field.column) != nullptr) {
+      continue;
+    }
+    const auto* part = std::get_if<solver::ListPart>(&field.value);
+    columns.push_back({std::string(field.column), std::string(field.unit), "output",
+                       place_in_json(field), std::string(field.meaning),
+                       std::holds_alternative<solver::Member<double>>(field.value) ? CellKind::kReal
+                       : std::holds_alternative<solver::Member<std::int64_t>>(field.value)
+                           ? CellKind::kInteger
+                           : CellKind::kText,
+                       part != nullptr ? !is_remade_by_view(*part->list)
+                                       : field.sent_with != solver::SentWith::kWorker,
+                       part != nullptr ? list_sql(*part) : std::string()});
+  }
+  // Lists that `solve --json` shows in another form.
+  for (const auto* list : solver::result_lists()) {
+    if (solver::find_result_column(list->column) == nullptr) {
+      columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
+                         std::string(list->meaning), CellKind::kText, !is_remade_by_view(*list)});
     }
   }
 }
 
-/// Adds the lists of the database that `solve --json` shows in another form.
-void add_stored_lists(std::vector<Column>& columns) {
-  for (const auto* list : solver::result_lists()) {
-    if (solver::find_result_column(list->column) == nullptr) {
-      columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
-                         std::string(list->meaning)});
+/// Whether a key has more than one value over the points of a recipe. A key that only some of the
+/// blocks have varies, and so does a key with an expression or a distribution.
+bool varies(const protocol::Recipe& recipe, std::string_view key) {
+  std::optional<std::string> first;  // the axis of the first block; empty: it has none
+  for (const auto& block : recipe.blocks()) {
+    const auto axis = std::ranges::find(block.axes(), key, &protocol::Axis::key);
+    const bool has_axis = axis != block.axes().end();
+    if (has_axis && (!protocol::has_own_values(*axis) || protocol::axis_size(*axis) > 1)) {
+      return true;
     }
+    const std::string text = has_axis ? axis->SerializeAsString() : std::string();
+    if (first && *first != text) {
+      return true;
+    }
+    first = text;
   }
+  return false;
 }
 
 }  // namespace
@@ -116,19 +146,33 @@ const std::vector<Column>& all_columns() {
     std::vector<Column> columns;
     add_inputs(columns);
     add_outputs(columns);
-    add_stored_lists(columns);
-    for (const auto& [name, meaning, values] : kRowColumns) {
-      columns.push_back({std::string(name), "", "row", "", std::string(meaning)});
+    std::ranges::move(row_columns(), std::back_inserter(columns));
+    for (Column& column : columns) {
+      column.sql = column.sql.empty() ? "runs." + column.name : column.sql;
     }
     return columns;
   }();
   return all;
 }
 
+const Column* find_column(std::string_view name) {
+  const auto found = std::ranges::find(all_columns(), name, &Column::name);
+  return found == all_columns().end() ? nullptr : &*found;
+}
+
 std::vector<Column> columns_and_functions() {
   auto columns = all_columns();
-  for (const WrittenForm& element : element_forms()) {
-    columns.push_back({element.form, element.unit, "element", "", element.meaning});
+  for (const auto* list : solver::result_lists()) {
+    const std::string_view member = list->members.back() == "major" ? "fn_N" : list->members.back();
+    columns.push_back({fmt::format("{}[0].{}", list->column, member), unit_of_member(member),
+                       "element", "",
+                       fmt::format("{} of the first element; -1 is the last{}. Members: {}", member,
+                                   list->column == "peaks" ? ", and ripples count: major_peak_1_N "
+                                                             "is the first peak that is none"
+                                                           : "",
+                                   fmt::join(list->members, ", "))});
+    columns.push_back(
+        {fmt::format("{}.count", list->column), "", "element", "", "number of elements"});
   }
   for (const SqlFunction& function : sql_functions()) {
     if (!function.form.empty()) {
@@ -139,52 +183,49 @@ std::vector<Column> columns_and_functions() {
   return columns;
 }
 
-const std::vector<ListColumn>& lists_of_queries() {
-  static const std::vector<ListColumn> all = [] {
-    std::vector<ListColumn> lists;
-    for (const auto& field : solver::result_fields()) {
-      const auto* part = std::get_if<solver::ListPart>(&field.value);
-      if (part != nullptr && field.column != part->list->column) {
-        lists.push_back({std::string(field.column), list_sql(*part)});
-      }
-    }
-    return lists;
-  }();
-  return all;
-}
-
-protocol::CellKind kind_of_values(std::string_view name) {
-  const auto* described =
-      std::find_if(kRowColumns.begin(), kRowColumns.end(),
-                   [&](const Described& column) { return column.name == name; });
-  if (described != kRowColumns.end()) {
-    return described->values;
-  }
-  if (const auto* field = solver::find_result_column(name)) {
-    return std::holds_alternative<solver::Member<double>>(field->value)         ? CellKind::kReal
-           : std::holds_alternative<solver::Member<std::int64_t>>(field->value) ? CellKind::kInteger
-                                                                                : CellKind::kText;
-  }
-  if (solver::find_result_list(name) != nullptr || name == "lengths_m" || name == "integrator") {
-    return CellKind::kText;
-  }
-  const auto& columns = all_columns();
-  if (std::none_of(columns.begin(), columns.end(),
-                   [&](const Column& column) { return column.name == name; })) {
-    return CellKind::kNull;
-  }
-  const auto* key = solver::find_model_key(name);
-  const bool is_whole = key != nullptr && key->is_allowed(2.0) && !key->is_allowed(2.5);
-  return is_whole ? CellKind::kInteger : CellKind::kReal;
+bool is_list_column(std::string_view name) {
+  const auto* field = solver::find_result_column(name);
+  return name == "lengths_m" || solver::find_result_list(name) != nullptr ||
+         (field != nullptr && std::holds_alternative<solver::ListPart>(field->value));
 }
 
 std::string unit_of_column(std::string_view name) {
-  for (const Column& column : all_columns()) {
-    if (column.name == name) {
-      return column.unit.find(',') == std::string::npos ? column.unit : "";
+  const Column* const column = find_column(name);
+  return column == nullptr || column->unit.find(',') != std::string::npos ? "" : column->unit;
+}
+
+std::string unit_of_member(std::string_view member) {
+  return member.ends_with("_s") ? "s" : member.ends_with("_N") ? "N" : "";
+}
+
+CellKind kind_of_values(std::string_view name) {
+  const Column* const column = find_column(name);
+  return column == nullptr ? CellKind::kNull : column->values;
+}
+
+std::vector<std::string> usual_columns(const protocol::Recipe& recipe) {
+  std::vector<std::string> columns{"point"};
+  for (const auto keys : {solver::point_keys(), solver::model_keys()}) {
+    for (const auto& key : keys) {
+      const bool is_of_point = keys.data() == solver::point_keys().data();
+      if (varies(recipe, key.name) || (recipe.blocks().empty() && is_of_point)) {
+        columns.push_back(column_of_key(key.name));
+      }
     }
   }
-  return {};
+  const auto has_single_length = [&](const protocol::Block& block) {
+    return std::ranges::any_of(block.axes(), [&](const protocol::Axis& axis) {
+      return protocol::link_of_key(protocol::key_number(axis.key())) && varies(recipe, axis.key());
+    });
+  };
+  if (std::ranges::any_of(recipe.blocks(), has_single_length)) {
+    columns.emplace_back("lengths_m");
+  }
+  for (const char* output : {"status", "fn_peak_N", "ft_peak_N", "duration_s", "slide_m",
+                             "stick_total_s", "major_mode"}) {
+    columns.emplace_back(output);
+  }
+  return columns;
 }
 
 }  // namespace oblique::server

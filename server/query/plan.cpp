@@ -1,10 +1,14 @@
 #include "server/query/plan.h"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cstdint>
-#include <memory>
-#include <span>
+#include <functional>
+#include <optional>
+#include <set>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,364 +17,440 @@
 #include "proto/suggestion.h"
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
-#include "server/query/elements.h"
-#include "server/query/point_ranges.h"
-#include "server/query/query_rules.h"
-#include "server/query/question.h"
-#include "server/query/sql_functions.h"
 #include "server/query/sql_text.h"
-#include "server/store/schema.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
 namespace {
 
-using Tokens = std::span<const SqlToken>;
-using Names = std::vector<std::string>;
+using solver::InputError;
+using Names = std::set<std::string, std::less<>>;
 
-bool contains(const Names& names, std::string_view name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+/// A part of a query and the keyword before it.
+struct Part {
+  const char* flag;
+  const char* keyword;
+  std::string written;
+  std::string sql{};  ///< as SQLite reads it
+};
+/// What is selected, the condition, the group and the order, as in a SELECT.
+using Parts = std::array<Part, 4>;
+
+/// Tokens that are replaced by an expression over a column: peaks[0].fn_N, peaks[0],
+/// fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from 0, as `seq` of the views
+/// does; -1 is the last. An element that a list lacks is NULL.
+struct Element {
+  std::size_t tokens = 0;  ///< number of its tokens; 0: no element
+  std::string column;
+  std::string sql;
+  std::string unit;
+};
+
+/// The list of the ends of phases as the table `results` has it.
+constexpr const char* kStoredPhases = "stored_phases";
+
+/// The index in "[2]" or "[-1]".
+int index_in(std::string_view list, std::string_view brackets) {
+  const char* const end = brackets.data() + brackets.size() - 1;
+  int index = 0;
+  const auto [read, error] = std::from_chars(brackets.data() + 1, end, index);
+  if (error != std::errc() || read != end) {
+    throw InputError(fmt::format(
+        "{}{} is not allowed: in brackets stands a whole number, from 0, or -1 for the last", list,
+        brackets));
+  }
+  return index;
+}
+
+/// Kind, beginning or end of phase `index`: compression comes first, then the kinds alternate, and
+/// each phase begins at the end of the previous one. Much faster than a list made by the view.
+std::string phase_sql(int index, std::size_t member) {
+  const std::string count = fmt::format("json_array_length({})", kStoredPhases);
+  const std::string i = index < 0 ? fmt::format("({} - {})", count, -index) : std::to_string(index);
+  const std::string value =
+      member == 0   ? fmt::format("iif({} % 2, 'restitution', 'compression')", i)
+      : member == 1 ? fmt::format("iif({0} = 0, 0.0, {1} ->> ({0} - 1))", i, kStoredPhases)
+                    : fmt::format("{} ->> {}", kStoredPhases, i);
+  return fmt::format("CASE WHEN {0} BETWEEN 0 AND {1} - 1 THEN {2} END", i, count, value);
+}
+
+/// The element of list `tokens[0]` at the index `tokens[1]`.
+Element indexed(SqlTokens tokens) {
+  const std::string name(tokens[0].text);
+  if (!is_list_column(name)) {
+    throw InputError(fmt::format(
+        "{0}{1} is not allowed: {0} is no list; `oblique columns` lists elements of lists", name,
+        tokens[1].text));
+  }
+  const int index = index_in(name, tokens[1].text);
+  const std::string path = fmt::format("$[{}{}]", index < 0 ? "#" : "", index);
+  const auto* list = solver::find_result_list(name);
+  if (list == nullptr || tokens.size() < 4 || !tokens[2].is_sign(".")) {
+    return {2, name, fmt::format("({} ->> '{}')", name, path), unit_of_column(name)};
+  }
+  const std::string member = name_of(tokens[3]);
+  const auto found = std::ranges::find(list->members, member);
+  if (found == list->members.end()) {
+    throw InputError(fmt::format("{}{}.{} is not allowed: the elements of {} have {}{}", name,
+                                 tokens[1].text, member, name, fmt::join(list->members, ", "),
+                                 protocol::did_you_mean(member, list->members)));
+  }
+  const auto number = static_cast<std::size_t>(found - list->members.begin());
+  if (name == "phases") {
+    return {4, kStoredPhases, phase_sql(index, number), unit_of_member(member)};
+  }
+  return {4, name, fmt::format("({} ->> '{}[{}]')", name, path, number), unit_of_member(member)};
+}
+
+/// The element at the beginning of `tokens`.
+Element element_at(SqlTokens tokens) {
+  if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
+    return {};
+  }
+  // After a space SQL reads brackets as an alias.
+  if (tokens[1].text.front() == '[' && tokens[0].text.end() == tokens[1].text.begin()) {
+    return indexed(tokens);
+  }
+  if (tokens.size() > 2 && tokens[1].is_sign(".") && tokens[2].text == "count" &&
+      solver::find_result_list(tokens[0].text) != nullptr) {
+    const std::string column(tokens[0].text == "phases" ? kStoredPhases : tokens[0].text);
+    return {3, column, fmt::format("json_array_length({})", column), {}};
+  }
+  if (!is_word(tokens[0], "count_mode")) {
+    return {};
+  }
+  if (tokens.size() < 4 || !tokens[1].is_sign("(") || !tokens[3].is_sign(")") ||
+      tokens[2].text.front() != '\'') {
+    throw InputError(
+        "count_mode() takes one mode in single quotes, ripples merged, as count_mode('SC SR')");
+  }
+  return {
+      4, "major_mode", fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
+}
+
+/// Whether SQLite 3.40 might read a number as another double than the nearest one.
+bool is_decimal(const SqlToken& token) {
+  return token.kind == SqlToken::Kind::kLiteral && decimal_number(token.text) &&
+         token.text.find_first_of(".eE") != std::string_view::npos;
+}
+
+/// `tokens` as SQLite reads them. Adds the columns that they name, and all other names, to `names`.
+std::string in_sqlite(SqlTokens tokens, Names& names) {
+  std::string result;
+  const char* copied = text_over(tokens).data();
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    Element element = element_at(tokens.subspan(i));
+    if (element.tokens == 0 && is_decimal(tokens[i])) {
+      element = {1, {}, fmt::format("{}('{}')", kNumberFunction, tokens[i].text), {}};
+    }
+    if (element.tokens > 0) {
+      names.insert(element.column);
+      result.append(copied, tokens[i].text.begin()) += element.sql;
+      i += element.tokens - 1;
+      copied = tokens[i].text.end();
+    } else if (tokens[i].is_name()) {
+      names.insert(name_of(tokens[i]));
+    }
+  }
+  return tokens.empty() ? result : result.append(copied, text_over(tokens).end());
+}
+
+const SqlFunction* function_at(SqlTokens tokens, std::size_t i) {
+  if (i + 1 >= tokens.size() || !tokens[i + 1].is_sign("(")) {
+    return nullptr;
+  }
+  const auto functions = sql_functions();
+  const auto found = std::ranges::find_if(
+      functions, [&](const SqlFunction& each) { return is_word(tokens[i], each.name); });
+  return found == functions.end() ? nullptr : &*found;
+}
+
+/// The tokens between the brackets of a call at token `i`.
+SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
+  const std::size_t end = std::min(closing_bracket(tokens, i + 1), tokens.size());
+  return tokens.subspan(i + 2, end - i - 2);
+}
+
+/// Whether a function that aggregates rows is called at token `i`. min and max with several
+/// arguments do not aggregate.
+bool is_aggregate(SqlTokens tokens, std::size_t i) {
+  const SqlFunction* const function = function_at(tokens, i);
+  const bool compares = function != nullptr && (function->name == "min" || function->name == "max");
+  return function != nullptr && function->aggregates &&
+         (!compares || sql_items(arguments_of(tokens, i)).size() == 1);
+}
+
+bool has_aggregate(SqlTokens tokens) {
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    if (is_aggregate(tokens, i)) {
+      return true;
+    }
+    const bool is_subquery =
+        tokens[i].is_sign("(") && i + 1 < tokens.size() && is_word(tokens[i + 1], "select");
+    i = is_subquery ? closing_bracket(tokens, i) : i;
+  }
+  return false;
+}
+
+bool has_window(SqlTokens tokens) {
+  return std::ranges::any_of(tokens, [](const SqlToken& token) { return is_word(token, "over"); });
+}
+
+/// Throws InputError for an item of a grouped row (or of the one row of all points) that has no
+/// aggregate, but a column that is not in --group: SQL would take its value from any point.
+void check_grouped(const Part& select, const Part& group) {
+  const auto selected = sql_tokens(select.written);
+  if (has_window(selected) || (group.written.empty() && !has_aggregate(selected))) {
+    return;
+  }
+  Names keys;
+  const auto group_tokens = sql_tokens(group.written);
+  (void)in_sqlite(group_tokens, keys);
+  for (const SqlTokens item : sql_items(selected)) {
+    const bool is_all = item.size() == 1 && item[0].is_sign("*");
+    const bool has_key_as_alias =
+        !item.empty() && item.back().is_name() && keys.contains(name_of(item.back()));
+    const auto column = std::ranges::find_if(item, [&](const SqlToken& token) {
+      return token.is_name() && find_column(name_of(token)) != nullptr &&
+             !keys.contains(name_of(token));
+    });
+    if (is_all || (column != item.end() && !has_key_as_alias && !has_aggregate(item))) {
+      throw InputError(not_allowed(
+          select.flag, select.written,
+          fmt::format(
+              "{0} has many values in {1}; use an aggregate, as avg({0}), or add it to "
+              "--group",
+              is_all ? "*" : column->text,
+              keys.empty() ? "the one row that an aggregate makes of all points" : "a group")));
+    }
+  }
+}
+
+/// The unit of a column, of an element, or of a function of one of these that keeps the unit. Empty
+/// for a pure number, a text, and other expressions.
+std::string unit_of(SqlTokens tokens) {
+  if (tokens.size() > 2 && is_word(tokens[tokens.size() - 2], "as")) {
+    tokens = tokens.first(tokens.size() - 2);
+  }
+  if (tokens.size() == 1 && tokens[0].is_name()) {
+    return unit_of_column(name_of(tokens[0]));
+  }
+  const Element element = element_at(tokens);
+  if (element.tokens > 0) {
+    return element.tokens == tokens.size() ? element.unit : std::string();
+  }
+  const SqlFunction* const function = function_at(tokens, 0);
+  const bool is_whole_call = function != nullptr && closing_bracket(tokens, 1) == tokens.size() - 1;
+  return is_whole_call && function->keeps_unit ? unit_of(sql_items(arguments_of(tokens, 0)).front())
+                                               : std::string();
+}
+
+/// The selected columns, and the SQL expression of each. `*` becomes all columns.
+std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns(SqlTokens tokens,
+                                                                                 Names& names) {
+  std::vector<PlannedColumn> columns;
+  std::vector<std::string> sql;
+  for (const SqlTokens item : sql_items(tokens)) {
+    if (item.size() != 1 || !item[0].is_sign("*")) {
+      columns.push_back({std::string(text_over(item)), unit_of(item)});
+      sql.push_back(in_sqlite(item, names));
+      continue;
+    }
+    for (const bool is_row : {true, false}) {
+      for (const Column& column : all_columns()) {
+        if ((column.kind == "row") == is_row) {
+          columns.push_back({column.name, unit_of_column(column.name)});
+          sql.push_back(column.name);
+          names.insert(column.name);
+        }
+      }
+    }
+  }
+  return {std::move(columns), std::move(sql)};
 }
 
 struct QueriedStudy {
-  std::int64_t study_id;
-  protocol::Recipe recipe;  ///< without blocks if it cannot be read or has too few points
+  std::string name;
+  std::int64_t study_id = 0;
+  std::uint64_t points = 0;
+  protocol::Recipe recipe{};  ///< without blocks if it cannot be read
 };
 
 QueriedStudy find_study(sqlite3* database, const std::string& name) {
   Statement study(database, "SELECT study_id, points, recipe FROM studies WHERE name = ?1");
   study.bind(1, name);
   if (!study.step()) {
-    throw solver::InputError(fmt::format("there is no study called \"{}\"", name));
+    throw InputError(no_such_study(database, name));
   }
-  QueriedStudy found{study.integer(0), {}};
-  try {
-    if (!protocol::parse_recipe(study.bytes(2), found.recipe) ||
-        points_of(found.recipe) < static_cast<std::uint64_t>(study.integer(1))) {
-      found.recipe.Clear();
-    }
-  } catch (const solver::InputError&) {
-    found.recipe.Clear();  // it has more points than a study may have
+  QueriedStudy found{name, study.integer(0), static_cast<std::uint64_t>(study.integer(1))};
+  if (!protocol::parse_recipe(study.bytes(2), found.recipe)) {
+    found.recipe.Clear();
   }
   return found;
 }
 
-/// The columns that a statement returns. Throws solver::InputError with SQLite's message.
-Names columns_of(sqlite3* database, const std::string& sql) {
-  sqlite3_stmt* raw = nullptr;
-  const int code =
-      sqlite3_prepare_v2(database, sql.data(), static_cast<int>(sql.size()), &raw, nullptr);
-  const std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement(raw, &sqlite3_finalize);
-  if (code != SQLITE_OK) {
-    const std::string reason = sqlite3_errmsg(database);
-    if (const auto missing = missing_views(database); !missing.empty()) {
-      throw solver::InputError(fmt::format(
-          "the question cannot be answered: the database lacks its view {0} ({1}). A server, or "
-          "`oblique run`, makes it again when it starts on this file; `oblique check` names all",
-          fmt::join(missing, ", "), reason));
-    }
-    throw solver::InputError(fmt::format("the question is wrong: {}", reason));
-  }
-  Names names;
-  for (int i = 0; i < sqlite3_column_count(raw); ++i) {
-    const char* name = sqlite3_column_name(raw, i);
-    names.emplace_back(name == nullptr ? "" : name);
-  }
-  return names;
-}
+/// The rows of a study as a table, of points that contain all that meet a condition.
+struct Rows {
+  std::string sql;
+  bool are_sorted = false;  ///< rows come by rising point without ORDER BY
+};
 
-/// The columns from which a query may select.
-Names columns_of_rows(sqlite3* database) {
-  Names columns = columns_of(database, "SELECT * FROM runs LIMIT 0");
-  for (const ListColumn& list : lists_of_queries()) {
-    columns.push_back(list.name);
-  }
-  return columns;
-}
-
-/// The ranges as a table to join with; empty for a single one.
-std::string join_of(const std::vector<PointRange>& ranges) {
-  if (ranges.size() < 2) {
-    return {};
-  }
-  // SQLite reads a JSON list faster than it compiles VALUES.
-  std::string list;
-  for (const PointRange& range : ranges) {
-    list += fmt::format("{}\"{}\":{}", list.empty() ? "" : ",", range.first, range.last);
-  }
-  return fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", list);
-}
-
-/// The condition in SQL that restricts points to `ranges`. A study without a recipe has no ranges
-/// and is not restricted. A range of all points is left out, because it would keep SQLite from
-/// looking up the points that the user's condition names, for example with IN.
-std::string condition_of(const std::vector<PointRange>& ranges, const protocol::Recipe& recipe) {
-  if (ranges.empty()) {
-    return recipe.blocks().empty() ? "1" : "0";
-  }
-  if (ranges.size() == 1 && points_in(ranges) == points_of(recipe)) {
-    return "1";
-  }
-  if (ranges.size() == 1) {
-    return fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
-  }
-  return "runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
-}
-
-/// All names in a text, whether of columns or not.
-Names names_in(std::string_view text) {
-  Names names;
-  for (const SqlToken& token : sql_tokens(text)) {
-    if (token.is_name()) {
-      names.push_back(name_of(token));
+/// The rows with the columns in `names`. They come from the table `results` if it has all of these,
+/// because looking up the model and worker of each row is slow. No condition of the user can reach
+/// another study.
+Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& names) {
+  std::string selected = "runs.point AS point";
+  bool are_stored = true;
+  for (const Column& column : all_columns()) {
+    if (names.contains(column.name) && column.name != "point") {
+      selected += fmt::format(
+          ", {} AS {}", column.name == "study" ? sql_text(study.name) : column.sql, column.name);
+      are_stored = are_stored && column.is_stored;
     }
   }
-  return names;
-}
-
-/// The table that is read as `runs`, and an addition to its condition. SQLite does not use the
-/// index of failed points unless the statement names it, because SQLite cannot estimate that they
-/// are few.
-std::pair<std::string, std::string> table_of(const std::string& where, const QueriedStudy& study,
-                                             bool is_in_results) {
-  if (!wants_only_failed(where)) {
-    return {is_in_results ? "results AS runs" : "runs AS runs", ""};
+  if (names.contains(kStoredPhases)) {
+    selected += fmt::format(
+        ", {} AS {}",
+        are_stored ? "runs.phases"
+                   : "(SELECT phases FROM results AS stored WHERE stored.study_id = runs.study_id "
+                     "AND stored.point = runs.point)",
+        kStoredPhases);
   }
-  if (is_in_results) {
-    return {"results AS runs INDEXED BY failed_points", " AND runs.error IS NOT NULL"};
-  }
-  return {"runs AS runs", fmt::format(" AND runs.point IN (SELECT point FROM results INDEXED BY "
-                                      "failed_points WHERE study_id = {} AND error IS NOT NULL)",
-                                      study.study_id)};
-}
-
-/// The rows of a study in `ranges`, with the columns that `text` names. They come from the table
-/// `results` if it has all of these, because looking up the model and worker of each row is slow.
-std::string rows_of(sqlite3* database, const protocol::StudyQuery& question,
-                    const QueriedStudy& study, const std::vector<PointRange>& ranges,
-                    std::string_view text, const Names& columns) {
-  const Names named = names_in(text);
-  const Names stored = columns_of(database, "SELECT * FROM results LIMIT 0");
-  // The view shows these lists in another form than the table.
-  const Names shown{"phases", "ft_peaks", "ft_peaks_N"};
-  const auto& lists = lists_of_queries();
-  const auto is_in_results = [&](const std::string& name) {
-    const bool is_list = std::any_of(lists.begin(), lists.end(),
-                                     [&](const ListColumn& list) { return list.name == name; });
-    return (name == "study" || is_list || contains(stored, name)) && !contains(shown, name);
-  };
-  const bool has_all = std::all_of(named.begin(), named.end(), [&](const std::string& name) {
-    return !contains(columns, name) || is_in_results(name);
-  });
-  std::string selected = "runs.point";
-  const auto add = [&](std::string_view name, std::string_view sql) {
-    selected += contains(named, name) ? fmt::format(", {} AS {}", sql, name) : "";
-  };
-  for (const std::string& column : columns) {
-    const auto list = std::find_if(lists.begin(), lists.end(),
-                                   [&](const ListColumn& each) { return each.name == column; });
-    if (column == "study") {
-      add(column, sql_text(question.study()));
-    } else if (list != lists.end()) {
-      add(column, list->sql);
-    } else if (column != "point") {
-      add(column, "runs." + column);
+  const auto ranges = point_ranges(study.recipe, where);
+  std::string join;
+  std::string condition;
+  if (study.recipe.blocks().empty() || points_in(ranges) == study.points) {
+    condition = "1";  // a range would keep SQLite from looking up points that the user names
+  } else if (ranges.size() < 2) {
+    condition = ranges.empty()
+                    ? "0"
+                    : fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
+  } else {
+    // SQLite reads a JSON list faster than it compiles VALUES. It reads the ranges of a cross join
+    // one after another, and the rows of each by their key.
+    for (const PointRange& range : ranges) {
+      join += fmt::format("{}\"{}\":{}", join.empty() ? "" : ",", range.first, range.last);
     }
+    join = fmt::format("json_each('{{{}}}') AS span CROSS JOIN ", join);
+    condition = "runs.point BETWEEN CAST(span.key AS INTEGER) AND span.value";
   }
-  const char* const list_of =
-      has_all ? "runs.{}"
-              : "(SELECT {} FROM results AS stored WHERE stored.study_id = runs.study_id AND "
-                "stored.point = runs.point)";
-  add(kStoredPhases, fmt::format(fmt::runtime(list_of), "phases"));
-  add(kStoredFtPeaks, fmt::format(fmt::runtime(list_of), "ft_peaks"));
-  const auto [table, condition] = table_of(question.where(), study, has_all);
-  return fmt::format("(SELECT {} FROM {}{} WHERE runs.study_id = {} AND {}{})", selected,
-                     join_of(ranges), table, study.study_id, condition_of(ranges, study.recipe),
-                     condition);
+  return {fmt::format("(SELECT {} FROM {}{} AS runs WHERE runs.study_id = {} AND {}) AS picked",
+                      selected, join, are_stored ? "results" : "runs", study.study_id, condition),
+          ranges.size() > 1};
 }
 
-/// Whether the requested order is that of rising points.
-bool is_in_point_order(const protocol::StudyQuery& question) {
-  const std::string selected = selected_by(question);
-  const auto selected_tokens = sql_tokens(selected);
-  // A window function sorts the rows, and ORDER BY prefers an alias `point` to the column.
-  if (std::ranges::any_of(selected_tokens,
-                          [](const auto& each) { return is_word(each, "over"); }) ||
-      std::ranges::any_of(aliases_in(selected),
-                          [](const auto& alias) { return same_but_case(alias, "point"); })) {
-    return false;
+/// The statement of the first of the parts of a query.
+std::string statement_of(std::span<const Part> parts, const std::string& rows) {
+  std::string sql = fmt::format("{} {} FROM {}", parts[0].keyword, parts[0].sql, rows);
+  for (const Part& part : parts.subspan(1)) {
+    sql += part.sql.empty() ? std::string() : fmt::format(" {} {}", part.keyword, part.sql);
   }
-  const auto tokens = sql_tokens(question.order());
-  return question.group().empty() &&
-         (tokens.empty() ||
-          (tokens[0].text == "point" &&
-           (tokens.size() == 1 || (tokens.size() == 2 && is_word(tokens[1], "asc")))));
+  return sql;
 }
 
-std::string statement_of(sqlite3* database, const protocol::StudyQuery& question,
-                         const QueriedStudy& study, const Names& columns,
-                         const std::vector<PointRange>& ranges) {
-  const std::string selected = columns_in_sqlite(selected_by(question), columns);
-  const std::string where =
-      question.where().empty() ? "" : fmt::format(" WHERE ({})", in_sqlite(question.where()));
-  const std::string group = in_sqlite(question.group());
-  const std::string order = !question.order().empty() ? in_sqlite(question.order())
-                            : group.empty()           ? "point"
-                                                      : group;
-  // The study is chosen in the subquery, where no condition can reach another one.
-  std::string statement =
-      fmt::format("SELECT {} FROM {}{}", selected,
-                  rows_of(database, question, study, ranges,
-                          fmt::format("{} {} {} {}", selected, where, group, order), columns),
-                  where);
-  statement += group.empty() ? "" : fmt::format(" GROUP BY {}", group);
-  // SQLite reads the ranges of a cross join one after another, and the rows of each by their key.
-  const bool is_sorted = ranges.size() > 1 && is_in_point_order(question);
-  statement += is_sorted ? "" : fmt::format(" ORDER BY {}", order);
-  if (question.has_limit()) {
-    statement += fmt::format(" LIMIT {}", std::min<std::uint64_t>(question.limit(), INT64_MAX));
-  }
-  return statement;
-}
-
-/// The unit of a column, of an element, or of a function of one of these that keeps the unit. Empty
-/// for a pure number, a text, and other expressions.
-std::string unit_of(Tokens tokens) {
-  if (tokens.size() == 1 && tokens[0].is_name()) {
-    return unit_of_column(name_of(tokens[0]));
-  }
-  if (const auto element = element_at(tokens); element.tokens > 0) {
-    const bool is_all = element.tokens == tokens.size();
-    return is_all && element.unit.find(',') == std::string::npos ? element.unit : "";
-  }
-  const bool is_call = tokens.size() > 3 && tokens[0].kind == SqlToken::Kind::kName &&
-                       tokens[1].is_sign('(') && closing_bracket(tokens, 1) == tokens.size() - 1;
-  const SqlFunction* const function = is_call ? find_sql_function(tokens[0].text) : nullptr;
-  return function != nullptr && function->keeps_unit
-             ? unit_of(sql_items(tokens.subspan(2, tokens.size() - 3)).front().tokens)
-             : "";
-}
-
-std::vector<PlannedColumn> with_units(Names names, const std::string& selected) {
-  const auto tokens = sql_tokens(selected);
-  const auto items = sql_items(tokens);
-  std::vector<PlannedColumn> columns;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const std::string unit =
-        items.size() == names.size() ? unit_of(items[i].tokens) : unit_of_column(names[i]);
-    columns.push_back({std::move(names[i]), unit});
-  }
-  return columns;
-}
-
-/// The part of `message` after `begin`; empty if `message` does not contain it.
-std::string behind(const std::string& message, std::string_view begin) {
-  const auto at = message.find(begin);
-  return at == std::string::npos ? "" : message.substr(at + begin.size());
-}
-
-/// The column that SQLite did not find; empty for other messages.
-std::string missing_column(const std::string& message) {
-  const std::string wrong = behind(message, "no such column: ");
-  // SQLite 3.42 and later may quote the name and add a remark.
-  const auto remark = wrong.find("\" - should this");
-  return remark == std::string::npos ? wrong : wrong.substr(1, remark - 1);
-}
-
-/// A hint about a name that SQLite did not find; empty for other messages.
+/// A hint about a column or function that SQLite did not find; empty for other messages.
 std::string name_hint(const std::string& message) {
-  const std::string function = behind(message, "no such function: ");
-  const std::string wrong = function.empty() ? missing_column(message) : function;
-  if (wrong.empty()) {
+  const auto colon = message.rfind(": ");
+  if (!message.starts_with("no such ") || colon == std::string::npos) {
     return {};
   }
-  if (same_but_case(function, "regexp") || same_but_case(function, "match")) {
-    return "; patterns are those of GLOB, as mode GLOB 'SC*', and of LIKE, as mode LIKE '%sR%'";
-  }
-  const auto columns = columns_and_functions();
   std::vector<std::string_view> names;  // without brackets
+  const auto columns = columns_and_functions();
   for (const Column& column : columns) {
-    const std::string_view name = column.name;
-    names.push_back(function.empty() || column.kind == "function" ? name.substr(0, name.find('('))
-                                                                  : std::string_view());
+    names.push_back(std::string_view(column.name).substr(0, column.name.find('(')));
   }
-  std::string meant;
-  if (const auto nearest = protocol::nearest(wrong, names); !nearest.empty()) {
-    const auto index = std::find(names.begin(), names.end(), nearest) - names.begin();
-    meant = fmt::format(" (did you mean `{}`?)", columns[static_cast<std::size_t>(index)].name);
-  }
-  return meant + "; `oblique columns` lists all";
+  return protocol::did_you_mean(message.substr(colon + 2), names) +
+         "; `oblique columns` lists columns and functions, and a text stands in single quotes";
 }
 
-/// Throws solver::InputError, which names the flag, for a text that is not valid SQL by itself.
-/// SQLite's message about the whole statement would quote text that the user did not write.
-void check_syntax(sqlite3* database, const protocol::StudyQuery& question) {
-  const struct {
-    const char* flag;
-    const char* before;
-    std::string text;
-  } parts[] = {{"--select", "SELECT ", selected_by(question)},
-               {"--where", "SELECT 1 WHERE ", question.where()},
-               {"--group", "SELECT 1 GROUP BY ", question.group()},
-               {"--order", "SELECT 1 ORDER BY ", question.order()}};
-  for (const auto& [flag, before, text] : parts) {
+/// Throws InputError for a statement that SQLite refuses. Names the flag of the first part without
+/// which SQLite takes it: a message about the whole statement may quote what the user did not
+/// write.
+[[noreturn]] void refuse(sqlite3* database, const Parts& parts, const std::string& rows) {
+  for (std::size_t count = 1; count <= parts.size(); ++count) {
+    const Part& last = parts[count - 1];
     try {
-      if (!text.empty()) {
-        (void)columns_of(database, before + with_elements(text));
-      }
-    } catch (const solver::InputError& error) {
-      const std::string_view message = error.what();
-      const bool is_cut = message.find("incomplete input") != std::string_view::npos;
-      if (is_cut || message.find("syntax error") != std::string_view::npos) {
-        throw solver::InputError(fmt::format(
-            "{} \"{}\" is not allowed: {}", flag, text,
-            is_cut ? "something must follow its end" : message.substr(message.find(": ") + 2)));
-      }
+      (void)prepare_query(database, statement_of(std::span(parts).first(count), rows));
+    } catch (const StatementError& error) {
+      throw InputError(
+          not_allowed(last.flag, last.written, error.what() + name_hint(error.what())));
     }
   }
+  throw InputError("the query is too long");
 }
 
-/// Sets the default columns of a query that selects none.
-void select_usual(protocol::StudyQuery& question, const protocol::Recipe& recipe) {
-  if (question.select().empty() && !question.group().empty()) {
-    question.add_select(question.group());
-    question.add_select("count(*)");
-  } else if (question.select().empty()) {
-    for (const std::string& column : usual_columns(recipe)) {
-      question.add_select(column);
+/// The parts of `question`, with default columns if it selects none. Throws InputError, which names
+/// the flag.
+Parts parts_of(const protocol::StudyQuery& question, const protocol::Recipe& recipe) {
+  std::string select = fmt::format("{}", fmt::join(question.select(), ", "));
+  if (select.empty()) {
+    select = question.group().empty() ? fmt::format("{}", fmt::join(usual_columns(recipe), ", "))
+                                      : question.group() + ", count(*)";
+  }
+  Parts parts{{{"--select", "SELECT", std::move(select)},
+               {"--where", "WHERE", question.where()},
+               {"--group", "GROUP BY", question.group()},
+               {"--order", "ORDER BY", question.order()}}};
+  for (const Part& part : parts) {
+    if (!part.written.empty()) {
+      check_sql_part(part.flag, part.written);
     }
   }
+  return parts;
 }
 
 }  // namespace
 
-std::string quotes_hint(const std::string& message, std::string_view sql) {
-  const std::string wrong = missing_column(message);
-  return wrong.empty() || sql.find(sql_name(wrong)) == std::string_view::npos
-             ? ""
-             : "; in double quotes stands the name of a column, in single quotes a text";
+std::string no_such_study(sqlite3* database, const std::string& name) {
+  constexpr std::size_t kMostCompared = 10'000;
+  Statement list(database, "SELECT name FROM studies");
+  std::vector<std::string> names;
+  while (names.size() < kMostCompared && list.step()) {
+    names.push_back(list.text(0));
+  }
+  return fmt::format(
+      "there is no study called \"{}\"{}", name,
+      protocol::did_you_mean(name, std::vector<std::string_view>(names.begin(), names.end())));
 }
 
-Plan plan(sqlite3* database, protocol::StudyQuery question) {
-  check_parts(question);
+Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   const QueriedStudy study = find_study(database, question.study());
-  select_usual(question, study.recipe);
-  const Names columns = columns_of_rows(database);
-  check_columns(question, columns);
-  auto ranges = point_ranges(study.recipe, question.where());
-  if (ranges.size() > 1 && wants_only_failed(question.where())) {
-    ranges = hull(ranges);  // the index of failed points selects fewer rows
+  Parts parts = parts_of(question, study.recipe);
+  auto& [select, where, group, order] = parts;
+  check_grouped(select, group);
+  Names names;
+  for (Part* part : {&where, &group, &order}) {
+    const auto tokens = sql_tokens(part->written);
+    part->sql = in_sqlite(tokens, names);
   }
-  Plan plan{statement_of(database, question, study, columns, ranges), {}};
-  if (plan.statement.size() > kLongestSql && ranges.size() > 1) {
-    plan.statement = statement_of(database, question, study, columns, hull(ranges));
+  const auto tokens = sql_tokens(select.written);
+  const bool is_distinct = tokens.size() > 1 && is_word(tokens[0], "distinct");
+  auto [columns, columns_sql] =
+      selected_columns(SqlTokens(tokens).subspan(is_distinct ? 1 : 0), names);
+  select.sql = fmt::format("{}{}", is_distinct ? "DISTINCT " : "", fmt::join(columns_sql, ", "));
+  if (names.contains("E")) {
+    throw InputError("E is no column, and SQL would take it for e: write e, or E_Pa");
+  }
+  const Rows rows = rows_of(study, where.written, names);
+  if (order.sql.empty() && (!group.sql.empty() || !rows.are_sorted || has_window(tokens))) {
+    order.sql = group.sql.empty() ? "picked.point" : group.sql;
+  }
+  Plan plan{statement_of(parts, rows.sql), {nullptr, nullptr}, std::move(columns)};
+  if (question.has_limit()) {
+    plan.sql += fmt::format(" LIMIT {}", std::min<std::uint64_t>(question.limit(), INT64_MAX));
   }
   try {
-    plan.columns = with_units(columns_of(database, plan.statement), selected_by(question));
-  } catch (const solver::InputError& error) {
-    check_syntax(database, question);
-    throw solver::InputError(error.what() + name_hint(error.what()) +
-                             quotes_hint(error.what(), plan.statement));
+    plan.statement = prepare_query(database, plan.sql);
+  } catch (const StatementError&) {
+    refuse(database, parts, rows.sql);
+  }
+  // SQLite names a column by its alias or else by its text, which may have been replaced.
+  for (std::size_t i = 0; i < plan.columns.size(); ++i) {
+    const char* name = sqlite3_column_name(plan.statement.get(), static_cast<int>(i));
+    if (name != nullptr && name != columns_sql[i]) {
+      plan.columns[i].name = name;
+    }
   }
   return plan;
 }

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
+#include "server/query/query_rules.h"
 
 namespace oblique::server {
 
@@ -13,23 +16,38 @@ namespace oblique::server {
 struct PlannedColumn {
   std::string name;
   std::string unit;  ///< SI; empty: a pure number, a text, or unknown
-
-  bool operator==(const PlannedColumn&) const = default;
 };
 
 /// The statement that answers a query about a study.
 struct Plan {
-  std::string statement;  ///< a SELECT
+  std::string sql;            ///< a SELECT
+  StatementHandle statement;  ///< the same, prepared
   std::vector<PlannedColumn> columns;
 };
 
-/// Plans the answer to `question`. `database` must have kNumberFunction. Throws solver::InputError
-/// for a wrong query, which names the flag or the column and what is allowed, and StorageError if
-/// the database cannot be read.
-Plan plan(sqlite3* database, protocol::StudyQuery question);
+/// Plans the answer to `question`. `database` must have passed restrict_to_reading. Throws
+/// solver::InputError for a wrong query, which names the flag or the column and what is allowed;
+/// StorageError or QueryError if the database cannot be read.
+Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
-/// A hint to append to SQLite's message about `sql` if an unknown name is in double quotes, because
-/// a text in single quotes may have been meant; else empty.
-std::string quotes_hint(const std::string& message, std::string_view sql);
+/// The error for a study that does not exist, with the nearest name.
+std::string no_such_study(sqlite3* database, const std::string& name);
+
+/// Consecutive points, both ends included.
+struct PointRange {
+  std::uint64_t first;
+  std::uint64_t last;
+
+  bool operator==(const PointRange&) const = default;
+};
+
+/// Ranges in rising order, disjoint, that contain every point of `recipe` that meets `condition`.
+/// They may contain other points. Only comparisons of an axis of a product block
+/// with numbers (=, <, <=, >, >=, BETWEEN) that AND joins are used. A range of an axis is one value
+/// wider at each end, because another machine may round a value differently. `condition` must have
+/// passed check_sql_part; empty: all points.
+std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
+
+std::uint64_t points_in(const std::vector<PointRange>& ranges);
 
 }  // namespace oblique::server

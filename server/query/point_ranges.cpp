@@ -1,33 +1,33 @@
-#include "server/query/point_ranges.h"
+#include "server/query/plan.h"
 
 #include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <map>
 #include <optional>
-#include <span>
 #include <string>
-#include <utility>
+#include <string_view>
 
 #include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "server/query/columns.h"
-#include "server/query/sql_functions.h"
 #include "server/query/sql_text.h"
 
 namespace oblique::server {
 namespace {
 
 using Ranges = std::vector<PointRange>;
-using Tokens = std::span<const SqlToken>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// More ranges are merged into one, because the statement would be long and slow to start.
 constexpr std::size_t kMostRanges = 20'000;
-/// Finding the first row of a range costs about as much as reading this many rows.
-constexpr std::uint64_t kRowsARange = 3;
 /// Conditions in more nested brackets than this are ignored.
 constexpr int kDeepest = 50;
+
+/// The range from the first point of `ranges`, which are not empty, to the last.
+Ranges hull(const Ranges& ranges) {
+  return {{ranges.front().first, ranges.back().last}};
+}
 
 struct Interval {
   double low = -kInfinity;
@@ -37,9 +37,9 @@ struct Interval {
 using Intervals = std::map<std::string, Interval, std::less<>>;
 
 /// The number in `tokens`, with or without a sign; none if they are not a plain number.
-std::optional<double> number_in(Tokens tokens) {
-  const bool is_negative = !tokens.empty() && tokens[0].is_sign('-');
-  if (is_negative || (!tokens.empty() && tokens[0].is_sign('+'))) {
+std::optional<double> number_in(SqlTokens tokens) {
+  const bool is_negative = !tokens.empty() && tokens[0].is_sign("-");
+  if (is_negative || (!tokens.empty() && tokens[0].is_sign("+"))) {
     tokens = tokens.subspan(1);
   }
   const bool is_literal = tokens.size() == 1 && tokens[0].kind == SqlToken::Kind::kLiteral;
@@ -47,122 +47,83 @@ std::optional<double> number_in(Tokens tokens) {
   return number && is_negative ? std::optional(-*number) : number;
 }
 
-/// A column and the interval to which a condition restricts it.
-using Restriction = std::optional<std::pair<std::string, Interval>>;
-
-Restriction restriction(Tokens column, std::optional<double> low, std::optional<double> high) {
-  const bool is_column = column.size() == 1 && column[0].kind == SqlToken::Kind::kName;
-  return is_column && low && high ? Restriction({std::string(column[0].text), {*low, *high}})
-                                  : std::nullopt;
+void restrict_column(Intervals& intervals, SqlTokens column, std::optional<double> low,
+                     std::optional<double> high) {
+  if (column.size() == 1 && column[0].kind == SqlToken::Kind::kName && low && high) {
+    Interval& known = intervals[std::string(column[0].text)];
+    known = {std::max(known.low, *low), std::min(known.high, *high)};
+  }
 }
 
-/// Reads `column < number`, `number < column` and so on; none for other tokens.
-Restriction comparison(Tokens tokens) {
-  const auto is_comparing = [](const SqlToken& token) {
-    return token.is_sign('<') || token.is_sign('=') || token.is_sign('>');
-  };
-  const auto sign = std::ranges::find_if(tokens, is_comparing);
-  const auto end = std::find_if_not(sign, tokens.end(), is_comparing);
-  std::string text;
-  std::for_each(sign, end, [&](const SqlToken& token) { text += token.text; });
-  Tokens column(tokens.begin(), sign);
-  auto number = number_in({end, tokens.end()});
-  if (const auto first = number_in(column)) {
-    column = {end, tokens.end()};
-    number = first;
-    std::ranges::transform(text, text.begin(), [](char c) {
-      return c == '<' ? '>' : c == '>' ? '<' : c;
-    });
-  }
-  if (text == "=" || text == "==") {
-    return restriction(column, number, number);
-  }
-  if (text == "<" || text == "<=") {
-    return restriction(column, -kInfinity, number);
-  }
-  return text == ">" || text == ">=" ? restriction(column, number, kInfinity) : std::nullopt;
-}
-
-/// Reads `column BETWEEN number AND number`; none for other tokens.
-Restriction between(Tokens tokens) {
-  const Tokens bounds = tokens.subspan(2);
-  const auto middle =
-      std::ranges::find_if(bounds, [](const SqlToken& token) { return is_word(token, "and"); });
-  return middle == bounds.end() ? std::nullopt
-                                : restriction(tokens.first(1), number_in({bounds.begin(), middle}),
-                                              number_in({middle + 1, bounds.end()}));
-}
-
-/// Adds to `all` the conditions that `tokens` join with AND. Adds none if it cannot separate them.
-void add_conjuncts(Tokens tokens, int depth, std::vector<Tokens>& all) {
-  if (depth > kDeepest || tokens.empty()) {
+/// Reads `column BETWEEN number AND number`, `column < number` and so on. Ignores other conditions.
+void add_condition(Intervals& intervals, SqlTokens tokens) {
+  if (tokens.size() > 2 && is_word(tokens[1], "between")) {
+    const auto middle =
+        std::ranges::find_if(tokens, [](const SqlToken& token) { return is_word(token, "and"); });
+    if (middle != tokens.end()) {
+      restrict_column(intervals, tokens.first(1), number_in({tokens.begin() + 2, middle}),
+                      number_in({middle + 1, tokens.end()}));
+    }
     return;
   }
-  if (tokens[0].is_sign('(') && closing_bracket(tokens, 0) == tokens.size() - 1) {
-    add_conjuncts(tokens.subspan(1, tokens.size() - 2), depth + 1, all);
+  const bool is_comparison = tokens.size() > 2 && tokens[1].kind == SqlToken::Kind::kSign;
+  const auto number = is_comparison ? number_in(tokens.subspan(2)) : std::nullopt;
+  if (!number) {
     return;
   }
-  std::vector<Tokens> parts;
+  const std::string_view sign = tokens[1].text;
+  if (sign == "=" || sign == "==") {
+    restrict_column(intervals, tokens.first(1), number, number);
+  } else if (sign == "<" || sign == "<=") {
+    restrict_column(intervals, tokens.first(1), -kInfinity, number);
+  } else if (sign == ">" || sign == ">=") {
+    restrict_column(intervals, tokens.first(1), number, kInfinity);
+  }
+}
+
+/// Adds the conditions that `tokens` join with AND. Adds none if it cannot separate them.
+void add_conjuncts(SqlTokens tokens, int depth, Intervals& intervals) {
+  const bool is_in_brackets =
+      !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;
+  if (is_in_brackets && depth < kDeepest) {
+    add_conjuncts(tokens.subspan(1, tokens.size() - 2), depth + 1, intervals);
+    return;
+  }
+  std::vector<SqlTokens> parts;
   std::size_t begin = 0;
   std::size_t open_betweens = 0;
-  for (std::size_t i = 0; i <= tokens.size(); ++i) {
-    if (i == tokens.size() || (is_word(tokens[i], "and") && open_betweens == 0)) {
-      parts.push_back(tokens.subspan(begin, i - begin));
-      begin = i + 1;
-    } else if (is_word(tokens[i], "or") || is_word(tokens[i], "case")) {
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    if (is_word(tokens[i], "or") || is_word(tokens[i], "case")) {
       return;  // not a conjunction
-    } else if (tokens[i].is_sign('(')) {
+    }
+    if (tokens[i].is_sign("(")) {
       i = std::min(closing_bracket(tokens, i), tokens.size() - 1);
     } else if (is_word(tokens[i], "between")) {
       ++open_betweens;
-    } else if (is_word(tokens[i], "and")) {
+    } else if (is_word(tokens[i], "and") && open_betweens > 0) {
       --open_betweens;
+    } else if (is_word(tokens[i], "and")) {
+      parts.push_back(tokens.subspan(begin, i - begin));
+      begin = i + 1;
     }
   }
-  for (const Tokens part : parts) {
-    if (parts.size() > 1 && !part.empty() && part[0].is_sign('(')) {
-      add_conjuncts(part, depth + 1, all);
-    } else {
-      all.push_back(part);
-    }
+  if (parts.empty()) {
+    add_condition(intervals, tokens);
+    return;
   }
-}
-
-std::vector<Tokens> conjuncts_of(Tokens tokens) {
-  std::vector<Tokens> all;
-  add_conjuncts(tokens, 0, all);
-  return all;
-}
-
-/// The intervals to which a condition restricts columns.
-Intervals intervals_of(std::string_view condition) {
-  const auto tokens = sql_tokens(condition);
-  Intervals intervals;
-  for (const Tokens part : conjuncts_of(tokens)) {
-    const auto found =
-        part.size() > 2 && is_word(part[1], "between") ? between(part) : comparison(part);
-    if (found) {
-      Interval& known = intervals[found->first];
-      known = {std::max(known.low, found->second.low), std::min(known.high, found->second.high)};
-    }
+  parts.push_back(tokens.subspan(begin));
+  for (const SqlTokens part : parts) {
+    add_conjuncts(part, depth, intervals);
   }
-  return intervals;
 }
 
 /// The interval to which an axis is restricted; nullptr: none, or the column depends on other axes.
-const Interval* interval_of(const protocol::Block& block, const protocol::Axis& axis,
-                            const Intervals& intervals) {
-  // The column `length` is the length of every link, which axes of single lengths change too.
-  const bool is_of_many =
-      axis.key() == "length" &&
-      std::any_of(block.axes().begin(), block.axes().end(), [](const auto& other) {
-        return other.key() != "length" && other.key().starts_with("length");
-      });
+const Interval* interval_of(const protocol::Axis& axis, const Intervals& intervals) {
   const auto found = intervals.find(column_of_key(axis.key()));
-  return found == intervals.end() || is_of_many || axis.key() == "integrator" ||
-                 !protocol::has_own_values(axis)
-             ? nullptr
-             : &found->second;
+  // `length` is changed by axes of single lengths too, and `integrator` is a text.
+  const bool is_own = protocol::has_own_values(axis) && !axis.key().starts_with("length") &&
+                      axis.key() != "integrator";
+  return found == intervals.end() || !is_own ? nullptr : &found->second;
 }
 
 /// Numbers of the first and the last value of an axis in `interval`; for a range of values one more
@@ -200,7 +161,7 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   for (int a = block.axes_size(); a-- > 0;) {
     const protocol::Axis& axis = block.axes(a);
     const std::uint64_t size = protocol::axis_size(axis);
-    const Interval* const interval = interval_of(block, axis, intervals);
+    const Interval* const interval = interval_of(axis, intervals);
     const auto numbers =
         interval == nullptr ? PointRange{0, size - 1} : numbers_in(axis, *interval);
     if (!numbers) {
@@ -224,36 +185,12 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   return ranges;
 }
 
-/// The part of `ranges` whose numbers lie in `interval`.
-Ranges clipped(const Ranges& ranges, const Interval& interval) {
-  Ranges left;
-  for (const PointRange& range : ranges) {
-    const double first = std::max(static_cast<double>(range.first), interval.low);
-    const double last = std::min(static_cast<double>(range.last), interval.high);
-    if (first <= last) {
-      left.push_back({static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(last)});
-    }
-  }
-  return left;
-}
-
 }  // namespace
 
-std::vector<PointRange> hull(const std::vector<PointRange>& ranges) {
-  return {{ranges.front().first, ranges.back().last}};
-}
-
-bool wants_only_failed(std::string_view condition) {
-  const auto tokens = sql_tokens(condition);
-  const auto parts = conjuncts_of(tokens);
-  return std::ranges::any_of(parts, [](Tokens part) {
-    return part.size() == 4 && is_word(part[0], "error") && is_word(part[1], "is") &&
-           is_word(part[2], "not") && is_word(part[3], "null");
-  });
-}
-
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition) {
-  const Intervals intervals = intervals_of(condition);
+  const auto tokens = sql_tokens(condition);
+  Intervals intervals;
+  add_conjuncts(tokens, 0, intervals);
   Ranges ranges;
   std::uint64_t points = 0;
   for (const protocol::Block& block : recipe.blocks()) {
@@ -269,24 +206,7 @@ std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string
     }
     points += protocol::points_of_block(block);
   }
-  if (const auto numbers = intervals.find("point"); numbers != intervals.end()) {
-    ranges = clipped(ranges, numbers->second);
-  }
-  const bool are_worth_it = points_in(ranges) + kRowsARange * ranges.size() <= points - points / 10;
-  return ranges.size() > 1 && !are_worth_it ? hull(ranges) : ranges;
-}
-
-std::uint64_t points_of(const protocol::Recipe& recipe) {
-  std::uint64_t points = 0;
-  for (const protocol::Block& block : recipe.blocks()) {
-    // An axis without values is not valid, and its points cannot be counted.
-    if (std::any_of(block.axes().begin(), block.axes().end(),
-                    [](const auto& axis) { return protocol::axis_size(axis) == 0; })) {
-      return 0;
-    }
-    points += protocol::points_of_block(block);
-  }
-  return points;
+  return ranges;
 }
 
 std::uint64_t points_in(const std::vector<PointRange>& ranges) {

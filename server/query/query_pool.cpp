@@ -1,11 +1,24 @@
 #include "server/query/query_pool.h"
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <iterator>
+#include <system_error>
 #include <utility>
+#include <vector>
 
+#include <fcntl.h>
 #include <poll.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "proto/frames.h"
+#include "proto/system/descriptor.h"
+#include "proto/system/spawn_plan.h"
 #include "server/query/query_rules.h"
 #include "server/query/reader_program.h"
 
@@ -18,62 +31,112 @@ constexpr std::int64_t kLongestWait_ms = 60'000;
 /// Number of chunks that marks a cancelled query.
 constexpr std::uint64_t kCancelled = UINT64_MAX;
 
-std::size_t bytes_of(const QueryJob& job) {
-  return job.request.ByteSizeLong();
-}
-
 }  // namespace
 
 bool QueryQueue::add(QueryJob job) {
-  std::size_t waiting = 0;
-  std::size_t bytes = bytes_of(job);
-  for (const Client& client : clients_) {
-    waiting += client.waiting.size();
-    for (const QueryJob& other : client.waiting) {
-      bytes += bytes_of(other);
-    }
+  const auto of_client = std::ranges::count(waiting_, job.client, &QueryJob::client);
+  std::size_t bytes = job.request.ByteSizeLong();
+  for (const QueryJob& other : waiting_) {
+    bytes += other.request.ByteSizeLong();
   }
-  if (waiting >= settings_.most_waiting || bytes > settings_.most_waiting_bytes) {
+  if (waiting_.size() >= settings_.most_waiting || bytes > settings_.most_waiting_bytes ||
+      static_cast<std::size_t>(of_client) >= settings_.most_waiting_each) {
     return false;
   }
-  auto client = std::find_if(clients_.begin(), clients_.end(),
-                             [&](const Client& each) { return each.name == job.client; });
-  if (client == clients_.end()) {
-    client = clients_.insert(clients_.end(), Client{job.client});
-  } else if (client->waiting.size() >= settings_.most_waiting_each) {
-    return false;
-  }
-  client->waiting.push_back(std::move(job));
+  waiting_.push_back(std::move(job));
   return true;
 }
 
 std::optional<QueryJob> QueryQueue::start_next() {
-  std::size_t running = 0;
-  for (const Client& client : clients_) {
-    running += client.running.size();
-  }
-  const auto next = std::find_if(clients_.begin(), clients_.end(), [this](const Client& client) {
-    return !client.waiting.empty() && client.running.size() < settings_.most_running_each;
+  const auto next = std::ranges::find_if(waiting_, [this](const QueryJob& job) {
+    const auto running = std::ranges::count(running_, job.client, &Running::value_type::second);
+    return static_cast<std::size_t>(running) < settings_.most_running_each;
   });
-  if (running >= settings_.readers || next == clients_.end()) {
+  if (running_.size() >= settings_.readers || next == waiting_.end()) {
     return std::nullopt;
   }
-  QueryJob job = std::move(next->waiting.front());
-  next->waiting.pop_front();
-  next->running.insert(job.ticket);
-  clients_.splice(clients_.end(), clients_, next);
+  QueryJob job = std::move(*next);
+  waiting_.erase(next);
+  running_.emplace(job.ticket, job.client);
+  // The other clients come before the next query of this one.
+  std::ranges::stable_partition(waiting_,
+                                [&](const QueryJob& each) { return each.client != job.client; });
   return job;
 }
 
 void QueryQueue::remove(std::uint64_t ticket) {
-  for (Client& client : clients_) {
-    client.running.erase(ticket);
-    std::erase_if(client.waiting, [&](const QueryJob& job) { return job.ticket == ticket; });
-  }
-  std::erase_if(clients_, [](const Client& client) {
-    return client.waiting.empty() && client.running.empty();
-  });
+  running_.erase(ticket);
+  std::erase_if(waiting_, [&](const QueryJob& job) { return job.ticket == ticket; });
 }
+
+/// A query and the process that answers it, which is killed when this is destroyed and when the
+/// thread that created this ends.
+struct QueryPool::Running {
+  Running(const std::string& program, const std::string& path, const QueryJob& job)
+      : ticket(job.ticket), time_limit_ms(time_limit_of(job.request)) {
+    const protocol::Descriptor request(memfd_create("query", MFD_CLOEXEC));
+    check_call(request.is_open() && job.request.SerializeToFileDescriptor(request.number()) &&
+                   lseek(request.number(), 0, SEEK_SET) == 0,
+               "memfd_create");
+    std::array<int, 2> ends{};
+    check_call(pipe2(ends.data(), O_CLOEXEC) == 0, "pipe2");
+    answer = protocol::Descriptor(ends[0]);
+    const protocol::Descriptor theirs(ends[1]);
+    check_call(fcntl(answer.number(), F_SETFL, O_NONBLOCK) == 0, "fcntl");
+    protocol::SpawnPlan plan;
+    plan.give(theirs.number(), STDOUT_FILENO);
+    plan.give(request.number(), kReaderRequest);
+    plan.close_from(kReaderRequest + 1);
+    pid = plan.start(program, {"oblique-reader", kReadMode, path}, environ);
+  }
+  ~Running() {
+    kill();
+    while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+  void kill() const { ::kill(pid, SIGKILL); }
+  bool waits_for_client() const { return given >= taken + kChunksAhead; }
+
+  struct Frame {
+    std::string reply;
+    bool is_last;
+  };
+  /// The next frame, if it is complete. The process blocks while its frames are not read.
+  std::optional<Frame> next_frame() {
+    constexpr std::size_t kReadBytes = 64 * 1024;
+    std::array<char, kReadBytes> bytes;
+    while (true) {
+      FrameHead head{};
+      std::memcpy(&head, received.data(), std::min(received.size(), sizeof head));
+      if (received.size() >= sizeof head + head.length) {
+        Frame frame{received.substr(sizeof head, head.length), head.is_last != 0};
+        received.erase(0, sizeof head + head.length);
+        return frame;
+      }
+      const ssize_t got = ::read(answer.number(), bytes.data(), bytes.size());
+      is_broken = got == 0 || head.length > protocol::kMaxFrameBytes ||
+                  (got < 0 && errno != EAGAIN && errno != EINTR);
+      if (got <= 0 || is_broken) {
+        return std::nullopt;
+      }
+      received.append(bytes.data(), static_cast<std::size_t>(got));
+    }
+  }
+
+  std::uint64_t ticket;
+  std::int64_t time_limit_ms;
+  std::int64_t deadline_ms = 0;     ///< for the next chunk, or for the client to take one
+  std::int64_t answer_ends_ms = 0;  ///< deadline of the whole answer
+  std::uint64_t given = 0;          ///< chunks reported
+  std::uint64_t taken = 0;          ///< chunks taken by the client
+  pid_t pid = -1;
+  protocol::Descriptor answer;
+  std::string received;    ///< bytes of frames that were not returned yet
+  bool is_broken = false;  ///< the process has ended or sent a frame that is too long
+};
 
 QueryPool::QueryPool(std::string database, QueryPoolSettings settings, Report report)
     : database_(std::move(database)),
@@ -118,38 +181,25 @@ void QueryPool::stop() {
 }
 
 void QueryPool::run() {
-  while (true) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (stopping_) {
-        break;
-      }
-    }
+  const auto is_stopping = [this] {
+    const std::lock_guard lock(mutex_);
+    return stopping_;
+  };
+  while (!is_stopping()) {
     try {
-      turn();
+      take_requests();
+      std::erase_if(running_, [this](Running& query) { return !goes_on(query); });
+      while (start_next()) {
+      }
+      wait();
     } catch (const std::exception&) {
       // For example std::bad_alloc. The next turn continues.
       std::this_thread::sleep_for(kRetryPause);
     }
   }
   // Kills all processes before it waits for the first one.
-  for (Slot& slot : slots_) {
-    if (slot.process != nullptr) {
-      slot.process->kill();
-    }
-  }
-  slots_.clear();
-}
-
-void QueryPool::turn() {
-  take_requests();
-  for (Slot& slot : slots_) {
-    read(slot);
-    check_deadline(slot);
-  }
-  std::erase_if(slots_, [](const Slot& slot) { return slot.process == nullptr; });
-  start_queries();
-  wait();
+  std::ranges::for_each(running_, &Running::kill);
+  running_.clear();
 }
 
 /// Waits for input from a process, a call from another thread, or a deadline.
@@ -157,13 +207,11 @@ void QueryPool::wait() {
   std::vector<pollfd> items{{woken_.descriptor(), POLLIN, 0}};
   const std::int64_t now_ms = settings_.now_ms();
   std::int64_t until_ms = now_ms + kLongestWait_ms;
-  for (const Slot& slot : slots_) {
-    if (!slot.waits_for_client()) {
-      items.push_back({slot.process->descriptor(), slot.process->events(), 0});
+  for (const Running& query : running_) {
+    if (!query.waits_for_client()) {
+      items.push_back({query.answer.number(), POLLIN, 0});
     }
-    if (slot.ticket != 0) {
-      until_ms = std::min({until_ms, slot.deadline_ms, slot.answer_ends_ms});
-    }
+    until_ms = std::min({until_ms, query.deadline_ms, query.answer_ends_ms});
   }
   const std::int64_t left_ms = std::max<std::int64_t>(until_ms - now_ms, 0);
   (void)::poll(items.data(), items.size(), static_cast<int>(left_ms));
@@ -177,123 +225,91 @@ void QueryPool::take_requests() {
     taken = std::exchange(taken_, {});
   }
   for (const auto& request : taken) {
-    const std::uint64_t ticket = request.first;
-    const std::uint64_t chunks = request.second;
-    Slot* const slot = slot_of(ticket);
-    if (chunks == kCancelled) {
-      forget(ticket);
-      std::erase_if(slots_, [&](const Slot& each) { return each.ticket == ticket; });
-    } else if (slot != nullptr && chunks > slot->taken) {
-      const bool waited = slot->waits_for_client();
-      slot->taken = chunks;
-      if (waited) {
-        slot->deadline_ms = settings_.now_ms() + slot->time_limit_ms;
-      }
+    const auto query = std::ranges::find(running_, request.first, &Running::ticket);
+    if (request.second == kCancelled) {
+      forget(request.first);
+      running_.erase(query, query == running_.end() ? query : std::next(query));
+    } else if (query != running_.end() && request.second > query->taken) {
+      const bool waited = query->waits_for_client();
+      query->taken = request.second;
+      query->deadline_ms = waited ? settings_.now_ms() + query->time_limit_ms : query->deadline_ms;
     }
   }
 }
 
-void QueryPool::start_queries() {
-  while (true) {
-    std::optional<QueryJob> job;
-    {
-      const std::lock_guard lock(mutex_);
-      job = queue_.start_next();
-    }
-    if (!job) {
-      return;
-    }
-    start(*job);
+/// Starts the next query that may run. False: there is none.
+bool QueryPool::start_next() {
+  std::optional<QueryJob> job;
+  {
+    const std::lock_guard lock(mutex_);
+    job = queue_.start_next();
   }
-}
-
-void QueryPool::start(const QueryJob& job) {
+  if (!job) {
+    return false;
+  }
   try {
-    Slot& slot = idle_slot();
-    slot.process->ask(protocol::encode(job.request));
-    slot.ticket = job.ticket;
-    slot.time_limit_ms = time_limit_of(job.request);
-    slot.deadline_ms = settings_.now_ms() + slot.time_limit_ms;
-    slot.answer_ends_ms = settings_.now_ms() + settings_.longest_answer_ms;
-    slot.given = 0;
-    slot.taken = 0;
-    report_({QueryReport::Kind::kBegun, job.ticket, {}});
+    Running& query = running_.emplace_back(settings_.reader_program, database_, *job);
+    query.deadline_ms = settings_.now_ms() + query.time_limit_ms;
+    query.answer_ends_ms = settings_.now_ms() + settings_.longest_answer_ms;
+    report_({QueryReport::Kind::kBegun, job->ticket, {}});
   } catch (const std::exception& error) {
-    forget(job.ticket);
-    std::erase_if(slots_, [&](const Slot& slot) { return slot.ticket == job.ticket; });
-    report_(
-        {QueryReport::Kind::kAnswered, job.ticket,
-         encoded_error(std::string("no process can be started for the query: ") + error.what())});
+    std::erase_if(running_, [&](const Running& query) { return query.ticket == job->ticket; });
+    end(job->ticket,
+        encoded_error(std::string("no process can be started for the query: ") + error.what()));
   }
+  return true;
 }
 
-QueryPool::Slot& QueryPool::idle_slot() {
-  if (Slot* idle = slot_of(0); idle != nullptr) {
-    return *idle;
-  }
-  slots_.push_back({std::make_unique<ReaderProcess>(settings_.reader_program, database_)});
-  return slots_.back();
-}
-
-/// Reports the received frames, up to kChunksAhead more than the client has taken.
-void QueryPool::read(Slot& slot) {
-  while (slot.process != nullptr && !slot.waits_for_client()) {
-    auto frame = slot.process->read();
-    if (!frame && slot.process->is_broken()) {
-      fail(slot, "the process that ran the query " + slot.process->end() +
-                     ": it may have needed more memory than there is");
-      return;
+/// Reports the received frames, up to kChunksAhead more than the client has taken. False when the
+/// query has ended.
+bool QueryPool::goes_on(Running& query) {
+  while (!query.waits_for_client()) {
+    auto frame = query.next_frame();
+    if (query.is_broken) {
+      end(query.ticket,
+          encoded_error("the process that ran the query has ended: it may have needed more memory "
+                        "than there is"));
+      return false;
     }
     if (!frame) {
-      return;
+      break;
     }
     if (frame->is_last) {
-      finish(slot, std::move(frame->reply));
-      continue;
+      end(query.ticket, std::move(frame->reply));
+      return false;
     }
-    ++slot.given;
-    slot.deadline_ms =
-        settings_.now_ms() + (slot.waits_for_client() ? settings_.patience_ms : slot.time_limit_ms);
-    report_({QueryReport::Kind::kRows, slot.ticket, std::move(frame->reply)});
+    ++query.given;
+    query.deadline_ms = settings_.now_ms() +
+                        (query.waits_for_client() ? settings_.patience_ms : query.time_limit_ms);
+    report_({QueryReport::Kind::kRows, query.ticket, std::move(frame->reply)});
   }
+  const std::string error = missed_deadline(query);
+  if (!error.empty()) {
+    end(query.ticket, encoded_error(error));
+  }
+  return error.empty();
 }
 
-void QueryPool::check_deadline(Slot& slot) {
-  if (slot.process == nullptr || slot.ticket == 0) {
-    return;
-  }
+/// Which deadline has passed; empty: none.
+std::string QueryPool::missed_deadline(const Running& query) const {
   const std::int64_t now_ms = settings_.now_ms();
-  if (now_ms >= slot.deadline_ms && slot.waits_for_client()) {
-    fail(slot, "the answer was ended in the middle: its client took no rows for " +
-                   std::to_string(settings_.patience_ms / 1000) + " s. Write it to a file first");
-  } else if (now_ms >= slot.deadline_ms) {
-    fail(slot, took_too_long(slot.time_limit_ms));
-  } else if (now_ms >= slot.answer_ends_ms) {
-    fail(slot, "the answer took more than " + std::to_string(settings_.longest_answer_ms / 1000) +
-                   " s in all: narrow it, as with WHERE or LIMIT, or read the file with --db");
+  if (now_ms >= query.answer_ends_ms) {
+    return "the answer took more than " + std::to_string(settings_.longest_answer_ms / 1000) +
+           " s in all: narrow it, as with WHERE or LIMIT, or read the file with --db";
   }
+  if (now_ms < query.deadline_ms) {
+    return {};
+  }
+  return query.waits_for_client()
+             ? "the answer was ended in the middle: its client took no rows for " +
+                   std::to_string(settings_.patience_ms / 1000) + " s. Write it to a file first"
+             : took_too_long(query.time_limit_ms);
 }
 
-/// Reports the last part of an answer and frees the process for another query.
-void QueryPool::finish(Slot& slot, std::string reply) {
-  const std::uint64_t ticket = std::exchange(slot.ticket, 0);
+/// Reports the last part of an answer.
+void QueryPool::end(std::uint64_t ticket, std::string reply) {
   forget(ticket);
   report_({QueryReport::Kind::kAnswered, ticket, std::move(reply)});
-}
-
-/// Answers the query of the slot, if any, with an error, and ends the process.
-void QueryPool::fail(Slot& slot, const std::string& message) {
-  if (slot.ticket != 0) {
-    finish(slot, encoded_error(message));
-  }
-  slot.process.reset();
-}
-
-/// The slot that runs the query with that ticket, or for ticket 0 an idle one; nullptr: none.
-QueryPool::Slot* QueryPool::slot_of(std::uint64_t ticket) {
-  const auto found = std::find_if(slots_.begin(), slots_.end(),
-                                  [&](const Slot& slot) { return slot.ticket == ticket; });
-  return found == slots_.end() ? nullptr : &*found;
 }
 
 void QueryPool::forget(std::uint64_t ticket) {

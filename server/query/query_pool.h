@@ -7,17 +7,13 @@
 #include <functional>
 #include <list>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "proto/oblique.pb.h"
 #include "proto/system/wake_up.h"
-#include "server/query/reader_process.h"
 
 namespace oblique::server {
 
@@ -37,7 +33,6 @@ struct QueueSettings {
 };
 
 /// Decides which query runs next: round-robin over clients, in order of arrival within one.
-/// Has no thread and no clock.
 class QueryQueue {
  public:
   explicit QueryQueue(QueueSettings settings) : settings_(settings) {}
@@ -50,23 +45,17 @@ class QueryQueue {
   void remove(std::uint64_t ticket);
 
  private:
-  struct Client {
-    std::string name;
-    std::deque<QueryJob> waiting{};
-    std::set<std::uint64_t> running{};  // tickets
-  };
+  using Running = std::map<std::uint64_t, std::string>;
 
   QueueSettings settings_;
-  std::list<Client> clients_;  // clients that have queries; the front one is next
+  std::deque<QueryJob> waiting_;  // the jobs of the next client come first
+  Running running_;               // clients, by ticket
 };
 
-/// Progress of a query.
+/// Progress of a query: it has begun to run, `reply` is a chunk of the answer, or `reply` is the
+/// last chunk or an error.
 struct QueryReport {
-  enum class Kind {
-    kBegun,     ///< it has begun to run
-    kRows,      ///< `reply` is a chunk of the answer, not the last
-    kAnswered,  ///< `reply` is the last chunk, or an error
-  };
+  enum class Kind { kBegun, kRows, kAnswered };
   Kind kind;
   std::uint64_t ticket;
   std::string reply;  ///< an encoded ClientReply without request_id
@@ -81,27 +70,22 @@ struct QueryPoolSettings {
   /// Longest time of a whole answer, including the time in which it waits for its client.
   std::int64_t longest_answer_ms = 1'800'000;
   std::function<std::int64_t()> now_ms = [] {
-    using std::chrono::steady_clock;
-    return std::chrono::duration_cast<std::chrono::milliseconds>(
-               steady_clock::now().time_since_epoch())
-        .count();
+    return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
   };
 };
 
 /// Most chunks that are sent to a client before it has taken the first of them.
 inline constexpr std::uint64_t kChunksAhead = 4;
 
-/// Runs queries in reader processes, which are started when needed and kept for later queries. A
-/// process has a memory limit and can be stopped at any time, whatever its statement does. One
-/// thread serves all processes.
+/// Runs each query in a reader process of its own, which has a memory limit and can be stopped at
+/// any time, whatever its statement does. One thread serves all processes.
 class QueryPool {
  public:
   using Report = std::function<void(QueryReport)>;
 
-  /// `report` is called on the pool's thread. No process is started before the first query.
+  /// `report` is called on the pool's thread.
   QueryPool(std::string database, QueryPoolSettings settings, Report report);
-  /// Calls `stop`.
-  ~QueryPool();
+  ~QueryPool();  ///< calls `stop`
   QueryPool(const QueryPool&) = delete;
   QueryPool& operator=(const QueryPool&) = delete;
 
@@ -115,31 +99,15 @@ class QueryPool {
   void stop();
 
  private:
-  /// A process with the query that it runs.
-  struct Slot {
-    std::unique_ptr<ReaderProcess> process;
-    std::uint64_t ticket = 0;  ///< 0: none
-    std::int64_t time_limit_ms = 0;
-    std::int64_t deadline_ms = 0;     ///< for the next chunk, or for the client to take one
-    std::int64_t answer_ends_ms = 0;  ///< deadline of the whole answer
-    std::uint64_t given = 0;          ///< chunks reported
-    std::uint64_t taken = 0;          ///< chunks taken by the client
-
-    bool waits_for_client() const { return ticket != 0 && given >= taken + kChunksAhead; }
-  };
+  struct Running;
 
   void run();
-  void turn();
   void wait();
   void take_requests();
-  void start_queries();
-  void start(const QueryJob& job);
-  void read(Slot& slot);
-  void check_deadline(Slot& slot);
-  void finish(Slot& slot, std::string reply);
-  void fail(Slot& slot, const std::string& message);
-  Slot* slot_of(std::uint64_t ticket);
-  Slot& idle_slot();
+  bool start_next();
+  bool goes_on(Running& query);
+  std::string missed_deadline(const Running& query) const;
+  void end(std::uint64_t ticket, std::string reply);
   void forget(std::uint64_t ticket);
 
   const std::string database_;
@@ -150,7 +118,7 @@ class QueryPool {
   QueryQueue queue_;                              // guarded by mutex_
   std::map<std::uint64_t, std::uint64_t> taken_;  // guarded by mutex_; chunks, by ticket
   bool stopping_ = false;                         // guarded by mutex_
-  std::vector<Slot> slots_;                       // used by the thread only
+  std::list<Running> running_;                    // used by the thread only
   std::thread thread_;                            // last: it uses the other members
 };
 

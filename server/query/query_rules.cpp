@@ -8,24 +8,18 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "server/database/sqlite.h"
-#include "server/query/plan.h"
-#include "server/query/sql_functions.h"
+#include "server/query/sql_text.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr const char* kOnlyReads = "this only reads";
 
-/// Pragmas that only return values, if they have no argument or name a table.
-bool is_harmless_pragma(std::string_view name, const char* argument) {
+/// Pragmas that only return values.
+bool is_harmless_pragma(std::string_view name) {
   constexpr std::array<std::string_view, 6> kAboutTables{
       "table_info", "table_xinfo", "table_list", "index_list", "index_info", "foreign_key_list"};
-  constexpr std::array<std::string_view, 4> kPlain{"user_version", "application_id",
-                                                   "compile_options", "page_count"};
-  const auto has = [name](const auto& names) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
-  return has(kAboutTables) || (argument == nullptr && has(kPlain));
+  return std::ranges::find(kAboutTables, name) != kAboutTables.end();
 }
 
 /// False for functions that reach out of the database, use addresses of this process, run SQL, or
@@ -36,7 +30,7 @@ bool is_harmless_function(std::string_view name) {
       "bm25",           "highlight",      "match",      "matchinfo",
       "offsets",        "optimize",       "rtreecheck", "rtreedepth",
       "rtreenode",      "snippet",        "sqlite_log", "edit"};
-  return std::find(kOthers.begin(), kOthers.end(), name) == kOthers.end();
+  return std::ranges::find(kOthers, name) == kOthers.end();
 }
 
 /// SQLite's authorizer: allows only reading and computing. Applies inside views too.
@@ -49,35 +43,25 @@ int authorize(void*, int action, const char* first, const char* second, const ch
     case SQLITE_FUNCTION:
       return second != nullptr && is_harmless_function(second) ? SQLITE_OK : SQLITE_DENY;
     case SQLITE_PRAGMA:
-      return first != nullptr && is_harmless_pragma(first, second) ? SQLITE_OK : SQLITE_DENY;
+      return first != nullptr && is_harmless_pragma(first) ? SQLITE_OK : SQLITE_DENY;
     default:
       return SQLITE_DENY;
   }
 }
 
-bool is_blank(std::string_view text) {
-  return text.find_first_not_of(" \t\r\n;") == std::string_view::npos;
-}
-
-std::string mebibytes(std::int64_t bytes) {
-  return std::to_string(bytes >> 20U) + " MiB";
-}
-
 }  // namespace
 
 std::int64_t time_limit_of(const protocol::QueryRequest& request) {
-  if (request.time_limit_ms() == 0) {
-    return QueryLimits().time_limit_ms;
-  }
-  return static_cast<std::int64_t>(std::min<std::uint64_t>(
-      request.time_limit_ms(), static_cast<std::uint64_t>(kLongestTimeLimit_ms)));
+  const std::uint64_t most_ms{kLongestTimeLimit_ms};
+  const std::uint64_t asked_ms = request.time_limit_ms();
+  return asked_ms == 0 ? QueryLimits().time_limit_ms
+                       : static_cast<std::int64_t>(std::min(asked_ms, most_ms));
 }
 
 std::string took_too_long(std::int64_t time_limit_ms) {
   return fmt::format(
       "the query took too long (more than {} s): narrow it, as with WHERE or LIMIT, or give it "
-      "more "
-      "time with --timeout",
+      "more time with --timeout",
       static_cast<double>(time_limit_ms) / 1000.0);
 }
 
@@ -122,16 +106,12 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
       sqlite3_prepare_v2(database, sql.c_str(), static_cast<int>(sql.size()) + 1, &raw, &tail);
   StatementHandle statement(raw, &sqlite3_finalize);
   const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
-  if (primary == SQLITE_AUTH) {
-    throw StatementError(fmt::format("{}: {}", kOnlyReads, sqlite3_errmsg(database)));
+  const std::string reason = code == SQLITE_OK ? "" : sqlite3_errmsg(database);
+  if (primary == SQLITE_AUTH || reason.starts_with("cannot modify ")) {  // the latter of a view
+    throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
   }
   if (primary == SQLITE_ERROR) {
-    const std::string reason = sqlite3_errmsg(database);
-    if (reason.starts_with("cannot modify ")) {  // a view
-      throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
-    }
-    throw StatementError(
-        fmt::format("the statement is wrong: {}{}", reason, quotes_hint(reason, sql)));
+    throw StatementError(reason);
   }
   if (primary != SQLITE_OK) {
     throw failure(database, code);
@@ -139,28 +119,18 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   if (statement == nullptr) {
     throw StatementError("there is no statement");
   }
-  if (!is_blank(tail)) {
+  if (std::string_view(tail).find_first_not_of(" \t\r\n;") != std::string_view::npos) {
     throw StatementError("one statement at a time: something follows the first");
   }
   if (sqlite3_stmt_readonly(raw) == 0) {
     throw StatementError(kOnlyReads);
   }
   if (sqlite3_bind_parameter_count(raw) > 0) {
-    // A parameter without a name is ?.
-    const char* name = sqlite3_bind_parameter_name(raw, sqlite3_bind_parameter_count(raw));
-    throw StatementError(std::string("the statement has the parameter ") +
-                         (name == nullptr ? "?" : name) +
-                         ", which has no value: write the value itself, a text in single quotes");
+    throw StatementError(
+        "the statement has a parameter (?, :x, @x or $x), which has no value: write the value "
+        "itself, a text in single quotes");
   }
   return statement;
-}
-
-void throw_failure(sqlite3* database, int code) {
-  const QueryError error = failure(database, code);
-  if (static_cast<int>(static_cast<unsigned>(code) & 0xffU) == kWrongArgument) {
-    throw StatementError(error.what());
-  }
-  throw error;
 }
 
 QueryError failure(sqlite3* database, int code) {
@@ -168,12 +138,13 @@ QueryError failure(sqlite3* database, int code) {
     case SQLITE_NOMEM: {
       const std::int64_t limit = sqlite3_hard_heap_limit64(-1);
       return QueryError("the query needs more memory than " +
-                        (limit > 0 ? "the " + mebibytes(limit) + " allowed" : "there is") +
+                        (limit > 0 ? fmt::format("the {} MiB allowed", limit >> 20U) : "there is") +
                         ": sort, group or gather less, as with WHERE or LIMIT");
     }
     case SQLITE_TOOBIG:
-      return QueryError("a text, a blob or a row of the query has more than the " +
-                        mebibytes(sqlite3_limit(database, SQLITE_LIMIT_LENGTH, -1)) + " allowed");
+      return QueryError(
+          fmt::format("a text, a blob or a row of the query has more than the {} MiB allowed",
+                      sqlite3_limit(database, SQLITE_LIMIT_LENGTH, -1) >> 20));
     default:
       return QueryError(std::string("the query failed: ") + sqlite3_errmsg(database));
   }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <sqlite3.h>
 
@@ -46,15 +47,10 @@ std::int64_t time_limit_of(const protocol::QueryRequest& request);
 /// Message of a query that took longer than `time_limit_ms`.
 std::string took_too_long(std::int64_t time_limit_ms);
 
-/// Memory that SQLite may allocate in a reader process. Sorting and grouping use memory, no files.
-inline constexpr std::int64_t kReaderHeapBytes = std::int64_t{256} << 20U;
+inline constexpr int kLongestSql = 1'000'000;  ///< longest statement [bytes]
 
-/// Longest statement [bytes].
-inline constexpr int kLongestSql = 1'000'000;
-
-/// Restricts statements on `database` to reading and computing, adds our functions, and limits the
-/// size of a statement. LIKE becomes case-sensitive, because in modes S is stick and s is slip.
-/// Sorting and grouping use no files.
+/// Restricts statements on `database` to reading and computing in memory, limits their size, and
+/// adds our functions. LIKE becomes case-sensitive, because in modes S is stick and s is slip.
 void restrict_to_reading(sqlite3* database);
 
 using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
@@ -66,9 +62,5 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql);
 
 /// The error for a client after a call on `database` returned `code`.
 QueryError failure(sqlite3* database, int code);
-
-/// Throws the error of a statement that failed while it ran: StatementError for a wrong argument of
-/// one of our functions, else QueryError.
-[[noreturn]] void throw_failure(sqlite3* database, int code);
 
 }  // namespace oblique::server

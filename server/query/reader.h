@@ -19,13 +19,18 @@ namespace oblique::server {
 /// Size at which a chunk of an answer is returned.
 inline constexpr std::uint64_t kChunkBytes = std::uint64_t{256} << 10U;
 
+/// When a statement must end. SQLite checks it as long as the statement runs.
+struct TimeLimit {
+  std::atomic<bool> is_interrupted = false;
+  std::int64_t end_ms = INT64_MAX;  ///< of the steady clock
+};
+
 /// The rows of one statement, returned in chunks. Holds a read transaction until it ends or is
 /// destroyed, during which the database cannot truncate its write-ahead log.
 class Answer {
  public:
-  /// See Reader::answer.
   Answer(sqlite3* database, const protocol::QueryRequest& request, const QueryLimits& limits,
-         const std::atomic<bool>& interrupted);
+         TimeLimit& time);
 
   /// The next chunk, with its number from 1 on; `ends` is set in the last one, which may have no
   /// rows. A blob is returned as the text x'0F..', as is a text that is not UTF-8. Throws
@@ -34,12 +39,14 @@ class Answer {
   protocol::QueryReply next();
 
  private:
+  void start_time();
   bool step();
   void copy_row();
 
   sqlite3* database_;
   QueryLimits limits_;
-  const std::atomic<bool>& interrupted_;
+  TimeLimit& time_;
+  std::int64_t start_ms_ = 0;  // of the call of `next`
   StatementHandle statement_{nullptr, &sqlite3_finalize};
   std::vector<std::string> units_;             // of the columns; may be empty
   std::optional<protocol::ChunkWriter> rows_;  // set by the constructor
@@ -57,8 +64,7 @@ class Reader {
   /// A remark if the database is read in an unusual way (open_for_reading); else empty.
   const std::string& remark() const { return remark_; }
 
-  /// Starts the answer to `request`. Throws QueryError as `prepare_query` does, and for a plan that
-  /// takes longer than the time limit; solver::InputError for a wrong query. The reader must
+  /// Starts the answer to `request`. Throws what `prepare_query` and `plan` throw. The reader must
   /// outlive the answer and must not be used otherwise until then.
   Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
 
@@ -70,14 +76,12 @@ class Reader {
   std::vector<protocol::StudyStatus> study_status(const std::string& name = {});
 
   /// Ends the running query and all later ones. May be called from any thread.
-  void interrupt() { interrupted_ = true; }
+  void interrupt() { time_.is_interrupted = true; }
 
  private:
-  std::string nearest_study(const std::string& name);
-
+  TimeLimit time_;
   DatabaseHandle database_;
   std::string remark_;
-  std::atomic<bool> interrupted_ = false;
 };
 
 /// A blob as SQL writes it: x'0F..'.

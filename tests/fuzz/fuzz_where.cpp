@@ -45,7 +45,7 @@ Opened& opened() {
 /// Whether the command line takes `condition`.
 bool is_taken(const std::string& condition) {
   try {
-    oblique::server::check_sql_part("--where", condition, oblique::server::SqlPart::kCondition);
+    oblique::server::check_sql_part("--where", condition);
     return true;
   } catch (const oblique::solver::InputError&) {
     return false;

@@ -76,7 +76,7 @@ std::string FieldReader::condition() const {
   const std::string condition = text("where").value_or("");
   try {
     if (!condition.empty()) {
-      check_sql_part("--where", condition, SqlPart::kCondition);
+      check_sql_part("--where", condition);
     }
   } catch (const solver::InputError& error) {
     throw std::invalid_argument(error.what());

@@ -12,7 +12,6 @@
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "server/query/columns.h"
-#include "server/query/question.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/parameters.h"
 
@@ -132,7 +131,10 @@ ordered_json first_failure(const JobContext& context, const ServedStudy& study) 
   protocol::StudyQuery query;
   query.set_study(study.name);
   query.add_select("point, error");
-  query.set_where("error IS NOT NULL");
+  query.set_where(fmt::format(
+      "point IN (SELECT point FROM results INDEXED BY failed_points WHERE study_id = {} "
+      "AND error IS NOT NULL)",
+      study.id));
   query.set_limit(1);
   ordered_json first;
   context.query(query, [&](const protocol::ChunkRows& row) {

@@ -22,8 +22,7 @@ constexpr std::size_t kLongestText = 4000;
 constexpr std::uint64_t kLongestSide = 4000;
 
 /// A part of a statement, which `oblique plot` judges once more.
-std::optional<std::string> sql_field(const FieldReader& fields, const std::string& name,
-                                     SqlPart part) {
+std::optional<std::string> sql_field(const FieldReader& fields, const std::string& name) {
   const auto text = fields.text(name);
   if (!text) {
     return std::nullopt;
@@ -33,7 +32,7 @@ std::optional<std::string> sql_field(const FieldReader& fields, const std::strin
         "{} must be a text of at most {} bytes without control characters", name, kLongestText));
   }
   try {
-    check_sql_part(name, *text, part);
+    check_sql_part(name, *text);
   } catch (const solver::InputError& error) {
     throw std::invalid_argument(error.what());
   }
@@ -52,7 +51,7 @@ std::string one_of(const FieldReader& fields, const std::string& name, const std
 }
 
 std::string needed(const FieldReader& fields, const std::string& name, std::string_view kind) {
-  auto text = sql_field(fields, name, SqlPart::kColumns);
+  auto text = sql_field(fields, name);
   if (!text) {
     throw std::invalid_argument(fmt::format("{} must be given for kind={}", name, kind));
   }
@@ -64,7 +63,7 @@ void add_kind(const FieldReader& fields, std::vector<std::string>& flags) {
   constexpr std::array<std::string_view, 4> kKinds{"map", "lines", "scatter", "histogram"};
   const std::string kind = one_of(fields, "kind", "", kKinds);
   const auto add = [&](const char* flag, const std::string& field) {
-    if (const auto text = sql_field(fields, field, SqlPart::kColumns)) {
+    if (const auto text = sql_field(fields, field)) {
       flags.push_back(fmt::format("--{}={}", flag, *text));
     }
   };
@@ -142,7 +141,7 @@ std::vector<std::string> study_picture_flags(const ServedStudy& study, const Fie
   if (const auto block = fields.whole("block")) {
     flags.push_back(fmt::format("--block={}", *block + 1));
   }
-  if (const auto where = sql_field(fields, "where", SqlPart::kCondition)) {
+  if (const auto where = sql_field(fields, "where")) {
     flags.push_back("--where=" + *where);
   }
   add_look(fields, flags);

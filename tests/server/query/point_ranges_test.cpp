@@ -1,4 +1,4 @@
-#include "server/query/point_ranges.h"
+#include "server/query/plan.h"
 
 #include <string>
 #include <vector>
@@ -27,7 +27,7 @@ Ranges ranges(const std::string& condition) {
 TEST(PointRanges, AnAxisIsRestrictedToOneValueMoreAtEachEnd) {
   EXPECT_EQ(ranges("H = 0.3"), (Ranges{{100, 399}}));
   EXPECT_EQ(ranges("H < 0.3"), (Ranges{{0, 399}}));
-  EXPECT_EQ(ranges("0.8 <= H"), (Ranges{{600, 999}}));
+  EXPECT_EQ(ranges("H >= 0.8"), (Ranges{{600, 999}}));
   EXPECT_EQ(ranges("H BETWEEN 0.3 AND 0.5 AND mu > 0"), (Ranges{{100, 599}}));
   EXPECT_EQ(ranges("H = 0.3 AND (mu = 2 AND fn_peak_N > 1)"),
             (Ranges{{180, 199}, {280, 299}, {380, 399}}));
@@ -64,27 +64,6 @@ TEST(PointRanges, SamplesZipsAndExpressionsRestrictNothing) {
   EXPECT_EQ(point_ranges(recipe, "mu = 0.1 AND H = 0.5"), (Ranges{{30, 59}}));
   recipe.mutable_blocks(0)->mutable_sample()->set_count(500);
   EXPECT_EQ(point_ranges(recipe, "H = 0.5"), (Ranges{{0, 499}}));
-}
-
-TEST(PointRanges, NumbersOfPointsAreCompared) {
-  EXPECT_EQ(ranges("point = 7"), (Ranges{{7, 7}}));
-  EXPECT_EQ(ranges("point >= 5 AND point <= 9 AND H = 0.1"), (Ranges{{5, 9}}));
-  EXPECT_EQ(ranges("point BETWEEN 9 AND 5"), Ranges());
-  EXPECT_EQ(ranges("point < -1"), Ranges());
-}
-
-TEST(PointRanges, AConditionWantsOnlyFailedPointsIfAndJoinsThatToOthers) {
-  for (const char* condition : {"error IS NOT NULL", "(error is not null)",
-                                "mu BETWEEN 0 AND 1 AND ((error IS NOT NULL) AND e = 1)"}) {
-    EXPECT_TRUE(wants_only_failed(condition)) << condition;
-  }
-  for (const char* condition :
-       {"", "error IS NULL", "NOT error IS NOT NULL", "mu > 1 OR error IS NOT NULL",
-        "(mu > 1 OR error IS NOT NULL) AND e = 1", "(error IS NOT NULL) = 0",
-        "mu BETWEEN 0 AND error IS NOT NULL", "CASE WHEN 1 AND error IS NOT NULL THEN 1 END",
-        "'error' IS NOT NULL", "e + error IS NOT NULL"}) {
-    EXPECT_FALSE(wants_only_failed(condition)) << condition;
-  }
 }
 
 TEST(PointRanges, OfHugeStudiesAreFew) {

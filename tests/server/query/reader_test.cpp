@@ -1,7 +1,6 @@
 #include "server/query/reader.h"
 
 #include <cstdint>
-#include <fstream>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -84,8 +83,7 @@ TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
   EXPECT_EQ(chunk.chunk_rows(), 3U);
   EXPECT_THAT(chunk.units(), ElementsAre("m", ""));
   EXPECT_THROW(ask("no such", "H"), solver::InputError);
-  EXPECT_THROW(ask("a", "percentile(mu, 100 + 20)"), StatementError);
-  EXPECT_THROW(reader.query("SELECT percentile(mu, 120) FROM runs", {}), StatementError);
+  EXPECT_THROW(ask("a", "median(status)"), QueryError);
 }
 
 TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
@@ -107,22 +105,19 @@ TEST_F(ReaderTest, AWrongStatementIsRefusedWithTheReason) {
     const char* reason;
   } wrong[] = {
       {"SELECT fts3_tokenizer('simple')", "not authorized to use function"},
-      {"SELECT fts3_tokenizer('x', x'00')", "not authorized to use function"},
       {"SELECT load_extension('x')", "not authorized to use function"},
-      {"SELECT sqlite_log(1, 'x')", "not authorized to use function"},
       {"SELECT rtreecheck('results')", "not authorized to use function"},
-      {"SELECT ?", "the parameter ?,"},
-      {"SELECT 1 WHERE 1 > :mu", "the parameter :mu,"},
-      {"SELECT $x", "the parameter $x,"},
+      {"SELECT ?", "a parameter"},
+      {"SELECT 1 WHERE 1 > :mu", "a parameter"},
+      {"SELECT $x", "a parameter"},
       {"SELECT 1; SELECT 2", "one statement"},
       {"  ", "no statement"},
       {"SELECT nothing FROM results", "nothing"},
-      {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "in single quotes a text"},
+      {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "no such column: mux"},
   };
   for (const auto& [sql, reason] : wrong) {
     EXPECT_THAT(refusal_of(sql), HasSubstr(reason)) << sql;
   }
-  EXPECT_THAT(refusal_of("SELECT mux FROM runs"), Not(HasSubstr("quotes")));
 }
 
 TEST_F(ReaderTest, StatementsMayListTablesAndUseJson) {
@@ -136,21 +131,16 @@ TEST_F(ReaderTest, StatementsMayListTablesAndUseJson) {
   EXPECT_EQ(row_of("SELECT sum(atom) FROM json_tree('[1, [2, 3]]')").values(0).integer(), 6);
 }
 
-TEST_F(ReaderTest, ARowOverTheLimitOfAReplyIsAnError) {
+TEST_F(ReaderTest, ARowOrAValueOverItsLimitIsAnError) {
   const QueryLimits limits{1000, 0, 1'000'000};
   EXPECT_THAT(refusal_of("SELECT zeroblob(499)", limits), HasSubstr("more than the 1000 bytes"));
   EXPECT_THAT(refusal_of("SELECT hex(zeroblob(501))", limits),
               HasSubstr("more than the 1000 bytes"));
   EXPECT_EQ(refusal_of("SELECT zeroblob(400)", limits), "it ran");
-  EXPECT_THAT(refusal_of("SELECT 1 UNION ALL SELECT zeroblob(499)", limits),
-              HasSubstr("more than the 1000 bytes"));
-}
-
-TEST_F(ReaderTest, AValueOverItsLimitIsAnErrorOnTheWayToo) {
-  const QueryLimits limits{1000, 0, 1 << 20U};
-  EXPECT_THAT(refusal_of("SELECT length(zeroblob(1048577))", limits),
+  const QueryLimits of_values{1000, 0, 1 << 20U};
+  EXPECT_THAT(refusal_of("SELECT length(zeroblob(1048577))", of_values),
               HasSubstr("more than the 1 MiB allowed"));
-  EXPECT_EQ(refusal_of("SELECT length(zeroblob(1000000))", limits), "it ran");
+  EXPECT_EQ(refusal_of("SELECT length(zeroblob(1000000))", of_values), "it ran");
 }
 
 TEST_F(ReaderTest, AnEndlessQueryEndsAtItsTimeLimit) {
@@ -182,23 +172,6 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
   commit({AddResults{1, table_of(4), 0, "", "", 1, "now", {solved_point(1)}}});
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
-}
-
-TEST_F(ReaderTest, WhatIsNoDatabaseOfOursIsRefusedByItsKind) {
-  const auto message_of = [](const std::string& path) -> std::string {
-    try {
-      const Reader reader(path);
-    } catch (const StorageError& error) {
-      return error.what();
-    }
-    return "it opened";
-  };
-  EXPECT_THAT(message_of(folder_.file("none.db")), HasSubstr("there is no database"));
-  EXPECT_THAT(message_of(folder_.file("")), HasSubstr("is a directory"));
-  std::ofstream(folder_.file("empty.db")) << "";
-  EXPECT_THAT(message_of(folder_.file("empty.db")), HasSubstr("is empty"));
-  std::ofstream(folder_.file("text.db")) << std::string(5000, 'x');
-  EXPECT_THAT(message_of(folder_.file("text.db")), HasSubstr("is not a database"));
 }
 
 /// Study "a" has points 0 to 9, of which 5 is not solved yet, and rows of a fourth of a chunk.
@@ -263,17 +236,6 @@ TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
   EXPECT_THAT(points_of(last), ElementsAre(9));
   EXPECT_TRUE(last.ends());
   EXPECT_EQ(reader.query("SELECT * FROM results", {}).rows_size(), 10);
-}
-
-TEST_F(AnswerTest, ALimitHoldsOverAllChunks) {
-  Reader reader(path_);
-  auto request = wide_rows();
-  request.mutable_question()->set_limit(6);
-  Answer answer = reader.answer(request, full_chunks());
-  EXPECT_THAT(points_of(answer.next()), ElementsAre(0, 1, 2, 3));
-  const auto last = answer.next();
-  EXPECT_THAT(points_of(last), ElementsAre(4, 6));
-  EXPECT_TRUE(last.ends());
 }
 
 TEST_F(AnswerTest, HoldsNoTransactionOnceItHasEnded) {

@@ -88,7 +88,7 @@ TEST_F(PageFiltersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
   solve(24);
   const std::vector<std::pair<std::string, std::string>> all{
       {"muu%20%3E%201", "did you mean `mu`?"},
-      {"mu%20%3E", "\\\"mu >\\\" is not allowed: something must follow its end"},
+      {"mu%20%3E", "\\\"mu >\\\" is not allowed: incomplete input"},
       {"1)%20OR%20(1", "is not allowed"},
       {"1;%20DROP%20TABLE%20studies", "is not allowed"},
       {"1%20--", "is not allowed"},
@@ -143,7 +143,7 @@ TEST_F(PageFiltersTest, TheRowsOfASliceAreLookedUpByKey) {
                   grid_recipe());
   const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
   restrict_to_reading(database.get());
-  const std::string statement = plan(database.get(), query).statement;
+  const std::string statement = plan(database.get(), query).sql;
   sqlite3_set_authorizer(database.get(), nullptr, nullptr);
   Statement explained(database.get(), "EXPLAIN QUERY PLAN " + statement);
   std::string steps;
