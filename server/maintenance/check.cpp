@@ -13,9 +13,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "proto/recipe/canonical.h"
-#include "proto/recipe/written/study_name.h"
-#include "proto/recipe/written/study_priority.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/written.h"
 #include "server/database/open_for_reading.h"
 #include "server/database/row_checksum.h"
 #include "server/store/completed_ranges.h"

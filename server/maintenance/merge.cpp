@@ -9,7 +9,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/frames.h"
-#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/written.h"
 #include "server/database/draft_file.h"
 #include "server/database/row_checksum.h"
 #include "server/database/sqlite.h"

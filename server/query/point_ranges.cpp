@@ -9,7 +9,6 @@
 #include <string>
 #include <utility>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "server/query/columns.h"
 #include "server/query/sql_functions.h"

@@ -7,7 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "server/query/columns.h"
 #include "server/query/elements.h"

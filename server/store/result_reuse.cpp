@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/canonical.h"
+#include "proto/recipe/model_message.h"
 #include "server/store/result_rows.h"
 
 namespace oblique::server {

@@ -5,8 +5,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/canonical.h"
-#include "proto/recipe/point_inputs.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "server/database/row_checksum.h"
 #include "server/store/result_rows.h"
