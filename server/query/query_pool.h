@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "server/query/reader_process.h"
 
 namespace oblique::server {
