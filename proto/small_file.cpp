@@ -32,7 +32,9 @@ std::string read_small_file(const std::string& path, std::string_view what,
   if (static_cast<std::size_t>(about.st_size) > most_bytes) {
     refuse(fmt::format("it has {} bytes, and at most {} are allowed", about.st_size, most_bytes));
   }
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file;
+  file.rdbuf()->pubsetbuf(nullptr, 0);  // or a secret of the file would stay in a buffer
+  file.open(path, std::ios::binary);
   std::string text(static_cast<std::size_t>(about.st_size), '\0');
   if (!file.is_open() || file.read(text.data(), about.st_size).bad()) {
     refuse(std::strerror(errno));

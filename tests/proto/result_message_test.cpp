@@ -1,6 +1,7 @@
 #include "proto/result_message.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -17,7 +18,6 @@ namespace {
 using testing::HasSubstr;
 
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A result whose every field differs from the others.
 solver::CaseResult distinct_result() {
@@ -145,7 +145,7 @@ TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
 TEST(PointResultTest, ANumberThatIsNotFiniteOrTooLargeForAUnitIsFoundAnywhere) {
   const PointResult sound = to_message(0, distinct_result());
   for (const auto& [number, fault] :
-       std::vector<std::pair<double, const char*>>{{kInfinity, "not a finite number"},
+       std::vector<std::pair<double, const char*>>{{HUGE_VAL, "not a finite number"},
                                                    {1e308, "too large to be stored"},
                                                    {-1.1e100, "too large to be stored"}}) {
     for (int i = 0; i < sound.reals_size(); ++i) {

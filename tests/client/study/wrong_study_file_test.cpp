@@ -191,7 +191,7 @@ std::vector<WrongFile> wrong_axes() {
        {":3:", "step = 0.2", "0.5 to 1", "0.9", "1.1"}},
       {"StepTooSmall",
        block_with("mu = { from = 0, to = 1, step = 1e-300 }"),
-       {":3:", "step = 1e-300", "the most that are allowed"}},
+       {":3:", "step = 1e-300", "at most 1000000000000"}},
       {"WholeKeyBetweenWholeNumbers",
        block_with("mu = 0.4\nelements_per_link = { from = 2, to = 8, count = 3 }\nlinks = { from = "
                   "1, to = 2, count = 3 }"),

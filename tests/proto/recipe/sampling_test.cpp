@@ -78,23 +78,6 @@ TEST(OwenScramblingTest, ValuesShareAsManyFirstDigitsAfterAsBefore) {
   }
 }
 
-// Of 4096 keys a digit is changed in half, with a standard deviation of 32; and of 2^12 values with
-// different first twelve digits, the thirteenth too: it is drawn for each anew.
-TEST(OwenScramblingTest, ADigitIsChangedForHalfOfTheKeysAndForHalfOfTheDigitsBeforeIt) {
-  for (int digit = 0; digit < kSobolBits; ++digit) {
-    int changed = 0;
-    for (std::uint64_t key = 0; key < 4096; ++key) {
-      changed += static_cast<int>((owen_scrambled(0, key) >> digit) & 1);
-    }
-    EXPECT_NEAR(changed, 2048, 5 * 32) << "digit " << digit;
-  }
-  int changed = 0;
-  for (std::uint64_t prefix = 0; prefix < 4096; ++prefix) {
-    changed += static_cast<int>((owen_scrambled(prefix << 40, 1) >> 39) & 1);
-  }
-  EXPECT_NEAR(changed, 2048, 5 * 32);
-}
-
 /// Whether 2^k points are one in each of the 2^k boxes that are 2^-a long in x and 2^(a-k) in y,
 /// for every a. True of (0, 2)-sequences: dimensions 1 and 2 of Sobol's.
 TEST(SobolTest, EveryElementaryIntervalOfTheFirstTwoDimensionsHasOnePoint) {
