@@ -20,7 +20,7 @@ inline constexpr int kMostLeftOutRanges = 10'000;
 inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
 
 // What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
-// order and without their names, which the worker says once, when it joins.
+// order and without their names, which the worker sends once, when it joins.
 
 /// What solving a point gave, without its inputs (proto/recipe/point_table.h).
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
@@ -36,13 +36,13 @@ PointResult failed_point(std::uint64_t point, const std::string& reason);
 /// impossible length, more elements, more bytes or longer texts than results have.
 std::string fault_of(const PointResult& message);
 
-/// Sets what a worker of this build says of its messages: their version, and what its results have.
+/// Sets the version of the protocol and the names of the outputs of this build.
 void say_protocol(WorkerHello& hello);
 
 /// The names of the scalars that results have, in their order, with spaces between.
 std::string sent_outputs();
 
-/// Why the server does not take results of that worker, or an empty text: it speaks another version
+/// Why the server does not take results of that worker, or an empty text: it has another version
 /// of the protocol, or its results have other outputs, so that numbers would mean something else.
 std::string objection_to_worker(const WorkerHello& hello);
 

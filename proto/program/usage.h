@@ -36,7 +36,7 @@ CLI::Validator whole_number_from(std::int64_t least);
 std::optional<std::chrono::milliseconds> time_until(std::string_view text,
                                                     std::chrono::system_clock::time_point now);
 
-/// Notes the values that an option may have, for completion; whoever reads the value checks it.
+/// Notes the values that an option may have, for completion; the reader of the value checks it.
 /// Returns `option`.
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
 
