@@ -18,8 +18,8 @@ struct Families {
   bool has_v6 = false;
 };
 
-/// Of a host that is written as a number, or of what a name has at present: none when nobody knows
-/// it. Looking a name up may take seconds where those who should know do not answer.
+/// Of a host that is written as a number, or of the present addresses of a name: none for an
+/// unknown name. The lookup may take seconds if name servers do not answer.
 Families families_of(const std::string& host);
 
 }  // namespace oblique::protocol

@@ -2,16 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
 
 namespace oblique::protocol {
 namespace {
-
-std::string escaped(const char* format, unsigned number) {
-  std::array<char, 16> text{};
-  const int length = std::snprintf(text.data(), text.size(), format, number);
-  return {text.data(), static_cast<std::size_t>(length)};
-}
 
 std::string escape_of(char32_t code) {
   switch (code) {
@@ -22,7 +18,8 @@ std::string escape_of(char32_t code) {
     case U'\t':
       return "\\t";
     default:
-      return escaped(code < 0x80 ? "\\x%02x" : "\\u%04x", code);
+      return code < 0x80 ? fmt::format("\\x{:02x}", static_cast<unsigned>(code))
+                         : fmt::format("\\u{:04x}", static_cast<unsigned>(code));
   }
 }
 
@@ -32,7 +29,7 @@ std::string visible_but(std::string_view text, std::string_view kept) {
   while (!text.empty()) {
     const Character next = first_character(text);
     if (next.bytes == 0) {
-      shown += escaped("\\x%02x", static_cast<unsigned char>(text.front()));
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text.front()));
       text.remove_prefix(1);
       continue;
     }
@@ -78,10 +75,7 @@ Character first_character(std::string_view text) {
 }
 
 bool is_control(char32_t code) {
-  struct Range {
-    char32_t first;
-    char32_t last;
-  };
+  using Range = std::pair<char32_t, char32_t>;
   constexpr std::array<Range, 13> kControls{{
       {0x00, 0x1f},        // C0
       {0x7f, 0x9f},        // DEL, C1
@@ -98,7 +92,7 @@ bool is_control(char32_t code) {
       {0xe0000, 0xe0fff},  // tags, variation selectors
   }};
   return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
-    return code >= range.first && code <= range.last;
+    return code >= range.first && code <= range.second;
   });
 }
 
@@ -111,14 +105,10 @@ std::string visible_lines(std::string_view text) {
 }
 
 bool is_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t bytes = first_character(text).bytes;
-    if (bytes == 0) {
-      return false;
-    }
-    text.remove_prefix(bytes);
+  while (!text.empty() && first_character(text).bytes > 0) {
+    text.remove_prefix(first_character(text).bytes);
   }
-  return true;
+  return text.empty();
 }
 
 std::string shortened(const std::string& text, std::size_t bytes) {

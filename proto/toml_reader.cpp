@@ -1,7 +1,6 @@
 #include "proto/toml_reader.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cstddef>
 #include <optional>
 #include <sstream>
@@ -15,7 +14,7 @@
 namespace oblique::protocol {
 namespace {
 
-constexpr int kMostKeyParts = 8;
+constexpr std::size_t kMostKeyParts = 100;
 
 /// A value of a list or table as the file has it; nested ones only by their kind.
 std::string element(const toml::node& node) {
@@ -36,42 +35,15 @@ std::string not_as_expected(std::string_view key, const toml::node& node,
                      expected);
 }
 
-/// The last character of the string in quotes that begins at `begin`.
-std::size_t end_of_string(std::string_view text, std::size_t begin) {
-  const char quote = text[begin];
-  const std::string three(3, quote);
-  const bool is_long = text.substr(begin).starts_with(three);
-  for (std::size_t at = begin + (is_long ? 3U : 1U); at < text.size(); ++at) {
-    if (is_long ? text.substr(at).starts_with(three) : text[at] == quote || text[at] == '\n') {
-      return at + (is_long ? 2U : 0U);
-    }
-    at += quote == '"' && text[at] == '\\' ? 1U : 0U;
-  }
-  return text.size();
-}
-
-/// Where a key with too many parts begins. Nothing is parsed: strings and comments are skipped.
-std::optional<std::size_t> too_long_key(std::string_view text) {
-  const auto is_of_key = [](char letter) {
-    const auto byte = static_cast<unsigned char>(letter);
-    return std::isalnum(byte) != 0 || byte >= 0x80 ||
-           std::string_view("_- \t").find(letter) != std::string_view::npos;
-  };
-  std::size_t begin = 0;
-  int parts = 1;
+/// Where a key has too many parts: tables nest as deep, and destroying them takes stack for each.
+/// Nothing is parsed: so many dots in a text without a comma or an equals sign count too.
+std::optional<std::size_t> too_deep_key(std::string_view text) {
+  std::size_t parts = 1;
   for (std::size_t at = 0; at < text.size(); ++at) {
-    const char letter = text[at];
-    if (letter == '"' || letter == '\'') {
-      at = end_of_string(text, at);
-    } else if (letter == '.') {
-      ++parts;
-    } else if (!is_of_key(letter)) {
-      at = letter == '#' ? std::min(text.find('\n', at), text.size()) : at;
-      parts = 1;
-      begin = at + 1;
-    }
+    const bool is_end = std::string_view("=,[]{}\n").find(text[at]) != std::string_view::npos;
+    parts = is_end ? 1 : parts + (text[at] == '.' ? 1 : 0);
     if (parts > kMostKeyParts) {
-      return std::min(text.find_first_not_of(" \t", begin), text.size());
+      return at;
     }
   }
   return std::nullopt;
@@ -119,14 +91,11 @@ std::string shown(const toml::node& node) {
 
 toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
-  if (const auto found = too_long_key(text)) {
-    const std::string_view before = text.substr(0, *found);
-    const auto line = std::count(before.begin(), before.end(), '\n') + 1;
-    const std::size_t column = *found - before.rfind('\n');  // npos is -1
-    throw solver::InputError(
-        fmt::format("{}:{}:{}: a key has more than {} parts with dots between "
-                    "them",
-                    file_, line, column, kMostKeyParts));
+  if (const auto found = too_deep_key(text)) {
+    const auto line =
+        std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*found), '\n');
+    throw solver::InputError(fmt::format("{}:{}: more than {} parts with dots between them", file_,
+                                         line + 1, kMostKeyParts));
   }
   try {
     return toml::parse(text, file_);

@@ -26,8 +26,7 @@ class TomlReader {
 
   const std::string& file() const { return file_; }
 
-  /// The content of the file. Keys with more than 8 parts between dots are refused: tables nest as
-  /// deep, and destroying them takes stack for each level.
+  /// The content of the file. Keys with more than 100 parts between dots are refused.
   toml::table parse(std::string_view text) const;
 
   /// Throws the error `message` about the node or key `at`.

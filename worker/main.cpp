@@ -17,9 +17,7 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/frames.h"
-#include "proto/program/completion.h"
 #include "proto/program/configuration.h"
-#include "proto/program/exit_code.h"
 #include "proto/program/log.h"
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
@@ -197,8 +195,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
       "Example: oblique-worker --server tcp://127.0.0.1:7601",
       kProgram);
   Configuration configuration(
-      app,
-      {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml"), {"log"}});
+      app, {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml")});
   StopWithParent parent;
   Ending ending;
   std::uint64_t fall_memory_bytes = 0;

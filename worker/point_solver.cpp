@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/point_inputs.h"
+#include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/library/point_runs.h"

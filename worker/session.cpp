@@ -99,8 +99,7 @@ void Session::open_socket() {
 
 void Session::note_rejection() {
   if (const auto rejection = link_->monitor.rejection()) {
-    apply(
-        conversation_.on_rejected(protocol::sentence_of(*rejection, dealer_settings()), now_ms()));
+    apply(conversation_.on_rejected(*rejection, now_ms()));
   }
 }
 

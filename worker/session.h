@@ -11,8 +11,7 @@
 
 #include "proto/keys/key_file.h"
 #include "proto/socket/socket.h"
-#include "proto/socket/socket_monitor.h"
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "worker/batch_solver.h"
 #include "worker/conversation.h"
 #include "worker/trace_solver.h"
@@ -57,7 +56,8 @@ class Session {
   /// The socket of the present attempt.
   struct Link {
     Link(zmq::context_t& context, const protocol::DealerSettings& settings)
-        : socket(protocol::made_dealer(context, settings)), monitor(context, socket, true) {}
+        : socket(protocol::made_dealer(context, settings)),
+          monitor(context, socket, settings, true) {}
     zmq::socket_t socket;
     protocol::SocketMonitor monitor;
   };

@@ -6,7 +6,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"

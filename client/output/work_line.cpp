@@ -12,7 +12,7 @@
 
 #include "client/output/progress.h"
 #include "proto/program/process.h"
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {

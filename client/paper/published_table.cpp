@@ -10,7 +10,7 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {

@@ -7,7 +7,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"

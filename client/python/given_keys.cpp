@@ -11,7 +11,7 @@
 
 #include "proto/recipe/expression.h"
 #include "proto/recipe/keys.h"
-#include "proto/recipe/written/written_model.h"
+#include "proto/recipe/written.h"
 #include "proto/suggestion.h"
 #include "worker/solver/model/parameters.h"
 

@@ -56,7 +56,7 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
     : settings_(std::move(settings)),
       keep_waiting_(std::move(keep_waiting)),
       socket_(protocol::made_dealer(context_, dealer_settings(settings_))),
-      monitor_(context_, socket_) {
+      monitor_(context_, socket_, dealer_settings(settings_)) {
   protocol::connect(socket_, dealer_settings(settings_));
 }
 
@@ -153,7 +153,7 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
     send_or_connect_again(outstanding);
     wait_a_slice(is_unsent(outstanding));
     if (const auto rejection = monitor_.rejection()) {
-      throw ConnectionError(protocol::sentence_of(*rejection, dealer_settings(settings_)));
+      throw ConnectionError(*rejection);
     }
     if (auto reply = received(request.request_id())) {
       if (std::exchange(said_silent, false)) {

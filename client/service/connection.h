@@ -13,7 +13,7 @@
 #include "client/study/study.h"
 #include "proto/keys/key_file.h"
 #include "proto/oblique.pb.h"
-#include "proto/socket/socket_monitor.h"
+#include "proto/socket/socket.h"
 
 namespace oblique::client {
 

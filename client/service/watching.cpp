@@ -12,7 +12,7 @@
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
 #include "client/service/watch_teller.h"
-#include "proto/program/exit_code.h"
+#include "proto/program/usage.h"
 #include "proto/study_counts.h"
 #include "proto/text.h"
 #include "server/query/sql_text.h"

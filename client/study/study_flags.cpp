@@ -5,8 +5,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/study/study_file.h"
-#include "proto/recipe/canonical.h"
-#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/written.h"
 
 namespace oblique::client {
 

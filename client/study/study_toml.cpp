@@ -11,9 +11,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {

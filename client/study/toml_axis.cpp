@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/keys.h"
-#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written.h"
 #include "proto/suggestion.h"
 
 namespace oblique::client {

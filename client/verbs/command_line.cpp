@@ -24,7 +24,6 @@
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/completion.h"
 #include "proto/program/origin/origin.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"

@@ -11,7 +11,6 @@
 #include "client/output/columns.h"
 #include "client/output/human_units.h"
 #include "client/output/terminal.h"
-#include "proto/program/exit_code.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
 #include "proto/wire/chunk_rows.h"

@@ -18,11 +18,10 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/process.h"
-#include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
 #include "proto/recipe/study_size.h"
-#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -72,13 +71,13 @@ struct Report {
   std::optional<StudyCost> cost;
 };
 
-/// The point that was gone to, by the axes, not by the model: of length and length1 both have a
-/// value.
-ShownPoint shown_point(const protocol::Block& block, const protocol::BlockPoints& points,
+/// By the axes, not by the model: of length and length1 both have a value.
+ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block& block,
                        std::uint64_t number) {
   ShownPoint shown{number, {}};
+  const auto values = table.values(number);
   for (int i = 0; i < block.axes_size(); ++i) {
-    shown.values.emplace_back(block.axes(i).key(), points.values()[static_cast<std::size_t>(i)]);
+    shown.values.emplace_back(block.axes(i).key(), values[static_cast<std::size_t>(i)]);
   }
   return shown;
 }
@@ -102,32 +101,28 @@ std::string made_of(const protocol::Block& block) {
   return kind + axes + following;
 }
 
-/// The first point from `from` on, or before it, that the filter leaves in; `from` when none of
-/// 10^5 is.
-std::uint64_t nearest_left_in(protocol::BlockPoints& points, std::uint64_t from, bool forward) {
-  constexpr std::uint64_t kMostLooks = 100'000;
-  for (std::uint64_t look = 0; look < std::min(kMostLooks, points.points()); ++look) {
-    const std::uint64_t point = forward ? from + look : from - look;
-    points.go_to(point);
-    if (points.is_left_in()) {
-      return point;
+/// The last point of the block that the filter keeps; the last of all if it keeps none of the last
+/// `most`.
+std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::BlockPlace& place,
+                           std::uint64_t most) {
+  const std::uint64_t last = place.first_point + place.points - 1;
+  for (std::uint64_t back = 0; back < std::min(most, place.points); ++back) {
+    if (table.is_left_in(last - back)) {
+      return last - back;
     }
   }
-  return from;
+  return last;
 }
 
 BlockReport report_of_block(const protocol::PointTable& table, int number) {
+  constexpr std::uint64_t kMostLooks = 100'000;
   const protocol::Block& block = table.recipe().blocks(number);
   const auto& place = table.block(static_cast<std::size_t>(number));
-  const auto base = protocol::from_message(table.recipe().model());
-  protocol::BlockPoints points(base, block);
-  const auto shown_from = [&](std::uint64_t from, bool forward) {
-    const std::uint64_t point = nearest_left_in(points, from, forward);
-    points.go_to(point);
-    return shown_point(block, points, place.first_point + point);
-  };
+  const std::uint64_t end = place.first_point + std::min(kMostLooks, place.points);
+  const std::uint64_t first = table.first_left_in(place.first_point, end);
   return {place, protocol::points_left_in(table, static_cast<std::size_t>(number)), made_of(block),
-          shown_from(0, true), shown_from(place.points - 1, false)};
+          shown_point(table, block, first < end ? first : place.first_point),
+          shown_point(table, block, last_left_in(table, place, kMostLooks))};
 }
 
 Report report_of(const std::string& name, const protocol::PointTable& table) {

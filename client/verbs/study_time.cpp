@@ -14,7 +14,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"

@@ -18,7 +18,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/written/study_priority.h"
+#include "proto/recipe/written.h"
 #include "proto/text.h"
 
 namespace oblique::client {

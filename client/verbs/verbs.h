@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "proto/program/exit_code.h"
+#include "proto/program/usage.h"
 
 namespace oblique::client {
 

@@ -4,7 +4,6 @@
 #include <limits>
 #include <new>
 #include <stdexcept>
-#include <utility>
 
 #include <sodium.h>
 
@@ -41,24 +40,19 @@ bool decode_z85(std::string_view text, SecretKey::Bytes key) {
   return true;
 }
 
-constexpr std::array<std::pair<Role, std::string_view>, 4> kRoles{{{Role::kServer, "server"},
-                                                                   {Role::kClient, "client"},
-                                                                   {Role::kWorker, "worker"},
-                                                                   {Role::kReader, "reader"}}};
+/// In the order of `Role`.
+constexpr std::array<std::string_view, 4> kRoles{"server", "client", "worker", "reader"};
 
 }  // namespace
 
 std::string_view name_of(Role role) {
-  return kRoles.at(static_cast<std::size_t>(role)).second;
+  return kRoles.at(static_cast<std::size_t>(role));
 }
 
 std::optional<Role> role_named(std::string_view name) {
-  for (const auto& [role, its_name] : kRoles) {
-    if (name == its_name) {
-      return role;
-    }
-  }
-  return std::nullopt;
+  const auto* const found = std::find(kRoles.begin(), kRoles.end(), name);
+  return found == kRoles.end() ? std::nullopt
+                               : std::optional(static_cast<Role>(found - kRoles.begin()));
 }
 
 SecretKey::SecretKey() {

@@ -55,7 +55,7 @@ struct KeyPair {
   SecretKey secret_key{};
 };
 
-/// A pair that nobody else has. Throws std::runtime_error when the system gives no random numbers.
+/// A new random pair. Throws std::runtime_error when the system gives no random numbers.
 KeyPair made_key_pair();
 
 /// The public half that belongs to a secret one.

@@ -6,7 +6,10 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <exception>
 #include <filesystem>
+#include <iterator>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <system_error>
@@ -34,9 +37,8 @@ namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
 constexpr mode_t kOwnersAlone = 0600;
-constexpr std::array<std::string_view, 4> kServersFields{"role", "name", "public", "secret"};
-constexpr std::array<std::string_view, 5> kPeersFields{"role", "name", "public", "secret",
-                                                       "server"};
+using Fields = std::span<const std::string_view>;
+constexpr std::array<std::string_view, 5> kFileFields{"role", "name", "public", "secret", "server"};
 constexpr std::array<std::string_view, 4> kEntryFields{"name", "role", "public", "added_at"};
 constexpr std::array<std::string_view, 1> kListFields{"key"};
 
@@ -57,33 +59,31 @@ class KeyFields {
   }
   Role role() const {
     const auto role = role_named(text("role"));
-    if (!role) {
-      fail("role", "`role` must be \"server\", \"client\", \"worker\" or \"reader\"");
-    }
+    require("role", role.has_value(),
+            "`role` must be \"server\", \"client\", \"worker\" or \"reader\"");
     return *role;
   }
   CurveKey key(std::string_view field) const {
     const auto key = key_of_z85(text(field));
-    if (!key) {
-      fail(field, fmt::format("`{}` is no key: one has {} characters, as `oblique keygen` writes "
-                              "them",
-                              field, kKeyCharacters));
-    }
+    require(field, key.has_value(),
+            fmt::format("`{}` is no key: one has {} characters, as `oblique keygen` writes them",
+                        field, kKeyCharacters));
     return *key;
   }
   std::string name() const {
     std::string name = text("name");
-    if (const std::string objection = objection_to_key_name(name); !objection.empty()) {
-      fail("name", "`name`: " + objection);
-    }
+    const std::string objection = objection_to_key_name(name);
+    require("name", objection.empty(), "`name`: " + objection);
     return name;
   }
-  void refuse_unknown(std::span<const std::string_view> known, std::string_view what) const {
+  void refuse_unknown(Fields known, std::string_view what) const {
     file_.refuse_unknown(table_, known, "", fmt::format("{} has {}", what, joined(known)));
   }
-  /// About a field that exists.
-  [[noreturn]] void fail(std::string_view field, const std::string& message) const {
-    file_.fail(*table_.get(field), message);
+  /// Throws an error about a field that exists, unless `is_met`.
+  void require(std::string_view field, bool is_met, const std::string& message) const {
+    if (!is_met) {
+      file_.fail(*table_.get(field), message);
+    }
   }
 
  private:
@@ -95,11 +95,27 @@ class KeyFields {
   throw std::runtime_error(fmt::format("{} {}: {}", what, path, std::strerror(errno)));
 }
 
-/// A new file, which gets `text` and is flushed to the disk with its name; removed when that fails.
-/// `prepare` runs before anything is written, `finish` afterwards.
-void write_new_file(const std::string& path, std::string_view text,
-                    const std::function<void(const Descriptor&)>& prepare,
-                    const std::function<void()>& finish) {
+/// What the system knows about a file; all zero where there is none.
+struct stat status_of(const std::string& path) {
+  struct stat file {};
+  static_cast<void>(::stat(path.c_str(), &file));
+  return file;
+}
+
+std::string folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
+/// Flushes the names in a file's folder to the disk. Not every file system does that.
+void flush_folder_of(const std::string& path) {
+  const Descriptor opened(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  static_cast<void>(::fsync(opened.number()));
+}
+
+/// Writes a new file with `text` and flushes it to the disk with its name; removes it if that
+/// fails. It gets owner and mode of the file `like`, if that exists.
+void write_new_file(const std::string& path, std::string_view text, const std::string& like = "") {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kOwnersAlone));
   if (!file.is_open() && errno == EEXIST) {
@@ -109,7 +125,11 @@ void write_new_file(const std::string& path, std::string_view text,
     fail_to("cannot make", path);
   }
   try {
-    prepare(file);
+    const struct stat other = status_of(like);
+    if (other.st_mode != 0 && (::fchown(file.number(), other.st_uid, other.st_gid) != 0 ||
+                               ::fchmod(file.number(), other.st_mode & 07777U) != 0)) {
+      fail_to("cannot keep owner and mode of", like);
+    }
     while (!text.empty()) {
       const ssize_t written = ::write(file.number(), text.data(), text.size());
       if (written < 0 && errno != EINTR) {
@@ -120,76 +140,40 @@ void write_new_file(const std::string& path, std::string_view text,
     if (::fsync(file.number()) != 0) {
       fail_to("cannot write", path);
     }
-    finish();
   } catch (const std::runtime_error&) {
     ::unlink(path.c_str());
     throw;
   }
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  const Descriptor opened(
-      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  // Not every file system flushes folders.
-  static_cast<void>(::fsync(opened.number()));
+  flush_folder_of(path);
 }
 
-/// The file, created where it is missing and locked against other processes that change it.
-Descriptor locked_file(const std::string& path) {
-  for (;;) {
-    Descriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnersAlone));
-    if (!file.is_open()) {
-      fail_to("cannot open", path);
-    }
-    while (::flock(file.number(), LOCK_EX) != 0) {
-      if (errno != EINTR) {
-        fail_to("cannot lock", path);
-      }
-    }
-    // Another process may have replaced the file before the lock.
-    struct stat opened {};
-    struct stat named {};
-    if (::fstat(file.number(), &opened) == 0 && ::stat(path.c_str(), &named) == 0 &&
-        opened.st_dev == named.st_dev && opened.st_ino == named.st_ino) {
-      return file;
+/// Locks the folder of a list against other processes that change the list.
+Descriptor locked_folder_of(const std::string& path) {
+  Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  while (::flock(folder.number(), LOCK_EX) != 0) {
+    if (errno != EINTR) {
+      fail_to("cannot lock the folder of", path);
     }
   }
+  return folder;
 }
 
-/// Replaces a locked file in one step, keeping owner and mode.
-void replace_file(const Descriptor& locked, const std::string& path, std::string_view text) {
-  const std::string draft = path + ".new";
-  ::unlink(draft.c_str());  // left by a process that was killed
-  const auto keep_owner_and_mode = [&](const Descriptor& file) {
-    struct stat before {};
-    if (::fstat(locked.number(), &before) != 0 ||
-        ::fchown(file.number(), before.st_uid, before.st_gid) != 0 ||
-        ::fchmod(file.number(), before.st_mode & 07777U) != 0) {
-      fail_to("cannot keep owner and mode of", path);
-    }
-  };
-  write_new_file(draft, text, keep_owner_and_mode, [&] {
-    if (::rename(draft.c_str(), path.c_str()) != 0) {
-      fail_to("cannot replace", path);
-    }
-  });
-}
-
-/// Refuses a file or folder that has one of the mode bits `refused`; reading it reports why it
+/// Refuses a file or folder that has one of the mode bits `refused`. Reading reports why a file
 /// cannot be read.
-void refuse_mode(const std::string& what, const std::string& path, mode_t refused,
+void refuse_mode(std::string_view what, const std::string& path, mode_t refused,
                  std::string_view risk, std::string_view remedy) {
-  struct stat file {};
-  if (::stat(path.c_str(), &file) == 0 && (file.st_mode & refused) != 0) {
+  if (const mode_t mode = status_of(path).st_mode; (mode & refused) != 0) {
     throw solver::InputError(
         fmt::format("{} {} has mode {:04o}: {}, so it is not used. Mend it with: chmod {} '{}'",
-                    what, path, file.st_mode & 07777U, risk, remedy, path));
+                    what, path, mode & 07777U, risk, remedy, path));
   }
 }
 
-/// Whoever can read a secret key can pass for its owner.
+/// A reader of a secret key can pass for its owner.
 void check_readers(const std::string& path) {
-  struct stat file {};
-  if (::stat(path.c_str(), &file) == 0 && S_ISREG(file.st_mode)) {
-    const bool is_ours = file.st_uid == ::geteuid();
+  const struct stat file = status_of(path);
+  const bool is_ours = file.st_uid == ::geteuid();
+  if (S_ISREG(file.st_mode)) {
     refuse_mode("the key file", path, is_ours ? S_IRWXG | S_IRWXO : S_IRWXO,
                 "others than its owner can use the secret key in it", is_ours ? "600" : "o=");
   }
@@ -199,10 +183,8 @@ void check_readers(const std::string& path) {
 void check_writers(const std::string& path) {
   constexpr std::string_view kRisk = "everybody could add a key";
   refuse_mode("the list of keys", path, S_IWOTH, kRisk, "o-w");
-  const std::string parent = std::filesystem::path(path).parent_path().string();
-  const std::string folder = parent.empty() ? "." : parent;
-  struct stat file {};
-  if (::stat(folder.c_str(), &file) == 0 && (file.st_mode & S_ISVTX) == 0) {
+  const std::string folder = folder_of(path);
+  if ((status_of(folder).st_mode & S_ISVTX) == 0) {
     refuse_mode("the folder of the list of keys,", folder, S_IWOTH, kRisk, "o-w");
   }
 }
@@ -231,9 +213,8 @@ AuthorizedKey entry_of(const TomlReader& file, const toml::node& node) {
   const KeyFields fields(file, *table);
   fields.refuse_unknown(kEntryFields, "an entry");
   AuthorizedKey key{fields.name(), fields.role(), fields.key("public"), fields.text("added_at")};
-  if (key.role == Role::kServer) {
-    fields.fail("role", "`role` must be \"client\", \"worker\" or \"reader\": a server is no peer");
-  }
+  fields.require("role", key.role != Role::kServer,
+                 "`role` must be \"client\", \"worker\" or \"reader\": a server is no peer");
   return key;
 }
 
@@ -249,24 +230,9 @@ std::string text_of(const AuthorizedKeys& keys) {
   return text;
 }
 
-/// Files that go again unless all of them could be made.
-class MadeFiles {
- public:
-  MadeFiles() = default;
-  MadeFiles(const MadeFiles&) = delete;
-  MadeFiles& operator=(const MadeFiles&) = delete;
-  ~MadeFiles() {
-    for (auto path = paths_.rbegin(); path != paths_.rend(); ++path) {
-      std::error_code ignored;
-      std::filesystem::remove(*path, ignored);
-    }
-  }
-  void add(const std::string& path) { paths_.push_back(path); }
-  void keep() { paths_.clear(); }
-
- private:
-  std::vector<std::string> paths_;
-};
+bool exists(const std::string& path) {
+  return std::filesystem::exists(std::filesystem::symlink_status(path));
+}
 
 }  // namespace
 
@@ -281,18 +247,15 @@ KeyFile read_key_file(const std::string& path) {
   key.path = path;
   key.role = fields.role();
   const bool is_server = key.role == Role::kServer;
-  fields.refuse_unknown(is_server ? std::span<const std::string_view>(kServersFields)
-                                  : std::span<const std::string_view>(kPeersFields),
+  fields.refuse_unknown(Fields(kFileFields).first(is_server ? 4 : 5),
                         is_server ? "the server's key file" : "a key file");
   key.name = fields.name();
   key.pair.public_key = fields.key("public");
-  if (fields.key("secret") != CurveKey{} || !secret) {
-    fields.fail("secret", "`secret` must begin its line, as secret = \"KEY\"");
-  }
+  fields.require("secret", fields.key("secret") == CurveKey{} && secret,
+                 "`secret` must begin its line, as secret = \"KEY\"");
   key.pair.secret_key = *secret;
-  if (public_half_of(key.pair.secret_key) != key.pair.public_key) {
-    fields.fail("secret", "`secret` is not the other half of `public`");
-  }
+  fields.require("secret", public_half_of(key.pair.secret_key) == key.pair.public_key,
+                 "`secret` is not the other half of `public`");
   if (!is_server) {
     key.server = fields.key("server");
   }
@@ -300,29 +263,22 @@ KeyFile read_key_file(const std::string& path) {
 }
 
 void write_key_file(const std::string& path, const KeyFile& key) {
-  constexpr std::size_t kLongestRest = 256;
-  std::string text = fmt::format(
-      "# A key of oblique: whoever can read this file can pass for its owner.\n"
-      "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\n",
-      name_of(key.role), key.name, z85(key.pair.public_key));
+  constexpr std::size_t kLongest = 1024;  // growing would leave parts of the secret key behind
   std::string secret = z85(key.pair.secret_key.bytes());
-  text.reserve(text.size() + kLongestRest);  // growing would leave the secret key behind
-  ((text += "secret = \"") += secret) += "\"\n";
+  std::string text;
+  text.reserve(kLongest);
+  fmt::format_to(std::back_inserter(text),
+                 "# A key of oblique: whoever can read this file can pass for its owner.\n"
+                 "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\nsecret = \"",
+                 name_of(key.role), key.name, z85(key.pair.public_key));
+  (text += secret) += "\"\n";
   if (key.server) {
     text += fmt::format("server = \"{}\"  # public key\n", z85(*key.server));
   }
-  const auto wipe = [&] {
-    sodium_memzero(secret.data(), secret.size());
-    sodium_memzero(text.data(), text.size());
-  };
-  try {
-    write_new_file(
-        path, text, [](const Descriptor&) {}, [] {});
-  } catch (const std::runtime_error&) {
-    wipe();
-    throw;
-  }
-  wipe();
+  const auto wiped = [](std::string* bytes) { sodium_memzero(bytes->data(), bytes->size()); };
+  const std::unique_ptr<std::string, decltype(wiped)> wipes_secret(&secret, wiped);
+  const std::unique_ptr<std::string, decltype(wiped)> wipes_text(&text, wiped);
+  write_new_file(path, text);
 }
 
 std::string objection_to_key_name(std::string_view name) {
@@ -341,13 +297,16 @@ std::string objection_to_key_name(std::string_view name) {
 }
 
 const AuthorizedKey* AuthorizedKeys::find(const CurveKey& public_key) const {
-  const auto place = places_.find(public_key);
-  return place == places_.end() ? nullptr : &keys_.at(place->second);
+  const auto found = std::find_if(keys_.begin(), keys_.end(), [&](const AuthorizedKey& key) {
+    return key.public_key == public_key;
+  });
+  return found == keys_.end() ? nullptr : &*found;
 }
 
 const AuthorizedKey* AuthorizedKeys::find(std::string_view name) const {
-  const auto place = places_by_name_.find(name);
-  return place == places_by_name_.end() ? nullptr : &keys_.at(place->second);
+  const auto found = std::find_if(keys_.begin(), keys_.end(),
+                                  [&](const AuthorizedKey& key) { return key.name == name; });
+  return found == keys_.end() ? nullptr : &*found;
 }
 
 void AuthorizedKeys::add(AuthorizedKey key) {
@@ -361,31 +320,20 @@ void AuthorizedKeys::add(AuthorizedKey key) {
     throw solver::InputError(fmt::format("the public key {} is there already, called {}",
                                          z85(key.public_key), same->name));
   }
-  places_.emplace(key.public_key, keys_.size());
-  places_by_name_.emplace(key.name, keys_.size());
   keys_.push_back(std::move(key));
 }
 
-AuthorizedKey AuthorizedKeys::remove(std::string_view name) {
-  const auto* found = find(name);
-  if (found == nullptr) {
-    std::vector<std::string_view> names;
-    for (const AuthorizedKey& key : keys_) {
-      names.emplace_back(key.name);
-    }
-    throw solver::InputError(fmt::format("there is no key called {}{}; there {}", excerpt(name),
-                                         did_you_mean(name, names),
-                                         names.empty() ? "is none" : "are: " + joined(names)));
+void AuthorizedKeys::remove(std::string_view name) {
+  if (std::erase_if(keys_, [&](const AuthorizedKey& key) { return key.name == name; }) > 0) {
+    return;
   }
-  AuthorizedKey removed = *found;
-  AuthorizedKeys others;
-  for (AuthorizedKey& key : keys_) {
-    if (key.name != name) {
-      others.add(std::move(key));
-    }
+  std::vector<std::string_view> names;
+  for (const AuthorizedKey& key : keys_) {
+    names.emplace_back(key.name);
   }
-  *this = std::move(others);
-  return removed;
+  throw solver::InputError(fmt::format("there is no key called {}{}; there {}", excerpt(name),
+                                       did_you_mean(name, names),
+                                       names.empty() ? "is none" : "are: " + joined(names)));
 }
 
 std::string authorized_keys_beside(const std::string& server_key_file) {
@@ -417,8 +365,8 @@ void change_authorized_keys(const std::string& path,
   std::error_code is_new;
   const auto real = std::filesystem::canonical(path, is_new);
   const std::string target = is_new ? path : real.string();
-  const Descriptor locked = locked_file(target);
-  AuthorizedKeys keys = read_authorized_keys(path);
+  const Descriptor lock = locked_folder_of(target);
+  AuthorizedKeys keys = exists(target) ? read_authorized_keys(path) : AuthorizedKeys();
   change(keys);
   const std::string text = text_of(keys);
   if (text.size() > kMostBytes) {
@@ -427,7 +375,14 @@ void change_authorized_keys(const std::string& path,
                     "revoke keys that nobody uses",
                     path, text.size(), kMostBytes));
   }
-  replace_file(locked, target, text);
+  const std::string draft = target + ".new";
+  ::unlink(draft.c_str());  // left by a process that was killed
+  write_new_file(draft, text, target);
+  if (::rename(draft.c_str(), target.c_str()) != 0) {
+    ::unlink(draft.c_str());
+    fail_to("cannot replace", path);
+  }
+  flush_folder_of(target);
 }
 
 std::string utc_now() {
@@ -443,11 +398,8 @@ std::string authorized_keys_in(const std::string& folder) {
 }
 
 std::string key_folder_meant(const std::string& named) {
-  const auto is_there = [](const std::string& path) {
-    return std::filesystem::exists(std::filesystem::symlink_status(path));
-  };
-  const auto has_keys = [&is_there](const std::string& folder) {
-    return is_there(authorized_keys_in(folder)) || is_there(key_file_in(folder, "server"));
+  const auto has_keys = [](const std::string& folder) {
+    return exists(authorized_keys_in(folder)) || exists(key_file_in(folder, "server"));
   };
   std::string folder = named;
   if (folder.empty()) {
@@ -462,28 +414,32 @@ std::string key_folder_meant(const std::string& named) {
 }
 
 CurveKey make_key_folder(const std::string& folder) {
-  MadeFiles made;
   constexpr mode_t kFolderMode = 0700;
+  std::vector<std::string> made;
   if (::mkdir(folder.c_str(), kFolderMode) == 0) {
-    made.add(folder);
+    made.push_back(folder);
   } else if (errno != EEXIST) {
     fail_to("cannot make the folder", folder);
   }
   const std::string list = authorized_keys_in(folder);
-  if (std::filesystem::exists(std::filesystem::symlink_status(list))) {
+  if (exists(list)) {
     throw std::runtime_error(list + " is there already, and is never overwritten");
   }
   const KeyPair server = made_key_pair();
-  const std::string server_file = key_file_in(folder, "server");
-  write_key_file(server_file, {Role::kServer, "server", server});
-  made.add(server_file);
-  made.add(list);
-  for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
-    const std::string name(name_of(role));
-    add_key(folder, name, role, std::nullopt);
-    made.add(key_file_in(folder, name));
+  try {
+    write_key_file(key_file_in(folder, "server"), {Role::kServer, "server", server});
+    made.insert(made.end(), {key_file_in(folder, "server"), list});
+    for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
+      const std::string name(name_of(role));
+      add_key(folder, name, role, std::nullopt);
+      made.push_back(key_file_in(folder, name));
+    }
+  } catch (const std::exception&) {
+    for (auto path = made.rbegin(); path != made.rend(); ++path) {
+      ::remove(path->c_str());
+    }
+    throw;
   }
-  made.keep();
   return server.public_key;
 }
 
@@ -497,16 +453,12 @@ AuthorizedKey add_key(const std::string& folder, const std::string& name, Role r
   }
   const KeyPair pair = public_key ? KeyPair{*public_key, {}} : made_key_pair();
   const AuthorizedKey added{name, role, pair.public_key, utc_now()};
-  MadeFiles made;
   change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
     keys.add(added);
     if (!public_key) {
-      const std::string path = key_file_in(folder, name);
-      write_key_file(path, {role, name, pair, server.pair.public_key});
-      made.add(path);
+      write_key_file(key_file_in(folder, name), {role, name, pair, server.pair.public_key});
     }
   });
-  made.keep();
   return added;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -55,12 +54,10 @@ class AuthorizedKeys {
   /// Throws solver::InputError when name or key exist, naming which, or the name is not allowed.
   void add(AuthorizedKey key);
   /// Throws solver::InputError, with the known names, for an unknown name.
-  AuthorizedKey remove(std::string_view name);
+  void remove(std::string_view name);
 
  private:
   std::vector<AuthorizedKey> keys_;
-  std::map<CurveKey, std::size_t> places_;
-  std::map<std::string, std::size_t, std::less<>> places_by_name_;
 };
 
 /// The list beside a server's key file: DIR/authorized_keys.toml.

@@ -1,4 +1,3 @@
-#include "proto/program/completion.h"
 
 #include <iostream>
 #include <string_view>

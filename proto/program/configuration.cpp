@@ -5,7 +5,6 @@
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <span>
 #include <sstream>
 #include <string_view>
@@ -20,6 +19,7 @@
 #include "proto/text.h"
 #include "proto/toml_reader.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
 namespace {
@@ -34,18 +34,10 @@ std::string variable(const std::string& name) {
 }
 
 /// "--worker-port" as a key: "worker_port".
-std::string key_form(std::string flag) {
-  flag.erase(0, 2);
-  std::replace(flag.begin(), flag.end(), '-', '_');
-  return flag;
-}
-
-/// The same as a variable: "WORKER_PORT".
-std::string variable_form(const std::string& flag) {
-  std::string name = key_form(flag);
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-  return name;
+std::string key_of(const CLI::Option& option) {
+  std::string key = option.get_name().substr(2);
+  std::replace(key.begin(), key.end(), '-', '_');
+  return key;
 }
 
 bool is_switch(const CLI::Option& option) {
@@ -62,8 +54,17 @@ bool is_typed(const CLI::Option& option) {
                                            [](const auto* other) { return other->count() > 0; });
 }
 
-/// The value of a key as it would be typed.
-std::string typed_value(const TomlReader& file, std::string_view key, const toml::node& node) {
+/// The values of a key as they would be typed.
+std::vector<std::string> typed_values(const TomlReader& file, std::string_view key,
+                                      const toml::node& node) {
+  if (const auto* list = node.as_array(); list != nullptr && !list->empty()) {
+    std::vector<std::string> values;
+    for (const toml::node& item : *list) {
+      const auto value = typed_values(file, key, item);
+      values.insert(values.end(), value.begin(), value.end());
+    }
+    return values;
+  }
   const std::string value = node.is_string()                        ? *node.value<std::string>()
                             : node.is_number() || node.is_boolean() ? shown(node)
                                                                     : "";
@@ -72,20 +73,7 @@ std::string typed_value(const TomlReader& file, std::string_view key, const toml
                                 "that is not empty, or a list of these",
                                 excerpt(key), shown(node)));
   }
-  return value;
-}
-
-std::vector<std::string> typed_values(const TomlReader& file, std::string_view key,
-                                      const toml::node& node) {
-  std::vector<std::string> values;
-  if (const auto* list = node.as_array(); list != nullptr && !list->empty()) {
-    for (const toml::node& item : *list) {
-      values.push_back(typed_value(file, key, item));
-    }
-  } else {
-    values.push_back(typed_value(file, key, node));
-  }
-  return values;
+  return {value};
 }
 
 /// The value of an option, or its default; none when it has neither.
@@ -105,17 +93,16 @@ std::vector<std::string> effective_values(const CLI::Option& option) {
                                                     : std::vector{by_default};
 }
 
-/// An option is a number in the file when the name of its type says so.
+/// A value as TOML. Numbers that would not read back as the same text are in quotes, which all
+/// options take.
 std::string toml_value(const CLI::Option& option, const std::string& value) {
-  constexpr std::array<std::string_view, 6> kNumbers{"INT",   "UINT",    "FLOAT",
-                                                     "BYTES", "SECONDS", "MILLISECONDS"};
   if (is_switch(option)) {
     return CLI::detail::to_flag_value(value) > 0 ? "true" : "false";
   }
-  // CLI11 appends descriptions of checks behind a colon.
-  const std::string type = option.get_type_name();
-  if (std::find(kNumbers.begin(), kNumbers.end(), type.substr(0, type.find(':'))) !=
-      kNumbers.end()) {
+  const auto number = solver::number_of(value);
+  const bool is_whole = value.find_first_not_of("0123456789") == std::string::npos &&
+                        value.size() < 19 && (value == "0" || !value.starts_with('0'));
+  if (number && (is_whole || solver::exact_number(*number) == value)) {
     return value;
   }
   std::ostringstream quoted;
@@ -171,160 +158,120 @@ void Configuration::add_log_options(LogSettings& settings) {
 
 std::optional<int> Configuration::parse(int argc, const char* const* argv) {
   find_settings();
-  // The flags alone, for --help, --config and their own errors.
   if (const auto exit_code = parse_command_line(app_, argc, argv)) {
     return exit_code;
   }
-  try {
-    std::vector<std::string> words;
-    if (!without_places_) {
-      read_file();
-      read_environment();
+  std::string place;  // of the values that are set
+  const auto set = [](CLI::Option& option, const std::vector<std::string>& values) {
+    option.clear();
+    for (const std::string& value : values) {
+      option.add_result(value);
     }
+    option.run_callback();
+  };
+  try {
+    const Given given = without_places_ ? Given() : values_of_places();
     for (const Setting& setting : settings_) {
-      for (const std::string& value : setting.values) {
-        if (!is_typed(*setting.option)) {
-          words.push_back(fmt::format("{}={}", setting.option->get_name(), value));
-        }
+      const auto found = given.find(setting.key);
+      if (found != given.end() && !is_typed(*setting.option)) {
+        place = found->second.place;
+        set(*setting.option, found->second.values);
       }
     }
-    for (const char* const* word = argv + 1; word < argv + argc; ++word) {
-      words.push_back(quiet_ != nullptr && quiet_->check_name(*word) ? "--log-level=warning"
-                                                                     : *word);
+    if (quiet_ != nullptr && quiet_->count() > 0) {
+      set(*app_.get_option("--log-level"), {"warning"});
     }
-    std::reverse(words.begin(), words.end());  // as CLI11 takes them
-    app_.parse(words);
     return std::nullopt;
   } catch (const solver::InputError& error) {
     return tell_wrong_usage(app_.get_name(), error.what());
   } catch (const CLI::ParseError& error) {
-    return tell_wrong_usage(app_.get_name(), located(objection_of(app_, app_, error)));
+    return tell_wrong_usage(app_.get_name(), place + objection_of(app_, app_, error));
   }
 }
 
-/// Also gives --help its footer, with an option of several words as example.
 void Configuration::find_settings() {
   for (CLI::Option* option : app_.get_options()) {
     if (option->get_configurable()) {
-      settings_.push_back({option, key_of(option->get_name()), option->get_envname()});
-      option->envname("");  // CLI11 would give the file precedence over it
+      settings_.push_back({option, key_of(*option), option->get_envname()});
+      option->envname("");  // CLI11 would give it precedence over the program's own variable
     }
   }
-  const auto example = std::find_if(settings_.begin(), settings_.end(), [](const Setting& setting) {
-    return !is_switch(*setting.option) && setting.key.find('_') != std::string::npos;
-  });
-  if (example != settings_.end()) {
-    const std::string flag = example->option->get_name();
-    app_.footer(fmt::format(
-        "Every option may also be an environment variable ({}: {}{}) or a key of the file ({});\n"
-        "--print-config shows the effective settings.",
-        flag, places_.environment_prefix, variable_form(flag), example->key));
-  }
+  app_.footer(fmt::format(
+      "Every option may also be an environment variable (--log-level: {}LOG_LEVEL) or a key of\n"
+      "the file (log_level); --print-config shows the effective settings.",
+      places_.environment_prefix));
 }
 
-std::string Configuration::key_of(const std::string& flag) const {
-  std::string key = key_form(flag);
-  for (const std::string& table : places_.tables) {
-    if (key.starts_with(table + "_")) {
-      key[table.size()] = '.';
-    }
-  }
-  return key;
-}
-
+/// The file to read; empty: none.
 std::string Configuration::file_to_read() const {
-  if (without_places_ || !file_.empty()) {
-    return file_;
-  }
-  if (std::string named = variable(places_.environment_prefix + "CONFIG"); !named.empty()) {
-    return named;
-  }
+  std::string path = file_.empty() ? variable(places_.environment_prefix + "CONFIG") : file_;
   std::error_code unknown;
-  const bool exists = std::filesystem::exists(places_.default_file, unknown);
-  return exists || unknown ? places_.default_file : "";
+  const bool takes_default =
+      path.empty() && (std::filesystem::exists(places_.default_file, unknown) || unknown);
+  return takes_default ? places_.default_file : path;
 }
 
-void Configuration::read_file() {
-  const std::string path = file_to_read();
-  if (path.empty()) {
-    return;
+/// The values of the file, and those of variables, which replace them.
+Configuration::Given Configuration::values_of_places() const {
+  Given given;
+  if (const std::string path = file_to_read(); !path.empty()) {
+    read_file(path, given);
   }
+  for (const Setting& setting : settings_) {
+    std::string own = setting.key;
+    std::transform(own.begin(), own.end(), own.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+    for (const std::string& name : {setting.shared_variable, places_.environment_prefix + own}) {
+      if (const std::string value = variable(name); !value.empty()) {
+        given[setting.key] = {{value}, fmt::format("environment variable {}: ", name)};
+      }
+    }
+  }
+  return given;
+}
+
+void Configuration::read_file(const std::string& path, Given& given) const {
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   const TomlReader file(path);
   const toml::table top = file.parse(read_small_file(path, "the configuration file", kMostBytes));
+  std::vector<std::string_view> known;
+  for (const Setting& setting : settings_) {
+    known.emplace_back(setting.key);
+  }
   const auto take = [&](const std::string& name, const toml::key& key, const toml::node& node) {
-    std::vector<std::string_view> known;
-    for (Setting& setting : settings_) {
-      if (setting.key == name) {
-        setting.values = typed_values(file, name, node);
-        setting.place = file.before(key.source());
-        return;
-      }
-      known.emplace_back(setting.key);
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      file.fail(key,
+                fmt::format("there is no setting {}{}", excerpt(name), did_you_mean(name, known)));
     }
-    file.fail(key,
-              fmt::format("there is no setting {}{}", excerpt(name), did_you_mean(name, known)));
+    given[name] = {typed_values(file, name, node), file.before(key.source())};
   };
   for (const auto& [key, node] : top) {
     const std::string name(key.str());
-    if (std::find(places_.tables.begin(), places_.tables.end(), name) == places_.tables.end()) {
+    if (!node.is_table()) {
       take(name, key, node);
       continue;
     }
-    for (const auto& [inner, value] : file.table(name, node, "a table")) {
-      take(name + "." + std::string(inner.str()), inner, value);
+    for (const auto& [inner, value] : *node.as_table()) {
+      take(name + "_" + std::string(inner.str()), inner, value);
     }
   }
-}
-
-void Configuration::read_environment() {
-  for (Setting& setting : settings_) {
-    const std::string own = places_.environment_prefix + variable_form(setting.option->get_name());
-    for (const std::string& name : {setting.shared_variable, own}) {
-      if (const std::string value = variable(name); !value.empty()) {
-        setting.values = {value};
-        setting.place = fmt::format("environment variable {}: ", name);
-      }
-    }
-  }
-}
-
-/// The error with the place of the value that it is about, unless that was typed.
-std::string Configuration::located(const std::string& error) const {
-  for (const Setting& setting : settings_) {
-    const std::string flag = setting.option->get_name();
-    const auto at = error.find(flag);
-    if (at != std::string::npos && !setting.place.empty() &&
-        std::string("-_abcdefghijklmnopqrstuvwxyz").find(error[at + flag.size()]) ==
-            std::string::npos) {
-      return setting.place + error;
-    }
-  }
-  return error;
 }
 
 std::string Configuration::printed() const {
-  const std::string path = file_to_read();
-  std::string top = fmt::format("# {}: the effective settings; {}\n", app_.get_name(),
-                                path.empty() ? "no file was read" : "read from " + visible(path));
-  std::map<std::string, std::string> tables;
+  const std::string path = without_places_ ? "" : file_to_read();
+  std::string text = fmt::format("# {}: the effective settings; {}\n", app_.get_name(),
+                                 path.empty() ? "no file was read" : "read from " + visible(path));
   for (const Setting& setting : settings_) {
     const CLI::Option& option = *setting.option;
-    const auto dot = setting.key.find('.');
-    std::string& text = dot == std::string::npos ? top : tables[setting.key.substr(0, dot)];
-    const std::string name = setting.key.substr(dot + 1);  // npos is -1
     std::vector<std::string> values = effective_values(option);
     for (std::string& value : values) {
       value = toml_value(option, value);
     }
-    text += values.empty()       ? fmt::format("# {} is not set\n", name)
-            : takes_list(option) ? fmt::format("{} = [{}]\n", name, fmt::join(values, ", "))
-                                 : fmt::format("{} = {}\n", name, values.back());
+    text += values.empty()       ? fmt::format("# {} is not set\n", setting.key)
+            : takes_list(option) ? fmt::format("{} = [{}]\n", setting.key, fmt::join(values, ", "))
+                                 : fmt::format("{} = {}\n", setting.key, values.back());
   }
-  for (const auto& [table, lines] : tables) {
-    top += fmt::format("\n[{}]\n{}", table, lines);
-  }
-  return top;
+  return text;
 }
 
 }  // namespace oblique::protocol

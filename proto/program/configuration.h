@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,9 +13,8 @@ namespace oblique::protocol {
 
 /// What is fixed for a program.
 struct ConfigurationPlaces {
-  std::string environment_prefix;   ///< of variables, as "OBLIQUE_SERVER_"
-  std::string default_file;         ///< read when it exists; empty: none
-  std::vector<std::string> tables;  ///< of the file: first words of flags that form a table
+  std::string environment_prefix;  ///< of variables, as "OBLIQUE_SERVER_"
+  std::string default_file;        ///< read when it exists; empty: none
 };
 
 /// The file NAME in the configuration folder of this installation: /etc/oblique of programs in
@@ -24,8 +24,8 @@ std::string default_configuration_file(const std::string& name);
 
 /// The settings of a program from a TOML file, environment variables and flags, the later being
 /// stronger. The flag --worker-port is the variable OBLIQUE_SERVER_WORKER_PORT and the key
-/// worker_port; --limits-connections is the variable OBLIQUE_SERVER_LIMITS_CONNECTIONS and the key
-/// connections of the table [limits]. Options that are not `configurable` are flags only.
+/// worker_port, or the key port of a table [worker]. Options that are not `configurable` are flags
+/// only.
 class Configuration {
  public:
   /// Adds --config, --no-config and --print-config to `app`, which must outlive this.
@@ -46,18 +46,20 @@ class Configuration {
  private:
   struct Setting {
     CLI::Option* option;
-    std::string key;                       ///< "limits.connections"
-    std::string shared_variable;           ///< of several programs; empty: none
-    std::vector<std::string> values = {};  ///< of file or environment
-    std::string place = {};                ///< of these values, as "server.toml:3:1: "
+    std::string key;              ///< "limits_connections"
+    std::string shared_variable;  ///< of several programs; empty: none
   };
+  /// Values of file or environment, and their place, as "server.toml:3:1: ".
+  struct PlacedValues {
+    std::vector<std::string> values;
+    std::string place;
+  };
+  using Given = std::map<std::string, PlacedValues>;  ///< by key
 
   void find_settings();
-  std::string key_of(const std::string& flag) const;
   std::string file_to_read() const;
-  void read_file();
-  void read_environment();
-  std::string located(const std::string& error) const;
+  Given values_of_places() const;
+  void read_file(const std::string& path, Given& given) const;
 
   CLI::App& app_;
   ConfigurationPlaces places_;

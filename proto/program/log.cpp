@@ -7,79 +7,73 @@
 #include <cstdlib>
 #include <ctime>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <string_view>
 #include <utility>
 
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
-#include <spdlog/pattern_formatter.h>
+#include <spdlog/formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
-#include "proto/program/exit_code.h"
+#include "proto/program/usage.h"
 #include "proto/text.h"
 
 namespace oblique::protocol {
 namespace {
 
-std::string text_of(const spdlog::string_view_t& view) {
-  return {view.data(), view.size()};
-}
+enum class Form { kText, kJournal, kJson };
 
-/// The message of a log line, made visible.
-class VisibleMessage : public spdlog::custom_flag_formatter {
+/// Lines of the log in one of the forms of `set_up_log`.
+class LineFormatter : public spdlog::formatter {
  public:
-  void format(const spdlog::details::log_msg& message, const std::tm&,
-              spdlog::memory_buf_t& line) override {
-    const std::string text = visible({message.payload.data(), message.payload.size()});
-    line.append(text.data(), text.data() + text.size());
-  }
-  std::unique_ptr<custom_flag_formatter> clone() const override {
-    return std::make_unique<VisibleMessage>();
-  }
-};
+  explicit LineFormatter(Form form) : form_(form) {}
 
-/// The level as the journal has it at the start of a line: that of syslog.
-class JournalLevel : public spdlog::custom_flag_formatter {
- public:
-  void format(const spdlog::details::log_msg& message, const std::tm&,
-              spdlog::memory_buf_t& line) override {
-    const char level = message.level >= spdlog::level::err    ? '3'
-                       : message.level == spdlog::level::warn ? '4'
-                       : message.level == spdlog::level::info ? '6'
-                                                              : '7';
-    for (const char c : {'<', level, '>'}) {
-      line.push_back(c);
-    }
-  }
-  std::unique_ptr<custom_flag_formatter> clone() const override {
-    return std::make_unique<JournalLevel>();
-  }
-};
-
-/// One JSON object a line.
-class JsonLine : public spdlog::formatter {
- public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
-    using std::chrono::duration_cast;
     using std::chrono::milliseconds;
-    const auto since_1970 = duration_cast<milliseconds>(message.time.time_since_epoch()).count();
+    const auto since_1970 =
+        std::chrono::duration_cast<milliseconds>(message.time.time_since_epoch()).count();
     const auto seconds = fmt::gmtime(static_cast<std::time_t>(since_1970 / 1000));
-    const nlohmann::ordered_json object{
-        {"time", fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", seconds, since_1970 % 1000)},
-        {"level", text_of(spdlog::level::to_string_view(message.level))},
-        {"program", text_of(message.logger_name)},
-        {"message", text_of(message.payload)}};
-    // Bytes that are no UTF-8 become U+FFFD; all beyond ASCII is escaped, so that a line is one
-    // line for every reader.
-    const std::string text = object.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-    line.append(text.data(), text.data() + text.size());
-    line.push_back('\n');
+    const std::string time = fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", seconds, since_1970 % 1000);
+    const std::string level = text_of(spdlog::level::to_string_view(message.level));
+    const std::string program = text_of(message.logger_name);
+    const std::string text = text_of(message.payload);
+    const auto add = [&line](std::string_view part) { line.append(part.begin(), part.end()); };
+    if (form_ == Form::kJson) {
+      const nlohmann::ordered_json object{
+          {"time", time}, {"level", level}, {"program", program}, {"message", text}};
+      // Bytes that are no UTF-8 become U+FFFD; all beyond ASCII is escaped, so that a line is one
+      // line for every reader.
+      add(object.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
+    } else if (form_ == Form::kJournal) {
+      add(fmt::format("<{}>{}", syslog_level(message.level), visible(text)));
+    } else {
+      add(fmt::format("{} {} ", time, program));
+      message.color_range_start = line.size();
+      add(level);
+      message.color_range_end = line.size();
+      add(": " + visible(text));
+    }
+    add("\n");
   }
-  std::unique_ptr<formatter> clone() const override { return std::make_unique<JsonLine>(); }
+  std::unique_ptr<formatter> clone() const override {
+    return std::make_unique<LineFormatter>(form_);
+  }
+
+ private:
+  static std::string text_of(const spdlog::string_view_t& view) {
+    return {view.data(), view.size()};
+  }
+  static int syslog_level(spdlog::level::level_enum level) {
+    return level >= spdlog::level::err    ? 3
+           : level == spdlog::level::warn ? 4
+           : level == spdlog::level::info ? 6
+                                          : 7;
+  }
+
+  Form form_;
 };
 
 /// The variable JOURNAL_STREAM names the file that systemd made standard error; it is inherited
@@ -91,17 +85,6 @@ bool journal_reads_standard_error() {
          fmt::format("{}:{}", file.st_dev, file.st_ino) == stream;
 }
 
-std::unique_ptr<spdlog::formatter> formatter_for(const LogSettings& settings) {
-  if (settings.format == "json") {
-    return std::make_unique<JsonLine>();
-  }
-  auto lines = std::make_unique<spdlog::pattern_formatter>(spdlog::pattern_time_type::utc);
-  lines->add_flag<VisibleMessage>('*').add_flag<JournalLevel>('J');
-  lines->set_pattern(journal_reads_standard_error() ? "%J%*"
-                                                    : "%Y-%m-%dT%H:%M:%S.%eZ %n %^%l%$: %*");
-  return lines;
-}
-
 }  // namespace
 
 void set_up_log(const std::string& program, const LogSettings& settings) {
@@ -110,7 +93,10 @@ void set_up_log(const std::string& program, const LogSettings& settings) {
   auto logger = std::make_shared<spdlog::logger>(
       program, std::make_shared<spdlog::sinks::stderr_color_sink_mt>(
                    wants_none ? spdlog::color_mode::never : spdlog::color_mode::automatic));
-  logger->set_formatter(formatter_for(settings));
+  logger->set_formatter(std::make_unique<LineFormatter>(settings.format == "json" ? Form::kJson
+                                                        : journal_reads_standard_error()
+                                                            ? Form::kJournal
+                                                            : Form::kText));
   logger->set_level(spdlog::level::from_str(settings.level));
   spdlog::set_default_logger(std::move(logger));
 }

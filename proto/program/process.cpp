@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -30,7 +29,7 @@ bool is_ignored(int signal) {
   return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
 }
 
-/// Empty for the id of a process, and for no value at all.
+/// Empty for the id of a process and for an empty text.
 std::string objection_to_process(const std::string& text) {
   pid_t process = 0;
   return text.empty() || (CLI::detail::lexical_cast(text, process) && process > 0)
@@ -38,19 +37,12 @@ std::string objection_to_process(const std::string& text) {
              : "\"" + text + "\" is no process id";
 }
 
-/// The value of the variable, which is gone afterwards; empty when there is none.
+/// Removes the variable and returns its value; empty when there is none.
 std::string taken(const char* name) {
   const char* const value = std::getenv(name);
   std::string kept = value == nullptr ? "" : value;
   unsetenv(name);
   return kept;
-}
-
-std::int64_t number_in(const std::string& text) {
-  std::int64_t value = 0;
-  const char* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
-  return error == std::errc() && end == last ? value : 0;
 }
 
 }  // namespace
@@ -73,7 +65,7 @@ StopSignals::StopSignals() {
 }
 
 StopSignals::~StopSignals() {
-  (void)requested();  // who polled the descriptor has heeded it; unblocked it would end the program
+  (void)requested();
   pthread_sigmask(SIG_SETMASK, &before_, nullptr);
 }
 
@@ -125,14 +117,14 @@ bool StopWithParent::begin() const {
   if (prctl(PR_SET_PDEATHSIG, SIGTERM) != 0) {
     throw std::system_error(errno, std::generic_category(), "cannot watch the parent process");
   }
-  // Who ended before the system was asked is missed by nobody else.
+  // The system does not report a parent that has ended already.
   return getppid() == (named_ > 0 ? named_ : parent_);
 }
 
 Notifier::Notifier() : socket_(taken("NOTIFY_SOCKET")) {
-  const std::int64_t within_us = number_in(taken("WATCHDOG_USEC"));
+  const std::int64_t within_us = std::atoll(taken("WATCHDOG_USEC").c_str());
   const std::string watched = taken("WATCHDOG_PID");
-  if (within_us > 0 && (watched.empty() || number_in(watched) == getpid())) {
+  if (within_us > 0 && (watched.empty() || watched == std::to_string(getpid()))) {
     heartbeat_ = std::chrono::microseconds(within_us) / 2;
   }
 }
@@ -157,7 +149,6 @@ void Notifier::stopping(const std::string& sentence, std::chrono::milliseconds l
 
 void Notifier::turn(Clock::time_point now) {
   if (heartbeat_ && now >= next_heartbeat_) {
-    // Half of the time is between two; turns come several times a second.
     next_heartbeat_ = now + *heartbeat_;
     send("WATCHDOG=1");
   }

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
+#include <ctime>
 #include <iostream>
 #include <iterator>
-#include <string_view>
-#include <vector>
+#include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -15,11 +16,8 @@
 namespace oblique::protocol {
 namespace {
 
-std::string objection_to_empty_flag(const std::string& value) {
-  return value.empty() ? "the value is empty: give one, or leave the flag out" : "";
-}
-std::string objection_to_empty_word(const std::string& value) {
-  return value.empty() ? "the value is empty: give one" : "";
+std::string objection_to_empty(const std::string& value) {
+  return value.empty() ? "the value is empty: give one, or leave the option out" : "";
 }
 
 /// Names of the verbs of a verb or the program, and of its flags.
@@ -40,6 +38,43 @@ bool has_verbs(const CLI::App& verb) {
   return !verb.get_subcommands([](const CLI::App*) { return true; }).empty();
 }
 
+constexpr std::int64_t kDay_s = 86'400;
+constexpr std::int64_t kLongest_s = 36'525 * kDay_s;
+
+std::optional<std::int64_t> duration_s(std::string_view text) {
+  std::int64_t value = -1;
+  const auto* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, value);
+  const std::string_view unit(end, static_cast<std::size_t>(last - end));
+  const std::int64_t unit_s = unit.empty() || unit == "s" ? 1
+                              : unit == "m"               ? 60
+                              : unit == "h"               ? 3600
+                              : unit == "d"               ? kDay_s
+                                                          : 0;
+  const bool is_duration =
+      error == std::errc() && unit_s > 0 && value >= 0 && value <= kLongest_s / unit_s;
+  return is_duration ? std::optional(value * unit_s) : std::nullopt;
+}
+
+/// Seconds since 1970 of a time in ISO 8601.
+std::optional<std::int64_t> moment_s(const std::string& text) {
+  std::tm parts{};
+  const char* rest = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &parts);
+  const bool is_local = rest != nullptr && *rest == '\0';
+  if (rest != nullptr && !is_local) {
+    rest = strptime(rest, "%z", &parts);
+  }
+  if (rest == nullptr || *rest != '\0') {
+    return std::nullopt;
+  }
+  const std::tm written = parts;
+  parts.tm_isdst = -1;
+  const std::int64_t moment = is_local ? std::mktime(&parts) : timegm(&parts) - written.tm_gmtoff;
+  // A day that the month does not have has become one of the next month.
+  const bool is_sound = parts.tm_mday == written.tm_mday && std::abs(written.tm_gmtoff) < kDay_s;
+  return is_sound ? std::optional(moment) : std::nullopt;
+}
+
 /// The name of a check that is never active and that help does not show: CLI11 keeps no other notes
 /// with options.
 constexpr const char* kChoices = "choices";
@@ -50,8 +85,7 @@ void refuse_empty_values(CLI::App& app) {
   for (auto* option : app.get_options()) {
     // An option that may stand without a value has none then.
     if (option->get_items_expected_min() > 0) {
-      const bool is_flag = !option->get_lnames().empty() || !option->get_snames().empty();
-      option->check(is_flag ? objection_to_empty_flag : objection_to_empty_word);
+      option->check(objection_to_empty);
     }
   }
   for (auto* verb : app.get_subcommands({})) {
@@ -85,6 +119,22 @@ CLI::Validator whole_number_from(std::int64_t least) {
       "");
 }
 
+std::optional<std::chrono::milliseconds> time_until(std::string_view text,
+                                                    std::chrono::system_clock::time_point now) {
+  using std::chrono::milliseconds;
+  using std::chrono::seconds;
+  if (const auto duration = duration_s(text)) {
+    return seconds(*duration);
+  }
+  const auto moment = moment_s(std::string(text));
+  if (!moment) {
+    return std::nullopt;
+  }
+  const auto now_ms = std::chrono::duration_cast<milliseconds>(now.time_since_epoch());
+  const milliseconds left = seconds(*moment) - now_ms;
+  return std::chrono::abs(left) <= seconds(kLongest_s) ? std::optional(left) : std::nullopt;
+}
+
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices) {
   return option->check(
       CLI::Validator(fmt::format("{}", fmt::join(choices, " "))).name(kChoices).active(false));
@@ -104,7 +154,7 @@ std::vector<std::string> choices_of(CLI::Option& option) {
 std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error) {
   const auto words = known_words(verb);
   const std::vector<std::string_view> candidates(words.begin(), words.end());
-  // A word too many says more than the missing verb or flag that it may have been meant for.
+  // An unexpected word is more helpful than the missing verb or flag that it may be a slip of.
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_verb = has_verbs(verb) && !first.starts_with("-");

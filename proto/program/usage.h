@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,11 +11,14 @@
 
 #include <CLI/CLI.hpp>
 
-#include "proto/program/exit_code.h"
-
 namespace oblique::protocol {
 
 // What the command lines of our programs share.
+
+// Exit codes.
+inline constexpr int kDone = 0;
+inline constexpr int kFailed = 1;
+inline constexpr int kWrongUsage = 2;
 
 /// Makes an empty value of any option or argument of `app` and its verbs wrong usage: it may come
 /// from a shell variable that is not set. Call it after all options are added.
@@ -27,13 +31,12 @@ CLI::Validator number_between(double least, double largest);
 CLI::Validator whole_number_from(std::int64_t least);
 
 /// The time from `now` to `text`, negative for the past. `text` is a time in ISO 8601, as
-/// 2026-11-22T05:00:00Z, 2026-11-22T05:00+01:00 or, in local time, 2026-11-22T05:00:00; or a
-/// duration: 5400, 5400s, 90m, 1h30m, 2d. Nothing for other text, and for more than a hundred
-/// years.
+/// 2026-11-22T05:00:00Z, 2026-11-22T06:00:00+01:00 or, in local time, 2026-11-22T05:00:00; or a
+/// duration: 5400, 5400s, 90m, 2h, 1d. Nothing for other text, and for more than a hundred years.
 std::optional<std::chrono::milliseconds> time_until(std::string_view text,
                                                     std::chrono::system_clock::time_point now);
 
-/// Notes the values that an option may have, for completion; whoever reads the value checks it.
+/// Notes the values that an option may have, for completion; the reader of the value checks it.
 /// Returns `option`.
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
 
@@ -51,5 +54,15 @@ int tell_wrong_usage(const std::string& words, const std::string& message);
 /// Parses the command line of a program without verbs. Returns the exit code when the program is to
 /// end: 0 after --help and --version, kWrongUsage after an error, which it has printed.
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv);
+
+/// Words that complete a value, by the name of its option ("--x") or of its type ("COLUMNS").
+using ValueWords = std::map<std::string, std::vector<std::string>>;
+
+/// Prints the completion script of `app` when the command line is `PROGRAM completion bash|zsh`,
+/// and returns the exit code. The script is static: it holds verbs, flags, the choices of flags
+/// (`note_choices`) and `words`, and offers file names for all other values. `app` must have all
+/// its verbs and options.
+std::optional<int> print_completion(CLI::App& app, int argc, const char* const* argv,
+                                    const ValueWords& words = {});
 
 }  // namespace oblique::protocol

@@ -19,6 +19,46 @@ inline constexpr std::uint64_t kMaxPoints = 1'000'000'000'000;
 /// Every block ends with the point keys in this order.
 inline constexpr std::array<std::string_view, 3> kPointKeyOrder{"H", "mu", "e"};
 
+/// Number of values of an axis: the length of a list or range, and 1 for an axis with a
+/// distribution or an expression.
+std::uint64_t axis_size(const Axis& axis);
+
+/// Whether the axis is a list or a range.
+bool has_own_values(const Axis& axis);
+
+/// Value i of a list or range. Throws std::out_of_range if the axis has no such value.
+double axis_value(const Axis& axis, std::uint64_t i);
+
+/// The values of a range. Both ends are exact. Value i of a linear range is (from (n - 1 - i) + to
+/// i) / (n - 1). If ends and step are decimals, it is the double nearest to the decimal: 0.1:1:10
+/// has 0.3. In a logarithmic range the logarithms are equally spaced.
+class RangeValues {
+ public:
+  /// `axis` must have a count.
+  explicit RangeValues(const Axis& axis);
+  double at(std::uint64_t i) const;
+
+ private:
+  double from_;
+  double to_;
+  std::uint64_t last_;
+  bool is_logarithmic_;
+  /// Value i is (first + step i) / per_unit, in whole numbers below 2^53.
+  struct Decimals {
+    double first;
+    double step;
+    double per_unit;  ///< a power of ten
+  };
+  std::optional<Decimals> decimals_;
+};
+
+/// Index of the first value that is at least `value`, or the number of values. Values must rise.
+std::uint64_t first_value_from(const Axis& axis, double value);
+
+/// Bounds of the values of a list, range or distribution; those of a distribution may be infinite.
+double smallest_value(const Axis& axis);
+double largest_value(const Axis& axis);
+
 /// How the axes of a block make points.
 enum class BlockKind : std::uint8_t {
   kProduct,  ///< all combinations of the values; the first axis varies slowest
@@ -55,10 +95,6 @@ struct AxisLayout {
 
 /// The axes of a checked block, in their order.
 std::vector<AxisLayout> layout_of(const Block& block);
-
-/// Whether the block is a product of lists and ranges without a filter, so that `layout_of` alone
-/// gives the points that meet a condition on its axes.
-bool is_plain_product(const Block& block);
 
 /// The model of the shortest finger in the block, without expressions: it has the smallest value of
 /// each key that sets lengths, because the length grows with each of them.

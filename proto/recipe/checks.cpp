@@ -4,7 +4,6 @@
 #include <bitset>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -14,11 +13,11 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/frames.h"
-#include "proto/recipe/axes.h"
-#include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/expression.h"
 #include "proto/recipe/keys.h"
+#include "proto/recipe/sampling.h"
+#include "proto/text.h"
 #include "proto/wire/frame_scan.h"
 #include "worker/solver/model/number.h"
 
@@ -46,26 +45,18 @@ void require(bool is_met, std::string_view sentence, const Arguments&... argumen
   }
 }
 
-/// Throws InputError if a list has a value twice. Sorts only values that neither rise nor fall.
-void check_repetition(const ParameterKey& key, const Axis& axis) {
-  std::vector<double> values(axis.values().begin(), axis.values().end());
-  if (std::adjacent_find(values.begin(), values.end(), std::greater_equal<>()) != values.end() &&
-      std::adjacent_find(values.begin(), values.end(), std::less_equal<>()) != values.end()) {
-    std::sort(values.begin(), values.end());
-    const auto twice = std::adjacent_find(values.begin(), values.end());
-    require(twice == values.end(), "{} has {} twice: every value of a list must differ", key.name,
-            twice == values.end() ? 0.0 : *twice);
-  }
-}
-
 void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   require(!axis.values().empty(), "{} = [] has no values: give at least one", key.name);
   for (const double value : axis.values()) {
     solver::check_value(key, value);
   }
-  if (kind != BlockKind::kZip) {  // in a zip a measured value may occur twice
-    check_repetition(key, axis);
-  }
+  std::vector<double> values(axis.values().begin(), axis.values().end());
+  std::sort(values.begin(), values.end());
+  const auto twice = std::adjacent_find(values.begin(), values.end());
+  // In a zip a measured value may occur twice.
+  require(twice == values.end() || kind == BlockKind::kZip,
+          "{} has {} twice: every value of a list must differ", key.name,
+          twice == values.end() ? 0.0 : *twice);
 }
 
 /// Whether the key takes only whole numbers, given that it takes `from` and values up to `to`.
@@ -151,41 +142,37 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   }
 }
 
-/// Checks the text and its names. BlockPoints finds circular expressions.
+/// Checks the text and its names. PointTable finds circular expressions.
 void check_expression(const Axis& axis) {
-  try {
+  in_expression(axis.key(), axis.expression(), [&] {
     const expressions::Expression expression(axis.expression());
     for (const std::string& name : expression.names()) {
       key_number(name);
     }
-  } catch (const InputError& fault) {
-    throw InputError(
-        fmt::format("{}: {}", expression_in_words(axis.key(), axis.expression()), fault.what()));
-  }
+  });
 }
 
-void check_one_way(const ParameterKey& key, const Axis& axis) {
-  std::vector<std::string_view> ways;
-  for (const auto& [is_given, way] : {std::pair{!axis.values().empty(), "listed values"},
-                                      {axis.count() > 0, "a range"},
-                                      {axis.has_distribution(), "a distribution"},
-                                      {!axis.expression().empty(), "an expression"}}) {
+/// Throws unless the axis has at most one kind of values, and nothing that belongs to another.
+void check_kind(const ParameterKey& key, const Axis& axis, BlockKind kind) {
+  std::vector<std::string_view> given;
+  for (const auto& [is_given, what] : {std::pair{!axis.values().empty(), "listed values"},
+                                       {axis.count() > 0, "a range"},
+                                       {axis.has_distribution(), "a distribution"},
+                                       {!axis.expression().empty(), "an expression"}}) {
     if (is_given) {
-      ways.emplace_back(way);
+      given.emplace_back(what);
     }
   }
-  if (ways.size() > 1) {
-    throw InputError(
-        fmt::format("{} has both {} and {}: give one of them", key.name, ways[0], ways[1]));
-  }
-}
-
-void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
-  check_one_way(key, axis);
+  require(given.size() < 2, "{} has both {}: give one of them", key.name,
+          fmt::format("{}", fmt::join(given, " and ")));
   require(Spacing_IsValid(axis.spacing()) && (axis.count() > 0 || axis.spacing() == SPACING_LINEAR),
           "{}: its spacing is unknown, or stands beside no range", key.name);
   require(!axis.has_distribution() || kind == BlockKind::kSample,
           "{} has a distribution: only a sample draws from one; give the block `sample`", key.name);
+}
+
+void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
+  check_kind(key, axis, kind);
   if (axis.count() > 0) {
     check_range(key, axis);
   } else if (axis.has_distribution()) {
@@ -305,9 +292,11 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
   check_single_lengths(model, block);
   if (!is_judged_by_points(model, block)) {
     check_reach(model, block);
-  } else {
-    const BlockPoints compiles(model, block);
   }
+}
+
+std::string expression_in_words(std::string_view key, std::string_view text) {
+  return fmt::format("{} = \"{}\"", key, excerpt(text));
 }
 
 void check_size(const Recipe& recipe) {

@@ -1,10 +1,11 @@
 #pragma once
 
-#include <cstddef>
+#include <string>
 #include <string_view>
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
 // The rules for studies. Parsers of files and flags call these functions and put the place before
@@ -36,8 +37,18 @@ void check_block(const solver::ModelParameters& model, const Block& block);
 /// point.
 bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
 
-/// Most expressions, filters among them, that a study may have.
-inline constexpr std::size_t kMostExpressions = 1000;
+/// The beginning of a message about an expression: `I = "A^2 / (4 * pi)"`.
+std::string expression_in_words(std::string_view key, std::string_view text);
+
+/// Calls `act` and puts these words before the message of an InputError.
+template <typename Act>
+auto in_expression(std::string_view key, std::string_view text, Act act) {
+  try {
+    return act();
+  } catch (const solver::InputError& fault) {
+    throw solver::InputError(expression_in_words(key, text) + ": " + fault.what());
+  }
+}
 
 /// Throws InputError for a recipe that is too long to be sent to a worker in one frame.
 void check_size(const Recipe& recipe);

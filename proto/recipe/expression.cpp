@@ -18,12 +18,20 @@ namespace {
 using solver::InputError;
 
 constexpr std::size_t kLongestQuoted = 40;
+constexpr const char* kComma = "`,` stands only between the arguments of a function";
 
 /// NaN stays NaN, because an undefined condition must not count as false.
 double truth(const double* x, bool value) {
   return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
                                               : static_cast<double>(value);
 }
+
+/// A function that an expression may call. `compute` reads as many values as `arguments`.
+struct Function {
+  std::string_view name;
+  std::size_t arguments;
+  double (*compute)(const double* x);
+};
 
 constexpr std::array<Function, 22> kFunctions{{
     {"abs", 1, [](const double* x) { return std::abs(x[0]); }},
@@ -98,14 +106,10 @@ std::string_view name_at(std::string_view text) {
 }
 
 [[noreturn]] void throw_foreign(char c) {
-  if (c == '=') {
-    throw InputError("`=` is no operator: `==` compares, and nothing is assigned");
-  }
-  if (c == '?') {
-    throw InputError("`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose");
-  }
-  throw InputError(c > ' ' && c <= '~' ? fmt::format("`{}` means nothing in it", c)
-                                       : "it has a character that means nothing in it");
+  throw InputError(c == '='   ? "`=` is no operator: `==` compares, and nothing is assigned"
+                   : c == '?' ? "`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose"
+                   : c > ' ' && c <= '~' ? fmt::format("`{}` means nothing in it", c)
+                                         : "it has a character that means nothing in it");
 }
 
 }  // namespace
@@ -120,11 +124,8 @@ class Expression::Parser {
       throw InputError("it is empty");
     }
     read_operations(kOr);
-    if (next() == ')') {
-      throw InputError("it has a closing bracket without an opening one");
-    }
-    if (next() == ',') {
-      throw InputError("it is a list of values: `,` stands between the arguments of a function");
+    if (next() != '\0') {
+      throw InputError(next() == ')' ? "it has a closing bracket without an opening one" : kComma);
     }
   }
 
@@ -163,7 +164,7 @@ class Expression::Parser {
 
   /// Reads a value and all following operations that bind at least as strongly as `weakest`.
   void read_operations(int weakest) {
-    read_value(weakest);
+    read_value();
     bool is_compared = false;
     for (const Operator* op = next_operator(); op != nullptr && op->priority >= weakest;
          op = next_operator()) {
@@ -177,25 +178,22 @@ class Expression::Parser {
     }
   }
 
-  void read_value(int weakest) {
+  void read_value() {
     const char c = next();
     const std::string_view word = name_at(rest_);
     if (is_digit(c) || c == '.') {
       read_number();
     } else if (take('(')) {
-      read_nested(kOr);
+      read_operations(kOr);
       close();
     } else if (take('-')) {
-      read_nested(kSign);
+      read_operations(kSign);
       to_.steps_.push_back({[](const double* x) { return -*x; }, 1});
     } else if (take('+')) {
-      read_nested(kSign);
+      read_operations(kSign);
     } else if ((c == '!' && !rest_.starts_with("!=")) || word == "not") {
-      if (weakest > kNot) {
-        throw InputError("`not` needs brackets where an operator stands before it");
-      }
       rest_.remove_prefix(std::max<std::size_t>(word.size(), 1));
-      read_nested(kNot);
+      read_operations(kNot);
       to_.steps_.push_back({[](const double* x) { return std::isnan(*x) ? *x : *x == 0.0; }, 1});
     } else if (word.empty() || word == "and" || word == "or") {
       throw_no_value(c, word);
@@ -205,29 +203,17 @@ class Expression::Parser {
   }
 
   [[noreturn]] void throw_no_value(char c, std::string_view word) const {
-    if (c == '\0') {
-      throw InputError("a value is missing at its end");
-    }
-    if (word.empty() && std::string_view("<>!&|*/^),").find(c) == std::string_view::npos) {
+    if (word.empty() && std::string_view("\0<>!&|*/^),", 11).find(c) == std::string_view::npos) {
       throw_foreign(c);
     }
-    throw InputError(
-        fmt::format("a value is missing before `{}`", word.empty() ? rest_.substr(0, 1) : word));
-  }
-
-  void read_nested(int weakest) {
-    if (++depth_ > kDeepestNesting) {
-      throw InputError(fmt::format("its brackets and signs stand more than {} deep in each other",
-                                   kDeepestNesting));
-    }
-    read_operations(weakest);
-    --depth_;
+    throw InputError(c == '\0' ? "a value is missing at its end"
+                               : fmt::format("a value is missing before `{}`",
+                                             word.empty() ? rest_.substr(0, 1) : word));
   }
 
   void close() {
     if (!take(')')) {
-      throw InputError(next() == ',' ? "`,` stands only between the arguments of a function"
-                                     : "a bracket is open at its end");
+      throw InputError(next() == ',' ? kComma : "a bracket is open at its end");
     }
   }
 
@@ -273,7 +259,7 @@ class Expression::Parser {
     std::size_t count = 0;
     if (next() != ')') {
       do {
-        read_nested(kOr);
+        read_operations(kOr);
         ++count;
       } while (take(','));
     }
@@ -287,18 +273,12 @@ class Expression::Parser {
 
   std::string_view rest_;
   Expression& to_;
-  std::size_t depth_ = 0;
 };
 
-std::span<const Function> functions() {
-  return kFunctions;
-}
-
 std::vector<std::string_view> function_names() {
-  std::vector<std::string_view> names;
-  for (const Function& function : kFunctions) {
-    names.push_back(function.name);
-  }
+  std::vector<std::string_view> names(kFunctions.size());
+  std::transform(kFunctions.begin(), kFunctions.end(), names.begin(),
+                 [](const Function& function) { return function.name; });
   return names;
 }
 
@@ -307,11 +287,19 @@ Expression::Expression(std::string_view text) {
     throw InputError(fmt::format("it has {} bytes, more than {}", text.size(), kLongestText));
   }
   Parser(text, *this).read();
-  stack_.resize(steps_.size());
 }
 
-double Expression::value_at(std::span<const double> values) {
-  double* end = stack_.data();
+void Expression::place_names(std::span<const std::size_t> places) {
+  for (Step& step : steps_) {
+    if (step.index != kNoName) {
+      step.index = places[step.index];
+    }
+  }
+}
+
+double Expression::value_at(std::span<const double> values) const {
+  std::array<double, kLongestText> stack;
+  double* end = stack.data();
   for (const Step& step : steps_) {
     if (step.compute != nullptr) {
       end -= step.arguments;
@@ -321,7 +309,7 @@ double Expression::value_at(std::span<const double> values) {
     }
     ++end;
   }
-  const double value = stack_.front();
+  const double value = stack.front();
   return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;  // without a sign
 }
 

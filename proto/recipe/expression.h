@@ -8,22 +8,15 @@
 
 namespace oblique::expressions {
 
-/// Longest text of an expression [bytes], and the most nested brackets and signs.
+/// Longest text of an expression [bytes].
 inline constexpr std::size_t kLongestText = 1000;
-inline constexpr std::size_t kDeepestNesting = 32;
 
-/// A function that an expression may call. `compute` reads as many values as `arguments`.
-struct Function {
-  std::string_view name;
-  std::size_t arguments;
-  double (*compute)(const double* x);
-};
-std::span<const Function> functions();
+/// The functions that an expression may call.
 std::vector<std::string_view> function_names();
 
 /// An expression such as `A^2 / (4 * pi)` or `mu > 0.5 and not e == 1`, compiled to steps of a
 /// stack machine: numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not` (&& || !),
-/// brackets and functions. Not thread-safe.
+/// brackets and functions.
 class Expression {
  public:
   /// Throws solver::InputError, which says what is wrong and what is allowed but does not repeat
@@ -33,8 +26,11 @@ class Expression {
   /// The names in the text, each once, in the order of `value_at`'s values.
   const std::vector<std::string>& names() const { return names_; }
 
+  /// Makes name i the value number `places[i]` of `value_at`.
+  void place_names(std::span<const std::size_t> places);
+
   /// The value, which may be NaN or infinite. A comparison is 1 or 0, or NaN if a side is NaN.
-  double value_at(std::span<const double> values);
+  double value_at(std::span<const double> values) const;
 
  private:
   class Parser;
@@ -49,8 +45,7 @@ class Expression {
   static constexpr std::size_t kNoName = ~std::size_t{0};
 
   std::vector<std::string> names_;
-  std::vector<Step> steps_;
-  std::vector<double> stack_;  ///< as long as `steps_`
+  std::vector<Step> steps_;  ///< at most one for each byte of the text
 };
 
 }  // namespace oblique::expressions

@@ -1,6 +1,7 @@
 #include "proto/recipe/keys.h"
 
-#include <array>
+#include <algorithm>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -12,24 +13,10 @@
 namespace oblique::protocol {
 namespace {
 
-/// "length1", "length2", ... in 7 or 8 characters, and 0.
-constexpr auto kLengthNames = [] {
-  std::array<std::array<char, 9>, kMostLinks> names{};
-  for (std::size_t link = 0; link < kMostLinks; ++link) {
-    const std::size_t number = link + 1;
-    const std::size_t digits = number < 10 ? 1 : 2;
-    std::string_view("length").copy(names[link].data(), 6);
-    names[link][5 + digits] = static_cast<char>('0' + number % 10);
-    if (digits == 2) {
-      names[link][6] = static_cast<char>('0' + number / 10);
-    }
-  }
-  return names;
-}();
-
 template <std::size_t link>
-constexpr solver::ParameterKey length_key() {
-  return {kLengthNames[link].data(),
+solver::ParameterKey length_key() {
+  static const std::string name = fmt::format("length{}", link + 1);
+  return {name,
           "m",
           "length of one link, counted from the pin",
           "> 0",
@@ -44,36 +31,35 @@ constexpr solver::ParameterKey length_key() {
           }};
 }
 
-constexpr auto kLengthKeys = []<std::size_t... links>(std::index_sequence<links...>) {
-  return std::array<solver::ParameterKey, kMostLinks>{length_key<links>()...};
+/// Every key, by its number.
+const std::vector<solver::ParameterKey>& all_keys() {
+  static const auto keys = []<std::size_t... links>(std::index_sequence<links...>) {
+    const auto model = solver::model_keys();
+    std::vector<solver::ParameterKey> all(model.begin(), model.end());
+    (all.push_back(length_key<links>()), ...);
+    all.insert(all.end(), solver::point_keys().begin(), solver::point_keys().end());
+    return all;
+  }
+  (std::make_index_sequence<kMostLinks>());
+  return keys;
 }
-(std::make_index_sequence<kMostLinks>());
 
 std::optional<std::size_t> find_key_number(std::string_view name) {
-  const bool is_length = name.starts_with("length");
-  for (std::size_t number = 0; number < key_count(); ++number) {
-    if (link_of_key(number) && !is_length) {
-      number += kMostLinks - 1;  // none of the single lengths
-    } else if (key_numbered(number).name == name) {
-      return number;
-    }
-  }
-  return std::nullopt;
+  const auto& keys = all_keys();
+  const auto found =
+      std::find_if(keys.begin(), keys.end(), [&](const auto& key) { return key.name == name; });
+  return found == keys.end() ? std::nullopt
+                             : std::optional(static_cast<std::size_t>(found - keys.begin()));
 }
 
 }  // namespace
 
 const solver::ParameterKey& key_numbered(std::size_t number) {
-  const auto model_keys = solver::model_keys();
-  if (number < model_keys.size()) {
-    return model_keys[number];
-  }
-  number -= model_keys.size();
-  return number < kMostLinks ? kLengthKeys.at(number) : solver::point_keys()[number - kMostLinks];
+  return all_keys().at(number);
 }
 
 std::size_t key_count() {
-  return solver::model_keys().size() + kMostLinks + kPointKeyOrder.size();
+  return all_keys().size();
 }
 
 std::size_t key_number(std::string_view name) {

@@ -3,18 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <mutex>
+#include <span>
 #include <stdexcept>
+#include <string_view>
+#include <tuple>
 #include <utility>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
-#include "proto/recipe/block_points.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
+#include "proto/recipe/expression.h"
+#include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/sample.h"
+#include "proto/recipe/sampling.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
 namespace {
@@ -26,61 +30,267 @@ double finite_or_0(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-std::size_t expressions_in(const Block& block) {
-  const auto count = std::count_if(block.axes().begin(), block.axes().end(),
-                                   [](const Axis& axis) { return !axis.expression().empty(); });
-  return static_cast<std::size_t>(count) + (block.where().empty() ? 0 : 1);
+/// The last of the sorted `places` whose `first` is at most `number`; there is one.
+template <class Place, class Number>
+std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, const Number& first) {
+  const auto next = std::upper_bound(
+      places.begin(), places.end(), number,
+      [&](std::uint64_t wanted, const Place& place) { return wanted < first(place); });
+  return static_cast<std::size_t>(next - places.begin()) - 1;
 }
 
 }  // namespace
 
-/// Compiled blocks, each used by one caller at a time. Keeps the ones that were returned last.
-class PointTable::Pool {
+/// The points of one block of any kind, each computed from its number.
+class PointTable::BlockPoints {
  public:
-  Pool(const solver::ModelParameters& base, const Recipe& recipe) : base_(base), recipe_(recipe) {}
+  /// `block` has passed `check_block` and outlives this. `base` has the values of keys that the
+  /// block does not have.
+  BlockPoints(const solver::ModelParameters& base, const Block& block);
 
-  template <typename Use>
-  auto with(std::size_t block, Use use) {
-    std::unique_ptr<BlockPoints> points = take(block);
-    if (points == nullptr) {
-      points = std::make_unique<BlockPoints>(base_, recipe_.blocks(static_cast<int>(block)));
-    }
-    auto result = use(*points);
-    const std::lock_guard lock(mutex_);
-    if (idle_.size() >= kMostIdle) {
-      idle_.erase(idle_.begin());
-    }
-    idle_.emplace_back(block, std::move(points));
-    return result;
+  /// Number of models: 1 if no model key varies, in a product the number of combinations of model
+  /// axes, and the number of points if a model key depends on a value that varies with the point.
+  std::uint64_t models() const { return models_; }
+  std::size_t expressions() const { return formulas_.size() + (filter_ ? 1 : 0); }
+
+  /// The values of a point in the order of the axes, and those of `base` that expressions use. The
+  /// functions below take them.
+  std::vector<double> values_at(std::uint64_t point) const;
+  bool is_left_in(std::span<const double> values) const;
+  solver::ModelParameters model(solver::ModelParameters base, std::span<const double> values) const;
+  std::string fault(const solver::ModelParameters& base, std::span<const double> values) const;
+  /// H, mu and e.
+  std::span<const double> point_values(std::span<const double> values) const {
+    return values.subspan(sources_.size() - kPointKeyOrder.size(), kPointKeyOrder.size());
   }
 
  private:
-  static constexpr std::size_t kMostIdle = 32;  // more than threads, few enough to search
+  /// Where the value of an axis comes from.
+  struct Source {
+    AxisLayout layout;
+    std::uint32_t dimension;  ///< dimension in the sample, if the axis is drawn
+    std::variant<std::monostate, RangeValues, sampling::Quantiles> values = {};
+  };
+  /// An expression, the numbers of its inputs in `values_at`, and the axis of the result.
+  struct Formula {
+    expressions::Expression expression;
+    std::vector<std::size_t> inputs;
+    std::size_t axis;
+  };
 
-  std::unique_ptr<BlockPoints> take(std::size_t block) {
-    const std::lock_guard lock(mutex_);
-    const auto found = std::find_if(idle_.rbegin(), idle_.rend(),
-                                    [&](const auto& entry) { return entry.first == block; });
-    if (found == idle_.rend()) {
-      return nullptr;
-    }
-    std::unique_ptr<BlockPoints> points = std::move(found->second);
-    idle_.erase(std::next(found).base());
-    return points;
-  }
+  Formula read_formula(const solver::ModelParameters& base, std::string_view key,
+                       const std::string& text, std::size_t axis);
+  std::size_t input_called(const solver::ModelParameters& base, const std::string& name);
+  std::size_t axis_of(std::size_t key) const;
+  void sort(std::vector<Formula> formulas);
+  void count_models();
+  double value_of(const Source& source, std::uint64_t point) const;
+  std::string in_words(std::span<const double> values) const;
 
-  const solver::ModelParameters base_;
-  const Recipe& recipe_;
-  std::mutex mutex_;
-  std::vector<std::pair<std::size_t, std::unique_ptr<BlockPoints>>> idle_;
+  const Block* block_;
+  std::vector<Source> sources_;    ///< one per axis
+  std::vector<Formula> formulas_;  ///< each after those that compute its inputs
+  std::optional<Formula> filter_;
+  std::vector<double> constants_;  ///< inputs from the base model
+  std::uint64_t models_ = 1;
 };
+
+PointTable::BlockPoints::BlockPoints(const solver::ModelParameters& base, const Block& block)
+    : block_(&block) {
+  std::uint32_t dimensions = 0;
+  for (const AxisLayout& layout : layout_of(block)) {
+    Source& source = sources_.emplace_back(Source{layout, layout.values == 0 ? dimensions++ : 0});
+    if (layout.axis->count() > 0) {
+      source.values.emplace<RangeValues>(*layout.axis);
+    } else if (layout.axis->has_distribution()) {
+      source.values.emplace<sampling::Quantiles>(*layout.axis);
+    }
+  }
+  std::vector<Formula> formulas;
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    if (const Axis& axis = *sources_[i].layout.axis; !axis.expression().empty()) {
+      formulas.push_back(read_formula(base, axis.key(), axis.expression(), i));
+    }
+  }
+  sort(std::move(formulas));
+  if (!block.where().empty()) {
+    filter_ = read_formula(base, "where", block.where(), sources_.size());
+  }
+  count_models();
+}
+
+PointTable::BlockPoints::Formula PointTable::BlockPoints::read_formula(
+    const solver::ModelParameters& base, std::string_view key, const std::string& text,
+    std::size_t axis) {
+  return in_expression(key, text, [&] {
+    Formula formula{expressions::Expression(text), {}, axis};
+    for (const std::string& name : formula.expression.names()) {
+      formula.inputs.push_back(input_called(base, name));
+    }
+    formula.expression.place_names(formula.inputs);
+    return formula;
+  });
+}
+
+std::size_t PointTable::BlockPoints::axis_of(std::size_t key) const {
+  const auto found = std::find_if(sources_.begin(), sources_.end(),
+                                  [&](const Source& source) { return source.layout.key == key; });
+  return static_cast<std::size_t>(found - sources_.begin());
+}
+
+/// The axis of that name, or a new constant of the base model.
+std::size_t PointTable::BlockPoints::input_called(const solver::ModelParameters& base,
+                                                  const std::string& name) {
+  const std::size_t key = key_number(name);
+  const auto link = link_of_key(key);
+  std::size_t axis = axis_of(key);
+  if (axis == sources_.size() && link) {
+    axis = axis_of(key_number("length"));  // sets the length of every link
+  }
+  if (axis < sources_.size()) {
+    return axis;
+  }
+  double constant = key_numbered(key).get(base);
+  if (link && axis_of(key_number("links")) < sources_.size()) {
+    constant = base.lengths_m.front();  // `links` makes all of them as long as the first
+  } else if (link && *link >= base.lengths_m.size()) {
+    throw InputError(fmt::format("`{}` is the length of no link: the model has {}", name,
+                                 base.lengths_m.size()));
+  }
+  constants_.push_back(constant);
+  return sources_.size() + constants_.size() - 1;
+}
+
+void PointTable::BlockPoints::sort(std::vector<Formula> formulas) {
+  while (!formulas.empty()) {
+    // The first formula whose inputs are all computed.
+    const auto next = std::find_if(formulas.begin(), formulas.end(), [&](const Formula& formula) {
+      return std::none_of(formulas.begin(), formulas.end(), [&](const Formula& other) {
+        return std::find(formula.inputs.begin(), formula.inputs.end(), other.axis) !=
+               formula.inputs.end();
+      });
+    });
+    if (next == formulas.end()) {
+      std::vector<std::string_view> circle;
+      for (const Formula& formula : formulas) {
+        circle.emplace_back(sources_[formula.axis].layout.axis->key());
+      }
+      throw InputError(fmt::format(
+          "{}: the expressions go round in a circle: one must follow from keys that do not",
+          fmt::join(circle, ", ")));
+    }
+    formulas_.push_back(std::move(*next));
+    formulas.erase(next);
+  }
+}
+
+void PointTable::BlockPoints::count_models() {
+  const bool is_product = block_kind(*block_) == BlockKind::kProduct;
+  std::vector<bool> varies;  // whether the axis varies within one combination of model axes
+  for (const Source& source : sources_) {
+    varies.push_back(is_drawn(*source.layout.axis) &&
+                     (!is_product || is_point_key(source.layout.key)));
+  }
+  for (const Formula& formula : formulas_) {
+    varies[formula.axis] =
+        std::any_of(formula.inputs.begin(), formula.inputs.end(),
+                    [&](std::size_t input) { return input < varies.size() && varies[input]; });
+  }
+  const auto model_axes_end = varies.end() - std::ssize(kPointKeyOrder);
+  if (std::find(varies.begin(), model_axes_end, true) != model_axes_end) {
+    models_ = points_of_block(*block_);
+  } else if (is_product) {
+    models_ = combinations(model_axes(*block_));
+  }
+}
+
+std::vector<double> PointTable::BlockPoints::values_at(std::uint64_t point) const {
+  std::vector<double> values(sources_.size());
+  values.insert(values.end(), constants_.begin(), constants_.end());
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    if (sources_[i].layout.axis->expression().empty()) {
+      values[i] = value_of(sources_[i], point);
+    }
+  }
+  for (const Formula& formula : formulas_) {
+    values[formula.axis] = formula.expression.value_at(values);
+  }
+  return values;
+}
+
+double PointTable::BlockPoints::value_of(const Source& source, std::uint64_t point) const {
+  const AxisLayout& layout = source.layout;
+  std::uint64_t number = 0;
+  if (layout.values == 0) {
+    const double part = sampling::fraction(block_->sample(), source.dimension, point);
+    if (const auto* quantiles = std::get_if<sampling::Quantiles>(&source.values)) {
+      return quantiles->value_at(part);
+    }
+    const std::uint64_t values = axis_size(*layout.axis);
+    number = std::min(static_cast<std::uint64_t>(part * static_cast<double>(values)), values - 1);
+  } else if (layout.values > 1) {
+    number = point / layout.stride % layout.values;
+  }
+  const auto* range = std::get_if<RangeValues>(&source.values);
+  return range != nullptr ? range->at(number) : layout.axis->values(static_cast<int>(number));
+}
+
+bool PointTable::BlockPoints::is_left_in(std::span<const double> values) const {
+  const double kept = filter_ ? filter_->expression.value_at(values) : 1.0;
+  return !std::isnan(kept) && kept != 0.0;
+}
+
+solver::ModelParameters PointTable::BlockPoints::model(solver::ModelParameters base,
+                                                       std::span<const double> values) const {
+  for (const bool are_single : {false, true}) {  // single lengths act on what `links` has made
+    for (std::size_t i = sources_.size() - kPointKeyOrder.size(); i-- > 0;) {
+      const std::size_t number = sources_[i].layout.key;
+      const solver::ParameterKey& key = key_numbered(number);
+      if (link_of_key(number).has_value() == are_single && std::isfinite(values[i]) &&
+          key.is_allowed(values[i])) {
+        key.set(base, values[i]);
+      }
+    }
+  }
+  return base;
+}
+
+std::string PointTable::BlockPoints::fault(const solver::ModelParameters& base,
+                                           std::span<const double> values) const {
+  if (filter_ && std::isnan(filter_->expression.value_at(values))) {
+    return fmt::format("where has no value: {}", in_words(values));
+  }
+  if (!is_left_in(values)) {
+    return {};
+  }
+  try {
+    for (const Formula& formula : formulas_) {
+      solver::check_value(key_numbered(sources_[formula.axis].layout.key), values[formula.axis]);
+    }
+    const auto point = point_values(values);
+    solver::validate_point(model(base, values), point[0], point[1], point[2]);
+  } catch (const InputError& fault) {
+    return fmt::format("{}: {}", fault.what(), in_words(values));
+  }
+  return {};
+}
+
+/// "k = 1e7, H = 0.3, mu = 0.1, e = 1"
+std::string PointTable::BlockPoints::in_words(std::span<const double> values) const {
+  std::string words;
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    words += fmt::format("{}{} = {}", words.empty() ? "" : ", ", sources_[i].layout.axis->key(),
+                         solver::exact_number(values[i]));
+  }
+  return words;
+}
 
 /// Calls `act`. If there are several blocks, puts the block's number before the message of its
 /// error.
 template <typename Act>
-auto PointTable::in_block(std::size_t number, Act act) const {
+void PointTable::in_block(std::size_t number, Act act) const {
   try {
-    return act();
+    act();
   } catch (const InputError& error) {
     if (recipe_->blocks_size() == 1) {
       throw;
@@ -98,7 +308,12 @@ PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::mo
   if (recipe_->blocks().empty()) {
     throw InputError("the study has no block: it needs at least one with H, mu and e");
   }
-  pool_ = std::make_unique<Pool>(base_model_, *recipe_);
+  if (static_cast<std::size_t>(recipe_->blocks_size()) > kMostBlocks) {
+    throw InputError(
+        fmt::format("the study has {} blocks, more than {}: write points that differ "
+                    "in all values as a block with `zip`",
+                    recipe_->blocks_size(), kMostBlocks));
+  }
   for (const Block& block : recipe_->blocks()) {
     in_block(blocks_.size(), [&] { add_block(block); });
   }
@@ -109,7 +324,8 @@ PointTable::PointTable(PointTable&&) noexcept = default;
 
 void PointTable::add_block(const Block& block) {
   check_block(base_model_, block);
-  expressions_ += expressions_in(block);
+  const BlockPoints& compiled = block_points_.emplace_back(base_model_, block);
+  expressions_ += compiled.expressions();
   if (expressions_ > kMostExpressions) {
     throw InputError(
         fmt::format("the study has more than {} expressions and filters", kMostExpressions));
@@ -118,27 +334,21 @@ void PointTable::add_block(const Block& block) {
   if (points > kMaxPoints - points_) {
     throw_too_many_points();
   }
-  BlockPlace place{points_, points, models_, 1, is_judged_by_points(base_model_, block)};
-  if (model_axes(block).empty()) {
-    place.first_model = base_model_number_.value_or(models_);
-    if (!base_segments_.empty() &&
-        base_segments_.back().first_point + base_segments_.back().count == points_) {
-      base_segments_.back().count += points;
-    } else {
-      base_segments_.push_back({place.first_model, points_, points});
-    }
-  } else {
-    place.models =
-        is_plain_product(block)
-            ? combinations(model_axes(block))
-            : pool_->with(blocks_.size(), [](auto& compiled) { return compiled.models(); });
-  }
-  if (!model_axes(block).empty() || !base_model_number_) {
+  BlockPlace place{points_, points, models_, compiled.models(),
+                   is_judged_by_points(base_model_, block)};
+  const bool has_base_model = model_axes(block).empty();
+  if (!has_base_model || !base_model_number_) {
     model_blocks_.push_back(blocks_.size());
     models_ += place.models;
   }
-  if (model_axes(block).empty()) {
-    base_model_number_ = place.first_model;
+  if (has_base_model) {
+    base_model_number_ = place.first_model = base_model_number_.value_or(place.first_model);
+    Segment* last = base_segments_.empty() ? nullptr : &base_segments_.back();
+    if (last != nullptr && last->first_point + last->count == points_) {
+      last->count += points;
+    } else {
+      base_segments_.push_back({place.first_model, points_, points});
+    }
   }
   blocks_.push_back(place);
   has_filter_ = has_filter_ || !block.where().empty();
@@ -149,47 +359,46 @@ std::size_t PointTable::block_of_point(std::uint64_t index) const {
   if (index >= points_) {
     throw std::out_of_range(fmt::format("the study has no point {}", index));
   }
-  const auto next = std::upper_bound(
-      blocks_.begin(), blocks_.end(), index,
-      [](std::uint64_t point, const BlockPlace& place) { return point < place.first_point; });
-  return static_cast<std::size_t>(next - blocks_.begin()) - 1;
+  return place_of(blocks_, index, [](const BlockPlace& place) { return place.first_point; });
+}
+
+std::vector<double> PointTable::values(std::uint64_t index) const {
+  const std::size_t block = block_of_point(index);
+  auto values = block_points_[block].values_at(index - blocks_[block].first_point);
+  values.resize(static_cast<std::size_t>(recipe_->blocks(static_cast<int>(block)).axes_size()));
+  return values;
 }
 
 Point PointTable::point(std::uint64_t index) const {
   const std::size_t block = block_of_point(index);
   const BlockPlace& place = blocks_[block];
   const std::uint64_t number = index - place.first_point;
-  const std::uint64_t model = place.first_model + number / (place.points / place.models);
-  return pool_->with(block, [&](BlockPoints& points) {
-    points.go_to(number);
-    const auto values = points.values().last(kPointKeyOrder.size());
-    return Point{model, finite_or_0(values[0]), finite_or_0(values[1]), finite_or_0(values[2])};
-  });
+  const auto all = block_points_[block].values_at(number);
+  const auto values = block_points_[block].point_values(all);
+  return {place.first_model + number / (place.points / place.models), finite_or_0(values[0]),
+          finite_or_0(values[1]), finite_or_0(values[2])};
 }
 
 solver::ModelParameters PointTable::model(std::uint64_t index) const {
   if (index >= models_) {
     throw std::out_of_range(fmt::format("the study has no model {}", index));
   }
-  const auto next = std::upper_bound(model_blocks_.begin(), model_blocks_.end(), index,
-                                     [this](std::uint64_t model, std::size_t block) {
-                                       return model < blocks_[block].first_model;
-                                     });
-  const std::size_t block = *(next - 1);
+  const std::size_t block = model_blocks_[place_of(
+      model_blocks_, index, [this](std::size_t number) { return blocks_[number].first_model; })];
   const BlockPlace& place = blocks_[block];
-  return pool_->with(block, [&](BlockPoints& points) {
-    points.go_to((index - place.first_model) * (place.points / place.models));
-    return points.model();
-  });
+  const BlockPoints& points = block_points_[block];
+  const std::uint64_t number = (index - place.first_model) * (place.points / place.models);
+  return points.model(base_model_, points.values_at(number));
 }
 
 Segment PointTable::segment_at(std::uint64_t index) const {
   const BlockPlace& place = blocks_[block_of_point(index)];
-  const auto next = std::upper_bound(
-      base_segments_.begin(), base_segments_.end(), index,
-      [](std::uint64_t point, const Segment& segment) { return point < segment.first_point; });
-  if (next != base_segments_.begin() && index - (next - 1)->first_point < (next - 1)->count) {
-    return *(next - 1);
+  if (!base_segments_.empty() && base_segments_.front().first_point <= index) {
+    const Segment& base = base_segments_[place_of(
+        base_segments_, index, [](const Segment& segment) { return segment.first_point; })];
+    if (index - base.first_point < base.count) {
+      return base;
+    }
   }
   const std::uint64_t points_per_model = place.points / place.models;
   const std::uint64_t model = (index - place.first_point) / points_per_model;
@@ -204,23 +413,13 @@ bool PointTable::is_left_in(std::uint64_t index) const {
 std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) const {
   while (has_filter_ && begin < end) {
     const std::size_t block = block_of_point(begin);
-    if (message(block).where().empty()) {
-      return begin;
-    }
     const BlockPlace& place = blocks_[block];
-    const std::uint64_t block_end = std::min(end, place.first_point + place.points);
-    begin = pool_->with(block, [&](BlockPoints& points) {
-      std::uint64_t point = begin;
-      for (; point < block_end; ++point) {
-        points.go_to(point - place.first_point);
-        if (points.is_left_in()) {
-          break;
-        }
+    const BlockPoints& points = block_points_[block];
+    for (const auto block_end = std::min(end, place.first_point + place.points); begin < block_end;
+         ++begin) {
+      if (points.is_left_in(points.values_at(begin - place.first_point))) {
+        return begin;
       }
-      return point;
-    });
-    if (begin < block_end) {
-      return begin;
     }
   }
   return std::min(begin, end);
@@ -228,13 +427,10 @@ std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) 
 
 std::string PointTable::fault(std::uint64_t index) const {
   const std::size_t block = block_of_point(index);
-  if (!blocks_[block].is_judged_by_points) {
-    return {};
-  }
-  return pool_->with(block, [&](BlockPoints& points) {
-    points.go_to(index - blocks_[block].first_point);
-    return points.fault();
-  });
+  const BlockPoints& points = block_points_[block];
+  return blocks_[block].is_judged_by_points
+             ? points.fault(base_model_, points.values_at(index - blocks_[block].first_point))
+             : "";
 }
 
 bool PointTable::needs_judging() const {
@@ -254,22 +450,77 @@ void PointTable::judge_points() const {
 }
 
 void PointTable::judge_block(std::size_t number, std::uint64_t most) const {
-  const Block& block = message(number);
   const BlockPlace& place = blocks_[number];
+  const BlockPoints& points = block_points_[number];
   const bool judges_all = place.points <= most;
-  BlockPoints points(base_model_, block);
   bool leaves_any_in = false;
   for (std::uint64_t look = 0; look < std::min(place.points, most); ++look) {
     const std::uint64_t i = judges_all ? look : sampling::hashed(number, look) % place.points;
-    points.go_to(i);
-    if (const std::string fault = points.fault(); !fault.empty()) {
+    const auto values = points.values_at(i);
+    if (const std::string fault = points.fault(base_model_, values); !fault.empty()) {
       throw InputError(fmt::format("point {}: {}", place.first_point + i, fault));
     }
-    leaves_any_in = leaves_any_in || points.is_left_in();
+    leaves_any_in = leaves_any_in || points.is_left_in(values);
   }
   if (judges_all && !leaves_any_in) {
-    throw InputError(expression_in_words("where", block.where()) + " leaves no point in");
+    const std::string& where = recipe_->blocks(static_cast<int>(number)).where();
+    throw InputError(expression_in_words("where", where) + " leaves no point in");
   }
+}
+
+bool is_close(double value, double own) {
+  constexpr double kTolerance = 1e-12;  // relative; some thousand times the rounding of a double
+  return std::abs(value - own) <= kTolerance * std::abs(own);
+}
+
+bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own) {
+  const auto keys = solver::model_keys();
+  return std::equal(model.lengths_m.begin(), model.lengths_m.end(), own.lengths_m.begin(),
+                    own.lengths_m.end(), [](double a, double b) { return is_close(a, b); }) &&
+         std::all_of(keys.begin(), keys.end(), [&](const solver::ParameterKey& key) {
+           return is_close(key.get(model), key.get(own));
+         });
+}
+
+void set_inputs(PointResult& result, const PointTable& table) {
+  const Point point = table.point(result.point());
+  result.set_h_m(point.H_m);
+  result.set_mu(point.mu);
+  result.set_e_star(point.e_star);
+  if (table.models() > 1) {
+    *result.mutable_model() = to_message(table.model(point.model));
+  }
+}
+
+std::string fault_of_inputs(const PointResult& result, const PointTable& table) {
+  if (!result.error().empty() && !result.has_h_m()) {
+    return {};
+  }
+  const Point own = table.point(result.point());
+  for (const auto& [key, is_sent, value, expected] :
+       {std::tuple{"H", result.has_h_m(), result.h_m(), own.H_m},
+        {"mu", result.has_mu(), result.mu(), own.mu},
+        {"e", result.has_e_star(), result.e_star(), own.e_star}}) {
+    if (!is_sent || !is_close(value, expected)) {
+      return fmt::format("the worker solved it with {} = {:.17g}, and the study has {:.17g}", key,
+                         value, expected);
+    }
+  }
+  // A result without a model is of a study that had one model when it was solved, but may have
+  // grown since.
+  bool has_model = !result.has_model() && own.model == 0;
+  try {
+    has_model = has_model || (result.has_model() && is_close(unjudged_from_message(result.model()),
+                                                             table.model(own.model)));
+  } catch (const InputError&) {  // a whole number outside the domain
+  }
+  return has_model ? "" : "the worker solved it with another model than the study has";
+}
+
+Point inputs_of(const PointResult& result, const PointTable& table) {
+  return result.has_h_m() ? Point{table.segment_at(result.point()).model, result.h_m(), result.mu(),
+                                  result.e_star()}
+                          : table.point(result.point());
 }
 
 }  // namespace oblique::protocol

@@ -12,6 +12,10 @@
 
 namespace oblique::protocol {
 
+/// Most blocks, and most expressions, filters among them, that a study may have.
+inline constexpr std::size_t kMostBlocks = 10'000;
+inline constexpr std::size_t kMostExpressions = 1000;
+
 /// One point of a study.
 struct Point {
   std::uint64_t model;  ///< number of its model in the recipe
@@ -41,8 +45,8 @@ struct BlockPlace {
 class PointTable {
  public:
   /// Throws solver::InputError naming key, value and what is allowed for a recipe without a model
-  /// or blocks, for too many points or expressions, and for what `check_block` refuses.
-  /// `judge_points` judges the rest.
+  /// or blocks, for too many points, blocks or expressions, for expressions that have unknown names
+  /// or depend on themselves, and for what `check_block` refuses. `judge_points` judges the rest.
   explicit PointTable(Recipe recipe);
   ~PointTable();
   PointTable(PointTable&&) noexcept;
@@ -57,6 +61,7 @@ class PointTable {
   std::uint64_t models() const { return models_; }
 
   bool has_filter() const { return has_filter_; }
+  /// Whether the filter keeps the point. A filter that is NaN does not.
   bool is_left_in(std::uint64_t index) const;
   /// The first point of [begin, end) that filters keep, or `end`. Throws std::out_of_range for an
   /// end beyond the last point.
@@ -72,13 +77,17 @@ class PointTable {
   void judge_points() const;
   static constexpr std::uint64_t kMostJudged = 100'000;
 
-  /// Why a point cannot be solved, as a sentence, or an empty text.
+  /// Why a point cannot be solved, or that its filter is NaN, as a sentence with the values; empty
+  /// if nothing is wrong.
   std::string fault(std::uint64_t index) const;
 
   /// Throw std::out_of_range for a point or model outside the study. A value that is not finite is
   /// returned as 0, a model value that is not allowed as that of the recipe's model.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
+  /// The values of a point in the order of the axes of its block. Those of expressions may be out
+  /// of range or NaN.
+  std::vector<double> values(std::uint64_t index) const;
   /// The longest run of points around `index` that share its model. Adjacent blocks without model
   /// axes are one run, so that many small blocks are leased and solved like one large block.
   Segment segment_at(std::uint64_t index) const;
@@ -88,17 +97,17 @@ class PointTable {
   std::size_t block_of_point(std::uint64_t index) const;
 
  private:
-  class Pool;
+  class BlockPoints;
 
   void add_block(const Block& block);
   template <typename Act>
-  auto in_block(std::size_t number, Act act) const;
+  void in_block(std::size_t number, Act act) const;
   void judge_block(std::size_t number, std::uint64_t most) const;
-  const Block& message(std::size_t block) const { return recipe_->blocks(static_cast<int>(block)); }
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
   solver::ModelParameters base_model_;
   std::vector<BlockPlace> blocks_;
+  std::vector<BlockPoints> block_points_;
   std::vector<Segment> base_segments_;              ///< of the blocks without model axes, in order
   std::vector<std::size_t> model_blocks_;           ///< blocks with models of their own, in order
   std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
@@ -106,7 +115,25 @@ class PointTable {
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
   bool has_filter_ = false;
-  std::unique_ptr<Pool> pool_;
 };
+
+// H, mu, e and the model of a point, as a worker sends them with a result. Two machines may compute
+// them with different last bits.
+
+/// Whether `value` equals the finite number `own` to within a relative difference of 1e-12. Only
+/// zero is close to zero.
+bool is_close(double value, double own);
+/// Whether every parameter is close. Whole numbers must be equal.
+bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own);
+
+/// Sets the inputs of the result's point; the model only if the study has several.
+void set_inputs(PointResult& result, const PointTable& table);
+
+/// Why the inputs of a result are not those of its point in `table`, or an empty text. A failed
+/// point may have none.
+std::string fault_of_inputs(const PointResult& result, const PointTable& table);
+
+/// The inputs of a result, or of its point in `table` when it has none.
+Point inputs_of(const PointResult& result, const PointTable& table);
 
 }  // namespace oblique::protocol

@@ -4,7 +4,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "proto/recipe/sample.h"
+#include "proto/recipe/sampling.h"
 #include "worker/solver/model/fall_model.h"
 
 namespace oblique::protocol {
@@ -13,6 +13,11 @@ namespace {
 /// Average size of a result and of a model in a database (server/store/README.md).
 constexpr std::uint64_t kBytesAResult = 970;
 constexpr std::uint64_t kBytesAModel = 600;
+
+/// More points than the first are not counted, but estimated from as many random points as the
+/// second.
+constexpr std::uint64_t kMostCounted = 100'000;
+constexpr std::uint64_t kLooks = 10'000;
 
 /// Number of examined points by the hash of their fall.
 using MetFalls = std::unordered_map<std::uint64_t, std::uint64_t>;
@@ -36,8 +41,6 @@ std::uint64_t estimated_falls(const MetFalls& met, double looks, double points) 
 }  // namespace
 
 StudySize size_of(const PointTable& table) {
-  constexpr std::uint64_t kMostCounted = 100'000;
-  constexpr std::uint64_t kLooks = 10'000;
   constexpr std::uint64_t kTries = 100 * kLooks;
   constexpr std::uint64_t kExamples = 64;
   const std::uint64_t numbers = table.size();
@@ -73,11 +76,12 @@ StudySize size_of(const PointTable& table) {
     return size;
   }
   for (std::uint64_t i = 0; i < kTries && looks < kLooks; ++i) {
-    const std::uint64_t point = sampling::hashed(0, i) % numbers;
-    const bool is_last_chance = i + 1 == kTries && looks == 0;
-    if (table.is_left_in(point) || is_last_chance) {  // at least one point is examined
+    if (const auto point = sampling::hashed(0, i) % numbers; table.is_left_in(point)) {
       look_at(point);
     }
+  }
+  if (looks == 0) {
+    look_at(0);  // the filter keeps few points or none
   }
   size.falls = estimated_falls(met, static_cast<double>(looks), static_cast<double>(size.points));
   size.falls_estimated = size.falls != met.size();
@@ -85,26 +89,21 @@ StudySize size_of(const PointTable& table) {
 }
 
 PointsLeftIn points_left_in(const PointTable& table, std::size_t block) {
-  constexpr std::uint64_t kMostCounted = 100'000;
-  constexpr std::uint64_t kLooks = 10'000;
   const BlockPlace& place = table.block(block);
   if (table.recipe().blocks(static_cast<int>(block)).where().empty()) {
     return {place.points, false};
   }
-  const std::uint64_t end = place.first_point + place.points;
+  const bool counts_all = place.points <= kMostCounted;
+  const std::uint64_t looks = counts_all ? place.points : kLooks;
   std::uint64_t found = 0;
-  if (place.points <= kMostCounted) {
-    for (std::uint64_t i = place.first_point; (i = table.first_left_in(i, end)) < end; ++i) {
-      ++found;
-    }
-    return {found, false};
+  for (std::uint64_t look = 0; look < looks; ++look) {
+    const std::uint64_t i = counts_all ? look : sampling::hashed(2, look) % place.points;
+    found += table.is_left_in(place.first_point + i) ? 1U : 0U;
   }
-  for (std::uint64_t look = 0; look < kLooks; ++look) {
-    found +=
-        table.is_left_in(place.first_point + sampling::hashed(2, look) % place.points) ? 1U : 0U;
-  }
-  const double share = static_cast<double>(found) / static_cast<double>(kLooks);
-  return {static_cast<std::uint64_t>(share * static_cast<double>(place.points)), true};
+  const double share = static_cast<double>(found) / static_cast<double>(looks);
+  return {
+      counts_all ? found : static_cast<std::uint64_t>(share * static_cast<double>(place.points)),
+      !counts_all};
 }
 
 }  // namespace oblique::protocol

@@ -1,6 +1,9 @@
 #include "proto/socket/socket.h"
 
-#include <cstdint>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -17,8 +20,8 @@ namespace {
                            ", as in " + settings.example_url);
 }
 
-/// Whether this attempt to connect is by IPv6. For that libzmq has to be told: it asks for
-/// addresses of one family only, and, for IPv6, for such of IPv4 where a name has none.
+/// Whether this attempt to connect is by IPv6, which is an option of libzmq: it looks up addresses
+/// of one family only, and with IPv6 those of IPv4 where a name has no others.
 bool is_by_v6(const std::string& url, unsigned attempt) {
   const auto [has_v4, has_v6] = families_of(host_of(url));
   return has_v6 && (!has_v4 || attempt % 2 == 1);
@@ -35,6 +38,45 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
   socket.set(zmq::sockopt::curve_publickey, z85(key.pair.public_key));
   socket.set(zmq::sockopt::curve_secretkey,
              zmq::const_buffer(key.pair.secret_key.data(), key.pair.secret_key.bytes().size()));
+}
+
+constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
+                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
+
+constexpr int kAttemptEvents = ZMQ_EVENT_CONNECTED | ZMQ_EVENT_CONNECT_RETRIED;
+
+/// Makes libzmq report `events` of `socket` under the name that is returned. That of a socket which
+/// was closed just now may still be taken.
+std::string monitored(zmq::socket_t& socket, int events) {
+  for (int number = 0;; ++number) {
+    std::string name = "inproc://connections-" + std::to_string(number);
+    if (zmq_socket_monitor(socket.handle(), name.c_str(), events) == 0) {
+      return name;
+    }
+    if (zmq_errno() != EADDRINUSE) {
+      throw zmq::error_t();
+    }
+  }
+}
+
+/// Why a server that has keys rejected ours. It sends the same answer for unknown keys and for keys
+/// for its other port.
+std::string key_objection(std::uint32_t status, const DealerSettings& settings) {
+  constexpr std::uint32_t kNotAdmitted = 400;
+  if (status != kNotAdmitted) {
+    return fmt::format(
+        "the public key of the server in that file, {}, is not its own, which its log shows at the "
+        "start",
+        z85(settings.key->server.value_or(CurveKey{})));
+  }
+  if ((settings.key->role == Role::kWorker) != settings.is_worker) {
+    return settings.is_worker ? "it is for clients, and this port is for workers"
+                              : "it is for workers, and this port is for clients";
+  }
+  return fmt::format(
+      "the key is not on the server's list, or was revoked, or this is not its port for {}. Where "
+      "the server is, `oblique keys list` shows the list and `oblique keys add` adds to it",
+      settings.is_worker ? "workers (by default 7601)" : "clients (by default 7600)");
 }
 
 }  // namespace
@@ -76,6 +118,86 @@ void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned att
 void connect_again(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
   socket.disconnect(settings.url);
   connect(socket, settings, attempt);
+}
+
+SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,
+                             DealerSettings settings, bool with_attempts)
+    : socket_(socket), settings_(std::move(settings)), events_(context, zmq::socket_type::pair) {
+  const std::string name = monitored(socket_, kEvents | (with_attempts ? kAttemptEvents : 0));
+  events_.set(zmq::sockopt::linger, 0);
+  events_.connect(name);
+}
+
+SocketMonitor::~SocketMonitor() {
+  zmq_socket_monitor(socket_.handle(), nullptr, 0);
+}
+
+void SocketMonitor::take_events() {
+  zmq::message_t frame;
+  while (events_.recv(frame, zmq::recv_flags::dontwait)) {
+    // An event is two frames: its number and a value, and the address.
+    std::uint16_t event = 0;
+    std::uint32_t value = 0;
+    if (!frame.more() || frame.size() != sizeof event + sizeof value) {
+      continue;
+    }
+    std::memcpy(&event, frame.data(), sizeof event);
+    std::memcpy(&value, frame.data<char>() + sizeof event, sizeof value);
+    if (event == ZMQ_EVENT_CONNECTED) {
+      attempts_.was_accepted = true;
+    } else if (event == ZMQ_EVENT_CONNECT_RETRIED) {
+      ++attempts_.failed;
+    } else if (event == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
+      ++connections_;
+      failure_.reset();
+    } else {
+      failure_ = {event, value};
+    }
+  }
+}
+
+std::uint64_t SocketMonitor::connections() {
+  take_events();
+  return connections_;
+}
+
+SocketMonitor::Attempts SocketMonitor::attempts() {
+  take_events();
+  return attempts_;
+}
+
+std::optional<std::string> SocketMonitor::rejection() {
+  constexpr std::uint32_t kTryLater = 300;
+  take_events();
+  if (!failure_) {
+    return std::nullopt;
+  }
+  const auto& key = settings_.key;
+  if (failure_->event == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH && failure_->value == kTryLater) {
+    return fmt::format(
+        "the server at {} has no room at present: it, or this key, has as many connections as it "
+        "may have",
+        settings_.url);
+  }
+  const bool is_mismatch = failure_->value == ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH;
+  if (failure_->event == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL && !is_mismatch) {
+    return fmt::format("the program at {} is not an oblique-server: check the address and port",
+                       settings_.url);
+  }
+  if (!key) {
+    return fmt::format("the server at {} {}", settings_.url,
+                       is_mismatch
+                           ? "requires a key, and none was given: name yours with --keys FILE or "
+                             "OBLIQUE_KEYS"
+                           : "did not accept this program");
+  }
+  return fmt::format(
+      "the server at {} did not accept this key ({}, a {}'s key called \"{}\", public key {}): {}",
+      settings_.url, key->path, name_of(key->role), key->name, z85(key->pair.public_key),
+      is_mismatch
+          ? "it has no keys. Start it with --keys, or leave out --keys and OBLIQUE_KEYS here "
+            "to connect unencrypted"
+          : key_objection(failure_->value, settings_));
 }
 
 }  // namespace oblique::protocol

@@ -6,7 +6,7 @@
 
 namespace oblique::protocol {
 
-/// What a container or a service may take of its machine, by its control group (cgroup).
+/// What a container or a service may take of its machine, by its control group (cgroup version 2).
 struct LimitsOfGroup {
   std::optional<double> cores = {};
   std::optional<std::uint64_t> memory_bytes = {};

@@ -5,7 +5,7 @@
 #include <utility>
 #include <variant>
 
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "server/query/query_pool.h"
 #include "server/service/outbox/request_reader.h"
 #include "server/store/writer.h"

@@ -9,10 +9,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/canonical.h"
-#include "proto/recipe/point_inputs.h"
-#include "proto/recipe/written/study_name.h"
-#include "proto/recipe/written/study_priority.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "proto/recipe/written.h"
 #include "server/database/open_for_reading.h"
 #include "server/store/completed_ranges.h"
 #include "server/store/result_rows.h"

@@ -6,7 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/checks.h"
-#include "proto/recipe/written/study_name.h"
+#include "proto/recipe/written.h"
 #include "server/database/open_for_reading.h"
 #include "server/store/store.h"
 

@@ -21,9 +21,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/frames.h"
-#include "proto/program/completion.h"
 #include "proto/program/configuration.h"
-#include "proto/program/exit_code.h"
 #include "proto/program/log.h"
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
@@ -230,9 +228,8 @@ int main(int argc, char** argv) {
       kProgram};
   Options options;
   options.loop.database = "oblique.db";
-  Configuration configuration(app, {"OBLIQUE_SERVER_",
-                                    oblique::protocol::default_configuration_file("server.toml"),
-                                    {"limits", "log"}});
+  Configuration configuration(
+      app, {"OBLIQUE_SERVER_", oblique::protocol::default_configuration_file("server.toml")});
   try {
     add_options(app, configuration, parent, options);
     if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {

@@ -8,7 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/parameters.h"

@@ -8,7 +8,6 @@
 #include <string>
 #include <string_view>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"

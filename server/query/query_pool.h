@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "proto/oblique.pb.h"
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 
 namespace oblique::server {
 

@@ -5,8 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/written/study_name.h"
-#include "proto/recipe/written/study_priority.h"
+#include "proto/recipe/written.h"
 #include "proto/text.h"
 
 namespace oblique::server {

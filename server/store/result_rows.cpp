@@ -8,7 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "proto/recipe/canonical.h"
+#include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "worker/solver/model/result_fields.h"
 

@@ -5,7 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/point_inputs.h"
+#include "proto/recipe/point_table.h"
 #include "server/store/schema.h"
 
 namespace oblique::server {

@@ -5,7 +5,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/canonical.h"
 #include "proto/recipe/model_message.h"
 #include "worker/solver/model/number.h"
 

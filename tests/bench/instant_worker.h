@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "proto/recipe/point_inputs.h"
+#include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"

@@ -7,19 +7,17 @@
 namespace oblique::protocol {
 namespace {
 
-TEST(Address, PassesWithAPortThatThereCanBe) {
+TEST(Address, IsObjectedToUnlessItHasAPortThatExistsAndBracketsAroundIpv6) {
   for (const char* url : {"tcp://127.0.0.1:7600", "tcp://host:1", "tcp://[::1]:65535",
                           "ipc:///tmp/x", "inproc://x"}) {
     EXPECT_EQ(objection_to_address(url), "") << url;
   }
-}
-
-TEST(Address, IsObjectedToWithoutOne) {
-  for (const char* url : {"tcp://127.0.0.1:0", "tcp://127.0.0.1:65536", "tcp://127.0.0.1:99999",
-                          "tcp://127.0.0.1:76x", "tcp://127.0.0.1:", "tcp://127.0.0.1", "tcp://",
-                          "tcp://127.0.0.1:-1", "tcp://127.0.0.1:99999999999999999999"}) {
-    EXPECT_NE(objection_to_address(url), "") << url;
+  for (const char* url : {"tcp://127.0.0.1:0", "tcp://127.0.0.1:65536", "tcp://127.0.0.1:76x",
+                          "tcp://127.0.0.1:", "tcp://127.0.0.1", "tcp://", "tcp://127.0.0.1:-1",
+                          "tcp://127.0.0.1:99999999999999999999"}) {
+    EXPECT_NE(objection_to_address(url).find("port"), std::string::npos) << url;
   }
+  EXPECT_NE(objection_to_address("tcp://::1:7601").find("brackets"), std::string::npos);
 }
 
 TEST(Address, NamesAHost) {
@@ -40,11 +38,6 @@ TEST(Address, IsOfTheFamilyThatItIsWrittenIn) {
   EXPECT_TRUE(v6.has_v6);
   const Families none = families_of("");
   EXPECT_FALSE(none.has_v4 || none.has_v6);
-}
-
-TEST(Address, OfIpv6StandsInBrackets) {
-  EXPECT_NE(objection_to_address("tcp://::1:7601").find("brackets"), std::string::npos);
-  EXPECT_EQ(objection_to_address("tcp://[::1]:7601"), "");
 }
 
 }  // namespace

@@ -37,20 +37,19 @@ TEST(TomlReader, NamesThePlaceOfTextThatIsNoToml) {
 }
 
 TEST(TomlReader, RefusesKeysThatNestDeeply) {
-  const std::string deep = "a.b.c.d.e.f.g.h.i";
-  EXPECT_THAT(parse_error("x = 1\n " + deep + " = 1\n"),
-              StartsWith("a.toml:2:2: a key has more than 8 parts"));
-  EXPECT_THAT(parse_error("[" + deep + "]\n"), StartsWith("a.toml:1:2: a key has more"));
-  EXPECT_THAT(parse_error("x = { " + deep + " = 1 }\n"), HasSubstr("a key has more"));
-  EXPECT_THAT(parse_error("\"#\".'='.\"\\\".\".d.e.f.g.h.i = 1\n"), HasSubstr("a key has more"));
-}
-
-TEST(TomlReader, DotsInTextCommentsAndNumbersAreNoPartsOfKeys) {
-  const std::string dots = "a.b.c.d.e.f.g.h.i.j";
-  EXPECT_EQ(parse_error("# " + dots + "\nx = \"" + dots + "\"\ny = '''\n" + dots +
-                        "\n'''\nz = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n" +
-                        dots.substr(0, 15) + " = 1\n"),
-            "nothing was thrown");
+  std::string deep = "a";
+  for (int i = 0; i < 100; ++i) {
+    deep += ".a";
+  }
+  for (const std::string& text : {deep + " = 1\n", "[" + deep + "]\n", "{ " + deep + " = 1 }\n"}) {
+    EXPECT_THAT(parse_error("x = 1\n" + text), StartsWith("a.toml:2: more than 100 parts"));
+  }
+  EXPECT_EQ(parse_error(deep.substr(2) + " = '" + deep.substr(2) + "'\n"), "nothing was thrown");
+  std::string numbers = "x = [0.5";
+  for (int i = 0; i < 200; ++i) {
+    numbers += ", 0.5";
+  }
+  EXPECT_EQ(parse_error(numbers + "]\n"), "nothing was thrown");
 }
 
 TEST(TomlReader, SaysWhatAValueIsAndMustBe) {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "proto/frames.h"
-#include "proto/recipe/point_inputs.h"
+#include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 
 namespace oblique::simulation {

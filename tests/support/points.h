@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "proto/recipe/point_inputs.h"
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "tests/support/recipes.h"

@@ -9,7 +9,7 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "tests/support/reserved_port.h"
 #include "tests/worker/conversation_fixture.h"
 

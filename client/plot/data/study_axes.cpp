@@ -4,7 +4,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "server/query/columns.h"

@@ -12,7 +12,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/study_size.h"
-#include "proto/recipe/written/written_model.h"
+#include "proto/recipe/written.h"
 #include "proto/text.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"

@@ -8,7 +8,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/text.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "server/web/http/http_message.h"
 
 namespace oblique::server {

@@ -15,7 +15,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-#include "proto/system/wake_up.h"
+#include "proto/system/descriptor.h"
 #include "server/network/listener.h"
 #include "server/web/http/http_parts.h"
 

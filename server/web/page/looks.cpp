@@ -6,9 +6,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/sha256.h"
-#include "proto/recipe/written/study_priority.h"
+#include "proto/recipe/written.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/json_answer.h"
 #include "worker/solver/model/errors.h"

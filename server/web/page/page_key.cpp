@@ -7,7 +7,7 @@
 #include <sodium/randombytes.h>
 #include <sodium/utils.h>
 
-#include "proto/recipe/sha256.h"
+#include "proto/recipe/model_message.h"
 
 namespace oblique::server {
 namespace {

@@ -10,7 +10,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/program/exit_code.h"
+#include "proto/program/usage.h"
 #include "proto/text.h"
 #include "server/web/answers/fields.h"
 #include "server/web/http/json_answer.h"

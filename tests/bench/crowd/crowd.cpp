@@ -17,7 +17,7 @@
 #include <zmq.hpp>
 
 #include "proto/frames.h"
-#include "proto/recipe/point_inputs.h"
+#include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "proto/socket/socket.h"
 #include "proto/system/descriptor.h"

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "client/study/flag_axis.h"
-#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/point_table.h"
 #include "tests/client/study/flags_of.h"

@@ -9,11 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "client/study/study_file.h"
-#include "proto/recipe/canonical.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written.h"
 
 namespace oblique::client {
 namespace {

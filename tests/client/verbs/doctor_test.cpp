@@ -190,7 +190,7 @@ TEST_F(Doctor, NamesVariablesThatNothingReadsWithoutTheirValues) {
                     HasSubstr("OBLIQUE_PAGER = less -S"), Not(HasSubstr("secret"))));
 }
 
-TEST(LimitsOfAGroup, AreTheTightestFromTheProcessUpwardsInBothVersions) {
+TEST(LimitsOfAGroup, AreTheTightestFromTheProcessUpwards) {
   const test::TemporaryFolder folder;
   const auto write = [&](const std::string& name, const std::string& text) {
     std::filesystem::create_directories(std::filesystem::path(folder.file(name)).parent_path());
@@ -201,15 +201,10 @@ TEST(LimitsOfAGroup, AreTheTightestFromTheProcessUpwardsInBothVersions) {
   write("a/cpu.max", "150000 100000\n");
   write("a/b/cpu.max", "max 100000\n");
   write("a/b/memory.max", "500000000\n");
-  const auto second = protocol::limits_of_group(root, "0::/a/b\n");
-  EXPECT_EQ(second.cores, 1.5);
-  EXPECT_EQ(second.memory_bytes, 500'000'000U);
-  write("cpu/job/cpu.cfs_quota_us", "200000\n");
-  write("cpu/job/cpu.cfs_period_us", "100000\n");
-  write("memory/memory.limit_in_bytes", "9223372036854771712\n");
-  const auto first = protocol::limits_of_group(root, "4:memory:/job\n2:cpu,cpuacct:/job\n");
-  EXPECT_EQ(first.cores, 2.0);
-  EXPECT_FALSE(first.memory_bytes);
+  const auto limits = protocol::limits_of_group(root, "4:memory:/c\n0::/a/b\n");
+  EXPECT_EQ(limits.cores, 1.5);
+  EXPECT_EQ(limits.memory_bytes, 500'000'000U);
+  EXPECT_FALSE(protocol::limits_of_group(root, "4:memory:/a/b\n").cores) << "of version 1";
 }
 
 TEST(TheHomeFolder, IsATildeWhereverItStandsAndNowhereElse) {

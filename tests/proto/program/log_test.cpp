@@ -106,23 +106,19 @@ TEST_F(ProgramLogTest, TheJournalGetsLevelsAndNoTimes) {
   EXPECT_EQ(lines(), (std::vector<std::string>{"<6>one\\ntwo", "<4>low", "<3>broken"}));
 }
 
-TEST_F(ProgramLogTest, AStandardErrorThatIsNotTheJournalHasTimes) {
+TEST_F(ProgramLogTest, AnotherStandardErrorGetsTimesAndFailuresInTheFormOfTheLog) {
   setenv("JOURNAL_STREAM", "1:1", 1);
   set_up_log("oblique-worker");
   spdlog::info("ready");
-  ASSERT_EQ(lines().size(), 1U);
-  EXPECT_TRUE(lines()[0].ends_with("Z oblique-worker info: ready")) << lines()[0];
-}
-
-TEST_F(ProgramLogTest, AProgramThatFailsSaysSoInTheFormOfItsLog) {
   EXPECT_EQ(tell_failure("oblique-server", "no disk", {}), 1);
   const LogSettings json{"info", "json"};
   set_up_log("oblique-server", json);
   tell_failure("oblique-server", "no disk", json);
   const auto written = lines();
-  ASSERT_EQ(written.size(), 2U);
-  EXPECT_EQ(written[0], "oblique-server: no disk");
-  EXPECT_EQ(nlohmann::json::parse(written[1]).at("message"), "no disk");
+  ASSERT_EQ(written.size(), 3U);
+  EXPECT_TRUE(written[0].ends_with("Z oblique-worker info: ready")) << written[0];
+  EXPECT_EQ(written[1], "oblique-server: no disk");
+  EXPECT_EQ(nlohmann::json::parse(written[2]).at("message"), "no disk");
 }
 
 }  // namespace

@@ -23,28 +23,20 @@ std::optional<std::int64_t> left_s(const std::string& text) {
   return left ? std::optional(std::chrono::duration_cast<seconds>(*left).count()) : std::nullopt;
 }
 
-TEST(TimeUntil, ReadsDurations) {
+TEST(TimeUntil, ReadsDurationsAndTimesWithAZone) {
   for (const auto& [text, expected_s] :
        std::vector<std::pair<std::string, std::int64_t>>{{"0", 0},
                                                          {"5400", 5400},
                                                          {"5400s", 5400},
                                                          {"90m", 5400},
-                                                         {"1h30m", 5400},
+                                                         {"2h", 7200},
                                                          {"2d", 172'800},
-                                                         {"1d1h1m1s", 90'061},
-                                                         {"1m30", 90}}) {
+                                                         {"2026-11-22T05:01:00Z", 60},
+                                                         {"2026-11-22T06:01:00+01:00", 60},
+                                                         {"2026-11-22T00:31:00-0430", 60},
+                                                         {"2026-11-22T04:59:00Z", -60}}) {
     EXPECT_EQ(left_s(text), expected_s) << text;
   }
-}
-
-TEST(TimeUntil, ReadsTimesWithAZone) {
-  EXPECT_EQ(left_s("2026-11-22T05:01:00Z"), 60);
-  EXPECT_EQ(left_s("2026-11-22T05:01Z"), 60);
-  EXPECT_EQ(left_s("2026-11-22 05:01:00Z"), 60);
-  EXPECT_EQ(left_s("2026-11-22T06:01:00+01:00"), 60);
-  EXPECT_EQ(left_s("2026-11-22T06:01:00+01"), 60);
-  EXPECT_EQ(left_s("2026-11-22T00:31:00-0430"), 60);
-  EXPECT_EQ(left_s("2026-11-22T04:59:00Z"), -60);
 }
 
 TEST(TimeUntil, ATimeWithoutAZoneIsLocal) {
@@ -63,25 +55,21 @@ TEST(TimeUntil, RefusesEverythingElse) {
                            "-5",
                            "5.5",
                            "5x",
-                           "5m5m",
-                           "5m1h",
-                           "1h 5m",
+                           "1h30m",
                            "m",
                            "99999999999",
                            "1e3",
+                           "40000d",
                            "2026-11-22",
-                           "2026-11-22T",
-                           "2026-13-01T00:00Z",
+                           "2026-13-01T00:00:00Z",
                            "2026-02-30T00:00:00Z",
                            "2026-02-30T00:00:00",
                            "2026-11-22T25:00:00Z",
-                           "2026-11-22T05:60:00Z",
                            "2026-11-22T05:00:00X",
                            "2026-11-22T05:00:00Z ",
                            "2026-11-22T05:00:00+25:00",
                            "0001-01-01T00:00:00Z",
-                           "9999-01-01T00:00:00Z",
-                           "40000d"}) {
+                           "9999-01-01T00:00:00Z"}) {
     EXPECT_EQ(left_s(text), std::nullopt) << text;
   }
 }

@@ -1,10 +1,12 @@
-#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -56,6 +58,21 @@ TEST(AxisTest, StepsMayHaveMoreDecimalsThanTheEnds) {
 TEST(AxisTest, AStepThatIsNoDecimalIsRoundedOnce) {
   EXPECT_EQ(axis_value(range("mu", 0.0, 1.0, 4), 1), 1.0 / 3.0);
   EXPECT_EQ(axis_value(range("mu", 0.0, 1.0 / 3.0, 3), 1), 1.0 / 6.0);
+}
+
+TEST(AxisTest, ALogarithmicRangeHasItsEndsAndTheNumbersThatPeopleType) {
+  const Axis decades = log_range("mu", 0.01, 100.0, 5);
+  const Axis octaves = log_range("links", 1.0, 64.0, 7);
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(axis_value(decades, i), std::vector({0.01, 0.1, 1.0, 10.0, 100.0})[i]);
+  }
+  for (std::uint64_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(axis_value(octaves, i), std::ldexp(1.0, static_cast<int>(i)));
+  }
+  const Axis many = log_range("mu", 0.3, 1.7, 1'000'000'000'000);
+  EXPECT_NEAR(axis_value(many, many.count() / 2), std::sqrt(0.3 * 1.7), 1e-11);
+  EXPECT_EQ(axis_value(many, many.count() - 1), 1.7);
+  EXPECT_EQ(first_value_from(many, axis_value(many, 12345)), 12345U);
 }
 
 TEST(AxisTest, ARangeOfHugeNumbersDoesNotOverflow) {

@@ -77,15 +77,16 @@ TEST(ExpressionTest, EveryFunctionTakesItsArgumentsAndNoOthers) {
   EXPECT_EQ(value_of("sqrt(2)"), std::sqrt(2.0));
   EXPECT_EQ(value_of("abs(-2) + floor(1.5) + ceil(1.5) + round(1.5)"), 7.0);
   EXPECT_EQ(value_of("log10(1000) + log2(8) + ln(1) + log(1)"), 6.0);
-  for (const Function& function : functions()) {
-    const std::string name(function.name);
+  for (const std::string_view each : function_names()) {
+    const std::string name(each);
+    const std::string needs = objection_to(name + "()");  // "`min` takes 2 arguments and has 0"
+    EXPECT_THAT(needs, HasSubstr("and has 0"));
     std::string list = "0.5";
-    for (std::size_t i = 1; i < function.arguments; ++i) {
+    for (int more = needs.at(needs.find(" takes ") + 7) - '1'; more > 0; --more) {
       list += ", 0.25";
     }
     EXPECT_TRUE(std::isfinite(value_of(name + "(" + list + ")"))) << name;
     EXPECT_THAT(objection_to(name + "(" + list + ", 1)"), HasSubstr("argument")) << name;
-    EXPECT_THAT(objection_to(name + "()"), HasSubstr("and has 0")) << name;
     EXPECT_THAT(objection_to(name), HasSubstr("brackets"));
   }
 }
@@ -98,45 +99,50 @@ TEST(ExpressionTest, WhatFollowsFromNoNumberIsNoNumberAlsoWhenCompared) {
   EXPECT_TRUE(std::isinf(value_of("1 / 0")));
 }
 
-TEST(ExpressionTest, TextsThatAreNoneAreRefusedWithWhatIsWrong) {
-  EXPECT_THAT(objection_to(""), HasSubstr("empty"));
-  EXPECT_THAT(objection_to("e = 1"), HasSubstr("`==` compares"));
-  EXPECT_THAT(objection_to("\"text\""), HasSubstr("`\"` means nothing"));
-  EXPECT_THAT(objection_to("a ? b : c"), HasSubstr("`?` means nothing"));
-  EXPECT_THAT(objection_to("a; b"), HasSubstr("`;`"));
-  EXPECT_THAT(objection_to("0 < mu < 1"), HasSubstr("a < b && b < c"));
-  EXPECT_THAT(objection_to("sqr(2)"), HasSubstr("did you mean `sqrt`?"));
-  EXPECT_THAT(objection_to("2 mu"), HasSubstr("operator is missing before `mu`"));
-  EXPECT_THAT(objection_to("2mu"), HasSubstr("runs into"));
-  EXPECT_THAT(objection_to("1.2.3"), HasSubstr("runs into"));
-  EXPECT_THAT(objection_to("1e999"), HasSubstr("cannot be read"));
-  EXPECT_THAT(objection_to("(1 + 2"), HasSubstr("open"));
-  EXPECT_THAT(objection_to("1 + 2)"), HasSubstr("closing"));
-  EXPECT_THAT(objection_to("1, 2"), HasSubstr("list of values"));
-  EXPECT_THAT(objection_to("\xce\xbc > 1"), HasSubstr("means nothing"));
-  EXPECT_THAT(objection_to("1 +"), HasSubstr("a value is missing at its end"));
-  EXPECT_THAT(objection_to("1 + * 2"), HasSubstr("a value is missing before `*`"));
-  EXPECT_THAT(objection_to("1 < or 2"), HasSubstr("a value is missing before `or`"));
-  EXPECT_THAT(objection_to("1 + not e"), HasSubstr("needs brackets"));
-  EXPECT_THAT(objection_to("(1, 2)"), HasSubstr("arguments of a function"));
-  for (const char* text : {"* 2", "()", "min(,)", "min(1,)", "sqrt(1 2)", ",", "(1)(2)", "!",
-                           "1 ! 2", "1 not 2", "e pi", "0 < mu == 1", "1e", "0x10", "a & b"}) {
-    EXPECT_NE(objection_to(text), "") << text;
+TEST(ExpressionTest, ATextThatIsNoneIsRefusedWithTheReason) {
+  for (const auto& [text, reason] : std::vector<std::pair<std::string, std::string>>{
+           {"", "empty"},
+           {"e = 1", "`==` compares"},
+           {"\"text\"", "`\"` means nothing"},
+           {"a ? b : c", "`?` means nothing"},
+           {"a; b", "`;`"},
+           {"0 < mu < 1", "a < b && b < c"},
+           {"0 < mu == 1", "a < b && b < c"},
+           {"sqr(2)", "did you mean `sqrt`?"},
+           {"2 mu", "operator is missing before `mu`"},
+           {"(1)(2)", "operator is missing before `(`"},
+           {"1 not 2", "operator is missing before `not`"},
+           {"2mu", "runs into"},
+           {"1.2.3", "runs into"},
+           {"1e", "runs into"},
+           {"0x10", "runs into"},
+           {"1e999", "cannot be read"},
+           {"(1 + 2", "open"},
+           {"1 + 2)", "closing"},
+           {"1, 2", "arguments of a function"},
+           {"(1, 2)", "arguments of a function"},
+           {"\xce\xbc > 1", "means nothing"},
+           {"a & b", "means nothing"},
+           {"1 +", "a value is missing at its end"},
+           {"!", "a value is missing at its end"},
+           {"1 + * 2", "a value is missing before `*`"},
+           {"1 < or 2", "a value is missing before `or`"},
+           {"()", "a value is missing before `)`"},
+           {"min(1,)", "a value is missing before `)`"},
+           {std::string(kLongestText + 1, '1'), "more than 1000"}}) {
+    EXPECT_THAT(objection_to(text), HasSubstr(reason)) << text;
   }
 }
 
-TEST(ExpressionTest, LongAndDeepTextsAreRefused) {
-  EXPECT_THAT(objection_to(std::string(kLongestText + 1, '1')), HasSubstr("more than 1000"));
-  const std::string deep =
-      std::string(kDeepestNesting, '(') + "1" + std::string(kDeepestNesting, ')');
-  EXPECT_EQ(objection_to(deep), "");
-  EXPECT_THAT(objection_to("(" + deep + ")"), HasSubstr("deep"));
+TEST(ExpressionTest, TheLongestTextsAreComputedHoweverTheyNest) {
+  const std::string brackets = std::string(499, '(') + "1" + std::string(499, ')');
+  EXPECT_EQ(value_of(brackets), 1.0);
+  EXPECT_EQ(value_of(std::string(kLongestText - 2, '-') + "1"), 1.0);
   std::string chain = "1";
   while (chain.size() + 2 <= kLongestText) {
     chain += "^1";
   }
   EXPECT_EQ(value_of(chain), 1.0);
-  EXPECT_NE(objection_to(std::string(kLongestText - 1, '-') + "1"), "");
 }
 
 }  // namespace

@@ -1,12 +1,13 @@
 #include "proto/recipe/point_table.h"
 
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/axes.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "tests/support/recipes.h"
@@ -73,21 +74,16 @@ TEST(PointTableTest, EveryPointIsThatOfNestedLoopsOverTheAxes) {
 
 TEST(PointTableTest, ASegmentIsTheLongestRunOfPointsWithOneModel) {
   const PointTable table(varied_recipe());
-  std::uint64_t next = 0;
   int segments = 0;
-  while (next < table.size()) {
+  for (std::uint64_t next = 0; next < table.size(); ++segments) {
     const Segment segment = table.segment_at(next);
     ASSERT_EQ(segment.first_point, next);
     ASSERT_GT(segment.count, 0U);
-    for (std::uint64_t i = next; i < next + segment.count; ++i) {
-      EXPECT_EQ(table.point(i).model, segment.model);
-      EXPECT_EQ(table.segment_at(i).first_point, segment.first_point);
-      EXPECT_EQ(table.segment_at(i).count, segment.count);
+    for (; next < segment.first_point + segment.count; ++next) {
+      EXPECT_EQ(table.point(next).model, segment.model);
+      EXPECT_EQ(table.segment_at(next).first_point, segment.first_point);
     }
-    next += segment.count;
-    ++segments;
   }
-  EXPECT_EQ(next, table.size());
   EXPECT_EQ(segments, 1 + 6 + 1 + 3);
 }
 
@@ -97,19 +93,13 @@ TEST(PointTableTest, BlocksThatShareAModelAndFollowEachOtherAreOneSegment) {
   std::vector<Axis> other_model = two;
   other_model.insert(other_model.begin(), listed("k", {1e7}));
   const PointTable table(recipe_of({point, two, point, other_model, other_model, two, two, point}));
-  struct Run {
-    std::uint64_t model;
-    std::uint64_t first_point;
-    std::uint64_t count;
-  };
+  using Run = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t>;
   for (const auto& [model, first_point, count] :
        {Run{0, 0, 4}, Run{1, 4, 2}, Run{2, 6, 2}, Run{0, 8, 5}}) {
     for (std::uint64_t i = first_point; i < first_point + count; ++i) {
-      SCOPED_TRACE(i);
       const Segment segment = table.segment_at(i);
-      EXPECT_EQ(segment.model, model);
-      EXPECT_EQ(segment.first_point, first_point);
-      EXPECT_EQ(segment.count, count);
+      EXPECT_EQ((Run{segment.model, segment.first_point, segment.count}),
+                (Run{model, first_point, count}));
     }
   }
   EXPECT_THROW(table.segment_at(13), std::out_of_range);
@@ -132,13 +122,6 @@ TEST(PointTableTest, TheModelOfTheRecipeIsTheBaseOfEveryModelAxis) {
   EXPECT_EQ(table.model(table.point(1).model), expected);
 }
 
-TEST(PointTableTest, ARecipeWithoutAModelIsRefused) {
-  Recipe recipe = varied_recipe();
-  recipe.clear_model();
-  EXPECT_THAT([&] { PointTable{recipe}; }, testing::ThrowsMessage<solver::InputError>(
-                                               testing::HasSubstr("the recipe has no model")));
-}
-
 TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {
   const PointTable table(recipe_of({{range("H", 0.5, 1.1, 10'000), range("mu", 0.0, 1.0, 10'000),
                                      range("e", 0.5, 1.0, 10'000)}}));
@@ -152,20 +135,111 @@ TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {
   EXPECT_EQ(inner.e_star, axis_value(table.recipe().blocks(0).axes(2), 9012));
 }
 
-TEST(PointTableTest, ABillionModelsAreReadAtAnyModel) {
+TEST(PointTableTest, ABillionModelsAreReadAtAnyModelAndNoneBeyond) {
   const PointTable table(recipe_of({{range("k", 1e7, 3e7, 1'000'000'001), listed("H", {1.0}),
                                      listed("mu", {0.4}), listed("e", {1.0})}}));
   EXPECT_EQ(table.models(), 1'000'000'001U);
   EXPECT_EQ(table.model(500'000'000).k_N_m, 2e7);
   EXPECT_EQ(table.point(500'000'000).model, 500'000'000U);
+  EXPECT_THROW(table.point(table.size()), std::out_of_range);
+  EXPECT_THROW(table.values(table.size()), std::out_of_range);
+  EXPECT_THROW(table.segment_at(table.size()), std::out_of_range);
+  EXPECT_THROW(table.model(table.models()), std::out_of_range);
 }
 
-TEST(PointTableTest, PointsAndModelsBeyondTheStudyAreOutOfRange) {
-  const PointTable table(
-      recipe_of({{listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})}}));
-  EXPECT_THROW(table.point(1), std::out_of_range);
-  EXPECT_THROW(table.segment_at(1), std::out_of_range);
-  EXPECT_THROW(table.model(1), std::out_of_range);
+// ---- Inputs that workers send -----------------------------------------------------------------
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+PointTable table_of_lengths() {
+  return PointTable(recipe_of({{range("length", 0.3, 0.4, 3), listed("H", {0.8}),
+                                listed("mu", {0.0, 0.4}), listed("e", {0.9})}}));
+}
+
+PointResult result_of(std::uint64_t point, const PointTable& table) {
+  PointResult result;
+  result.set_point(point);
+  set_inputs(result, table);
+  return result;
+}
+
+TEST(PointInputs, OfEveryPointAreThoseOfItsStudy) {
+  const PointTable table = table_of_lengths();
+  for (std::uint64_t i = 0; i < table.size(); ++i) {
+    const PointResult result = result_of(i, table);
+    EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
+    const Point point = inputs_of(result, table);
+    EXPECT_EQ(point.model, table.point(i).model);
+    EXPECT_EQ(point.mu, table.point(i).mu);
+  }
+}
+
+TEST(PointInputs, MayDifferInTheLastBitsAndAreKeptAsTheyWereSent) {
+  const PointTable table = table_of_lengths();
+  PointResult result = result_of(3, table);
+  const double H_m = std::nextafter(result.h_m(), 1.0);
+  result.set_h_m(H_m);
+  result.set_mu(result.mu() * (1.0 - 0.9e-12));
+  result.mutable_model()->set_e_pa(result.model().e_pa() * (1.0 + 0.9e-12));
+  EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
+  EXPECT_EQ(inputs_of(result, table).H_m, H_m);
+}
+
+TEST(PointInputs, ThatDifferByMoreAreAFault) {
+  const PointTable table = table_of_lengths();
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  for (const double factor : {1.0 + 1.2e-12, 1.0 - 1.2e-12, -1.0, 0.0, kNaN, kInfinite}) {
+    PointResult result = result_of(3, table);
+    result.set_h_m(result.h_m() * factor);
+    EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("with H = ")) << factor;
+    result = result_of(3, table);
+    result.set_e_star(result.e_star() * factor);
+    EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("with e = ")) << factor;
+    result = result_of(3, table);
+    result.mutable_model()->set_lengths_m(1, result.model().lengths_m(1) * factor);
+    EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("another model")) << factor;
+  }
+  PointResult result = result_of(2, table);
+  result.set_mu(1e-300);
+  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("mu")) << "the study has 0";
+}
+
+TEST(PointInputs, OfTheModelAreWholeNumbersAndLengthsToo) {
+  const PointTable table = table_of_lengths();
+  for (void (*change)(ModelParameters&) :
+       {+[](ModelParameters& m) { m.set_elements_per_link(m.elements_per_link() + 1); },
+        +[](ModelParameters& m) { m.set_integrator(77); },
+        +[](ModelParameters& m) { m.add_lengths_m(0.1); }}) {
+    PointResult result = result_of(3, table);
+    change(*result.mutable_model());
+    EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("another model"));
+  }
+}
+
+TEST(PointInputs, OfAStudyThatHasGrownByModelsSinceAreThoseOfItsPoint) {
+  const Axis H = listed("H", {0.8});
+  const Axis mu = listed("mu", {0.0, 0.4});
+  const Axis e = listed("e", {0.9});
+  const PointTable before(recipe_of({{H, mu, e}}));
+  const PointTable grown(recipe_of({{H, mu, e}, {range("length", 0.3, 0.4, 3), H, mu, e}}));
+  EXPECT_THAT(fault_of_inputs(result_of(1, before), grown), IsEmpty());
+}
+
+TEST(PointInputs, MayBeMissingOnlyInAFailedPoint) {
+  const PointTable table = table_of_lengths();
+  PointResult result = result_of(3, table);
+  result.clear_model();
+  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("another model"));
+  result = result_of(3, table);
+  result.clear_mu();
+  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("with mu = "));
+  result.clear_h_m();
+  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("with H = "));
+  result.set_error("it never fell");
+  EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
+  EXPECT_EQ(inputs_of(result, table).mu, table.point(3).mu) << "the study's own";
 }
 
 }  // namespace

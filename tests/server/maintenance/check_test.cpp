@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/canonical.h"
+#include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "server/maintenance/backup.h"
 #include "server/store/result_rows.h"

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/axes.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/point_table.h"
 #include "server/database/open_for_reading.h"
 #include "server/query/plan.h"

@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/canonical.h"
+#include "proto/recipe/model_message.h"
 #include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {

@@ -72,8 +72,8 @@ TEST(ConfigurationOfProgramsTest, ServerAndWorkerRunOnFilesAlone) {
 TEST(ConfigurationOfProgramsTest, HelpEndsWithTheVariableAndTheKeyThatAnOptionMayAlsoBe) {
   const TemporaryFolder folder;
   for (const auto& [program, words] : std::vector<std::pair<std::string, std::string>>{
-           {server_program(), "(--worker-port: OBLIQUE_SERVER_WORKER_PORT)"},
-           {worker_program(), "(--fall-memory: OBLIQUE_WORKER_FALL_MEMORY)"}}) {
+           {server_program(), "(--log-level: OBLIQUE_SERVER_LOG_LEVEL)"},
+           {worker_program(), "(--log-level: OBLIQUE_WORKER_LOG_LEVEL)"}}) {
     Process process(folder, program, {"--help"});
     EXPECT_EQ(process.wait(), 0);
     const auto said = process.out().find(words);

@@ -1,4 +1,4 @@
-#include "proto/recipe/written/written_model.h"
+#include "proto/recipe/written.h"
 
 #include <functional>
 #include <string>
@@ -9,6 +9,8 @@
 
 namespace oblique::protocol {
 namespace {
+
+using namespace std::string_literals;
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -69,6 +71,32 @@ TEST(WrittenModel, TakesLengthsOrLinksAndLengthButNotBoth) {
                 }),
                 HasSubstr("lengths stands beside"));
   }
+}
+
+TEST(StudyName, MayBeAnyTextThatPeopleCanReadAndShellsTake) {
+  for (const auto& name : {"paper"s, "μ and e, 2nd"s, "a-b"s, "参数"s, std::string(100, 'x')}) {
+    EXPECT_EQ(objection_to_study_name(name), "") << name;
+  }
+  for (const auto& name : {""s, std::string(101, 'x'), "-x"s}) {
+    EXPECT_NE(objection_to_study_name(name), "") << name;
+  }
+}
+
+TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
+  for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
+                           "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
+    const auto objection = objection_to_study_name(name);
+    EXPECT_THAT(objection, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
+                                 testing::Not(HasSubstr(name))));
+  }
+}
+
+TEST(StudyPriority, IsWithinLimitsThatTheObjectionNames) {
+  for (const std::int64_t priority : {-1000, 0, 1000}) {
+    EXPECT_EQ(objection_to_priority(priority), "");
+  }
+  EXPECT_EQ(objection_to_priority(1001), "priority = 1001 is not allowed: -1000 to 1000 is");
+  EXPECT_NE(objection_to_priority(-1001), "");
 }
 
 }  // namespace

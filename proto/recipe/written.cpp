@@ -1,13 +1,16 @@
-#include "proto/recipe/written/written_axis.h"
+#include "proto/recipe/written.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/checks.h"
+#include "proto/recipe/keys.h"
 #include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
@@ -24,8 +27,11 @@ Axis axis_of(const solver::ParameterKey& key) {
   return axis;
 }
 
+constexpr std::array<std::string_view, 3> kDistributions{"uniform", "log-uniform", "normal"};
+constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
+
 /// The index of a name in `names`. `what` begins the message about an unknown name.
-int number_of_name(std::string_view name, const std::vector<std::string_view>& names,
+int number_of_name(std::string_view name, std::span<const std::string_view> names,
                    std::string_view what) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
@@ -67,15 +73,11 @@ Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::
 
 Axis stepped_axis(const solver::ParameterKey& key, double from, double to, double step) {
   check_ends(key, from, to);
-  if (!(std::isfinite(step) && step > 0.0)) {
-    throw InputError(fmt::format("{}: step = {} is not allowed: step must be > 0", key.name,
-                                 exact_number(step)));
-  }
   const double steps = (to - from) / step;
-  if (steps > static_cast<double>(kMaxPoints)) {
+  if (!(std::isfinite(step) && step > 0.0 && steps <= static_cast<double>(kMaxPoints))) {
     throw InputError(
-        fmt::format("{}: step = {} makes more than {} values, the most that are allowed", key.name,
-                    exact_number(step), kMaxPoints));
+        fmt::format("{}: step = {} is not allowed: step must be > 0 and make at most {} values",
+                    key.name, exact_number(step), kMaxPoints));
   }
   const double whole_steps = std::round(steps);
   // Decimal steps are not exact in binary. This tolerance, relative to a step, is well above their
@@ -135,33 +137,104 @@ Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t se
     }
   }
   Sample sample;
-  sample.set_kind(static_cast<SampleKind>(number_of_name(kind, sample_names(), "the sample")));
+  sample.set_kind(static_cast<SampleKind>(number_of_name(kind, kSamples, "the sample")));
   sample.set_count(static_cast<std::uint64_t>(count));
   sample.set_seed(static_cast<std::uint64_t>(seed));
   return sample;
 }
 
-const std::vector<std::string_view>& distribution_names() {
-  static const std::vector<std::string_view> names{"uniform", "log-uniform", "normal"};
-  return names;
-}
-
-const std::vector<std::string_view>& sample_names() {
-  static const std::vector<std::string_view> names{"random", "lhs", "sobol"};
-  return names;
+std::span<const std::string_view> distribution_names() {
+  return kDistributions;
 }
 
 std::string_view name_of(DistributionKind kind) {
-  return distribution_names().at(static_cast<std::size_t>(kind));
+  return kDistributions.at(static_cast<std::size_t>(kind));
 }
 
 std::string_view name_of(SampleKind kind) {
-  return sample_names().at(static_cast<std::size_t>(kind));
+  return kSamples.at(static_cast<std::size_t>(kind));
 }
 
 DistributionKind distribution_named(std::string_view name) {
   return static_cast<DistributionKind>(
       number_of_name(name, distribution_names(), "the distribution"));
+}
+
+const solver::ParameterKey& model_key(std::string_view name) {
+  if (const auto* key = solver::find_model_key(name)) {
+    return *key;
+  }
+  std::vector<std::string_view> known{WrittenModel::kPreset, WrittenModel::kLengths};
+  for (const auto& key : solver::model_keys()) {
+    known.push_back(key.name);
+  }
+  throw solver::InputError(
+      fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
+}
+
+void WrittenModel::set_preset(std::string_view name) {
+  preset_ = solver::preset(name);
+}
+
+void WrittenModel::set_lengths(std::vector<double> lengths_m) {
+  lengths_m_ = std::move(lengths_m);
+  check_lengths_alone();
+  if (lengths_m_->empty()) {
+    throw solver::InputError("lengths = [] is not allowed: give the lengths in m, one a link");
+  }
+  for (const double length_m : *lengths_m_) {
+    solver::check_value(model_key("length"), length_m);
+  }
+}
+
+void WrittenModel::set(std::string_view key, double value) {
+  solver::check_value(model_key(key), value);
+  values_.insert_or_assign(std::string(key), value);
+  check_lengths_alone();
+}
+
+void WrittenModel::check_lengths_alone() const {
+  if (lengths_m_ && (values_.contains("links") || values_.contains("length"))) {
+    throw solver::InputError(std::string(kLengthsStandAlone));
+  }
+}
+
+solver::ModelParameters WrittenModel::model() const {
+  solver::ModelParameters model = preset_;
+  if (lengths_m_) {
+    model.lengths_m = *lengths_m_;
+  }
+  // In the order of the listing: `links` must come before `length`.
+  for (const auto& key : solver::model_keys()) {
+    if (const auto value = values_.find(key.name); value != values_.end()) {
+      key.set(model, value->second);
+    }
+  }
+  solver::validate(model);
+  return model;
+}
+
+std::string objection_to_study_name(const std::string& name) {
+  constexpr std::size_t kMostBytes = 100;
+  if (!name.empty() && name.size() <= kMostBytes && name.front() != '-' && is_visible(name)) {
+    return {};
+  }
+  return "name = \"" + visible(name.substr(0, kMostBytes)) +
+         "\" is not allowed: a study's name has 1 to " + std::to_string(kMostBytes) +
+         " bytes of UTF-8, no control characters, marks of writing direction or zero-width "
+         "characters, "
+         "and does not begin with '-'";
+}
+
+std::string allowed_priorities() {
+  return fmt::format("{} to {}", -kHighestPriority, kHighestPriority);
+}
+
+std::string objection_to_priority(std::int64_t priority) {
+  const bool is_allowed = priority >= -kHighestPriority && priority <= kHighestPriority;
+  return is_allowed
+             ? ""
+             : fmt::format("priority = {} is not allowed: {} is", priority, allowed_priorities());
 }
 
 }  // namespace oblique::protocol

@@ -1,11 +1,14 @@
 #include "proto/program/process.h"
 
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
+#include <csignal>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +16,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <CLI/CLI.hpp>
 
 #include "tests/support/temporary_folder.h"
 
@@ -71,21 +75,15 @@ TEST_F(NotifierTest, SaysThatTheProgramIsReadyAtAPathOrAnAbstractName) {
   }
 }
 
-TEST_F(NotifierTest, AStatusIsSaidOnceAndInOneLine) {
+TEST_F(NotifierTest, SendsAStatusOnceInOneLineAndAnEndWithTheTimeThatItMayTake) {
   listen(folder_.file("notify"));
   Notifier notifier;
   notifier.status("one\nREADY=1");
   notifier.status("one\nREADY=1");
-  notifier.status("two");
-  EXPECT_EQ(heard(), (std::vector<std::string>{"STATUS=one\\nREADY=1", "STATUS=two"}));
-}
-
-TEST_F(NotifierTest, AnEndThatTakesLongIsGivenTheTime) {
-  listen(folder_.file("notify"));
-  Notifier notifier;
   notifier.stopping("draining", 120s);
-  EXPECT_EQ(heard(),
-            std::vector<std::string>{"STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"});
+  EXPECT_EQ(heard(), (std::vector<std::string>{
+                         "STATUS=one\\nREADY=1",
+                         "STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"}));
 }
 
 TEST_F(NotifierTest, SaysThatItLivesAtHalfOfTheTimeAndOnlyWhenItTurns) {
@@ -93,6 +91,8 @@ TEST_F(NotifierTest, SaysThatItLivesAtHalfOfTheTimeAndOnlyWhenItTurns) {
   setenv("WATCHDOG_USEC", "1000000", 1);
   setenv("WATCHDOG_PID", std::to_string(getpid()).c_str(), 1);
   Notifier notifier;
+  EXPECT_EQ(std::getenv("NOTIFY_SOCKET"), nullptr) << "no child inherits it";
+  EXPECT_EQ(std::getenv("WATCHDOG_USEC"), nullptr);
   std::size_t said = 0;
   for (int turn = 0; turn < 100; ++turn, now_ += 100ms) {  // 10 s
     notifier.turn(now_);
@@ -112,14 +112,6 @@ TEST_F(NotifierTest, AWatchdogOfAnotherProcessIsNotFed) {
   EXPECT_TRUE(heard().empty());
 }
 
-TEST_F(NotifierTest, ChildrenDoNotInheritTheSocket) {
-  listen(folder_.file("notify"));
-  setenv("WATCHDOG_USEC", "1000000", 1);
-  const Notifier notifier;
-  EXPECT_EQ(std::getenv("NOTIFY_SOCKET"), nullptr);
-  EXPECT_EQ(std::getenv("WATCHDOG_USEC"), nullptr);
-}
-
 TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
   for (const std::string& name : {std::string(), std::string("relative"), std::string("@"),
                                   std::string(1000, '/'), folder_.file("nobody")}) {
@@ -129,6 +121,95 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
     notifier.turn(now_);
     notifier.stopping("stopping", 1s);
   }
+}
+
+/// What `begin` gives in a process of its own, started with these words; −1 when the words are
+/// wrong.
+int began(std::vector<std::string> words) {
+  const pid_t child = fork();
+  if (child == 0) {
+    StopWithParent parent;
+    CLI::App app;
+    app.option_defaults()->always_capture_default();
+    parent.add_to(app);
+    try {
+      app.parse(std::move(words));
+      int signal = 0;
+      const bool begins = parent.begin();
+      const bool watches = prctl(PR_GET_PDEATHSIG, &signal) == 0 && signal == SIGTERM;
+      _exit((begins ? 1 : 0) + (watches ? 2 : 0));
+    } catch (const CLI::ParseError&) {
+      _exit(100);
+    }
+  }
+  int status = 0;
+  EXPECT_EQ(waitpid(child, &status, 0), child);
+  return WIFEXITED(status) && WEXITSTATUS(status) != 100 ? WEXITSTATUS(status) : -1;
+}
+
+constexpr int kBegins = 1;
+constexpr int kWatches = 2;
+
+TEST(StopWithParent, WithoutTheOptionNobodyIsWatched) {
+  EXPECT_EQ(began({}), kBegins);
+}
+
+TEST(StopWithParent, TheSystemIsAskedForSigtermWhenTheParentEnds) {
+  EXPECT_EQ(began({"--stop-with-parent"}), kBegins + kWatches);
+  EXPECT_EQ(began({std::to_string(getpid()), "--stop-with-parent"}), kBegins + kWatches);
+}
+
+TEST(StopWithParent, AParentThatNamedItselfAndIsGoneIsMissed) {
+  EXPECT_EQ(began({std::to_string(getppid()), "--stop-with-parent"}), kWatches);
+}
+
+TEST(StopWithParent, WhatIsNoProcessIsRefused) {
+  for (const char* const text : {"-1", "0", "1.5", "me"}) {
+    EXPECT_EQ(began({text, "--stop-with-parent"}), -1) << text;
+  }
+}
+
+TEST(StopSignals, NoneHasComeAtFirstAndTheWaitEnds) {
+  StopSignals stop;
+  EXPECT_FALSE(stop.requested());
+  EXPECT_FALSE(stop.wait(1ms));
+}
+
+TEST(StopSignals, ASignalIsNoticedAndBecomesTheExitCode) {
+  StopSignals stop;
+  raise(SIGTERM);
+  EXPECT_TRUE(stop.wait(0ms));
+  EXPECT_EQ(stop.exit_code(), 128 + SIGTERM);
+}
+
+TEST(StopSignals, TheFirstOfSeveralIsTheExitCode) {
+  StopSignals stop;
+  raise(SIGHUP);
+  EXPECT_TRUE(stop.requested());
+  raise(SIGINT);
+  EXPECT_TRUE(stop.requested());
+  EXPECT_EQ(stop.exit_code(), 128 + SIGHUP);
+}
+
+TEST(StopSignals, AHangUpThatIsIgnoredStaysIgnored) {
+  const auto before = std::signal(SIGHUP, SIG_IGN);
+  {
+    StopSignals stop;
+    raise(SIGHUP);
+    EXPECT_FALSE(stop.requested());
+  }
+  std::signal(SIGHUP, before);
+}
+
+TEST(StopSignals, AfterItSignalsArePassedOnButNotOneThatHasCome) {
+  {
+    const StopSignals stop;
+    raise(SIGTERM);  // would end this process below if it were left pending
+  }
+  sigset_t blocked;
+  ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);
+  EXPECT_EQ(sigismember(&blocked, SIGTERM), 0);
+  EXPECT_EQ(sigismember(&blocked, SIGINT), 0);
 }
 
 }  // namespace

@@ -1,0 +1,233 @@
+// What makes a recipe wrong, and how the message names it.
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/recipe/blocks.h"
+#include "proto/recipe/checks.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "tests/support/recipes.h"
+
+namespace oblique::protocol {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string refusal(const Recipe& recipe) {
+  try {
+    const PointTable table(recipe);
+    return "";
+  } catch (const solver::InputError& error) {
+    return error.what();
+  }
+}
+std::string refusal(const Block& block) {
+  return refusal(recipe_of_blocks({block}));
+}
+
+const Axis kH = listed("H", {0.5});
+const Axis kMu = listed("mu", {0.4});
+const Axis kE = listed("e", {1.0});
+
+/// A product of this axis of mu, and one of a model key beside H, mu and e.
+Block of_mu(const Axis& mu) {
+  return filtered({listed("H", {1.0}), mu, kE}, "");
+}
+Block with(const Axis& model_axis, double H_m = 1.0) {
+  return filtered({model_axis, listed("H", {H_m}), kMu, kE}, "");
+}
+Block drawing(const Axis& mu) {
+  return sampled({kH, mu, kE}, SAMPLE_RANDOM, 10);
+}
+
+Axis normal(double mean, double sd, std::optional<double> from = {}) {
+  Axis axis;
+  axis.set_key("mu");
+  Distribution& drawn = *axis.mutable_distribution();
+  drawn.set_kind(DISTRIBUTION_NORMAL);
+  drawn.set_mean(mean);
+  drawn.set_sd(sd);
+  if (from) {
+    drawn.set_from(*from);
+  }
+  return axis;
+}
+
+Axis log_uniform(double from, double to) {
+  Axis axis = uniform("mu", from, to);
+  axis.mutable_distribution()->set_kind(DISTRIBUTION_LOG_UNIFORM);
+  return axis;
+}
+
+Axis with_value(Axis axis, double value) {
+  axis.add_values(value);
+  return axis;
+}
+
+struct Refused {
+  Block block;
+  std::vector<std::string> words;  ///< all in the message; none: the block is allowed
+};
+
+void expect_refusals(const std::vector<Refused>& blocks) {
+  for (const Refused& each : blocks) {
+    const std::string message = refusal(each.block);
+    EXPECT_EQ(message.empty(), each.words.empty()) << message << each.block.DebugString();
+    for (const std::string& word : each.words) {
+      EXPECT_THAT(message, HasSubstr(word)) << each.block.DebugString();
+    }
+  }
+}
+
+TEST(RecipeRules, KeysAreKnownAndGivenOnceInOrder) {
+  expect_refusals({
+      {with(listed("wobble", {1.0})), {"`wobble`", "elements_per_link", "mu"}},
+      {filtered({kH, kMu, listed("mu", {0.5}), kE}, ""), {"mu appears twice"}},
+      {filtered({kMu, kE}, ""), {"H is missing"}},
+      {filtered({kH, kE}, ""), {"mu is missing"}},
+      {filtered({kH, kMu}, ""), {"e is missing"}},
+      {filtered({}, ""), {"H is missing"}},
+      {filtered({kMu, kH, kE}, ""), {"out of order"}},
+      {filtered({kH, kMu, kE, listed("k", {1e7})}, ""), {"out of order"}},
+  });
+  EXPECT_LT(refusal(with(listed(std::string(100'000, 'x'), {1.0}))).size(), 500U);
+}
+
+TEST(RecipeRules, ListsAndRangesHaveAllowedValues) {
+  expect_refusals({
+      {of_mu(kMu), {}},
+      {of_mu(range("mu", 0.4, 0.4, 1)), {}},
+      {of_mu(listed("mu", {0.5, 0.4, 0.6})), {}},
+      {with(range("links", 3, 6, 4)), {}},
+      {of_mu(listed("mu", {})), {"mu = [] has no values"}},
+      {of_mu(with_value(range("mu", 0.1, 0.2, 2), 0.4)), {"both listed values and a range"}},
+      {of_mu(range("mu", 2.0, 0.5, 4)), {"from 2 to 0.5", "reversed"}},
+      {of_mu(range("mu", 0.5, 2.0, 1)), {"holds both ends"}},
+      {of_mu(range("mu", 0.5, 0.5, 7)), {"count = 7", "equal ends, 0.5"}},
+      {of_mu(listed("mu", {kNan})), {"mu = nan"}},
+      {of_mu(listed("mu", {kInfinity})), {"mu = inf"}},
+      {of_mu(range("mu", 0.0, kInfinity, 3)), {"mu = inf"}},
+      {of_mu(range("mu", kNan, 1.0, 3)), {"mu = nan"}},
+      {of_mu(listed("mu", {0.4, -0.1})), {"mu = -0.1", ">= 0"}},
+      {filtered({kH, kMu, range("e", 0.0, 1.0, 3)}, ""), {"e = 0", "[0.001, 1]"}},
+      {filtered({listed("H", {-1.0}), kMu, kE}, ""), {"H = -1"}},
+      {with(listed("k", {0.0})), {"k = 0"}},
+      {of_mu(listed("mu", {0.4, 0.4})), {"twice"}},
+      {of_mu(listed("mu", {0.5, 0.4, 0.3, 0.4})), {"twice"}},
+      {of_mu(listed("mu", {0.0, 1.0, -0.0})), {"twice"}},
+      {of_mu(log_range("mu", 0.0, 1.0, 3)), {"mu from 0"}},
+      {with(range("elements_per_link", 2, 8, 5)), {"elements_per_link = 3.5"}},
+      {with(log_range("elements_per_link", 1.0, 8.0, 4)), {}},
+      {with(log_range("elements_per_link", 1.0, 8.0, 3)), {"whole number"}},
+      {with(log_range("elements_per_link", 1.0, 8.0, 1'000'000'000'000)), {"whole number"}},
+  });
+}
+
+TEST(RecipeRules, ARangeIsRefusedExactlyWhenOneOfItsValuesIs) {
+  const solver::ParameterKey& key = *solver::find_model_key("elements_per_link");
+  for (const double from : {1.0, 2.0, 7.0}) {
+    for (const double to : {8.0, 13.0, 256.0}) {
+      for (std::uint64_t count = 2; count <= 520; ++count) {
+        const Axis axis = range("elements_per_link", from, to, count);
+        bool all_allowed = true;
+        for (std::uint64_t i = 0; i < count; ++i) {
+          all_allowed = all_allowed && key.is_allowed(axis_value(axis, i));
+        }
+        EXPECT_EQ(refusal(with(axis)).empty(), all_allowed) << from << ":" << to << ":" << count;
+      }
+    }
+  }
+}
+
+TEST(RecipeRules, NoHIsLargerThanTheShortestFingerOfTheBlock) {
+  expect_refusals({
+      {filtered({range("H", 0.9, 1.3, 5), kMu, kE}, ""), {"H = 1.3", "1.2 m"}},
+      {with(listed("length", {0.4, 0.3})), {"H = 1", "0.9 m"}},
+      {with(range("links", 2, 4, 3)), {"0.8 m"}},
+      {with(listed("length3", {0.1}), 0.9), {}},
+      {with(listed("length3", {0.1}), 0.95), {"H = 0.95"}},
+      {with(listed("length4", {0.1}), 0.5), {"length4 is not allowed"}},
+      {with(listed("length0", {0.1}), 0.5), {"unknown key"}},
+      {with(listed("length65", {0.1}), 0.5), {"unknown key"}},
+      {with(listed("length1", {0.0}), 0.5), {"length1 = 0"}},
+  });
+}
+
+TEST(RecipeRules, ZipsAndSamplesFitTogether) {
+  expect_refusals({
+      {zipped({listed("H", {0.3, 0.2}), listed("mu", {0.1, 0.2, 0.3}), kE}),
+       {"H has 2 values and another axis 3"}},
+      {drawing(normal(0.4, 0.05)), {"cut it off with `from`"}},
+      {drawing(normal(0.4, 0.05, 0.0)), {}},
+      {drawing(normal(0.4, 0.0, 0.0)), {"sd = 0"}},
+      {drawing(normal(0.4, 1e-3, 1e3)), {"nothing is left"}},
+      {drawing(uniform("mu", -0.1, 1.0)), {"mu = -0.1"}},
+      {drawing(uniform("mu", 1.0, 0.5)), {"swap"}},
+      {drawing(log_uniform(0.0, 1.0)), {"logarithm"}},
+      {drawing(kMu), {"nothing to draw"}},
+      {filtered({kH, uniform("mu", 0.0, 1.0), kE}, ""), {"only a sample draws"}},
+      {sampled({uniform("elements_per_link", 2.0, 8.0), kH, kMu, kE}, SAMPLE_RANDOM, 10),
+       {"list the values"}},
+      {sampled({uniform("H", 0.5, 0.6), kMu, kE}, SAMPLE_SOBOL, 0), {"count"}},
+  });
+}
+
+TEST(RecipeRules, ExpressionsAreReadable) {
+  const auto both = [](const Axis& a, const Axis& b) { return filtered({a, b, kH, kMu, kE}, ""); };
+  expect_refusals({
+      {both(following("E", "k"), following("k", "E")), {"circle"}},
+      {both(following("E", "E * 2"), listed("k", {1e7})), {"circle"}},
+      {both(following("E", "muu * 2"), listed("k", {1e7})), {"did you mean `mu`?"}},
+      {both(following("E", "2 +"), listed("k", {1e7})), {"E = \"2 +\": a value is missing"}},
+      {with(following("E", "length4")), {"`length4` is the length of no link"}},
+  });
+}
+
+TEST(RecipeRules, AStudyHasABoundedNumberOfExpressionsBlocksAndPoints) {
+  const Block expressed = filtered({kH, following("mu", "H / 2"), kE}, "");
+  EXPECT_EQ(refusal(recipe_of_blocks(std::vector<Block>(kMostExpressions, expressed))), "");
+  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMostExpressions + 1, expressed))),
+              HasSubstr("more than 1000 expressions"));
+  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMostBlocks + 1, of_mu(kMu)))),
+              HasSubstr("10001 blocks, more than 10000"));
+  const std::uint64_t huge = std::numeric_limits<std::uint64_t>::max();
+  const std::uint64_t half = std::uint64_t{1} << 32U;  // half * half would wrap to 0
+  const Block most =
+      filtered({kH, range("mu", 0, 1, 1'000'000), range("e", 0.5, 1, 1'000'000)}, "");
+  EXPECT_EQ(refusal(most), "");
+  for (const Recipe& recipe : {recipe_of_blocks({of_mu(range("mu", 0.0, 1.0, huge))}),
+                               recipe_of({{kH, range("mu", 0, 1, half), range("e", 0.5, 1, half)}}),
+                               recipe_of_blocks({most, most})}) {
+    EXPECT_THAT(refusal(recipe), HasSubstr("more than 1000000000000"));
+  }
+}
+
+TEST(RecipeRules, ARecipeThatNoWorkerCanBeSentIsRefused) {
+  Recipe recipe = recipe_of({{listed("mu", {})}});
+  recipe.mutable_blocks(0)->mutable_axes(0)->mutable_values()->Resize(1 << 20, 0.5);
+  EXPECT_NO_THROW(check_size(recipe));
+  recipe.mutable_blocks(0)->mutable_axes(0)->mutable_values()->Resize(1 << 21, 0.5);
+  EXPECT_THROW(check_size(recipe), solver::InputError);
+}
+
+TEST(RecipeRules, ARecipeHasBlocksAndAModelInItsDomain) {
+  EXPECT_THAT(refusal(recipe_of({})), HasSubstr("no block"));
+  EXPECT_THAT(refusal(recipe_of_blocks({of_mu(kMu), of_mu(listed("mu", {-1}))})),
+              StartsWith("block 2: mu = -1"));
+  Recipe recipe = recipe_of_blocks({of_mu(kMu)});
+  recipe.mutable_model()->set_e_pa(-1.0);
+  EXPECT_THAT(refusal(recipe), HasSubstr("E = -1"));
+  recipe.clear_model();
+  EXPECT_THAT(refusal(recipe), HasSubstr("the recipe has no model"));
+}
+
+}  // namespace
+}  // namespace oblique::protocol
