@@ -105,19 +105,9 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
   add("waiting-out-bytes-of-key", network.waiting_out_bytes_of_key, kOneMessage, kMostBytes,
       "What waits to go out to the connections of one key");
   // Results on their way to the disk.
-  LedgerLimits& ledger = service.ledger;
-  add("unstored-messages-of-worker", ledger.most_messages_of_worker, 1, kMost,
-      "Results messages of one worker that wait for the disk");
-  add("unstored-bytes-of-worker", ledger.bytes_of_worker, 1, kMostBytes,
-      "Results of one worker that wait for the disk");
-  add("unstored-bytes", ledger.bytes, 1, kMostBytes, "Results that wait for the disk");
-  add("unstored-bytes-to-hold", ledger.bytes_to_hold, 1, kMostBytes,
-      "With so many no batch goes out");
-  add("unstored-messages-to-hold", ledger.messages_to_hold, 1, kMost,
-      "With so many no batch goes out");
-  add("unstored-changes", ledger.most_changes, 1, kMost, "Changes of clients that wait");
+  add("unstored-bytes", service.ledger.bytes, 1, kMostBytes, "Results that wait for the disk");
   // Requests of clients.
-  ClientsDeskSettings& clients = service.clients;
+  ClientHandlerSettings& clients = service.clients;
   add("long-requests", clients.most_long_requests, 1, kMost, "Long requests that wait");
   add("long-requests-of-client", clients.most_long_requests_of_one, 1, kMost,
       "Long requests of one client that wait");
@@ -131,11 +121,9 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
       "Queries of one client that wait");
   add("waiting-query-bytes", queries.most_waiting_bytes, 1, kMostBytes,
       "Statements of queries that wait");
-  // Studies. The bounds of a key are of what was submitted with it.
+  // Studies.
   add("open-studies", service.bounds.studies, 1, kMostBytes, "Studies neither done nor cancelled");
-  add("open-points", service.bounds.points, 1, kMostPoints, "Points of these that are not settled");
-  add("open-studies-of-key", service.bounds.studies_of_key, 1, kMostBytes, "Open studies of a key");
-  add("open-points-of-key", service.bounds.points_of_key, 1, kMostPoints, "Open points of a key");
+  add("open-points", service.bounds.points, 1, kMostPoints, "Points of these studies");
   // Workers.
   add("credit", service.scheduler.max_credit, 1, 65'536, "Batches that a worker may ask for");
 }

@@ -28,7 +28,7 @@
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
-#include "server/loop/loop.h"
+#include "server/event_loop/event_loop.h"
 #include "server/program/limits.h"
 #include "server/query/reader_program.h"
 #include "server/web/http_options.h"
@@ -39,9 +39,9 @@ namespace {
 using oblique::protocol::Configuration;
 using oblique::protocol::Notifier;
 using oblique::protocol::StopWithParent;
-using oblique::server::Loop;
+using oblique::server::EventLoop;
 using oblique::server::LoopSettings;
-using oblique::server::LoopTurn;
+using oblique::server::LoopState;
 
 constexpr const char* kProgram = "oblique-server";
 /// The last commit may take so long on a slow disk.
@@ -86,7 +86,7 @@ void tell_line(int fd, const nlohmann::json& told) {
   }
 }
 
-void tell_ready(int fd, const Loop& loop) {
+void tell_ready(int fd, const EventLoop& loop) {
   nlohmann::json ends{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
   if (!loop.http_url().empty()) {
     ends["http"] = loop.http_url();
@@ -96,17 +96,17 @@ void tell_ready(int fd, const Loop& loop) {
   ::close(fd);
 }
 
-/// Tells the service manager how the loop is.
-void tell_turn(Notifier& notifier, const LoopTurn& turn, std::chrono::milliseconds drain) {
-  switch (turn.stage) {
-    case LoopTurn::Stage::kRuns:
-      notifier.status(fmt::format("{} workers", turn.workers));
+/// Reports the state of the loop to the service manager.
+void notify(Notifier& notifier, const LoopState& state, std::chrono::milliseconds drain) {
+  switch (state.stage) {
+    case LoopState::Stage::kRuns:
+      notifier.status(fmt::format("{} workers", state.workers));
       break;
-    case LoopTurn::Stage::kDrains:
-      notifier.stopping(fmt::format("draining: {} batches are with workers", turn.leases),
+    case LoopState::Stage::kDrains:
+      notifier.stopping(fmt::format("draining: {} batches are with workers", state.leases),
                         drain + kLongestEnd);
       break;
-    case LoopTurn::Stage::kEnds:
+    case LoopState::Stage::kEnds:
       notifier.stopping("stopping", kLongestEnd);
       break;
   }
@@ -122,10 +122,10 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
     return oblique::protocol::kDone;
   }
   take_all_descriptors();
-  settings.on_turn = [&notifier, drain = settings.drain](const LoopTurn& turn) {
-    tell_turn(notifier, turn, drain);
+  settings.on_turn = [&notifier, drain = settings.drain](const LoopState& state) {
+    notify(notifier, state, drain);
   };
-  Loop loop(settings);
+  EventLoop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint(),
                loop.http_url().empty() ? "no address" : loop.http_url() + "/metrics");

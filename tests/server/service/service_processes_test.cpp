@@ -1,4 +1,4 @@
-// Connections and the worker processes behind them, probes, and workers of the previous protocol.
+// Connections and the worker processes behind them, and probes.
 #include <algorithm>
 #include <string>
 
@@ -24,19 +24,10 @@ class ProcessesTest : public ServiceTest {
     worker_says(message, identity);
   }
   protocol::WorkersReply workers() {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
+    ClientRequest message = client_request();
     message.mutable_workers();
     request(message);
     return last_reply().workers();
-  }
-  /// The worker at `identity` solves a batch and says goodbye.
-  void solve_and_leave(const std::string& identity) {
-    credit(1, identity);
-    answer_batch(1000, identity);
-    WorkerMessage goodbye;
-    goodbye.mutable_goodbye();
-    worker_says(goodbye, identity);
   }
   /// Three newcomers get batches and are gone.
   void let_newcomers_vanish() {
@@ -44,17 +35,16 @@ class ProcessesTest : public ServiceTest {
       hello_as(identity, identity);
       credit(1, identity);
       EXPECT_TRUE(last_message().has_batch());
-      outbox_.unreachable = identity;
+      ports_.unreachable = identity;
       now_.steady_ms += 1200;
       service_->tick(now_);
     }
-    outbox_.unreachable.clear();
+    ports_.unreachable.clear();
   }
 };
 
 TEST_F(ProcessesTest, AProcessOnANewConnectionGetsAtOnceWhatItHeldOnTheOldOne) {
-  request(submit_request("a", 1));
-  write_all();
+  submit("a", 1);
   hello_as("first", "process 1");
   credit(1, "first");
   hello_as("second", "process 1");
@@ -65,22 +55,8 @@ TEST_F(ProcessesTest, AProcessOnANewConnectionGetsAtOnceWhatItHeldOnTheOldOne) {
   EXPECT_TRUE(last_message().has_hello_again()) << "the old connection is nobody's any more";
 }
 
-TEST_F(ProcessesTest, AWorkerThatDrewNoIdIsKnownByItsNameIfThatHasAProcessNumber) {
-  request(submit_request("a", 100));
-  write_all();
-  for (const char* name : {"box:12", "lab"}) {
-    hello_as("first", "", name);
-    solve_and_leave("first");
-    hello_as("second", "", name);
-    const bool is_known = name == std::string("box:12");
-    EXPECT_EQ(workers().workers(0).proven(), is_known) << name;
-    solve_and_leave("second");
-  }
-}
-
 TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
-  request(submit_request("a", 100));
-  write_all();
+  submit("a", 100);
   hello_as("first", "process 1");
   credit(2, "first");
   hello_as("second", "process 1");
@@ -91,8 +67,7 @@ TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
 }
 
 TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAcknowledged) {
-  request(submit_request("a", 100));
-  write_all();
+  submit("a", 100);
   let_newcomers_vanish();
   hello_as("worker", "sound");
   EXPECT_TRUE(workers().workers(0).set_aside());
@@ -101,7 +76,7 @@ TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAc
   const auto batch = last_message().batch();
   EXPECT_EQ(batch.study_id(), 0U);
   EXPECT_EQ(points_of(batch).size(), 1U);
-  const auto& definition = outbox_.worker_messages.at(outbox_.worker_messages.size() - 2);
+  const auto& definition = ports_.worker_messages.at(ports_.worker_messages.size() - 2);
   ASSERT_TRUE(definition.has_study());
   EXPECT_EQ(definition.study().study_id(), 0U);
   EXPECT_EQ(protocol::PointTable(definition.study().recipe()).size(), 1U);
@@ -115,12 +90,10 @@ TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAc
 }
 
 TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
-  request(submit_request("a", 1));
-  write_all();
+  submit("a", 1);
   hello_as("slow", "slow", "slow");
   credit(1, "slow");
-  hello();
-  credit(1);
+  hello_and_credit();
   for (int i = 0; i < 8 && !last_message().has_batch(); ++i) {
     now_.steady_ms += 250;
     credit(0, "slow");
@@ -130,7 +103,7 @@ TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
   ASSERT_TRUE(last_message().has_batch());
   answer_batch(1);
   const auto releases =
-      std::count_if(outbox_.worker_messages.begin(), outbox_.worker_messages.end(),
+      std::count_if(ports_.worker_messages.begin(), ports_.worker_messages.end(),
                     [](const ServerToWorker& message) { return message.has_release(); });
   EXPECT_EQ(releases, 1);
 }
@@ -142,8 +115,7 @@ TEST_F(ProcessesTest, ABatchMayBeOfSeveralModels) {
                             protocol::listed("mu", {0.4}), protocol::listed("e", {1.0})}});
   request(submit);
   write_all();
-  hello();
-  credit(1);
+  hello_and_credit();
   EXPECT_EQ(points_of(last_message().batch()).size(), 8U);
 }
 

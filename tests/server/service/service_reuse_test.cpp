@@ -39,7 +39,7 @@ class ServiceReuseTest : public ServiceTest {
   /// The first points of the parts that wait for the writer.
   std::vector<std::uint64_t> parts() const {
     std::vector<std::uint64_t> firsts;
-    for (const WriteJob& job : outbox_.jobs) {
+    for (const WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
         firsts.push_back(part->first_point);
       }
@@ -48,7 +48,7 @@ class ServiceReuseTest : public ServiceTest {
   }
   /// The study of the end that waits for the writer; 0: none does.
   std::uint64_t ended() const {
-    for (const WriteJob& job : outbox_.jobs) {
+    for (const WriteJob& job : ports_.jobs) {
       if (const auto* end = std::get_if<EndReuse>(&job.change)) {
         return end->study_id;
       }
@@ -57,7 +57,7 @@ class ServiceReuseTest : public ServiceTest {
   }
   /// Writes what waits; this came of the part that is among it.
   void write_part(const ReusedResults& outcome) {
-    for (WriteJob& job : outbox_.jobs) {
+    for (WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
         *part->outcome = outcome;
       }
@@ -73,30 +73,29 @@ class ServiceReuseTest : public ServiceTest {
 TEST_F(ServiceReuseTest, WithoutAnyResultNothingIsLookedUp) {
   request(reusing("a"));
   write_all();
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
   EXPECT_TRUE(last_reply().has_submit());
 }
 
 TEST_F(ServiceReuseTest, NothingIsLookedUpForARequestWithoutReuse) {
   solve_some();
-  request(submit_request("b"));
-  write_all();
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  submit("b");
+  EXPECT_THAT(ports_.jobs, IsEmpty());
   EXPECT_EQ(last_reply().submit().study_id(), kStudy);
 }
 
 TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
   solve_some();
   request(reusing("b"));
-  const std::size_t replies = outbox_.replies.size();
+  const std::size_t replies = ports_.replies.size();
   write_all();
   EXPECT_THAT(parts(), ElementsAre(0));
-  EXPECT_EQ(outbox_.replies.size(), replies);
-  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("known points to be taken over"));
+  EXPECT_EQ(ports_.replies.size(), replies);
+  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("the lookup of results of other studies"));
   write_part(copies_of_a(IntervalSet(0, 4), 6));
   EXPECT_THAT(parts(), ElementsAre(6));
   EXPECT_EQ(status_of("b").solved(), 4U);
-  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("4 so far"));
+  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("4 reused so far"));
   write_part({});
   EXPECT_EQ(ended(), kStudy);
   write_all();
@@ -106,7 +105,7 @@ TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
   EXPECT_EQ(reply.taken().from(0).study(), "a");
   EXPECT_FALSE(status_of("b").taken().under_way());
   EXPECT_EQ(status_of("b").waits_for(), "");
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
 TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
@@ -120,7 +119,7 @@ TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
 
 TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesIsCutShort) {
   submit_study();
-  const std::uint64_t half = TakeOvers::kMostProbesInVain / 2;
+  const std::uint64_t half = ReuseTracker::kMostProbesInVain / 2;
   write_part({{}, {}, half, 1});
   write_part(copies_of_a(IntervalSet(0, 1), 2));  // and the count begins again
   write_part({{}, {}, half, 3});
@@ -142,9 +141,9 @@ TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
 
 TEST_F(ServiceReuseTest, ALookupThatFindsNothingForLongIsCutShort) {
   submit_study();
-  now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
+  now_.steady_ms += ReuseTracker::kLongestInVain_ms - 1;
   write_part(copies_of_a(IntervalSet(0, 1), 1));  // and the time begins again
-  now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
+  now_.steady_ms += ReuseTracker::kLongestInVain_ms - 1;
   write_part({{}, {}, 1, 2});
   EXPECT_THAT(parts(), ElementsAre(2));
   now_.steady_ms += 1;
@@ -174,12 +173,12 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) 
   write_all();
   auto longer = reusing("b", 7);
   *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
-  const WriteJob part = outbox_.jobs.at(0);
-  outbox_.jobs.clear();
+  const WriteJob part = ports_.jobs.at(0);
+  ports_.jobs.clear();
   request(longer);
   write_all();
   EXPECT_THAT(parts(), IsEmpty()) << "one lookup of a study at a time";
-  outbox_.jobs.push_back(part);
+  ports_.jobs.push_back(part);
   write_part({});
   EXPECT_THAT(parts(), ElementsAre(0));
   EXPECT_TRUE(status_of("b").taken().under_way());
@@ -190,11 +189,11 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) 
 
 TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledStudyIsTheLast) {
   submit_study();
-  const WriteJob part = outbox_.jobs.at(0);
-  outbox_.jobs.clear();
+  const WriteJob part = ports_.jobs.at(0);
+  ports_.jobs.clear();
   request(cancel_request("b"));
   write_all();
-  outbox_.jobs.push_back(part);
+  ports_.jobs.push_back(part);
   write_part(copies_of_a(IntervalSet(0, 4), 4));
   EXPECT_EQ(ended(), kStudy);
   write_all();
@@ -203,33 +202,30 @@ TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledStudyIsTheLast) {
 
 TEST_F(ServiceReuseTest, OfADeletedStudyNothingMoreIsLookedUp) {
   submit_study();
-  const WriteJob part = outbox_.jobs.at(0);
-  outbox_.jobs.clear();
+  const WriteJob part = ports_.jobs.at(0);
+  ports_.jobs.clear();
   request(change_request("b", protocol::STUDY_CHANGE_DELETE));
   write_all();
-  outbox_.jobs.push_back(part);
+  ports_.jobs.push_back(part);
   write_part({{}, {}, 1, 4});
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
 TEST_F(ServiceReuseTest, AServerThatStopsLeavesTheRestToTheNextOne) {
   submit_study();
   service_->drain(now_);
   write_part(copies_of_a(IntervalSet(0, 4), 4));
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
 TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
-  ServiceSettings settings;
-  settings.solver_version = "1.0";
   StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   source.settled = IntervalSet(0, 5);
   StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   pending.reuses = true;
   pending.taken = {{"a", 3}};
   pending.settled = IntervalSet(0, 3);
-  service_.reset();
-  service_.emplace(settings, outbox_, std::vector<StoredStudy>{source, pending}, now_);
+  start({}, {source, pending});
   EXPECT_THAT(parts(), ElementsAre(0));
   EXPECT_EQ(status_of("b").taken().points(), 3U);
   EXPECT_TRUE(status_of("b").taken().under_way());
