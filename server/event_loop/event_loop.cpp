@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -128,20 +129,24 @@ bool EventLoop::to_client(const std::string& identity, const std::string& frame)
   return counted(network_.send(identity, frame), frame, client_traffic_) != Delivery::kGone;
 }
 
-PeerCounts EventLoop::peer_counts() const {
-  PeerCounts counts;
+void EventLoop::add_peers(protocol::WorkersReply& reply) const {
+  std::map<std::string, protocol::KeyStatus> keys;  // a replaced key of that name may be connected
   for (const auto& [key, share] : network_.key_shares().all()) {
-    auto& of_key = counts.keys[share.holder->name];
-    of_key = {share.holder->role, of_key.connections + share.connections};
+    protocol::KeyStatus& status = keys[share.holder->name];
+    status.set_name(share.holder->name);
+    status.set_role(std::string(protocol::name_of(share.holder->role)));
+    status.set_connections(status.connections() + share.connections);
   }
-  const RefusalCounts& refusals = network_.refusals();
-  for (std::size_t cause = 0; cause < refusals.size(); ++cause) {
-    if (refusals.at(cause).count > 0) {
-      counts.refusals.emplace_back(name_of(static_cast<RefusalCause>(cause)),
-                                   refusals.at(cause).count);
+  for (auto& [name, status] : keys) {
+    *reply.add_keys() = std::move(status);
+  }
+  for (std::size_t cause = 0; cause < network_.refusals().size(); ++cause) {
+    if (const auto count = network_.refusals().at(cause).count; count > 0) {
+      auto& refusals = *reply.add_refusals();
+      refusals.set_reason(std::string(name_of(static_cast<RefusalCause>(cause))));
+      refusals.set_peers(count);
     }
   }
-  return counts;
 }
 
 void EventLoop::log(Severity severity, const std::string& text) {

@@ -84,7 +84,7 @@ class EventLoop final : private Ports {
     return network_.has_unheard(identity);
   }
   bool to_client(const std::string& identity, const std::string& frame) override;
-  PeerCounts peer_counts() const override;
+  void add_peers(protocol::WorkersReply& reply) const override;
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
   void more_rows(std::uint64_t query, std::uint64_t taken) override { queries_.more(query, taken); }

@@ -107,12 +107,6 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
   // Results on their way to the disk.
   add("unstored-bytes", service.ledger.bytes, 1, kMostBytes, "Results that wait for the disk");
   // Requests of clients.
-  ClientHandlerSettings& clients = service.clients;
-  add("long-requests", clients.most_long_requests, 1, kMost, "Long requests that wait");
-  add("long-requests-of-client", clients.most_long_requests_of_one, 1, kMost,
-      "Long requests of one client that wait");
-  add("long-request-bytes", clients.most_long_bytes, kOneMessage, kMostBytes,
-      "Long requests that wait");
   add("running-queries", queries.readers, 1, 256, "Queries that run side by side");
   add("running-queries-of-client", queries.most_running_each, 1, 256,
       "Queries of one client that run side by side");

@@ -16,6 +16,13 @@ namespace {
 
 constexpr const char* kStopping = "the server is stopping: ask again when it runs";
 
+/// Longer requests are read on the check thread.
+constexpr std::size_t kLongestInlineFrame = std::size_t{64} * 1024;
+/// Requests that wait for the check thread, in all and of one client, and their bytes.
+constexpr std::size_t kMostChecks = 64;
+constexpr std::size_t kMostChecksOfClient = 2;
+constexpr std::size_t kMostCheckedBytes = std::size_t{64} << 20U;
+
 /// Number of entries of a page; 0: as many as there may be.
 int page_size(std::uint32_t requested, std::size_t largest) {
   return static_cast<int>(requested == 0 ? largest : std::min<std::size_t>(requested, largest));
@@ -27,14 +34,14 @@ int page_size(std::uint32_t requested, std::size_t largest) {
 
 void ClientHandler::frame(const std::string& identity, std::string_view frame, Instant now,
                           const std::shared_ptr<const KeyHolder>& holder) {
-  if (frame.size() > settings_.longest_inline_bytes) {
+  if (frame.size() > kLongestInlineFrame) {
     check({identity, protocol::request_id_of(frame), holder}, frame, now);
     return;
   }
   const ReadRequest read = read_request(frame, false);
   const Client client{identity, read.request_id, holder};
   if (const std::string reason = objection_to(client, read); !reason.empty()) {
-    parts_.ports.reply_error(client, reason);
+    core_.ports.reply_error(client, reason);
   } else if (read.needs_judging) {
     check(client, frame, now);
   } else {
@@ -59,17 +66,16 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     of_client += request.client.identity == client.identity ? 1U : 0U;
   }
   if (stopping_) {
-    parts_.ports.reply_error(client, kStopping);
+    core_.ports.reply_error(client, kStopping);
     return;
   }
-  if (of_all >= settings_.most_long_requests || of_client >= settings_.most_long_requests_of_one ||
-      bytes > settings_.most_long_bytes) {
-    parts_.ports.reply_error(client, "too many long requests wait already: ask again later");
+  if (of_all >= kMostChecks || of_client >= kMostChecksOfClient || bytes > kMostCheckedBytes) {
+    core_.ports.reply_error(client, "too many long requests wait already: ask again later");
     return;
   }
   const std::uint64_t ticket = ++last_ticket_;
   auto kept = std::make_shared<const std::string>(frame);
-  parts_.ports.run_check([this, ticket, weak = std::weak_ptr(kept)]() -> Ports::Completion {
+  core_.ports.run_check([this, ticket, weak = std::weak_ptr(kept)]() -> Ports::Completion {
     const auto locked = weak.lock();
     if (locked == nullptr) {
       return [](Instant) {};  // the client is gone
@@ -94,7 +100,7 @@ void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Insta
   const Client client{request.mapped().client.identity, read.request_id,
                       request.mapped().client.holder};
   if (const std::string reason = objection_to(client, read); !reason.empty()) {
-    parts_.ports.reply_error(client, reason);
+    core_.ports.reply_error(client, reason);
   } else {
     answer(client, read, now);
   }
@@ -103,13 +109,13 @@ void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Insta
 /// Why the request is refused whatever it asks for; empty: it is not.
 std::string ClientHandler::objection_to(const Client& client, const ReadRequest& read) {
   const protocol::ClientRequest& request = read.request;
-  const WriteLedger& ledger = parts_.sources.ledger;
+  const WriteLedger& ledger = core_.ledger;
   if (!read.is_readable) {
-    parts_.bad_frames.count("a client");
+    bad_frames_.count("a client");
     return "the request cannot be read";
   }
   if (request.protocol_version() == 0) {
-    parts_.bad_frames.count("a client");
+    bad_frames_.count("a client");
     return "this is the port for clients; workers connect to the other one";
   }
   if (std::string reason = protocol::objection_to_version(request.protocol_version(), "client");
@@ -126,7 +132,7 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
           "nothing",
           client.key());
     }
-    if (ledger.takes_no_change()) {
+    if (!ledger.has_room()) {
       return "too many changes wait for the disk already: ask again later";
     }
     if (ledger.is_slow()) {
@@ -151,7 +157,7 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, Instan
   using Kind = protocol::ClientRequest;
   switch (request.kind_case()) {
     case Kind::kSubmit:
-      parts_.changes.submit(client, read, now);
+      changes_.submit(client, read, now);
       break;
     case Kind::kStatus:
       status(client, request.status(), now);
@@ -160,7 +166,7 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, Instan
       workers(client, request.workers(), now);
       break;
     case Kind::kChange:
-      parts_.changes.change(client, request.change(), now);
+      changes_.change(client, request.change(), now);
       break;
     case Kind::kQuery:
       query(client, request.query(), now);
@@ -178,8 +184,8 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, Instan
       end_query(client, request.end_query().request_id());
       break;
     case Kind::KIND_NOT_SET:
-      parts_.bad_frames.count("a client");
-      parts_.ports.reply_error(client, "the server does not know this kind of request");
+      bad_frames_.count("a client");
+      core_.ports.reply_error(client, "the server does not know this kind of request");
       break;
   }
 }
@@ -193,9 +199,9 @@ void ClientHandler::query(const Client& client, const protocol::QueryRequest& re
   }
   const std::uint64_t ticket = ++last_ticket_;
   if (stopping_) {
-    parts_.ports.reply_error(client, kStopping);
-  } else if (!parts_.ports.query({ticket, client.share(), request})) {
-    parts_.ports.reply_error(client, "too many queries wait already: ask again later");
+    core_.ports.reply_error(client, kStopping);
+  } else if (!core_.ports.query({ticket, client.share(), request})) {
+    core_.ports.reply_error(client, "too many queries wait already: ask again later");
   } else {
     pending_.emplace(ticket,
                      Pending{client, nullptr, now.steady_ms + settings_.still_working_every_ms});
@@ -206,13 +212,13 @@ void ClientHandler::more_rows(const Client& client, const protocol::MoreRows& re
   const Client asker{client.identity, request.request_id(), client.holder};
   const auto found = find(asker.identity, asker.request_id);
   if (found == pending_.end()) {
-    parts_.ports.reply_error(asker, "no answer to that request is under way");
+    core_.ports.reply_error(asker, "no answer to that request is under way");
   } else if (request.taken() > found->second.sent) {
     cancel(found);
-    parts_.ports.reply_error(asker, "more of the answer was taken than was given");
+    core_.ports.reply_error(asker, "more of the answer was taken than was given");
   } else if (request.taken() > found->second.taken) {
     found->second.taken = request.taken();
-    parts_.ports.more_rows(found->first, request.taken());
+    core_.ports.more_rows(found->first, request.taken());
   }
 }
 
@@ -220,7 +226,7 @@ void ClientHandler::end_query(const Client& client, std::uint64_t request_id) {
   if (const auto found = find(client.identity, request_id); found != pending_.end()) {
     cancel(found);
   }
-  parts_.traces.end(client.identity, request_id);
+  traces_.end(client.identity, request_id);
 }
 
 void ClientHandler::query_report(QueryReport report) {
@@ -233,7 +239,7 @@ void ClientHandler::query_report(QueryReport report) {
     query.runs = true;
     return;
   }
-  const bool is_there = parts_.ports.to_client(
+  const bool is_there = core_.ports.to_client(
       query.client.identity, protocol::with_request_id(query.client.request_id, report.reply));
   ++query.sent;
   if (report.kind == QueryReport::Kind::kAnswered) {
@@ -254,7 +260,7 @@ ClientHandler::PendingRequests::iterator ClientHandler::find(std::string_view id
 
 ClientHandler::PendingRequests::iterator ClientHandler::cancel(PendingRequests::iterator request) {
   if (request->second.frame == nullptr) {
-    parts_.ports.cancel_query(request->first);
+    core_.ports.cancel_query(request->first);
   }
   return pending_.erase(request);
 }
@@ -272,7 +278,7 @@ QueryCounts ClientHandler::query_counts() const {
 // ---- Status ------------------------------------------------------------------------------------
 
 protocol::StudyStatus ClientHandler::status_of(StudyId id, Instant now) const {
-  protocol::StudyStatus status = study_status(id, parts_.sources, now);
+  protocol::StudyStatus status = study_status(id, core_, now);
   if (draining_ && status.state() == state_name(StudyState::kRunning)) {
     status.set_waits_for("the server, which is draining, to be started again");
   }
@@ -282,22 +288,22 @@ protocol::StudyStatus ClientHandler::status_of(StudyId id, Instant now) const {
 void ClientHandler::status(const Client& client, const protocol::StatusRequest& request,
                            Instant now) {
   constexpr std::size_t kMostPageBytes = std::size_t{1} << 20U;
-  const StudyStates& states = parts_.sources.states;
+  const StudyStates& states = core_.states;
   protocol::ClientReply reply;
   protocol::StatusReply& fields = *reply.mutable_status();
   fields.set_draining(draining_);
-  fields.set_workers(static_cast<std::uint32_t>(parts_.sources.scheduler.workers()));
+  fields.set_workers(static_cast<std::uint32_t>(core_.scheduler.workers()));
   fields.set_access(settings_.access);
   fields.set_version(settings_.version);
   fields.set_utc_ms(now.utc_ms);
   if (!request.study().empty() || request.study_id() != 0) {
     const auto known = states.find_durable(request.study(), request.study_id());
     if (!known) {
-      parts_.ports.reply_error(client, unknown_study(request.study(), states));
+      core_.ports.reply_error(client, unknown_study(request.study(), states));
       return;
     }
     *fields.add_studies() = status_of(*known, now);
-    parts_.ports.reply(client, std::move(reply));
+    core_.ports.reply(client, std::move(reply));
     return;
   }
   const int most = page_size(request.limit(), settings_.largest_page);
@@ -312,18 +318,18 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
     bytes += fields.studies(fields.studies_size() - 1).ByteSizeLong();
     last = *id;
   }
-  parts_.ports.reply(client, std::move(reply));
+  core_.ports.reply(client, std::move(reply));
 }
 
 /// The recipe is sent as it is stored.
 void ClientHandler::describe(const Client& client, const protocol::DescribeRequest& request) {
-  const StudyStates& states = parts_.sources.states;
+  const StudyStates& states = core_.states;
   if (const auto known = states.find_durable(request.study())) {
-    parts_.ports.to_client(
-        client.identity, protocol::description_around(client.request_id,
-                                                      states.record(*known).table.recipe_bytes()));
+    core_.ports.to_client(client.identity,
+                          protocol::description_around(client.request_id,
+                                                       states.record(*known).table.recipe_bytes()));
   } else {
-    parts_.ports.reply_error(client, unknown_study(request.study(), states));
+    core_.ports.reply_error(client, unknown_study(request.study(), states));
   }
 }
 
@@ -331,70 +337,54 @@ void ClientHandler::workers(const Client& client, const protocol::WorkersRequest
                             Instant now) {
   protocol::ClientReply reply;
   protocol::WorkersReply& fields = *reply.mutable_workers();
-  fields.set_bad_frames(parts_.bad_frames.total());
+  fields.set_bad_frames(bad_frames_.total());
   fields.set_access(settings_.access);
   if (request.after_worker_id() == 0) {
-    add_peers(fields);
+    core_.ports.add_peers(fields);
   }
   const int most = page_size(request.limit(), settings_.largest_page);
   std::uint64_t last = request.after_worker_id();
-  while (const auto id = parts_.sources.workers.next_after(last)) {
+  while (const auto id = core_.workers.next_after(last)) {
     if (fields.workers_size() == most) {
       fields.set_next_after(last);
       break;
     }
-    *fields.add_workers() = worker_status(*id, parts_.sources, now);
+    *fields.add_workers() = worker_status(*id, core_, now);
     last = *id;
   }
-  parts_.ports.reply(client, std::move(reply));
-}
-
-void ClientHandler::add_peers(protocol::WorkersReply& reply) const {
-  const PeerCounts peers = parts_.ports.peer_counts();
-  for (const auto& [reason, count] : peers.refusals) {
-    auto& refusals = *reply.add_refusals();
-    refusals.set_reason(reason);
-    refusals.set_peers(count);
-  }
-  for (const auto& [name, connected] : peers.keys) {
-    auto& key = *reply.add_keys();
-    key.set_name(name);
-    key.set_role(std::string(protocol::name_of(connected.role)));
-    key.set_connections(connected.connections);
-  }
+  core_.ports.reply(client, std::move(reply));
 }
 
 void ClientHandler::trace(const Client& client, const protocol::TraceRequest& request,
                           Instant now) {
-  const StudyStates& states = parts_.sources.states;
+  const StudyStates& states = core_.states;
   const auto known = states.find_durable(request.study());
   if (!known) {
-    parts_.ports.reply_error(client, unknown_study(request.study(), states));
+    core_.ports.reply_error(client, unknown_study(request.study(), states));
     return;
   }
   const StudyRecord& study = states.record(*known);
   if (study.failures.contains(request.point()) && !request.only_point()) {
-    parts_.ports.reply_error(client, fmt::format("point {} of the study \"{}\" failed and has no "
-                                                 "trace: `oblique retry` solves it again",
-                                                 request.point(), study.name));
+    core_.ports.reply_error(client, fmt::format("point {} of the study \"{}\" failed and has no "
+                                                "trace: `oblique retry` solves it again",
+                                                request.point(), study.name));
   } else {
-    parts_.traces.ask(client, request,
-                      {*known, study.table, parts_.sources.scheduler.study(*known).solver_version},
-                      now);
+    traces_.ask(client, request,
+                {*known, study.table, core_.scheduler.study(*known).solver_version}, now);
   }
 }
 
 // ---- Time and ends -----------------------------------------------------------------------------
 
 void ClientHandler::tick(Instant now) {
-  parts_.traces.tick(now);
+  traces_.tick(now);
   for (auto entry = pending_.begin(); entry != pending_.end();) {
     Pending& request = entry->second;
     bool is_there = true;
     if (now.steady_ms >= request.next_word_ms) {
       request.next_word_ms = now.steady_ms + settings_.still_working_every_ms;
       const bool waits_for_client = request.sent == request.taken + kChunksAhead;
-      is_there = waits_for_client || parts_.ports.reply_still_working(request.client, request.runs);
+      is_there = waits_for_client || core_.ports.reply_still_working(request.client, request.runs);
     }
     entry = is_there ? std::next(entry) : cancel(entry);
   }
@@ -404,15 +394,15 @@ void ClientHandler::client_left(std::string_view identity) {
   for (auto entry = pending_.begin(); entry != pending_.end();) {
     entry = entry->second.client.identity == identity ? cancel(entry) : std::next(entry);
   }
-  parts_.traces.client_left(identity);
+  traces_.client_left(identity);
 }
 
 void ClientHandler::stop() {
   stopping_ = true;
   for (const auto& [ticket, request] : std::exchange(pending_, {})) {
-    parts_.ports.reply_error(request.client, kStopping);
+    core_.ports.reply_error(request.client, kStopping);
   }
-  parts_.traces.stop();
+  traces_.stop();
 }
 
 }  // namespace oblique::server

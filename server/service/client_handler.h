@@ -9,7 +9,6 @@
 
 #include "proto/oblique.pb.h"
 #include "server/service/ports/ports.h"
-#include "server/service/request_check.h"
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
 #include "server/service/traces/trace_desk.h"
@@ -21,11 +20,6 @@ struct ClientHandlerSettings {
   /// Interval at which a client hears that its request waits or runs. A failure to send that shows
   /// that the client is gone.
   std::int64_t still_working_every_ms = 1000;
-  /// Longer requests are checked on the check thread.
-  std::size_t longest_inline_bytes = std::size_t{64} * 1024;
-  std::size_t most_long_requests = 64;        ///< that wait for the check thread
-  std::size_t most_long_requests_of_one = 2;  ///< the same, of one client
-  std::size_t most_long_bytes = std::size_t{64} * 1024 * 1024;
   std::size_t largest_page = 1000;  ///< studies or workers in one reply
   std::string access = "loopback";  ///< as StatusReply.access
   std::string version{};            ///< as StatusReply.version
@@ -40,16 +34,13 @@ struct QueryCounts {
 /// traces on. Frames may be malicious. Not thread-safe.
 class ClientHandler {
  public:
-  struct Parts {
-    Ports& ports;
-    BadFrames& bad_frames;
-    StudyChanges& changes;
-    TraceDesk& traces;
-    StatusSources sources;
-  };
-
-  ClientHandler(ClientHandlerSettings settings, Parts parts)
-      : settings_(std::move(settings)), parts_(parts) {}
+  ClientHandler(ClientHandlerSettings settings, const Core& core, BadFrames& bad_frames,
+                StudyChanges& changes, TraceDesk& traces)
+      : settings_(std::move(settings)),
+        core_(core),
+        bad_frames_(bad_frames),
+        changes_(changes),
+        traces_(traces) {}
 
   /// `holder`: of the client's key; null without keys.
   void frame(const std::string& identity, std::string_view frame, Instant now,
@@ -90,12 +81,14 @@ class ClientHandler {
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void trace(const Client& client, const protocol::TraceRequest& request, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
-  void add_peers(protocol::WorkersReply& reply) const;
   PendingRequests::iterator find(std::string_view identity, std::uint64_t request_id);
   PendingRequests::iterator cancel(PendingRequests::iterator request);
 
   ClientHandlerSettings settings_;
-  Parts parts_;
+  const Core& core_;
+  BadFrames& bad_frames_;
+  StudyChanges& changes_;
+  TraceDesk& traces_;
   PendingRequests pending_;  // by ticket
   std::uint64_t last_ticket_ = 0;
   bool stopping_ = false;

@@ -26,16 +26,9 @@ void ReuseTracker::begin(StudyId id, Instant now) {
   std::optional<Lookup>& lookup = reused_[id].lookup;
   if (lookup) {
     lookup->begins_again = true;
-    lookup->is_stopped = false;
   } else {
     lookup = Lookup{now.steady_ms};
     write_part(id, 0);
-  }
-}
-
-void ReuseTracker::stop(StudyId id) {
-  if (is_under_way(id)) {
-    reused_.at(id).lookup->is_stopped = true;
   }
 }
 
@@ -89,7 +82,7 @@ std::optional<std::uint64_t> ReuseTracker::next_part(StudyId id, const ReusedRes
     lookup.probes_in_vain = 0;
     lookup.last_result_ms = now.steady_ms;
   }
-  if (lookup.is_stopped) {
+  if (states_.state(id) == StudyState::kCancelled) {
     return std::nullopt;
   }
   if (part.next_point) {
@@ -129,7 +122,7 @@ void ReuseTracker::end_stored(StudyId id, Instant now) {
     return;
   }
   Reused& reused = reused_.at(id);
-  if (reused.lookup->begins_again && !reused.lookup->is_stopped) {
+  if (reused.lookup->begins_again && states_.state(id) != StudyState::kCancelled) {
     reused.lookup = Lookup{now.steady_ms};
     write_part(id, 0);
     return;

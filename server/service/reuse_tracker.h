@@ -46,10 +46,9 @@ class ReuseTracker {
   /// Whether a study with results of `version` (empty: without results) can reuse any.
   bool should_look_up(StudyId id, std::string_view version) const;
 
-  /// Starts a lookup of all open points. One that is under way starts again at its end.
+  /// Starts a lookup of all open points. One that is under way starts again at its end; that of a
+  /// cancelled study ends with the part that is being written.
   void begin(StudyId id, Instant now);
-  /// Ends the lookup with the part that is being written.
-  void stop(StudyId id);
   /// Starts no further part of any lookup. The next server continues.
   void stop_all() { stopping_ = true; }
   void forget(StudyId id);
@@ -63,7 +62,6 @@ class ReuseTracker {
     std::int64_t last_result_ms;
     std::uint64_t probes_in_vain = 0;
     bool begins_again = false;  ///< the study has grown
-    bool is_stopped = false;
   };
   struct Reused {
     std::map<std::string, std::uint64_t> origins;  ///< points by name of the source

@@ -37,19 +37,17 @@ Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<Stor
                 settings.solver_version, settings.database_id, settings.last_worker_id,
                 settings.clients.access == "insecure"},
                ports, bad_frames_, ledger_),
-      changes_(settings.last_study_id, settings.bounds,
-               {states_, ledger_, reuse_, rates_, ports, sources(),
-                [this](const Event& event, Instant then) { feed(event, then); }}),
+      core_{
+          ports,   scheduler_,    states_,
+          ledger_, reuse_,        workers_,
+          rates_,  worker_rates_, [this](const Event& event, Instant then) { feed(event, then); }},
+      changes_(settings.last_study_id, settings.bounds, core_),
       traces_(settings.traces, settings.solver_version, ports,
               settings.clients.still_working_every_ms),
-      clients_(settings.clients, {ports, bad_frames_, changes_, traces_, sources()}) {
+      clients_(settings.clients, core_, bad_frames_, changes_, traces_) {
   for (StoredStudy& study : studies) {
     restore(std::move(study), settings.only_study, now);
   }
-}
-
-StatusSources Service::sources() const {
-  return {scheduler_, states_, ledger_, rates_, reuse_, workers_, worker_rates_};
 }
 
 void Service::restore(StoredStudy study, const std::string& only_study, Instant now) {
@@ -145,14 +143,14 @@ double Service::points_per_s(std::int64_t now_ms) const {
 }
 
 protocol::StudyStatus Service::study_status(StudyId id, Instant now) const {
-  return server::study_status(id, sources(), now);
+  return server::study_status(id, core_, now);
 }
 
 std::vector<protocol::WorkerStatus> Service::worker_statuses(std::size_t most, Instant now) const {
   std::vector<protocol::WorkerStatus> statuses;
   for (auto id = workers_.next_after(0); id && statuses.size() < most;
        id = workers_.next_after(*id)) {
-    statuses.push_back(worker_status(*id, sources(), now));
+    statuses.push_back(worker_status(*id, core_, now));
   }
   return statuses;
 }

@@ -91,7 +91,6 @@ class Service {
   std::vector<protocol::WorkerStatus> worker_statuses(std::size_t most, Instant now) const;
 
  private:
-  StatusSources sources() const;
   /// Passes an event to the scheduler, and then those that its effects cause.
   void feed(const Event& event, Instant now);
   /// `results`: the worker's message of a ResultsReceived.
@@ -117,6 +116,7 @@ class Service {
   PointRates worker_rates_;
   BadFrames bad_frames_;
   WorkerSessions workers_;
+  Core core_;
   StudyChanges changes_;
   TraceDesk traces_;
   ClientHandler clients_;

@@ -8,10 +8,10 @@ namespace oblique::server {
 namespace {
 
 /// Why a running study makes no progress; empty: it does.
-std::string reason_to_wait(StudyId id, const StatusSources& sources, const StudyCounts& counts,
+std::string reason_to_wait(StudyId id, const Core& core, const StudyCounts& counts,
                            const protocol::TakenOver& reused, Instant now) {
   constexpr std::int64_t kQuietAfter_ms = 20'000;
-  const WriteLedger& ledger = sources.ledger;
+  const WriteLedger& ledger = core.ledger;
   if (ledger.is_gone()) {
     return ledger.fault();
   }
@@ -25,14 +25,14 @@ std::string reason_to_wait(StudyId id, const StatusSources& sources, const Study
   if (reused.under_way()) {
     return fmt::format("the lookup of results of other studies, {} reused so far", reused.points());
   }
-  if (counts.leased == 0 && sources.scheduler.sets_all_aside()) {
+  if (counts.leased == 0 && core.scheduler.sets_all_aside()) {
     return "a worker";
   }
   if (counts.lacks_worker) {
     return fmt::format("a worker with solver version {}, that of its results",
                        counts.solver_version);
   }
-  const QuietWorkers quiet = sources.scheduler.quiet_workers(id, now.steady_ms);
+  const QuietWorkers quiet = core.scheduler.quiet_workers(id, now.steady_ms);
   if (counts.leased > 0 && quiet.quiet_ms >= kQuietAfter_ms) {
     return fmt::format("results of {} point{} from {} worker{}, which stored nothing for over {} s",
                        counts.leased, counts.leased == 1 ? "" : "s", quiet.workers,
@@ -52,10 +52,10 @@ const char* worker_state(const WorkerCounts& counts, bool is_busy) {
 
 }  // namespace
 
-protocol::StudyStatus study_status(StudyId id, const StatusSources& sources, Instant now) {
-  const StudyRecord& record = sources.states.record(id);
-  const StudyState state = sources.states.state(id);
-  const StudyCounts counts = sources.scheduler.study(id);
+protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
+  const StudyRecord& record = core.states.record(id);
+  const StudyState state = core.states.state(id);
+  const StudyCounts counts = core.scheduler.study(id);
   const std::uint64_t completed = counts.solved + counts.failed + counts.left_out;
   protocol::StudyStatus status;
   status.set_study_id(id);
@@ -70,11 +70,11 @@ protocol::StudyStatus study_status(StudyId id, const StatusSources& sources, Ins
   status.set_priority(record.priority);
   status.set_solver_version(counts.solver_version);
   status.set_submitted_by(record.submitted_by);
-  const protocol::TakenOver reused = sources.reuse.status(id);
+  const protocol::TakenOver reused = core.reuse.status(id);
   if (state == StudyState::kRunning) {
-    status.set_points_per_s(sources.rates.points_per_s(id, completed, now.steady_ms));
+    status.set_points_per_s(core.rates.points_per_s(id, completed, now.steady_ms));
     if (completed < counts.points) {
-      status.set_waits_for(reason_to_wait(id, sources, counts, reused, now));
+      status.set_waits_for(reason_to_wait(id, core, counts, reused, now));
     }
   }
   if (reused.points() > 0 || reused.under_way() || reused.cut_short()) {
@@ -83,9 +83,9 @@ protocol::StudyStatus study_status(StudyId id, const StatusSources& sources, Ins
   return status;
 }
 
-protocol::WorkerStatus worker_status(WorkerId id, const StatusSources& sources, Instant now) {
-  const WorkerRecord& worker = *sources.workers.find(id);
-  const WorkerCounts counts = sources.scheduler.worker(id, now.steady_ms);
+protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now) {
+  const WorkerRecord& worker = *core.workers.find(id);
+  const WorkerCounts counts = core.scheduler.worker(id, now.steady_ms);
   protocol::WorkerStatus status;
   status.set_worker_id(id);
   status.set_name(worker.name);
@@ -100,8 +100,7 @@ protocol::WorkerStatus worker_status(WorkerId id, const StatusSources& sources, 
   status.set_proven(counts.is_proven);
   status.set_key(worker.key);
   status.set_host(worker.host);
-  status.set_points_per_s(
-      sources.worker_rates.points_per_s(id, counts.solved_points, now.steady_ms));
+  status.set_points_per_s(core.worker_rates.points_per_s(id, counts.solved_points, now.steady_ms));
   status.set_state(worker_state(counts, worker.is_busy));
   return status;
 }

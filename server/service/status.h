@@ -12,21 +12,25 @@
 #include "server/service/worker_sessions.h"
 #include "server/service/write_ledger.h"
 
-// The status of studies and workers as clients and the page get it.
 namespace oblique::server {
 
-struct StatusSources {
-  const Scheduler& scheduler;
-  const StudyStates& states;
-  const WriteLedger& ledger;
-  const PointRates& rates;  ///< of studies
-  const ReuseTracker& reuse;
-  const WorkerSessions& workers;
-  const PointRates& worker_rates;
+/// The parts of the service that its handlers share.
+struct Core {
+  Ports& ports;
+  Scheduler& scheduler;
+  StudyStates& states;
+  WriteLedger& ledger;
+  ReuseTracker& reuse;
+  WorkerSessions& workers;
+  PointRates& rates;  ///< of studies
+  PointRates& worker_rates;
+  Feed feed;
 };
 
+// The status of studies and workers as clients and the page get it.
+
 /// Throws std::out_of_range for a study that is not durable.
-protocol::StudyStatus study_status(StudyId id, const StatusSources& sources, Instant now);
-protocol::WorkerStatus worker_status(WorkerId id, const StatusSources& sources, Instant now);
+protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now);
+protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now);
 
 }  // namespace oblique::server

@@ -2,14 +2,19 @@
 
 #include <algorithm>
 #include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frames.h"
+#include "proto/recipe/checks.h"
 #include "proto/recipe/written/study_name.h"
 #include "proto/recipe/written/study_priority.h"
 #include "proto/text.h"
+#include "proto/wire/frame_scan.h"
+#include "server/study/recipe_growth.h"
 
 namespace oblique::server {
 namespace {
@@ -37,6 +42,34 @@ std::string unknown_study(const std::string& name, const StudyStates& states) {
                      nearest.empty() ? "" : fmt::format(" (did you mean `{}`?)", nearest));
 }
 
+// ---- Reading -----------------------------------------------------------------------------------
+
+ReadRequest read_request(std::string_view frame, bool judges) {
+  // Padding cannot make much of a shorter frame.
+  constexpr std::size_t kScannedAbove = std::size_t{64} * 1024;
+  ReadRequest read;
+  read.is_readable = (frame.size() <= kScannedAbove || protocol::is_of_a_requests_shape(frame)) &&
+                     protocol::decode(frame, read.request);
+  read.request_id = read.is_readable ? read.request.request_id() : protocol::request_id_of(frame);
+  if (!read.is_readable || !read.request.has_submit()) {
+    return read;
+  }
+  try {
+    protocol::Recipe& recipe = *read.request.mutable_submit()->mutable_recipe();
+    protocol::check_size(recipe);
+    auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
+    read.needs_judging = table->needs_judging() && !judges;
+    if (judges) {
+      table->judge_points();
+    }
+    read.table = std::move(table);
+  } catch (const solver::InputError& error) {
+    read.objection = error.what();
+  }
+  read.request.mutable_submit()->clear_recipe();
+  return read;
+}
+
 // ---- Writing -----------------------------------------------------------------------------------
 
 void StudyChanges::write(StudyId id, Pending pending, Change change, OnStored on_stored,
@@ -49,7 +82,7 @@ void StudyChanges::write(StudyId id, Pending pending, Change change, OnStored on
       request(now);
     }
   };
-  parts_.ledger.write(
+  core_.ledger.write(
       std::move(change),
       [end, on_stored = std::move(on_stored)](Instant now) {
         end(now, [&](const Pending& ended) { on_stored(ended, now); });
@@ -62,7 +95,7 @@ void StudyChanges::write(StudyId id, Pending pending, Change change, OnStored on
 void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored) {
   write(id, {}, std::move(change), std::move(on_stored),
         [this, client](const Pending&, const std::string& error, Instant) {
-          parts_.ports.reply_error(client, not_changed(error));
+          core_.ports.reply_error(client, not_changed(error));
         });
 }
 
@@ -74,8 +107,7 @@ bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(I
     return false;
   }
   if (pending->second.deferred.size() >= kMostDeferred) {
-    parts_.ports.reply_error(client,
-                             "too many changes of that study wait already: ask again later");
+    core_.ports.reply_error(client, "too many changes of that study wait already: ask again later");
   } else {
     pending->second.deferred.push_back(std::move(request));
   }
@@ -86,14 +118,14 @@ bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(I
 
 void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant now) {
   const protocol::SubmitRequest& request = read.request.submit();
-  const auto known = parts_.states.find(request.name());
+  const auto known = core_.states.find(request.name());
   const std::int32_t priority = request.has_priority() ? request.priority()
-                                : known                ? parts_.states.record(*known).priority
+                                : known                ? core_.states.record(*known).priority
                                                        : 0;
   for (const std::string& reason : {protocol::objection_to_study_name(request.name()),
                                     protocol::objection_to_priority(priority), read.objection}) {
     if (!reason.empty()) {
-      parts_.ports.reply_error(client, reason);
+      core_.ports.reply_error(client, reason);
       return;
     }
   }
@@ -110,7 +142,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   if (defers(client, *known, [this, client, read](Instant then) { submit(client, read, then); })) {
     return;
   }
-  const StudyRecord& study = parts_.states.record(*known);
+  const StudyRecord& study = core_.states.record(*known);
   if (!study.table.is_of_the_recipe_of(read.table)) {
     grow(client, *known, read, priority, now);
   } else if (study.priority != priority) {
@@ -128,18 +160,18 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   const StudyId id = ++last_study_id_;
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
-  const bool reuses = !read.request.submit().no_reuse() && parts_.reuse.should_look_up(id, {});
-  parts_.states.add(id,
-                    {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
+  const bool reuses = !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, {});
+  core_.states.add(id,
+                   {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
   const auto on_stored = [this, id, reuses](const Pending& added, Instant then) {
-    parts_.states.set_durable(id, then.steady_ms);
-    const StudyRecord& study = parts_.states.record(id);
+    core_.states.set_durable(id, then.steady_ms);
+    const StudyRecord& study = core_.states.record(id);
     log(id, fmt::format("of {} points begins", study.table.size()));
     StudyAdded event{id, study.table, {}, 0, false, false, study.priority};
     event.held = reuses;
-    parts_.feed(event, then);
+    core_.feed(event, then);
     if (reuses) {
-      parts_.reuse.begin(id, then);
+      core_.reuse.begin(id, then);
     }
     bool created = true;
     for (const Client& submitter : added.submitters) {
@@ -147,9 +179,9 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
     }
   };
   const auto on_refused = [this, id](const Pending& refused, const std::string& error, Instant) {
-    parts_.states.remove(id);
+    core_.states.remove(id);
     for (const Client& submitter : refused.submitters) {
-      parts_.ports.reply_error(submitter, "the study was not stored: " + error);
+      core_.ports.reply_error(submitter, "the study was not stored: " + error);
     }
   };
   write(id, {read.table, {client}},
@@ -160,7 +192,7 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
 /// The submitted recipe is not that of the study: appends its further points, or refuses it.
 void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
                         std::int32_t priority, Instant now) {
-  const StudyRecord& study = parts_.states.record(id);
+  const StudyRecord& study = core_.states.record(id);
   const std::uint64_t points_before = study.table.size();
   Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
   try {
@@ -169,7 +201,7 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
     // Only another version can read it.
   }
   if (growth.kind != Growth::Kind::kLonger || read.table.size() <= points_before) {
-    parts_.ports.reply_error(
+    core_.ports.reply_error(
         client,
         fmt::format("there is a study called \"{}\" with {}. A study may grow by blocks "
                     "behind those that it has, and never change:\n{}\n"
@@ -179,23 +211,23 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
                     growth.difference));
     return;
   }
-  const bool is_open = parts_.states.is_open(id);
+  const bool is_open = core_.states.is_open(id);
   if (!may_open(client, is_open ? 0 : 1, read.table.size() - (is_open ? points_before : 0))) {
     return;
   }
-  const protocol::StudyStatus before = study_status(id, parts_.sources, now);
+  const protocol::StudyStatus before = study_status(id, core_, now);
   const bool reuses =
-      !read.request.submit().no_reuse() && parts_.reuse.should_look_up(id, before.solver_version());
+      !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, before.solver_version());
   const auto on_stored = [this, id, priority, points_before, was = before.state(), reuses](
                              const Pending& grown, Instant then) {
-    parts_.states.grow(id, grown.table, priority);
+    core_.states.grow(id, grown.table, priority);
     log(id, fmt::format("grows from {} to {} points", points_before, grown.table.size()));
     if (reuses) {
-      parts_.feed(StudyHeld{id, true}, then);
+      core_.feed(StudyHeld{id, true}, then);
     }
-    parts_.feed(StudyGrown{id, grown.table, priority}, then);
+    core_.feed(StudyGrown{id, grown.table, priority}, then);
     if (reuses) {
-      parts_.reuse.begin(id, then);
+      core_.reuse.begin(id, then);
     }
     protocol::SubmitReply more;
     more.set_appended(grown.table.size() - points_before);
@@ -206,9 +238,9 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
   };
   const auto on_refused = [this, id](const Pending& refused, const std::string& error,
                                      Instant then) {
-    parts_.states.set_doubtful(id);
+    core_.states.set_doubtful(id);
     for (const Client& submitter : refused.submitters) {
-      parts_.ports.reply_error(submitter, not_changed(error));
+      core_.ports.reply_error(submitter, not_changed(error));
     }
     if (refused.is_complete) {
       finish(id, then);
@@ -221,8 +253,8 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
 void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t priority) {
   write(client, id, SetPriority{id, priority},
         [this, client, id, priority](const Pending&, Instant then) {
-          parts_.states.set_priority(id, priority);
-          parts_.feed(PriorityChanged{id, priority}, then);
+          core_.states.set_priority(id, priority);
+          core_.feed(PriorityChanged{id, priority}, then);
           resume_submitted(client, id, then);
         });
 }
@@ -230,7 +262,7 @@ void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t p
 /// The study was submitted again as it is.
 void StudyChanges::resume_submitted(const Client& client, StudyId id, Instant now) {
   const auto reply = [this, client, id](Instant then) { reply_submitted(client, id, false, then); };
-  if (!parts_.states.needs_write(id, StudyState::kRunning)) {
+  if (!core_.states.needs_write(id, StudyState::kRunning)) {
     reply(now);
   } else if (may_reopen(client, id)) {
     set_state(client, id, StudyState::kRunning, reply, now);
@@ -241,7 +273,7 @@ void StudyChanges::resume_submitted(const Client& client, StudyId id, Instant no
 
 void StudyChanges::change(const Client& client, const protocol::ChangeRequest& request,
                           Instant now) {
-  const auto known = parts_.states.find_durable(request.study(), request.study_id());
+  const auto known = core_.states.find_durable(request.study(), request.study_id());
   if (!known) {
     const bool was_deleted = request.change() == protocol::STUDY_CHANGE_DELETE &&
                              request.study_id() != 0 && request.study_id() <= last_study_id_;
@@ -251,7 +283,7 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
       study.set_name(request.study());
       reply_deleted(client, study);
     } else {
-      parts_.ports.reply_error(client, unknown_study(request.study(), parts_.states));
+      core_.ports.reply_error(client, unknown_study(request.study(), core_.states));
     }
     return;
   }
@@ -267,8 +299,8 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
     case protocol::STUDY_CHANGE_PAUSE:
       // Nothing of a cancelled study is handed out either.
       change_state(client, id,
-                   parts_.states.state(id) == StudyState::kCancelled ? StudyState::kCancelled
-                                                                     : StudyState::kPaused,
+                   core_.states.state(id) == StudyState::kCancelled ? StudyState::kCancelled
+                                                                    : StudyState::kPaused,
                    now);
       break;
     case protocol::STUDY_CHANGE_RESUME:
@@ -284,14 +316,14 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
       remove(client, id);
       break;
     default:
-      parts_.ports.reply_error(client, "the server does not know this change of a study");
+      core_.ports.reply_error(client, "the server does not know this change of a study");
       break;
   }
 }
 
 void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted, Instant now) {
   const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
-  if (!parts_.states.needs_write(id, wanted)) {
+  if (!core_.states.needs_write(id, wanted)) {
     reply(now);
   } else if (wanted != StudyState::kRunning || may_reopen(client, id)) {
     set_state(client, id, wanted, reply, now);
@@ -301,50 +333,45 @@ void StudyChanges::change_state(const Client& client, StudyId id, StudyState wan
 void StudyChanges::set_state(const Client& client, StudyId id, StudyState state,
                              std::function<void(Instant)> reply, Instant now) {
   const auto on_stored = [this, id, state, reply = std::move(reply)](const Pending&, Instant then) {
-    parts_.states.set_state(id, state);
+    core_.states.set_state(id, state);
     if (state == StudyState::kRunning) {
       log(id, "goes on");
-      parts_.feed(StudyReopened{id}, then);
+      core_.feed(StudyReopened{id}, then);
     } else {
       log(id, fmt::format("is {}", state_name(state)));
-      if (state == StudyState::kPaused) {
-        parts_.feed(StudyPaused{id}, then);
-      } else {
-        parts_.feed(StudyCancelled{id}, then);
-        parts_.reuse.stop(id);
-      }
+      core_.feed(state == StudyState::kPaused ? Event(StudyPaused{id}) : StudyCancelled{id}, then);
     }
     reply(then);
   };
   const auto on_refused = [this, client, id](const Pending&, const std::string& error, Instant) {
-    parts_.states.set_doubtful(id);
-    parts_.ports.reply_error(client, not_changed(error));
+    core_.states.set_doubtful(id);
+    core_.ports.reply_error(client, not_changed(error));
   };
   write(id, {}, SetStudyState{id, state, iso_8601(now)}, on_stored, on_refused);
 }
 
 void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
-  const IntervalSet failures = parts_.states.record(id).failures;
+  const IntervalSet failures = core_.states.record(id).failures;
   if (failures.empty()) {
     reply_changed(client, id, 0, now);
     return;
   }
   try {
-    (void)parts_.states.record(id).table.get();
+    (void)core_.states.record(id).table.get();
   } catch (const std::runtime_error& error) {
-    parts_.ports.reply_error(
+    core_.ports.reply_error(
         client, fmt::format("the recipe of the study cannot be read: {}", error.what()));
     return;
   }
-  if (parts_.states.state(id) == StudyState::kDone && !may_reopen(client, id)) {
+  if (core_.states.state(id) == StudyState::kDone && !may_reopen(client, id)) {
     return;
   }
   write(client, id, ForgetFailures{id, failures, iso_8601(now)},
         [this, client, id, failures](const Pending&, Instant then) {
-          parts_.rates.forget(id);  // fewer points are completed now
-          parts_.states.forget_failures(id, failures, then.steady_ms);
+          core_.rates.forget(id);  // fewer points are completed now
+          core_.states.forget_failures(id, failures, then.steady_ms);
           log(id, fmt::format("tries its failed points again: {}", failures.size()));
-          parts_.feed(FailuresForgotten{id, failures, parts_.states.record(id).attempts}, then);
+          core_.feed(FailuresForgotten{id, failures, core_.states.record(id).attempts}, then);
           reply_changed(client, id, failures.size(), then);
         });
 }
@@ -352,42 +379,42 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
 void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& request, StudyId id,
                           Instant now) {
   const std::string& name = request.new_name();
-  const auto owner = parts_.states.find(name);
+  const auto owner = core_.states.find(name);
   if (const std::string reason = protocol::objection_to_study_name(name); !reason.empty()) {
-    parts_.ports.reply_error(client, reason);
+    core_.ports.reply_error(client, reason);
   } else if (owner == id) {
     reply_changed(client, id, 0, now);
   } else if (owner) {
     if (!defers(client, *owner,
                 [this, client, request](Instant then) { change(client, request, then); })) {
-      parts_.ports.reply_error(
+      core_.ports.reply_error(
           client, fmt::format("there is a study called \"{}\" already: choose another name", name));
     }
   } else {
-    parts_.states.reserve(id, name);
+    core_.states.reserve(id, name);
     write(
         id, {}, RenameStudy{id, name},
         [this, client, id, name](const Pending&, Instant then) {
           log(id, fmt::format("is called {} from now on", name));
-          parts_.states.rename(id, name);
+          core_.states.rename(id, name);
           reply_changed(client, id, 0, then);
         },
         [this, client, name](const Pending&, const std::string& error, Instant) {
-          parts_.states.release(name);
-          parts_.ports.reply_error(client, not_changed(error));
+          core_.states.release(name);
+          core_.ports.reply_error(client, not_changed(error));
         });
   }
 }
 
 void StudyChanges::remove(const Client& client, StudyId id) {
   write(client, id, DeleteStudy{id}, [this, client, id](const Pending&, Instant then) {
-    const protocol::StudyStatus last = study_status(id, parts_.sources, then);
+    const protocol::StudyStatus last = study_status(id, core_, then);
     log(id, "is deleted");
-    parts_.rates.forget(id);
-    parts_.states.remove(id);
-    parts_.reuse.forget(id);
+    core_.rates.forget(id);
+    core_.states.remove(id);
+    core_.reuse.forget(id);
     release_replies(then, id);
-    parts_.feed(StudyRemoved{id}, then);
+    core_.feed(StudyRemoved{id}, then);
     reply_deleted(client, last);
   });
 }
@@ -396,9 +423,9 @@ void StudyChanges::finish(StudyId id, Instant now) {
   const auto pending = pending_.find(id);
   if (pending != pending_.end() && !pending->second.submitters.empty()) {
     pending->second.is_complete = true;  // further points are being written
-  } else if (parts_.states.finish(id)) {
+  } else if (core_.states.finish(id)) {
     log(id, "is done");
-    parts_.ledger.write(SetStudyState{id, StudyState::kDone, iso_8601(now)});
+    core_.ledger.write(SetStudyState{id, StudyState::kDone, iso_8601(now)});
   }
 }
 
@@ -411,26 +438,26 @@ bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::ui
     if (open <= most && more <= most - open) {
       return true;
     }
-    parts_.ports.reply_error(
+    core_.ports.reply_error(
         client, fmt::format("{} {} are open, and the bound {} of the server is {}: wait until some "
                             "studies are done, or cancel some",
                             open, what, bound, most));
     return false;
   };
-  return fits("open-studies", "studies", parts_.states.unfinished().size(), studies,
+  return fits("open-studies", "studies", core_.states.unfinished().size(), studies,
               bounds_.studies) &&
-         fits("open-points", "points", parts_.states.open_points(), points, bounds_.points);
+         fits("open-points", "points", core_.states.open_points(), points, bounds_.points);
 }
 
 bool StudyChanges::may_reopen(const Client& client, StudyId id) {
-  return parts_.states.is_open(id) || may_open(client, 1, parts_.states.record(id).table.size());
+  return core_.states.is_open(id) || may_open(client, 1, core_.states.record(id).table.size());
 }
 
 /// While results of other studies are looked up the reply waits for them, but not long.
 void StudyChanges::reply_submitted(const Client& client, StudyId id, bool created, Instant now,
                                    const protocol::SubmitReply& more) {
   constexpr std::int64_t kLongestWait_ms = 1500;
-  const StudyCounts counts = parts_.sources.scheduler.study(id);
+  const StudyCounts counts = core_.scheduler.study(id);
   protocol::ClientReply reply;
   protocol::SubmitReply& fields = *reply.mutable_submit();
   fields = more;
@@ -438,53 +465,52 @@ void StudyChanges::reply_submitted(const Client& client, StudyId id, bool create
   fields.set_points(counts.points);
   fields.set_settled(counts.solved + counts.failed + counts.left_out);
   fields.set_created(created);
-  if (parts_.reuse.is_under_way(id)) {
+  if (core_.reuse.is_under_way(id)) {
     held_.push_back({id, client, std::move(reply), now.steady_ms + kLongestWait_ms});
   } else {
-    parts_.ports.reply(client, std::move(reply));
+    core_.ports.reply(client, std::move(reply));
   }
 }
 
 void StudyChanges::release_replies(Instant now, StudyId id) {
   const auto waits = [&](const HeldReply& held) {
     return held.study != id && held.until_ms > now.steady_ms &&
-           parts_.reuse.is_under_way(held.study);
+           core_.reuse.is_under_way(held.study);
   };
   const auto first = std::stable_partition(held_.begin(), held_.end(), waits);
   std::vector<HeldReply> released(std::make_move_iterator(first),
                                   std::make_move_iterator(held_.end()));
   held_.erase(first, held_.end());
   for (HeldReply& held : released) {
-    if (!parts_.states.contains(held.study)) {
-      parts_.ports.reply_error(held.client, "the study was deleted meanwhile");
+    if (!core_.states.contains(held.study)) {
+      core_.ports.reply_error(held.client, "the study was deleted meanwhile");
       continue;
     }
-    const protocol::StudyStatus status = study_status(held.study, parts_.sources, now);
+    const protocol::StudyStatus status = study_status(held.study, core_, now);
     protocol::SubmitReply& fields = *held.reply.mutable_submit();
     fields.set_settled(status.solved() + status.failed() + status.left_out());
     *fields.mutable_taken() = status.taken();
-    parts_.ports.reply(held.client, std::move(held.reply));
+    core_.ports.reply(held.client, std::move(held.reply));
   }
 }
 
 void StudyChanges::reply_changed(const Client& client, StudyId id, std::uint64_t retried,
                                  Instant now) {
   protocol::ClientReply reply;
-  *reply.mutable_change()->mutable_study() = study_status(id, parts_.sources, now);
+  *reply.mutable_change()->mutable_study() = study_status(id, core_, now);
   reply.mutable_change()->set_retried(retried);
-  parts_.ports.reply(client, std::move(reply));
+  core_.ports.reply(client, std::move(reply));
 }
 
 void StudyChanges::reply_deleted(const Client& client, const protocol::StudyStatus& study) {
   protocol::ClientReply reply;
   *reply.mutable_change()->mutable_study() = study;
   reply.mutable_change()->mutable_study()->set_state(kDeletedState);
-  parts_.ports.reply(client, std::move(reply));
+  core_.ports.reply(client, std::move(reply));
 }
 
 void StudyChanges::log(StudyId id, const std::string& what) {
-  parts_.ports.log(Severity::kInfo,
-                   fmt::format("study {} {}", parts_.states.record(id).name, what));
+  core_.ports.log(Severity::kInfo, fmt::format("study {} {}", core_.states.record(id).name, what));
 }
 
 }  // namespace oblique::server

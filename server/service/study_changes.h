@@ -4,16 +4,31 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/oblique.pb.h"
 #include "server/service/ports/ports.h"
-#include "server/service/request_check.h"
 #include "server/service/reuse_tracker.h"
 #include "server/service/status.h"
-#include "server/study/recipe_growth.h"
+#include "server/study/study_table.h"
 
 namespace oblique::server {
+
+/// A parsed request of a client and, if it submits a study, the table of its recipe.
+struct ReadRequest {
+  bool is_readable = false;         ///< otherwise only the number counts
+  std::uint64_t request_id = 0;     ///< 0: it cannot be read
+  protocol::ClientRequest request;  ///< its recipe is moved into the table
+  StudyTable table;                 ///< of a recipe without faults
+  std::string objection;            ///< what is wrong with the recipe; empty: nothing
+  bool needs_judging = false;       ///< the points of the recipe were not checked and must be
+};
+
+/// Parses one frame. Time and memory are proportional to its bytes: a long one that is padded with
+/// empty messages is not parsed. With `judges` the points of a recipe are checked too
+/// (PointTable::judge_points), which may take a second.
+ReadRequest read_request(std::string_view frame, bool judges = true);
 
 /// Bounds on the studies that are neither done nor cancelled, and on their points.
 struct StudyBounds {
@@ -26,19 +41,9 @@ struct StudyBounds {
 /// study is being written, later requests for that study wait. Not thread-safe.
 class StudyChanges {
  public:
-  struct Parts {
-    StudyStates& states;
-    WriteLedger& ledger;
-    ReuseTracker& reuse;
-    PointRates& rates;
-    Ports& ports;
-    StatusSources sources;
-    Feed feed;
-  };
-
   /// `last_study_id` is the last one of the database.
-  StudyChanges(std::uint64_t last_study_id, const StudyBounds& bounds, Parts parts)
-      : last_study_id_(last_study_id), bounds_(bounds), parts_(std::move(parts)) {}
+  StudyChanges(std::uint64_t last_study_id, const StudyBounds& bounds, const Core& core)
+      : last_study_id_(last_study_id), bounds_(bounds), core_(core) {}
 
   /// `read` has a recipe without faults.
   void submit(const Client& client, const ReadRequest& read, Instant now);
@@ -93,7 +98,7 @@ class StudyChanges {
 
   std::uint64_t last_study_id_;
   StudyBounds bounds_;
-  Parts parts_;
+  const Core& core_;
   std::map<StudyId, Pending> pending_;
   std::vector<HeldReply> held_;
 };

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -19,8 +18,6 @@ namespace {
 
 constexpr std::size_t kLongestWorkerText = 256;
 constexpr std::uint32_t kMostThreads = 4096;
-/// A worker says hello once on a connection.
-constexpr std::uint32_t kMostHellos = 8;
 
 /// A text of a peer, without control characters and shortened, for logs and tables.
 std::string plain(const std::string& text) {
@@ -139,19 +136,12 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
   if (ledger_.is_gone() || !ledger_.has_room()) {
     return;  // the worker repeats it
   }
-  std::uint32_t hellos = 1;
   if (const auto known = ids_.find(identity); known != ids_.end()) {
     const WorkerId old = known->second;
-    hellos = workers_.at(old).hellos + 1;
-    if (hellos > kMostHellos) {
-      bad_frames_.count("a worker");
-      return;
-    }
-    // It begins anew, and so do we: what it held is free again.
-    forget(old);
+    forget(old);  // it begins anew, and what it held is free again
     input.events.emplace_back(WorkerLeft{old});
   }
-  if (refuse(identity, hello)) {
+  if (refuse(identity, hello, now)) {
     return;
   }
   const WorkerId id = ++settings_.last_worker_id;
@@ -164,7 +154,6 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
                             plain(hello.solver_version()),
                             plain(hello.instruction_set()),
                             iso_8601(now),
-                            hellos,
                             key,
                             plain(hello.host()),
                             now.steady_ms};
@@ -177,7 +166,8 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
 }
 
 /// Whether the worker is refused; it gets the reason.
-bool WorkerSessions::refuse(const std::string& identity, const protocol::WorkerHello& hello) {
+bool WorkerSessions::refuse(const std::string& identity, const protocol::WorkerHello& hello,
+                            Instant now) {
   std::string reason = protocol::objection_to_worker(hello);
   if (reason.empty() && hello.solver_version().empty()) {
     reason = "it does not say which version its solver has";
@@ -185,10 +175,7 @@ bool WorkerSessions::refuse(const std::string& identity, const protocol::WorkerH
   if (reason.empty()) {
     return false;
   }
-  if (std::has_single_bit(++refused_)) {
-    ports_.log(Severity::kWarning,
-               fmt::format("a worker is refused: {} ({} refused so far)", reason, refused_));
-  }
+  log_rarely(Severity::kWarning, fmt::format("a worker is refused: {}", reason), now);
   protocol::ServerToWorker reply;
   reply.mutable_refused()->set_reason(reason);
   ports_.send(identity, reply);
@@ -265,7 +252,7 @@ void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerI
 
 /// A sound worker says hello again and delivers what it has kept.
 void WorkerSessions::give_up(WorkerId worker, const std::string& why, WorkerInput& input) {
-  bad_frames_.count();
+  bad_frames_.count("a worker");
   protocol::ServerToWorker again;
   again.mutable_hello_again();
   send(worker, again);

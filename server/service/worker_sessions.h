@@ -33,7 +33,6 @@ struct WorkerRecord {
   std::string solver_version;
   std::string instruction_set;
   std::string joined_at;
-  std::uint32_t hellos = 1;       ///< on this connection
   std::string key{};              ///< its name; empty: without keys
   std::string host{};             ///< its machine
   std::int64_t last_sent_ms = 0;  ///< when it was sent something, to a tick
@@ -96,7 +95,7 @@ class WorkerSessions {
  private:
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
              const std::string& key, WorkerInput& input);
-  bool refuse(const std::string& identity, const protocol::WorkerHello& hello);
+  bool refuse(const std::string& identity, const protocol::WorkerHello& hello, Instant now);
   bool welcome(WorkerId id, const std::string& identity);
   void greet(WorkerId id, Instant now);
   void results(WorkerId worker, protocol::Results results, WorkerInput& input);
@@ -115,7 +114,6 @@ class WorkerSessions {
   std::map<std::string, WorkerId, std::less<>> ids_;  // by identity
   std::map<WorkerId, WorkerUnreachable> unreachable_;
   std::vector<Event> events_;
-  std::uint64_t refused_ = 0;
   std::int64_t log_span_began_ms_ = 0;
   std::uint64_t log_lines_ = 0;  // since then, written or left out
   bool stopping_ = false;

@@ -1,18 +1,15 @@
 #include "server/service/write_ledger.h"
 
 #include <utility>
-#include <variant>
 
 namespace oblique::server {
 
 void WriteLedger::write(Change change, OnStored on_stored, OnRefused on_refused) {
   const std::uint64_t ticket = ++last_ticket_;
   const bool can_be_refused = on_refused != nullptr;
-  const auto* results = std::get_if<AddResults>(&change);
-  const std::size_t bytes = results != nullptr ? results->message_bytes : 0;
+  const std::size_t bytes = bytes_of(change);
   writes_.emplace(ticket, Write{std::move(on_stored), std::move(on_refused), bytes});
   bytes_ += bytes;
-  changes_ += can_be_refused ? 1U : 0U;
   weigh();
   ports_.write({ticket, std::move(change), can_be_refused});
 }
@@ -53,7 +50,6 @@ void WriteLedger::tick(std::int64_t now_ms) {
 }
 
 void WriteLedger::discount(const Write& write) {
-  changes_ -= write.on_refused ? 1U : 0U;
   bytes_ -= write.bytes;
   weigh();
 }

@@ -11,12 +11,12 @@
 namespace oblique::server {
 
 struct LedgerLimits {
-  /// Bytes of results messages that wait for the disk. Above it no message of a worker is read;
-  /// above a quarter no batch is sent, until half of that is stored.
+  /// Bytes of results and recipes that wait for the disk. Above it no message of a worker is read
+  /// and no change of a client accepted; above a quarter no batch is sent, until half of that is
+  /// stored.
   std::size_t bytes = std::size_t{64} << 20U;
   /// The same for all writes, so that small messages are bounded, too.
   std::size_t writes = 80'000;
-  std::size_t changes = 10'000;  ///< of clients
 };
 
 /// The writes whose outcome is not known yet: what follows from each, their size, and whether the
@@ -52,19 +52,18 @@ class WriteLedger {
   bool is_gone() const { return is_gone_; }
   bool is_empty() const { return writes_.empty(); }
   std::size_t jobs() const { return writes_.size(); }
-  std::size_t bytes() const { return bytes_; }  ///< of results messages
+  std::size_t bytes() const { return bytes_; }
 
   /// No batch should be sent: the database accepts nothing, or is far behind.
   bool holds_batches() const { return !fault_.empty() || is_behind_; }
-  /// Whether further messages of workers should be read.
+  /// Whether further messages of workers and changes of clients should be taken.
   bool has_room() const { return bytes_ < limits_.bytes && writes_.size() < limits_.writes; }
-  bool takes_no_change() const { return changes_ >= limits_.changes; }
 
  private:
   struct Write {
     OnStored on_stored;
     OnRefused on_refused;
-    std::size_t bytes;  ///< of a results message
+    std::size_t bytes;
   };
   void discount(const Write& write);
   void weigh();
@@ -74,7 +73,6 @@ class WriteLedger {
   std::map<std::uint64_t, Write> writes_;  // by ticket
   std::uint64_t last_ticket_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t changes_ = 0;  // that can be refused
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;

@@ -153,6 +153,21 @@ inline std::uint64_t study_of(const Change& change) {
   return std::visit([](const auto& kind) { return kind.study_id; }, change);
 }
 
+/// Size of the message or recipe in a change that has one.
+inline std::size_t bytes_of(const Change& change) {
+  return std::visit(
+      [](const auto& kind) -> std::size_t {
+        if constexpr (requires { kind.message_bytes; }) {
+          return kind.message_bytes;
+        } else if constexpr (requires { kind.table.recipe_bytes(); }) {
+          return kind.table.recipe_bytes().size();
+        } else {
+          return 0;
+        }
+      },
+      change);
+}
+
 inline bool needs_full_sync(const Change& change) {
   return std::visit([](const auto& kind) { return kind.kNeedsFullSync; }, change);
 }

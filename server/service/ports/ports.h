@@ -2,12 +2,9 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "proto/oblique.pb.h"
 #include "server/network/curve/doorkeeper.h"
@@ -41,17 +38,6 @@ struct Client {
   bool operator==(const Client&) const = default;
 };
 
-/// Connections of one key.
-struct KeyConnections {
-  protocol::Role role;
-  std::uint64_t connections = 0;
-};
-
-struct PeerCounts {
-  std::map<std::string, KeyConnections> keys;                     ///< by name
-  std::vector<std::pair<std::string, std::uint64_t>> refusals{};  ///< causes with refused peers
-};
-
 enum class Severity { kInfo, kWarning, kError };
 
 /// Network, writer, query pool, check thread and log as the service uses them. The event loop
@@ -73,7 +59,8 @@ class Ports {
   virtual bool has_unheard(const std::string& /*identity*/) const { return false; }
   /// False when the client is gone; the reply is dropped then.
   virtual bool to_client(const std::string& identity, const std::string& frame) = 0;
-  virtual PeerCounts peer_counts() const { return {}; }
+  /// Adds the keys that are connected, and how many peers were refused.
+  virtual void add_peers(protocol::WorkersReply& /*reply*/) const {}
 
   // ---- Other threads.
   /// `Service::written` is called with the outcome.
@@ -101,8 +88,6 @@ class BadFrames {
  public:
   explicit BadFrames(Ports& ports) : ports_(ports) {}
 
-  /// Of a peer that is disconnected, whose reason is logged elsewhere.
-  void count() { ++count_; }
   void count(std::string_view sender);
   std::uint64_t total() const { return count_; }
 

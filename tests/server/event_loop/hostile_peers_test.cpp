@@ -177,22 +177,5 @@ TEST_F(HostilePeersTest, FloodsOfManyWorkersAndClientsKeepNobodyFromBeingServed)
   }
 }
 
-TEST_F(HostilePeersTest, ConnectionsWithoutEndLeaveRoomForThoseAtWork) {
-  NetworkLimits limits;
-  limits.connections = 20;
-  limits.active_ms = 0;
-  RunningServer server(path_, {}, limits);
-  PretendedClient client(server.client_endpoint());
-  client.submit("a", 10);
-  std::vector<std::unique_ptr<RawPeer>> storm;
-  for (int i = 0; i < 200; ++i) {
-    storm.push_back(std::make_unique<RawPeer>(server.client_endpoint()));
-    if (i % 10 == 0) {
-      EXPECT_EQ(client.status("a").points(), 10U);
-    }
-  }
-  EXPECT_EQ(client.status("a").points(), 10U);
-}
-
 }  // namespace
 }  // namespace oblique::server

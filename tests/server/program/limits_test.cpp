@@ -52,7 +52,6 @@ TEST_F(LimitsTest, DefaultsAreAllowedAndNegativeNumbersAreNot) {
 TEST_F(LimitsTest, EachOptionSetsABoundOfItsOwn) {
   const auto all = [this] {
     const auto& ledger = service_.ledger;
-    const auto& clients = service_.clients;
     return std::vector<std::int64_t>{static_cast<std::int64_t>(network_.connections),
                                      network_.handshake_ms,
                                      network_.active_ms,
@@ -65,9 +64,6 @@ TEST_F(LimitsTest, EachOptionSetsABoundOfItsOwn) {
                                      static_cast<std::int64_t>(network_.waiting_out_bytes),
                                      static_cast<std::int64_t>(network_.all_waiting_out_bytes),
                                      static_cast<std::int64_t>(ledger.bytes),
-                                     static_cast<std::int64_t>(clients.most_long_requests),
-                                     static_cast<std::int64_t>(clients.most_long_requests_of_one),
-                                     static_cast<std::int64_t>(clients.most_long_bytes),
                                      static_cast<std::int64_t>(queries_.readers),
                                      static_cast<std::int64_t>(queries_.most_running_each),
                                      static_cast<std::int64_t>(queries_.most_waiting),

@@ -3,7 +3,6 @@
 #include <memory>
 #include <vector>
 
-#include "server/service/request_check.h"
 #include "tests/server/service/service_fixture.h"
 #include "tests/support/recipes.h"
 
@@ -132,16 +131,6 @@ TEST_F(FilteredStudyTest, WhoWaitsHearsOfItAndWhoIsGoneIsForgotten) {
   run_checks();
   EXPECT_THAT(ports_.replies, IsEmpty());
   EXPECT_THAT(ports_.jobs, IsEmpty());
-}
-
-TEST_F(FilteredStudyTest, TheSameStudySubmittedAgainIsThatStudy) {
-  for (int i = 0; i < 2; ++i) {
-    request(filtered_request("mu > 0.75"));
-    run_checks();
-    write_all();
-  }
-  EXPECT_EQ(last_reply().submit().points(), 11U);
-  EXPECT_FALSE(last_reply().submit().created());
 }
 
 }  // namespace

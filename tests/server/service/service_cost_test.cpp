@@ -12,13 +12,6 @@ namespace {
 
 using testing::HasSubstr;
 
-ClientRequest status_request(std::uint64_t after = 0, std::uint32_t limit = 0) {
-  ClientRequest message = client_request();
-  message.mutable_status()->set_after_study_id(after);
-  message.mutable_status()->set_limit(limit);
-  return message;
-}
-
 /// A submission whose recipe has so many bytes at least.
 ClientRequest long_submission(const std::string& name, std::size_t bytes) {
   ClientRequest message = client_request(7);
@@ -40,8 +33,7 @@ TEST_F(ServiceTest, ALongRecipeIsJudgedElsewhereAndOthersAreAnsweredMeanwhile) {
   EXPECT_TRUE(ports_.replies.empty());
   submit("small");
   EXPECT_TRUE(last_reply().has_submit());
-  request(status_request());
-  EXPECT_EQ(last_reply().status().studies_size(), 1);
+  EXPECT_EQ(statuses().studies_size(), 1);
   run_checks();
   write_all();
   EXPECT_EQ(last_reply().request_id(), 7U);
@@ -124,29 +116,25 @@ TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
   EXPECT_EQ(service_->bad_frames(), 1U);
 }
 
-TEST_F(ServiceTest, AHeartbeatOfMoreLeasesThanAWorkerHoldsIsABadFrameThatIsNotRead) {
-  hello();
-  WorkerMessage message;
+TEST_F(ServiceTest, MessagesThatAreLongerThanThoseOfWorkersAreBadFramesThatAreNotParsed) {
+  WorkerMessage heartbeat;
   for (std::uint64_t i = 0; i <= protocol::kMostLeasesAHeartbeat; ++i) {
-    message.mutable_heartbeat()->add_lease_ids(i);
+    heartbeat.mutable_heartbeat()->add_lease_ids(i);
   }
-  worker_says(message);
-  EXPECT_EQ(service_->bad_frames(), 1U);
-  EXPECT_TRUE(last_message().has_hello_again());
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
-  worker_says(message);
-  EXPECT_EQ(service_->bad_frames(), 2U) << "a stranger's too";
-}
-
-TEST_F(ServiceTest, ResultsOfMorePointsThanAMessageHoldsAreABadFrame) {
-  hello();
-  WorkerMessage message;
+  WorkerMessage results;
   for (std::size_t i = 0; i <= protocol::kMostResultsAMessage; ++i) {
-    message.mutable_results()->add_results();
+    results.mutable_results()->add_results();
   }
-  worker_says(message);
-  EXPECT_EQ(service_->bad_frames(), 1U);
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  worker_says(heartbeat);
+  EXPECT_EQ(service_->bad_frames(), 1U) << "a stranger's";
+  for (const WorkerMessage& message : {heartbeat, results}) {
+    hello();
+    worker_says(message);
+    EXPECT_TRUE(last_message().has_hello_again());
+    EXPECT_EQ(service_->scheduler().workers(), 0U);
+  }
+  EXPECT_EQ(service_->bad_frames(), 3U);
+  EXPECT_TRUE(ports_.jobs.empty());
 }
 
 TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirst) {
@@ -188,61 +176,35 @@ TEST_F(ServiceTest, WorkersThatComeAndGoWithoutEndDoNotFillTheLog) {
   EXPECT_THAT(ports_.lines[1], HasSubstr("joins"));
 }
 
-/// A service with 2,500 studies.
-class ManyStudiesTest : public ServiceTest {
- protected:
-  static constexpr int kStudies = 2500;
-  ManyStudiesTest() {
-    for (int i = 0; i < kStudies; ++i) {
-      request_unchecked(submit_request("study " + std::to_string(i)));
-    }
-    for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
-      service_->written({WriteReport::Kind::kStored, job.ticket, {}}, now_);
-    }
+TEST_F(ServiceTest, StudiesComeInPagesThatHoldEachOnce) {
+  constexpr int kStudies = 2500;
+  for (int i = 0; i < kStudies; ++i) {
+    service_->client_frame("client", protocol::encode(submit_request(std::to_string(i))), now_);
   }
-  void request_unchecked(const ClientRequest& message) {
-    service_->client_frame("client", protocol::encode(message), now_);
-  }
-};
-
-TEST_F(ManyStudiesTest, TheirStatusComesInPagesThatHoldEachStudyOnce) {
+  write_all();
   std::uint64_t after = 0;
   int seen = 0;
-  int pages = 0;
-  do {
-    request_unchecked(status_request(after));
-    const auto& page = ports_.replies.back().status();
-    ASSERT_LE(page.studies_size(), 1000);
+  for (const int size : {1000, 1000, 500}) {
+    const auto page = statuses(after);
+    ASSERT_EQ(page.studies_size(), size);
     for (const auto& study : page.studies()) {
       EXPECT_GT(study.study_id(), after);
       after = study.study_id();
     }
-    seen += page.studies_size();
+    seen += size;
     EXPECT_EQ(page.next_after(), seen < kStudies ? after : 0U);
-    ++pages;
-  } while (ports_.replies.back().status().next_after() != 0);
-  EXPECT_EQ(seen, kStudies);
-  EXPECT_EQ(pages, 3);
-}
-
-TEST_F(ManyStudiesTest, APageIsAsShortAsAskedAndNeverLongerThanTheServersOwn) {
-  request_unchecked(status_request(0, 10));
-  EXPECT_EQ(last_reply().status().studies_size(), 10);
-  request_unchecked(status_request(0, 1'000'000));
-  EXPECT_EQ(last_reply().status().studies_size(), 1000);
+  }
+  EXPECT_EQ(statuses(0, 10).studies_size(), 10);
+  EXPECT_EQ(statuses(0, 1'000'000).studies_size(), 1000);
 }
 
 TEST_F(ServiceTest, WorkersComeInPagesToo) {
   for (int i = 0; i < 1500; ++i) {
     hello("worker " + std::to_string(i));
   }
-  ClientRequest message = client_request();
-  message.mutable_workers();
-  request(message);
-  ASSERT_EQ(last_reply().workers().workers_size(), 1000);
-  message.mutable_workers()->set_after_worker_id(last_reply().workers().next_after());
-  request(message);
-  EXPECT_EQ(last_reply().workers().workers_size(), 500);
+  const auto page = workers();
+  ASSERT_EQ(page.workers_size(), 1000);
+  EXPECT_EQ(workers(page.next_after()).workers_size(), 500);
   EXPECT_EQ(last_reply().workers().next_after(), 0U);
 }
 

@@ -110,6 +110,11 @@ class ServiceTest : public testing::Test {
   ClientRequest cancel_request(const std::string& name) {
     return change_request(name, protocol::STUDY_CHANGE_CANCEL);
   }
+  /// A change that is stored.
+  void change(const std::string& name, protocol::StudyChange change) {
+    request(change_request(name, change));
+    write_all();
+  }
   /// Results of the points of the last batch, failed ones from `first_failed` on.
   void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
     const auto batch = last_message().batch();
@@ -158,6 +163,19 @@ class ServiceTest : public testing::Test {
     WorkerMessage message;
     message.mutable_credit()->set_batches(batches);
     worker_says(message, identity);
+  }
+  protocol::StatusReply statuses(std::uint64_t after = 0, std::uint32_t limit = 0) {
+    ClientRequest message = client_request();
+    message.mutable_status()->set_after_study_id(after);
+    message.mutable_status()->set_limit(limit);
+    service_->client_frame("client", protocol::encode(message), now_);
+    return last_reply().status();
+  }
+  protocol::WorkersReply workers(std::uint64_t after = 0) {
+    ClientRequest message = client_request();
+    message.mutable_workers()->set_after_worker_id(after);
+    service_->client_frame("client", protocol::encode(message), now_);
+    return last_reply().workers();
   }
   protocol::StudyStatus status_of(const std::string& name) {
     ClientRequest message = client_request();

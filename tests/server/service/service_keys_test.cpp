@@ -93,14 +93,6 @@ TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheBounds) 
   EXPECT_EQ(status_of("a").state(), "cancelled");
 }
 
-TEST_F(ServiceKeysTest, AStudyThatTheDiskRefusesTakesNoRoom) {
-  for (int i = 0; i < 3; ++i) {
-    request(submit_request("a", 1000));
-    write_all("the disk is full");
-  }
-  EXPECT_EQ(error_of(submit_request("a", 1000)), "");
-}
-
 TEST_F(ServiceKeysTest, QueriesOfAllConnectionsOfAKeyAreThoseOfOneClient) {
   ClientRequest query = client_request();
   query.mutable_query()->set_sql("SELECT 1");

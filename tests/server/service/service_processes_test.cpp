@@ -23,12 +23,6 @@ class ProcessesTest : public ServiceTest {
     message.mutable_hello()->set_process_id(process_id);
     worker_says(message, identity);
   }
-  protocol::WorkersReply workers() {
-    ClientRequest message = client_request();
-    message.mutable_workers();
-    request(message);
-    return last_reply().workers();
-  }
   /// Three newcomers get batches and are gone.
   void let_newcomers_vanish() {
     for (const char* identity : {"x", "y", "z"}) {
@@ -106,17 +100,6 @@ TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
       std::count_if(ports_.worker_messages.begin(), ports_.worker_messages.end(),
                     [](const ServerToWorker& message) { return message.has_release(); });
   EXPECT_EQ(releases, 1);
-}
-
-TEST_F(ProcessesTest, ABatchMayBeOfSeveralModels) {
-  ClientRequest submit = submit_request("models");
-  *submit.mutable_submit()->mutable_recipe() =
-      protocol::recipe_of({{protocol::range("k", 1e7, 2e7, 100), protocol::listed("H", {1.0}),
-                            protocol::listed("mu", {0.4}), protocol::listed("e", {1.0})}});
-  request(submit);
-  write_all();
-  hello_and_credit();
-  EXPECT_EQ(points_of(last_message().batch()).size(), 8U);
 }
 
 }  // namespace

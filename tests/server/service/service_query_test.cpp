@@ -9,22 +9,25 @@ namespace {
 
 class ServiceQueryTest : public ServiceTest {
  protected:
+  void send(const ClientRequest& message, const std::string& identity) {
+    service_->client_frame(identity, protocol::encode(message), now_);
+  }
   void ask(std::uint64_t request_id, const std::string& identity = "client") {
     ClientRequest message = client_request(request_id);
     message.mutable_query()->set_sql("SELECT 1");
-    service_->client_frame(identity, protocol::encode(message), now_);
+    send(message, identity);
   }
   void want_more(std::uint64_t request_id, std::uint64_t taken,
                  const std::string& identity = "client") {
     ClientRequest message = client_request(request_id);
     message.mutable_more_rows()->set_request_id(request_id);
     message.mutable_more_rows()->set_taken(taken);
-    service_->client_frame(identity, protocol::encode(message), now_);
+    send(message, identity);
   }
   void end(std::uint64_t request_id, const std::string& identity = "client") {
     ClientRequest message = client_request(request_id);
     message.mutable_end_query()->set_request_id(request_id);
-    service_->client_frame(identity, protocol::encode(message), now_);
+    send(message, identity);
   }
   /// A reader gives another chunk of the answer.
   void give(std::size_t index) {

@@ -10,7 +10,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::SizeIs;
 
 class ServiceReuseTest : public ServiceTest {
  protected:
@@ -70,15 +69,13 @@ class ServiceReuseTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceReuseTest, WithoutAnyResultNothingIsLookedUp) {
-  request(reusing("a"));
+TEST_F(ServiceReuseTest, NothingIsLookedUpWithoutAnyResultOrForARequestWithoutReuse) {
+  request(reusing("first"));
   write_all();
   EXPECT_THAT(ports_.jobs, IsEmpty());
   EXPECT_TRUE(last_reply().has_submit());
-}
-
-TEST_F(ServiceReuseTest, NothingIsLookedUpForARequestWithoutReuse) {
-  solve_some();
+  hello_and_credit();
+  answer_batch(1000);
   submit("b");
   EXPECT_THAT(ports_.jobs, IsEmpty());
   EXPECT_EQ(last_reply().submit().study_id(), kStudy);
@@ -117,17 +114,23 @@ TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
   EXPECT_TRUE(reply.taken().under_way());
 }
 
-TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesIsCutShort) {
-  submit_study();
-  const std::uint64_t half = ReuseTracker::kMostProbesInVain / 2;
-  write_part({{}, {}, half, 1});
-  write_part(copies_of_a(IntervalSet(0, 1), 2));  // and the count begins again
-  write_part({{}, {}, half, 3});
-  EXPECT_THAT(parts(), ElementsAre(3));
-  write_part({{}, {}, half, 4});
-  EXPECT_EQ(ended(), kStudy);
-  write_all();
-  EXPECT_TRUE(last_reply().submit().taken().cut_short());
+TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShort) {
+  for (const bool is_long : {false, true}) {
+    start({});
+    submit_study();
+    const auto vain_part = [&](std::uint64_t next) {
+      now_.steady_ms += is_long ? ReuseTracker::kLongestInVain_ms / 2 : 0;
+      write_part({{}, {}, is_long ? 1 : ReuseTracker::kMostProbesInVain / 2, next});
+    };
+    vain_part(1);
+    write_part(copies_of_a(IntervalSet(0, 1), 2));  // and both begin again
+    vain_part(3);
+    EXPECT_THAT(parts(), ElementsAre(3));
+    vain_part(4);
+    EXPECT_EQ(ended(), kStudy);
+    write_all();
+    EXPECT_TRUE(last_reply().submit().taken().cut_short());
+  }
 }
 
 TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
@@ -137,18 +140,6 @@ TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
   write_all();
   EXPECT_TRUE(last_reply().submit().taken().cut_short());
   EXPECT_EQ(status_of("b").waits_for(), "");
-}
-
-TEST_F(ServiceReuseTest, ALookupThatFindsNothingForLongIsCutShort) {
-  submit_study();
-  now_.steady_ms += ReuseTracker::kLongestInVain_ms - 1;
-  write_part(copies_of_a(IntervalSet(0, 1), 1));  // and the time begins again
-  now_.steady_ms += ReuseTracker::kLongestInVain_ms - 1;
-  write_part({{}, {}, 1, 2});
-  EXPECT_THAT(parts(), ElementsAre(2));
-  now_.steady_ms += 1;
-  write_part({{}, {}, 1, 3});
-  EXPECT_EQ(ended(), kStudy);
 }
 
 TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
@@ -187,28 +178,19 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) 
   EXPECT_FALSE(status_of("b").taken().under_way());
 }
 
-TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledStudyIsTheLast) {
-  submit_study();
-  const WriteJob part = ports_.jobs.at(0);
-  ports_.jobs.clear();
-  request(cancel_request("b"));
-  write_all();
-  ports_.jobs.push_back(part);
-  write_part(copies_of_a(IntervalSet(0, 4), 4));
-  EXPECT_EQ(ended(), kStudy);
-  write_all();
-  EXPECT_FALSE(status_of("b").taken().under_way());
-}
-
-TEST_F(ServiceReuseTest, OfADeletedStudyNothingMoreIsLookedUp) {
-  submit_study();
-  const WriteJob part = ports_.jobs.at(0);
-  ports_.jobs.clear();
-  request(change_request("b", protocol::STUDY_CHANGE_DELETE));
-  write_all();
-  ports_.jobs.push_back(part);
-  write_part({{}, {}, 1, 4});
-  EXPECT_THAT(ports_.jobs, IsEmpty());
+TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
+  for (const auto change : {protocol::STUDY_CHANGE_CANCEL, protocol::STUDY_CHANGE_DELETE}) {
+    start({});
+    submit_study();
+    const WriteJob part = ports_.jobs.at(0);
+    ports_.jobs.clear();
+    request(change_request("b", change));
+    write_all();
+    ports_.jobs.push_back(part);
+    write_part(copies_of_a(IntervalSet(0, 4), 4));
+    EXPECT_EQ(ended(), change == protocol::STUDY_CHANGE_CANCEL ? kStudy : 0U);
+    write_all();
+  }
 }
 
 TEST_F(ServiceReuseTest, AServerThatStopsLeavesTheRestToTheNextOne) {

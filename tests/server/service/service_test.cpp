@@ -76,29 +76,6 @@ TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
   EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
 }
 
-TEST_F(ServiceTest, TheSameBlocksWrittenInAnotherWayAreTheSameStudy) {
-  submit("a");
-  ClientRequest written = submit_request("a");
-  auto& recipe = *written.mutable_submit()->mutable_recipe();
-  auto& H = *recipe.mutable_blocks(0)->mutable_axes(0);
-  ASSERT_EQ(H.values_size(), 1);
-  H = protocol::range("H", H.values(0), H.values(0), 1);
-  request(written);
-  EXPECT_FALSE(last_reply().submit().created());
-  EXPECT_EQ(last_reply().submit().study_id(), 1U);
-  recipe.mutable_model()->set_k_n_m(1e7);
-  request(written);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("model, k: stored 2.7e+07, given 1e+07"));
-}
-
-TEST_F(ServiceTest, TwoWhoSubmitTheSameBeforeItIsStoredAreBothAnswered) {
-  request(submit_request("a"));
-  submit("a");
-  ASSERT_EQ(ports_.replies.size(), 2U);
-  EXPECT_TRUE(ports_.replies[0].submit().created());
-  EXPECT_FALSE(ports_.replies[1].submit().created());
-}
-
 TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
   request(submit_request(""));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("1 to 100 bytes"));
@@ -108,6 +85,10 @@ TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
   bad.mutable_submit()->mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(0, 1.5);
   request(bad);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
+  bad = submit_request("a");
+  bad.mutable_submit()->set_priority(100'000);
+  request(bad);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("priority = 100000"));
   bad = submit_request("a");
   bad.mutable_submit()->mutable_recipe()->clear_model();
   request(bad);
@@ -131,20 +112,13 @@ TEST_F(ServiceTest, CancellingIsAcknowledgedOnceItIsStoredAndSubmittingAgainGoes
   EXPECT_THAT(last_reply().error().message(), HasSubstr("no study called \"b\""));
 }
 
-TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndToldTheDatabase) {
+TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
+  credit(1);
+  EXPECT_TRUE(last_message().has_hello_again()) << "a stranger";
   hello();
   EXPECT_EQ(last_message().welcome().worker_id(), 1U);
   EXPECT_EQ(last_message().welcome().database_id(), "db");
   EXPECT_EQ(last_message().welcome().lost_after_ms(), 2800U);
-}
-
-TEST_F(ServiceTest, AnUnknownWorkerIsAskedToSayHelloAgain) {
-  credit(1);
-  EXPECT_TRUE(last_message().has_hello_again());
-}
-
-TEST_F(ServiceTest, AHeartbeatIsAnswered) {
-  hello();
   WorkerMessage message;
   message.mutable_heartbeat();
   worker_says(message);
@@ -183,40 +157,26 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
   EXPECT_EQ(std::get<SetStudyState>(ports_.jobs[0].change).state, StudyState::kDone);
 }
 
-TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
-  submit("a", 1);
+TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFailedPoint) {
+  submit("a", 3);
   hello();
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
-  auto result = solved(0);
-  result.set_reals(4, std::numeric_limits<double>::quiet_NaN());
-  *message.mutable_results()->add_results() = result;
-  write_all();
-  worker_says(message);
-  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
-  const auto& change = std::get<AddResults>(ports_.jobs[1].change);
-  EXPECT_THAT(change.results.at(0).error(), HasSubstr("duration_s"));
-}
-
-TEST_F(ServiceTest, AResultOfOtherValuesThanItsPointHasBecomesAFailedPoint) {
-  submit("a", 2);
-  hello();
-  WorkerMessage message;
-  message.mutable_results()->set_study_id(1);
-  auto result = solved(0);
-  result.set_h_m(std::nextafter(result.h_m(), 2.0));
-  *message.mutable_results()->add_results() = result;
-  result = solved(1);
-  result.set_h_m(1.001 * result.h_m());
-  *message.mutable_results()->add_results() = result;
-  write_all();
+  for (std::uint64_t point = 0; point < 3; ++point) {
+    *message.mutable_results()->add_results() = solved(point);
+  }
+  auto& results = *message.mutable_results()->mutable_results();
+  results.at(0).set_h_m(std::nextafter(results.at(0).h_m(), 2.0));
+  results.at(1).set_h_m(1.001 * results.at(1).h_m());
+  results.at(2).set_reals(4, std::numeric_limits<double>::quiet_NaN());
   worker_says(message);
   ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
   const auto& change = std::get<AddResults>(ports_.jobs[1].change);
   EXPECT_EQ(change.results.at(0).error(), "") << "another machine may round otherwise";
   EXPECT_THAT(change.results.at(1).error(), HasSubstr("H = 1.00"));
+  EXPECT_THAT(change.results.at(2).error(), HasSubstr("duration_s"));
   write_all();
-  EXPECT_EQ(service_->scheduler().study(1).failed, 1U);
+  EXPECT_EQ(service_->scheduler().study(1).failed, 2U);
 }
 
 TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
@@ -233,15 +193,6 @@ TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
   *message.mutable_results()->mutable_results(0) = solved(0);
   worker_says(message);
   EXPECT_TRUE(service_->scheduler().worker(1, now_.steady_ms).is_proven);
-}
-
-TEST_F(ServiceTest, AWorkerThatCannotBeReachedLosesItsBatchAtOnce) {
-  submit("a");
-  hello();
-  ports_.unreachable = "worker";
-  credit(1);
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
-  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
 }
 
 TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
@@ -295,13 +246,10 @@ TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
   worker_says(message);
   write_all();
   now_.steady_ms += 500;
-  ClientRequest status = client_request();
-  status.mutable_status()->set_study("a");
-  request(status);
-  ASSERT_EQ(last_reply().status().studies_size(), 1);
-  EXPECT_EQ(last_reply().status().studies(0).solved(), 100U);
-  EXPECT_DOUBLE_EQ(last_reply().status().studies(0).points_per_s(), 200.0);
-  EXPECT_EQ(last_reply().status().studies(0).created_at(), "2023-11-14T22:13:20.123Z");
+  const auto status = status_of("a");
+  EXPECT_EQ(status.solved(), 100U);
+  EXPECT_DOUBLE_EQ(status.points_per_s(), 200.0);
+  EXPECT_EQ(status.created_at(), "2023-11-14T22:13:20.123Z");
 }
 
 TEST_F(ServiceTest, AServerThatStopsTellsItsWorkersAndHandsOutNothing) {

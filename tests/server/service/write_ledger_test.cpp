@@ -7,7 +7,7 @@ namespace {
 
 class WriteLedgerTest : public testing::Test {
  protected:
-  static LedgerLimits small() { return {.bytes = 200, .writes = 24, .changes = 2}; }
+  static LedgerLimits small() { return {.bytes = 200, .writes = 24}; }
 
   /// A results message of so many bytes.
   void write_results(std::size_t bytes) {
@@ -49,18 +49,6 @@ TEST_F(WriteLedgerTest, EachWriteHasOneOutcome) {
   EXPECT_TRUE(ledger_.is_empty());
 }
 
-TEST_F(WriteLedgerTest, ChangesOfClientsAreBoundedUntilSomeHaveAnOutcome) {
-  write_results(0);
-  write_change();
-  EXPECT_FALSE(ledger_.takes_no_change());
-  write_change();
-  EXPECT_TRUE(ledger_.takes_no_change());
-  store_first();
-  EXPECT_TRUE(ledger_.takes_no_change()) << "results are no changes";
-  store_first();
-  EXPECT_FALSE(ledger_.takes_no_change());
-}
-
 TEST_F(WriteLedgerTest, BatchesAreHeldFromAQuarterOfTheBytesUntilHalfOfThatIsStored) {
   for (const std::size_t bytes : {20U, 10U, 19U}) {
     write_results(bytes);
@@ -99,12 +87,15 @@ TEST_F(WriteLedgerTest, BatchesAreHeldDuringAFaultAndAfterItWhileTheDiskIsBehind
   EXPECT_FALSE(ledger_.holds_batches());
 }
 
-TEST_F(WriteLedgerTest, WorkersAreReadUntilTheBytesOrWritesAreTooMany) {
+TEST_F(WriteLedgerTest, MessagesAreTakenUntilTheBytesOrWritesAreTooMany) {
   write_results(199);
   EXPECT_TRUE(ledger_.has_room());
   write_results(1);
   EXPECT_FALSE(ledger_.has_room());
   store_first();
+  store_first();
+  ledger_.write(AddStudy{1, "a", StudyTable(std::string(200, 'x'), 1), ""});
+  EXPECT_FALSE(ledger_.has_room()) << "recipes count, too";
   store_first();
   for (int i = 0; i < 24; ++i) {
     EXPECT_TRUE(ledger_.has_room());
