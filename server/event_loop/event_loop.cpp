@@ -104,7 +104,7 @@ EventLoop::EventLoop(LoopSettings settings)
   service.clients.access = name_of(doors_.access());
   service.last_study_id = store_.last_study_id();
   service.last_worker_id = store_.last_worker_id();
-  // Above every number that an earlier run can have given, whatever the clock says.
+  // Above every number of an earlier run, whatever the clock shows.
   service.scheduler.first_lease_id = store_.count_start() << 40U;
   Ports& ports = *this;
   service_.emplace(service, ports, store_.studies(), now());

@@ -40,7 +40,7 @@ struct LoopSettings {
   QueryPoolSettings queries;
   NetworkLimits network;
   std::optional<WebSettings> web;  ///< database and solver version are those of the server
-  /// When it is told to stop, it waits so long for results under way; 0: it ends at once.
+  /// On a request to stop, time to wait for results under way; 0: none.
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once as the loop ends.
   std::function<void(const LoopState&)> on_turn = [](const LoopState&) {};

@@ -381,8 +381,8 @@ void ClientHandler::tick(Instant now) {
   for (auto entry = pending_.begin(); entry != pending_.end();) {
     Pending& request = entry->second;
     bool is_there = true;
-    if (now.steady_ms >= request.next_word_ms) {
-      request.next_word_ms = now.steady_ms + settings_.still_working_every_ms;
+    if (now.steady_ms >= request.next_sign_ms) {
+      request.next_sign_ms = now.steady_ms + settings_.still_working_every_ms;
       const bool waits_for_client = request.sent == request.taken + kChunksAhead;
       is_there = waits_for_client || core_.ports.reply_still_working(request.client, request.runs);
     }

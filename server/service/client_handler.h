@@ -17,8 +17,8 @@
 namespace oblique::server {
 
 struct ClientHandlerSettings {
-  /// Interval at which a client hears that its request waits or runs. A failure to send that shows
-  /// that the client is gone.
+  /// Interval of the messages that a request waits or runs. A failure to send one shows that the
+  /// client is gone.
   std::int64_t still_working_every_ms = 1000;
   std::size_t largest_page = 1000;  ///< studies or workers in one reply
   std::string access = "loopback";  ///< as StatusReply.access
@@ -62,7 +62,7 @@ class ClientHandler {
   struct Pending {
     Client client;
     std::shared_ptr<const std::string> frame;  ///< of a long request; null: a query
-    std::int64_t next_word_ms;                 ///< when the client hears of it again
+    std::int64_t next_sign_ms;                 ///< when the client gets the next such message
     bool runs = false;
     std::uint64_t sent = 0;  ///< chunks of the answer
     std::uint64_t taken = 0;

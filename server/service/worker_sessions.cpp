@@ -250,7 +250,7 @@ void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerI
   input.results = std::move(message);
 }
 
-/// A sound worker says hello again and delivers what it has kept.
+/// Disconnects the worker. A sound one joins again and delivers the results that it has kept.
 void WorkerSessions::give_up(WorkerId worker, const std::string& why, WorkerInput& input) {
   bad_frames_.count("a worker");
   protocol::ServerToWorker again;
@@ -286,12 +286,12 @@ void WorkerSessions::tick(const Silence& silent_ms, Instant now) {
     }
     const bool is_silent = silent_ms(id) > late_ms;
     if (is_silent || now.steady_ms - worker.last_sent_ms > late_ms) {
-      // A connection that is gone, as that of a killed process, shows long before the silence
-      // would. And a worker whose messages wait here must hear something too.
+      // Sending shows at once that the connection of a killed process is gone. And a worker whose
+      // messages wait here must get a sign of life.
       send(id, sign);
     }
     if (is_silent && (!ledger_.has_room() || ports_.has_unheard(worker.identity))) {
-      events_.emplace_back(CreditGiven{id, 0});  // it is not silent: it is not heard
+      events_.emplace_back(CreditGiven{id, 0});  // it is not silent: its messages are not read
     }
     if (worker.is_busy && !ports_.is_busy(worker.identity)) {
       worker.is_busy = false;
