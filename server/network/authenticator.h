@@ -46,7 +46,6 @@ struct KeyIdentity {
   bool operator==(const KeyIdentity&) const = default;
 };
 
-using KeyHolder = KeyIdentity;  // the name that server/service uses
 
 using AuthResult = std::variant<std::shared_ptr<const KeyIdentity>, Refusal>;
 

@@ -100,24 +100,8 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
       "What waits to go out to all peers");
   add("handshakes", network.handshakes, 1, kMost, "Connections that have not said who they are");
   // Results on their way to the disk.
-  LedgerLimits& ledger = service.ledger;
-  add("unstored-messages-of-worker", ledger.most_messages_of_worker, 1, kMost,
-      "Results messages of one worker that wait for the disk");
-  add("unstored-bytes-of-worker", ledger.bytes_of_worker, 1, kMostBytes,
-      "Results of one worker that wait for the disk");
-  add("unstored-bytes", ledger.bytes, 1, kMostBytes, "Results that wait for the disk");
-  add("unstored-bytes-to-hold", ledger.bytes_to_hold, 1, kMostBytes,
-      "With so many no batch goes out");
-  add("unstored-messages-to-hold", ledger.messages_to_hold, 1, kMost,
-      "With so many no batch goes out");
-  add("unstored-changes", ledger.most_changes, 1, kMost, "Changes of clients that wait");
+  add("unstored-bytes", service.ledger.bytes, 1, kMostBytes, "Results that wait for the disk");
   // Requests of clients.
-  ClientsDeskSettings& clients = service.clients;
-  add("long-requests", clients.most_long_requests, 1, kMost, "Long requests that wait");
-  add("long-requests-of-client", clients.most_long_requests_of_one, 1, kMost,
-      "Long requests of one client that wait");
-  add("long-request-bytes", clients.most_long_bytes, kOneMessage, kMostBytes,
-      "Long requests that wait");
   add("running-queries", queries.readers, 1, 256, "Queries that run side by side");
   add("running-queries-of-client", queries.most_running_each, 1, 256,
       "Queries of one client that run side by side");
@@ -126,11 +110,9 @@ void add_limits(CLI::App& app, NetworkLimits& network, ServiceSettings& service,
       "Queries of one client that wait");
   add("waiting-query-bytes", queries.most_waiting_bytes, 1, kMostBytes,
       "Statements of queries that wait");
-  // Studies. The bounds of a key are of what was submitted with it.
+  // Studies.
   add("open-studies", service.bounds.studies, 1, kMostBytes, "Studies neither done nor cancelled");
-  add("open-points", service.bounds.points, 1, kMostPoints, "Points of these that are not settled");
-  add("open-studies-of-key", service.bounds.studies_of_key, 1, kMostBytes, "Open studies of a key");
-  add("open-points-of-key", service.bounds.points_of_key, 1, kMostPoints, "Open points of a key");
+  add("open-points", service.bounds.points, 1, kMostPoints, "Points of these studies");
   // Workers.
   add("credit", service.scheduler.max_credit, 1, 65'536, "Batches that a worker may ask for");
 }

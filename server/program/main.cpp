@@ -26,7 +26,7 @@
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
-#include "server/loop/loop.h"
+#include "server/event_loop/event_loop.h"
 #include "server/program/limits.h"
 #include "server/query/reader_program.h"
 #include "server/web/http_options.h"
@@ -37,15 +37,15 @@ namespace {
 using oblique::protocol::Configuration;
 using oblique::protocol::Notifier;
 using oblique::protocol::StopWithParent;
-using oblique::server::Loop;
+using oblique::server::EventLoop;
 using oblique::server::LoopSettings;
-using oblique::server::LoopTurn;
+using oblique::server::LoopState;
 
 constexpr const char* kProgram = "oblique-server";
 /// The last commit may take so long on a slow disk.
 constexpr std::chrono::seconds kLongestEnd{60};
 
-/// What people choose.
+/// The options of the command line.
 struct Options {
   LoopSettings loop;
   std::uint16_t worker_port = 7601;
@@ -75,36 +75,32 @@ std::string objection_to_descriptor(const std::string& text) {
              : "\"" + text + "\" is no open file descriptor";
 }
 
-/// Writes one line of JSON to the descriptor of --ready-fd.
-void tell_line(int fd, const nlohmann::json& told) {
-  const std::string line = told.dump(-1, ' ', true) + "\n";
+/// Writes the endpoints as one line of JSON to the descriptor of --ready-fd.
+void write_endpoints(int fd, const EventLoop& loop) {
+  nlohmann::json endpoints{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
+  if (!loop.http_url().empty()) {
+    endpoints["http"] = loop.http_url();
+    endpoints["page"] = loop.page_url();
+  }
+  const std::string line = endpoints.dump(-1, ' ', true) + "\n";
   if (::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
     throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
                              std::string(std::strerror(errno)));
   }
-}
-
-void tell_ready(int fd, const Loop& loop) {
-  nlohmann::json ends{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
-  if (!loop.http_url().empty()) {
-    ends["http"] = loop.http_url();
-    ends["page"] = loop.page_url();
-  }
-  tell_line(fd, ends);
   ::close(fd);
 }
 
-/// Tells the service manager how the loop is.
-void tell_turn(Notifier& notifier, const LoopTurn& turn, std::chrono::milliseconds drain) {
-  switch (turn.stage) {
-    case LoopTurn::Stage::kRuns:
-      notifier.status(fmt::format("{} workers", turn.workers));
+/// Reports the state of the loop to the service manager.
+void notify(Notifier& notifier, const LoopState& state, std::chrono::milliseconds drain) {
+  switch (state.stage) {
+    case LoopState::Stage::kRuns:
+      notifier.status(fmt::format("{} workers", state.workers));
       break;
-    case LoopTurn::Stage::kDrains:
-      notifier.stopping(fmt::format("draining: {} batches are with workers", turn.leases),
+    case LoopState::Stage::kDrains:
+      notifier.stopping(fmt::format("draining: {} batches are with workers", state.leases),
                         drain + kLongestEnd);
       break;
-    case LoopTurn::Stage::kEnds:
+    case LoopState::Stage::kEnds:
       notifier.stopping("stopping", kLongestEnd);
       break;
   }
@@ -120,15 +116,15 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
     return oblique::protocol::kDone;
   }
   take_all_descriptors();
-  settings.on_turn = [&notifier, drain = settings.drain](const LoopTurn& turn) {
-    tell_turn(notifier, turn, drain);
+  settings.on_turn = [&notifier, drain = settings.drain](const LoopState& state) {
+    notify(notifier, state, drain);
   };
-  Loop loop(settings);
+  EventLoop loop(settings);
   spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint(),
                loop.http_url().empty() ? "no address" : loop.http_url() + "/metrics");
   if (ready_fd >= 0) {
-    tell_ready(ready_fd, loop);
+    write_endpoints(ready_fd, loop);
   }
   if (!loop.page_url().empty() && ::isatty(STDERR_FILENO) == 1) {
     // Not in the log: whoever has it may change studies.
@@ -166,8 +162,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->check(port);
   app.add_option("--ready-fd", options.ready_fd,
                  "File descriptor that gets one line of JSON with both endpoints "
-                 "once the server can be used, and before it a line with a notice "
-                 "for each step of a start that takes long; -1: none")
+                 "once the server can be used; -1: none")
       ->check(objection_to_descriptor)
       ->configurable(false);
   options.http.add_to(app);
@@ -178,7 +173,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->configurable(false);
   constexpr double kLongestDrain_s = 1e6;
   app.add_option("--drain", options.drain_s,
-                 "When told to stop, wait so long for results under way; 0: end at once")
+                 "Time to wait for running batches on shutdown; 0: stop at once")
       ->type_name("SECONDS")
       ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
   parent.add_to(app);
@@ -186,7 +181,8 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
   add_limits(app, loop.network, loop.service, loop.queries.queue);
 }
 
-/// The exit code when there is nothing to run, or it is told what is wrong with the options.
+/// Completes the options. Returns the exit code if the server is not to run: the options are wrong,
+/// which is printed, or only to be printed.
 std::optional<int> finish_options(const CLI::App& app, const Configuration& configuration,
                                   Options& options) {
   LoopSettings& loop = options.loop;

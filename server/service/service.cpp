@@ -1,6 +1,7 @@
 #include "server/service/service.h"
 
 #include <utility>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -10,6 +11,13 @@
 namespace oblique::server {
 namespace {
 
+template <typename... Kinds>
+struct Overloaded : Kinds... {
+  using Kinds::operator()...;
+};
+template <typename... Kinds>
+Overloaded(Kinds...) -> Overloaded<Kinds...>;
+
 SchedulerSettings scheduler_settings(const ServiceSettings& settings) {
   SchedulerSettings scheduler = settings.scheduler;
   scheduler.solver_version = settings.solver_version;
@@ -18,76 +26,88 @@ SchedulerSettings scheduler_settings(const ServiceSettings& settings) {
 
 }  // namespace
 
-Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<StoredStudy> studies,
+Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<StoredStudy> studies,
                  Instant now)
-    : outbox_(outbox),
+    : ports_(ports),
       scheduler_(scheduler_settings(settings)),
-      ledger_(settings.ledger, outbox),
-      known_(settings.solver_version),
-      bad_frames_(outbox),
+      ledger_(settings.ledger, ports),
+      reuse_(
+          settings.solver_version, ports, states_, ledger_,
+          [this](const Event& event, Instant then) { feed(event, then); },
+          [this](StudyId id, Instant then) {
+            rates_.forget(id);  // the reused points were not solved
+            changes_.release_replies(then);
+          }),
+      bad_frames_(ports),
       workers_({settings.heartbeat_interval_ms, settings.scheduler.lost_after_ms,
                 settings.solver_version, settings.database_id, settings.last_worker_id,
                 settings.clients.access == "insecure"},
-               outbox, outbox, bad_frames_, ledger_),
-      open_(settings.bounds),
-      changes_(settings.last_study_id, states_, ledger_,
-               {scheduler_, states_, ledger_, rates_, known_}, known_, open_, outbox, outbox),
-      traces_(settings.traces, settings.solver_version, outbox, outbox,
+               ports, bad_frames_, ledger_),
+      core_{
+          ports,   scheduler_,    states_,
+          ledger_, reuse_,        workers_,
+          rates_,  worker_rates_, [this](const Event& event, Instant then) { feed(event, then); }},
+      changes_(settings.last_study_id, settings.bounds, core_),
+      traces_(settings.traces, settings.solver_version, ports,
               settings.clients.still_working_every_ms),
-      clients_(settings.clients, {outbox,
-                                  outbox,
-                                  bad_frames_,
-                                  changes_,
-                                  workers_,
-                                  {scheduler_, states_, ledger_, rates_, known_},
-                                  open_,
-                                  outbox,
-                                  worker_rates_,
-                                  traces_}) {
+      clients_(settings.clients, core_, bad_frames_, changes_, traces_) {
   for (StoredStudy& study : studies) {
-    states_.restore(study, now.steady_ms);
-    if (!study.completed.empty()) {
-      known_.note_source(study.study_id);
-    }
-    known_.restore(study.study_id, study.reused);
-    const std::string& name = states_.record(study.study_id).name;
-    const bool waits = !settings.only_study.empty() && name != settings.only_study;
-    const bool seeks = study.reuses && !waits;
-    feed(StudyAdded{study.study_id, study.table, std::move(study.completed), study.failures.size(),
-                    study.state == StudyState::kCancelled,
-                    study.state == StudyState::kPaused || waits, study.priority,
-                    study.solver_version, std::move(study.attempts), seeks, study.left_out},
-         now);
-    if (seeks) {  // it was not at its end when the server ended
-      begin_reuse(study.study_id, now);
-    }
-    changes_.recount(study.study_id);
+    restore(std::move(study), settings.only_study, now);
   }
 }
 
-// ---- Messages, time ---------------------------------------------------------------------------
+void Service::restore(StoredStudy study, const std::string& only_study, Instant now) {
+  const StudyId id = study.study_id;
+  states_.restore(study, now.steady_ms);
+  if (!study.completed.empty()) {
+    reuse_.add_source(id);
+  }
+  reuse_.restore(id, study.reused);
+  const bool is_excluded = !only_study.empty() && study.name != only_study;
+  const bool looks_up = study.reuses && !is_excluded;  // the lookup had not ended
+  feed(StudyAdded{id, study.table, std::move(study.completed), study.failures.size(),
+                  study.state == StudyState::kCancelled,
+                  study.state == StudyState::kPaused || is_excluded, study.priority,
+                  study.solver_version, std::move(study.attempts), looks_up, study.left_out},
+       now);
+  if (looks_up) {
+    reuse_.begin(id, now);
+  }
+}
+
+// ---- Messages, time ----------------------------------------------------------------------------
 
 void Service::worker_frame(const std::string& identity, std::string_view frame, Instant now,
-                           const std::shared_ptr<const KeyHolder>& holder) {
-  Heard heard =
-      workers_.take(identity, frame, now, holder == nullptr ? std::string() : holder->name);
-  for (Event& event : heard.events) {
+                           const std::shared_ptr<const KeyIdentity>& holder) {
+  WorkerInput input =
+      workers_.frame(identity, frame, now, holder == nullptr ? std::string() : holder->name);
+  for (Event& event : input.events) {
     if (auto* received = std::get_if<ResultsReceived>(&event)) {
-      judge_inputs(*received, heard.results);
+      fail_wrong_inputs(*received, input.results);
     }
-    handle(event, {now, &heard.results});
+    handle(event, now, &input.results);
   }
-  if (heard.trace_of != 0) {
-    traces_.part(heard.trace_of, heard.trace_part);
+  if (input.trace_of != 0) {
+    traces_.part(input.trace_of, input.trace_part);
   }
-  handle_found(now);
-  hand_out_or_hold(now);
+  handle_worker_events(now);
+  hold_or_release_batches(now);
   send_traces();
 }
 
 void Service::client_frame(const std::string& identity, std::string_view frame, Instant now,
-                           const std::shared_ptr<const KeyHolder>& holder) {
-  clients_.take(identity, frame, now, holder);
+                           const std::shared_ptr<const KeyIdentity>& holder) {
+  clients_.frame(identity, frame, now, holder);
+  send_traces();
+}
+
+void Service::client_left(std::string_view identity) {
+  clients_.client_left(identity);
+  send_traces();
+}
+
+void Service::check_done(const Ports::Completion& completion, Instant now) {
+  completion(now);
   send_traces();
 }
 
@@ -98,8 +118,8 @@ void Service::tick(Instant now) {
   clients_.tick(now);
   send_traces();
   changes_.release_replies(now);
-  rates_.sample([this](StudyId id) { return settled_of(id); }, now.steady_ms);
-  // One that is gone comes to rest at 0.
+  rates_.sample([this](StudyId id) { return completed_of(id); }, now.steady_ms);
+  // The count of a worker that is gone stays at 0.
   worker_rates_.sample(
       [this](WorkerId id) {
         return scheduler_.knows_worker(id) ? scheduler_.solved_points(id) : 0;
@@ -109,46 +129,76 @@ void Service::tick(Instant now) {
 
 void Service::drain(Instant now) {
   draining_ = true;
-  hand_out_or_hold(now);
+  reuse_.stop_all();
+  hold_or_release_batches(now);
   workers_.stop();
   clients_.drain();
 }
 
 void Service::stop(Instant now) {
   stopping_ = true;
-  hand_out_or_hold(now);
+  reuse_.stop_all();
+  hold_or_release_batches(now);
   workers_.stop();
   clients_.stop();
   send_traces();
 }
 
 double Service::points_per_s(std::int64_t now_ms) const {
-  return rates_.points_per_s([this](StudyId id) { return settled_of(id); }, now_ms);
+  return rates_.points_per_s([this](StudyId id) { return completed_of(id); }, now_ms);
 }
 
-bool Service::has_room_for(std::string_view worker) const {
-  const auto known = workers_.find(worker);
-  return !known || ledger_.has_room_for(*known);
+protocol::StudyStatus Service::study_status(StudyId id, Instant now) const {
+  return server::study_status(id, core_, now);
 }
 
-// ---- The scheduler ----------------------------------------------------------------------------
+std::vector<protocol::WorkerStatus> Service::worker_statuses(std::size_t most, Instant now) const {
+  std::vector<protocol::WorkerStatus> statuses;
+  for (auto id = workers_.next_after(0); id && statuses.size() < most;
+       id = workers_.next_after(*id)) {
+    statuses.push_back(worker_status(*id, core_, now));
+  }
+  return statuses;
+}
+
+// ---- The scheduler -----------------------------------------------------------------------------
 
 void Service::feed(const Event& event, Instant now) {
-  handle(event, {now});
-  handle_found(now);
+  handle(event, now);
+  handle_worker_events(now);
 }
 
-void Service::handle(const Event& event, Turn turn) {
-  for (const Effect& effect : scheduler_.handle(event, turn.now.steady_ms)) {
-    std::visit([&](const auto& kind) { perform(kind, turn); }, effect);
+void Service::handle(const Event& event, Instant now, protocol::Results* results) {
+  const Overloaded perform{[&](const DefineStudy& effect) {
+                             workers_.define(effect,
+                                             states_.record(effect.study).table.recipe_bytes());
+                           },
+                           [&](const StoreResults& effect) { store(effect, *results, now); },
+                           [&](const StoreFailure& effect) { store(effect, now); },
+                           [&](const DropWorker& effect) {
+                             traces_.left(effect.worker);
+                             workers_.drop(effect, now);
+                           },
+                           [&](const StudyFinished& effect) { changes_.finish(effect.study, now); },
+                           [&](const auto& message) { workers_.send(message); }};
+  for (const Effect& effect : scheduler_.handle(event, now.steady_ms)) {
+    std::visit(perform, effect);
   }
-  tell_traces(event);
+  update_traces(event);
 }
 
-/// Results with other inputs than their points have are failures, before a worker counts as one
-/// that solves points.
-void Service::judge_inputs(ResultsReceived& event, protocol::Results& message) const {
-  // Of a study without open points nothing is stored, and no table is made for that.
+/// The events that were found while messages were sent to workers.
+void Service::handle_worker_events(Instant now) {
+  for (auto events = workers_.take_events(); !events.empty(); events = workers_.take_events()) {
+    for (const Event& event : events) {
+      handle(event, now);
+    }
+  }
+}
+
+/// Results whose inputs are not those of their points become failures.
+void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
+  // Of a study without open points nothing is stored, and its table need not be made.
   if (!states_.contains(event.study) || !scheduler_.knows_study(event.study) ||
       scheduler_.points(event.study).open() == 0) {
     return;
@@ -166,8 +216,8 @@ void Service::judge_inputs(ResultsReceived& event, protocol::Results& message) c
   }
 }
 
-/// Those who solve traces are the workers.
-void Service::tell_traces(const Event& event) {
+/// Workers solve traces, too.
+void Service::update_traces(const Event& event) {
   if (const auto* joined = std::get_if<WorkerJoined>(&event)) {
     if (const WorkerRecord* worker = workers_.find(joined->worker)) {
       traces_.joined(joined->worker, worker->name, worker->solver_version, worker->instruction_set);
@@ -179,252 +229,115 @@ void Service::tell_traces(const Event& event) {
   }
 }
 
-/// What came to light while messages went out to workers.
-void Service::handle_found(Instant now) {
-  for (auto found = workers_.take_found(); !found.empty(); found = workers_.take_found()) {
-    for (const Event& event : found) {
-      handle(event, {now});
-    }
-  }
-}
-
-void Service::hand_out_or_hold(Instant now) {
+void Service::hold_or_release_batches(Instant now) {
   const bool holds = stopping_ || draining_ || ledger_.holds_batches();
   if (std::exchange(holds_batches_, holds) != holds) {
     feed(DispatchHeld{holds}, now);
   }
 }
 
-std::uint64_t Service::settled_of(StudyId id) const {
-  return scheduler_.points(id).settled;
-}
+// ---- The database ------------------------------------------------------------------------------
 
-void Service::perform(const DefineStudy& effect, Turn /*turn*/) {
-  workers_.define(effect, states_.record(effect.study).table.recipe_bytes());
-}
-
-void Service::perform(const SendBatch& effect, Turn /*turn*/) {
-  workers_.send(effect);
-}
-
-void Service::perform(const SendProbe& effect, Turn /*turn*/) {
-  workers_.send(effect);
-}
-
-void Service::perform(const AcknowledgeResults& effect, Turn /*turn*/) {
-  workers_.send(effect);
-}
-
-void Service::perform(const WithdrawStudy& effect, Turn /*turn*/) {
-  workers_.send(effect);
-}
-
-void Service::perform(const ReleaseBatch& effect, Turn /*turn*/) {
-  workers_.send(effect);
-}
-
-void Service::perform(const DropWorker& effect, Turn turn) {
-  traces_.left(effect.worker);
-  workers_.drop(effect, turn.now);
-}
-
-void Service::perform(const StoreResults& effect, Turn turn) {
+void Service::store(const StoreResults& effect, protocol::Results& message, Instant now) {
   const WorkerRecord& worker = *workers_.find(effect.worker);
-  protocol::Results& message = *turn.results;
-  const std::size_t bytes = message.ByteSizeLong();
   const bool has_rows = !effect.accepted.empty() && states_.contains(effect.study);
   if (has_rows && workers_.needs_row(effect.worker)) {
-    // Whoever only comes and goes leaves no row.
+    // A worker that only comes and goes gets no row.
     ledger_.write(AddWorker{effect.worker, worker.name, worker.threads, worker.solver_version,
-                            worker.instruction_set, worker.joined_at},
-                  QuietWrite{});
+                            worker.instruction_set, worker.joined_at});
   }
   AddResults change{
       effect.study,           has_rows ? states_.record(effect.study).table.get() : nullptr,
       effect.worker,          worker.solver_version,
       worker.instruction_set, message.attempt(),
-      iso_8601(turn.now),     {},
-      effect.left_out};
-  ResultsWrite write{{effect.worker, effect.study, effect.sequence, {}, effect.left_out},
-                     message.attempt(),
-                     bytes};
+      iso_8601(now),          {},
+      effect.left_out,        message.ByteSizeLong()};
+  ResultsStored event{effect.worker, effect.study, effect.sequence, {}, effect.left_out};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
-    write.event.outcomes.push_back({result.point(), !result.error().empty()});
+    event.outcomes.push_back({result.point(), !result.error().empty()});
     change.results.push_back(std::move(result));
   }
-  ledger_.write(std::move(change), std::move(write));
+  write_results(std::move(change), std::move(event));
 }
 
-void Service::perform(const StoreFailure& effect, Turn turn) {
+void Service::store(const StoreFailure& effect, Instant now) {
   const StudyRecord& study = states_.record(effect.study);
-  outbox_.note(Severity::kWarning, fmt::format("point {} of study {} failed: {}", effect.point,
-                                               study.name, effect.reason));
-  AddResults change{effect.study,
-                    study.table.get(),
-                    0,
-                    {},
-                    {},
-                    effect.attempt,
-                    iso_8601(turn.now),
-                    {protocol::failed_point(effect.point, effect.reason)}};
-  ledger_.write(std::move(change),
-                ResultsWrite{{0, effect.study, 0, {{effect.point, true}}, {}}, effect.attempt, 0});
+  ports_.log(Severity::kWarning, fmt::format("point {} of study {} failed: {}", effect.point,
+                                             study.name, effect.reason));
+  write_results({effect.study,
+                 study.table.get(),
+                 0,
+                 {},
+                 {},
+                 effect.attempt,
+                 iso_8601(now),
+                 {protocol::failed_point(effect.point, effect.reason)}},
+                {0, effect.study, 0, {{effect.point, true}}, {}});
 }
 
-void Service::perform(const StudyFinished& effect, Turn turn) {
-  if (changes_.puts_off_end(effect.study)) {
-    return;  // further points of it are on their way to the disk
-  }
-  if (states_.finish(effect.study)) {
-    open_.close(effect.study);
-    outbox_.note(Severity::kInfo,
-                 fmt::format("study {} is done", states_.record(effect.study).name));
-    ledger_.write(SetStudyState{effect.study, StudyState::kDone, iso_8601(turn.now)}, QuietWrite{});
-  }
+void Service::write_results(AddResults change, ResultsStored event) {
+  const std::uint32_t attempt = change.attempt;
+  ledger_.write(std::move(change), [this, event = std::move(event), attempt](Instant now) {
+    results_stored(event, attempt, now);
+  });
 }
 
-// ---- The database -----------------------------------------------------------------------------
-
-void Service::written(const WriteReport& report, Instant now) {
-  switch (report.kind) {
-    case WriteReport::Kind::kFault:
-      outbox_.note(Severity::kError, "results wait, nothing is handed out: " + report.error);
-      ledger_.note_fault(report.error);
-      break;
-    case WriteReport::Kind::kRecovered:
-      outbox_.note(Severity::kInfo, "the database takes results again");
-      ledger_.note_recovery();
-      break;
-    case WriteReport::Kind::kGone:
-      lose_storage(report.error, now);
-      break;
-    case WriteReport::Kind::kUnmerged:
-      outbox_.note(Severity::kWarning,
-                   fmt::format("the write-ahead log, the file beside the database that ends in "
-                               "-wal, is not yet merged into it: {}. Until then a copy needs both "
-                               "files; `oblique backup` makes one that is whole",
-                               report.error));
-      break;
-    case WriteReport::Kind::kStored:
-      if (const auto meaning = ledger_.settle(report.ticket)) {
-        std::visit([&](const auto& write) { stored(write, now); }, *meaning);
-      }
-      break;
-    case WriteReport::Kind::kRefused:
-      if (const auto meaning = ledger_.settle(report.ticket)) {
-        std::visit([&](const auto& write) { refused(write, report.error, now); }, *meaning);
-      }
-      break;
-  }
-  hand_out_or_hold(now);
-}
-
-/// Nobody is told that something is stored from here on.
-void Service::lose_storage(const std::string& error, Instant now) {
-  outbox_.note(Severity::kError, error);
-  for (const Meaning& meaning : ledger_.abandon(error)) {
-    std::visit([&](const auto& write) { refused(write, error, now); }, meaning);
-  }
-  workers_.notice(error);
-  stop(now);
-}
-
-void Service::stored(const ResultsWrite& write, Instant now) {
-  const StudyId id = write.event.study;
+void Service::results_stored(const ResultsStored& event, std::uint32_t attempt, Instant now) {
+  const StudyId id = event.study;
   if (!states_.contains(id)) {
-    feed(write.event, now);  // it was deleted meanwhile, and the database dropped these
+    feed(event, now);  // the study was deleted, and the database dropped these
     return;
   }
-  for (const PointOutcome& outcome : write.event.outcomes) {
+  for (const PointOutcome& outcome : event.outcomes) {
     if (outcome.failed) {
-      states_.point_failed(id, outcome.point, write.attempt);
+      states_.point_failed(id, outcome.point, attempt);
     }
     ++(outcome.failed ? stored_points_.failed : stored_points_.solved);
   }
-  const bool settles = !write.event.outcomes.empty() || !write.event.left_out.empty();
-  if (settles) {
-    rates_.note(id, settled_of(id), states_.record(id).since_ms, now.steady_ms);
+  if (!event.outcomes.empty() || !event.left_out.empty()) {
+    rates_.begin(id, completed_of(id), states_.record(id).since_ms, now.steady_ms);
   }
-  const WorkerId worker = write.event.worker;
-  if (scheduler_.knows_worker(worker) && !worker_rates_.knows(worker)) {
-    worker_rates_.note(worker, scheduler_.solved_points(worker), 0, now.steady_ms);
+  if (!event.outcomes.empty()) {
+    reuse_.add_source(id);
   }
-  feed(write.event, now);
-  if (!write.event.outcomes.empty()) {
-    known_.note_source(id);
+  if (scheduler_.knows_worker(event.worker)) {
+    worker_rates_.begin(event.worker, scheduler_.solved_points(event.worker), 0, now.steady_ms);
   }
-  if (settles) {
-    open_.set_points(id, scheduler_.study(id).points - settled_of(id));
+  feed(event, now);
+}
+
+void Service::written(const WriteReport& report, Instant now) {
+  switch (report.kind) {
+    case WriteReport::Kind::kStored:
+      ledger_.stored(report.ticket, now);
+      break;
+    case WriteReport::Kind::kRefused:
+      ledger_.refused(report.ticket, report.error, now);
+      break;
+    case WriteReport::Kind::kFault:
+      ports_.log(Severity::kError, "results wait, nothing is handed out: " + report.error);
+      ledger_.set_fault(report.error);
+      break;
+    case WriteReport::Kind::kRecovered:
+      ports_.log(Severity::kInfo, "the database takes results again");
+      ledger_.set_fault({});
+      break;
+    case WriteReport::Kind::kGone:
+      ports_.log(Severity::kError, report.error);
+      ledger_.abandon(report.error, now);
+      workers_.notify_all(report.error);
+      stop(now);
+      break;
+    case WriteReport::Kind::kUnmerged:
+      ports_.log(Severity::kWarning,
+                 fmt::format("the write-ahead log, the file beside the database that ends in -wal, "
+                             "is not yet merged into it: {}. Until then a copy needs both files; "
+                             "`oblique backup` makes one that is whole",
+                             report.error));
+      break;
   }
-}
-
-void Service::stored(const StateWrite& write, Instant now) {
-  feed(changes_.stored(write, now), now);
-  if (write.state == StudyState::kCancelled) {
-    known_.stop(write.study);
-  }
-  changes_.answer(write, now);
-}
-
-void Service::stored(const PriorityWrite& write, Instant now) {
-  feed(changes_.stored(write, now), now);
-  changes_.answer(write, now);
-}
-
-void Service::stored(const FailuresWrite& write, Instant now) {
-  rates_.forget(write.study);  // fewer points are settled now: no rate can be had of that
-  feed(changes_.stored(write, now), now);
-  changes_.answer(write, now);
-}
-
-void Service::stored(const NameWrite& write, Instant now) {
-  changes_.stored(write);
-  changes_.answer(write, now);
-}
-
-void Service::stored(const RemovalWrite& write, Instant now) {
-  rates_.forget(write.study);
-  feed(changes_.stored(write, now), now);
-  changes_.answer(write, now);
-}
-
-void Service::stored(const QuietWrite& /*write*/, Instant /*now*/) {}
-
-/// The writer keeps these until it can write them; when the database is gone, workers keep results.
-void Service::refused(const ResultsWrite& /*write*/, const std::string& /*error*/,
-                      Instant /*now*/) {}
-void Service::refused(const QuietWrite& /*write*/, const std::string& /*error*/, Instant /*now*/) {}
-
-void Service::refused(const StudyWrite& write, const std::string& error, Instant now) {
-  changes_.refused(write, error, now);
-}
-
-void Service::refused(const StateWrite& write, const std::string& error, Instant /*now*/) {
-  changes_.refused(write, error);
-}
-
-void Service::refused(const PriorityWrite& write, const std::string& error, Instant now) {
-  changes_.refused(write, error, now);
-}
-
-void Service::refused(const FailuresWrite& write, const std::string& error, Instant /*now*/) {
-  changes_.refused(write, error);
-}
-
-void Service::refused(const GrowthWrite& write, const std::string& error, Instant now) {
-  changes_.refused(write, error, now);
-  if (changes_.takes_end(write.study)) {
-    perform(StudyFinished{write.study}, {now});
-  }
-}
-
-void Service::refused(const NameWrite& write, const std::string& error, Instant now) {
-  changes_.refused(write, error, now);
-}
-
-void Service::refused(const RemovalWrite& write, const std::string& error, Instant now) {
-  changes_.refused(write, error, now);
+  hold_or_release_batches(now);
 }
 
 }  // namespace oblique::server

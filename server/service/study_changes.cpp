@@ -1,345 +1,515 @@
 #include "server/service/study_changes.h"
 
+#include <algorithm>
+#include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frames.h"
+#include "proto/recipe/checks.h"
 #include "proto/recipe/written.h"
 #include "proto/text.h"
+#include "proto/wire/frame_scan.h"
+#include "server/study/recipe_growth.h"
 
 namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestShownName = 200;
-/// Of one study, for a change of it to be durable.
-constexpr std::size_t kMostWaiting = 1000;
+/// Requests for one study that wait for a change of it.
+constexpr std::size_t kMostDeferred = 1000;
+/// In place of the state of a study that was deleted.
+constexpr const char* kDeletedState = "deleted";
+
+std::string not_changed(const std::string& error) {
+  return "the change was not stored, the study is as before: " + error;
+}
 
 }  // namespace
 
 std::string unknown_study(const std::string& name, const StudyStates& states) {
   const std::string nearest = states.nearest(name);
-  if (!name.empty() && nearest == name) {  // who asked gave a number, too
+  const std::string shown = protocol::shortened(name, kLongestShownName);
+  if (!name.empty() && nearest == name) {  // the request had a number, too
     return fmt::format(
-        "the study that is called \"{}\" is another one than was asked for: `oblique "
-        "studies` lists all",
-        protocol::shortened(name, kLongestShownName));
+        "study name \"{}\" and study number do not match: `oblique studies` lists all", shown);
   }
-  return fmt::format("there is no study called \"{}\"{}: `oblique studies` lists all",
-                     protocol::shortened(name, kLongestShownName),
+  return fmt::format("there is no study called \"{}\"{}: `oblique studies` lists all", shown,
                      nearest.empty() ? "" : fmt::format(" (did you mean `{}`?)", nearest));
 }
 
-// ---- What is asked ----------------------------------------------------------------------------
+// ---- Reading -----------------------------------------------------------------------------------
+
+ReadRequest read_request(std::string_view frame, bool judges) {
+  // Padding cannot make much of a shorter frame.
+  constexpr std::size_t kScannedAbove = std::size_t{64} * 1024;
+  ReadRequest read;
+  read.is_readable = (frame.size() <= kScannedAbove || protocol::is_of_a_requests_shape(frame)) &&
+                     protocol::decode(frame, read.request);
+  read.request_id = read.is_readable ? read.request.request_id() : protocol::request_id_of(frame);
+  if (!read.is_readable || !read.request.has_submit()) {
+    return read;
+  }
+  try {
+    protocol::Recipe& recipe = *read.request.mutable_submit()->mutable_recipe();
+    protocol::check_size(recipe);
+    auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
+    read.needs_judging = table->needs_judging() && !judges;
+    if (judges) {
+      table->judge_points();
+    }
+    read.table = std::move(table);
+  } catch (const solver::InputError& error) {
+    read.objection = error.what();
+  }
+  read.request.mutable_submit()->clear_recipe();
+  return read;
+}
+
+// ---- Writing -----------------------------------------------------------------------------------
+
+void StudyChanges::write(StudyId id, Pending pending, Change change, OnStored on_stored,
+                         OnRefused on_refused) {
+  pending_.insert_or_assign(id, std::move(pending));
+  const auto end = [this, id](Instant now, const auto& act) {
+    const auto ended = pending_.extract(id);
+    act(ended.mapped());
+    for (const auto& request : ended.mapped().deferred) {
+      request(now);
+    }
+  };
+  core_.ledger.write(
+      std::move(change),
+      [end, on_stored = std::move(on_stored)](Instant now) {
+        end(now, [&](const Pending& ended) { on_stored(ended, now); });
+      },
+      [end, on_refused = std::move(on_refused)](const std::string& error, Instant now) {
+        end(now, [&](const Pending& ended) { on_refused(ended, error, now); });
+      });
+}
+
+void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored) {
+  write(id, {}, std::move(change), std::move(on_stored),
+        [this, client](const Pending&, const std::string& error, Instant) {
+          core_.ports.reply_error(client, not_changed(error));
+        });
+}
+
+/// Whether the request waits until the change of the study that is being written has an outcome. It
+/// is handled again then.
+bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(Instant)> request) {
+  const auto pending = pending_.find(id);
+  if (pending == pending_.end()) {
+    return false;
+  }
+  if (pending->second.deferred.size() >= kMostDeferred) {
+    core_.ports.reply_error(client, "too many changes of that study wait already: ask again later");
+  } else {
+    pending->second.deferred.push_back(std::move(request));
+  }
+  return true;
+}
+
+// ---- Submit ------------------------------------------------------------------------------------
 
 void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant now) {
   const protocol::SubmitRequest& request = read.request.submit();
-  if (const std::string reason = protocol::objection_to_study_name(request.name());
-      !reason.empty()) {
-    clients_.reply_error(client, reason);
-    return;
-  }
-  const auto known = states_.find(request.name());
+  const auto known = core_.states.find(request.name());
   const std::int32_t priority = request.has_priority() ? request.priority()
-                                : known                ? states_.record(*known).priority
+                                : known                ? core_.states.record(*known).priority
                                                        : 0;
-  if (const std::string reason = protocol::objection_to_priority(priority); !reason.empty()) {
-    clients_.reply_error(client, reason);
-    return;
-  }
-  if (!read.objection.empty()) {
-    clients_.reply_error(client, read.objection);
-    return;
+  for (const std::string& reason : {protocol::objection_to_study_name(request.name()),
+                                    protocol::objection_to_priority(priority), read.objection}) {
+    if (!reason.empty()) {
+      core_.ports.reply_error(client, reason);
+      return;
+    }
   }
   if (!known) {
     add(client, read, priority, now);
     return;
   }
-  if (const auto turn = turns_.find(*known); turn != turns_.end() &&
-                                             !turn->second.submitters.empty() &&
-                                             turn->second.grown.is_of_the_recipe_of(read.table)) {
-    turn->second.submitters.push_back(client);
+  const auto pending = pending_.find(*known);
+  if (pending != pending_.end() && !pending->second.submitters.empty() &&
+      pending->second.table.is_of_the_recipe_of(read.table)) {
+    pending->second.submitters.push_back(client);
     return;
   }
-  if (waits(client, *known, [this, client, read](Instant then) { submit(client, read, then); })) {
+  if (defers(client, *known, [this, client, read](Instant then) { submit(client, read, then); })) {
     return;
   }
-  const StudyRecord& study = states_.record(*known);
+  const StudyRecord& study = core_.states.record(*known);
   if (!study.table.is_of_the_recipe_of(read.table)) {
     grow(client, *known, read, priority, now);
-  } else if (states_.is_durable(*known) && study.priority != priority) {
-    turns_[*known];
-    ledger_.write(SetPriority{*known, priority}, PriorityWrite{*known, priority, client});
+  } else if (study.priority != priority) {
+    set_priority(client, *known, priority);
   } else {
-    go_on(client, *known, now);
+    resume_submitted(client, *known, now);
   }
-}
-
-/// The recipe is not that of the study: the study grows by what it has more, or it is refused.
-void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
-                        std::int32_t priority, Instant now) {
-  const StudyRecord& study = states_.record(id);
-  Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
-  bool has_more = false;
-  try {
-    growth = study.table.growth_to(read.table);
-    has_more = read.table.size() > study.table.size();
-  } catch (const std::runtime_error&) {
-    // Only another version can.
-  }
-  if (growth.kind != Growth::Kind::kLonger || !has_more) {
-    refuse_recipe(client, study.name, growth);
-    return;
-  }
-  if (!states_.is_durable(id)) {
-    turns_[id].later.emplace_back(
-        [this, client, read](Instant then) { submit(client, read, then); });
-    return;
-  }
-  const std::uint64_t appended = read.table.size() - study.table.size();
-  if (!may_open(client, id, study.submitted_by, open_points_of(id, sources_) + appended)) {
-    return;
-  }
-  const StudyView view = view_of(id, sources_, now);
-  const bool reuses =
-      !read.request.submit().no_reuse() && known_.should_seek(id, view.solver_version);
-  const GrowthWrite write{id, read.table, priority, study.table.size(), view.state, reuses};
-  Turn& turn = turns_[id];
-  turn.grown = read.table;
-  turn.submitters.push_back(client);
-  states_.change(id, StudyState::kRunning);
-  recount(id);
-  ledger_.write(GrowStudy{id, read.table, priority, iso_8601(now), reuses}, write);
-}
-
-void StudyChanges::refuse_recipe(const Client& client, const std::string& name,
-                                 const Growth& growth) {
-  const bool is_shorter = growth.kind == Growth::Kind::kShorter;
-  clients_.reply_error(
-      client, fmt::format("there is a study called \"{}\" with {}. A study may grow by blocks "
-                          "behind those that it has, and never change:\n{}\n"
-                          "Give this one another name, or use another database",
-                          name, is_shorter ? "more points" : "another recipe", growth.difference));
-}
-
-/// Whether the request waits until the change of the study that is on its way is durable or
-/// refused; it is asked again then.
-bool StudyChanges::waits(const Client& client, StudyId id, std::function<void(Instant)> later) {
-  const auto turn = turns_.find(id);
-  if (turn == turns_.end()) {
-    return false;
-  }
-  if (turn->second.later.size() >= kMostWaiting) {
-    clients_.reply_error(client, "too many changes of that study wait already: ask again later");
-  } else {
-    turn->second.later.push_back(std::move(later));
-  }
-  return true;
-}
-
-void StudyChanges::end_turn(StudyId id, Instant now) {
-  const auto turn = turns_.extract(id);
-  if (turn) {
-    for (const auto& later : turn.mapped().later) {
-      later(now);
-    }
-  }
-}
-
-bool StudyChanges::puts_off_end(StudyId id) {
-  const auto turn = turns_.find(id);
-  if (turn == turns_.end() || turn->second.submitters.empty()) {
-    return false;
-  }
-  turn->second.end_is_put_off = true;
-  return true;
-}
-
-bool StudyChanges::takes_end(StudyId id) {
-  return ends_put_off_.erase(id) != 0;
 }
 
 void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32_t priority,
                        Instant now) {
-  if (!may_open(client, last_study_id_ + 1, client.key(), read.table.size())) {
+  if (!may_open(client, 1, read.table.size())) {
     return;
   }
   const StudyId id = ++last_study_id_;
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
-  states_.add(id, {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
-  recount(id);
-  submitters_[id].push_back(client);
-  const bool reuses = !read.request.submit().no_reuse() && known_.should_seek(id, {});
-  ledger_.write(AddStudy{id, name, read.table, created_at, priority, client.key(), reuses},
-                StudyWrite{id, reuses});
-}
-
-/// Whether the study may have so many further points open; else the client is told why not.
-bool StudyChanges::may_open(const Client& client, StudyId id, const std::string& key,
-                            std::uint64_t points) {
-  const std::string objection = open_.objection_to(id, key, points);
-  if (objection.empty()) {
-    return true;
-  }
-  open_.count_refusal(client.key());
-  clients_.reply_error(client, objection);
-  return false;
-}
-
-/// The same of a study that is to get another state.
-bool StudyChanges::may_reopen(const Client& client, StudyId id, StudyState wanted) {
-  return wanted != StudyState::kRunning || states_.is_open(id) ||
-         may_open(client, id, states_.record(id).submitted_by, open_points_of(id, sources_));
-}
-
-void StudyChanges::recount(StudyId id) {
-  if (states_.contains(id) && states_.is_open(id)) {
-    open_.set(id, states_.record(id).submitted_by, open_points_of(id, sources_));
-  } else {
-    open_.close(id);
-  }
-}
-
-/// Submitted again.
-void StudyChanges::go_on(const Client& client, StudyId id, Instant now) {
-  if (!states_.is_durable(id)) {
-    submitters_[id].push_back(client);
-  } else if (states_.needs_write(id, StudyState::kRunning)) {
-    if (may_reopen(client, id, StudyState::kRunning)) {
-      set_state(client, id, StudyState::kRunning, true, now);
+  const bool reuses = !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, {});
+  core_.states.add(id,
+                   {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
+  const auto on_stored = [this, id, reuses](const Pending& added, Instant then) {
+    core_.states.set_durable(id, then.steady_ms);
+    const StudyRecord& study = core_.states.record(id);
+    log(id, fmt::format("of {} points begins", study.table.size()));
+    StudyAdded event{id, study.table, {}, 0, false, false, study.priority};
+    event.held = reuses;
+    core_.feed(event, then);
+    if (reuses) {
+      core_.reuse.begin(id, then);
     }
-  } else {
-    reply_submitted(client, id, false, now);
+    bool created = true;
+    for (const Client& submitter : added.submitters) {
+      reply_submitted(submitter, id, std::exchange(created, false), then);
+    }
+  };
+  const auto on_refused = [this, id](const Pending& refused, const std::string& error, Instant) {
+    core_.states.remove(id);
+    for (const Client& submitter : refused.submitters) {
+      core_.ports.reply_error(submitter, "the study was not stored: " + error);
+    }
+  };
+  write(id, {read.table, {client}},
+        AddStudy{id, name, read.table, created_at, priority, client.key(), reuses}, on_stored,
+        on_refused);
+}
+
+/// The submitted recipe is not that of the study: appends its further points, or refuses it.
+void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
+                        std::int32_t priority, Instant now) {
+  const StudyRecord& study = core_.states.record(id);
+  const std::uint64_t points_before = study.table.size();
+  Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
+  try {
+    growth = study.table.growth_to(read.table);
+  } catch (const std::runtime_error&) {
+    // Only another version can read it.
+  }
+  if (growth.kind != Growth::Kind::kLonger || read.table.size() <= points_before) {
+    core_.ports.reply_error(
+        client,
+        fmt::format("there is a study called \"{}\" with {}. A study may grow by blocks "
+                    "behind those that it has, and never change:\n{}\n"
+                    "Give this one another name, or use another database",
+                    study.name,
+                    growth.kind == Growth::Kind::kShorter ? "more points" : "another recipe",
+                    growth.difference));
+    return;
+  }
+  const bool is_open = core_.states.is_open(id);
+  if (!may_open(client, is_open ? 0 : 1, read.table.size() - (is_open ? points_before : 0))) {
+    return;
+  }
+  const protocol::StudyStatus before = study_status(id, core_, now);
+  const bool reuses =
+      !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, before.solver_version());
+  const auto on_stored = [this, id, priority, points_before, was = before.state(), reuses](
+                             const Pending& grown, Instant then) {
+    core_.states.grow(id, grown.table, priority);
+    log(id, fmt::format("grows from {} to {} points", points_before, grown.table.size()));
+    if (reuses) {
+      core_.feed(StudyHeld{id, true}, then);
+    }
+    core_.feed(StudyGrown{id, grown.table, priority}, then);
+    if (reuses) {
+      core_.reuse.begin(id, then);
+    }
+    protocol::SubmitReply more;
+    more.set_appended(grown.table.size() - points_before);
+    more.set_was(was);
+    for (const Client& submitter : grown.submitters) {
+      reply_submitted(submitter, id, false, then, more);
+    }
+  };
+  const auto on_refused = [this, id](const Pending& refused, const std::string& error,
+                                     Instant then) {
+    core_.states.set_doubtful(id);
+    for (const Client& submitter : refused.submitters) {
+      core_.ports.reply_error(submitter, not_changed(error));
+    }
+    if (refused.is_complete) {
+      finish(id, then);
+    }
+  };
+  write(id, {read.table, {client}}, GrowStudy{id, read.table, priority, iso_8601(now), reuses},
+        on_stored, on_refused);
+}
+
+void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t priority) {
+  write(client, id, SetPriority{id, priority},
+        [this, client, id, priority](const Pending&, Instant then) {
+          core_.states.set_priority(id, priority);
+          core_.feed(PriorityChanged{id, priority}, then);
+          resume_submitted(client, id, then);
+        });
+}
+
+/// The study was submitted again as it is.
+void StudyChanges::resume_submitted(const Client& client, StudyId id, Instant now) {
+  const auto reply = [this, client, id](Instant then) { reply_submitted(client, id, false, then); };
+  if (!core_.states.needs_write(id, StudyState::kRunning)) {
+    reply(now);
+  } else if (may_reopen(client, id)) {
+    set_state(client, id, StudyState::kRunning, reply, now);
   }
 }
+
+// ---- Change ------------------------------------------------------------------------------------
 
 void StudyChanges::change(const Client& client, const protocol::ChangeRequest& request,
                           Instant now) {
-  std::optional<StudyId> known = states_.find_durable(request.study());
-  if (request.study_id() != 0) {
-    known = states_.contains(request.study_id()) && states_.is_durable(request.study_id())
-                ? std::optional(request.study_id())
-                : std::nullopt;
-  }
+  const auto known = core_.states.find_durable(request.study(), request.study_id());
   if (!known) {
-    reply_gone(client, request);
-  } else if (!waits(client, *known,
-                    [this, client, request](Instant then) { change(client, request, then); })) {
-    change_one(client, request, *known, now);
-  }
-}
-
-/// There is no study of that name or number. One that was deleted before is deleted.
-void StudyChanges::reply_gone(const Client& client, const protocol::ChangeRequest& request) {
-  if (request.change() != protocol::STUDY_CHANGE_DELETE || request.study_id() == 0 ||
-      request.study_id() > last_study_id_) {
-    clients_.reply_error(client, unknown_study(request.study(), states_));
+    const bool was_deleted = request.change() == protocol::STUDY_CHANGE_DELETE &&
+                             request.study_id() != 0 && request.study_id() <= last_study_id_;
+    if (was_deleted) {
+      protocol::StudyStatus study;
+      study.set_study_id(request.study_id());
+      study.set_name(request.study());
+      reply_deleted(client, study);
+    } else {
+      core_.ports.reply_error(client, unknown_study(request.study(), core_.states));
+    }
     return;
   }
-  protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
-  auto& status = *reply.mutable_change()->mutable_study();
-  status.set_study_id(request.study_id());
-  status.set_name(request.study());
-  status.set_state(kDeletedState);
-  clients_.to_client(client.identity, reply);
-}
-
-void StudyChanges::change_one(const Client& client, const protocol::ChangeRequest& request,
-                              StudyId id, Instant now) {
-  const std::optional known(id);
-  StudyState wanted{};
+  const StudyId id = *known;
+  if (defers(client, id,
+             [this, client, request](Instant then) { change(client, request, then); })) {
+    return;
+  }
   switch (request.change()) {
     case protocol::STUDY_CHANGE_CANCEL:
-      wanted = StudyState::kCancelled;
+      change_state(client, id, StudyState::kCancelled, now);
       break;
     case protocol::STUDY_CHANGE_PAUSE:
-      // A cancelled study rests already.
-      wanted = states_.state(*known) == StudyState::kCancelled ? StudyState::kCancelled
-                                                               : StudyState::kPaused;
+      // Nothing of a cancelled study is handed out either.
+      change_state(client, id,
+                   core_.states.state(id) == StudyState::kCancelled ? StudyState::kCancelled
+                                                                    : StudyState::kPaused,
+                   now);
       break;
     case protocol::STUDY_CHANGE_RESUME:
-      wanted = StudyState::kRunning;
+      change_state(client, id, StudyState::kRunning, now);
       break;
     case protocol::STUDY_CHANGE_RETRY:
-      retry(client, *known, now);
-      return;
+      retry(client, id, now);
+      break;
     case protocol::STUDY_CHANGE_RENAME:
       rename(client, request, id, now);
-      return;
+      break;
     case protocol::STUDY_CHANGE_DELETE:
       remove(client, id);
-      return;
+      break;
     default:
-      clients_.reply_error(client, "the server does not know this change of a study");
-      return;
+      core_.ports.reply_error(client, "the server does not know this change of a study");
+      break;
   }
-  if (states_.needs_write(*known, wanted)) {
-    if (may_reopen(client, *known, wanted)) {
-      set_state(client, *known, wanted, false, now);
+}
+
+void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted, Instant now) {
+  const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
+  if (!core_.states.needs_write(id, wanted)) {
+    reply(now);
+  } else if (wanted != StudyState::kRunning || may_reopen(client, id)) {
+    set_state(client, id, wanted, reply, now);
+  }
+}
+
+void StudyChanges::set_state(const Client& client, StudyId id, StudyState state,
+                             std::function<void(Instant)> reply, Instant now) {
+  const auto on_stored = [this, id, state, reply = std::move(reply)](const Pending&, Instant then) {
+    core_.states.set_state(id, state);
+    if (state == StudyState::kRunning) {
+      log(id, "goes on");
+      core_.feed(StudyReopened{id}, then);
+    } else {
+      log(id, fmt::format("is {}", state_name(state)));
+      core_.feed(state == StudyState::kPaused ? Event(StudyPaused{id}) : StudyCancelled{id}, then);
     }
-  } else {
-    reply_changed(client, *known, 0, now);
+    reply(then);
+  };
+  const auto on_refused = [this, client, id](const Pending&, const std::string& error, Instant) {
+    core_.states.set_doubtful(id);
+    core_.ports.reply_error(client, not_changed(error));
+  };
+  write(id, {}, SetStudyState{id, state, iso_8601(now)}, on_stored, on_refused);
+}
+
+void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
+  const IntervalSet failures = core_.states.record(id).failures;
+  if (failures.empty()) {
+    reply_changed(client, id, 0, now);
+    return;
   }
+  try {
+    (void)core_.states.record(id).table.get();
+  } catch (const std::runtime_error& error) {
+    core_.ports.reply_error(
+        client, fmt::format("the recipe of the study cannot be read: {}", error.what()));
+    return;
+  }
+  if (core_.states.state(id) == StudyState::kDone && !may_reopen(client, id)) {
+    return;
+  }
+  write(client, id, ForgetFailures{id, failures, iso_8601(now)},
+        [this, client, id, failures](const Pending&, Instant then) {
+          core_.rates.forget(id);  // fewer points are completed now
+          core_.states.forget_failures(id, failures, then.steady_ms);
+          log(id, fmt::format("tries its failed points again: {}", failures.size()));
+          core_.feed(FailuresForgotten{id, failures, core_.states.record(id).attempts}, then);
+          reply_changed(client, id, failures.size(), then);
+        });
 }
 
 void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& request, StudyId id,
                           Instant now) {
   const std::string& name = request.new_name();
+  const auto owner = core_.states.find(name);
   if (const std::string reason = protocol::objection_to_study_name(name); !reason.empty()) {
-    clients_.reply_error(client, reason);
-    return;
-  }
-  const auto taken = states_.find(name);
-  if (taken == id) {
+    core_.ports.reply_error(client, reason);
+  } else if (owner == id) {
     reply_changed(client, id, 0, now);
-    return;
-  }
-  if (taken) {
-    if (!waits(client, *taken,
-               [this, client, request](Instant then) { change(client, request, then); })) {
-      clients_.reply_error(
+  } else if (owner) {
+    if (!defers(client, *owner,
+                [this, client, request](Instant then) { change(client, request, then); })) {
+      core_.ports.reply_error(
           client, fmt::format("there is a study called \"{}\" already: choose another name", name));
     }
-    return;
+  } else {
+    core_.states.reserve(id, name);
+    write(
+        id, {}, RenameStudy{id, name},
+        [this, client, id, name](const Pending&, Instant then) {
+          log(id, fmt::format("is called {} from now on", name));
+          core_.states.rename(id, name);
+          reply_changed(client, id, 0, then);
+        },
+        [this, client, name](const Pending&, const std::string& error, Instant) {
+          core_.states.release(name);
+          core_.ports.reply_error(client, not_changed(error));
+        });
   }
-  states_.reserve(id, name);
-  turns_[id];
-  ledger_.write(RenameStudy{id, name}, NameWrite{id, name, client});
 }
 
 void StudyChanges::remove(const Client& client, StudyId id) {
-  turns_[id];
-  ledger_.write(DeleteStudy{id}, RemovalWrite{id, client});
+  write(client, id, DeleteStudy{id}, [this, client, id](const Pending&, Instant then) {
+    const protocol::StudyStatus last = study_status(id, core_, then);
+    log(id, "is deleted");
+    core_.rates.forget(id);
+    core_.states.remove(id);
+    core_.reuse.forget(id);
+    release_replies(then, id);
+    core_.feed(StudyRemoved{id}, then);
+    reply_deleted(client, last);
+  });
 }
 
-void StudyChanges::set_state(const Client& client, StudyId id, StudyState state, bool submitted,
-                             Instant now) {
-  states_.change(id, state);
-  recount(id);
-  ledger_.write(SetStudyState{id, state, iso_8601(now)}, StateWrite{id, state, client, submitted});
+void StudyChanges::finish(StudyId id, Instant now) {
+  const auto pending = pending_.find(id);
+  if (pending != pending_.end() && !pending->second.submitters.empty()) {
+    pending->second.is_complete = true;  // further points are being written
+  } else if (core_.states.finish(id)) {
+    log(id, "is done");
+    core_.ledger.write(SetStudyState{id, StudyState::kDone, iso_8601(now)});
+  }
 }
 
-void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
-  const StudyRecord& study = states_.record(id);
-  if (study.failures.empty()) {
-    reply_changed(client, id, 0, now);
-    return;
+// ---- Bounds and replies ------------------------------------------------------------------------
+
+/// Whether so many further studies and points may be open; otherwise the client gets the bound.
+bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::uint64_t points) {
+  const auto fits = [&](const char* bound, const char* what, std::uint64_t open, std::uint64_t more,
+                        std::uint64_t most) {
+    if (open <= most && more <= most - open) {
+      return true;
+    }
+    core_.ports.reply_error(
+        client, fmt::format("{} {} are open, and the bound {} of the server is {}: wait until some "
+                            "studies are done, or cancel some",
+                            open, what, bound, most));
+    return false;
+  };
+  return fits("open-studies", "studies", core_.states.unfinished().size(), studies,
+              bounds_.studies) &&
+         fits("open-points", "points", core_.states.open_points(), points, bounds_.points);
+}
+
+bool StudyChanges::may_reopen(const Client& client, StudyId id) {
+  return core_.states.is_open(id) || may_open(client, 1, core_.states.record(id).table.size());
+}
+
+/// While results of other studies are looked up the reply waits for them, but not long.
+void StudyChanges::reply_submitted(const Client& client, StudyId id, bool created, Instant now,
+                                   const protocol::SubmitReply& more) {
+  constexpr std::int64_t kLongestWait_ms = 1500;
+  const StudyCounts counts = core_.scheduler.study(id);
+  protocol::ClientReply reply;
+  protocol::SubmitReply& fields = *reply.mutable_submit();
+  fields = more;
+  fields.set_study_id(id);
+  fields.set_points(counts.points);
+  fields.set_settled(counts.solved + counts.failed + counts.left_out);
+  fields.set_created(created);
+  if (core_.reuse.is_under_way(id)) {
+    held_.push_back({id, client, std::move(reply), now.steady_ms + kLongestWait_ms});
+  } else {
+    core_.ports.reply(client, std::move(reply));
   }
-  try {
-    (void)study.table.get();
-  } catch (const std::runtime_error& error) {
-    clients_.reply_error(client,
-                         fmt::format("the recipe of the study cannot be read: {}", error.what()));
-    return;
+}
+
+void StudyChanges::release_replies(Instant now, StudyId id) {
+  const auto waits = [&](const HeldReply& held) {
+    return held.study != id && held.until_ms > now.steady_ms &&
+           core_.reuse.is_under_way(held.study);
+  };
+  const auto first = std::stable_partition(held_.begin(), held_.end(), waits);
+  std::vector<HeldReply> released(std::make_move_iterator(first),
+                                  std::make_move_iterator(held_.end()));
+  held_.erase(first, held_.end());
+  for (HeldReply& held : released) {
+    if (!core_.states.contains(held.study)) {
+      core_.ports.reply_error(held.client, "the study was deleted meanwhile");
+      continue;
+    }
+    const protocol::StudyStatus status = study_status(held.study, core_, now);
+    protocol::SubmitReply& fields = *held.reply.mutable_submit();
+    fields.set_settled(status.solved() + status.failed() + status.left_out());
+    *fields.mutable_taken() = status.taken();
+    core_.ports.reply(held.client, std::move(held.reply));
   }
-  const bool stays_closed = states_.state(id) == StudyState::kCancelled;
-  if (!stays_closed && !may_open(client, id, study.submitted_by, study.failures.size())) {
-    return;
-  }
-  ledger_.write(ForgetFailures{id, study.failures, iso_8601(now)},
-                FailuresWrite{id, study.failures, client});
+}
+
+void StudyChanges::reply_changed(const Client& client, StudyId id, std::uint64_t retried,
+                                 Instant now) {
+  protocol::ClientReply reply;
+  *reply.mutable_change()->mutable_study() = study_status(id, core_, now);
+  reply.mutable_change()->set_retried(retried);
+  core_.ports.reply(client, std::move(reply));
+}
+
+void StudyChanges::reply_deleted(const Client& client, const protocol::StudyStatus& study) {
+  protocol::ClientReply reply;
+  *reply.mutable_change()->mutable_study() = study;
+  reply.mutable_change()->mutable_study()->set_state(kDeletedState);
+  core_.ports.reply(client, std::move(reply));
+}
+
+void StudyChanges::log(StudyId id, const std::string& what) {
+  core_.ports.log(Severity::kInfo, fmt::format("study {} {}", core_.states.record(id).name, what));
 }
 
 }  // namespace oblique::server

@@ -2,155 +2,77 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
-#include <memory>
-#include <optional>
 #include <string>
-#include <variant>
-#include <vector>
 
-#include "server/scheduler/scheduler_events.h"
-#include "server/service/outbox/outbox.h"
+#include "server/service/ports/ports.h"
 
 namespace oblique::server {
 
-// What a write stands for: what follows when it is durable, or refused.
-
-/// Results of one message, or a point that the server failed itself.
-struct ResultsWrite {
-  ResultsStored event;
-  std::uint32_t attempt;
-  std::size_t bytes;  ///< of the worker's message; 0: of none
-};
-struct StudyWrite {
-  StudyId study;
-  bool reuses = false;  ///< results of other studies are to be looked up
-};
-struct StateWrite {
-  StudyId study;
-  StudyState state;
-  Client client;
-  bool submitted;  ///< the client asked for it by submitting the study again
-};
-struct PriorityWrite {
-  StudyId study;
-  std::int32_t priority = 0;
-  Client client;  ///< submitted the study again
-};
-struct FailuresWrite {
-  StudyId study;
-  IntervalSet points;  ///< whose failures are forgotten
-  Client client;
-};
-/// The study has all the points of the table.
-struct GrowthWrite {
-  StudyId study;
-  StudyTable table;
-  std::int32_t priority = 0;
-  std::uint64_t points_before;
-  StudyState state_before;
-  bool reuses = false;  ///< as in StudyWrite
-};
-struct NameWrite {
-  StudyId study;
-  std::string name;  ///< the new one
-  Client client;
-};
-struct RemovalWrite {
-  StudyId study;
-  Client client;
-};
-/// Rows that were copied from other studies.
-struct ReuseWrite {
-  StudyId study;
-  std::shared_ptr<const ReusedResults> outcome;
-};
-struct EndReuseWrite {
-  StudyId study;
-};
-/// Nothing follows.
-struct QuietWrite {};
-
-using Meaning =
-    std::variant<ResultsWrite, StudyWrite, StateWrite, PriorityWrite, FailuresWrite, GrowthWrite,
-                 NameWrite, RemovalWrite, ReuseWrite, EndReuseWrite, QuietWrite>;
-
 struct LedgerLimits {
-  /// Results messages of one worker that wait for the disk. A sound worker stops long before.
-  std::size_t most_messages_of_worker = 100'000;
-  /// Results that wait for the disk, as bytes of their messages. With so many of one worker, or of
-  /// all, no more are taken: they wait where they are.
-  std::size_t bytes_of_worker = std::size_t{16} << 20U;
+  /// Bytes of results and recipes that wait for the disk. Above it no message of a worker is read
+  /// and no change of a client accepted; above a quarter no batch is sent, until half of that is
+  /// stored.
   std::size_t bytes = std::size_t{64} << 20U;
-  /// With so many no batch goes out, until half of them are stored.
-  std::size_t bytes_to_hold = std::size_t{16} << 20U;
-  std::size_t messages_to_hold = 20'000;
-  std::size_t most_changes = 10'000;  ///< of clients
+  /// The same for all writes, so that small messages are bounded, too.
+  std::size_t writes = 80'000;
 };
 
-/// The writes that were handed to the writer and are not known to be durable or refused: what each
-/// stands for, how much they are, of whom, and whether the database takes any. Who hands something
-/// over acknowledges it only when `settle` gave it back. Not thread-safe.
+/// The writes whose outcome is not known yet: what follows from each, their size, and whether the
+/// database accepts any. Not thread-safe.
 class WriteLedger {
  public:
-  WriteLedger(const LedgerLimits& limits, ToWriter& writer) : limits_(limits), writer_(writer) {}
+  using OnStored = std::function<void(Instant)>;
+  using OnRefused = std::function<void(const std::string& error, Instant)>;
 
-  /// Hands the change over. Where a client waits for a yes or no, a failure is reported at once;
-  /// else the change is tried until it is durable.
-  void write(Change change, Meaning meaning);
-  /// What the write of that ticket stands for, which is known to be durable or refused now. Nothing
-  /// for a ticket that is not open.
-  std::optional<Meaning> settle(std::uint64_t ticket);
-  /// The database is gone, as `error` says: all that is open, in order, none of which will be
-  /// durable.
-  std::vector<Meaning> abandon(const std::string& error);
+  WriteLedger(const LedgerLimits& limits, Ports& ports) : limits_(limits), ports_(ports) {}
 
-  /// The database takes no results, as `error` says, or takes them again.
-  void note_fault(const std::string& error) { fault_ = error; }
-  void note_recovery() { fault_.clear(); }
+  /// Writes a change and calls `on_stored` when it is durable. With `on_refused` a failure is
+  /// reported at once, because a client waits; without it the change is tried until it is durable.
+  void write(Change change, OnStored on_stored = {}, OnRefused on_refused = {});
+  /// The outcome of a write. Unknown tickets are ignored.
+  void stored(std::uint64_t ticket, Instant now);
+  void refused(std::uint64_t ticket, const std::string& error, Instant now);
+  /// The database is gone: refuses all writes, in order.
+  void abandon(const std::string& error, Instant now);
+
+  /// The database accepts no changes, as `error` says; empty: it does again.
+  void set_fault(const std::string& error) { fault_ = error; }
 
   /// To be called several times a second.
   void tick(std::int64_t now_ms);
-  /// Nothing became durable for `kSlowAfter_s`, and the database does not say why.
+  /// Nothing was stored for `kSlowAfter_s`, and the database has not reported why.
   bool is_slow() const { return is_slow_ && fault_.empty(); }
   static constexpr std::int64_t kSlowAfter_s = 5;
 
-  /// Why the database takes no results; empty: it does.
+  /// Why the database accepts no changes; empty: it does.
   const std::string& fault() const { return fault_; }
-  /// The database is not where it was; nothing can be stored any more.
+  /// The file is gone; nothing more can be stored.
   bool is_gone() const { return is_gone_; }
-  bool is_empty() const { return open_.empty(); }
-  /// So much is not durable yet, and so many bytes of it are messages with results.
-  std::size_t jobs() const { return open_.size(); }
+  bool is_empty() const { return writes_.empty(); }
+  std::size_t jobs() const { return writes_.size(); }
   std::size_t bytes() const { return bytes_; }
 
-  /// No batch should go out: the database takes nothing, or is far behind.
+  /// No batch should be sent: the database accepts nothing, or is far behind.
   bool holds_batches() const { return !fault_.empty() || is_behind_; }
-  /// Whether results of that worker should be taken now, or wait until more is stored.
-  bool has_room_for(WorkerId worker) const;
-  /// The worker has sent more than sound workers keep, or all together have.
-  bool is_flooded_by(WorkerId worker) const;
-  /// So much waits that no further worker should be taken on.
-  bool takes_no_worker() const;
-  /// So many changes of clients wait that no further one should be taken.
-  bool takes_no_change() const { return changes_ >= limits_.most_changes; }
+  /// Whether further messages of workers and changes of clients should be taken.
+  bool has_room() const { return bytes_ < limits_.bytes && writes_.size() < limits_.writes; }
 
  private:
-  struct Unstored {
-    std::size_t messages = 0;
-    std::size_t bytes = 0;
+  struct Write {
+    OnStored on_stored;
+    OnRefused on_refused;
+    std::size_t bytes;
   };
-  void count(const Meaning& meaning);
-  void discount(const Meaning& meaning);
+  void discount(const Write& write);
   void weigh();
 
   LedgerLimits limits_;
-  ToWriter& writer_;
-  std::map<std::uint64_t, Meaning> open_;  // by ticket
+  Ports& ports_;
+  std::map<std::uint64_t, Write> writes_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  std::map<WorkerId, Unstored> of_workers_;
-  std::size_t bytes_ = 0;    // of all workers' results
-  std::size_t changes_ = 0;  // that a client waits for
+  std::size_t bytes_ = 0;
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -34,9 +35,11 @@ constexpr const char* state_name(StudyState state) {
   return "";
 }
 
-// Changes of the database. Instants are UTC in ISO 8601.
+// Changes of the database. Instants are UTC in ISO 8601. `kNeedsFullSync`: the change must survive
+// a loss of power. Results need not, because they can be solved again.
 
 struct AddStudy {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
   std::string name;
   StudyTable table;
@@ -47,24 +50,29 @@ struct AddStudy {
 };
 
 struct SetPriority {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
   std::int32_t priority = 0;
 };
 
 /// Deletes the rows of the failed ones among these points. A study that was done runs again.
 struct ForgetFailures {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
   IntervalSet points;
   std::string changed_at;
 };
 
 struct SetStudyState {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
   StudyState state;
   std::string changed_at;
 };
 
 struct AddWorker {
+  static constexpr bool kNeedsFullSync = false;
+  static constexpr std::uint64_t study_id = 0;  ///< of no study
   std::uint64_t worker_id;
   std::string name;
   std::uint32_t threads;
@@ -75,6 +83,7 @@ struct AddWorker {
 
 /// Adds results of one study. A point that has a row already keeps it.
 struct AddResults {
+  static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
   std::uint64_t worker_id;  ///< 0: the server itself failed the points
@@ -83,11 +92,13 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  IntervalSet left_out{};  ///< points that the filter leaves out: completed without a row
+  IntervalSet left_out{};         ///< points that the filter leaves out: completed without a row
+  std::size_t message_bytes = 0;  ///< of the worker's message
 };
 
 /// Appends points to a study, which then runs with this priority.
 struct GrowStudy {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
   StudyTable table;  ///< all points, the earlier ones included
   std::int32_t priority = 0;
@@ -107,6 +118,7 @@ struct ReusedResults {
 /// other studies, and copies the rows that it finds. A row is copied only if it is of
 /// `solver_version` and both studies request estimated errors or neither does.
 struct ReuseResults {
+  static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
   std::uint64_t first_point;
@@ -116,10 +128,12 @@ struct ReuseResults {
 
 /// Ends the lookup of results for a study.
 struct EndReuse {
+  static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
 };
 
 struct RenameStudy {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
   std::string name;
 };
@@ -127,12 +141,36 @@ struct RenameStudy {
 /// Deletes a study: its name becomes free, and later results of it are dropped. Its rows are
 /// deleted in parts by `Storage::clear_away`.
 struct DeleteStudy {
+  static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
 };
 
 using Change =
     std::variant<AddStudy, SetStudyState, SetPriority, ForgetFailures, GrowStudy, RenameStudy,
                  DeleteStudy, ReuseResults, EndReuse, AddWorker, AddResults>;
+
+inline std::uint64_t study_of(const Change& change) {
+  return std::visit([](const auto& kind) { return kind.study_id; }, change);
+}
+
+/// Size of the message or recipe in a change that has one.
+inline std::size_t bytes_of(const Change& change) {
+  return std::visit(
+      [](const auto& kind) -> std::size_t {
+        if constexpr (requires { kind.message_bytes; }) {
+          return kind.message_bytes;
+        } else if constexpr (requires { kind.table.recipe_bytes(); }) {
+          return kind.table.recipe_bytes().size();
+        } else {
+          return 0;
+        }
+      },
+      change);
+}
+
+inline bool needs_full_sync(const Change& change) {
+  return std::visit([](const auto& kind) { return kind.kNeedsFullSync; }, change);
+}
 
 /// The outcome of one step of deleting the rows of deleted studies.
 enum class ClearedAway {

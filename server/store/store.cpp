@@ -15,13 +15,6 @@ constexpr std::size_t kMostCachedModels = 65536;
 /// Instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
 constexpr int kStepsBetweenInterrupts = 1000;
 
-/// Whether the change must survive a loss of power. Results need not: they can be solved again.
-bool is_lasting(const Change& change) {
-  return !std::holds_alternative<AddResults>(change) &&
-         !std::holds_alternative<ReuseResults>(change) &&
-         !std::holds_alternative<EndReuse>(change) && !std::holds_alternative<AddWorker>(change);
-}
-
 }  // namespace
 
 Store::Store(const std::string& path)
@@ -126,7 +119,7 @@ void Store::in_transaction(bool full_sync, const std::function<void()>& work) {
 
 void Store::commit(std::span<const Change> changes) {
   try {
-    in_transaction(std::ranges::any_of(changes, is_lasting), [&] {
+    in_transaction(std::ranges::any_of(changes, needs_full_sync), [&] {
       for (const Change& change : changes) {
         std::visit([this](const auto& kind) { add(kind); }, change);
       }

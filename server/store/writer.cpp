@@ -39,19 +39,6 @@ bool ends_a_study(const Change& change) {
   return state != nullptr && state->state == StudyState::kDone;
 }
 
-/// The study that the change belongs to; 0: none.
-std::uint64_t study_of(const Change& change) {
-  return std::visit(
-      [](const auto& kind) -> std::uint64_t {
-        if constexpr (requires { kind.study_id; }) {
-          return kind.study_id;
-        } else {
-          return 0;
-        }
-      },
-      change);
-}
-
 }  // namespace
 
 Writer::Writer(Storage& storage, Report report, std::chrono::milliseconds longest_last_step)

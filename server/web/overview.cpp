@@ -15,12 +15,12 @@ std::string overview_json(const Snapshot& snapshot) {
     states[state_name(static_cast<StudyState>(i))] = snapshot.studies.at(i);
   }
   ordered_json studies = ordered_json::array();
-  for (const StudyView& study : snapshot.shown_studies) {
-    studies.push_back(study_json(to_message(study)));
+  for (const protocol::StudyStatus& study : snapshot.shown_studies) {
+    studies.push_back(study_json(study));
   }
   ordered_json workers = ordered_json::array();
-  for (const WorkerView& worker : snapshot.shown_workers) {
-    workers.push_back(worker_json(to_message(worker)));
+  for (const protocol::WorkerStatus& worker : snapshot.shown_workers) {
+    workers.push_back(worker_json(worker));
   }
   std::uint64_t there = 0;
   std::uint64_t threads = 0;

@@ -64,7 +64,7 @@ void count_studies(const Service& service, std::int64_t now_ms, bool for_page, S
   for (const Ranked& study : ranked) {
     snapshot.listed.push_back(numbers_of(study.id, service, now_ms));
     if (for_page) {
-      snapshot.shown_studies.push_back(service.study_view(study.id, {now_ms, 0}));
+      snapshot.shown_studies.push_back(service.study_status(study.id, {now_ms, 0}));
     }
   }
 }
@@ -103,7 +103,7 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms, bool
   snapshot.thread_s_per_point = scheduler.thread_s_per_point();
   count_studies(service, now_ms, for_page, snapshot);
   if (for_page) {
-    snapshot.shown_workers = service.worker_views(kShownWorkers, {now_ms, 0});
+    snapshot.shown_workers = service.worker_statuses(kShownWorkers, {now_ms, 0});
   }
   snapshot.batches_leased = scheduler.leases();
   snapshot.batch_s = scheduler.batch_s();

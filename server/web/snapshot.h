@@ -9,9 +9,7 @@
 
 #include "server/network/network.h"
 #include "server/scheduler/scheduler.h"
-#include "server/service/counts/study_states.h"
-#include "server/service/views.h"
-#include "server/service/waiting_queries.h"
+#include "server/service/client_handler.h"
 #include "server/store/writer.h"
 
 namespace oblique::server {
@@ -62,8 +60,8 @@ struct Snapshot {
   bool is_for_page = false;
   /// Of a snapshot for the page: the same studies, and the first workers, with all that is known of
   /// them.
-  std::vector<StudyView> shown_studies;
-  std::vector<WorkerView> shown_workers;
+  std::vector<protocol::StudyStatus> shown_studies;
+  std::vector<protocol::WorkerStatus> shown_workers;
   std::map<std::string, OpenNumbers> open_by_key;  ///< by its name
 
   std::uint64_t batches_leased = 0;

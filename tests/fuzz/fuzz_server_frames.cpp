@@ -12,36 +12,30 @@
 namespace oblique::server {
 namespace {
 
-/// Writes at once, and forgets what is said.
-class Sink final : public Outbox {
+/// Keeps writes, and drops everything else.
+class Sink final : public Ports {
  public:
-  Delivery to_worker(const std::string&, const protocol::ServerToWorker&) override {
-    return Delivery::kSent;
-  }
+  Delivery to_worker(const std::string&, const std::string&) override { return Delivery::kSent; }
   bool is_busy(const std::string&) const override { return false; }
-  Delivery forward_to_worker(const std::string&, const std::string&) override {
-    return Delivery::kSent;
-  }
-  bool to_client(const std::string&, const protocol::ClientReply&) override { return true; }
-  bool forward_to_client(const std::string&, const std::string&) override { return true; }
+  bool to_client(const std::string&, const std::string&) override { return true; }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }
   bool query(QueryJob) override { return true; }
   void more_rows(std::uint64_t, std::uint64_t) override {}
   void cancel_query(std::uint64_t) override {}
-  void read(ReadJob) override {}
-  void note(Severity, const std::string&) override {}
+  void run_check(Check) override {}
+  void log(Severity, const std::string&) override {}
 
   std::vector<WriteJob> jobs;
 };
 
 /// The input is a conversation: of each piece the first byte says who speaks and how long it is.
 void converse(std::string_view input) {
-  Sink outbox;
+  Sink ports;
   ServiceSettings settings;
   settings.solver_version = "1";
   settings.database_id = "db";
   Instant now{1000, 1'700'000'000'000};
-  Service service(settings, outbox, {}, now);
+  Service service(settings, ports, {}, now);
   while (!input.empty()) {
     const auto head = static_cast<unsigned char>(input.front());
     const std::size_t length = std::min<std::size_t>((head >> 2U) * 4U, input.size() - 1);
@@ -53,7 +47,7 @@ void converse(std::string_view input) {
     } else {
       service.client_frame(identity, frame, now);
     }
-    for (const WriteJob& job : std::exchange(outbox.jobs, {})) {
+    for (const WriteJob& job : std::exchange(ports.jobs, {})) {
       service.written({WriteReport::Kind::kStored, job.ticket, {}}, now);
     }
     now.steady_ms += 100;

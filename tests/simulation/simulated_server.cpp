@@ -25,7 +25,7 @@ void SimulatedServer::start() {
   on_started(found);
   server::ServiceSettings settings;
   settings.scheduler.loss_limits.condemned_after = max_losses_;
-  // As server/loop/loop.cpp does.
+  // As server/event_loop/event_loop.cpp does.
   settings.scheduler.first_lease_id = found.starts << 40U;
   settings.solver_version = "1";
   settings.database_id = "disk";
@@ -135,31 +135,20 @@ void SimulatedServer::take(std::function<void()> frame) {
   }
 }
 
-server::Delivery SimulatedServer::to_worker(const std::string& identity,
-                                            const protocol::ServerToWorker& message) {
-  if (message.has_results_stored()) {
+server::Delivery SimulatedServer::to_worker(const std::string& identity, const std::string& frame) {
+  protocol::ServerToWorker message;
+  if (protocol::decode(frame, message) && message.has_results_stored()) {
     on_acknowledged(identity, message.results_stored().sequence());
   }
-  return forward_to_worker(identity, protocol::encode(message));
-}
-
-server::Delivery SimulatedServer::forward_to_worker(const std::string& identity,
-                                                    const std::string& frame) {
   return workers->send_to(identity, frame) ? server::Delivery::kSent : server::Delivery::kGone;
 }
 
-bool SimulatedServer::to_client(const std::string& identity, const protocol::ClientReply& reply) {
-  return forward_to_client(identity, protocol::encode(reply));
-}
-
-bool SimulatedServer::forward_to_client(const std::string& identity, const std::string& frame) {
+bool SimulatedServer::to_client(const std::string& identity, const std::string& frame) {
   return clients->send_to(identity, frame);
 }
 
-void SimulatedServer::read(server::ReadJob job) {
-  after(1, [this, job = std::move(job)] {
-    service_->request_read({job.ticket, server::read_request(job.frame)}, now());
-  });
+void SimulatedServer::run_check(Check check) {
+  after(1, [this, check = std::move(check)] { service_->check_done(check(), now()); });
 }
 
 void SimulatedServer::write(server::WriteJob job) {

@@ -15,7 +15,7 @@ namespace oblique::simulation {
 
 /// The real service, scheduler and store on a simulated disk and network. It can be killed at any
 /// moment, stopped in an orderly way or for a while, and starts again from what the disk has.
-class SimulatedServer final : public server::Outbox {
+class SimulatedServer final : public server::Ports {
  public:
   /// Called with each acknowledgement before it is sent: its results must be durable.
   using OnAcknowledged = std::function<void(const std::string& identity, std::uint64_t sequence)>;
@@ -40,19 +40,15 @@ class SimulatedServer final : public server::Outbox {
   void worker_frame(const std::string& identity, const std::string& frame);
   void client_frame(const std::string& identity, const std::string& frame);
 
-  server::Delivery to_worker(const std::string& identity,
-                             const protocol::ServerToWorker& message) override;
+  server::Delivery to_worker(const std::string& identity, const std::string& frame) override;
   bool is_busy(const std::string&) const override { return false; }
-  server::Delivery forward_to_worker(const std::string& identity,
-                                     const std::string& frame) override;
-  bool to_client(const std::string& identity, const protocol::ClientReply& reply) override;
-  bool forward_to_client(const std::string& identity, const std::string& frame) override;
+  bool to_client(const std::string& identity, const std::string& frame) override;
   void write(server::WriteJob job) override;
   bool query(server::QueryJob) override { return false; }
   void more_rows(std::uint64_t, std::uint64_t) override {}
   void cancel_query(std::uint64_t) override {}
-  void read(server::ReadJob job) override;
-  void note(server::Severity, const std::string&) override {}
+  void run_check(Check check) override;
+  void log(server::Severity, const std::string&) override {}
 
   Network* workers = nullptr;
   Network* clients = nullptr;

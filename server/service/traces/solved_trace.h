@@ -10,7 +10,7 @@
 
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler_events.h"
-#include "server/service/outbox/request_reader.h"
+#include "server/service/traces/traced_point.h"
 
 namespace oblique::server {
 

@@ -10,17 +10,14 @@
 namespace oblique::server {
 namespace {
 
-/// Number of no request: a reply with it is passed over by clients that do not know its kind.
-constexpr std::uint64_t kNoRequest = UINT64_MAX;
 /// Recipes of more bytes are read on a thread of their own.
 constexpr std::size_t kLongestInlineBytes = std::size_t{64} * 1024;
 
 constexpr const char* kTooManyTraces = "too many traces are waited for already: ask again later";
 constexpr const char* kStoppingTraces = "the server is stopping: ask again when it runs";
 
-protocol::ClientReply reply_to(const Client& client, protocol::TraceReply trace) {
+protocol::ClientReply with_trace(protocol::TraceReply trace) {
   protocol::ClientReply reply;
-  reply.set_request_id(client.request_id);
   *reply.mutable_trace() = std::move(trace);
   return reply;
 }
@@ -36,10 +33,10 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
     return;  // the answer is on its way
   }
   // Who has a key has one share, however many connections that is.
-  const std::string asker = client.holder == nullptr ? client.identity : "key " + client.key();
+  const std::string asker = client.share();
   const TraceKey key{study.id, request.point(), request.shape(), request.fall()};
   if (stopping_ || is_full(asker, key)) {
-    clients_.reply_error(client, stopping_ ? kStoppingTraces : kTooManyTraces);
+    ports_.reply_error(client, stopping_ ? kStoppingTraces : kTooManyTraces);
     return;
   }
   const std::uint64_t ticket = ++last_ticket_;
@@ -52,7 +49,10 @@ void TraceDesk::ask(const Client& client, const protocol::TraceRequest& request,
   if (!request.only_point() && orders_.answer(question, now.steady_ms)) {
     answer_what_is_done();
   } else if (!study.table.is_made() && study.table.recipe_bytes().size() > kLongestInlineBytes) {
-    readers_.read({ticket, {}, study.table, request.point(), asker});
+    ports_.run_check([this, ticket, table = study.table, number = request.point()] {
+      TracedPoint point = traced_point(table.recipe_bytes(), number);
+      return [this, ticket, point = std::move(point)](Instant then) { found(ticket, point, then); };
+    });
   } else {
     const bool is_kept = study.table.is_made();
     TracedPoint point;
@@ -83,10 +83,6 @@ bool TraceDesk::is_full(const std::string& asker, const TraceKey& key) const {
          waiting_.size() >= limits_.most_waiting;
 }
 
-void TraceDesk::point_read(std::uint64_t ticket, const TracedPoint& point, Instant now) {
-  found(ticket, point, now);
-}
-
 /// It is known what the point is; who asked may be gone.
 void TraceDesk::found(std::uint64_t ticket, const TracedPoint& point, Instant now) {
   const auto entry = waiting_.find(ticket);
@@ -100,9 +96,9 @@ void TraceDesk::found(std::uint64_t ticket, const TracedPoint& point, Instant no
     said.set_study_id(waiting.question.key.study);
     waiting_.erase(entry);
     if (!point.objection.empty()) {
-      clients_.reply_error(client, "the point cannot be had: " + point.objection);
+      ports_.reply_error(client, "the point cannot be had: " + point.objection);
     } else {
-      clients_.to_client(client.identity, reply_to(client, std::move(said)));
+      ports_.reply(client, with_trace(std::move(said)));
     }
     return;
   }
@@ -125,9 +121,9 @@ void TraceDesk::answer_what_is_done() {
     const Client client = std::move(entry->second.client);
     waiting_.erase(entry);
     if (answer != nullptr) {
-      clients_.to_client(client.identity, reply_to(client, std::move(answer->reply)));
+      ports_.reply(client, with_trace(std::move(answer->reply)));
     } else {
-      clients_.reply_error(client, refusal->reason);
+      ports_.reply_error(client, refusal->reason);
     }
   }
 }
@@ -148,7 +144,6 @@ void TraceDesk::end_those(const std::function<bool(const Client&)>& wait_no_more
       return false;
     }
     orders_.leave(entry.first);
-    readers_.cancel_read(entry.first);
     return true;
   });
   answer_what_is_done();
@@ -168,7 +163,6 @@ void TraceDesk::tick(Instant now) {
       ++entry;
     } else {
       orders_.leave(ticket);
-      readers_.cancel_read(ticket);
       entry = waiting_.erase(entry);
     }
   }
@@ -177,11 +171,7 @@ void TraceDesk::tick(Instant now) {
 
 /// False when the client is gone.
 bool TraceDesk::tell(const Waiting& waiting) {
-  protocol::ClientReply word;
-  word.set_request_id(kNoRequest);
-  word.mutable_still_working()->set_request_id(waiting.client.request_id);
-  word.mutable_still_working()->set_runs(orders_.is_at_work(waiting.question.ticket));
-  return clients_.to_client(waiting.client.identity, word);
+  return ports_.reply_still_working(waiting.client, orders_.is_at_work(waiting.question.ticket));
 }
 
 void TraceDesk::stop() {
@@ -189,7 +179,7 @@ void TraceDesk::stop() {
   orders_.stop(kStoppingTraces);
   answer_what_is_done();
   for (const auto& [ticket, waiting] : std::exchange(waiting_, {})) {
-    clients_.reply_error(waiting.client, kStoppingTraces);
+    ports_.reply_error(waiting.client, kStoppingTraces);
   }
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "server/service/outbox/outbox.h"
+#include "server/service/ports/ports.h"
 #include "server/service/traces/trace_orders.h"
 
 namespace oblique::server {
@@ -25,10 +25,9 @@ struct StudyToLookAt {
 /// Not thread-safe.
 class TraceDesk {
  public:
-  TraceDesk(const TraceLimits& limits, const std::string& server_version, ToClients& clients,
-            ToReaders& readers, std::int64_t word_every_ms)
-      : clients_(clients),
-        readers_(readers),
+  TraceDesk(const TraceLimits& limits, const std::string& server_version, Ports& ports,
+            std::int64_t word_every_ms)
+      : ports_(ports),
         limits_(limits),
         orders_(limits, server_version),
         word_every_ms_(word_every_ms) {}
@@ -39,8 +38,6 @@ class TraceDesk {
            Instant now);
   /// That client waits no more for the answer to that request, if it was one for a trace.
   void end(std::string_view identity, std::uint64_t request_id);
-  /// A point of a long recipe was found, under the ticket of its ReadJob.
-  void point_read(std::uint64_t ticket, const TracedPoint& point, Instant now);
   void client_left(std::string_view identity);
   /// To be called several times a second.
   void tick(Instant now);
@@ -72,14 +69,12 @@ class TraceDesk {
   void end_those(const std::function<bool(const Client&)>& wait_no_more);
   bool tell(const Waiting& waiting);
 
-  ToClients& clients_;
-  ToReaders& readers_;
+  Ports& ports_;
   TraceLimits limits_;
   TraceOrders orders_;
   std::int64_t word_every_ms_;
   std::map<std::uint64_t, Waiting> waiting_;  // by ticket
-  /// The readers get tickets of long requests too, which are counted from 1.
-  std::uint64_t last_ticket_ = std::uint64_t{1} << 63U;
+  std::uint64_t last_ticket_ = 0;
   std::vector<TraceEffect> to_workers_;
   bool stopping_ = false;
 };

@@ -21,10 +21,10 @@ class LimitsTest : public testing::Test {
 };
 
 TEST_F(LimitsTest, ReachTheStructuresThatTheyAreNamedAfter) {
-  app_.parse(std::vector<std::string>{"--limits-connections=77", "--limits-unstored-changes=5",
+  app_.parse(std::vector<std::string>{"--limits-connections=77", "--limits-unstored-bytes=5",
                                       "--limits-running-queries=3"});
   EXPECT_EQ(network_.connections, 77U);
-  EXPECT_EQ(service_.ledger.most_changes, 5U);
+  EXPECT_EQ(service_.ledger.bytes, 5U);
   EXPECT_EQ(queries_.readers, 3U);
 }
 
@@ -52,7 +52,6 @@ TEST_F(LimitsTest, DefaultsAreAllowedAndNegativeNumbersAreNot) {
 TEST_F(LimitsTest, EachOptionSetsABoundOfItsOwn) {
   const auto all = [this] {
     const auto& ledger = service_.ledger;
-    const auto& clients = service_.clients;
     return std::vector<std::int64_t>{static_cast<std::int64_t>(network_.connections),
                                      network_.handshake_ms,
                                      network_.active_ms,
@@ -61,15 +60,7 @@ TEST_F(LimitsTest, EachOptionSetsABoundOfItsOwn) {
                                      static_cast<std::int64_t>(network_.busy_bytes),
                                      static_cast<std::int64_t>(network_.waiting_out_bytes),
                                      static_cast<std::int64_t>(network_.all_waiting_out_bytes),
-                                     static_cast<std::int64_t>(ledger.most_messages_of_worker),
-                                     static_cast<std::int64_t>(ledger.bytes_of_worker),
                                      static_cast<std::int64_t>(ledger.bytes),
-                                     static_cast<std::int64_t>(ledger.bytes_to_hold),
-                                     static_cast<std::int64_t>(ledger.messages_to_hold),
-                                     static_cast<std::int64_t>(ledger.most_changes),
-                                     static_cast<std::int64_t>(clients.most_long_requests),
-                                     static_cast<std::int64_t>(clients.most_long_requests_of_one),
-                                     static_cast<std::int64_t>(clients.most_long_bytes),
                                      static_cast<std::int64_t>(queries_.readers),
                                      static_cast<std::int64_t>(queries_.most_running_each),
                                      static_cast<std::int64_t>(queries_.most_waiting),

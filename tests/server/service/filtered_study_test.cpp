@@ -3,7 +3,6 @@
 #include <memory>
 #include <vector>
 
-#include "server/service/outbox/request_reader.h"
 #include "tests/server/service/service_fixture.h"
 #include "tests/support/recipes.h"
 
@@ -28,9 +27,9 @@ class FilteredStudyTest : public ServiceTest {
 
 TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
   request(filtered_request("mu > 0.75"));
-  EXPECT_THAT(outbox_.replies, IsEmpty());
-  ASSERT_EQ(outbox_.reads.size(), 1U);
-  read_all();
+  EXPECT_THAT(ports_.replies, IsEmpty());
+  ASSERT_EQ(ports_.checks.size(), 1U);
+  run_checks();
   write_all();
   EXPECT_EQ(last_reply().submit().points(), 11U);
   EXPECT_EQ(status_of("filtered").points(), 11U);
@@ -39,14 +38,12 @@ TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
 
 TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
   request(filtered_request("mu > 0.75"));
-  read_all();
+  run_checks();
   write_all();
   hello();
   const auto ask = [&](std::uint64_t point) {
-    outbox_.replies.clear();
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(7);
+    ports_.replies.clear();
+    ClientRequest message = client_request(7);
     message.mutable_trace()->set_study("filtered");
     message.mutable_trace()->set_point(point);
     message.mutable_trace()->set_only_point(true);
@@ -59,21 +56,19 @@ TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
 }
 
 TEST_F(FilteredStudyTest, AChangeOfTheRightNameAndAWrongNumberSaysWhatIsWrong) {
-  request(submit_request("a"));
-  write_all();
+  submit("a");
   ClientRequest message = change_request("a", protocol::STUDY_CHANGE_DELETE);
   message.mutable_change()->set_study_id(9);
   request(message);
   EXPECT_THAT(last_reply().error().message(),
-              HasSubstr("the study that is called \"a\" is another one"));
+              HasSubstr("study name \"a\" and study number do not match"));
 }
 
 TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
   request(filtered_request("mu > 0.75"));
-  read_all();
+  run_checks();
   write_all();
-  hello();
-  credit(1);
+  hello_and_credit();
   while (last_message().has_batch()) {
     answer_batch(100);
     credit(1);
@@ -86,7 +81,7 @@ TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
 
 TEST_F(FilteredStudyTest, RangesThatAreNoneEndTheConnectionOfTheirWorker) {
   request(filtered_request("mu > 0.75"));
-  read_all();
+  run_checks();
   write_all();
   // After three lost workers the next one gets a probe: the first two are of its batch.
   const std::vector<std::vector<std::uint64_t>> wrong{
@@ -114,13 +109,13 @@ TEST_F(FilteredStudyTest, AValueThatIsNotAllowedIsAnErrorWithThePoint) {
       {{protocol::following("k", "1e7 * (0.55 - mu)"), protocol::listed("H", {0.5}),
         protocol::range("mu", 0.0, 1.0, 11), protocol::listed("e", {1.0})}});
   request(message);
-  read_all();
+  run_checks();
   EXPECT_THAT(last_reply().error().message(), HasSubstr("point 6: k = "));
 }
 
 TEST_F(FilteredStudyTest, AFilterThatIsNoneIsRefusedAtOnce) {
   request(filtered_request("mu >"));
-  EXPECT_THAT(outbox_.reads, IsEmpty());
+  EXPECT_THAT(ports_.checks, IsEmpty());
   EXPECT_THAT(last_reply().error().message(), HasSubstr("where"));
 }
 
@@ -130,37 +125,12 @@ TEST_F(FilteredStudyTest, WhoWaitsHearsOfItAndWhoIsGoneIsForgotten) {
   service_->tick(now_);
   EXPECT_EQ(last_reply().still_working().request_id(), 42U);
   service_->client_left("client");
-  outbox_.replies.clear();
+  ports_.replies.clear();
   now_.steady_ms += 1500;
   service_->tick(now_);
-  read_all();
-  EXPECT_THAT(outbox_.replies, IsEmpty());
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
-}
-
-TEST_F(FilteredStudyTest, OneKeyWithManyConnectionsLeavesRoomForOthers) {
-  const auto submit = [&](const std::string& client, const std::string& key) {
-    const auto holder = std::make_shared<const KeyHolder>(KeyHolder{key, protocol::Role::kClient});
-    service_->client_frame(client, protocol::encode(filtered_request("mu > 0.75")), now_, holder);
-  };
-  const std::size_t room = ClientsDeskSettings().most_long_requests;
-  for (std::size_t i = 0; i < room; ++i) {
-    submit("connection " + std::to_string(i), "one");
-  }
-  EXPECT_EQ(outbox_.reads.size(), room / 4);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("too many long requests"));
-  submit("another connection", "other");
-  EXPECT_EQ(outbox_.reads.size(), room / 4 + 1);
-}
-
-TEST_F(FilteredStudyTest, TheSameStudySubmittedAgainIsThatStudy) {
-  for (int i = 0; i < 2; ++i) {
-    request(filtered_request("mu > 0.75"));
-    read_all();
-    write_all();
-  }
-  EXPECT_EQ(last_reply().submit().points(), 11U);
-  EXPECT_FALSE(last_reply().submit().created());
+  run_checks();
+  EXPECT_THAT(ports_.replies, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
 }  // namespace

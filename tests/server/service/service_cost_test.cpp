@@ -12,19 +12,9 @@ namespace {
 
 using testing::HasSubstr;
 
-ClientRequest status_request(std::uint64_t after = 0, std::uint32_t limit = 0) {
-  ClientRequest message;
-  message.set_protocol_version(protocol::kProtocolVersion);
-  message.mutable_status()->set_after_study_id(after);
-  message.mutable_status()->set_limit(limit);
-  return message;
-}
-
 /// A submission whose recipe has so many bytes at least.
 ClientRequest long_submission(const std::string& name, std::size_t bytes) {
-  ClientRequest message;
-  message.set_protocol_version(protocol::kProtocolVersion);
-  message.set_request_id(7);
+  ClientRequest message = client_request(7);
   message.mutable_submit()->set_name(name);
   auto& mu = *message.mutable_submit()->mutable_recipe();
   mu = protocol::recipe_of(
@@ -39,14 +29,12 @@ constexpr std::size_t kLong = std::size_t{100} * 1024;
 
 TEST_F(ServiceTest, ALongRecipeIsJudgedElsewhereAndOthersAreAnsweredMeanwhile) {
   request(long_submission("large", kLong));
-  ASSERT_EQ(outbox_.reads.size(), 1U);
-  EXPECT_TRUE(outbox_.replies.empty());
-  request(submit_request("small"));
-  write_all();
+  ASSERT_EQ(ports_.checks.size(), 1U);
+  EXPECT_TRUE(ports_.replies.empty());
+  submit("small");
   EXPECT_TRUE(last_reply().has_submit());
-  request(status_request());
-  EXPECT_EQ(last_reply().status().studies_size(), 1);
-  read_all();
+  EXPECT_EQ(statuses().studies_size(), 1);
+  run_checks();
   write_all();
   EXPECT_EQ(last_reply().request_id(), 7U);
   EXPECT_TRUE(last_reply().submit().created());
@@ -56,24 +44,23 @@ TEST_F(ServiceTest, OfTwoLongSubmissionsOfOneNameTheSameIsOneStudyAndAnotherIsRe
   request(long_submission("a", kLong));
   service_->client_frame("same", protocol::encode(long_submission("a", kLong)), now_);
   service_->client_frame("other", protocol::encode(long_submission("a", 2 * kLong)), now_);
-  read_all();
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
-  outbox_.replies.clear();
+  run_checks();
   write_all();
-  ASSERT_EQ(outbox_.replies.size(), 2U);
-  EXPECT_TRUE(outbox_.replies[0].submit().created());
-  EXPECT_FALSE(outbox_.replies[1].submit().created());
-  EXPECT_EQ(outbox_.replies[0].submit().study_id(), outbox_.replies[1].submit().study_id());
+  ASSERT_EQ(ports_.replies.size(), 3U);
+  EXPECT_TRUE(ports_.replies[0].submit().created());
+  EXPECT_FALSE(ports_.replies[1].submit().created());
+  EXPECT_EQ(ports_.replies[0].submit().study_id(), ports_.replies[1].submit().study_id());
+  EXPECT_THAT(ports_.replies[2].error().message(), HasSubstr("another name"));
 }
 
 TEST_F(ServiceTest, ALongRecipeWithAFaultIsRefusedWithTheReason) {
   ClientRequest bad = long_submission("a", kLong);
   bad.mutable_submit()->mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(0, 1.5);
   request(bad);
-  read_all();
+  run_checks();
   EXPECT_EQ(last_reply().request_id(), 7U);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
-  EXPECT_TRUE(outbox_.jobs.empty());
+  EXPECT_TRUE(ports_.jobs.empty());
 }
 
 TEST_F(ServiceTest, LongRequestsThatWaitAreBoundedForEachClientAndInAll) {
@@ -82,28 +69,28 @@ TEST_F(ServiceTest, LongRequestsThatWaitAreBoundedForEachClientAndInAll) {
     message.set_request_id(id);
     request(message);
   }
-  EXPECT_EQ(outbox_.reads.size(), 2U);
+  EXPECT_EQ(ports_.checks.size(), 2U);
   EXPECT_EQ(last_reply().request_id(), 3U);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("ask again later"));
   const std::string frame = protocol::encode(long_submission("a", std::size_t{10} << 20U));
   for (int i = 0; i < 12; ++i) {
     service_->client_frame("client " + std::to_string(i), frame, now_);
   }
-  EXPECT_EQ(outbox_.reads.size() - 2, (std::size_t{64} << 20U) / frame.size());
-  read_all();
+  EXPECT_EQ(ports_.checks.size() - 2, (std::size_t{64} << 20U) / frame.size());
+  run_checks();
   request(message);
-  EXPECT_EQ(outbox_.reads.size(), 1U) << "there is room again";
+  EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
 }
 
 TEST_F(ServiceTest, ALongRequestThatIsSentAgainWhileItWaitsIsReadAndAnsweredOnce) {
   for (int i = 0; i < 5; ++i) {
     request(long_submission("a", kLong));
   }
-  EXPECT_EQ(outbox_.reads.size(), 1U);
-  EXPECT_TRUE(outbox_.replies.empty());
-  read_all();
+  EXPECT_EQ(ports_.checks.size(), 1U);
+  EXPECT_TRUE(ports_.replies.empty());
+  run_checks();
   write_all();
-  EXPECT_EQ(outbox_.replies.size(), 1U);
+  EXPECT_EQ(ports_.replies.size(), 1U);
 }
 
 TEST_F(ServiceTest, ALongRequestThatComesOrWaitsWhileTheServerStopsIsAnswered) {
@@ -111,11 +98,11 @@ TEST_F(ServiceTest, ALongRequestThatComesOrWaitsWhileTheServerStopsIsAnswered) {
   service_->stop(now_);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
   request(long_submission("b", kLong));
-  EXPECT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_EQ(ports_.replies.size(), 2U);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
-  read_all();
-  EXPECT_EQ(outbox_.replies.size(), 2U) << "each is answered once";
-  EXPECT_TRUE(outbox_.jobs.empty());
+  run_checks();
+  EXPECT_EQ(ports_.replies.size(), 2U) << "each is answered once";
+  EXPECT_TRUE(ports_.jobs.empty());
 }
 
 TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
@@ -123,46 +110,40 @@ TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
   frame.back() = '\x7f';
   frame += '\x7f';
   service_->client_frame("client", frame, now_);
-  read_all();
+  run_checks();
   EXPECT_EQ(last_reply().request_id(), 7U);
   EXPECT_TRUE(last_reply().has_error());
   EXPECT_EQ(service_->bad_frames(), 1U);
 }
 
-TEST_F(ServiceTest, AHeartbeatOfMoreLeasesThanAWorkerHoldsIsABadFrameThatIsNotRead) {
-  hello();
-  WorkerMessage message;
+TEST_F(ServiceTest, MessagesThatAreLongerThanThoseOfWorkersAreBadFramesThatAreNotParsed) {
+  WorkerMessage heartbeat;
   for (std::uint64_t i = 0; i <= protocol::kMostLeasesAHeartbeat; ++i) {
-    message.mutable_heartbeat()->add_lease_ids(i);
+    heartbeat.mutable_heartbeat()->add_lease_ids(i);
   }
-  worker_says(message);
-  EXPECT_EQ(service_->bad_frames(), 1U);
-  EXPECT_TRUE(last_message().has_hello_again());
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
-  worker_says(message);
-  EXPECT_EQ(service_->bad_frames(), 2U) << "a stranger's too";
-}
-
-TEST_F(ServiceTest, ResultsOfMorePointsThanAMessageHoldsAreABadFrame) {
-  hello();
-  WorkerMessage message;
+  WorkerMessage results;
   for (std::size_t i = 0; i <= protocol::kMostResultsAMessage; ++i) {
-    message.mutable_results()->add_results();
+    results.mutable_results()->add_results();
   }
-  worker_says(message);
-  EXPECT_EQ(service_->bad_frames(), 1U);
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  worker_says(heartbeat);
+  EXPECT_EQ(service_->bad_frames(), 1U) << "a stranger's";
+  for (const WorkerMessage& message : {heartbeat, results}) {
+    hello();
+    worker_says(message);
+    EXPECT_TRUE(last_message().has_hello_again());
+    EXPECT_EQ(service_->scheduler().workers(), 0U);
+  }
+  EXPECT_EQ(service_->bad_frames(), 3U);
+  EXPECT_TRUE(ports_.jobs.empty());
 }
 
 TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirst) {
-  request(submit_request("a", 4));
-  write_all();
+  submit("a", 4);
   for (int i = 0; i < 1000; ++i) {
     hello("worker " + std::to_string(i));
   }
-  EXPECT_TRUE(outbox_.jobs.empty());
-  hello();
-  credit(1);
+  EXPECT_TRUE(ports_.jobs.empty());
+  hello_and_credit();
   const auto batch = last_message().batch();
   WorkerMessage message;
   auto& results = *message.mutable_results();
@@ -174,98 +155,56 @@ TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirs
     *results.add_results() = solved(points_of(batch).front());
     worker_says(message);
   }
-  ASSERT_EQ(outbox_.jobs.size(), 3U) << "one row of the worker, and two messages";
-  EXPECT_EQ(std::get<AddWorker>(outbox_.jobs[0].change).worker_id, 1001U);
-  EXPECT_EQ(std::get<AddResults>(outbox_.jobs[1].change).worker_id, 1001U);
+  ASSERT_EQ(ports_.jobs.size(), 3U) << "one row of the worker, and two messages";
+  EXPECT_EQ(std::get<AddWorker>(ports_.jobs[0].change).worker_id, 1001U);
+  EXPECT_EQ(std::get<AddResults>(ports_.jobs[1].change).worker_id, 1001U);
 }
 
 TEST_F(ServiceTest, WorkersThatComeAndGoWithoutEndDoNotFillTheLog) {
+  WorkerMessage goodbye;
+  goodbye.mutable_goodbye();
   for (int i = 0; i < 10'000; ++i) {
     hello("worker " + std::to_string(i));
-    WorkerMessage goodbye;
-    goodbye.mutable_goodbye();
-    service_->worker_frame("worker " + std::to_string(i), protocol::encode(goodbye), now_);
+    worker_says(goodbye, "worker " + std::to_string(i));
   }
-  EXPECT_LT(outbox_.notes, 50);
-  const int notes = outbox_.notes;
+  EXPECT_EQ(ports_.lines.size(), 20U);
+  ports_.lines.clear();
   now_.steady_ms += 20'000;
-  service_->tick(now_);
-  EXPECT_EQ(outbox_.notes, notes + 1) << "how many were left out is said";
   hello();
-  EXPECT_EQ(outbox_.notes, notes + 2) << "and later ones are written again";
+  ASSERT_EQ(ports_.lines.size(), 2U);
+  EXPECT_THAT(ports_.lines[0], HasSubstr("and 19980 more lines"));
+  EXPECT_THAT(ports_.lines[1], HasSubstr("joins"));
 }
 
-/// A service with 2,500 studies.
-class ManyStudiesTest : public ServiceTest {
- protected:
-  static constexpr int kStudies = 2500;
-  ManyStudiesTest() {
-    for (int i = 0; i < kStudies; ++i) {
-      request_unchecked(submit_request("study " + std::to_string(i)));
-    }
-    for (const WriteJob& job : std::exchange(outbox_.jobs, {})) {
-      service_->written({WriteReport::Kind::kStored, job.ticket, {}}, now_);
-    }
+TEST_F(ServiceTest, StudiesComeInPagesThatHoldEachOnce) {
+  constexpr int kStudies = 2500;
+  for (int i = 0; i < kStudies; ++i) {
+    service_->client_frame("client", protocol::encode(submit_request(std::to_string(i))), now_);
   }
-  void request_unchecked(const ClientRequest& message) {
-    service_->client_frame("client", protocol::encode(message), now_);
-  }
-};
-
-TEST_F(ManyStudiesTest, TheirStatusComesInPagesThatHoldEachStudyOnce) {
+  write_all();
   std::uint64_t after = 0;
   int seen = 0;
-  int pages = 0;
-  do {
-    request_unchecked(status_request(after));
-    const auto& page = outbox_.replies.back().status();
-    ASSERT_LE(page.studies_size(), 1000);
+  for (const int size : {1000, 1000, 500}) {
+    const auto page = statuses(after);
+    ASSERT_EQ(page.studies_size(), size);
     for (const auto& study : page.studies()) {
       EXPECT_GT(study.study_id(), after);
       after = study.study_id();
     }
-    seen += page.studies_size();
+    seen += size;
     EXPECT_EQ(page.next_after(), seen < kStudies ? after : 0U);
-    ++pages;
-  } while (outbox_.replies.back().status().next_after() != 0);
-  EXPECT_EQ(seen, kStudies);
-  EXPECT_EQ(pages, 3);
-}
-
-TEST_F(ManyStudiesTest, APageIsAsShortAsAskedAndNeverLongerThanTheServersOwn) {
-  request_unchecked(status_request(0, 10));
-  EXPECT_EQ(last_reply().status().studies_size(), 10);
-  request_unchecked(status_request(0, 1'000'000));
-  EXPECT_EQ(last_reply().status().studies_size(), 1000);
-}
-
-TEST_F(ManyStudiesTest, OnlyStudiesOfWhichPointsAreSettledAreSampledForTheirRate) {
-  service_->tick(now_);
-  EXPECT_EQ(service_->rates().studies(), 0U);
-  hello();
-  credit(1);
-  answer_batch(1000);
-  service_->tick(now_);
-  EXPECT_EQ(service_->rates().studies(), 1U);
-  for (int i = 0; i < 200; ++i) {
-    now_.steady_ms += 100;
-    service_->tick(now_);
   }
-  EXPECT_EQ(service_->rates().studies(), 0U) << "it rests again";
+  EXPECT_EQ(statuses(0, 10).studies_size(), 10);
+  EXPECT_EQ(statuses(0, 1'000'000).studies_size(), 1000);
 }
 
 TEST_F(ServiceTest, WorkersComeInPagesToo) {
   for (int i = 0; i < 1500; ++i) {
     hello("worker " + std::to_string(i));
   }
-  ClientRequest message;
-  message.set_protocol_version(protocol::kProtocolVersion);
-  message.mutable_workers();
-  request(message);
-  ASSERT_EQ(last_reply().workers().workers_size(), 1000);
-  message.mutable_workers()->set_after_worker_id(last_reply().workers().next_after());
-  request(message);
-  EXPECT_EQ(last_reply().workers().workers_size(), 500);
+  const auto page = workers();
+  ASSERT_EQ(page.workers_size(), 1000);
+  EXPECT_EQ(workers(page.next_after()).workers_size(), 500);
   EXPECT_EQ(last_reply().workers().next_after(), 0U);
 }
 

@@ -21,34 +21,24 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// Keeps what the service sends, and writes only when told to.
-class FakeOutbox final : public Outbox {
+/// Keeps what the service sends. Writes, queries and checks have an outcome when the test says so.
+class FakePorts final : public Ports {
  public:
-  Delivery to_worker(const std::string& identity, const ServerToWorker& message) override {
+  Delivery to_worker(const std::string& identity, const std::string& frame) override {
     if (identity == unreachable) {
       return Delivery::kGone;
     }
-    worker_messages.push_back(message);
+    EXPECT_TRUE(protocol::decode(frame, worker_messages.emplace_back()));
     return identity == busy ? Delivery::kBusy : Delivery::kSent;
   }
-  Delivery forward_to_worker(const std::string& identity, const std::string& frame) override {
-    ServerToWorker message;
-    EXPECT_TRUE(protocol::decode(frame, message));
-    return to_worker(identity, message);
-  }
   bool is_busy(const std::string& identity) const override { return identity == busy; }
-  bool has_unheard(const std::string& identity) const override { return identity == unheard; }
-  bool to_client(const std::string& identity, const ClientReply& reply) override {
+  bool has_unread_input(const std::string& identity) const override { return identity == unheard; }
+  bool to_client(const std::string& identity, const std::string& frame) override {
     if (identity == unreachable) {
       return false;
     }
-    replies.push_back(reply);
+    EXPECT_TRUE(protocol::decode(frame, replies.emplace_back()));
     return true;
-  }
-  bool forward_to_client(const std::string& identity, const std::string& frame) override {
-    ClientReply reply;
-    EXPECT_TRUE(protocol::decode(frame, reply));
-    return to_client(identity, reply);
   }
   void write(WriteJob job) override { jobs.push_back(std::move(job)); }
   bool query(QueryJob job) override {
@@ -56,14 +46,11 @@ class FakeOutbox final : public Outbox {
     return queries.size() < 3;
   }
   void more_rows(std::uint64_t ticket, std::uint64_t taken) override {
-    wishes.emplace_back(ticket, taken);
+    more.emplace_back(ticket, taken);
   }
   void cancel_query(std::uint64_t ticket) override { cancelled_queries.push_back(ticket); }
-  void read(ReadJob job) override { reads.push_back(std::move(job)); }
-  void note(Severity, const std::string& text) override {
-    ++notes;
-    log.push_back(text);
-  }
+  void run_check(Check check) override { checks.push_back(std::move(check)); }
+  void log(Severity, const std::string& text) override { lines.push_back(text); }
 
   std::string unreachable;
   std::string busy;
@@ -73,45 +60,60 @@ class FakeOutbox final : public Outbox {
   std::vector<WriteJob> jobs;
   std::vector<QueryJob> queries;
   std::vector<std::uint64_t> cancelled_queries;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> wishes;  // ticket, chunks taken
-  std::vector<ReadJob> reads;
-  int notes = 0;
-  std::vector<std::string> log;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> more;  // ticket, chunks taken
+  std::vector<Check> checks;
+  std::vector<std::string> lines;  // of the log
 };
+
+inline ClientRequest client_request(std::uint64_t request_id = 0) {
+  ClientRequest message;
+  message.set_protocol_version(protocol::kProtocolVersion);
+  message.set_request_id(request_id);
+  return message;
+}
 
 class ServiceTest : public testing::Test {
  protected:
-  ServiceTest() {
-    ServiceSettings settings;
+  ServiceTest() { start({}); }
+
+  /// Another server starts, on a database with these studies.
+  void start(ServiceSettings settings, std::vector<StoredStudy> studies = {}) {
     settings.solver_version = "1.0";
     settings.database_id = "db";
-    service_.emplace(settings, outbox_, std::vector<StoredStudy>{}, now_);
+    service_.emplace(settings, ports_, std::move(studies), now_);
   }
 
   void request(const ClientRequest& message,
-               const std::shared_ptr<const KeyHolder>& holder = nullptr) {
+               const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     service_->client_frame("client", protocol::encode(message), now_, holder);
     service_->scheduler().check_invariants();
   }
   /// Results of other studies are not reused.
   ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(42);
+    ClientRequest message = client_request(42);
     message.mutable_submit()->set_name(name);
     *message.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
     message.mutable_submit()->set_no_reuse(true);
     return message;
   }
+  /// Submits a study, which is stored.
+  void submit(const std::string& name, std::uint64_t points = 10) {
+    request(submit_request(name, points));
+    write_all();
+  }
   ClientRequest change_request(const std::string& name, protocol::StudyChange change) {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
+    ClientRequest message = client_request();
     message.mutable_change()->set_study(name);
     message.mutable_change()->set_change(change);
     return message;
   }
   ClientRequest cancel_request(const std::string& name) {
     return change_request(name, protocol::STUDY_CHANGE_CANCEL);
+  }
+  /// A change that is stored.
+  void change(const std::string& name, protocol::StudyChange change) {
+    request(change_request(name, change));
+    write_all();
   }
   /// Results of the points of the last batch, failed ones from `first_failed` on.
   void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
@@ -145,6 +147,11 @@ class ServiceTest : public testing::Test {
     service_->worker_frame(identity, protocol::encode(message), now_);
     service_->scheduler().check_invariants();
   }
+  /// A worker joins and gets a batch.
+  void hello_and_credit() {
+    hello();
+    credit(1);
+  }
   void hello(const std::string& identity = "worker", const std::string& solver = "1.0") {
     WorkerMessage message;
     protocol::say_protocol(*message.mutable_hello());
@@ -157,16 +164,28 @@ class ServiceTest : public testing::Test {
     message.mutable_credit()->set_batches(batches);
     worker_says(message, identity);
   }
+  protocol::StatusReply statuses(std::uint64_t after = 0, std::uint32_t limit = 0) {
+    ClientRequest message = client_request();
+    message.mutable_status()->set_after_study_id(after);
+    message.mutable_status()->set_limit(limit);
+    service_->client_frame("client", protocol::encode(message), now_);
+    return last_reply().status();
+  }
+  protocol::WorkersReply workers(std::uint64_t after = 0) {
+    ClientRequest message = client_request();
+    message.mutable_workers()->set_after_worker_id(after);
+    service_->client_frame("client", protocol::encode(message), now_);
+    return last_reply().workers();
+  }
   protocol::StudyStatus status_of(const std::string& name) {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
+    ClientRequest message = client_request();
     message.mutable_status()->set_study(name);
     request(message);
     return last_reply().status().studies(0);
   }
   /// All that waits is written, and fails with `error` unless that is empty.
   void write_all(const std::string& error = {}) {
-    for (const WriteJob& job : std::exchange(outbox_.jobs, {})) {
+    for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
       const bool refused = !error.empty() && job.answer_failure;
       service_->written(
           {refused ? WriteReport::Kind::kRefused : WriteReport::Kind::kStored, job.ticket, error},
@@ -176,27 +195,34 @@ class ServiceTest : public testing::Test {
   }
   /// The query that was asked `index`-th gets that answer.
   void answer_query(std::size_t index, const std::string& reply) {
-    service_->queried({QueryReport::Kind::kAnswered, outbox_.queries.at(index).ticket, reply});
+    service_->query_report({QueryReport::Kind::kAnswered, ports_.queries.at(index).ticket, reply});
   }
-  /// Long requests that wait are read.
-  void read_all() {
-    for (const ReadJob& job : std::exchange(outbox_.reads, {})) {
-      service_->request_read({job.ticket, read_request(job.frame)}, now_);
+  /// Runs the checks that wait.
+  void run_checks() {
+    for (const Ports::Check& check : std::exchange(ports_.checks, {})) {
+      service_->check_done(check(), now_);
     }
     service_->scheduler().check_invariants();
   }
+  /// Time passes in ticks.
+  void pass(std::int64_t duration_ms) {
+    for (const std::int64_t end_ms = now_.steady_ms + duration_ms; now_.steady_ms < end_ms;) {
+      now_.steady_ms += 100;
+      service_->tick(now_);
+    }
+  }
   ClientReply last_reply() {
-    EXPECT_FALSE(outbox_.replies.empty());
-    return outbox_.replies.empty() ? ClientReply() : outbox_.replies.back();
+    EXPECT_FALSE(ports_.replies.empty());
+    return ports_.replies.empty() ? ClientReply() : ports_.replies.back();
   }
   ServerToWorker last_message() {
-    EXPECT_FALSE(outbox_.worker_messages.empty());
-    return outbox_.worker_messages.empty() ? ServerToWorker() : outbox_.worker_messages.back();
+    EXPECT_FALSE(ports_.worker_messages.empty());
+    return ports_.worker_messages.empty() ? ServerToWorker() : ports_.worker_messages.back();
   }
 
   std::uint64_t sequence_ = 0;
   Instant now_{1000, 1'700'000'000'123};
-  FakeOutbox outbox_;
+  FakePorts ports_;
   std::optional<Service> service_;
 };
 

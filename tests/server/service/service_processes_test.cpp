@@ -1,4 +1,4 @@
-// Connections and the worker processes behind them, probes, and workers of the previous protocol.
+// Connections and the worker processes behind them, and probes.
 #include <algorithm>
 #include <string>
 
@@ -23,38 +23,22 @@ class ProcessesTest : public ServiceTest {
     message.mutable_hello()->set_process_id(process_id);
     worker_says(message, identity);
   }
-  protocol::WorkersReply workers() {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.mutable_workers();
-    request(message);
-    return last_reply().workers();
-  }
-  /// The worker at `identity` solves a batch and says goodbye.
-  void solve_and_leave(const std::string& identity) {
-    credit(1, identity);
-    answer_batch(1000, identity);
-    WorkerMessage goodbye;
-    goodbye.mutable_goodbye();
-    worker_says(goodbye, identity);
-  }
   /// Three newcomers get batches and are gone.
   void let_newcomers_vanish() {
     for (const char* identity : {"x", "y", "z"}) {
       hello_as(identity, identity);
       credit(1, identity);
       EXPECT_TRUE(last_message().has_batch());
-      outbox_.unreachable = identity;
+      ports_.unreachable = identity;
       now_.steady_ms += 1200;
       service_->tick(now_);
     }
-    outbox_.unreachable.clear();
+    ports_.unreachable.clear();
   }
 };
 
 TEST_F(ProcessesTest, AProcessOnANewConnectionGetsAtOnceWhatItHeldOnTheOldOne) {
-  request(submit_request("a", 1));
-  write_all();
+  submit("a", 1);
   hello_as("first", "process 1");
   credit(1, "first");
   hello_as("second", "process 1");
@@ -66,8 +50,7 @@ TEST_F(ProcessesTest, AProcessOnANewConnectionGetsAtOnceWhatItHeldOnTheOldOne) {
 }
 
 TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
-  request(submit_request("a", 100));
-  write_all();
+  submit("a", 100);
   hello_as("first", "process 1");
   credit(2, "first");
   hello_as("second", "process 1");
@@ -78,8 +61,7 @@ TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
 }
 
 TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAcknowledged) {
-  request(submit_request("a", 100));
-  write_all();
+  submit("a", 100);
   let_newcomers_vanish();
   hello_as("worker", "sound");
   EXPECT_TRUE(workers().workers(0).set_aside());
@@ -88,7 +70,7 @@ TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAc
   const auto batch = last_message().batch();
   EXPECT_EQ(batch.study_id(), 0U);
   EXPECT_EQ(points_of(batch).size(), 1U);
-  const auto& definition = outbox_.worker_messages.at(outbox_.worker_messages.size() - 2);
+  const auto& definition = ports_.worker_messages.at(ports_.worker_messages.size() - 2);
   ASSERT_TRUE(definition.has_study());
   EXPECT_EQ(definition.study().study_id(), 0U);
   EXPECT_EQ(protocol::PointTable(definition.study().recipe()).size(), 1U);
@@ -102,12 +84,10 @@ TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAc
 }
 
 TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
-  request(submit_request("a", 1));
-  write_all();
+  submit("a", 1);
   hello_as("slow", "slow", "slow");
   credit(1, "slow");
-  hello();
-  credit(1);
+  hello_and_credit();
   for (int i = 0; i < 8 && !last_message().has_batch(); ++i) {
     now_.steady_ms += 250;
     credit(0, "slow");
@@ -117,21 +97,9 @@ TEST_F(ProcessesTest, ABatchThatAnotherWorkerSolvedIsReleased) {
   ASSERT_TRUE(last_message().has_batch());
   answer_batch(1);
   const auto releases =
-      std::count_if(outbox_.worker_messages.begin(), outbox_.worker_messages.end(),
+      std::count_if(ports_.worker_messages.begin(), ports_.worker_messages.end(),
                     [](const ServerToWorker& message) { return message.has_release(); });
   EXPECT_EQ(releases, 1);
-}
-
-TEST_F(ProcessesTest, ABatchMayBeOfSeveralModels) {
-  ClientRequest submit = submit_request("models");
-  *submit.mutable_submit()->mutable_recipe() =
-      protocol::recipe_of({{protocol::range("k", 1e7, 2e7, 100), protocol::listed("H", {1.0}),
-                            protocol::listed("mu", {0.4}), protocol::listed("e", {1.0})}});
-  request(submit);
-  write_all();
-  hello();
-  credit(1);
-  EXPECT_EQ(points_of(last_message().batch()).size(), 8U);
 }
 
 }  // namespace

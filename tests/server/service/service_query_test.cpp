@@ -9,48 +9,39 @@ namespace {
 
 class ServiceQueryTest : public ServiceTest {
  protected:
-  void ask(std::uint64_t request_id, const std::string& identity = "client") {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(request_id);
-    message.mutable_query()->set_sql("SELECT 1");
+  void send(const ClientRequest& message, const std::string& identity) {
     service_->client_frame(identity, protocol::encode(message), now_);
+  }
+  void ask(std::uint64_t request_id, const std::string& identity = "client") {
+    ClientRequest message = client_request(request_id);
+    message.mutable_query()->set_sql("SELECT 1");
+    send(message, identity);
   }
   void want_more(std::uint64_t request_id, std::uint64_t taken,
                  const std::string& identity = "client") {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(request_id);
+    ClientRequest message = client_request(request_id);
     message.mutable_more_rows()->set_request_id(request_id);
     message.mutable_more_rows()->set_taken(taken);
-    service_->client_frame(identity, protocol::encode(message), now_);
+    send(message, identity);
   }
   void end(std::uint64_t request_id, const std::string& identity = "client") {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(request_id);
+    ClientRequest message = client_request(request_id);
     message.mutable_end_query()->set_request_id(request_id);
-    service_->client_frame(identity, protocol::encode(message), now_);
+    send(message, identity);
   }
   /// A reader gives another chunk of the answer.
   void give(std::size_t index) {
     protocol::QueryReply chunk;
     chunk.set_chunk_rows(1);
-    service_->queried({QueryReport::Kind::kRows, outbox_.queries.at(index).ticket,
-                       protocol::reply_around(protocol::encode(chunk))});
-  }
-  void pass(std::int64_t duration_ms) {
-    for (const std::int64_t end_ms = now_.steady_ms + duration_ms; now_.steady_ms < end_ms;) {
-      now_.steady_ms += 100;
-      service_->tick(now_);
-    }
+    service_->query_report({QueryReport::Kind::kRows, ports_.queries.at(index).ticket,
+                            protocol::reply_around(protocol::encode(chunk))});
   }
 };
 
 TEST_F(ServiceQueryTest, AnAnswerGoesToTheOneWhoAskedUnderItsNumber) {
   ask(7);
-  ASSERT_EQ(outbox_.queries.size(), 1U);
-  EXPECT_EQ(outbox_.queries[0].client, "client");
+  ASSERT_EQ(ports_.queries.size(), 1U);
+  EXPECT_EQ(ports_.queries[0].client, "client");
   protocol::QueryReply rows;
   rows.add_columns("a");
   answer_query(0, protocol::reply_around(protocol::encode(rows)));
@@ -61,40 +52,40 @@ TEST_F(ServiceQueryTest, AnAnswerGoesToTheOneWhoAskedUnderItsNumber) {
 TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
   ask(7);
   pass(900);
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   pass(100);
-  ASSERT_EQ(outbox_.replies.size(), 1U);
+  ASSERT_EQ(ports_.replies.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), UINT64_MAX);
   EXPECT_EQ(last_reply().still_working().request_id(), 7U);
   EXPECT_FALSE(last_reply().still_working().runs());
-  service_->queried({QueryReport::Kind::kBegun, outbox_.queries[0].ticket, {}});
+  service_->query_report({QueryReport::Kind::kBegun, ports_.queries[0].ticket, {}});
   pass(1000);
-  ASSERT_EQ(outbox_.replies.size(), 2U);
+  ASSERT_EQ(ports_.replies.size(), 2U);
   EXPECT_TRUE(last_reply().still_working().runs());
   answer_query(0, encoded_error("no such column"));
-  const auto replies = outbox_.replies.size();
+  const auto replies = ports_.replies.size();
   pass(5000);
-  EXPECT_EQ(outbox_.replies.size(), replies);
+  EXPECT_EQ(ports_.replies.size(), replies);
 }
 
 TEST_F(ServiceQueryTest, TheQueryOfAClientThatIsGoneIsCancelled) {
   ask(7);
-  outbox_.unreachable = "client";
+  ports_.unreachable = "client";
   pass(1000);
-  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
   pass(5000);
-  EXPECT_EQ(outbox_.cancelled_queries.size(), 1U);
+  EXPECT_EQ(ports_.cancelled_queries.size(), 1U);
   answer_query(0, encoded_error("too late"));
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
 }
 
 TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesAreCancelledAtOnceAndNobodyElses) {
   ask(7);
   ask(8, "another");
   service_->client_left("client");
-  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
   answer_query(0, encoded_error("too late"));
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   answer_query(1, encoded_error("in time"));
   EXPECT_EQ(last_reply().request_id(), 8U);
 }
@@ -102,9 +93,9 @@ TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesAreCancelledAtOnceAndNobod
 TEST_F(ServiceQueryTest, AQueryAskedTwiceUnderOneNumberRunsOnce) {
   ask(7);
   ask(7);
-  EXPECT_EQ(outbox_.queries.size(), 1U);
+  EXPECT_EQ(ports_.queries.size(), 1U);
   ask(7, "another");
-  EXPECT_EQ(outbox_.queries.size(), 2U);
+  EXPECT_EQ(ports_.queries.size(), 2U);
 }
 
 TEST_F(ServiceQueryTest, AStoppingServerAnswersThoseWhoWait) {
@@ -113,26 +104,26 @@ TEST_F(ServiceQueryTest, AStoppingServerAnswersThoseWhoWait) {
   EXPECT_EQ(last_reply().request_id(), 7U);
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("stopping"));
   ask(8);
-  EXPECT_EQ(outbox_.queries.size(), 1U);
+  EXPECT_EQ(ports_.queries.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), 8U);
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("stopping"));
 }
 
 TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReaders) {
-  using Wishes = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
+  using Taken = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
   ask(7);
   give(0);
   give(0);
-  EXPECT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_EQ(ports_.replies.size(), 2U);
   EXPECT_EQ(last_reply().request_id(), 7U);
   want_more(7, 1);
   want_more(7, 1);
   want_more(7, 2);
   want_more(7, 1);
-  const std::uint64_t ticket = outbox_.queries[0].ticket;
-  EXPECT_EQ(outbox_.wishes, (Wishes{{ticket, 1}, {ticket, 2}}));
+  const std::uint64_t ticket = ports_.queries[0].ticket;
+  EXPECT_EQ(ports_.more, (Taken{{ticket, 1}, {ticket, 2}}));
   answer_query(0, protocol::reply_around({}));
-  EXPECT_EQ(outbox_.replies.size(), 3U);
+  EXPECT_EQ(ports_.replies.size(), 3U);
   want_more(7, 3);
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("no answer"));
   EXPECT_EQ(last_reply().request_id(), 7U);
@@ -143,8 +134,8 @@ TEST_F(ServiceQueryTest, WhoSaysToHaveTakenWhatWasNotGivenLosesTheAnswer) {
   give(0);
   want_more(7, UINT64_MAX);
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("than was given"));
-  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
-  EXPECT_TRUE(outbox_.wishes.empty());
+  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
+  EXPECT_TRUE(ports_.more.empty());
 }
 
 TEST_F(ServiceQueryTest, AnswersOfOthersCanBeNeitherTakenNorEnded) {
@@ -153,19 +144,19 @@ TEST_F(ServiceQueryTest, AnswersOfOthersCanBeNeitherTakenNorEnded) {
   want_more(7, 1, "another");
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("no answer"));
   end(7, "another");
-  EXPECT_TRUE(outbox_.wishes.empty());
-  EXPECT_TRUE(outbox_.cancelled_queries.empty());
+  EXPECT_TRUE(ports_.more.empty());
+  EXPECT_TRUE(ports_.cancelled_queries.empty());
 }
 
 TEST_F(ServiceQueryTest, AnAnswerThatItsClientEndsIsCancelledWithoutAReply) {
   ask(7);
   give(0);
   end(7);
-  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
   give(0);
-  EXPECT_EQ(outbox_.replies.size(), 1U);
+  EXPECT_EQ(ports_.replies.size(), 1U);
   end(7);
-  EXPECT_EQ(outbox_.replies.size(), 1U);
+  EXPECT_EQ(ports_.replies.size(), 1U);
 }
 
 TEST_F(ServiceQueryTest, NobodyIsToldToWaitWhileHeIsWaitedFor) {
@@ -174,7 +165,7 @@ TEST_F(ServiceQueryTest, NobodyIsToldToWaitWhileHeIsWaitedFor) {
     give(0);
   }
   pass(10'000);
-  EXPECT_EQ(outbox_.replies.size(), kChunksAhead);
+  EXPECT_EQ(ports_.replies.size(), kChunksAhead);
   want_more(7, 1);
   pass(1000);
   EXPECT_TRUE(last_reply().has_still_working());
@@ -182,9 +173,9 @@ TEST_F(ServiceQueryTest, NobodyIsToldToWaitWhileHeIsWaitedFor) {
 
 TEST_F(ServiceQueryTest, APartThatCannotBeDeliveredCancelsTheQuery) {
   ask(7);
-  outbox_.unreachable = "client";
+  ports_.unreachable = "client";
   give(0);
-  EXPECT_EQ(outbox_.cancelled_queries, std::vector{outbox_.queries[0].ticket});
+  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
 }
 
 }  // namespace

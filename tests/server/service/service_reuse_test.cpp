@@ -10,7 +10,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::SizeIs;
 
 class ServiceReuseTest : public ServiceTest {
  protected:
@@ -39,7 +38,7 @@ class ServiceReuseTest : public ServiceTest {
   /// The first points of the parts that wait for the writer.
   std::vector<std::uint64_t> parts() const {
     std::vector<std::uint64_t> firsts;
-    for (const WriteJob& job : outbox_.jobs) {
+    for (const WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
         firsts.push_back(part->first_point);
       }
@@ -48,7 +47,7 @@ class ServiceReuseTest : public ServiceTest {
   }
   /// The study of the end that waits for the writer; 0: none does.
   std::uint64_t ended() const {
-    for (const WriteJob& job : outbox_.jobs) {
+    for (const WriteJob& job : ports_.jobs) {
       if (const auto* end = std::get_if<EndReuse>(&job.change)) {
         return end->study_id;
       }
@@ -57,7 +56,7 @@ class ServiceReuseTest : public ServiceTest {
   }
   /// Writes what waits; this came of the part that is among it.
   void write_part(const ReusedResults& outcome) {
-    for (WriteJob& job : outbox_.jobs) {
+    for (WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
         *part->outcome = outcome;
       }
@@ -70,33 +69,30 @@ class ServiceReuseTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceReuseTest, WithoutAnyResultNothingIsLookedUp) {
-  request(reusing("a"));
+TEST_F(ServiceReuseTest, NothingIsLookedUpWithoutAnyResultOrForARequestWithoutReuse) {
+  request(reusing("first"));
   write_all();
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
   EXPECT_TRUE(last_reply().has_submit());
-}
-
-TEST_F(ServiceReuseTest, NothingIsLookedUpForARequestWithoutReuse) {
-  solve_some();
-  request(submit_request("b"));
-  write_all();
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  hello_and_credit();
+  answer_batch(1000);
+  submit("b");
+  EXPECT_THAT(ports_.jobs, IsEmpty());
   EXPECT_EQ(last_reply().submit().study_id(), kStudy);
 }
 
 TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
   solve_some();
   request(reusing("b"));
-  const std::size_t replies = outbox_.replies.size();
+  const std::size_t replies = ports_.replies.size();
   write_all();
   EXPECT_THAT(parts(), ElementsAre(0));
-  EXPECT_EQ(outbox_.replies.size(), replies);
-  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("known points to be taken over"));
+  EXPECT_EQ(ports_.replies.size(), replies);
+  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("the lookup of results of other studies"));
   write_part(copies_of_a(IntervalSet(0, 4), 6));
   EXPECT_THAT(parts(), ElementsAre(6));
   EXPECT_EQ(status_of("b").solved(), 4U);
-  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("4 so far"));
+  EXPECT_THAT(status_of("b").waits_for(), HasSubstr("4 reused so far"));
   write_part({});
   EXPECT_EQ(ended(), kStudy);
   write_all();
@@ -106,7 +102,7 @@ TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
   EXPECT_EQ(reply.taken().from(0).study(), "a");
   EXPECT_FALSE(status_of("b").taken().under_way());
   EXPECT_EQ(status_of("b").waits_for(), "");
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
 TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
@@ -118,17 +114,23 @@ TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
   EXPECT_TRUE(reply.taken().under_way());
 }
 
-TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesIsCutShort) {
-  submit_study();
-  const std::uint64_t half = TakeOvers::kMostProbesInVain / 2;
-  write_part({{}, {}, half, 1});
-  write_part(copies_of_a(IntervalSet(0, 1), 2));  // and the count begins again
-  write_part({{}, {}, half, 3});
-  EXPECT_THAT(parts(), ElementsAre(3));
-  write_part({{}, {}, half, 4});
-  EXPECT_EQ(ended(), kStudy);
-  write_all();
-  EXPECT_TRUE(last_reply().submit().taken().cut_short());
+TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShort) {
+  for (const bool is_long : {false, true}) {
+    start({});
+    submit_study();
+    const auto vain_part = [&](std::uint64_t next) {
+      now_.steady_ms += is_long ? ReuseTracker::kLongestInVain_ms / 2 : 0;
+      write_part({{}, {}, is_long ? 1 : ReuseTracker::kMostProbesInVain / 2, next});
+    };
+    vain_part(1);
+    write_part(copies_of_a(IntervalSet(0, 1), 2));  // and both begin again
+    vain_part(3);
+    EXPECT_THAT(parts(), ElementsAre(3));
+    vain_part(4);
+    EXPECT_EQ(ended(), kStudy);
+    write_all();
+    EXPECT_TRUE(last_reply().submit().taken().cut_short());
+  }
 }
 
 TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
@@ -138,18 +140,6 @@ TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
   write_all();
   EXPECT_TRUE(last_reply().submit().taken().cut_short());
   EXPECT_EQ(status_of("b").waits_for(), "");
-}
-
-TEST_F(ServiceReuseTest, ALookupThatFindsNothingForLongIsCutShort) {
-  submit_study();
-  now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
-  write_part(copies_of_a(IntervalSet(0, 1), 1));  // and the time begins again
-  now_.steady_ms += TakeOvers::kLongestInVain_ms - 1;
-  write_part({{}, {}, 1, 2});
-  EXPECT_THAT(parts(), ElementsAre(2));
-  now_.steady_ms += 1;
-  write_part({{}, {}, 1, 3});
-  EXPECT_EQ(ended(), kStudy);
 }
 
 TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
@@ -174,12 +164,12 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) 
   write_all();
   auto longer = reusing("b", 7);
   *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
-  const WriteJob part = outbox_.jobs.at(0);
-  outbox_.jobs.clear();
+  const WriteJob part = ports_.jobs.at(0);
+  ports_.jobs.clear();
   request(longer);
   write_all();
   EXPECT_THAT(parts(), IsEmpty()) << "one lookup of a study at a time";
-  outbox_.jobs.push_back(part);
+  ports_.jobs.push_back(part);
   write_part({});
   EXPECT_THAT(parts(), ElementsAre(0));
   EXPECT_TRUE(status_of("b").taken().under_way());
@@ -188,48 +178,36 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) 
   EXPECT_FALSE(status_of("b").taken().under_way());
 }
 
-TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledStudyIsTheLast) {
-  submit_study();
-  const WriteJob part = outbox_.jobs.at(0);
-  outbox_.jobs.clear();
-  request(cancel_request("b"));
-  write_all();
-  outbox_.jobs.push_back(part);
-  write_part(copies_of_a(IntervalSet(0, 4), 4));
-  EXPECT_EQ(ended(), kStudy);
-  write_all();
-  EXPECT_FALSE(status_of("b").taken().under_way());
-}
-
-TEST_F(ServiceReuseTest, OfADeletedStudyNothingMoreIsLookedUp) {
-  submit_study();
-  const WriteJob part = outbox_.jobs.at(0);
-  outbox_.jobs.clear();
-  request(change_request("b", protocol::STUDY_CHANGE_DELETE));
-  write_all();
-  outbox_.jobs.push_back(part);
-  write_part({{}, {}, 1, 4});
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
+  for (const auto change : {protocol::STUDY_CHANGE_CANCEL, protocol::STUDY_CHANGE_DELETE}) {
+    start({});
+    submit_study();
+    const WriteJob part = ports_.jobs.at(0);
+    ports_.jobs.clear();
+    request(change_request("b", change));
+    write_all();
+    ports_.jobs.push_back(part);
+    write_part(copies_of_a(IntervalSet(0, 4), 4));
+    EXPECT_EQ(ended(), change == protocol::STUDY_CHANGE_CANCEL ? kStudy : 0U);
+    write_all();
+  }
 }
 
 TEST_F(ServiceReuseTest, AServerThatStopsLeavesTheRestToTheNextOne) {
   submit_study();
   service_->drain(now_);
   write_part(copies_of_a(IntervalSet(0, 4), 4));
-  EXPECT_THAT(outbox_.jobs, IsEmpty());
+  EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
 TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
-  ServiceSettings settings;
-  settings.solver_version = "1.0";
   StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   source.completed = IntervalSet(0, 5);
   StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   pending.reuses = true;
   pending.reused = {{"a", 3}};
   pending.completed = IntervalSet(0, 3);
-  service_.reset();
-  service_.emplace(settings, outbox_, std::vector<StoredStudy>{source, pending}, now_);
+  start({}, {source, pending});
   EXPECT_THAT(parts(), ElementsAre(0));
   EXPECT_EQ(status_of("b").taken().points(), 3U);
   EXPECT_TRUE(status_of("b").taken().under_way());

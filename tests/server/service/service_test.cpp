@@ -12,7 +12,7 @@ using testing::HasSubstr;
 
 TEST_F(ServiceTest, AStudyIsAcknowledgedOnlyOnceItIsStored) {
   request(submit_request("a"));
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   write_all();
   const auto reply = last_reply();
   EXPECT_EQ(reply.request_id(), 42U);
@@ -21,15 +21,14 @@ TEST_F(ServiceTest, AStudyIsAcknowledgedOnlyOnceItIsStored) {
 }
 
 TEST_F(ServiceTest, WhileTheDatabaseStoresNothingForSecondsClientsAreToldSo) {
-  request(submit_request("a"));
-  write_all();
-  const std::size_t replies = outbox_.replies.size();
+  submit("a");
+  const std::size_t replies = ports_.replies.size();
   request(submit_request("b"));
   service_->tick(now_);
   now_.steady_ms += 4999;
   service_->tick(now_);
   request(submit_request("b"));
-  EXPECT_EQ(outbox_.replies.size(), replies) << "it may be stored in a moment";
+  EXPECT_EQ(ports_.replies.size(), replies) << "it may be stored in a moment";
   now_.steady_ms += 1;
   service_->tick(now_);
   request(submit_request("b"));
@@ -41,10 +40,8 @@ TEST_F(ServiceTest, WhileTheDatabaseStoresNothingForSecondsClientsAreToldSo) {
 }
 
 TEST_F(ServiceTest, TheStatusOfAStudySaysThatItsWorkersStoreNothing) {
-  request(submit_request("a", 1));
-  write_all();
-  hello();
-  credit(1);
+  submit("a", 1);
+  hello_and_credit();
   WorkerMessage heartbeat;
   heartbeat.mutable_heartbeat()->add_lease_ids(last_message().batch().lease_id());
   const auto pass = [&](int seconds) {
@@ -67,43 +64,16 @@ TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
   request(submit_request("a"));
   write_all("the disk is full");
   EXPECT_THAT(last_reply().error().message(), HasSubstr("the disk is full"));
-  request(submit_request("a", 20));
-  write_all();
+  submit("a", 20);
   EXPECT_EQ(last_reply().submit().points(), 20U);
 }
 
 TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
-  request(submit_request("a"));
-  write_all();
+  submit("a");
   request(submit_request("a"));
   EXPECT_FALSE(last_reply().submit().created());
   request(submit_request("a", 11));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
-}
-
-TEST_F(ServiceTest, TheSameBlocksWrittenInAnotherWayAreTheSameStudy) {
-  request(submit_request("a"));
-  write_all();
-  ClientRequest written = submit_request("a");
-  auto& recipe = *written.mutable_submit()->mutable_recipe();
-  auto& H = *recipe.mutable_blocks(0)->mutable_axes(0);
-  ASSERT_EQ(H.values_size(), 1);
-  H = protocol::range("H", H.values(0), H.values(0), 1);
-  request(written);
-  EXPECT_FALSE(last_reply().submit().created());
-  EXPECT_EQ(last_reply().submit().study_id(), 1U);
-  recipe.mutable_model()->set_k_n_m(1e7);
-  request(written);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("model, k: stored 2.7e+07, given 1e+07"));
-}
-
-TEST_F(ServiceTest, TwoWhoSubmitTheSameBeforeItIsStoredAreBothAnswered) {
-  request(submit_request("a"));
-  request(submit_request("a"));
-  write_all();
-  ASSERT_EQ(outbox_.replies.size(), 2U);
-  EXPECT_TRUE(outbox_.replies[0].submit().created());
-  EXPECT_FALSE(outbox_.replies[1].submit().created());
 }
 
 TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
@@ -116,53 +86,39 @@ TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
   request(bad);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
   bad = submit_request("a");
+  bad.mutable_submit()->set_priority(100'000);
+  request(bad);
+  EXPECT_THAT(last_reply().error().message(), HasSubstr("priority = 100000"));
+  bad = submit_request("a");
   bad.mutable_submit()->mutable_recipe()->clear_model();
   request(bad);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("the recipe has no model"));
-  EXPECT_TRUE(outbox_.jobs.empty());
+  EXPECT_TRUE(ports_.jobs.empty());
 }
 
 TEST_F(ServiceTest, CancellingIsAcknowledgedOnceItIsStoredAndSubmittingAgainGoesOn) {
-  request(submit_request("a"));
-  write_all();
-  outbox_.replies.clear();
+  submit("a");
+  ports_.replies.clear();
   request(cancel_request("a"));
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   write_all();
   EXPECT_EQ(last_reply().change().study().state(), "cancelled");
   request(cancel_request("a"));
   EXPECT_EQ(last_reply().change().study().state(), "cancelled");
-  request(submit_request("a"));
-  write_all();
+  submit("a");
   EXPECT_FALSE(last_reply().submit().created());
   EXPECT_FALSE(service_->scheduler().study(1).cancelled);
   request(cancel_request("b"));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("no study called \"b\""));
 }
 
-TEST_F(ServiceTest, ACancellationThatCouldNotBeStoredLeavesTheStudyRunning) {
-  request(submit_request("a"));
-  write_all();
-  request(cancel_request("a"));
-  write_all("the disk is full");
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("the disk is full"));
-  EXPECT_FALSE(service_->scheduler().study(1).cancelled);
-}
-
-TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndToldTheDatabase) {
+TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
+  credit(1);
+  EXPECT_TRUE(last_message().has_hello_again()) << "a stranger";
   hello();
   EXPECT_EQ(last_message().welcome().worker_id(), 1U);
   EXPECT_EQ(last_message().welcome().database_id(), "db");
   EXPECT_EQ(last_message().welcome().lost_after_ms(), 2800U);
-}
-
-TEST_F(ServiceTest, AnUnknownWorkerIsAskedToSayHelloAgain) {
-  credit(1);
-  EXPECT_TRUE(last_message().has_hello_again());
-}
-
-TEST_F(ServiceTest, AHeartbeatIsAnswered) {
-  hello();
   WorkerMessage message;
   message.mutable_heartbeat();
   worker_says(message);
@@ -170,10 +126,8 @@ TEST_F(ServiceTest, AHeartbeatIsAnswered) {
 }
 
 TEST_F(ServiceTest, AWorkerThatSaysHelloTwiceBeginsAnew) {
-  request(submit_request("a"));
-  write_all();
-  hello();
-  credit(1);
+  submit("a");
+  hello_and_credit();
   ASSERT_TRUE(last_message().has_batch());
   hello();
   EXPECT_EQ(service_->scheduler().workers(), 1U);
@@ -181,10 +135,8 @@ TEST_F(ServiceTest, AWorkerThatSaysHelloTwiceBeginsAnew) {
 }
 
 TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
-  request(submit_request("a", 1));
-  write_all();
-  hello();
-  credit(1);
+  submit("a", 1);
+  hello_and_credit();
   const auto batch = last_message().batch();
   WorkerMessage message;
   auto& results = *message.mutable_results();
@@ -196,58 +148,40 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
   *results.add_results() = solved(0);
   write_all();
   worker_says(message);
-  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
+  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), 9U);
   // Its end is noted in the database.
-  ASSERT_EQ(outbox_.jobs.size(), 1U);
-  EXPECT_EQ(std::get<SetStudyState>(outbox_.jobs[0].change).state, StudyState::kDone);
+  ASSERT_EQ(ports_.jobs.size(), 1U);
+  EXPECT_EQ(std::get<SetStudyState>(ports_.jobs[0].change).state, StudyState::kDone);
 }
 
-TEST_F(ServiceTest, AResultThatIsNotFiniteBecomesAFailedPoint) {
-  request(submit_request("a", 1));
-  write_all();
+TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFailedPoint) {
+  submit("a", 3);
   hello();
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
-  auto result = solved(0);
-  result.set_reals(4, std::numeric_limits<double>::quiet_NaN());
-  *message.mutable_results()->add_results() = result;
-  write_all();
+  for (std::uint64_t point = 0; point < 3; ++point) {
+    *message.mutable_results()->add_results() = solved(point);
+  }
+  auto& results = *message.mutable_results()->mutable_results();
+  results.at(0).set_h_m(std::nextafter(results.at(0).h_m(), 2.0));
+  results.at(1).set_h_m(1.001 * results.at(1).h_m());
+  results.at(2).set_reals(4, std::numeric_limits<double>::quiet_NaN());
   worker_says(message);
-  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
-  const auto& change = std::get<AddResults>(outbox_.jobs[1].change);
-  EXPECT_THAT(change.results.at(0).error(), HasSubstr("duration_s"));
-}
-
-TEST_F(ServiceTest, AResultOfOtherValuesThanItsPointHasBecomesAFailedPoint) {
-  request(submit_request("a", 2));
-  write_all();
-  hello();
-  WorkerMessage message;
-  message.mutable_results()->set_study_id(1);
-  auto result = solved(0);
-  result.set_h_m(std::nextafter(result.h_m(), 2.0));
-  *message.mutable_results()->add_results() = result;
-  result = solved(1);
-  result.set_h_m(1.001 * result.h_m());
-  *message.mutable_results()->add_results() = result;
-  write_all();
-  worker_says(message);
-  ASSERT_EQ(outbox_.jobs.size(), 2U) << "the worker's row and the results";
-  const auto& change = std::get<AddResults>(outbox_.jobs[1].change);
+  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
+  const auto& change = std::get<AddResults>(ports_.jobs[1].change);
   EXPECT_EQ(change.results.at(0).error(), "") << "another machine may round otherwise";
   EXPECT_THAT(change.results.at(1).error(), HasSubstr("H = 1.00"));
+  EXPECT_THAT(change.results.at(2).error(), HasSubstr("duration_s"));
   write_all();
-  EXPECT_EQ(service_->scheduler().study(1).failed, 1U);
+  EXPECT_EQ(service_->scheduler().study(1).failed, 2U);
 }
 
 TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
-  request(submit_request("a", 2));
-  write_all();
-  hello();
-  credit(1);
+  submit("a", 2);
+  hello_and_credit();
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
   message.mutable_results()->set_lease_id(last_message().batch().lease_id());
@@ -261,25 +195,14 @@ TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
   EXPECT_TRUE(service_->scheduler().worker(1, now_.steady_ms).is_proven);
 }
 
-TEST_F(ServiceTest, AWorkerThatCannotBeReachedLosesItsBatchAtOnce) {
-  request(submit_request("a"));
-  write_all();
-  hello();
-  outbox_.unreachable = "worker";
-  credit(1);
-  EXPECT_EQ(service_->scheduler().workers(), 0U);
-  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
-}
-
 TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
   service_->worker_frame("worker", "\xff\xff", now_);
   service_->worker_frame("worker", "", now_);
   EXPECT_EQ(service_->bad_frames(), 2U);
-  EXPECT_TRUE(outbox_.worker_messages.empty());
+  EXPECT_TRUE(ports_.worker_messages.empty());
   service_->client_frame("client", "\xff\xff", now_);
   EXPECT_TRUE(last_reply().has_error());
-  ClientRequest nothing;
-  nothing.set_protocol_version(protocol::kProtocolVersion);
+  ClientRequest nothing = client_request();
   request(nothing);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("kind of request"));
   nothing.set_protocol_version(protocol::kProtocolVersion + 1);
@@ -291,18 +214,17 @@ TEST_F(ServiceTest, NoFloodOfBadFramesFloodsTheLog) {
   for (int i = 0; i < 1000; ++i) {
     service_->worker_frame("worker", "\xff", now_);
   }
-  EXPECT_LE(outbox_.notes, 10);
+  EXPECT_LE(ports_.lines.size(), 10);
 }
 
 TEST_F(ServiceTest, TooManyQueriesAreRefused) {
-  ClientRequest message;
-  message.set_protocol_version(protocol::kProtocolVersion);
+  ClientRequest message = client_request();
   message.mutable_query()->set_sql("SELECT 1");
   for (std::uint64_t id = 1; id <= 2; ++id) {
     message.set_request_id(id);
     request(message);
   }
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   message.set_request_id(3);
   request(message);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("too many queries"));
@@ -313,8 +235,7 @@ TEST_F(ServiceTest, TooManyQueriesAreRefused) {
 }
 
 TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
-  request(submit_request("a", 1000));
-  write_all();
+  submit("a", 1000);
   hello();
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
@@ -325,25 +246,20 @@ TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
   worker_says(message);
   write_all();
   now_.steady_ms += 500;
-  ClientRequest status;
-  status.set_protocol_version(protocol::kProtocolVersion);
-  status.mutable_status()->set_study("a");
-  request(status);
-  ASSERT_EQ(last_reply().status().studies_size(), 1);
-  EXPECT_EQ(last_reply().status().studies(0).solved(), 100U);
-  EXPECT_DOUBLE_EQ(last_reply().status().studies(0).points_per_s(), 200.0);
-  EXPECT_EQ(last_reply().status().studies(0).created_at(), "2023-11-14T22:13:20.123Z");
+  const auto status = status_of("a");
+  EXPECT_EQ(status.solved(), 100U);
+  EXPECT_DOUBLE_EQ(status.points_per_s(), 200.0);
+  EXPECT_EQ(status.created_at(), "2023-11-14T22:13:20.123Z");
 }
 
 TEST_F(ServiceTest, AServerThatStopsTellsItsWorkersAndHandsOutNothing) {
-  request(submit_request("a"));
-  write_all();
+  submit("a");
   hello();
   service_->stop(now_);
   EXPECT_TRUE(last_message().has_stopping());
-  const auto before = outbox_.worker_messages.size();
+  const auto before = ports_.worker_messages.size();
   credit(1);
-  EXPECT_EQ(outbox_.worker_messages.size(), before);
+  EXPECT_EQ(ports_.worker_messages.size(), before);
   request(submit_request("b"));
   EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
 }

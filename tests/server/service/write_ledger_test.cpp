@@ -1,195 +1,120 @@
 #include "server/service/write_ledger.h"
 
-#include <utility>
-
-#include <gtest/gtest.h>
+#include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
 namespace {
 
-class KeptJobs final : public ToWriter {
- public:
-  void write(WriteJob job) override { jobs.push_back(std::move(job)); }
-  std::vector<WriteJob> jobs;
-};
-
 class WriteLedgerTest : public testing::Test {
  protected:
-  /// A message of that worker with so many bytes of results.
-  void write_results(WorkerId worker, std::size_t bytes) {
-    ledger_.write(AddResults{}, ResultsWrite{{worker, 1, ++sequence_, {}}, 1, bytes});
+  static LedgerLimits small() { return {.bytes = 200, .writes = 24}; }
+
+  /// A results message of so many bytes.
+  void write_results(std::size_t bytes) {
+    AddResults change{};
+    change.message_bytes = bytes;
+    ledger_.write(std::move(change), [this](Instant) { outcomes_.emplace_back("results"); });
   }
+  /// A change that a client waits for.
   void write_change() {
-    ledger_.write(SetStudyState{1, StudyState::kPaused, ""},
-                  StateWrite{1, StudyState::kPaused, client_, false});
+    ledger_.write(
+        SetStudyState{1, StudyState::kPaused, ""},
+        [this](Instant) { outcomes_.emplace_back("change"); },
+        [this](const std::string& error, Instant) { outcomes_.push_back(error); });
   }
-  std::optional<Meaning> settle_first() {
-    const std::uint64_t ticket = writer_.jobs.front().ticket;
-    writer_.jobs.erase(writer_.jobs.begin());
-    return ledger_.settle(ticket);
-  }
-
-  static LedgerLimits small() {
-    LedgerLimits limits;
-    limits.most_messages_of_worker = 3;
-    limits.bytes_of_worker = 100;
-    limits.bytes = 150;
-    limits.bytes_to_hold = 50;
-    limits.messages_to_hold = 6;
-    limits.most_changes = 2;
-    return limits;
+  void store_first() {
+    ledger_.stored(ports_.jobs.front().ticket, now_);
+    ports_.jobs.erase(ports_.jobs.begin());
   }
 
-  KeptJobs writer_;
-  WriteLedger ledger_{small(), writer_};
-  std::uint64_t sequence_ = 0;
-  Client client_{"client", 7};
+  const Instant now_{};
+  FakePorts ports_;
+  WriteLedger ledger_{small(), ports_};
+  std::vector<std::string> outcomes_;
 };
 
-TEST_F(WriteLedgerTest, AWriteIsGivenBackOnceWithWhatItStandsFor) {
-  write_results(4, 10);
+TEST_F(WriteLedgerTest, EachWriteHasOneOutcome) {
+  write_results(10);
   write_change();
-  ASSERT_EQ(writer_.jobs.size(), 2U);
-  EXPECT_NE(writer_.jobs[0].ticket, writer_.jobs[1].ticket);
-  const auto change = ledger_.settle(writer_.jobs[1].ticket);
-  ASSERT_TRUE(change.has_value());
-  EXPECT_EQ(std::get<StateWrite>(*change).client, client_);
-  const auto results = ledger_.settle(writer_.jobs[0].ticket);
-  ASSERT_TRUE(results.has_value());
-  EXPECT_EQ(std::get<ResultsWrite>(*results).event.worker, 4U);
-  EXPECT_EQ(ledger_.settle(writer_.jobs[0].ticket), std::nullopt);
-  EXPECT_EQ(ledger_.settle(999), std::nullopt);
+  write_change();
+  ASSERT_EQ(ports_.jobs.size(), 3U);
+  EXPECT_FALSE(ports_.jobs[0].answer_failure) << "results are tried until they are stored";
+  EXPECT_TRUE(ports_.jobs[1].answer_failure) << "a client waits";
+  ledger_.stored(ports_.jobs[1].ticket, now_);
+  ledger_.refused(ports_.jobs[2].ticket, "the disk is full", now_);
+  ledger_.stored(ports_.jobs[0].ticket, now_);
+  ledger_.stored(ports_.jobs[0].ticket, now_);
+  ledger_.refused(999, "unknown", now_);
+  EXPECT_EQ(outcomes_, (std::vector<std::string>{"change", "the disk is full", "results"}));
   EXPECT_TRUE(ledger_.is_empty());
 }
 
-TEST_F(WriteLedgerTest, OnlyWhereAClientWaitsIsAFailureReportedAtOnce) {
-  ledger_.write(AddResults{}, ResultsWrite{});
-  ledger_.write(AddWorker{}, QuietWrite{});
-  ledger_.write(AddStudy{}, StudyWrite{});
-  ledger_.write(SetStudyState{}, StateWrite{});
-  ledger_.write(SetPriority{}, PriorityWrite{});
-  ledger_.write(ForgetFailures{}, FailuresWrite{});
-  std::vector<bool> reported;
-  for (const WriteJob& job : writer_.jobs) {
-    reported.push_back(job.answer_failure);
+TEST_F(WriteLedgerTest, BatchesAreHeldFromAQuarterOfTheBytesUntilHalfOfThatIsStored) {
+  for (const std::size_t bytes : {20U, 10U, 19U}) {
+    write_results(bytes);
   }
-  EXPECT_EQ(reported, (std::vector<bool>{false, false, true, true, true, true}));
-}
-
-TEST_F(WriteLedgerTest, ChangesOfClientsAreBoundedUntilSomeAreSettled) {
-  write_results(1, 0);
-  ledger_.write(AddWorker{}, QuietWrite{});
-  write_change();
-  EXPECT_FALSE(ledger_.takes_no_change());
-  write_change();
-  EXPECT_TRUE(ledger_.takes_no_change());
-  settle_first();
-  settle_first();
-  EXPECT_TRUE(ledger_.takes_no_change()) << "those were not of clients";
-  settle_first();
-  EXPECT_FALSE(ledger_.takes_no_change());
-}
-
-TEST_F(WriteLedgerTest, BatchesAreHeldFromTheBoundInBytesUntilHalfOfThemAreStored) {
-  write_results(1, 20);
-  write_results(2, 10);
-  write_results(1, 19);
   EXPECT_FALSE(ledger_.holds_batches());
-  write_results(2, 1);
+  write_results(1);
   EXPECT_TRUE(ledger_.holds_batches());
-  settle_first();
+  store_first();
   EXPECT_TRUE(ledger_.holds_batches()) << "30 bytes wait";
-  settle_first();
-  EXPECT_FALSE(ledger_.holds_batches()) << "20 wait, less than half";
-  write_results(1, 20);
-  EXPECT_FALSE(ledger_.holds_batches()) << "40: until the bound again";
+  store_first();
+  EXPECT_FALSE(ledger_.holds_batches()) << "20 bytes wait";
+  write_results(20);
+  EXPECT_FALSE(ledger_.holds_batches()) << "40 bytes wait";
 }
 
-TEST_F(WriteLedgerTest, BatchesAreHeldFromTheBoundInMessagesUntilHalfOfThemAreStored) {
-  for (WorkerId worker = 1; worker <= 6; ++worker) {
+TEST_F(WriteLedgerTest, BatchesAreHeldFromAQuarterOfTheWritesUntilHalfOfThatIsStored) {
+  for (int i = 0; i < 6; ++i) {
     EXPECT_FALSE(ledger_.holds_batches());
-    write_results(worker, 0);
+    write_results(0);
   }
-  for (int left = 5; left >= 3; --left) {
-    EXPECT_TRUE(ledger_.holds_batches());
-    settle_first();
+  for (int left = 6; left >= 3; --left) {
+    EXPECT_TRUE(ledger_.holds_batches()) << left;
+    store_first();
   }
-  EXPECT_TRUE(ledger_.holds_batches());
-  settle_first();
   EXPECT_FALSE(ledger_.holds_batches());
 }
 
-TEST_F(WriteLedgerTest, TheBoundsOfADiskThatIsBehindAre16MiBAnd20000Messages) {
-  const LedgerLimits limits;
-  EXPECT_EQ(limits.bytes_to_hold, std::size_t{16} * 1024 * 1024);
-  EXPECT_EQ(limits.messages_to_hold, 20'000U);
-}
-
-TEST_F(WriteLedgerTest, BatchesAreHeldWhileTheDatabaseTakesNothing) {
-  ledger_.note_fault("disk full");
+TEST_F(WriteLedgerTest, BatchesAreHeldDuringAFaultAndAfterItWhileTheDiskIsBehind) {
+  ledger_.set_fault("disk full");
   EXPECT_TRUE(ledger_.holds_batches());
   EXPECT_EQ(ledger_.fault(), "disk full");
-  ledger_.note_recovery();
-  EXPECT_FALSE(ledger_.holds_batches());
-  EXPECT_EQ(ledger_.fault(), "");
-}
-
-TEST_F(WriteLedgerTest, ARecoveryHandsOutNothingWhileTheDiskIsBehind) {
-  ledger_.note_fault("disk full");
-  write_results(1, 60);
-  ledger_.note_recovery();
+  write_results(60);
+  ledger_.set_fault({});
   EXPECT_TRUE(ledger_.holds_batches());
+  store_first();
+  EXPECT_FALSE(ledger_.holds_batches());
 }
 
-TEST_F(WriteLedgerTest, AWorkerHasRoomUntilItsOwnBytesOrThoseOfAllAreTooMany) {
-  write_results(1, 99);
-  EXPECT_TRUE(ledger_.has_room_for(1));
-  write_results(1, 1);
-  EXPECT_FALSE(ledger_.has_room_for(1));
-  EXPECT_TRUE(ledger_.has_room_for(2));
-  write_results(2, 50);
-  EXPECT_FALSE(ledger_.has_room_for(2)) << "150 of all";
-  EXPECT_FALSE(ledger_.has_room_for(3));
-  settle_first();
-  EXPECT_TRUE(ledger_.has_room_for(1));
-  EXPECT_TRUE(ledger_.has_room_for(3));
-}
-
-TEST_F(WriteLedgerTest, AWorkerWithMoreMessagesThanSoundOnesKeepFloods) {
-  write_results(1, 0);
-  write_results(1, 0);
-  EXPECT_FALSE(ledger_.is_flooded_by(1));
-  write_results(1, 0);
-  EXPECT_TRUE(ledger_.is_flooded_by(1));
-  EXPECT_FALSE(ledger_.is_flooded_by(2));
-  EXPECT_TRUE(ledger_.takes_no_worker());
-  settle_first();
-  EXPECT_FALSE(ledger_.is_flooded_by(1));
-  EXPECT_FALSE(ledger_.takes_no_worker());
-}
-
-TEST_F(WriteLedgerTest, AllWorkersTogetherFloodItWhenAHundredOfThemWould) {
-  for (WorkerId worker = 1; worker <= 299; ++worker) {
-    write_results(worker, 0);
+TEST_F(WriteLedgerTest, MessagesAreTakenUntilTheBytesOrWritesAreTooMany) {
+  write_results(199);
+  EXPECT_TRUE(ledger_.has_room());
+  write_results(1);
+  EXPECT_FALSE(ledger_.has_room());
+  store_first();
+  store_first();
+  ledger_.write(AddStudy{1, "a", StudyTable(std::string(200, 'x'), 1), ""});
+  EXPECT_FALSE(ledger_.has_room()) << "recipes count, too";
+  store_first();
+  for (int i = 0; i < 24; ++i) {
+    EXPECT_TRUE(ledger_.has_room());
+    write_results(0);
   }
-  EXPECT_FALSE(ledger_.is_flooded_by(1000));
-  write_results(300, 0);
-  EXPECT_TRUE(ledger_.is_flooded_by(1000));
+  EXPECT_FALSE(ledger_.has_room());
 }
 
-TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllThatIsOpenIsGivenUpInOrderAndNothingIsTaken) {
-  write_results(1, 10);
+TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
+  write_results(10);
   write_change();
-  const auto given_up = ledger_.abandon("the file was deleted");
-  ASSERT_EQ(given_up.size(), 2U);
-  EXPECT_TRUE(std::holds_alternative<ResultsWrite>(given_up[0]));
-  EXPECT_TRUE(std::holds_alternative<StateWrite>(given_up[1]));
+  ledger_.abandon("the file was deleted", now_);
+  EXPECT_EQ(outcomes_, std::vector<std::string>{"the file was deleted"});
   EXPECT_TRUE(ledger_.is_gone());
   EXPECT_TRUE(ledger_.is_empty());
   EXPECT_TRUE(ledger_.holds_batches());
-  EXPECT_TRUE(ledger_.takes_no_worker());
   EXPECT_EQ(ledger_.fault(), "the file was deleted");
-  EXPECT_EQ(ledger_.settle(writer_.jobs[0].ticket), std::nullopt) << "a late report";
+  store_first();
+  EXPECT_EQ(outcomes_.size(), 1U) << "a late report";
 }
 
 }  // namespace

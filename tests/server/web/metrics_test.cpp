@@ -108,7 +108,7 @@ TEST(Metrics, ThreadsAreWantedForOpenPointsOnly) {
   EXPECT_EQ(snapshot.threads_wanted(), 1'000'000'000U);
 }
 
-TEST(Health, IsThatTheLoopTurns) {
+TEST(Health, IsThatTheLoopStates) {
   EXPECT_EQ(health(1000, 1000).status, 200U);
   EXPECT_EQ(health(1000, 6000).status, 200U);
   EXPECT_EQ(health(1000, 8500).status, 503U);

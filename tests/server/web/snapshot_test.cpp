@@ -87,7 +87,7 @@ TEST_F(SnapshotTest, CountsOnlyWhatRunsAsOpen) {
 }
 
 TEST_F(SnapshotTest, TellsWhatAKeyHasOpen) {
-  const auto holder = std::make_shared<const KeyHolder>(KeyHolder{"lab", protocol::Role::kClient});
+  const auto holder = std::make_shared<const KeyIdentity>(KeyIdentity{"lab", protocol::Role::kClient});
   service_->client_frame("client", protocol::encode(submit_request("a", 10)), now_, holder);
   write_all();
   submit("of nobody", 20);
@@ -128,13 +128,11 @@ TEST_F(SnapshotTest, SaysWhyNothingIsStored) {
 
 TEST_F(SnapshotTest, TellsHowQueriesStand) {
   for (std::uint64_t id = 1; id <= 2; ++id) {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(id);
+    ClientRequest message = client_request(id);
     message.mutable_query()->set_sql("SELECT 1");
     request(message);
   }
-  service_->queried({QueryReport::Kind::kBegun, outbox_.queries.at(0).ticket, {}});
+  service_->query_report({QueryReport::Kind::kBegun, ports_.queries.at(0).ticket, {}});
   EXPECT_EQ(snapshot().queries.waiting, 1U);
   EXPECT_EQ(snapshot().queries.running, 1U);
 }

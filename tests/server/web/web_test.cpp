@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/server/loop/running_server.h"
+#include "tests/server/event_loop/running_server.h"
 #include "tests/server/web/prometheus_text.h"
 #include "tests/server/web/raw_http.h"
 #include "tests/support/temporary_folder.h"

@@ -16,7 +16,7 @@ class EndedTraces : public ServiceTest {
   EndedTraces() {
     request(submit_request("a", 100));
     write_all();
-    outbox_.replies.clear();
+    ports_.replies.clear();
     hello();
   }
 
@@ -37,7 +37,7 @@ class EndedTraces : public ServiceTest {
     say(message, identity);
   }
   bool is_cancelled() const {
-    return std::any_of(outbox_.worker_messages.begin(), outbox_.worker_messages.end(),
+    return std::any_of(ports_.worker_messages.begin(), ports_.worker_messages.end(),
                        [](const ServerToWorker& message) { return message.has_trace_cancel(); });
   }
 };
@@ -50,10 +50,10 @@ TEST_F(EndedTraces, LeaveTheirShareToOthersOfTheSameClient) {
   ask(5, 5);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("too many traces"))
       << "nobody ends what another one asked for";
-  const std::size_t replies = outbox_.replies.size();
+  const std::size_t replies = ports_.replies.size();
   end(2);
   ask(6, 6);
-  EXPECT_EQ(outbox_.replies.size(), replies) << "it waits";
+  EXPECT_EQ(ports_.replies.size(), replies) << "it waits";
 }
 
 TEST_F(EndedTraces, AreCancelledWhenNobodyElseWaits) {

@@ -16,20 +16,18 @@ class ServiceTraceTest : public ServiceTest {
   ServiceTraceTest() {
     request(submit_request("a", 100));
     write_all();
-    outbox_.replies.clear();
+    ports_.replies.clear();
   }
 
   static ClientRequest trace_request(std::uint64_t id, std::uint64_t point,
                                      const std::string& study = "a") {
-    ClientRequest message;
-    message.set_protocol_version(protocol::kProtocolVersion);
-    message.set_request_id(id);
+    ClientRequest message = client_request(id);
     message.mutable_trace()->set_study(study);
     message.mutable_trace()->set_point(point);
     return message;
   }
   void ask(const ClientRequest& message, const std::string& identity = "client",
-           const std::shared_ptr<const KeyHolder>& holder = nullptr) {
+           const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     service_->client_frame(identity, protocol::encode(message), now_, holder);
   }
   void ask(std::uint64_t id, std::uint64_t point, const std::string& identity = "client") {
@@ -40,7 +38,7 @@ class ServiceTraceTest : public ServiceTest {
   /// Orders that workers were sent.
   std::vector<protocol::TraceOrder> orders() const {
     std::vector<protocol::TraceOrder> found;
-    for (const ServerToWorker& message : outbox_.worker_messages) {
+    for (const ServerToWorker& message : ports_.worker_messages) {
       if (message.has_trace_order()) {
         found.push_back(message.trace_order());
       }
@@ -49,7 +47,7 @@ class ServiceTraceTest : public ServiceTest {
   }
   std::size_t cancels() const {
     return static_cast<std::size_t>(
-        std::count_if(outbox_.worker_messages.begin(), outbox_.worker_messages.end(),
+        std::count_if(ports_.worker_messages.begin(), ports_.worker_messages.end(),
                       [](const ServerToWorker& message) { return message.has_trace_cancel(); }));
   }
 
@@ -110,9 +108,9 @@ TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheOne
   EXPECT_EQ(order.h_m(), 1.0);
   EXPECT_DOUBLE_EQ(order.mu(), 3.0 / 99.0);
   worker_sends(part_of(order, 2));
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   worker_sends(end_of(order, 1));
-  ASSERT_EQ(outbox_.replies.size(), 1U);
+  ASSERT_EQ(ports_.replies.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), 7U);
   const auto trace = last_reply().trace();
   EXPECT_EQ(trace.total_rows(), 3U);
@@ -129,7 +127,7 @@ TEST_F(ServiceTraceTest, ATraceIsSolvedOnceAndKeptForWhoAsksAgainOrForMore) {
   ask(7, 3, "another");
   ASSERT_EQ(orders().size(), 1U) << "they share it";
   worker_sends(end_of(orders()[0], 10));
-  EXPECT_EQ(outbox_.replies.size(), 2U);
+  EXPECT_EQ(ports_.replies.size(), 2U);
   auto rest = trace_request(8, 3);
   rest.mutable_trace()->set_first_row(7);
   ask(rest);
@@ -170,8 +168,7 @@ TEST_F(ServiceTraceTest, WhatIsNotThereIsNamed) {
 }
 
 TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainForItMayKill) {
-  hello();
-  credit(1);
+  hello_and_credit();
   answer_batch(0);
   ask(7, 0);
   EXPECT_THAT(refusal(), HasSubstr("point 0 of the study \"a\" failed"));
@@ -202,7 +199,7 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostIsReplacedOnceAndThenThePointIsLeftAlo
   worker_sends(part_of(orders()[0], 5), "one");
   goodbye("one");
   ASSERT_EQ(orders().size(), 2U);
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
   hello("three");
   goodbye("two");
   EXPECT_THAT(refusal(), HasSubstr("two workers were lost"));
@@ -250,7 +247,7 @@ TEST_F(ServiceTraceTest, NobodyWaitsForTheTraceOfAClientThatIsGone) {
   EXPECT_EQ(orders().size(), 1U) << "the worker has not said that it is free";
   worker_sends(not_taken(orders()[0]));
   EXPECT_EQ(orders().size(), 2U);
-  EXPECT_TRUE(outbox_.replies.empty());
+  EXPECT_TRUE(ports_.replies.empty());
 }
 
 TEST_F(ServiceTraceTest, AClientHearsEverySecondThatItsTraceWaitsOrIsSolved) {
@@ -258,10 +255,10 @@ TEST_F(ServiceTraceTest, AClientHearsEverySecondThatItsTraceWaitsOrIsSolved) {
   ask(7, 3);
   ask(7, 4, "another");
   pass(1000);
-  ASSERT_EQ(outbox_.replies.size(), 2U);
-  EXPECT_TRUE(outbox_.replies[0].still_working().runs());
-  EXPECT_FALSE(outbox_.replies[1].still_working().runs());
-  outbox_.unreachable = "client";
+  ASSERT_EQ(ports_.replies.size(), 2U);
+  EXPECT_TRUE(ports_.replies[0].still_working().runs());
+  EXPECT_FALSE(ports_.replies[1].still_working().runs());
+  ports_.unreachable = "client";
   pass(1000);
   EXPECT_EQ(cancels(), 1U) << "no word of it could be delivered";
 }
@@ -281,12 +278,12 @@ TEST_F(ServiceTraceTest, OneWhoAsksForManyAtOnceHasAShareAndOthersTheRest) {
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(i, i);
   }
-  EXPECT_EQ(outbox_.replies.size(), 96U);
+  EXPECT_EQ(ports_.replies.size(), 96U);
   EXPECT_THAT(refusal(), HasSubstr("too many traces"));
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(1, i, "client" + std::to_string(i));
   }
-  EXPECT_EQ(outbox_.replies.size(), 96U + 40U) << "64 wait in all";
+  EXPECT_EQ(ports_.replies.size(), 96U + 40U) << "64 wait in all";
   EXPECT_EQ(orders().size(), 1U) << "a worker has one at a time";
 }
 
@@ -295,11 +292,11 @@ TEST_F(ServiceTraceTest, WhoAsksAnewForTheTraceThatHeWaitsForTakesNoMoreOfHisSha
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(i, 3);
   }
-  EXPECT_EQ(outbox_.replies.size(), 100U - 32U) << "others may wait, too";
+  EXPECT_EQ(ports_.replies.size(), 100U - 32U) << "others may wait, too";
   for (std::uint64_t i = 0; i < 8; ++i) {
     ask(i, 3 + i % 4, "another");
   }
-  EXPECT_EQ(outbox_.replies.size(), 100U - 32U);
+  EXPECT_EQ(ports_.replies.size(), 100U - 32U);
   ask(9, 9, "another");
   EXPECT_THAT(refusal(), HasSubstr("too many traces")) << "a fifth trace";
 }
@@ -307,11 +304,11 @@ TEST_F(ServiceTraceTest, WhoAsksAnewForTheTraceThatHeWaitsForTakesNoMoreOfHisSha
 TEST_F(ServiceTraceTest, WhoHasAKeyHasOneShareHoweverManyConnectionsThatIs) {
   hello();
   const auto reader =
-      std::make_shared<const KeyHolder>(KeyHolder{"onlooker", protocol::Role::kReader});
+      std::make_shared<const KeyIdentity>(KeyIdentity{"onlooker", protocol::Role::kReader});
   for (std::uint64_t i = 0; i < 4; ++i) {
     ask(trace_request(i, i), "client" + std::to_string(i), reader);
   }
-  EXPECT_TRUE(outbox_.replies.empty()) << "who may only look may look at this too";
+  EXPECT_TRUE(ports_.replies.empty()) << "who may only look may look at this too";
   ask(trace_request(5, 5), "client5", reader);
   EXPECT_THAT(refusal(), HasSubstr("too many traces"));
 }
@@ -355,20 +352,16 @@ TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnAThreadOfItsOwn) {
     axis.add_values(0.1 + 1e-5 * i);
   }
   request(message);
-  read_all();
+  run_checks();
   write_all();
   request(change_request("long", protocol::STUDY_CHANGE_CANCEL));  // its table is given up
   write_all();
   hello();
-  outbox_.replies.clear();
+  ports_.replies.clear();
   ask(trace_request(7, 25, "long"));
-  ASSERT_EQ(outbox_.reads.size(), 1U);
+  ASSERT_EQ(ports_.checks.size(), 1U);
   EXPECT_TRUE(orders().empty());
-  const ReadJob job = outbox_.reads[0];
-  outbox_.reads.clear();
-  service_->request_read(
-      {job.ticket, {}, traced_point(protocol::PointTable(message.submit().recipe()), job.point)},
-      now_);
+  run_checks();
   ASSERT_EQ(orders().size(), 1U);
 }
 

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/server/loop/running_server.h"
+#include "tests/server/event_loop/running_server.h"
 #include "tests/server/web/raw_http.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "proto/oblique.pb.h"
+#include "server/network/authenticator.h"
+#include "server/network/delivery.h"
+#include "server/query/query_pool.h"
+#include "server/store/writer.h"
+
+namespace oblique::server {
+
+/// A moment by two clocks.
+struct Instant {
+  std::int64_t steady_ms;  ///< never runs backwards
+  std::int64_t utc_ms;     ///< since 1970
+};
+
+/// UTC in ISO 8601 with milliseconds.
+std::string iso_8601(Instant now);
+
+/// A client that waits for the reply to a request.
+struct Client {
+  std::string identity;  ///< of its connection
+  std::uint64_t request_id;
+  std::shared_ptr<const KeyIdentity> holder = {};  ///< null: there are no keys
+
+  /// Name of its key; empty: without keys.
+  std::string key() const { return holder == nullptr ? std::string() : holder->name; }
+  bool is_reader() const { return holder != nullptr && holder->role == protocol::Role::kReader; }
+  /// What takes turns with other clients: the key, or without keys the connection.
+  std::string share() const { return holder == nullptr ? identity : "key " + holder->name; }
+
+  bool operator==(const Client&) const = default;
+};
+
+enum class Severity { kInfo, kWarning, kError };
+
+/// Network, writer, query pool, check thread and log as the service uses them. The event loop
+/// implements them; tests and the simulation replace them. No function blocks or calls the service.
+class Ports {
+ public:
+  /// Called on the service's thread with the result of a check.
+  using Completion = std::function<void(Instant)>;
+  /// Runs on the check thread and must not throw.
+  using Check = std::function<Completion()>;
+
+  virtual ~Ports() = default;
+
+  // ---- Network. Frames are encoded messages.
+  virtual Delivery to_worker(const std::string& identity, const std::string& frame) = 0;
+  /// More output waits for that worker than should.
+  virtual bool is_busy(const std::string& identity) const = 0;
+  /// Input of that worker was received and not yet taken.
+  virtual bool has_unread_input(const std::string& /*identity*/) const { return false; }
+  /// False when the client is gone; the reply is dropped then.
+  virtual bool to_client(const std::string& identity, const std::string& frame) = 0;
+  /// Adds the keys that are connected, and how many peers were refused.
+  virtual void add_peers(protocol::WorkersReply& /*reply*/) const {}
+
+  // ---- Other threads.
+  /// `Service::written` is called with the outcome.
+  virtual void write(WriteJob job) = 0;
+  /// `Service::query_report` is called with the answer. False when too many queries wait.
+  virtual bool query(QueryJob job) = 0;
+  /// The client has taken so many chunks of its answer.
+  virtual void more_rows(std::uint64_t ticket, std::uint64_t taken) = 0;
+  virtual void cancel_query(std::uint64_t ticket) = 0;
+  virtual void run_check(Check check) = 0;
+
+  virtual void log(Severity severity, const std::string& text) = 0;
+
+  // ---- The same for messages.
+  Delivery send(const std::string& worker, const protocol::ServerToWorker& message);
+  /// Sets the number of the request in `reply`.
+  bool reply(const Client& client, protocol::ClientReply reply);
+  bool reply_error(const Client& client, const std::string& message);
+  /// The request of the client waits, or is being worked on. False when the client is gone.
+  bool reply_still_working(const Client& client, bool runs);
+};
+
+/// Counts frames that no sound peer sends. The log gets a line at each power of two.
+class BadFrames {
+ public:
+  explicit BadFrames(Ports& ports) : ports_(ports) {}
+
+  void count(std::string_view sender);
+  std::uint64_t total() const { return count_; }
+
+ private:
+  Ports& ports_;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "server/scheduler/scheduler_events.h"
+#include "server/store/changes.h"
+#include "server/store/store.h"
+#include "server/study/interval_set.h"
+#include "server/study/study_table.h"
+
+namespace oblique::server {
+
+/// What is known of a study beside the points that the scheduler has.
+struct StudyRecord {
+  std::string name;
+  StudyTable table;
+  std::string created_at;
+  std::int32_t priority = 0;
+  IntervalSet failures;        ///< points whose rows say failed
+  PointAttempts attempts;      ///< of points that failed, also of those that are retried
+  std::int64_t since_ms{};     ///< start of the time over which its rate is known
+  std::string submitted_by{};  ///< name of the key; empty: without keys
+};
+
+/// The studies by number and name, as the database has them. A study that is being added is known
+/// by its name, but not durable. Unless said otherwise a study must be known, or std::out_of_range
+/// is thrown.
+class StudyStates {
+ public:
+  /// Adds a study of the database. One that is called done and lacks rows runs again.
+  void restore(const StoredStudy& study, std::int64_t now_ms);
+  /// Adds a running study that is being written. Its number and name must be unused.
+  void add(StudyId id, StudyRecord record);
+  void set_durable(StudyId id, std::int64_t now_ms);
+  void remove(StudyId id);
+
+  /// The study of that name, durable or being added.
+  std::optional<StudyId> find(std::string_view name) const;
+  /// The durable study of that number, or, if that is 0, of that name.
+  std::optional<StudyId> find_durable(std::string_view name, StudyId id = 0) const;
+  /// The name nearest to this one; empty: none is near, or there are too many studies.
+  std::string nearest(std::string_view name) const;
+  /// The durable study of the lowest number above this one.
+  std::optional<StudyId> durable_after(StudyId id) const;
+  bool contains(StudyId id) const { return studies_.contains(id); }
+  bool is_durable(StudyId id) const { return studies_.at(id).is_durable; }
+  const StudyRecord& record(StudyId id) const { return studies_.at(id).record; }
+  StudyState state(StudyId id) const { return studies_.at(id).state; }
+  /// It is neither done nor cancelled.
+  bool is_open(StudyId id) const { return unfinished_.contains(id); }
+
+  /// Studies by state, by the values of StudyState.
+  const std::array<std::uint64_t, kStudyStates>& counts() const { return counts_; }
+  /// Numbers of the open studies.
+  const std::set<StudyId>& unfinished() const { return unfinished_; }
+  /// Points of the open studies.
+  std::uint64_t open_points() const { return open_points_; }
+
+  /// Whether the state must be written: the study has another one, or a refused write made it
+  /// doubtful, because what the disk took of it may count after a crash. A done study keeps its
+  /// state.
+  bool needs_write(StudyId id, StudyState wanted) const;
+  void set_doubtful(StudyId id) { studies_.at(id).is_doubtful = true; }
+  /// The state is durable. A study that is done stays so.
+  void set_state(StudyId id, StudyState state);
+  /// All points are completed. False when that was known.
+  bool finish(StudyId id);
+
+  /// Reserves an unused name until `release` or `rename`.
+  void reserve(StudyId id, const std::string& name) { ids_.emplace(name, id); }
+  void release(const std::string& name) { ids_.erase(name); }
+  void rename(StudyId id, const std::string& name);
+  /// The study has all points of the table, and runs.
+  void grow(StudyId id, const StudyTable& table, std::int32_t priority);
+  void set_priority(StudyId id, std::int32_t priority) {
+    studies_.at(id).record.priority = priority;
+  }
+  void point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt);
+  /// The failures are forgotten: a study that was done runs.
+  void forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms);
+
+ private:
+  struct Study {
+    StudyRecord record;
+    StudyState state = StudyState::kRunning;
+    bool is_doubtful = false;
+    bool is_durable = false;
+  };
+
+  void count(StudyId id, const Study& study);
+  void discount(StudyId id, const Study& study);
+  void move(StudyId id, StudyState state);
+
+  std::map<StudyId, Study> studies_;
+  std::map<std::string, StudyId, std::less<>> ids_;  // by name
+  std::array<std::uint64_t, kStudyStates> counts_{};
+  std::set<StudyId> unfinished_;
+  std::uint64_t open_points_ = 0;
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,451 @@
+#include "server/service/worker_sessions.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/frames.h"
+#include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
+#include "proto/result_message.h"
+#include "proto/text.h"
+#include "proto/wire/frame_scan.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr std::size_t kLongestWorkerText = 256;
+constexpr std::uint32_t kMostThreads = 4096;
+
+/// A text of a peer, without control characters and shortened, for logs and tables.
+std::string plain(const std::string& text) {
+  std::string kept = protocol::shortened(text, kLongestWorkerText);
+  std::replace_if(
+      kept.begin(), kept.end(),
+      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+  return kept;
+}
+
+/// The points that a filter leaves out; nothing if the message has no valid ranges.
+std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
+  IntervalSet points;
+  if (message.left_out_size() % 2 != 0 ||
+      message.left_out_size() > 2 * protocol::kMostLeftOutRanges) {
+    return std::nullopt;
+  }
+  for (int i = 0; i < message.left_out_size(); i += 2) {
+    const std::uint64_t first = message.left_out(i);
+    const std::uint64_t count = message.left_out(i + 1);
+    if (count == 0 || count > protocol::kMaxPoints || first > protocol::kMaxPoints - count) {
+      return std::nullopt;
+    }
+    points.insert(first, first + count);
+  }
+  return points;
+}
+
+/// A recipe of one point that every sound worker solves in a moment.
+protocol::Recipe probe_recipe() {
+  protocol::Recipe recipe;
+  *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
+  protocol::Block& block = *recipe.add_blocks();
+  for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
+    protocol::Axis& axis = *block.add_axes();
+    axis.set_key(key);
+    axis.add_values(value);
+  }
+  return recipe;
+}
+
+}  // namespace
+
+// ---- Messages of workers -----------------------------------------------------------------------
+
+WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view frame, Instant now,
+                                  const std::string& key) {
+  WorkerInput input;
+  const auto known = ids_.find(identity);
+  if (!protocol::is_of_a_workers_size(frame)) {  // checked before it is parsed
+    if (known == ids_.end()) {
+      bad_frames_.count("a worker");
+    } else {
+      give_up(known->second, "it sends more in one message than workers do", input);
+    }
+    return input;
+  }
+  protocol::WorkerMessage message;
+  using Kind = protocol::WorkerMessage;
+  if (!protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
+    bad_frames_.count("a worker");
+    return input;
+  }
+  if (message.kind_case() == Kind::kHello) {
+    hello(identity, message.hello(), now, key, input);
+    return input;
+  }
+  if (known == ids_.end()) {
+    if (message.kind_case() != Kind::kGoodbye) {
+      protocol::ServerToWorker again;
+      again.mutable_hello_again();
+      ports_.send(identity, again);
+    }
+    return input;
+  }
+  const WorkerId worker = known->second;
+  switch (message.kind_case()) {
+    case Kind::kCredit:
+      input.events.emplace_back(CreditGiven{worker, message.credit().batches()});
+      break;
+    case Kind::kResults:
+      results(worker, std::move(*message.mutable_results()), input);
+      break;
+    case Kind::kHeartbeat: {
+      const auto& leases = message.heartbeat().lease_ids();
+      input.events.emplace_back(HeartbeatReceived{worker, {leases.begin(), leases.end()}});
+      protocol::ServerToWorker reply;
+      reply.mutable_heartbeat_reply();
+      send(worker, reply);
+      break;
+    }
+    case Kind::kGiveBack: {
+      const auto& leases = message.give_back().lease_ids();
+      input.events.emplace_back(BatchesReturned{worker, {leases.begin(), leases.end()}});
+      break;
+    }
+    case Kind::kTracePart:
+      input.events.emplace_back(CreditGiven{worker, 0});  // it lives
+      input.trace_of = worker;
+      input.trace_part = std::move(*message.mutable_trace_part());
+      break;
+    case Kind::kGoodbye:
+      log_rarely(Severity::kInfo, fmt::format("worker {} leaves", worker), now);
+      forget(worker);
+      input.events.emplace_back(WorkerLeft{worker});
+      break;
+    case Kind::kHello:
+    case Kind::KIND_NOT_SET:
+      break;
+  }
+  return input;
+}
+
+void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHello& hello,
+                           Instant now, const std::string& key, WorkerInput& input) {
+  if (ledger_.is_gone() || !ledger_.has_room()) {
+    return;  // the worker repeats it
+  }
+  if (const auto known = ids_.find(identity); known != ids_.end()) {
+    const WorkerId old = known->second;
+    forget(old);  // it begins anew, and what it held is free again
+    input.events.emplace_back(WorkerLeft{old});
+  }
+  if (refuse(identity, hello, now)) {
+    return;
+  }
+  const WorkerId id = ++settings_.last_worker_id;
+  if (!welcome(id, identity)) {
+    return;
+  }
+  const WorkerRecord worker{identity,
+                            plain(hello.name()),
+                            std::clamp(hello.threads(), 1U, kMostThreads),
+                            plain(hello.solver_version()),
+                            plain(hello.instruction_set()),
+                            iso_8601(now),
+                            key,
+                            plain(hello.host()),
+                            now.steady_ms};
+  workers_.emplace(id, worker);
+  ids_[identity] = id;
+  greet(id, now);
+  const std::string process = protocol::shortened(hello.process_id(), kLongestWorkerText);
+  input.events.emplace_back(
+      WorkerJoined{id, worker.threads, worker.solver_version, process, !process.empty()});
+}
+
+/// Whether the worker is refused; it gets the reason.
+bool WorkerSessions::refuse(const std::string& identity, const protocol::WorkerHello& hello,
+                            Instant now) {
+  std::string reason = protocol::objection_to_worker(hello);
+  if (reason.empty() && hello.solver_version().empty()) {
+    reason = "it does not say which version its solver has";
+  }
+  if (reason.empty()) {
+    return false;
+  }
+  log_rarely(Severity::kWarning, fmt::format("a worker is refused: {}", reason), now);
+  protocol::ServerToWorker reply;
+  reply.mutable_refused()->set_reason(reason);
+  ports_.send(identity, reply);
+  return true;
+}
+
+/// False when the worker is gone already.
+bool WorkerSessions::welcome(WorkerId id, const std::string& identity) {
+  protocol::ServerToWorker message;
+  auto& welcome = *message.mutable_welcome();
+  welcome.set_protocol_version(protocol::kProtocolVersion);
+  welcome.set_worker_id(id);
+  welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
+  welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
+  welcome.set_database_id(settings_.database_id);
+  welcome.set_takes_back(true);
+  return ports_.send(identity, message) != Delivery::kGone;
+}
+
+/// Logs that the worker joined, and sends it the notices that concern it.
+void WorkerSessions::greet(WorkerId id, Instant now) {
+  const WorkerRecord& worker = workers_.at(id);
+  log_rarely(Severity::kInfo,
+             fmt::format("worker {} ({}, {} threads{}) joins", id, worker.name, worker.threads,
+                         worker.key.empty() ? "" : ", key " + worker.key),
+             now);
+  if (worker.solver_version != settings_.solver_version) {
+    const std::string text = fmt::format(
+        "worker {}: its solver has version {}, the server's {}: studies with results of another "
+        "version than its own go to other workers",
+        id, worker.solver_version, settings_.solver_version);
+    log_rarely(Severity::kWarning, text, now);
+    notify(id, text);
+  }
+  if (settings_.is_insecure) {
+    notify(id,
+           "the server runs with --insecure: whoever reaches it can use it, and what is sent "
+           "there is not encrypted");
+  }
+  if (stopping_) {
+    protocol::ServerToWorker stopping;
+    stopping.mutable_stopping();
+    send(id, stopping);
+  }
+}
+
+void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerInput& input) {
+  if (ledger_.is_gone()) {
+    return;  // not acknowledged: the worker keeps them
+  }
+  std::optional<IntervalSet> left_out = left_out_of(message);
+  if (!left_out) {
+    give_up(worker, "it sends ranges of points that are none", input);
+    return;
+  }
+  ResultsReceived event{worker,
+                        message.study_id(),
+                        message.lease_id(),
+                        message.sequence(),
+                        message.batch_done(),
+                        message.busy_s(),
+                        {},
+                        std::move(*left_out)};
+  event.outcomes.reserve(static_cast<std::size_t>(message.results_size()));
+  for (protocol::PointResult& result : *message.mutable_results()) {
+    if (const std::string fault = fault_of(result); !fault.empty()) {
+      result = protocol::failed_point(result.point(), fault);
+    }
+    event.outcomes.push_back({result.point(), !result.error().empty()});
+  }
+  input.events.emplace_back(std::move(event));
+  input.results = std::move(message);
+}
+
+/// Disconnects the worker. A sound one joins again and delivers the results that it has kept.
+void WorkerSessions::give_up(WorkerId worker, const std::string& why, WorkerInput& input) {
+  bad_frames_.count("a worker");
+  protocol::ServerToWorker again;
+  again.mutable_hello_again();
+  send(worker, again);
+  input.events.emplace_back(WorkerUnreachable{worker, why});
+}
+
+void WorkerSessions::drop(const DropWorker& drop, Instant now) {
+  const WorkerRecord* record = find(drop.worker);
+  log_rarely(Severity::kWarning,
+             fmt::format("worker {} ({}) is lost: {}", drop.worker,
+                         record == nullptr ? "" : record->name, drop.reason),
+             now);
+  forget(drop.worker);
+}
+
+void WorkerSessions::forget(WorkerId worker) {
+  const auto known = workers_.find(worker);
+  if (known != workers_.end()) {
+    ids_.erase(known->second.identity);
+    workers_.erase(known);
+  }
+}
+
+void WorkerSessions::tick(const Silence& silent_ms, Instant now) {
+  protocol::ServerToWorker sign;
+  sign.mutable_heartbeat_reply();
+  const std::int64_t late_ms = settings_.heartbeat_interval_ms * 5 / 4;
+  for (auto& [id, worker] : workers_) {
+    if (std::exchange(worker.was_sent, false)) {
+      worker.last_sent_ms = now.steady_ms;
+    }
+    const bool is_silent = silent_ms(id) > late_ms;
+    if (is_silent || now.steady_ms - worker.last_sent_ms > late_ms) {
+      // Sending shows at once that the connection of a killed process is gone. And a worker whose
+      // messages wait here must get a sign of life.
+      send(id, sign);
+    }
+    if (is_silent && (!ledger_.has_room() || ports_.has_unread_input(worker.identity))) {
+      events_.emplace_back(CreditGiven{id, 0});  // it is not silent: its messages are not read
+    }
+    if (worker.is_busy && !ports_.is_busy(worker.identity)) {
+      worker.is_busy = false;
+      events_.emplace_back(WorkerBusy{id, false});
+    }
+  }
+}
+
+std::vector<Event> WorkerSessions::take_events() {
+  std::vector<Event> events = std::exchange(events_, {});
+  for (auto& [id, unreachable] : std::exchange(unreachable_, {})) {
+    events.emplace_back(std::move(unreachable));
+  }
+  return events;
+}
+
+const WorkerRecord* WorkerSessions::find(WorkerId worker) const {
+  const auto known = workers_.find(worker);
+  return known == workers_.end() ? nullptr : &known->second;
+}
+
+std::optional<WorkerId> WorkerSessions::next_after(WorkerId worker) const {
+  const auto next = workers_.upper_bound(worker);
+  return next == workers_.end() ? std::nullopt : std::optional(next->first);
+}
+
+bool WorkerSessions::needs_row(WorkerId worker) {
+  return !std::exchange(workers_.at(worker).has_row, true);
+}
+
+/// For lines that peers can cause at any rate: a span of time gets few of them, and one with the
+/// number of the others.
+void WorkerSessions::log_rarely(Severity severity, const std::string& text, Instant now) {
+  constexpr std::uint64_t kMostLines = 20;
+  constexpr std::int64_t kLogSpan_ms = 10'000;
+  if (now.steady_ms - log_span_began_ms_ >= kLogSpan_ms) {
+    if (log_lines_ > kMostLines) {
+      ports_.log(Severity::kInfo, fmt::format("and {} more lines of workers that come and go",
+                                              log_lines_ - kMostLines));
+    }
+    log_span_began_ms_ = now.steady_ms;
+    log_lines_ = 0;
+  }
+  if (++log_lines_ <= kMostLines) {
+    ports_.log(severity, text);
+  }
+}
+
+// ---- Messages to workers -----------------------------------------------------------------------
+
+void WorkerSessions::send(const SendBatch& batch) {
+  protocol::ServerToWorker message;
+  auto& fields = *message.mutable_batch();
+  fields.set_study_id(batch.study);
+  fields.set_attempt(batch.attempt);
+  fields.set_lease_id(batch.lease);
+  fields.set_priority(batch.priority);
+  std::uint64_t reached = 0;
+  for (const Interval& range : batch.points) {
+    fields.add_ranges(static_cast<std::int64_t>(range.begin - reached));
+    fields.add_ranges(static_cast<std::int64_t>(range.end - range.begin));
+    reached = range.end;
+  }
+  send(batch.worker, message, batch.lease);
+}
+
+void WorkerSessions::send(const SendProbe& probe) {
+  protocol::ServerToWorker definition;
+  definition.mutable_study()->set_study_id(kProbeStudy);
+  *definition.mutable_study()->mutable_recipe() = probe_recipe();
+  send(probe.worker, definition);
+  send(SendBatch{probe.worker, kProbeStudy, {{0, 1}}, 1, probe.lease});
+}
+
+void WorkerSessions::send(const AcknowledgeResults& stored) {
+  protocol::ServerToWorker message;
+  message.mutable_results_stored()->set_sequence(stored.sequence);
+  send(stored.worker, message);
+}
+
+void WorkerSessions::send(const WithdrawStudy& withdraw) {
+  protocol::ServerToWorker message;
+  message.mutable_withdraw()->set_study_id(withdraw.study);
+  send(withdraw.worker, message);
+}
+
+void WorkerSessions::send(const ReleaseBatch& release) {
+  protocol::ServerToWorker message;
+  message.mutable_release()->set_lease_id(release.lease);
+  send(release.worker, message);
+}
+
+void WorkerSessions::send(const std::vector<TraceEffect>& orders) {
+  for (const TraceEffect& effect : orders) {
+    protocol::ServerToWorker message;
+    if (const auto* order = std::get_if<SendOrder>(&effect)) {
+      *message.mutable_trace_order() = order->order;
+      send(order->worker, message);
+    } else if (const auto* cancel = std::get_if<CancelOrder>(&effect)) {
+      message.mutable_trace_cancel()->set_trace_id(cancel->trace_id);
+      send(cancel->worker, message);
+    }
+  }
+}
+
+void WorkerSessions::define(const DefineStudy& define, const std::string& recipe_bytes) {
+  send_frame(define.worker, protocol::definition_around(define.study, recipe_bytes));
+}
+
+void WorkerSessions::notify_all(const std::string& text) {
+  for (const auto& [id, worker] : workers_) {
+    notify(id, text);
+  }
+}
+
+void WorkerSessions::notify(WorkerId worker, const std::string& text) {
+  protocol::ServerToWorker message;
+  message.mutable_notice()->set_text(text);
+  send(worker, message);
+}
+
+void WorkerSessions::stop() {
+  if (std::exchange(stopping_, true)) {
+    return;
+  }
+  protocol::ServerToWorker message;
+  message.mutable_stopping();
+  for (const auto& [id, worker] : workers_) {
+    send(id, message);
+  }
+}
+
+void WorkerSessions::send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease) {
+  send_frame(worker, protocol::encode(message), lease);
+}
+
+/// `lease`: of the batch in the frame; 0: none. A worker that is gone or busy becomes an event.
+void WorkerSessions::send_frame(WorkerId worker, const std::string& frame, LeaseId lease) {
+  const auto known = workers_.find(worker);
+  if (known == workers_.end()) {
+    return;
+  }
+  WorkerRecord& record = known->second;
+  record.was_sent = true;
+  const Delivery delivery = ports_.to_worker(record.identity, frame);
+  if (delivery == Delivery::kGone) {
+    WorkerUnreachable& unreachable =
+        unreachable_.try_emplace(worker, WorkerUnreachable{worker}).first->second;
+    if (lease != 0) {
+      unreachable.unsent.push_back(lease);
+    }
+  } else if (delivery == Delivery::kBusy && !std::exchange(record.is_busy, true)) {
+    events_.emplace_back(WorkerBusy{worker, true});
+  }
+}
+
+}  // namespace oblique::server

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "server/scheduler/scheduler_events.h"
+#include "server/service/ports/ports.h"
+#include "server/service/traces/trace_orders.h"
+#include "server/service/write_ledger.h"
+
+namespace oblique::server {
+
+struct WorkerSessionSettings {
+  std::uint32_t heartbeat_interval_ms = 900;
+  std::int64_t lost_after_ms = 2800;  ///< the scheduler's
+  std::string solver_version;         ///< workers with another one get a notice
+  std::string database_id;
+  std::uint64_t last_worker_id = 0;  ///< in the database
+  bool is_insecure = false;          ///< workers get a notice about it
+};
+
+/// A connected worker, as it describes itself.
+struct WorkerRecord {
+  std::string identity;
+  std::string name;
+  std::uint32_t threads;
+  std::string solver_version;
+  std::string instruction_set;
+  std::string joined_at;
+  std::string key{};              ///< its name; empty: without keys
+  std::string host{};             ///< its machine
+  std::int64_t last_sent_ms = 0;  ///< when it was sent something, to a tick
+  bool was_sent = false;          ///< something since the last tick
+  bool is_busy = false;           ///< it does not read what it is sent, as the scheduler knows
+  bool has_row = false;           ///< in the database, since its first result
+};
+
+/// What a frame of a worker comes to.
+struct WorkerInput {
+  std::vector<Event> events;  ///< for the scheduler, in order
+  protocol::Results results;  ///< of a ResultsReceived among them
+  WorkerId trace_of = 0;      ///< worker that sent `trace_part`; 0: none
+  protocol::TracePart trace_part;
+};
+
+/// The connections with workers: turns their messages into events, and effects into messages.
+/// Refuses what no sound worker sends. Frames may be malicious. Not thread-safe.
+class WorkerSessions {
+ public:
+  WorkerSessions(WorkerSessionSettings settings, Ports& ports, BadFrames& bad_frames,
+                 const WriteLedger& ledger)
+      : settings_(std::move(settings)), ports_(ports), bad_frames_(bad_frames), ledger_(ledger) {}
+
+  /// `key`: name of the worker's; empty without keys.
+  WorkerInput frame(const std::string& identity, std::string_view frame, Instant now,
+                    const std::string& key = {});
+
+  // Messages to workers; those that are gone are ignored.
+  void send(const SendBatch& batch);
+  void send(const SendProbe& probe);
+  void send(const AcknowledgeResults& stored);
+  void send(const WithdrawStudy& withdraw);
+  void send(const ReleaseBatch& release);
+  /// The orders and cancellations among them.
+  void send(const std::vector<TraceEffect>& orders);
+  /// Sends the recipe as it is stored, because encoding a long one for each worker takes long.
+  void define(const DefineStudy& define, const std::string& recipe_bytes);
+  void notify_all(const std::string& text);
+  /// Tells all workers, and those that join later, that the server stops.
+  void stop();
+
+  void drop(const DropWorker& drop, Instant now);
+
+  /// Time since the last message of a worker, in ms.
+  using Silence = std::function<std::int64_t(WorkerId)>;
+  /// Sends a sign of life to workers whose heartbeat is late, and to those that were sent nothing
+  /// for as long. To be called several times a second.
+  void tick(const Silence& silent_ms, Instant now);
+  /// Events that were found while messages were sent: workers that are unreachable or busy.
+  std::vector<Event> take_events();
+
+  /// Null for an unknown worker.
+  const WorkerRecord* find(WorkerId worker) const;
+  /// The worker of the lowest number above this one.
+  std::optional<WorkerId> next_after(WorkerId worker) const;
+  /// True at the first call for a worker, whose row is stored with its first result.
+  bool needs_row(WorkerId worker);
+
+ private:
+  void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
+             const std::string& key, WorkerInput& input);
+  bool refuse(const std::string& identity, const protocol::WorkerHello& hello, Instant now);
+  bool welcome(WorkerId id, const std::string& identity);
+  void greet(WorkerId id, Instant now);
+  void results(WorkerId worker, protocol::Results results, WorkerInput& input);
+  void give_up(WorkerId worker, const std::string& why, WorkerInput& input);
+  void notify(WorkerId worker, const std::string& text);
+  void forget(WorkerId worker);
+  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
+  void send_frame(WorkerId worker, const std::string& frame, LeaseId lease = 0);
+  void log_rarely(Severity severity, const std::string& text, Instant now);
+
+  WorkerSessionSettings settings_;
+  Ports& ports_;
+  BadFrames& bad_frames_;
+  const WriteLedger& ledger_;
+  std::map<WorkerId, WorkerRecord> workers_;
+  std::map<std::string, WorkerId, std::less<>> ids_;  // by identity
+  std::map<WorkerId, WorkerUnreachable> unreachable_;
+  std::vector<Event> events_;
+  std::int64_t log_span_began_ms_ = 0;
+  std::uint64_t log_lines_ = 0;  // since then, written or left out
+  bool stopping_ = false;
+};
+
+}  // namespace oblique::server

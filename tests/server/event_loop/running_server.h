@@ -1,0 +1,269 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <zmq.hpp>
+
+#include "proto/frames.h"
+#include "proto/result_message.h"
+#include "proto/wire/chunk_writer.h"
+#include "server/event_loop/event_loop.h"
+#include "server/query/query_rules.h"
+#include "tests/support/hang_limit.h"
+#include "tests/support/points.h"
+
+namespace oblique::server {
+
+using protocol::ClientReply;
+using protocol::ClientRequest;
+using protocol::ServerToWorker;
+using protocol::WorkerMessage;
+
+/// A server on ports that the system picked, stopped when it goes out of scope.
+class RunningServer {
+ public:
+  explicit RunningServer(const std::string& database, QueueSettings queue = {},
+                         NetworkLimits network = {}, ClientHandlerSettings clients = {},
+                         const AccessSettings& access = {}, const std::optional<WebSettings>& web = {})
+      : loop_(settings(database, queue, network, clients, access, web)) {
+    thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
+  }
+  ~RunningServer() { stop(); }
+  RunningServer(const RunningServer&) = delete;
+  RunningServer& operator=(const RunningServer&) = delete;
+
+  LoopEnd stop() {
+    if (thread_.joinable()) {
+      const std::uint64_t one = 1;
+      EXPECT_EQ(::write(stop_fd_, &one, sizeof one), static_cast<ssize_t>(sizeof one));
+      thread_.join();
+      ::close(stop_fd_);
+    }
+    return end_;
+  }
+  std::string client_endpoint() const { return loop_.client_endpoint(); }
+  std::string worker_endpoint() const { return loop_.worker_endpoint(); }
+  std::string http_url() const { return loop_.http_url(); }
+
+ private:
+  static LoopSettings settings(const std::string& database, QueueSettings queue,
+                               NetworkLimits network, const ClientHandlerSettings& clients,
+                               const AccessSettings& access, const std::optional<WebSettings>& web) {
+    LoopSettings settings;
+    settings.web = web;
+    settings.access = access;
+    settings.service.clients = clients;
+    settings.network = network;
+    settings.queries.queue = queue;
+    settings.database = database;
+    settings.worker_port = "*";
+    settings.client_port = "*";
+    settings.service.solver_version = "1.0";
+    // Pretended workers send no heartbeats, and on a busy machine they wait long for their tests.
+    settings.service.scheduler.lost_after_ms = kLongestSilence_ms;
+    settings.queries.reader_program = OBLIQUE_SERVER_PROGRAM;
+    return settings;
+  }
+
+  static constexpr std::int64_t kLongestSilence_ms =
+      std::chrono::milliseconds(test::kHangLimit).count();
+
+  int stop_fd_ = eventfd(0, 0);
+  EventLoop loop_;
+  LoopEnd end_{};
+  std::thread thread_;
+};
+
+/// A DEALER socket that speaks in messages.
+template <typename Out, typename In>
+class Peer {
+ public:
+  explicit Peer(const std::string& endpoint) : socket_(context_, zmq::socket_type::dealer) {
+    socket_.set(zmq::sockopt::linger, 0);
+    socket_.set(zmq::sockopt::rcvtimeo, kLongest_ms);
+    disconnections_.init(socket_, "inproc://disconnections", ZMQ_EVENT_DISCONNECTED);
+    socket_.connect(endpoint);
+  }
+  void send(const Out& message) { send_frame(protocol::encode(message)); }
+  void send_frame(const std::string& frame) {
+    socket_.send(zmq::buffer(frame), zmq::send_flags::none);
+  }
+  void send_frames(const std::vector<std::string>& frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      socket_.send(zmq::buffer(frames[i]),
+                   i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
+    }
+  }
+  /// Waits until the server ends the connection; false when it does not.
+  bool is_cut_off() { return disconnections_.check_event(kLongest_ms); }
+  In receive() {
+    zmq::message_t frame;
+    In message;
+    if (!socket_.recv(frame)) {
+      throw std::runtime_error("the server does not answer");
+    }
+    if (!protocol::decode(frame.to_string_view(), message)) {
+      throw std::runtime_error("the server sent what is no message");
+    }
+    return message;
+  }
+
+ private:
+  static constexpr int kLongest_ms = std::chrono::milliseconds(test::kHangLimit).count();
+
+  zmq::context_t context_;
+  zmq::socket_t socket_;
+  zmq::monitor_t disconnections_;  // of them alone
+};
+
+class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
+ public:
+  using Peer::Peer;
+
+  ServerToWorker hello() {
+    WorkerMessage message;
+    protocol::say_protocol(*message.mutable_hello());
+    message.mutable_hello()->set_solver_version("1.0");
+    message.mutable_hello()->set_instruction_set("avx2");
+    message.mutable_hello()->set_name("pretended");
+    message.mutable_hello()->set_threads(1);
+    send(message);
+    return receive();
+  }
+  ServerToWorker receive() {
+    ServerToWorker message = Peer::receive();
+    if (message.has_study()) {
+      studies_[message.study().study_id()] =
+          std::make_unique<protocol::PointTable>(message.study().recipe());
+    }
+    return message;
+  }
+  void credit(std::uint32_t batches) {
+    WorkerMessage message;
+    message.mutable_credit()->set_batches(batches);
+    send(message);
+  }
+  /// Which points it fails.
+  void fail(std::set<std::uint64_t> points) { failing_ = std::move(points); }
+  /// Sends a result for each point of the batch, or names it as left out. Returns how many these
+  /// are.
+  std::uint64_t solve(const protocol::Batch& batch) {
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(batch.study_id());
+    results.set_lease_id(batch.lease_id());
+    results.set_attempt(batch.attempt());
+    results.set_sequence(++sequence_);
+    results.set_batch_done(true);
+    results.set_busy_s(1e-3);
+    const protocol::PointTable& table = *studies_.at(batch.study_id());
+    const auto points = points_of(batch);
+    for (const std::uint64_t point : points) {
+      if (failing_.contains(point)) {
+        *results.add_results() =
+            protocol::failed_point(point, "failed as " + std::to_string(point));
+      } else if (table.is_left_in(point)) {
+        *results.add_results() = solved_point(point, table);
+      } else {
+        results.add_left_out(point);
+        results.add_left_out(1);
+      }
+    }
+    send(message);
+    return points.size();
+  }
+  /// Takes batches, one at a time, until `points` are solved and stored.
+  void work(std::uint64_t points) {
+    std::uint64_t waiting = points;
+    credit(1);
+    while (waiting > 0) {
+      const auto message = receive();
+      if (message.has_batch()) {
+        const std::uint64_t solved = solve(message.batch());
+        in_hand_[sequence_] = solved;
+      } else if (message.has_results_stored()) {
+        waiting -= std::min(waiting, in_hand_.at(message.results_stored().sequence()));
+        credit(1);
+      }
+    }
+  }
+
+ private:
+  std::uint64_t sequence_ = 0;
+  std::map<std::uint64_t, std::uint64_t> in_hand_;
+  std::set<std::uint64_t> failing_;
+  std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;  // as defined last
+};
+
+class PretendedClient : public Peer<ClientRequest, ClientReply> {
+ public:
+  using Peer::Peer;
+
+  ClientReply ask(ClientRequest request) {
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(++id_);
+    send(request);
+    const auto reply = receive();
+    EXPECT_EQ(reply.request_id(), id_);
+    return reply;
+  }
+  ClientReply submit(const std::string& name, std::uint64_t points) {
+    ClientRequest request;
+    request.mutable_submit()->set_name(name);
+    *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
+    return ask(request);
+  }
+  /// With the rows of the first chunk.
+  ClientReply query(const std::string& sql) {
+    ClientRequest request;
+    request.mutable_query()->set_sql(sql);
+    request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
+    ClientReply reply = ask(request);
+    if (reply.has_query()) {
+      *reply.mutable_query() = protocol::as_rows(reply.query());
+    }
+    return reply;
+  }
+  /// Asks for what takes minutes, and waits until it is said that the query runs.
+  void start_query(const std::string& sql) {
+    ClientRequest request;
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(++id_);
+    request.mutable_query()->set_sql(sql);
+    request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
+    send(request);
+    constexpr int kMostWords = 600;  // one a second
+    for (int words = 0; words < kMostWords; ++words) {
+      const auto word = receive();
+      ASSERT_EQ(word.still_working().request_id(), id_);
+      if (word.still_working().runs()) {
+        return;
+      }
+    }
+    FAIL() << "the query does not begin";
+  }
+  protocol::StudyStatus status(const std::string& name) {
+    ClientRequest request;
+    request.mutable_status()->set_study(name);
+    return ask(request).status().studies(0);
+  }
+
+ private:
+  std::uint64_t id_ = 0;
+};
+
+}  // namespace oblique::server
