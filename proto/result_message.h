@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <string>
 
+#include "proto/frames.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/case_result.h"
+#include "worker/solver/model/trace_columns.h"
 
 namespace oblique::protocol {
 
@@ -37,7 +39,16 @@ PointResult failed_point(std::uint64_t point, const std::string& reason);
 /// have.
 std::string fault_of(const PointResult& message);
 
-/// Sets what a worker of this build says of its messages: their version, and what its results have.
+/// Most bytes of the rows of a trace: with its result and the model it fits into one frame.
+inline constexpr std::size_t kMostTraceBytes =
+    kMaxFrameBytes - kMostResultBytes - (std::size_t{64} << 10U);
+
+/// What is wrong with a trace of that shape from the network, or an empty text: rows of the wrong
+/// length, values that are not finite, unknown states, rows of the fall unasked or after the touch,
+/// or its result.
+std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, bool with_fall);
+
+/// Sets the protocol version and the outputs of this build.
 void say_protocol(WorkerHello& hello);
 
 /// The names of the scalars that results have, in their order, with spaces between.

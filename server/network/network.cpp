@@ -87,6 +87,7 @@ std::size_t Network::connections(Port port) const {
 }
 
 void Network::collect(std::int64_t now_ms) {
+  now_ms_ = now_ms;
   has_unopened_ = false;
   read_paused_again();
   std::array<epoll_event, 256> events;

@@ -19,12 +19,14 @@
 #include "server/network/delivery.h"
 #include "server/network/key_shares.h"
 #include "server/network/listener.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 
-/// What peers can make the server hold; proto/protocol.md has these numbers.
+/// What peers can make the server hold. The first and `waiting_out_bytes` are options.
 struct NetworkLimits {
-  std::size_t connections = 4096;  ///< at all ports; fewer where the system allows fewer
+  std::size_t connections =
+      limits::kConnections;  ///< at all ports; fewer where the system allows fewer
   /// Messages of all peers that are incomplete or not taken. Of one peer it is at most one message.
   std::size_t held_in_bytes = std::size_t{512} << 20U;
   /// With so much of a port's peers, nobody of them is read while whole messages wait to be taken:
@@ -32,7 +34,7 @@ struct NetworkLimits {
   std::size_t held_in_to_pause_bytes = std::size_t{64} << 20U;
   /// With more than this waiting to go out, a peer is busy.
   std::size_t busy_bytes = std::size_t{4} << 20U;
-  std::size_t waiting_out_bytes = std::size_t{64} << 20U;       ///< to one peer
+  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;     ///< to one peer
   std::size_t all_waiting_out_bytes = std::size_t{512} << 20U;  ///< to all
   std::int64_t handshake_ms = 10'000;  ///< for a new connection to say who it is
   /// A connection that said something so recently does not make room for a new one.
@@ -106,7 +108,7 @@ class Network {
   /// More waits to go out to it than a peer should have.
   bool is_busy(const std::string& identity) const;
   bool is_connected(const std::string& identity) const;
-  /// Something has come from it that was not taken yet.
+  /// Something has come from it that was not taken yet, or a message is coming in.
   bool has_unheard(const std::string& identity) const;
   /// Tries for so long to send what is kept.
   void flush(std::chrono::milliseconds longest);
@@ -207,6 +209,7 @@ class Network {
   std::size_t held_in_bytes_ = 0;
   std::size_t waiting_out_bytes_ = 0;
   std::int64_t next_look_ms_ = 0;
+  std::int64_t now_ms_ = 0;  // of the last `collect`
   std::vector<Departure> departures_;
   RefusalCounts refusals_;
 };

@@ -27,7 +27,13 @@ bool Network::has_more() const {
 
 bool Network::has_unheard(const std::string& identity) const {
   const Peer* const peer = find(identity);
-  return peer != nullptr && (peer->stands_in_line || peer->is_paused);
+  // A trace on a slow line takes longer to come than a worker may be silent.
+  constexpr std::int64_t kPauseInAMessage_ms = 1000;
+  const auto is_coming = [&] {
+    return peer->connection.held_in_bytes() > 0 &&
+           now_ms_ - peer->last_heard_ms < kPauseInAMessage_ms;
+  };
+  return peer != nullptr && (peer->stands_in_line || peer->is_paused || is_coming());
 }
 
 void Network::read_paused_again() {

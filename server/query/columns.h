@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::server {
 

@@ -11,6 +11,7 @@
 #include "server/scheduler/points/study_points.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/study/interval_set.h"
+#include "server/study/limits.h"
 #include "server/study/point_attempts.h"
 
 // What the scheduler is told, and what it wants done.
@@ -64,8 +65,8 @@ struct SchedulerSettings {
   double stall_factor = 10.0;
   std::int64_t shortest_stall_ms = 60'000;
   std::int64_t longest_stall_ms = 3'600'000;
-  std::size_t most_absent_processes = 1024;  ///< are remembered, of newcomers and of others each
-  std::uint32_t max_credit = 1024;           ///< batches a worker may ask for at a time
+  std::size_t most_absent_processes = 1024;    ///< are remembered, of newcomers and of others each
+  std::uint32_t max_credit = limits::kCredit;  ///< batches a worker may ask for at a time
   /// Points a thread that a batch of a filtered study has at most before the worker has solved one:
   /// the filter may leave in all of them.
   std::uint64_t unsolved_batch_points = 256;

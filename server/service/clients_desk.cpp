@@ -7,12 +7,10 @@
 
 #include "proto/frames.h"
 #include "proto/wire/frame_scan.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 namespace {
-
-/// A page ends when it has so many bytes, whatever its number of lines.
-constexpr std::size_t kMostPageBytes = std::size_t{1} << 20U;
 
 /// Lines of a page for a client that asks for so many; 0: for as many as there may be.
 std::size_t page_size(std::uint32_t asked, std::size_t largest) {
@@ -28,7 +26,7 @@ ClientsDesk::ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& 
 
 void ClientsDesk::take(const std::string& identity, std::string_view frame, Instant now,
                        const std::shared_ptr<const KeyHolder>& holder) {
-  if (frame.size() > settings_.longest_inline_bytes) {
+  if (frame.size() > limits::kLongestInlineRequest) {
     read_elsewhere({identity, protocol::request_id_of(frame), holder}, frame);
     return;
   }
@@ -71,39 +69,32 @@ void ClientsDesk::tick(Instant now) {
   }
 }
 
-/// Of one client few wait, and of all connections with one key a quarter, so that the others find
-/// room.
 void ClientsDesk::read_elsewhere(const Client& client, std::string_view frame) {
   std::size_t bytes = frame.size();
-  std::size_t of_client = 0;
-  std::size_t of_key = 0;
+  std::size_t of_connection = 0;
   for (const auto& [ticket, request] : long_requests_) {
     if (client.request_id != 0 && request.client == client) {
       return;  // it is sent again because the answer takes long; it waits already
     }
     bytes += request.bytes;
-    of_client += request.client.identity == client.identity ? 1U : 0U;
-    of_key += !client.key().empty() && request.client.key() == client.key() ? 1U : 0U;
+    of_connection += request.client.identity == client.identity ? 1U : 0U;
   }
   if (stopping_) {
     at_.clients.reply_error(client, "the server is stopping: ask again when it is back");
-  } else if (long_requests_.size() >= settings_.most_long_requests ||
-             of_client >= settings_.most_long_requests_of_one ||
-             of_key >=
-                 std::max(settings_.most_long_requests_of_one, settings_.most_long_requests / 4) ||
-             bytes > settings_.most_long_bytes) {
+  } else if (long_requests_.size() >= limits::kLongRequests ||
+             of_connection >= limits::kLongRequestsOfConnection ||
+             bytes > limits::kLongRequestBytes) {
     at_.clients.reply_error(client, "too many long requests wait already: ask again later");
   } else {
     const std::uint64_t ticket = ++last_ticket_;
     long_requests_.emplace(ticket, LongRequest{client, frame.size()});
-    at_.readers.read(
-        {ticket, std::string(frame), {}, 0, client.key().empty() ? client.identity : client.key()});
+    at_.readers.read({ticket, std::string(frame), {}, 0, client.identity});
   }
 }
 
 void ClientsDesk::request_read(const ReadReport& report, Instant now) {
   if (report.point) {
-    at_.traces.point_read(report.ticket, *report.point, now);
+    at_.traces.point_read(report.ticket, *report.point);
     return;
   }
   const auto found = long_requests_.find(report.ticket);
@@ -197,7 +188,6 @@ bool ClientsDesk::may_ask(const Client& client, const protocol::ClientRequest& r
   if (!client.is_reader() || !(request.has_submit() || request.has_change())) {
     return true;
   }
-  at_.open.count_refusal(client.key());
   at_.clients.reply_error(
       client, fmt::format("the key \"{}\" is a reader's: it may look at studies, workers and "
                           "results, and change nothing",
@@ -252,11 +242,11 @@ void ClientsDesk::status(const Client& client, const protocol::StatusRequest& re
     at_.clients.to_client(client.identity, reply);
     return;
   }
-  const std::size_t most = page_size(request.limit(), settings_.largest_page);
+  const std::size_t most = page_size(request.limit(), limits::kPageLength);
   std::size_t bytes = 0;
   for (auto id = at_.sources.states.durable_after(request.after_study_id()); id;
        id = at_.sources.states.durable_after(*id)) {
-    if (static_cast<std::size_t>(fields.studies_size()) == most || bytes > kMostPageBytes) {
+    if (static_cast<std::size_t>(fields.studies_size()) == most || bytes > limits::kPageBytes) {
       fields.set_next_after(fields.studies(fields.studies_size() - 1).study_id());
       break;
     }
@@ -289,7 +279,7 @@ void ClientsDesk::workers(const Client& client, const protocol::WorkersRequest& 
   if (request.after_worker_id() == 0) {
     add_keys(fields);
   }
-  const std::size_t most = page_size(request.limit(), settings_.largest_page);
+  const std::size_t most = page_size(request.limit(), limits::kPageLength);
   for (auto id = at_.workers.next_after(request.after_worker_id()); id;
        id = at_.workers.next_after(*id)) {
     if (static_cast<std::size_t>(fields.workers_size()) == most) {
@@ -314,12 +304,12 @@ void ClientsDesk::trace(const Client& client, const protocol::TraceRequest& requ
                                                 "trace: `oblique retry` solves it again",
                                                 request.point(), study.name));
   } else {
-    at_.traces.ask(client, request,
-                   {*known, study.table, at_.sources.scheduler.study(*known).solver_version}, now);
+    at_.traces.request(client, request, *known, study.table,
+                       at_.sources.scheduler.study(*known).solver_version, now);
   }
 }
 
-/// Who was turned away, and what the holders of keys have.
+/// Who was turned away, and which keys are connected.
 void ClientsDesk::add_keys(protocol::WorkersReply& reply) const {
   const PeerCounts peers = at_.network.peer_counts();
   for (const auto& [reason, count] : peers.refusals) {
@@ -327,19 +317,11 @@ void ClientsDesk::add_keys(protocol::WorkersReply& reply) const {
     refusals.set_reason(reason);
     refusals.set_peers(count);
   }
-  std::map<std::string, protocol::KeyStatus> keys;
   for (const auto& [name, connected] : peers.keys) {
-    keys[name].set_role(std::string(protocol::name_of(connected.role)));
-    keys[name].set_connections(connected.connections);
-  }
-  for (const auto& [name, share] : at_.open.shares()) {
-    keys[name].set_open_studies(share.studies);
-    keys[name].set_open_points(share.points);
-    keys[name].set_refused(share.refused);
-  }
-  for (auto& [name, key] : keys) {
+    auto& key = *reply.add_keys();
     key.set_name(name);
-    *reply.add_keys() = std::move(key);
+    key.set_role(std::string(protocol::name_of(connected.role)));
+    key.set_connections(connected.connections);
   }
 }
 

@@ -12,7 +12,7 @@
 #include "server/service/outbox/outbox.h"
 #include "server/service/outbox/request_reader.h"
 #include "server/service/study_changes.h"
-#include "server/service/traces/trace_desk.h"
+#include "server/service/traces/trace_handler.h"
 #include "server/service/views.h"
 #include "server/service/waiting_queries.h"
 #include "server/service/workers_desk.h"
@@ -23,12 +23,6 @@ struct ClientsDeskSettings {
   /// How often a client hears that its query or long request waits or runs, by which the server
   /// also finds out that the client is gone.
   std::int64_t still_working_every_ms = 1000;
-  /// Longer requests are read on a thread of their own; so many of them wait there at most.
-  std::size_t longest_inline_bytes = std::size_t{64} * 1024;
-  std::size_t most_long_requests = 64;
-  std::size_t most_long_requests_of_one = 2;  ///< client
-  std::size_t most_long_bytes = std::size_t{64} * 1024 * 1024;
-  std::size_t largest_page = 1000;  ///< studies or workers in one reply
   std::string access = "loopback";  ///< as StatusReply.access
   std::string version{};            ///< as StatusReply.version
 };
@@ -46,10 +40,9 @@ class ClientsDesk {
     StudyChanges& changes;
     const WorkersDesk& workers;
     StudySources sources;
-    OpenStudies& open;
     const ToNetwork& network;
     const SettledRates& worker_rates;
-    TraceDesk& traces;
+    TraceHandler& traces;
   };
 
   ClientsDesk(const ClientsDeskSettings& settings, const Neighbours& neighbours);

@@ -23,15 +23,13 @@ Service::Service(const ServiceSettings& settings, Outbox& outbox, std::vector<St
       open_(settings.bounds),
       changes_(settings.last_study_id, states_, ledger_,
                {scheduler_, states_, ledger_, rates_, known_}, known_, open_, outbox, outbox),
-      traces_(settings.traces, settings.solver_version, outbox, outbox,
-              settings.clients.still_working_every_ms),
+      traces_(settings.solver_version, outbox, outbox, settings.clients.still_working_every_ms),
       clients_(settings.clients, {outbox,
                                   outbox,
                                   bad_frames_,
                                   changes_,
                                   workers_,
                                   {scheduler_, states_, ledger_, rates_, known_},
-                                  open_,
                                   outbox,
                                   worker_rates_,
                                   traces_}) {
@@ -69,7 +67,7 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
     handle(event, {now, &heard.results});
   }
   if (heard.trace_of != 0) {
-    traces_.part(heard.trace_of, heard.trace_part);
+    traces_.trace_received(heard.trace_of, std::move(heard.trace));
   }
   handle_found(now);
   hand_out_or_hold(now);

@@ -14,7 +14,7 @@
 #include "server/service/outbox/log_limits.h"
 #include "server/service/outbox/outbox.h"
 #include "server/service/study_changes.h"
-#include "server/service/traces/trace_desk.h"
+#include "server/service/traces/trace_handler.h"
 #include "server/service/workers_desk.h"
 #include "server/service/write_ledger.h"
 #include "server/store/store.h"
@@ -26,7 +26,6 @@ struct ServiceSettings {
   LedgerLimits ledger;
   ClientsDeskSettings clients;
   StudyBounds bounds;
-  TraceLimits traces;
   std::uint32_t heartbeat_interval_ms = 900;
   std::string solver_version;  ///< workers with another one are told so
   std::string database_id;
@@ -120,7 +119,11 @@ class Service {
   void handle_found(Instant now);
   void hand_out_or_hold(Instant now);
   void tell_traces(const Event& event);
-  void send_traces() { workers_.send(traces_.take_orders()); }
+  void send_traces() {
+    for (const auto& [worker, message] : traces_.take_messages()) {
+      workers_.send(worker, message);
+    }
+  }
   std::uint64_t settled_of(StudyId id) const;
 
   void perform(const DefineStudy& effect, Turn turn);
@@ -172,7 +175,7 @@ class Service {
   WorkersDesk workers_;
   OpenStudies open_;
   StudyChanges changes_;
-  TraceDesk traces_;
+  TraceHandler traces_;
   ClientsDesk clients_;
   StoredPoints stored_points_;
   bool stopping_ = false;

@@ -98,7 +98,7 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
     return;
   }
   const std::uint64_t appended = read.table.size() - study.table.size();
-  if (!may_open(client, id, study.submitted_by, open_points_of(id, sources_) + appended)) {
+  if (!may_open(client, id, open_points_of(id, sources_) + appended)) {
     return;
   }
   const StudyView view = view_of(id, sources_, now);
@@ -162,7 +162,7 @@ bool StudyChanges::takes_end(StudyId id) {
 
 void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32_t priority,
                        Instant now) {
-  if (!may_open(client, last_study_id_ + 1, client.key(), read.table.size())) {
+  if (!may_open(client, last_study_id_ + 1, read.table.size())) {
     return;
   }
   const StudyId id = ++last_study_id_;
@@ -176,27 +176,24 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
                 StudyWrite{id, reuses});
 }
 
-/// Whether the study may have so many further points open; else the client is told why not.
-bool StudyChanges::may_open(const Client& client, StudyId id, const std::string& key,
-                            std::uint64_t points) {
-  const std::string objection = open_.objection_to(id, key, points);
-  if (objection.empty()) {
-    return true;
+/// Whether the study may be open with so many open points; else the client is told why not.
+bool StudyChanges::may_open(const Client& client, StudyId id, std::uint64_t points) {
+  const std::string objection = open_.objection_to(id, points);
+  if (!objection.empty()) {
+    clients_.reply_error(client, objection);
   }
-  open_.count_refusal(client.key());
-  clients_.reply_error(client, objection);
-  return false;
+  return objection.empty();
 }
 
 /// The same of a study that is to get another state.
 bool StudyChanges::may_reopen(const Client& client, StudyId id, StudyState wanted) {
   return wanted != StudyState::kRunning || states_.is_open(id) ||
-         may_open(client, id, states_.record(id).submitted_by, open_points_of(id, sources_));
+         may_open(client, id, open_points_of(id, sources_));
 }
 
 void StudyChanges::recount(StudyId id) {
   if (states_.contains(id) && states_.is_open(id)) {
-    open_.set(id, states_.record(id).submitted_by, open_points_of(id, sources_));
+    open_.set(id, open_points_of(id, sources_));
   } else {
     open_.close(id);
   }
@@ -336,7 +333,8 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
     return;
   }
   const bool stays_closed = states_.state(id) == StudyState::kCancelled;
-  if (!stays_closed && !may_open(client, id, study.submitted_by, study.failures.size())) {
+  if (!stays_closed &&
+      !may_open(client, id, open_points_of(id, sources_) + study.failures.size())) {
     return;
   }
   ledger_.write(ForgetFailures{id, study.failures, iso_8601(now)},

@@ -89,7 +89,7 @@ class StudyChanges {
   };
 
   void add(const Client& client, const ReadRequest& read, std::int32_t priority, Instant now);
-  bool may_open(const Client& client, StudyId id, const std::string& key, std::uint64_t points);
+  bool may_open(const Client& client, StudyId id, std::uint64_t points);
   bool may_reopen(const Client& client, StudyId id, StudyState wanted);
   void go_on(const Client& client, StudyId id, Instant now);
   void set_state(const Client& client, StudyId id, StudyState state, bool submitted, Instant now);

@@ -21,9 +21,7 @@ void WaitingQueries::ask(const Client& client, const protocol::QueryRequest& req
     return;
   }
   const std::uint64_t ticket = ++last_ticket_;
-  // Who has a key has one share, however many connections that is.
-  const std::string asker = client.holder == nullptr ? client.identity : "key " + client.key();
-  if (!readers_.query({ticket, asker, request})) {
+  if (!readers_.query({ticket, client.identity, request})) {
     clients_.reply_error(client, "too many queries wait already: ask again later");
     return;
   }

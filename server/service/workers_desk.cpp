@@ -29,19 +29,6 @@ std::string plain(const std::string& text) {
   return kept;
 }
 
-/// By what the process of a worker is known again, or an empty text: by the id that it has drawn,
-/// or by the name that older workers have when they are given no other one, HOST:PID.
-std::string process_of(const protocol::WorkerHello& hello) {
-  if (!hello.process_id().empty()) {
-    return "id " + protocol::shortened(hello.process_id(), kLongestWorkerText);
-  }
-  const std::string& name = hello.name();
-  const std::size_t colon = name.rfind(':');
-  const bool ends_in_number = colon != std::string::npos && colon > 0 && colon + 1 < name.size() &&
-                              name.find_first_not_of("0123456789", colon + 1) == std::string::npos;
-  return ends_in_number ? "name " + protocol::shortened(name, kLongestWorkerText) : std::string();
-}
-
 /// The points that a filter leaves out; nothing where the message has no ranges of points.
 std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   IntervalSet points;
@@ -118,10 +105,10 @@ Heard WorkersDesk::take(const std::string& identity, std::string_view frame, Ins
       heard.events.emplace_back(BatchesReturned{worker, {leases.begin(), leases.end()}});
       break;
     }
-    case Kind::kTracePart:
+    case Kind::kTrace:
       heard.events.emplace_back(CreditGiven{worker, 0});  // it lives
       heard.trace_of = worker;
-      heard.trace_part = std::move(*message.mutable_trace_part());
+      heard.trace = std::move(*message.mutable_trace());
       break;
     case Kind::kGoodbye:
       note(Severity::kInfo, fmt::format("worker {} leaves", worker), now);
@@ -165,9 +152,7 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
                       hellos,
                       key,
                       now.steady_ms};
-  // Of older workers the name is HOST:PROCESS when they are given no other.
-  worker.host =
-      hello.host().empty() ? worker.name.substr(0, worker.name.rfind(':')) : plain(hello.host());
+  worker.host = plain(hello.host());
   if (!welcome(id, worker)) {
     return;
   }
@@ -188,8 +173,9 @@ void WorkersDesk::hello(const std::string& identity, const protocol::WorkerHello
     stopping.mutable_stopping();
     network_.to_worker(identity, stopping);
   }
-  heard.events.emplace_back(WorkerJoined{id, worker.threads, worker.solver_version,
-                                         process_of(hello), !hello.process_id().empty()});
+  heard.events.emplace_back(WorkerJoined{
+      id, worker.threads, worker.solver_version,
+      protocol::shortened(hello.process_id(), kLongestWorkerText), !hello.process_id().empty()});
 }
 
 /// Says why, if there is a reason.
@@ -220,7 +206,6 @@ bool WorkersDesk::welcome(WorkerId id, const WorkerRecord& worker) {
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
   welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
   welcome.set_database_id(settings_.database_id);
-  welcome.set_takes_back(true);
   return network_.to_worker(worker.identity, reply) != Delivery::kGone;
 }
 

@@ -12,7 +12,6 @@
 #include "server/scheduler/scheduler_events.h"
 #include "server/service/outbox/log_limits.h"
 #include "server/service/outbox/outbox.h"
-#include "server/service/traces/trace_orders.h"
 #include "server/service/write_ledger.h"
 
 namespace oblique::server {
@@ -47,8 +46,8 @@ struct WorkerRecord {
 struct Heard {
   std::vector<Event> events;  ///< for the scheduler, in order
   protocol::Results results;  ///< that a ResultsReceived among them tells of
-  WorkerId trace_of = 0;      ///< worker that sent a part of a trace; 0: none did
-  protocol::TracePart trace_part;
+  WorkerId trace_of = 0;      ///< worker that sent a trace; 0: none did
+  protocol::Trace trace;
 };
 
 /// Speaks with workers: makes the scheduler's events of their messages, and messages of what the
@@ -69,8 +68,7 @@ class WorkersDesk {
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
-  /// The orders and cancellations among them.
-  void send(const std::vector<TraceEffect>& orders);
+  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
   /// The recipe goes out as it is kept: encoding a long one again for each worker would hold up the
   /// others.
   void define(const DefineStudy& define, const std::string& recipe_bytes);
@@ -110,7 +108,6 @@ class WorkersDesk {
   void notice_to(WorkerId worker, const std::string& text);
   void forget(WorkerId worker);
   /// `lease`: of the batch that the message is; 0: it is none.
-  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
   void note_delivery(WorkerId worker, WorkerRecord& record, Delivery delivery);
   void note(Severity severity, const std::string& text, Instant now);
 

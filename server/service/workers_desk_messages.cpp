@@ -66,19 +66,6 @@ void WorkersDesk::send(const ReleaseBatch& release) {
   send(release.worker, message);
 }
 
-void WorkersDesk::send(const std::vector<TraceEffect>& orders) {
-  for (const TraceEffect& effect : orders) {
-    protocol::ServerToWorker message;
-    if (const auto* order = std::get_if<SendOrder>(&effect)) {
-      *message.mutable_trace_order() = order->order;
-      send(order->worker, message);
-    } else if (const auto* cancel = std::get_if<CancelOrder>(&effect)) {
-      message.mutable_trace_cancel()->set_trace_id(cancel->trace_id);
-      send(cancel->worker, message);
-    }
-  }
-}
-
 void WorkersDesk::define(const DefineStudy& define, const std::string& recipe_bytes) {
   const auto known = workers_.find(define.worker);
   if (known == workers_.end()) {

@@ -11,6 +11,7 @@
 
 #include "server/scheduler/scheduler_events.h"
 #include "server/service/outbox/outbox.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 
@@ -77,15 +78,15 @@ using Meaning =
 
 struct LedgerLimits {
   /// Results messages of one worker that wait for the disk. A sound worker stops long before.
-  std::size_t most_messages_of_worker = 100'000;
+  std::size_t most_messages_of_worker = limits::kUnstoredMessagesOfWorker;
   /// Results that wait for the disk, as bytes of their messages. With so many of one worker, or of
   /// all, no more are taken: they wait where they are.
-  std::size_t bytes_of_worker = std::size_t{16} << 20U;
-  std::size_t bytes = std::size_t{64} << 20U;
+  std::size_t bytes_of_worker = limits::kUnstoredBytesOfWorker;
+  std::size_t bytes = limits::kUnstoredBytes;
   /// With so many no batch goes out, until half of them are stored.
-  std::size_t bytes_to_hold = std::size_t{16} << 20U;
-  std::size_t messages_to_hold = 20'000;
-  std::size_t most_changes = 10'000;  ///< of clients
+  std::size_t bytes_to_hold = limits::kUnstoredBytesToHold;
+  std::size_t messages_to_hold = limits::kUnstoredMessagesToHold;
+  std::size_t most_changes = limits::kUnstoredChanges;  ///< of clients
 };
 
 /// The writes that were handed to the writer and are not known to be durable or refused: what each

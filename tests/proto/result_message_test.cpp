@@ -116,43 +116,19 @@ TEST(PointResultTest, AResultComesBackFromItsFrame) {
   EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "every other member";
 }
 
-TEST(PointResultTest, WhatAResultLacksIsLeftOutAndTheOthersKeepTheirPlaces) {
+TEST(PointResultTest, WhatAResultLacksStaysAbsent) {
   auto lacking = distinct_result();
   lacking.margin.reset();
-  for (const bool has_event : {true, false}) {
-    if (!has_event) {
-      lacking.margin_event.reset();
-    }
-    const PointResult message = to_message(0, lacking);
-    EXPECT_EQ(message.reals_size(), 31);
-    EXPECT_EQ(message.texts_size(), has_event ? 3 : 2);
-    EXPECT_EQ(fault_of(message), "");
-    const auto received = from_message(message);
-    EXPECT_FALSE(received.margin.has_value());
-    EXPECT_EQ(received.margin_event, lacking.margin_event);
-    EXPECT_EQ(received.stick_total_s, 7e-5) << "that stands behind it";
-    EXPECT_EQ(received.major_mode, "SC SR");
-  }
-}
-
-TEST(PointResultTest, OnlyWhatMayBeAbsentIs) {
-  auto lacking = distinct_result();
-  lacking.margin.reset();
-  PointResult sound = to_message(0, lacking);
-  ASSERT_EQ(sound.absent_size(), 1);
-  PointResult longer = sound;
-  longer.add_reals(1.0);
-  EXPECT_THAT(fault_of(longer), HasSubstr("32 real numbers")) << "and one of them named absent";
-  PointResult twice = sound;
-  twice.add_absent(sound.absent(0));
-  EXPECT_THAT(fault_of(twice), HasSubstr("no result may lack")) << "places ascend";
-  PointResult beyond = sound;
-  beyond.add_absent(1000);
-  EXPECT_THAT(fault_of(beyond), HasSubstr("no result may lack"));
-  PointResult without_peak = to_message(0, distinct_result());
-  without_peak.mutable_reals()->RemoveLast();
-  without_peak.add_absent(5);  // fn_peak_N
-  EXPECT_THAT(fault_of(without_peak), HasSubstr("no result may lack"));
+  lacking.margin_event.reset();
+  lacking.errors.mode_same.reset();
+  const PointResult message = to_message(0, lacking);
+  EXPECT_EQ(fault_of(message), "");
+  const auto received = from_message(message);
+  EXPECT_FALSE(received.margin.has_value());
+  EXPECT_FALSE(received.margin_event.has_value());
+  EXPECT_FALSE(received.errors.mode_same.has_value());
+  EXPECT_EQ(received.stick_total_s, 7e-5);
+  EXPECT_EQ(received.major_mode, "SC SR");
 }
 
 TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
@@ -164,11 +140,16 @@ TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
 
 TEST(PointResultTest, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
   const PointResult sound = to_message(0, distinct_result());
-  for (int i = 0; i < sound.reals_size(); ++i) {
+  int i = 0;
+  solver::for_each_sent<double>([&](const auto& field, const auto& member) {
     PointResult message = sound;
     message.set_reals(i, kNotANumber);
-    EXPECT_THAT(fault_of(message), HasSubstr("not a finite number")) << i;
-  }
+    EXPECT_THAT(fault_of(message),
+                member.may_be_absent ? HasSubstr("") : HasSubstr("not a finite number"))
+        << field.name;
+    message.set_reals(i++, std::numeric_limits<double>::infinity());
+    EXPECT_THAT(fault_of(message), HasSubstr("not a finite number")) << field.name;
+  });
   PointResult closing = sound;
   closing.set_reals(21, std::numeric_limits<double>::infinity());
   EXPECT_THAT(fault_of(closing), HasSubstr("closure"));

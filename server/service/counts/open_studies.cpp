@@ -3,75 +3,39 @@
 #include <spdlog/fmt/fmt.h>
 
 namespace oblique::server {
-namespace {
 
-/// Why `more` cannot come to `held`, which may not become more than `most`.
-std::string objection_to_bound(const char* bound, const std::string& who, const char* what,
-                               std::uint64_t held, std::uint64_t more, std::uint64_t most) {
-  const bool fits = held <= most && more <= most - held;
-  return fits ? std::string()
-              : fmt::format(
-                    "{} {} {} open, and the bound {} of the server is {}: wait until some are "
-                    "done, or cancel some",
-                    who, held, what, bound, most);
-}
-
-}  // namespace
-
-void OpenStudies::set(StudyId study, const std::string& key, std::uint64_t points) {
-  if (!studies_.contains(study)) {
-    const auto share = shares_.try_emplace(key).first;
-    ++share->second.studies;
-    studies_.emplace(study, Study{share, 0});
-  }
+void OpenStudies::set(StudyId study, std::uint64_t points) {
+  points_.try_emplace(study, 0);
   set_points(study, points);
 }
 
 void OpenStudies::set_points(StudyId study, std::uint64_t points) {
-  const auto found = studies_.find(study);
-  if (found == studies_.end()) {
-    return;
+  if (const auto found = points_.find(study); found != points_.end()) {
+    all_points_ += points - found->second;  // modulo 2^64, so also when they become fewer
+    found->second = points;
   }
-  Study& open = found->second;
-  open.share->second.points += points - open.points;  // modulo 2^64, and so also when it shrinks
-  points_ += points - open.points;
-  open.points = points;
 }
 
 void OpenStudies::close(StudyId study) {
   set_points(study, 0);
-  const auto found = studies_.find(study);
-  if (found == studies_.end()) {
-    return;
-  }
-  const auto share = found->second.share;
-  studies_.erase(found);
-  --share->second.studies;
-  if (share->second.studies == 0 && share->second.refused == 0) {
-    shares_.erase(share);
-  }
+  points_.erase(study);
 }
 
-std::string OpenStudies::objection_to(StudyId study, const std::string& key,
-                                      std::uint64_t points) const {
-  const std::uint64_t studies = studies_.contains(study) ? 0 : 1;
-  const auto first = [](std::string one, std::string other) {
-    return one.empty() ? std::move(other) : std::move(one);
-  };
-  std::string objection = first(
-      objection_to_bound("open-studies", "all have", "studies", studies_.size(), studies,
-                         bounds_.studies),
-      objection_to_bound("open-points", "all have", "points", points_, points, bounds_.points));
-  if (key.empty() || !objection.empty()) {
-    return objection;
+std::string OpenStudies::objection_to(StudyId study, std::uint64_t points) const {
+  if (points_.size() >= bounds_.studies && !points_.contains(study)) {
+    return fmt::format(
+        "{} studies are open, and the server takes no more: wait until some are done, or cancel "
+        "some",
+        points_.size());
   }
-  const auto found = shares_.find(key);
-  const Share share = found == shares_.end() ? Share{} : found->second;
-  const std::string who = fmt::format("the key \"{}\" has", key);
-  return first(objection_to_bound("open-studies-of-key", who, "studies", share.studies, studies,
-                                  bounds_.studies_of_key),
-               objection_to_bound("open-points-of-key", who, "points", share.points, points,
-                                  bounds_.points_of_key));
+  const auto known = points_.find(study);
+  const std::uint64_t others = all_points_ - (known == points_.end() ? 0 : known->second);
+  return others <= bounds_.points && points <= bounds_.points - others
+             ? std::string()
+             : fmt::format(
+                   "the open studies would have more than {} points without a result "
+                   "(--limits-open-points of the server): wait until some are done, or cancel some",
+                   bounds_.points);
 }
 
 }  // namespace oblique::server

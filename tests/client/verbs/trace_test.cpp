@@ -149,7 +149,7 @@ TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   says({"models", "0", "--format", "csv", "--out", "x.json"}, 2, "contradict each other");
   says({"models", "0", "--format", "jsn"}, 2, "did you mean `json`?");
   says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
-  says({"models", "0", "--here", "--on-worker"}, 2, "--here");
+  says({"models", "0", "--local", "--on-worker"}, 2, "--local");
 }
 
 TEST_F(TraceVerb, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
@@ -192,7 +192,7 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   const auto nobody = ask({"models", "3"});
   EXPECT_EQ(nobody.exit_code, 1);
   EXPECT_THAT(nobody.err, HasSubstr("no worker is connected"));
-  const auto here = ask({"models", "3", "--here", "--out", "here.csv"});
+  const auto here = ask({"models", "3", "--local", "--out", "here.csv"});
   EXPECT_EQ(here.exit_code, 0) << here.err;
   EXPECT_THAT(here.err, HasSubstr("solved here, same as stored."));
 
@@ -207,7 +207,7 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   EXPECT_EQ(there.out, text_of("here.csv"));
   for (const char* file : {"fall_here.csv", "fall_there.csv"}) {
     const bool is_here = file == std::string_view("fall_here.csv");
-    ask({"models", "3", "--shape", "--fall", is_here ? "--here" : "--on-worker", "--out", file});
+    ask({"models", "3", "--shape", "--fall", is_here ? "--local" : "--on-worker", "--out", file});
   }
   EXPECT_THAT(text_of("fall_here.csv"), StartsWith("t_s,"));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 #include "server/loop/loop.h"
 #include "tests/server/loop/running_server.h"
 #include "tests/support/temporary_folder.h"

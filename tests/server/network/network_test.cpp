@@ -141,6 +141,21 @@ TEST_F(NetworkTest, APeerIsToldOfOnceWhenItHasGone) {
   EXPECT_EQ(departures[0].reason, "");
 }
 
+TEST_F(NetworkTest, APeerWhoseMessageIsComingInHasSomethingUnheardUntilItStops) {
+  const auto slow = peer();
+  slow->send(zmtp_frame("hello"));
+  const std::string identity = next().identity;
+  now_ms_ += 5000;
+  network_.collect(now_ms_);
+  EXPECT_FALSE(network_.has_unheard(identity));
+  const std::string frame = zmtp_frame(std::string(1 << 20, 'x'));
+  slow->send(frame.substr(0, 100));
+  turn_until([&] { return network_.has_unheard(identity); });
+  now_ms_ += 5000;
+  network_.collect(now_ms_);
+  EXPECT_FALSE(network_.has_unheard(identity));
+}
+
 TEST_F(NetworkTest, WhoSpeaksAnotherProtocolIsMadeToLeave) {
   RawPeer stranger(network_.endpoint(0));
   stranger.send("GET / HTTP/1.1\r\n\r\n");

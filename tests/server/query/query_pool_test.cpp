@@ -21,7 +21,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 #include "server/query/query_rules.h"
 #include "server/query/reader_program.h"
 #include "server/store/store.h"

@@ -3,7 +3,11 @@
 #include <memory>
 #include <vector>
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include "server/service/outbox/request_reader.h"
+#include "server/study/limits.h"
 #include "tests/server/service/service_fixture.h"
 #include "tests/support/recipes.h"
 
@@ -138,19 +142,19 @@ TEST_F(FilteredStudyTest, WhoWaitsHearsOfItAndWhoIsGoneIsForgotten) {
   EXPECT_THAT(outbox_.jobs, IsEmpty());
 }
 
-TEST_F(FilteredStudyTest, OneKeyWithManyConnectionsLeavesRoomForOthers) {
-  const auto submit = [&](const std::string& client, const std::string& key) {
-    const auto holder = std::make_shared<const KeyHolder>(KeyHolder{key, protocol::Role::kClient});
-    service_->client_frame(client, protocol::encode(filtered_request("mu > 0.75")), now_, holder);
+TEST_F(FilteredStudyTest, OneConnectionLeavesRoomForOthers) {
+  const auto submit = [&](const std::string& client, std::uint64_t id) {
+    ClientRequest message = filtered_request("mu > 0.75");
+    message.set_request_id(id);
+    service_->client_frame(client, protocol::encode(message), now_);
   };
-  const std::size_t room = ClientsDeskSettings().most_long_requests;
-  for (std::size_t i = 0; i < room; ++i) {
-    submit("connection " + std::to_string(i), "one");
+  for (std::uint64_t id = 1; id <= limits::kLongRequestsOfConnection + 1; ++id) {
+    submit("one", id);
   }
-  EXPECT_EQ(outbox_.reads.size(), room / 4);
+  EXPECT_EQ(outbox_.reads.size(), limits::kLongRequestsOfConnection);
   EXPECT_THAT(last_reply().error().message(), HasSubstr("too many long requests"));
-  submit("another connection", "other");
-  EXPECT_EQ(outbox_.reads.size(), room / 4 + 1);
+  submit("another", 1);
+  EXPECT_EQ(outbox_.reads.size(), limits::kLongRequestsOfConnection + 1);
 }
 
 TEST_F(FilteredStudyTest, TheSameStudySubmittedAgainIsThatStudy) {
