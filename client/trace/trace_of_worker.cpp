@@ -70,7 +70,7 @@ SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
   if (trace.states().empty()) {
     throw ServerError(fmt::format(
         "the trace has {} instants, more than one message of a server can hold: --every {} gives "
-        "each {}th and all ends of phases, --local solves the point in this process and gives all",
+        "one in {} and all ends of phases, --local solves the point in this process and gives all",
         trace.instants(), trace.every(), trace.every()));
   }
   begin(shape);

@@ -1,4 +1,5 @@
 // Points looked at again, by the program itself: here, by a worker, and when neither can.
+#include <algorithm>
 #include <csignal>
 #include <fstream>
 #include <map>
@@ -150,6 +151,7 @@ TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   says({"models", "0", "--format", "jsn"}, 2, "did you mean `json`?");
   says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
   says({"models", "0", "--local", "--on-worker"}, 2, "--local");
+  says({"models", "0", "--every", "0"}, 2, "--every");
 }
 
 TEST_F(TraceVerb, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
@@ -211,6 +213,12 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   }
   EXPECT_THAT(text_of("fall_here.csv"), StartsWith("t_s,"));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
+  // Each 50th instant, the ends of phases and the last instant, whoever solves it.
+  const auto thinned = ask({"models", "3", "--every", "50"});
+  EXPECT_EQ(thinned.out, ask({"models", "3", "--every", "50", "--local"}).out);
+  const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
+  EXPECT_GT(lines(thinned.out), lines(there.out) / 50);
+  EXPECT_LT(lines(thinned.out), lines(there.out) / 5);
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
   EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
