@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -11,7 +10,7 @@
 namespace oblique::protocol {
 
 /// Peers of any other version are refused with both numbers in the reason.
-inline constexpr std::uint32_t kProtocolVersion = 7;
+inline constexpr std::uint32_t kProtocolVersion = 8;
 
 /// Largest frame that either side takes; a longer one is a foreign or broken peer.
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;

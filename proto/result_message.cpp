@@ -2,115 +2,110 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
-#include <type_traits>
+#include <span>
+#include <string_view>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/frames.h"
 #include "worker/solver/model/result_fields.h"
 
 namespace oblique::protocol {
 namespace {
 
 using solver::CaseResult;
+using solver::for_each_sent;
 using solver::Member;
+using solver::PhaseKind;
 using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
+using WholeNumbers = google::protobuf::RepeatedField<std::int64_t>;
+using Texts = google::protobuf::RepeatedPtrField<std::string>;
 
 /// Longest text that a result may have, in bytes.
 constexpr std::size_t kLongestText = 65536;
 
-/// Calls `take` with every field that is sent with a result and its member, in the order of
-/// `sent_outputs()`.
-template <class Take>
-void for_each_scalar(const Take& take) {
-  solver::for_each_sent<double>(take);
-  solver::for_each_sent<std::int64_t>(take);
-  solver::for_each_sent<std::string>(take);
+// Scalars travel by type. What a result lacks has a value that no result has.
+
+const Numbers& sent(const PointResult& message, double /*type*/) {
+  return message.reals();
+}
+const WholeNumbers& sent(const PointResult& message, std::int64_t /*type*/) {
+  return message.whole_numbers();
+}
+const Texts& sent(const PointResult& message, const std::string& /*type*/) {
+  return message.texts();
 }
 
-/// Stands for an output that a result lacks: NaN, the least whole number, or an empty text.
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t kNoWholeNumber = std::numeric_limits<std::int64_t>::min();
+
+bool is_absent(double value) {
+  return std::isnan(value);
+}
+bool is_absent(std::int64_t value) {
+  return value == kNoWholeNumber;
+}
+bool is_absent(const std::string& value) {
+  return value.empty();
+}
+
+void add_scalars(const CaseResult& result, PointResult& message) {
+  for_each_sent<double>([&](const ResultField&, const Member<double>& member) {
+    const double* value = member.of(result);
+    message.add_reals(value != nullptr ? *value : kNoNumber);
+  });
+  for_each_sent<std::int64_t>([&](const ResultField&, const Member<std::int64_t>& member) {
+    const std::int64_t* value = member.of(result);
+    message.add_whole_numbers(value != nullptr ? *value : kNoWholeNumber);
+  });
+  for_each_sent<std::string>([&](const ResultField&, const Member<std::string>& member) {
+    const std::string* value = member.of(result);
+    message.add_texts(value != nullptr ? *value : std::string());
+  });
+}
+
+/// Reads the scalars of type T, as far as there are any.
 template <class T>
-T absent() {
-  if constexpr (std::is_same_v<T, double>) {
-    return std::numeric_limits<double>::quiet_NaN();
-  } else if constexpr (std::is_same_v<T, std::int64_t>) {
-    return std::numeric_limits<std::int64_t>::min();
-  } else {
-    return {};
-  }
-}
-
-template <class T>
-bool is_absent(const Member<T>& member, const T& value) {
-  if constexpr (std::is_same_v<T, double>) {
-    return member.may_be_absent && std::isnan(value);
-  } else {
-    return member.may_be_absent && value == absent<T>();
-  }
-}
-
-void add(PointResult& message, double value) {
-  message.add_reals(value);
-}
-void add(PointResult& message, std::int64_t value) {
-  message.add_whole_numbers(value);
-}
-void add(PointResult& message, const std::string& value) {
-  message.add_texts(value);
-}
-
-/// Calls `take` with each field, its member and its value in the message. False if the message has
-/// fewer or more scalars than there are fields.
-template <class Take>
-bool for_each_value(const PointResult& message, const Take& take) {
-  const auto walk = [&take]<class T>(const auto& values, T /*type*/) {
-    int i = 0;
-    solver::for_each_sent<T>([&](const ResultField& field, const Member<T>& member) {
-      if (i < values.size()) {
-        take(field, member, values[i]);
-      }
-      ++i;
-    });
-    return i == values.size();
-  };
-  const bool has_reals = walk(message.reals(), double());
-  const bool has_whole_numbers = walk(message.whole_numbers(), std::int64_t());
-  const bool has_texts = walk(message.texts(), std::string());
-  return has_reals && has_whole_numbers && has_texts;
-}
-
-void append(Numbers& list, std::initializer_list<double> element) {
-  for (const double number : element) {
-    list.Add(number);
-  }
+void read_scalars(const PointResult& message, CaseResult& result) {
+  const auto& values = sent(message, T{});
+  int i = 0;
+  for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
+    if (i < values.size() && !(member.may_be_absent && is_absent(values[i]))) {
+      member.in(result) = values[i];
+    }
+    ++i;
+  });
 }
 
 void add_lists(const CaseResult& result, PointResult& message) {
   for (std::size_t i = 0; i < result.peaks.size(); ++i) {
     const solver::Peak& peak = result.peaks[i];
-    append(*message.mutable_peaks(), {peak.t_s, peak.fn_N, peak.ft_N});
+    for (const double number : {peak.t_s, peak.fn_N, peak.ft_N}) {
+      message.add_peaks(number);
+    }
     if (peak.major) {
       message.add_major_peaks(static_cast<std::uint32_t>(i));
     }
   }
-  for (const solver::TangentialPeak& peak : result.ft_peaks) {
-    append(*message.mutable_ft_peaks(), {peak.t_s, peak.ft_N});
+  for (const auto& [t_s, ft_N] : result.ft_peaks) {
+    message.add_ft_peaks(t_s);
+    message.add_ft_peaks(ft_N);
   }
   for (const solver::Phase& phase : result.phases) {
     message.add_phase_ends_s(phase.t1_s);
   }
-  for (const solver::StickInterval& interval : result.stick_intervals) {
-    append(*message.mutable_stick_intervals(), {interval.t0_s, interval.t1_s});
+  for (const auto& [t0_s, t1_s] : result.stick_intervals) {
+    message.add_stick_intervals(t0_s);
+    message.add_stick_intervals(t1_s);
   }
-  for (const solver::ReactionPeak& peak : result.reaction_peaks) {
-    append(*message.mutable_reaction_peaks(), {peak.t_s, peak.force_N});
+  for (const auto& [t_s, force_N] : result.reaction_peaks) {
+    message.add_reaction_peaks(t_s);
+    message.add_reaction_peaks(force_N);
   }
 }
 
-/// Appends to `list` the pairs of a flat list.
+/// Appends each pair of a flat list.
 template <class Element>
 void read_pairs(const Numbers& numbers, std::vector<Element>& list) {
   list.reserve(static_cast<std::size_t>(numbers.size() / 2));
@@ -129,46 +124,44 @@ void read_lists(const PointResult& message, CaseResult& result) {
       result.peaks[number].major = true;
     }
   }
+  read_pairs(message.ft_peaks(), result.ft_peaks);
+  read_pairs(message.stick_intervals(), result.stick_intervals);
+  read_pairs(message.reaction_peaks(), result.reaction_peaks);
+  result.phases.reserve(static_cast<std::size_t>(message.phase_ends_s_size()));
   double begin_s = 0.0;
   for (const double end_s : message.phase_ends_s()) {
     const bool compresses = result.phases.size() % 2 == 0;
     result.phases.push_back(
-        {compresses ? solver::PhaseKind::kCompression : solver::PhaseKind::kRestitution, begin_s,
-         end_s});
+        {compresses ? PhaseKind::kCompression : PhaseKind::kRestitution, begin_s, end_s});
     begin_s = end_s;
   }
-  read_pairs(message.ft_peaks(), result.ft_peaks);
-  read_pairs(message.stick_intervals(), result.stick_intervals);
-  read_pairs(message.reaction_peaks(), result.reaction_peaks);
 }
 
 /// What is wrong with a number, as "is not a finite number"; nullptr: nothing.
 const char* fault_of_number(double number) {
-  return std::abs(number) <= kLargestOutput ? nullptr
-         : std::isfinite(number)            ? "is too large to be stored"
-                                            : "is not a finite number";
+  if (std::abs(number) <= kLargestOutput) {
+    return nullptr;
+  }
+  return std::isfinite(number) ? "is too large to be stored" : "is not a finite number";
 }
 
-/// A list of a message, and how many of its numbers are an element of it.
-struct List {
-  const char* name;
-  const Numbers* numbers;
-  int per_element;
-};
-
 std::string fault_of_lists(const PointResult& message) {
+  struct List {
+    const char* name;
+    const Numbers* numbers;
+    int per_element;
+  };
   for (const List& list : {List{"peaks", &message.peaks(), 3},
                            {"ft_peaks", &message.ft_peaks(), 2},
                            {"phases", &message.phase_ends_s(), 1},
                            {"stick_intervals", &message.stick_intervals(), 2},
                            {"reaction_peaks", &message.reaction_peaks(), 2}}) {
-    const int elements = list.numbers->size() / list.per_element;
-    if (elements > kMostListElements) {
-      return fmt::format("the worker sent {} {}, and a result has at most {}", elements, list.name,
-                         kMostListElements);
+    if (list.numbers->size() / list.per_element > kMostListElements) {
+      return fmt::format("the worker sent {} {}, and a result has at most {}",
+                         list.numbers->size() / list.per_element, list.name, kMostListElements);
     }
     if (list.numbers->size() % list.per_element != 0) {
-      return fmt::format("the worker sent a list {} of the wrong length", list.name);
+      return fmt::format("the worker sent {} of the wrong length", list.name);
     }
     for (const double number : *list.numbers) {
       if (const char* fault = fault_of_number(number)) {
@@ -177,29 +170,31 @@ std::string fault_of_lists(const PointResult& message) {
     }
   }
   const auto peaks = static_cast<std::uint32_t>(message.peaks_size() / 3);
-  const bool are_known = std::all_of(message.major_peaks().begin(), message.major_peaks().end(),
-                                     [peaks](std::uint32_t number) { return number < peaks; });
-  return are_known ? "" : "the worker sent the number of a major peak that is not there";
+  const bool are_peaks = std::all_of(message.major_peaks().begin(), message.major_peaks().end(),
+                                     [&](std::uint32_t number) { return number < peaks; });
+  return are_peaks ? "" : "the worker sent the number of a major peak that does not exist";
 }
 
-std::string fault_of_scalars(const PointResult& message) {
+/// The first fault of the scalars of type T, or an empty text.
+template <class T>
+std::string fault_of_scalars(const PointResult& message, const char* what) {
+  const auto& values = sent(message, T{});
+  int number = 0;
   std::string fault;
-  const auto check = [&fault]<class T>(const ResultField& field, const Member<T>& member,
-                                       const T& value) {
-    if constexpr (std::is_same_v<T, double>) {
-      const char* found = is_absent(member, value) ? nullptr : fault_of_number(value);
-      if (found != nullptr && fault.empty()) {
-        fault = fmt::format("the worker sent a {} that {}", field.column, found);
-      }
+  for_each_sent<T>([&](const ResultField& field, const Member<T>& member) {
+    const int i = number++;
+    if (i >= values.size() || !fault.empty() || (member.may_be_absent && is_absent(values[i]))) {
+      return;
     }
-  };
-  if (!for_each_value(message, check)) {
-    return fmt::format(
-        "the worker sent {} real numbers, {} whole ones and {} texts, which are not those of a "
-        "result",
-        message.reals_size(), message.whole_numbers_size(), message.texts_size());
-  }
-  return fault;
+    if constexpr (std::is_same_v<T, double>) {
+      const char* const found = fault_of_number(values[i]);
+      fault =
+          found == nullptr ? "" : fmt::format("the worker sent a {} that {}", field.column, found);
+    }
+  });
+  return values.size() == number ? fault
+                                 : fmt::format("the worker sent {} {}, and a result has {}",
+                                               values.size(), what, number);
 }
 
 bool is_too_long(const std::string& text) {
@@ -211,22 +206,16 @@ bool is_too_long(const std::string& text) {
 PointResult to_message(std::uint64_t point, const CaseResult& result) {
   PointResult message;
   message.set_point(point);
-  for_each_scalar([&]<class T>(const ResultField&, const Member<T>& member) {
-    const T* value = member.of(result);
-    add(message, value != nullptr ? *value : absent<T>());
-  });
+  add_scalars(result, message);
   add_lists(result, message);
   return message;
 }
 
 CaseResult from_message(const PointResult& message) {
   CaseResult result{};
-  for_each_value(message,
-                 [&]<class T>(const ResultField&, const Member<T>& member, const T& value) {
-                   if (!is_absent(member, value)) {
-                     member.in(result) = value;
-                   }
-                 });
+  read_scalars<double>(message, result);
+  read_scalars<std::int64_t>(message, result);
+  read_scalars<std::string>(message, result);
   read_lists(message, result);
   return result;
 }
@@ -250,8 +239,43 @@ std::string fault_of(const PointResult& message) {
   if (!message.error().empty()) {
     return {};
   }
-  std::string fault = fault_of_scalars(message);
-  return fault.empty() ? fault_of_lists(message) : fault;
+  for (std::string fault : {fault_of_scalars<double>(message, "real numbers"),
+                            fault_of_scalars<std::int64_t>(message, "whole numbers"),
+                            fault_of_scalars<std::string>(message, "texts")}) {
+    if (!fault.empty()) {
+      return fault;
+    }
+  }
+  return fault_of_lists(message);
+}
+
+std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, bool with_fall) {
+  const std::string& states = trace.states();
+  const std::size_t numbers = solver::trace_numbers(shape);
+  if (static_cast<std::size_t>(trace.values_size()) != states.size() * numbers) {
+    return "its rows have other columns than a trace of this model";
+  }
+  const auto code = [](char state) { return static_cast<unsigned char>(state); };
+  if (std::any_of(states.begin(), states.end(),
+                  [&](char state) { return code(state) >= solver::kTraceStates.size(); })) {
+    return "it has a state that no contact has";
+  }
+  const auto falls = [&](char state) { return code(state) == solver::kFallingCode; };
+  if (!std::is_partitioned(states.begin(), states.end(), falls)) {
+    return "it falls again after the touch";
+  }
+  if (!with_fall && !states.empty() && falls(states.front())) {
+    return "it has rows of the fall that were not requested";
+  }
+  if (!std::all_of(trace.values().begin(), trace.values().end(),
+                   [](double value) { return std::isfinite(value); })) {
+    return "it has a value that is not finite";
+  }
+  const bool names_every = trace.every() > 1;  // with which it is short enough
+  if (states.empty() && trace.result().error().empty() && !names_every) {
+    return "it has no instant";
+  }
+  return fault_of(trace.result());
 }
 
 void say_protocol(WorkerHello& hello) {
@@ -261,10 +285,12 @@ void say_protocol(WorkerHello& hello) {
 
 std::string sent_outputs() {
   std::string names;
-  for_each_scalar([&](const ResultField& field, const auto&) {
-    names += names.empty() ? "" : " ";
-    names += field.column;
-  });
+  const auto add = [&](const ResultField& field, const auto&) {
+    names.append(names.empty() ? "" : " ").append(field.column);
+  };
+  for_each_sent<double>(add);
+  for_each_sent<std::int64_t>(add);
+  for_each_sent<std::string>(add);
   return names;
 }
 

@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <string>
 
+#include "proto/frames.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/case_result.h"
+#include "worker/solver/model/trace_columns.h"
 
 namespace oblique::protocol {
 
@@ -20,9 +22,9 @@ inline constexpr int kMostLeftOutRanges = 10'000;
 inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
 
 // What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
-// order and without their names, which the worker sends once, when it joins.
+// order and without their names, which the worker says once, when it joins.
 
-/// What solving a point gave, without its inputs (proto/recipe/point_table.h).
+/// What solving a point gave, without its inputs (proto/recipe/point_inputs.h).
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
 
 /// The result that was made a message; what it does not hold is 0 or empty.
@@ -31,18 +33,28 @@ solver::CaseResult from_message(const PointResult& message);
 /// A failed point. An empty reason becomes "unknown".
 PointResult failed_point(std::uint64_t point, const std::string& reason);
 
-/// Why a message from the network is no result, or an empty text: another number of scalars, a
-/// number that is not finite (NaN where an output may be absent) or beyond kLargestOutput, lists of
-/// impossible length, more elements, more bytes or longer texts than results have.
+/// Why a result from the network is none, or an empty text: another number of scalars than results
+/// have, or none where no result may lack one, a number that is not finite or beyond
+/// kLargestOutput, lists of impossible length, more elements, bytes or longer texts than results
+/// have.
 std::string fault_of(const PointResult& message);
 
-/// Sets the version of the protocol and the names of the outputs of this build.
+/// Most bytes of the rows of a trace: with its result and the model it fits into one frame.
+inline constexpr std::size_t kMostTraceBytes =
+    kMaxFrameBytes - kMostResultBytes - (std::size_t{64} << 10U);
+
+/// What is wrong with a trace of that shape from the network, or an empty text: rows of the wrong
+/// length, values that are not finite, unknown states, rows of the fall unasked or after the touch,
+/// or its result.
+std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, bool with_fall);
+
+/// Sets the protocol version and the outputs of this build.
 void say_protocol(WorkerHello& hello);
 
 /// The names of the scalars that results have, in their order, with spaces between.
 std::string sent_outputs();
 
-/// Why the server does not take results of that worker, or an empty text: it has another version
+/// Why the server does not take results of that worker, or an empty text: it speaks another version
 /// of the protocol, or its results have other outputs, so that numbers would mean something else.
 std::string objection_to_worker(const WorkerHello& hello);
 

@@ -224,7 +224,6 @@ void Conversation::on(const protocol::Welcome& welcome) {
   deadline_ms_ = now_ms_ + lost_after_ms_;
   heartbeat_due_ms_ = now_ms_ + heartbeat_interval_ms_;
   server_stopping_ = false;
-  server_takes_back_ = welcome.takes_back();
   effects_.emplace_back(Note{"welcomed as worker " + std::to_string(welcome.worker_id())});
 
   // The server has given up what this worker held and hands it out anew.
@@ -261,7 +260,8 @@ void Conversation::on(const protocol::StudyDefinition& definition) {
     // The server took this recipe, so it reads recipes otherwise than this worker does. To fail the
     // points would blame the study.
     finish(1, "study " + std::to_string(definition.study_id()) +
-                  " cannot be read, is this worker older than the server? " + error.what());
+                  " cannot be read: install the same release on server and worker. " +
+                  error.what());
   }
 }
 

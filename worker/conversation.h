@@ -51,7 +51,7 @@ class Conversation {
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
   /// What the tracing of a point gave so far.
-  Effects on_trace_parts(std::vector<protocol::TracePart> parts, std::int64_t now_ms);
+  Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
   /// A message could not be sent; what follows it of the same effects must not be sent either.
   Effects on_send_failed(std::int64_t now_ms);
   /// The server has turned the socket away, for this reason, and people must mend that.
@@ -138,7 +138,6 @@ class Conversation {
   std::int64_t last_points_until_ms_ = 0;
   std::int64_t stop_repeats_until_ms_ = 0;
   bool server_stopping_ = false;
-  bool server_takes_back_ = false;
   std::string database_id_;
 
   std::map<std::uint64_t, std::shared_ptr<const protocol::PointTable>> studies_;

@@ -133,18 +133,17 @@ void Conversation::on(const protocol::TraceOrder& order) {
     return;
   }
   protocol::WorkerMessage message;
-  message.mutable_trace_part()->set_trace_id(order.trace_id());
-  message.mutable_trace_part()->set_last(true);
-  message.mutable_trace_part()->set_not_taken(true);
+  message.mutable_trace()->set_trace_id(order.trace_id());
+  message.mutable_trace()->set_not_taken(true);
   send(std::move(message));
 }
 
-Effects Conversation::on_trace_parts(std::vector<protocol::TracePart> parts, std::int64_t now_ms) {
+Effects Conversation::on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms) {
   now_ms_ = now_ms;
-  for (protocol::TracePart& part : parts) {
+  for (protocol::Trace& trace : traces) {
     leaving_.note_work(now_ms);
     protocol::WorkerMessage message;
-    *message.mutable_trace_part() = std::move(part);
+    *message.mutable_trace() = std::move(trace);
     send(std::move(message));
   }
   return take_effects();
@@ -161,14 +160,13 @@ std::vector<HeldPoints> Conversation::held_points() const {
   return points;
 }
 
-/// The batches from that number on. To a server that does not know of it they go back with the
-/// goodbye.
+/// The batches from that number on.
 void Conversation::give_back(std::uint64_t first_batch) {
   protocol::WorkerMessage message;
   for (auto held = held_.lower_bound(first_batch); held != held_.end(); ++held) {
     message.mutable_give_back()->add_lease_ids(held->second.lease_id);
   }
-  if (server_takes_back_ && message.has_give_back()) {
+  if (message.has_give_back()) {
     send(std::move(message));
   }
 }
@@ -178,7 +176,7 @@ void Conversation::give_back(std::uint64_t first_batch) {
 void Conversation::give_back_what_takes_too_long() {
   const std::vector<HeldPoints> points = held_points();
   const std::size_t kept = std::max<std::size_t>(leaving_.ending_in_time(points, now_ms_), 1);
-  if (stopping_ || !server_takes_back_ || kept >= held_.size()) {
+  if (stopping_ || kept >= held_.size()) {
     return;
   }
   const auto first = std::next(held_.begin(), static_cast<std::ptrdiff_t>(kept));

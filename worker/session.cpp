@@ -176,7 +176,7 @@ std::int64_t Session::poll_timeout_ms() const {
 
 void Session::report_progress() {
   apply(conversation_.on_progress(solver_.collect(), now_ms()));
-  apply(conversation_.on_trace_parts(tracer_.collect(), now_ms()));
+  apply(conversation_.on_traces(tracer_.collect(), now_ms()));
   report_due_ms_ =
       now_ms() + (conversation_.is_stopping() ? kLastReports_ms : settings_.report_interval_ms);
 }

@@ -1,27 +1,97 @@
 #include "worker/trace_solver.h"
 
-#include <string>
+#include <algorithm>
 #include <utility>
 
-#include "proto/result_message.h"
 #include "worker/solver/model/trace_columns.h"
 
 namespace oblique::worker {
 namespace {
 
-protocol::TracePart not_taken(std::uint64_t trace_id) {
-  protocol::TracePart part;
-  part.set_trace_id(trace_id);
-  part.set_last(true);
-  part.set_not_taken(true);
-  return part;
+protocol::Trace not_taken(std::uint64_t trace_id) {
+  protocol::Trace trace;
+  trace.set_trace_id(trace_id);
+  trace.set_not_taken(true);
+  return trace;
 }
 
 }  // namespace
 
-TraceSolver::TraceSolver(Solve solve, std::function<void()> has_part)
+TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
+    : every_(std::max<std::uint64_t>(every, 1)),
+      chooses_every_(every == 0),
+      most_bytes_(most_bytes) {}
+
+std::size_t TraceRows::most_rows() const {
+  return most_bytes_ / (row_numbers_ * sizeof(double) + 1);
+}
+
+void TraceRows::add(const solver::TraceRow& row) {
+  if (!kept_.empty() && !stays(kept_.back())) {
+    remove_last();  // it was kept as the last one
+  }
+  const bool falls = row.state == solver::kFalling;
+  const bool is_always_kept = falls || solver::ends_phase(last_state_, row.state);
+  kept_.push_back({instants_, is_always_kept});
+  states_.push_back(static_cast<char>(solver::code_of_state(row.state)));
+  const std::size_t before = values_.size();
+  solver::append_numbers(row, values_);
+  row_numbers_ = values_.size() - before;
+  instants_ += falls ? 0U : 1U;
+  always_kept_ += is_always_kept ? 1U : 0U;
+  last_state_ = row.state;
+  while (chooses_every_ && kept_.size() > most_rows() && every_ < instants_) {
+    every_ *= 2;
+    thin();
+  }
+  if (kept_.size() > most_rows()) {  // the rest is only counted
+    is_too_long_ = true;
+    remove_last();
+  }
+}
+
+void TraceRows::remove_last() {
+  kept_.pop_back();
+  states_.pop_back();
+  values_.resize(values_.size() - row_numbers_);
+}
+
+void TraceRows::thin() {
+  std::size_t to = 0;
+  for (std::size_t from = 0; from < kept_.size(); ++from) {
+    if (!stays(kept_[from]) && from + 1 < kept_.size()) {
+      continue;
+    }
+    kept_[to] = kept_[from];
+    states_[to] = states_[from];
+    const auto row = values_.begin() + static_cast<std::ptrdiff_t>(from * row_numbers_);
+    std::copy(row, row + static_cast<std::ptrdiff_t>(row_numbers_),
+              values_.begin() + static_cast<std::ptrdiff_t>(to * row_numbers_));
+    ++to;
+  }
+  kept_.resize(to);
+  states_.resize(to);
+  values_.resize(to * row_numbers_);
+}
+
+void TraceRows::move_to(protocol::Trace& trace) {
+  trace.set_instants(instants_);
+  trace.set_every(every_);
+  if (is_too_long_) {
+    // The first instant and the last one are kept with any `every`.
+    const std::uint64_t always = always_kept_ + 2;
+    const std::uint64_t room = most_rows() > always ? most_rows() - always : 1;
+    trace.set_every((instants_ + room - 1) / room);
+    return;
+  }
+  trace.mutable_values()->Add(values_.begin(), values_.end());
+  trace.set_states(std::move(states_));
+}
+
+TraceSolver::TraceSolver(Solve solve, std::function<void()> has_trace, std::size_t most_bytes)
     : solve_(std::move(solve)),
-      has_part_(std::move(has_part)),
+      has_trace_(std::move(has_trace)),
+      most_bytes_(most_bytes),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
 TraceSolver::~TraceSolver() {
@@ -32,15 +102,11 @@ TraceSolver::~TraceSolver() {
 void TraceSolver::take(protocol::TraceOrder order) {
   const std::lock_guard lock(mutex_);
   if (job_ || !solve_) {
-    parts_.push_back(not_taken(order.trace_id()));
-    has_part_();
+    traces_.push_back(not_taken(order.trace_id()));
+    has_trace_();
     return;
   }
-  job_.emplace(Job{std::move(order), {}});
-  job_->part.set_trace_id(job_->order.trace_id());
-  if (job_->order.shape()) {
-    job_->thinning.emplace(job_->order.most_bytes());
-  }
+  job_.emplace(Job{std::move(order)});
   changed_.notify_all();
 }
 
@@ -53,7 +119,7 @@ void TraceSolver::cancel(std::uint64_t trace_id) {
 
 void TraceSolver::drop_all() {
   const std::lock_guard lock(mutex_);
-  parts_.clear();
+  traces_.clear();
   if (job_) {
     job_->is_dropped = true;
   }
@@ -64,83 +130,30 @@ bool TraceSolver::is_solving() const {
   return job_.has_value();
 }
 
-std::vector<protocol::TracePart> TraceSolver::collect() {
+std::vector<protocol::Trace> TraceSolver::collect() {
   const std::lock_guard lock(mutex_);
-  return std::exchange(parts_, {});
+  return std::exchange(traces_, {});
 }
 
 void TraceSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return job_.has_value(); })) {
     lock.unlock();
-    auto result = solve_(job_->order, [this](const solver::TraceRow& row) { add_row(row); });
-    if (job_->thinning) {
-      for (const TraceThinning::Shared& row : job_->thinning->rows()) {
-        add_numbers(row->numbers, row->state);
-      }
+    protocol::Trace trace;
+    trace.set_trace_id(job_->order.trace_id());
+    TraceRows rows(job_->order.every(), most_bytes_);
+    *trace.mutable_result() =
+        solve_(job_->order, [&rows](const solver::TraceRow& row) { rows.add(row); });
+    if (trace.result().error().empty()) {
+      rows.move_to(trace);
     }
-    end(std::move(result));
     lock.lock();
+    const Job job = *std::exchange(job_, std::nullopt);
+    if (!job.is_dropped) {
+      traces_.push_back(job.is_cancelled ? not_taken(trace.trace_id()) : std::move(trace));
+      has_trace_();
+    }
   }
-}
-
-void TraceSolver::add_row(const solver::TraceRow& row) {
-  if (job_->thinning) {
-    job_->thinning->add(row);
-    return;
-  }
-  if (job_->bytes > job_->order.most_bytes()) {
-    return;  // it fails in the end
-  }
-  std::vector<double> numbers;
-  solver::append_numbers(row, numbers);
-  add_numbers(numbers, solver::code_of_state(row.state));
-}
-
-void TraceSolver::add_numbers(const std::vector<double>& numbers, std::uint8_t state) {
-  auto& rows = *job_->part.mutable_rows();
-  rows.mutable_values()->Add(numbers.begin(), numbers.end());
-  rows.mutable_states()->push_back(static_cast<char>(state));
-  const std::size_t row_bytes = numbers.size() * sizeof(double) + 1;
-  job_->bytes += row_bytes;
-  const std::size_t rows_here = rows.states().size();
-  if ((rows_here + 1) * row_bytes > kPartBytes) {
-    protocol::TracePart next;
-    next.set_trace_id(job_->part.trace_id());
-    hand_on(std::exchange(job_->part, std::move(next)));
-  }
-}
-
-void TraceSolver::hand_on(protocol::TracePart part) {
-  const std::lock_guard lock(mutex_);
-  if (job_->is_cancelled || job_->is_dropped) {
-    return;
-  }
-  parts_.push_back(std::move(part));
-  has_part_();
-}
-
-void TraceSolver::end(protocol::PointResult result) {
-  const std::lock_guard lock(mutex_);
-  Job job = std::move(*job_);
-  job_.reset();
-  if (job.is_dropped) {
-    return;
-  }
-  if (job.is_cancelled) {
-    parts_.push_back(not_taken(job.order.trace_id()));
-    has_part_();
-    return;
-  }
-  if (result.error().empty() && job.bytes > job.order.most_bytes()) {
-    result = protocol::failed_point(0, "its trace has more than the " +
-                                           std::to_string(job.order.most_bytes()) +
-                                           " bytes that pass through a server");
-  }
-  job.part.set_last(true);
-  *job.part.mutable_result() = std::move(result);
-  parts_.push_back(std::move(job.part));
-  has_part_();
 }
 
 }  // namespace oblique::worker

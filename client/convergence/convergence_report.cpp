@@ -8,6 +8,7 @@
 
 #include "client/output/columns.h"
 #include "client/output/printer.h"
+#include "proto/wire/chunk.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -75,10 +76,7 @@ std::optional<double> times(const std::optional<double>& value, double factor) {
 }
 
 void add_optional(protocol::Row& row, const std::optional<double>& value) {
-  auto* added = row.add_values();
-  if (value) {
-    added->set_real(*value);
-  }
+  row.push_back(value ? protocol::Value(*value) : protocol::Value());
 }
 
 // Two digits are all that an estimate has.
@@ -95,16 +93,16 @@ std::optional<double> relative(const OutputConvergence& output) {
 }
 
 void print_outputs(std::ostream& out, const Refinement& refinement) {
-  protocol::QueryReply table;
-  table.add_columns("output");
+  protocol::Table table;
+  table.columns.emplace_back("output");
   for (const auto& level : refinement.levels) {
-    table.add_columns(level.level.name);
+    table.columns.emplace_back(level.level.name);
   }
   for (const char* column : {"limit", "order", "error", "error [%]", "remark"}) {
-    table.add_columns(column);
+    table.columns.emplace_back(column);
   }
   for (const auto& output : refinement.convergence.outputs) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     const auto shown = shown_column(output.name);
     add_value(row, shown.heading);
     for (const auto& value : output.values) {
@@ -329,16 +327,16 @@ ordered_json json_of(const Refinement& refinement) {
 }
 
 void print_errors(std::ostream& out, const Refinement& refinement) {
-  protocol::QueryReply table;
-  table.add_columns("output");
+  protocol::Table table;
+  table.columns.emplace_back("output");
   for (const auto& level : refinement.levels) {
-    table.add_columns(level.level.name + " [%]");
+    table.columns.emplace_back(level.level.name + " [%]");
   }
   for (const char* column : {"finest", "limit", "order"}) {
-    table.add_columns(column);
+    table.columns.emplace_back(column);
   }
   for (const auto& output : refinement.convergence.outputs) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     const auto shown = shown_column(output.name);
     add_value(row, shown.heading);
     for (const auto& value : output.values) {

@@ -115,13 +115,13 @@ std::optional<std::size_t> coarsest_good_enough(const MeshStudy& study) {
 
 void print_cells(std::ostream& out, const MeshStudy& study,
                  const std::function<std::string(const OutputStudy&, std::size_t)>& cell) {
-  protocol::QueryReply table;
-  table.add_columns("output");
+  protocol::Table table;
+  table.columns.emplace_back("output");
   for (const auto& level : study.levels) {
-    table.add_columns(level);
+    table.columns.emplace_back(level);
   }
   for (const auto& output : study.outputs) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, output.name);
     for (std::size_t level = 0; level < study.levels.size(); ++level) {
       add_value(row, cell(output, level));

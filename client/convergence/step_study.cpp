@@ -167,14 +167,12 @@ std::vector<StepStudyResult> step_study(
 
 void print_step_study(std::ostream& out, const std::vector<StepStudyResult>& results,
                       Format format) {
-  protocol::QueryReply table;
-  for (const char* column : {"model", "points", "step [us]", "of limit", "peaks", "each peak",
-                             "duration", "slide", "stick [s]", "exit [m/s]", "> 5 ns", "grazing"}) {
-    table.add_columns(column);
-  }
+  protocol::Table table{.columns = {"model", "points", "step [us]", "of limit", "peaks",
+                                    "each peak", "duration", "slide", "stick [s]", "exit [m/s]",
+                                    "> 5 ns", "grazing"}};
   for (const auto& result : results) {
     for (const auto& step : result.steps) {
-      auto& row = *table.add_rows();
+      auto& row = table.rows.emplace_back();
       add_value(row, step.factor == 1.0
                          ? result.name
                          : fmt::format("{}, {} h", result.name, solver::exact_number(step.factor)));

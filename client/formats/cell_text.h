@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 

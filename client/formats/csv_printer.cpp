@@ -1,7 +1,7 @@
 #include "client/formats/csv_printer.h"
 
 #include "client/formats/cell_text.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 namespace {

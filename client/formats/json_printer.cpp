@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "client/formats/cell_text.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 

@@ -6,7 +6,7 @@
 
 #include "client/formats/packed_columns.h"
 #include "client/formats/row_printer.h"
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 

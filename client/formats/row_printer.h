@@ -9,7 +9,7 @@
 
 #include "client/formats/sink.h"
 #include "proto/oblique.pb.h"
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 

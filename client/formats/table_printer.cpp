@@ -9,7 +9,7 @@
 
 #include "client/formats/cell_text.h"
 #include "proto/text.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 namespace {

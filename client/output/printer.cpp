@@ -6,7 +6,7 @@
 #include "client/formats/cell_text.h"
 #include "client/formats/row_output.h"
 #include "client/formats/sink.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 
@@ -16,47 +16,47 @@ std::string csv_field(std::string_view text) {
   return field;
 }
 
-void print(std::ostream& out, const protocol::QueryReply& rows, Format format) {
+void print(std::ostream& out, const protocol::Table& rows, Format format) {
   TextSink text;
   const auto printer = made_printer(format, text);
-  printer->print(protocol::as_chunk(rows));
+  printer->print(protocol::chunk_of(rows));
   printer->end();
   text.finish();
   out << text.text();
 }
 
-void print_out(const protocol::QueryReply& rows, Format format) {
+void print_out(const protocol::Table& rows, Format format) {
   RowOutput out({.format = format, .may_page = false, .may_leave_out = false});
-  out.print(protocol::as_chunk(rows));
+  out.print(protocol::chunk_of(rows));
   out.finish();
 }
 
-void align_right(protocol::QueryReply& rows, const std::vector<std::string>& columns) {
-  for (int column = 0; column < rows.columns_size(); ++column) {
-    if (std::find(columns.begin(), columns.end(), rows.columns(column)) == columns.end()) {
+void align_right(protocol::Table& rows, const std::vector<std::string>& columns) {
+  for (std::size_t column = 0; column < rows.columns.size(); ++column) {
+    std::string& heading = rows.columns[column];
+    if (std::find(columns.begin(), columns.end(), heading) == columns.end()) {
       continue;
     }
-    std::size_t width = rows.columns(column).size();
-    for (const auto& row : rows.rows()) {
-      width = std::max(width, row.values(column).text().size());
+    std::size_t width = heading.size();
+    for (const auto& row : rows.rows) {
+      width = std::max(width, std::get<std::string>(row[column]).size());
     }
-    for (auto& row : *rows.mutable_rows()) {
-      std::string& text = *row.mutable_values(column)->mutable_text();
+    for (auto& row : rows.rows) {
+      auto& text = std::get<std::string>(row[column]);
       text.insert(0, width - text.size(), ' ');
     }
-    std::string& heading = *rows.mutable_columns(column);
     heading.insert(0, width - heading.size(), ' ');
   }
 }
 
 void add_value(protocol::Row& row, const std::string& text) {
-  row.add_values()->set_text(text);
+  row.emplace_back(text);
 }
 void add_value(protocol::Row& row, double value) {
-  row.add_values()->set_real(value);
+  row.emplace_back(value);
 }
 void add_value(protocol::Row& row, std::int64_t value) {
-  row.add_values()->set_integer(value);
+  row.emplace_back(value);
 }
 
 }  // namespace oblique::client

@@ -38,10 +38,10 @@ OwnCase own_case(const protocol::Row& row) {
   OwnCase own{.fn_N = {},
               .ft_N = {},
               .phases_s = {},
-              .stick_total_s = row.values(6).real(),
-              .major_mode = row.values(7).text()};
-  const auto peaks = nlohmann::json::parse(row.values(4).text());
-  const auto phases = nlohmann::json::parse(row.values(5).text());
+              .stick_total_s = std::get<double>(row[6]),
+              .major_mode = std::get<std::string>(row[7])};
+  const auto peaks = nlohmann::json::parse(std::get<std::string>(row[4]));
+  const auto phases = nlohmann::json::parse(std::get<std::string>(row[5]));
   std::size_t known_phases = phases.size();
   for (std::size_t i = 0; i < peaks.size(); ++i) {
     if (peaks[i].at(3).get<int>() != 0) {
@@ -172,13 +172,14 @@ std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
 }
 
 std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
-                                              const protocol::QueryReply& rows) {
+                                              const protocol::Table& rows) {
   std::vector<std::optional<OwnCase>> own(table.cases.size());
   for (std::size_t i = 0; i < table.cases.size(); ++i) {
     const auto& published = table.cases[i];
-    for (const auto& row : rows.rows()) {
-      if (!same(row.values(1).real(), published.H_m) || !same(row.values(2).real(), published.mu) ||
-          !same(row.values(3).real(), published.e_star)) {
+    for (const auto& row : rows.rows) {
+      if (!same(std::get<double>(row[1]), published.H_m) ||
+          !same(std::get<double>(row[2]), published.mu) ||
+          !same(std::get<double>(row[3]), published.e_star)) {
         continue;
       }
       if (own[i]) {
@@ -193,16 +194,12 @@ std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
   return own;
 }
 
-protocol::QueryReply rows_of(const PublishedTable& table,
-                             const std::vector<Difference>& differences) {
-  protocol::QueryReply reply;
-  for (const char* column :
-       {"H", "mu", "e", "quantity", "seq", "published", "ours", "difference_percent"}) {
-    reply.add_columns(column);
-  }
+protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences) {
+  protocol::Table reply{
+      .columns = {"H", "mu", "e", "quantity", "seq", "published", "ours", "difference_percent"}};
   for (const auto& difference : differences) {
     const auto& published = table.cases[difference.case_index];
-    auto& row = *reply.add_rows();
+    auto& row = reply.rows.emplace_back();
     add_value(row, published.H_m);
     add_value(row, published.mu);
     add_value(row, published.e_star);
@@ -210,10 +207,7 @@ protocol::QueryReply rows_of(const PublishedTable& table,
     add_value(row, static_cast<std::int64_t>(difference.index));
     add_value(row, difference.published);
     for (const auto& value : {difference.ours, difference.percent()}) {
-      auto* added = row.add_values();
-      if (value) {
-        added->set_real(*value);
-      }
+      row.push_back(value ? protocol::Value(*value) : protocol::Value());
     }
   }
   return reply;

@@ -10,6 +10,7 @@
 #include "client/output/printer.h"
 #include "client/paper/published_table.h"
 #include "proto/oblique.pb.h"
+#include "proto/wire/chunk.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/solve.h"
 
@@ -64,7 +65,7 @@ std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
 /// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the
 /// first ripple on are left out. Throws std::runtime_error when a case has several points.
 std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
-                                              const protocol::QueryReply& rows);
+                                              const protocol::Table& rows);
 
 /// Prints the tables for people: forces, durations, stick times, modes and where they are not the
 /// published ones, summary, misprints.
@@ -76,7 +77,6 @@ void print_modes(std::ostream& out, const PublishedTable& table,
                  const std::vector<std::optional<OwnCase>>& own);
 
 /// The differences as rows, one a published number, for CSV and JSON.
-protocol::QueryReply rows_of(const PublishedTable& table,
-                             const std::vector<Difference>& differences);
+protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences);
 
 }  // namespace oblique::client

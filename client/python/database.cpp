@@ -19,7 +19,7 @@
 #include "client/python/interruptible.h"
 #include "client/python/query_columns.h"
 #include "proto/oblique.pb.h"
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 #include "server/query/columns.h"
 #include "server/query/query_rules.h"
 #include "server/query/reader.h"

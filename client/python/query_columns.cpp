@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::python {
 namespace {

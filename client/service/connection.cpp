@@ -205,12 +205,15 @@ protocol::ClientReply Connection::call_numbered(protocol::ClientRequest& request
                     "lists of values as ranges",
                     frame.size(), protocol::kMaxFrameBytes));
   }
-  auto reply = answer_to(request,
-                         {.frame = std::move(frame),
-                          .heard = Clock::now(),
-                          .resend_after = std::chrono::milliseconds(settings_.resend_after_ms),
-                          .sent = Clock::now()},
-                         tell);
+  auto reply =
+      answer_to(request,
+                {.frame = std::move(frame),
+                 .heard = Clock::now(),
+                 // A trace may take long to arrive; a new connection would begin anew.
+                 .resend_after = std::chrono::milliseconds(
+                     request.has_trace() ? settings_.timeout_ms : settings_.resend_after_ms),
+                 .sent = Clock::now()},
+                tell);
   check(reply, request);
   return reply;
 }

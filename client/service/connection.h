@@ -14,6 +14,7 @@
 #include "proto/keys/key_file.h"
 #include "proto/oblique.pb.h"
 #include "proto/socket/socket.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 
@@ -82,8 +83,7 @@ class Connection {
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
   /// The study of that name, or all of them when it is empty, however many pages they fill.
   protocol::StatusReply status(const std::string& study, const Tell& tell = {});
-  /// The same of one study by its number, whatever it is called by now; `study` is for older
-  /// servers, which know no numbers.
+  /// The same of one study by its number, whatever it is called by now; errors call it `study`.
   protocol::StatusReply status_of(const std::string& study, std::uint64_t study_id,
                                   const Tell& tell = {});
   /// All workers, likewise.
@@ -96,9 +96,8 @@ class Connection {
   /// Deletes it with its results.
   protocol::ChangeReply remove(const protocol::StudyStatus& study);
   protocol::Recipe describe(const std::string& study);
-  /// The whole answer to one statement that only reads, as `rows` of one reply. For answers that
-  /// fit into memory.
-  protocol::QueryReply query(const std::string& sql, const Tell& tell = {});
+  /// The whole answer to one statement that only reads. For answers that fit into memory.
+  protocol::Table query(const std::string& sql, const Tell& tell = {});
 
   /// The chunks of the answer to a question, all of them. For answers that fit into memory.
   std::vector<protocol::QueryReply> chunks(protocol::QueryRequest request, const Tell& tell = {});

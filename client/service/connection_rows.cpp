@@ -9,8 +9,7 @@
 
 #include "client/service/connection.h"
 #include "proto/frames.h"
-#include "proto/wire/chunk_rows.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -34,10 +33,10 @@ std::vector<protocol::QueryReply> Connection::chunks(protocol::QueryRequest requ
   return all;
 }
 
-protocol::QueryReply Connection::query(const std::string& sql, const Tell& tell) {
+protocol::Table Connection::query(const std::string& sql, const Tell& tell) {
   protocol::QueryRequest request;
   request.set_sql(sql);
-  protocol::QueryReply whole;
+  protocol::Table whole;
   for (const protocol::QueryReply& chunk : chunks(std::move(request), tell)) {
     protocol::append_rows(chunk, whole);
   }

@@ -7,7 +7,7 @@
 
 #include "client/service/database_rows.h"
 #include "proto/text.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "server/database/database_file.h"
 #include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
@@ -45,7 +45,7 @@ class DatabaseSource : public Source {
                                                const Tell& tell) override {
     const auto name = reader_.query(
         fmt::format("SELECT name FROM studies WHERE study_id = {}", study_id), limits_);
-    return status(name.rows_size() == 1 ? name.rows(0).values(0).text() : study, tell);
+    return status(name.rows.size() == 1 ? std::get<std::string>(name.rows[0][0]) : study, tell);
   }
   std::string place() const override { return file_; }
 
@@ -109,11 +109,11 @@ class ServerSource : public Source {
 
 }  // namespace
 
-protocol::QueryReply Source::query(const std::string& sql) {
+protocol::Table Source::query(const std::string& sql) {
   protocol::QueryRequest request;
   request.set_sql(sql);
   const auto stream = rows(std::move(request));
-  protocol::QueryReply whole;
+  protocol::Table whole;
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = stream->next();
     protocol::append_rows(chunk, whole);

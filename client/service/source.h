@@ -7,6 +7,7 @@
 
 #include "client/service/connection.h"
 #include "proto/oblique.pb.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 
@@ -37,7 +38,7 @@ class Source {
   /// solver::InputError for a wrong one, and what the source throws, then or with the first chunk.
   virtual std::unique_ptr<RowStream> rows(protocol::QueryRequest request) = 0;
   /// The whole answer to one statement, however long.
-  protocol::QueryReply query(const std::string& sql);
+  protocol::Table query(const std::string& sql);
   /// The study of that name, or all of them when it is empty. Throws for an unknown name. Given a
   /// `tell`, waits for a server that is away; see Connection.
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;

@@ -31,17 +31,17 @@ Seconds pause_after(Seconds elapsed) {
 }
 
 void tell_failures(const protocol::StudyStatus& status,
-                   const std::function<protocol::QueryReply(const std::string&)>& query) {
+                   const std::function<protocol::Table(const std::string&)>& query) {
   std::cerr << fmt::format("{} of {} points failed:\n", shown_count(status.failed()),
                            shown_count(status.points()));
   const auto reasons = query(fmt::format(
       "SELECT error, count(*), min(point) FROM runs WHERE study = {} AND status = 'failed' "
       "GROUP BY error ORDER BY count(*) DESC LIMIT 10",
       server::sql_text(status.name())));
-  for (const auto& row : reasons.rows()) {
+  for (const auto& row : reasons.rows) {
     tell_line(fmt::format("  {} x {} (first at point {})",
-                          shown_count(static_cast<std::uint64_t>(row.values(1).integer())),
-                          row.values(0).text(), row.values(2).integer()));
+                          shown_count(static_cast<std::uint64_t>(std::get<std::int64_t>(row[1]))),
+                          std::get<std::string>(row[0]), std::get<std::int64_t>(row[2])));
   }
 }
 
@@ -119,7 +119,7 @@ protocol::StudyStatus WatchedStudy::ask(const Tell& tell) {
 }
 
 int tell_end(const protocol::StudyStatus& status,
-             const std::function<protocol::QueryReply(const std::string&)>& query) {
+             const std::function<protocol::Table(const std::string&)>& query) {
   const ErrorOn error(std::cerr);
   if (status.failed() > 0) {
     tell_failures(status, query);
@@ -162,19 +162,17 @@ std::string taken_over(const protocol::TakenOver& taken) {
   return text;
 }
 
-protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies) {
-  protocol::QueryReply table;
-  for (const char* column : {"study", "state", "points", "solved", "failed", "leased",
-                             "points_per_s", "created_at", "priority", "waits_for", "left_out"}) {
-    table.add_columns(column);
-  }
+protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies) {
+  protocol::Table table{.columns = {"study", "state", "points", "solved", "failed", "leased",
+                                    "points_per_s", "created_at", "priority", "waits_for",
+                                    "left_out"}};
   const bool any_taken = std::any_of(studies.begin(), studies.end(),
                                      [](const auto& study) { return study.taken().points() > 0; });
   if (any_taken) {
-    table.add_columns("taken_over");
+    table.columns.emplace_back("taken_over");
   }
   for (const auto& study : studies) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, study.name());
     add_value(row, study.state());
     for (const auto count : {study.points(), study.solved(), study.failed(), study.leased()}) {

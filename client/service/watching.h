@@ -9,6 +9,7 @@
 #include "client/service/source.h"
 #include "proto/oblique.pb.h"
 #include "proto/program/process.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client {
 
@@ -44,7 +45,7 @@ class WatchedStudy {
 /// Tells on standard error how a watched study stands: failed points with their reasons, or that
 /// it was cancelled. Gives the exit code: kDone when every point is solved.
 int tell_end(const protocol::StudyStatus& status,
-             const std::function<protocol::QueryReply(const std::string&)>& query);
+             const std::function<protocol::Table(const std::string&)>& query);
 
 /// Tells on standard error when anybody may come to the server at `place`, as StatusReply.access
 /// says.
@@ -54,6 +55,6 @@ void tell_if_insecure(const std::string& access, const std::string& place);
 std::string taken_over(const protocol::TakenOver& taken);
 
 /// Columns and rows of studies for `status` and `studies`.
-protocol::QueryReply table_of(const std::vector<protocol::StudyStatus>& studies);
+protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies);
 
 }  // namespace oblique::client

@@ -36,8 +36,8 @@ bool is_kept_as(const json& stored, const solver::Cell& cell) {
 bool is_same_list(const Value& stored, const solver::ResultList& list,
                   const solver::CaseResult& result) {
   // A list without elements may be NULL.
-  const json elements =
-      stored.has_text() ? json::parse(stored.text(), nullptr, false) : json::array();
+  const auto* text = std::get_if<std::string>(&stored);
+  const json elements = text != nullptr ? json::parse(*text, nullptr, false) : json::array();
   if (!elements.is_array()) {
     return false;
   }
@@ -55,15 +55,9 @@ bool is_same_list(const Value& stored, const solver::ResultList& list,
 template <class T>
 bool is_same_scalar(const Value& stored, const T* value) {
   if (value == nullptr) {
-    return stored.kind_case() == Value::KIND_NOT_SET;
+    return std::holds_alternative<std::monostate>(stored);
   }
-  if constexpr (std::is_same_v<T, double>) {
-    return stored.has_real() && stored.real() == *value;
-  } else if constexpr (std::is_same_v<T, std::string>) {
-    return stored.has_text() && stored.text() == *value;
-  } else {
-    return stored.has_integer() && stored.integer() == *value;
-  }
+  return stored == Value(*value);
 }
 
 template <class T>
@@ -80,22 +74,23 @@ void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
 }  // namespace
 
 std::optional<Value> StoredRow::value(const std::string& column) const {
-  const auto& columns = rows_.columns();
-  const auto found = std::find(columns.begin(), columns.end(), column);
-  return found == columns.end() || rows_.rows().empty()
+  const auto found = std::find(rows_.columns.begin(), rows_.columns.end(), column);
+  return found == rows_.columns.end() || rows_.rows.empty()
              ? std::nullopt
-             : std::optional(rows_.rows(0).values(static_cast<int>(found - columns.begin())));
+             : std::optional(
+                   rows_.rows[0].at(static_cast<std::size_t>(found - rows_.columns.begin())));
 }
 
 std::string StoredRow::text(const std::string& column) const {
   const auto found = value(column);
-  return found ? found->text() : std::string();
+  const auto* text = found ? std::get_if<std::string>(&*found) : nullptr;
+  return text == nullptr ? std::string() : *text;
 }
 
 std::optional<StoredRow> stored_row(Source& source, const std::string& study, std::uint64_t point) {
   auto rows = source.query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
                                        server::sql_text(study), point));
-  return rows.rows().empty() ? std::nullopt : std::optional(StoredRow(std::move(rows)));
+  return rows.rows.empty() ? std::nullopt : std::optional(StoredRow(std::move(rows)));
 }
 
 std::vector<std::string> differences(const StoredRow& stored, const solver::CaseResult& result) {

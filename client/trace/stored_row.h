@@ -7,6 +7,7 @@
 
 #include "client/service/source.h"
 #include "proto/oblique.pb.h"
+#include "proto/wire/chunk.h"
 #include "worker/solver/model/case_result.h"
 
 namespace oblique::client {
@@ -15,7 +16,7 @@ namespace oblique::client {
 class StoredRow {
  public:
   /// `rows`: of the view `runs`, one row at most.
-  explicit StoredRow(protocol::QueryReply rows) : rows_(std::move(rows)) {}
+  explicit StoredRow(protocol::Table rows) : rows_(std::move(rows)) {}
 
   /// The value of that column of the view `runs`; nothing: the view has no such column.
   std::optional<protocol::Value> value(const std::string& column) const;
@@ -24,7 +25,7 @@ class StoredRow {
   bool has_failed() const { return text("status") == "failed"; }
 
  private:
-  protocol::QueryReply rows_;
+  protocol::Table rows_;
 };
 
 /// The row of that point; nothing: it is not solved yet.

@@ -21,13 +21,14 @@ struct SolvedByWorker {
   std::string worker;                        ///< its name
   std::string solver_version;
   std::string instruction_set;
-  std::uint64_t instants_left_out = 0;  ///< of the contact, where a trace with shapes was too long
+  std::uint64_t every = 1;  ///< the rows have each such instant of the contact
 };
 
 /// What is wanted of a trace.
 struct TraceWishes {
   bool with_shape = false;
-  bool with_fall = false;          ///< older servers and workers give none all the same
+  bool with_fall = false;
+  std::uint64_t every = 1;         ///< each such instant and all ends of phases; 0: as many as fit
   std::int64_t time_limit_ms = 0;  ///< 0: the server's own
 };
 
@@ -37,8 +38,9 @@ using BeginTrace = std::function<void(const solver::TraceShape&)>;
 /// What the point is, as the server says; nothing is solved.
 PointAtHand point_at(Connection& connection, const std::string& study, std::uint64_t point);
 
-/// Has a worker solve the point and gives its instants, part by part, to `row`. Throws what the
-/// connection throws, and ConnectionError for rows that are none.
+/// Has a worker solve the point and passes its instants to `row`. Throws what the connection
+/// throws, ServerError for a trace that is too long, and ConnectionError for a reply that is no
+/// trace.
 SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
                                std::uint64_t point, const TraceWishes& wishes,
                                const BeginTrace& begin, const solver::Tracing::Sink& row);

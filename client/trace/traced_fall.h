@@ -9,8 +9,7 @@
 namespace oblique::client {
 
 /// Takes the rows of the fall off the front of a trace: from release (its time is minus the time of
-/// the fall) to touch. What is left is the contact, as of a trace without the fall. None where it
-/// was not asked for, and from older workers.
+/// the fall) to touch. What is left is the contact, as of a trace without the fall.
 inline std::vector<solver::TraceRow> take_fall(std::vector<solver::TraceRow>& rows) {
   const auto touch = std::find_if(rows.begin(), rows.end(), [](const solver::TraceRow& row) {
     return row.state != solver::kFalling;

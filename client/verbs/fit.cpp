@@ -63,13 +63,11 @@ double percent_from(double value, double reference) {
 
 void print_end(const FitStep& end, const solver::ModelParameters& start) {
   const solver::ModelParameters preset = solver::preset("paper");
-  protocol::QueryReply table;
-  for (const char* column : {"parameter", "start", "fitted", "preset paper", "difference [%]"}) {
-    table.add_columns(column);
-  }
+  protocol::Table table{
+      .columns = {"parameter", "start", "fitted", "preset paper", "difference [%]"}};
   for (const auto name : kFittedKeys) {
     const auto& key = fitted_key(name);
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, heading(name));
     add_value(row, key.get(start));
     add_value(row, key.get(end.model));

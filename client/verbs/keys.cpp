@@ -110,14 +110,11 @@ int add(const KeysFlags& flags) {
 
 int list(const KeysFlags& flags) {
   const auto format = format_named(flags.format);
-  protocol::QueryReply table;
-  for (const char* column : {"name", "role", "public", "added_at"}) {
-    table.add_columns(column);
-  }
+  protocol::Table table{.columns = {"name", "role", "public", "added_at"}};
   const auto keys = protocol::read_authorized_keys(
       protocol::authorized_keys_in(protocol::key_folder_meant(flags.folder)));
   for (const auto& key : keys.all()) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, key.name);
     add_value(row, std::string(name_of(key.role)));
     add_value(row, protocol::z85(key.public_key));

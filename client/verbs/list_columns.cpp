@@ -79,12 +79,9 @@ std::string names_of(const solver::TraceColumn& column) {
 }
 
 int list_trace_columns(Format format) {
-  protocol::QueryReply table;
-  for (const char* heading : {"column", "unit", "meaning"}) {
-    table.add_columns(heading);
-  }
+  protocol::Table table{.columns = {"column", "unit", "meaning"}};
   for (const auto& column : solver::trace_columns()) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, names_of(column));
     add_value(row, std::string(column.unit));
     add_value(row, std::string(column.meaning));
@@ -104,12 +101,9 @@ int list_columns(const ColumnsFlags& flags) {
   if (flags.trace) {
     return list_trace_columns(format);
   }
-  protocol::QueryReply table;
-  for (const char* heading : {"column", "unit", "kind", "solve --json", "meaning"}) {
-    table.add_columns(heading);
-  }
+  protocol::Table table{.columns = {"column", "unit", "kind", "solve --json", "meaning"}};
   for (const auto& column : columns_like(flags.pattern)) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, column.name);
     add_value(row, column.unit);
     add_value(row, column.kind);

@@ -43,7 +43,7 @@ struct PaperFlags {
   std::string figures;  // folder; empty: tables
 };
 
-protocol::QueryReply rows_of_study(Source& source, const std::string& study) {
+protocol::Table rows_of_study(Source& source, const std::string& study) {
   study_named(source, study);
   return source.query(
       "SELECT point, H, mu, e, peaks, phases, stick_total_s, major_mode FROM runs WHERE study = " +

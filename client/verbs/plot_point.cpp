@@ -88,6 +88,7 @@ SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& 
       connection, flags.study, static_cast<std::uint64_t>(*flags.point),
       {.with_shape = true,
        .with_fall = true,
+       .every = 0,
        .time_limit_ms = source.timeout_s ? connection_settings(source).timeout_ms : 0},
       [](const solver::TraceShape&) {},
       [&rows](const solver::TraceRow& row) { rows.push_back(row); });
@@ -97,16 +98,11 @@ SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& 
   PointHistory history = history_of(solved.point);
   history.rows = std::move(rows);
   history.result = solved.result;
-  if (solved.instants_left_out > 0) {
-    history.remarks.push_back(fmt::format("{} instants are left out; with --here all are drawn.",
-                                          shown_count(solved.instants_left_out)));
+  if (solved.every > 1) {
+    history.remarks.push_back(
+        fmt::format("One of {} instants is drawn; with --local all are.", solved.every));
   }
   take_falls(history);
-  if (history.falls.empty() &&
-      (flags.panel.empty() || plot::point_panel_named(flags.panel) == plot::PointPanel::kShape)) {
-    history.remarks.emplace_back(
-        "This worker gives the shapes from touch on; with --here those of the fall are drawn too.");
-  }
   return {solved.point, std::move(history)};
 }
 
@@ -165,7 +161,7 @@ PointHistory history_of_study(const PointPictureFlags& flags, const SourceFlags&
   const auto stored = stored_row(*source, flags.study, number);
   refuse_failed_point(flags, stored);
   auto solved =
-      !is_file && !flags.here
+      !is_file && !flags.local
           ? solved_by_worker(flags, source_flags, *connection)
           : solved_here(flags, is_file
                                    ? point_in(database, study_named(*source, flags.study), number)
@@ -206,10 +202,10 @@ void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags, bool with
                     ->type_name("NAME")
                     ->group(group);
   protocol::note_choices(panel, plot::kPointPanels);
-  auto* here = verb.add_flag("--here", flags.here, "solve the point in this process");
-  here->group(group);
+  auto* local = verb.add_flag("--local", flags.local, "solve the point in this process");
+  local->group(group);
   verb.add_flag("--on-worker", flags.on_worker, "have a worker of the server solve the point")
-      ->excludes(here)
+      ->excludes(local)
       ->group(group);
   add_point_flags(verb, flags.values, FlagValues::kOne, with_single_lengths);
 }
@@ -231,9 +227,9 @@ bool is_point_meant(const PointPictureFlags& flags) {
   }
   static_cast<void>(plot::point_panel_named(flags.panel));
   const bool is_point = has_values || flags.point;
-  if (!is_point && (!flags.panel.empty() || flags.here || flags.on_worker)) {
+  if (!is_point && (!flags.panel.empty() || flags.local || flags.on_worker)) {
     throw solver::InputError(
-        "--panel, --here and --on-worker are of one point: name it with --point N");
+        "--panel, --local and --on-worker are of one point: name it with --point N");
   }
   return is_point;
 }

@@ -18,11 +18,11 @@ struct PointPictureFlags {
   std::optional<std::int64_t> point;  ///< of the study
   PointFlags values;                  ///< of a point of no study
   std::string panel;                  ///< empty: all
-  bool here = false;
+  bool local = false;
   bool on_worker = false;
 };
 
-/// Adds --point, --panel, --here, --on-worker and the flags of a point's values and model. `flags`
+/// Adds --point, --panel, --local, --on-worker and the flags of a point's values and model. `flags`
 /// must live as long as `verb`.
 void add_point_picture_flags(CLI::App& verb, PointPictureFlags& flags, bool with_single_lengths);
 

@@ -13,8 +13,7 @@
 #include "client/output/terminal.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
-#include "proto/wire/chunk_rows.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "server/query/columns.h"
 
 namespace oblique::client {

@@ -33,15 +33,15 @@ struct StatusFlags {
 };
 
 /// What only programs ask for: who submitted each study, and who may come to the server.
-void add_details(protocol::QueryReply& table, const std::vector<protocol::StudyStatus>& studies,
+void add_details(protocol::Table& table, const std::vector<protocol::StudyStatus>& studies,
                  const std::string& access) {
-  table.add_columns("submitted_by");
-  table.add_columns("access");
-  table.add_columns("solver_version");
-  for (int i = 0; i < table.rows_size(); ++i) {
-    add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).submitted_by());
-    add_value(*table.mutable_rows(i), access);
-    add_value(*table.mutable_rows(i), studies.at(static_cast<std::size_t>(i)).solver_version());
+  table.columns.emplace_back("submitted_by");
+  table.columns.emplace_back("access");
+  table.columns.emplace_back("solver_version");
+  for (std::size_t i = 0; i < table.rows.size(); ++i) {
+    add_value(table.rows[i], studies.at(i).submitted_by());
+    add_value(table.rows[i], access);
+    add_value(table.rows[i], studies.at(i).solver_version());
   }
 }
 
@@ -53,7 +53,7 @@ int percent_done(const protocol::StudyStatus& study) {
 }
 
 /// What people look for, in 80 columns; what a study waits for stands below, in sentences.
-protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& studies) {
+protocol::Table table_for_people(const std::vector<protocol::StudyStatus>& studies) {
   constexpr std::size_t kNameBytes = 18;
   const bool any_failed = std::any_of(studies.begin(), studies.end(),
                                       [](const auto& study) { return study.failed() > 0; });
@@ -63,24 +63,21 @@ protocol::QueryReply table_for_people(const std::vector<protocol::StudyStatus>& 
   const bool any_version = std::any_of(studies.begin(), studies.end(), [](const auto& study) {
     return !study.solver_version().empty();
   });
-  protocol::QueryReply table;
-  for (const char* column : {"study", "state", "points", "done"}) {
-    table.add_columns(column);
-  }
+  protocol::Table table{.columns = {"study", "state", "points", "done"}};
   if (any_failed) {
-    table.add_columns("failed");
+    table.columns.emplace_back("failed");
   }
   if (any_left_out) {
-    table.add_columns("left out");
+    table.columns.emplace_back("left out");
   }
   for (const char* column : {"points/s", "prio"}) {
-    table.add_columns(column);
+    table.columns.emplace_back(column);
   }
   if (any_version) {
-    table.add_columns("solver");
+    table.columns.emplace_back("solver");
   }
   for (const auto& study : studies) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     // With one study there is room for its name.
     add_value(row,
               studies.size() == 1 ? study.name() : protocol::shortened(study.name(), kNameBytes));

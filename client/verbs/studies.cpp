@@ -24,12 +24,9 @@ struct StudiesFlags {
 int studies(const StudiesFlags& flags) {
   const auto format = format_named(flags.format);
   const auto source = open_source(flags.source);
-  protocol::QueryReply table;
-  for (const char* column : {"study", "state", "points", "done", "created_at"}) {
-    table.add_columns(column);
-  }
+  protocol::Table table{.columns = {"study", "state", "points", "done", "created_at"}};
   for (const auto& study : source->status({})) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, study.name());
     add_value(row, study.state());
     for (const auto count : {study.points(), protocol::completed_points(study)}) {

@@ -39,7 +39,8 @@ struct TraceFlags {
   std::string format;  // empty: as the file's name ends, or CSV
   bool shape = false;
   bool fall = false;
-  bool here = false;
+  std::uint64_t every = 1;
+  bool local = false;
   bool on_worker = false;
   SourceFlags source;
 };
@@ -68,13 +69,27 @@ Solved solve_in_this_process(const TraceFlags& flags, const PointAtHand& point,
   output.begin(solver::trace_shape(point.model.lengths_m.size(),
                                    static_cast<std::size_t>(point.model.elements_per_link),
                                    flags.shape));
-  const solver::Tracing tracing{[&](const solver::TraceRow& row) { output.add(row); }, flags.shape,
-                                flags.fall};
+  std::optional<solver::TraceRow> last;  // that is not printed yet
+  std::string state_before;
+  std::uint64_t instants = 0;
+  const auto take = [&](const solver::TraceRow& row) {
+    const bool is_instant = row.state != solver::kFalling;
+    last.reset();
+    if (!is_instant || instants % flags.every == 0 || solver::ends_phase(state_before, row.state)) {
+      output.add(row);
+    } else {
+      last = row;
+    }
+    instants += is_instant ? 1U : 0U;
+    state_before = row.state;
+  };
   try {
-    return {point,
-            solve_here(finger, {point.H_m, point.mu, point.e_star, point.errors}, tracing,
-                       output.fills_terminal()),
-            "here"};
+    const auto result = solve_here(finger, {point.H_m, point.mu, point.e_star, point.errors},
+                                   {take, flags.shape, flags.fall}, output.fills_terminal());
+    if (last) {
+      output.add(*last);
+    }
+    return {point, result, "here"};
   } catch (const solver::SolveError& error) {
     throw_failure(flags, error.what());
   } catch (const solver::InputError& error) {  // the study was taken with it: no wrong usage here
@@ -88,31 +103,16 @@ Solved solve_by_worker(const TraceFlags& flags, Connection& connection, TraceOut
   WorkLine line(std::cerr, settings);
   const auto waiting = line.begin(fmt::format("a worker of {} solves point {} of {}",
                                               connection.url(), flags.point, flags.study));
-  bool has_fall = false;
   const auto solved = trace_by_worker(
       connection, flags.study, static_cast<std::uint64_t>(flags.point),
       {.with_shape = flags.shape,
        .with_fall = flags.fall,
+       .every = flags.every,
        .time_limit_ms = flags.source.timeout_s ? connection_settings(flags.source).timeout_ms : 0},
       [&](const solver::TraceShape& shape) { output.begin(shape); },
-      [&](const solver::TraceRow& row) {
-        output.add(row);
-        has_fall = has_fall || row.state == solver::kFalling;
-      });
+      [&](const solver::TraceRow& row) { output.add(row); });
   if (!solved.error.empty()) {
     throw_failure(flags, solved.error);
-  }
-  if (flags.fall && !has_fall) {
-    tell_line(
-        "The trace has no rows of the fall: the server or its worker is older than these. --here "
-        "solves the point in this process.");
-  }
-  if (solved.instants_left_out > 0) {
-    tell_line(fmt::format(
-        "With the shapes the trace is too long to pass through a server: {} instants of the "
-        "contact are left out, "
-        "evenly, but for extremes of the forces and changes of state. --here has all of them.",
-        shown_count(solved.instants_left_out)));
   }
   return {solved.point, solved.result,
           fmt::format("by worker {} ({})", solved.worker, solved.instruction_set)};
@@ -158,7 +158,7 @@ int trace(const TraceFlags& flags) {
   if (!is_file) {
     connection.emplace(connection_settings(flags.source));
   }
-  const bool is_here = is_file || flags.here;
+  const bool is_here = is_file || flags.local;
   std::optional<PointAtHand> point;
   if (is_here) {
     point = is_file ? point_in(database, study_named(*source, flags.study), number)
@@ -197,9 +197,13 @@ void add_trace(CLI::App& app, Command& command) {
       "--fall", flags->fall,
       "begin with 121 rows of the fall, from release to touch: times are negative there, "
       "the state is falling");
-  auto* here = verb->add_flag("--here", flags->here, "solve it in this process");
+  verb->add_option("--every", flags->every,
+                   "give each K-th instant of the contact and all ends of phases")
+      ->check(protocol::whole_number_from(1))
+      ->type_name("K");
+  auto* local = verb->add_flag("--local", flags->local, "solve it in this process");
   verb->add_flag("--on-worker", flags->on_worker, "have a worker of the server solve it")
-      ->excludes(here);
+      ->excludes(local);
   add_source_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return trace(*flags); }; });
 }

@@ -34,23 +34,9 @@ std::string counted(std::uint64_t count, const char* one, const char* several) {
   return fmt::format("{} {}", shown_count(count), count == 1 ? one : several);
 }
 
-/// What the holder of a key has, of that only what is not nothing; empty where all is nothing.
 std::string shown_key(const protocol::KeyStatus& key) {
-  std::string has;
-  const auto add = [&has](const std::string& part) { has += (has.empty() ? "" : ", ") + part; };
-  if (key.connections() > 0) {
-    add(counted(key.connections(), "connection", "connections"));
-  }
-  if (key.open_studies() > 0) {
-    add(fmt::format("{} with {} open", counted(key.open_studies(), "study", "studies"),
-                    counted(key.open_points(), "point", "points")));
-  }
-  if (key.refused() > 0) {
-    add(counted(key.refused(), "request refused", "requests refused"));
-  }
-  return has.empty() ? has
-                     : fmt::format("key {}{}: {}", key.name(),
-                                   key.role().empty() ? "" : fmt::format(" ({})", key.role()), has);
+  return fmt::format("key {} ({}): {}", key.name(), key.role(),
+                     counted(key.connections(), "connection", "connections"));
 }
 
 /// A cause of the server's as people know it: who has no key comes with another mechanism.
@@ -61,12 +47,10 @@ std::string shown_cause(const protocol::WorkersReply& reply, const std::string& 
                                     : "with a key, where there are none";
 }
 
-/// What the holders of keys have, who was turned away, and what no sound peer sends.
+/// The keys that are connected, who was turned away, and what no sound peer sends.
 void tell_access(const protocol::WorkersReply& reply) {
   for (const auto& key : reply.keys()) {
-    if (const auto shown = shown_key(key); !key.name().empty() && !shown.empty()) {
-      tell_line(shown);
-    }
+    tell_line(shown_key(key));
   }
   std::string refusals;
   for (const auto& of_cause : reply.refusals()) {
@@ -89,21 +73,13 @@ std::string standing_of(const protocol::WorkerStatus& worker) {
   return worker.set_aside() ? "set aside" : worker.proven() ? "proven" : "new";
 }
 
-/// Older servers do not say it.
-std::string state_of(const protocol::WorkerStatus& worker) {
-  return !worker.state().empty() ? worker.state() : worker.leased_points() > 0 ? "working" : "idle";
-}
-
 /// All that is known, for programs.
-protocol::QueryReply full_table(const protocol::WorkersReply& reply) {
-  protocol::QueryReply table;
-  for (const char* column : {"worker", "name", "threads", "instruction_set", "solver_version",
-                             "leased_points", "solved_points", "silent_ms", "losses", "standing",
-                             "host", "points_per_s", "state", "key"}) {
-    table.add_columns(column);
-  }
+protocol::Table full_table(const protocol::WorkersReply& reply) {
+  protocol::Table table{.columns = {"worker", "name", "threads", "instruction_set",
+                                    "solver_version", "leased_points", "solved_points", "silent_ms",
+                                    "losses", "standing", "host", "points_per_s", "state", "key"}};
   for (const auto& worker : reply.workers()) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, static_cast<std::int64_t>(worker.worker_id()));
     add_value(row, worker.name());
     add_value(row, static_cast<std::int64_t>(worker.threads()));
@@ -115,34 +91,31 @@ protocol::QueryReply full_table(const protocol::WorkersReply& reply) {
     add_value(row, static_cast<std::int64_t>(worker.losses()));
     add_value(row, standing_of(worker));
     add_value(row, worker.host());
-    row.add_values()->set_real(worker.points_per_s());
-    add_value(row, state_of(worker));
+    add_value(row, worker.points_per_s());
+    add_value(row, worker.state());
     add_value(row, worker.key());
   }
   return table;
 }
 
 /// What people look for, in 100 columns. A name that begins with the host goes on without it.
-protocol::QueryReply table_for_people(const protocol::WorkersReply& reply) {
+protocol::Table table_for_people(const protocol::WorkersReply& reply) {
   constexpr double kMillisecondsASecond = 1000.0;
   const bool has_keys = std::any_of(reply.workers().begin(), reply.workers().end(),
                                     [](const auto& worker) { return !worker.key().empty(); });
   const std::size_t host_bytes = has_keys ? 12 : 18;
   const std::size_t name_bytes = has_keys ? 10 : 12;
   constexpr std::size_t kKeyBytes = 9;
-  protocol::QueryReply table;
-  for (const char* column :
-       {"worker", "host", "name", "threads", "cpu", "version", "points/s", "silent", "state"}) {
-    table.add_columns(column);
-  }
+  protocol::Table table{.columns = {"worker", "host", "name", "threads", "cpu", "version",
+                                    "points/s", "silent", "state"}};
   if (has_keys) {
-    table.add_columns("key");
+    table.columns.emplace_back("key");
   }
   for (const auto& worker : reply.workers()) {
     const bool has_host = !worker.host().empty() && worker.name().starts_with(worker.host() + ":");
     const std::string name =
         has_host ? worker.name().substr(worker.host().size() + 1) : worker.name();
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, static_cast<std::int64_t>(worker.worker_id()));
     add_value(row, protocol::shortened(worker.host(), host_bytes));
     add_value(row, protocol::shortened(name, name_bytes));
@@ -151,7 +124,7 @@ protocol::QueryReply table_for_people(const protocol::WorkersReply& reply) {
     add_value(row, worker.solver_version());
     add_value(row, shown_rate(worker.points_per_s()));
     add_value(row, shown_duration(worker.silent_ms() / kMillisecondsASecond));
-    add_value(row, state_of(worker));
+    add_value(row, worker.state());
     if (has_keys) {
       add_value(row, protocol::shortened(worker.key(), kKeyBytes));
     }

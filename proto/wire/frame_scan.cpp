@@ -1,10 +1,13 @@
 #include "proto/wire/frame_scan.h"
 
 #include <algorithm>
+#include <span>
+#include <vector>
 
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/wire_format_lite.h>
 
+#include "proto/frames.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::protocol {
@@ -13,117 +16,103 @@ namespace {
 using google::protobuf::internal::WireFormatLite;
 using google::protobuf::io::CodedInputStream;
 
-/// Calls `visit(number, bytes)` for each field of a serialised message until it gives false;
-/// `bytes` are those of a text, a packed list or a message, and empty for a number. False when the
-/// bytes are no message.
-template <typename Visitor>
-bool for_each_field(std::string_view message, Visitor visit) {
-  CodedInputStream in(reinterpret_cast<const std::uint8_t*>(message.data()),
-                      static_cast<int>(message.size()));
-  while (const std::uint32_t tag = in.ReadTag()) {
-    std::string_view bytes;
-    if (WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
-      std::uint32_t length = 0;
-      if (!in.ReadVarint32(&length)) {
-        return false;
-      }
-      const auto begin = static_cast<std::size_t>(in.CurrentPosition());
-      if (length > message.size() - begin || !in.Skip(static_cast<int>(length))) {
-        return false;
-      }
-      bytes = message.substr(begin, length);
-    } else if (!WireFormatLite::SkipField(&in, tag)) {
-      return false;
-    }
-    if (!visit(WireFormatLite::GetTagFieldNumber(tag), bytes)) {
-      return true;
-    }
-  }
-  return in.ConsumedEntireMessage();
+CodedInputStream stream_of(std::string_view bytes) {
+  return CodedInputStream(reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                          static_cast<int>(bytes.size()));
 }
 
-/// Numbers in a list that is packed or, when there are no bytes, a single one.
-std::size_t listed_numbers(std::string_view packed) {
-  return packed.empty()
-             ? 1
-             : static_cast<std::size_t>(std::count_if(packed.begin(), packed.end(), [](char byte) {
-                 return (static_cast<unsigned char>(byte) & 0x80U) == 0;
-               }));
+/// What a message holds at a path of field numbers.
+struct Found {
+  std::size_t fields = 0;
+  std::size_t bytes = 0;    ///< of texts, packed lists and messages
+  std::size_t numbers = 0;  ///< in packed lists or alone
+  bool is_whole = true;     ///< every message on the path could be read to its end
+};
+
+void find(std::string_view message, std::span<const int> path, Found& found) {
+  CodedInputStream in = stream_of(message);
+  while (const std::uint32_t tag = in.ReadTag()) {
+    std::string_view bytes;
+    bool is_read = true;
+    if (WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
+      std::uint32_t length = 0;
+      is_read = in.ReadVarint32(&length);
+      const auto begin = static_cast<std::size_t>(in.CurrentPosition());
+      is_read = is_read && length <= message.size() - begin && in.Skip(static_cast<int>(length));
+      bytes = is_read ? message.substr(begin, length) : bytes;
+    } else {
+      is_read = WireFormatLite::SkipField(&in, tag);
+    }
+    if (!is_read) {
+      break;
+    }
+    if (WireFormatLite::GetTagFieldNumber(tag) != path.front()) {
+      continue;
+    }
+    if (path.size() > 1) {
+      find(bytes, path.subspan(1), found);
+      continue;
+    }
+    ++found.fields;
+    found.bytes += bytes.size();
+    // The last byte of each number in a packed list has no continuation bit.
+    const auto last_bytes = std::count_if(bytes.begin(), bytes.end(), [](char byte) {
+      return (static_cast<unsigned char>(byte) & 0x80U) == 0;
+    });
+    found.numbers += bytes.empty() ? 1 : static_cast<std::size_t>(last_bytes);
+  }
+  found.is_whole = found.is_whole && in.ConsumedEntireMessage();
+}
+
+Found find(std::string_view message, const std::vector<int>& path) {
+  Found found;
+  find(message, path, found);
+  return found;
+}
+
+/// Whether the recipe at that path has room in its bytes for the axes that its blocks need.
+bool has_room_for_axes(std::string_view message, std::vector<int> path) {
+  // The least that an axis takes is its key and a range from 0 to 0; a block has three.
+  constexpr std::size_t kLeastAxisBytes = 5;
+  constexpr std::size_t kLeastBlockBytes = 3 * (2 + kLeastAxisBytes);
+  path.push_back(Recipe::kBlocksFieldNumber);
+  const Found blocks = find(message, path);
+  path.push_back(Block::kAxesFieldNumber);
+  const Found axes = find(message, path);
+  return axes.is_whole && blocks.fields * kLeastBlockBytes <= blocks.bytes &&
+         axes.fields * kLeastAxisBytes <= axes.bytes;
 }
 
 }  // namespace
 
 bool is_of_a_workers_size(std::string_view frame) {
-  if (frame.size() > kMaxWorkerFrameBytes) {
+  if (frame.size() > kMaxFrameBytes) {
     return false;
   }
-  std::size_t results = 0;
-  std::size_t lease_ids = 0;
-  for_each_field(frame, [&](int kind, std::string_view part) {
-    if (kind == WorkerMessage::kResultsFieldNumber) {
-      for_each_field(part, [&](int field, std::string_view) {
-        results += field == Results::kResultsFieldNumber ? 1U : 0U;
-        return results <= kMostResultsAMessage;
-      });
-    } else if (kind == WorkerMessage::kHeartbeatFieldNumber ||
-               kind == WorkerMessage::kGiveBackFieldNumber) {
-      static_assert(int{Heartbeat::kLeaseIdsFieldNumber} == int{GiveBack::kLeaseIdsFieldNumber});
-      for_each_field(part, [&](int field, std::string_view ids) {
-        lease_ids += field == Heartbeat::kLeaseIdsFieldNumber ? listed_numbers(ids) : 0;
-        return lease_ids <= kMostLeasesAHeartbeat;
-      });
-    }
-    return true;
-  });
-  return results <= kMostResultsAMessage && lease_ids <= kMostLeasesAHeartbeat;
+  using Message = WorkerMessage;
+  const auto rows = find(frame, {Message::kTraceFieldNumber, Trace::kValuesFieldNumber}).bytes +
+                    find(frame, {Message::kTraceFieldNumber, Trace::kStatesFieldNumber}).bytes;
+  const auto results = find(frame, {Message::kResultsFieldNumber, Results::kResultsFieldNumber});
+  const auto leases =
+      find(frame, {Message::kHeartbeatFieldNumber, Heartbeat::kLeaseIdsFieldNumber}).numbers +
+      find(frame, {Message::kGiveBackFieldNumber, GiveBack::kLeaseIdsFieldNumber}).numbers;
+  return frame.size() - rows <= kMaxWorkerFrameBytes && results.fields <= kMostResultsAMessage &&
+         leases <= kMostLeasesAHeartbeat;
 }
 
 bool is_of_a_recipes_shape(std::string_view recipe) {
-  // Key and count, of a range from 0 to 0: the least that an axis takes.
-  constexpr std::size_t kLeastAxisBytes = 5;
-  constexpr std::size_t kLeastAxes = 3;
-  bool is_padded = false;
-  const auto look_at_axes = [&](std::string_view block) {
-    std::size_t axes = 0;
-    const bool is_message = for_each_field(block, [&](int field, std::string_view axis) {
-      if (field == Block::kAxesFieldNumber) {
-        is_padded = is_padded || axis.size() < kLeastAxisBytes;
-        ++axes;
-      }
-      return !is_padded;
-    });
-    is_padded = is_padded || !is_message || axes < kLeastAxes;
-  };
-  const bool is_message = for_each_field(recipe, [&](int field, std::string_view part) {
-    if (field == Recipe::kBlocksFieldNumber) {
-      look_at_axes(part);
-    }
-    return !is_padded;
-  });
-  return is_message && !is_padded;
+  return has_room_for_axes(recipe, {});
 }
 
 bool is_of_a_requests_shape(std::string_view frame) {
-  bool is_padded = false;
-  const bool is_message = for_each_field(frame, [&](int kind, std::string_view part) {
-    const bool is_submission = kind == ClientRequest::kSubmitFieldNumber;
-    if (is_submission && !for_each_field(part, [&](int field, std::string_view recipe) {
-          is_padded = is_padded || (field == SubmitRequest::kRecipeFieldNumber &&
-                                    !is_of_a_recipes_shape(recipe));
-          return !is_padded;
-        })) {
-      is_padded = true;
-    }
-    return !is_padded;
-  });
-  return is_message && !is_padded;
+  return has_room_for_axes(frame,
+                           {ClientRequest::kSubmitFieldNumber, SubmitRequest::kRecipeFieldNumber});
 }
 
 std::uint64_t request_id_of(std::string_view frame) {
   // Few fields stand before it in any request, and none after it counts.
   constexpr int kMostFields = 8;
-  CodedInputStream in(reinterpret_cast<const std::uint8_t*>(frame.data()),
-                      static_cast<int>(frame.size()));
+  CodedInputStream in = stream_of(frame);
   for (int i = 0; i < kMostFields; ++i) {
     const std::uint32_t tag = in.ReadTag();
     std::uint64_t id = 0;

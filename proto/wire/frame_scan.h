@@ -9,7 +9,7 @@ namespace oblique::protocol {
 // What a frame holds, counted on its bytes before anything is built of it. A message of two bytes
 // becomes an object of hundreds, so a hostile frame could else cost a hundred times its size.
 
-/// Longest frame that a worker sends: a sound one splits its results at 1 MiB.
+/// Longest frame of a worker, without the rows of a trace: a sound one splits its results at 1 MiB.
 inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024;
 /// Most results in one message; a sound worker sends 1,000.
 inline constexpr std::size_t kMostResultsAMessage = 10'000;
@@ -17,13 +17,11 @@ inline constexpr std::size_t kMostResultsAMessage = 10'000;
 /// holds at most 1,024 batches.
 inline constexpr std::size_t kMostLeasesAHeartbeat = 65'536;
 
-/// Whether the frame is short and holds no more than a sound worker sends. One that cannot be read
-/// may pass.
+/// Whether the frame holds no more than a correct worker sends. One that cannot be parsed may pass.
 bool is_of_a_workers_size(std::string_view frame);
 
-/// Whether the recipe in a client's request has room in its bytes for all the axes that its blocks
-/// need. One that has none is padded with empty messages, and wrong. So is a request that cannot be
-/// read.
+/// Whether the recipe in a client's request has room in its bytes for the axes that its blocks
+/// need. Else it is padded with empty messages, or cannot be parsed.
 bool is_of_a_requests_shape(std::string_view frame);
 
 /// The same of a serialised recipe.

@@ -18,6 +18,7 @@
 #include "server/network/authenticator.h"
 #include "server/network/delivery.h"
 #include "server/network/listener.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 

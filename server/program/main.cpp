@@ -2,6 +2,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <exception>
@@ -10,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -136,6 +138,32 @@ int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
                                                     : oblique::protocol::kFailed;
 }
 
+/// The bounds that people may set; server/study/limits.h has their defaults and all others.
+void add_limits(CLI::App& app, LoopSettings& loop) {
+  constexpr std::size_t kMost = 1'000'000;  // of things that are counted
+  constexpr std::size_t kLongestMessage = oblique::protocol::kMaxFrameBytes;
+  constexpr std::size_t kMostBytes = std::size_t{1} << 40U;
+  const auto add = [&app](const char* name, auto& value, auto least, auto largest,
+                          const char* meaning) {
+    using Number = std::decay_t<decltype(value)>;
+    app.add_option(name, value, meaning)
+        ->check(CLI::Range(static_cast<Number>(least), static_cast<Number>(largest)))
+        ->group("Limits");
+  };
+  add("--limits-connections", loop.network.connections, 2U, kMost, "Connections at all ports");
+  add("--limits-waiting-out-bytes", loop.network.waiting_out_bytes, kLongestMessage, kMostBytes,
+      "End a connection with more unsent bytes than this");
+  add("--limits-unstored-bytes", loop.service.ledger.bytes, 1U, kMostBytes,
+      "Stop reading from workers with more bytes of results than this that are not stored yet");
+  add("--limits-running-queries", loop.queries.queue.readers, 1U, 256U,
+      "Queries that run at a time, each in a process of its own");
+  constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 60U;
+  add("--limits-open-points", loop.service.bounds.points, 1U, kMostPoints,
+      "Points without a result of all studies that are neither done nor cancelled");
+  add("--limits-credit", loop.service.scheduler.max_credit, 1U, 65'536U,
+      "Batches that a worker may request at a time");
+}
+
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
                  Options& options) {
   LoopSettings& loop = options.loop;
@@ -178,7 +206,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
   parent.add_to(app);
   configuration.add_log_options(options.log);
-  add_limits(app, loop.network, loop.service, loop.queries.queue);
+  add_limits(app, loop);
 }
 
 /// Completes the options. Returns the exit code if the server is not to run: the options are wrong,

@@ -4,8 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/oblique.pb.h"
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::server {
 

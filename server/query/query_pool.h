@@ -25,11 +25,11 @@ struct QueryJob {
 };
 
 struct QueueSettings {
-  std::size_t readers = 4;                      ///< queries that run at the same time
-  std::size_t most_running_each = 2;            ///< of one client
-  std::size_t most_waiting = 64;                ///< of all clients
-  std::size_t most_waiting_each = 16;           ///< of one client
-  std::size_t most_waiting_bytes = 16U << 20U;  ///< of all statements that wait
+  std::size_t readers = limits::kRunningQueries;                    ///< that run at the same time
+  std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< of one client
+  std::size_t most_waiting = limits::kWaitingQueries;               ///< of all clients
+  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< of one client
+  std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;      ///< of all statements that wait
 };
 
 /// Decides which query runs next: round-robin over clients, in order of arrival within one.

@@ -170,11 +170,11 @@ Reader::Reader(const std::string& path) {
   sqlite3_progress_handler(database_.get(), kInstructionsPerCheck, is_over, &time_);
 }
 
-protocol::QueryReply Reader::query(const std::string& sql, const QueryLimits& limits) {
+protocol::Table Reader::query(const std::string& sql, const QueryLimits& limits) {
   protocol::QueryRequest request;
   request.set_sql(sql);
   Answer rows = answer(request, limits);
-  protocol::QueryReply whole;
+  protocol::Table whole;
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = rows.next();
     protocol::append_rows(chunk, whole);

@@ -10,7 +10,7 @@
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "server/database/sqlite.h"
 #include "server/query/query_rules.h"
 
@@ -69,7 +69,7 @@ class Reader {
   Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
 
   /// The whole answer to one statement, as `rows` of one reply. Throws what Answer throws.
-  protocol::QueryReply query(const std::string& sql, const QueryLimits& limits);
+  protocol::Table query(const std::string& sql, const QueryLimits& limits);
 
   /// Status of the study called `name`, or of all when `name` is empty. Leases and rate are 0,
   /// because only a server has them. Throws QueryError for an unknown name.

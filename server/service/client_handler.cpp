@@ -369,8 +369,7 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
                                                 "trace: `oblique retry` solves it again",
                                                 request.point(), study.name));
   } else {
-    traces_.ask(client, request,
-                {*known, study.table, core_.scheduler.study(*known).solver_version}, now);
+    traces_.request(client, request, *known, study.table, now);
   }
 }
 

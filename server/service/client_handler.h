@@ -11,7 +11,7 @@
 #include "server/service/ports/ports.h"
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
-#include "server/service/traces/trace_desk.h"
+#include "server/service/traces/trace_handler.h"
 #include "server/service/worker_sessions.h"
 
 namespace oblique::server {
@@ -35,7 +35,7 @@ struct QueryCounts {
 class ClientHandler {
  public:
   ClientHandler(ClientHandlerSettings settings, const Core& core, BadFrames& bad_frames,
-                StudyChanges& changes, TraceDesk& traces)
+                StudyChanges& changes, TraceHandler& traces)
       : settings_(std::move(settings)),
         core_(core),
         bad_frames_(bad_frames),
@@ -88,7 +88,7 @@ class ClientHandler {
   const Core& core_;
   BadFrames& bad_frames_;
   StudyChanges& changes_;
-  TraceDesk& traces_;
+  TraceHandler& traces_;
   PendingRequests pending_;  // by ticket
   std::uint64_t last_ticket_ = 0;
   bool stopping_ = false;

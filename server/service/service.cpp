@@ -48,8 +48,7 @@ Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<Stor
           ledger_, reuse_,        workers_,
           rates_,  worker_rates_, [this](const Event& event, Instant then) { feed(event, then); }},
       changes_(settings.last_study_id, settings.bounds, core_),
-      traces_(settings.traces, settings.solver_version, ports,
-              settings.clients.still_working_every_ms),
+      traces_(settings.solver_version, ports, settings.clients.still_working_every_ms),
       clients_(settings.clients, core_, bad_frames_, changes_, traces_) {
   for (StoredStudy& study : studies) {
     restore(std::move(study), settings.only_study, now);
@@ -88,7 +87,7 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
     handle(event, now, &input.results);
   }
   if (input.trace_of != 0) {
-    traces_.part(input.trace_of, input.trace_part);
+    traces_.trace_received(input.trace_of, std::move(input.trace));
   }
   handle_worker_events(now);
   hold_or_release_batches(now);
@@ -220,7 +219,7 @@ void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& messa
 void Service::update_traces(const Event& event) {
   if (const auto* joined = std::get_if<WorkerJoined>(&event)) {
     if (const WorkerRecord* worker = workers_.find(joined->worker)) {
-      traces_.joined(joined->worker, worker->name, worker->solver_version, worker->instruction_set);
+      traces_.joined(joined->worker, worker->name, worker->instruction_set);
     }
   } else if (const auto* left = std::get_if<WorkerLeft>(&event)) {
     traces_.left(left->worker);

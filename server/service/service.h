@@ -15,7 +15,7 @@
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
 #include "server/service/study_states.h"
-#include "server/service/traces/trace_desk.h"
+#include "server/service/traces/trace_handler.h"
 #include "server/service/worker_sessions.h"
 #include "server/service/write_ledger.h"
 #include "server/store/store.h"
@@ -27,7 +27,6 @@ struct ServiceSettings {
   LedgerLimits ledger;
   ClientHandlerSettings clients;
   StudyBounds bounds;
-  TraceLimits traces;
   std::uint32_t heartbeat_interval_ms = 900;
   std::string solver_version;
   std::string database_id;
@@ -99,7 +98,11 @@ class Service {
   void fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const;
   void hold_or_release_batches(Instant now);
   void update_traces(const Event& event);
-  void send_traces() { workers_.send(traces_.take_orders()); }
+  void send_traces() {
+    for (const auto& [worker, message] : traces_.take_messages()) {
+      workers_.send(worker, message);
+    }
+  }
   std::uint64_t completed_of(StudyId id) const { return scheduler_.points(id).settled; }
   void store(const StoreResults& effect, protocol::Results& message, Instant now);
   void store(const StoreFailure& effect, Instant now);
@@ -118,7 +121,7 @@ class Service {
   WorkerSessions workers_;
   Core core_;
   StudyChanges changes_;
-  TraceDesk traces_;
+  TraceHandler traces_;
   ClientHandler clients_;
   StoredPoints stored_points_;
   bool stopping_ = false;

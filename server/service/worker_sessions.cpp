@@ -114,10 +114,10 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       input.events.emplace_back(BatchesReturned{worker, {leases.begin(), leases.end()}});
       break;
     }
-    case Kind::kTracePart:
+    case Kind::kTrace:
       input.events.emplace_back(CreditGiven{worker, 0});  // it lives
       input.trace_of = worker;
-      input.trace_part = std::move(*message.mutable_trace_part());
+      input.trace = std::move(*message.mutable_trace());
       break;
     case Kind::kGoodbye:
       log_rarely(Severity::kInfo, fmt::format("worker {} leaves", worker), now);
@@ -382,19 +382,6 @@ void WorkerSessions::send(const ReleaseBatch& release) {
   protocol::ServerToWorker message;
   message.mutable_release()->set_lease_id(release.lease);
   send(release.worker, message);
-}
-
-void WorkerSessions::send(const std::vector<TraceEffect>& orders) {
-  for (const TraceEffect& effect : orders) {
-    protocol::ServerToWorker message;
-    if (const auto* order = std::get_if<SendOrder>(&effect)) {
-      *message.mutable_trace_order() = order->order;
-      send(order->worker, message);
-    } else if (const auto* cancel = std::get_if<CancelOrder>(&effect)) {
-      message.mutable_trace_cancel()->set_trace_id(cancel->trace_id);
-      send(cancel->worker, message);
-    }
-  }
 }
 
 void WorkerSessions::define(const DefineStudy& define, const std::string& recipe_bytes) {

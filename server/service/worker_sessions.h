@@ -11,7 +11,6 @@
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler_events.h"
 #include "server/service/ports/ports.h"
-#include "server/service/traces/trace_orders.h"
 #include "server/service/write_ledger.h"
 
 namespace oblique::server {
@@ -45,8 +44,8 @@ struct WorkerRecord {
 struct WorkerInput {
   std::vector<Event> events;  ///< for the scheduler, in order
   protocol::Results results;  ///< of a ResultsReceived among them
-  WorkerId trace_of = 0;      ///< worker that sent `trace_part`; 0: none
-  protocol::TracePart trace_part;
+  WorkerId trace_of = 0;      ///< worker that sent `trace`; 0: none
+  protocol::Trace trace;
 };
 
 /// The connections with workers: turns their messages into events, and effects into messages.
@@ -67,8 +66,8 @@ class WorkerSessions {
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
-  /// The orders and cancellations among them.
-  void send(const std::vector<TraceEffect>& orders);
+  /// `lease`: of the batch in the message; 0: none.
+  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
   /// Sends the recipe as it is stored, because encoding a long one for each worker takes long.
   void define(const DefineStudy& define, const std::string& recipe_bytes);
   void notify_all(const std::string& text);
@@ -102,7 +101,6 @@ class WorkerSessions {
   void give_up(WorkerId worker, const std::string& why, WorkerInput& input);
   void notify(WorkerId worker, const std::string& text);
   void forget(WorkerId worker);
-  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
   void send_frame(WorkerId worker, const std::string& frame, LeaseId lease = 0);
   void log_rarely(Severity severity, const std::string& text, Instant now);
 

@@ -58,7 +58,7 @@ void expect_no_row(oblique::server::Reader& database, const std::string& conditi
       database.query("SELECT 1 FROM (SELECT 1 AS point, 0.4 AS mu, 0.9 AS e) WHERE (" + condition +
                          ") AND 0 LIMIT 5",
                      {10'000, 50, 1'000'000});
-  if (reply.rows_size() > 0) {
+  if (!reply.rows.empty()) {
     std::abort();
   }
 }

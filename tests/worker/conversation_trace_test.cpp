@@ -12,11 +12,10 @@ protocol::ServerToWorker trace_order(std::uint64_t id) {
   return message;
 }
 
-protocol::TracePart last_part(std::uint64_t id) {
-  protocol::TracePart part;
-  part.set_trace_id(id);
-  part.set_last(true);
-  return part;
+protocol::Trace trace_of(std::uint64_t id) {
+  protocol::Trace trace;
+  trace.set_trace_id(id);
+  return trace;
 }
 
 TEST_F(ConversationTest, AnOrderedTraceIsSolvedAndTakesNothingFromTheCredit) {
@@ -24,8 +23,8 @@ TEST_F(ConversationTest, AnOrderedTraceIsSolvedAndTakesNothingFromTheCredit) {
   receive(trace_order(5));
   ASSERT_EQ(effects_of<SolveTrace>().size(), 1U);
   EXPECT_EQ(effects_of<SolveTrace>()[0].order.trace_id(), 5U);
-  take(conversation_->on_trace_parts({last_part(5)}, now_ms_));
-  EXPECT_EQ(sent(WorkerMessage::kTracePart).size(), 1U);
+  take(conversation_->on_traces({trace_of(5)}, now_ms_));
+  EXPECT_EQ(sent(WorkerMessage::kTrace).size(), 1U);
   EXPECT_EQ(credit_given(), 0U);
   protocol::ServerToWorker cancel;
   cancel.mutable_trace_cancel()->set_trace_id(5);
@@ -37,8 +36,8 @@ TEST_F(ConversationTest, TracesOfAnEarlierSessionAreForgotten) {
   join();
   receive(trace_order(5));
   receive(hello_again_message());
-  take(conversation_->on_trace_parts({last_part(5)}, now_ms_));
-  EXPECT_TRUE(sent(WorkerMessage::kTracePart).empty()) << "nobody is there to take it";
+  take(conversation_->on_traces({trace_of(5)}, now_ms_));
+  EXPECT_TRUE(sent(WorkerMessage::kTrace).empty()) << "nobody is there to take it";
   pass(1000);  // it connects again
   receive(welcome_message());
   EXPECT_TRUE(has<DropTraces>());
@@ -52,8 +51,8 @@ TEST_F(ConversationTest, AStoppingWorkerTakesNoTrace) {
   EXPECT_TRUE(has<DropTraces>());
   receive(trace_order(5));
   EXPECT_FALSE(has<SolveTrace>());
-  ASSERT_EQ(sent(WorkerMessage::kTracePart).size(), 1U);
-  EXPECT_TRUE(sent(WorkerMessage::kTracePart)[0].trace_part().not_taken());
+  ASSERT_EQ(sent(WorkerMessage::kTrace).size(), 1U);
+  EXPECT_TRUE(sent(WorkerMessage::kTrace)[0].trace().not_taken());
 }
 
 }  // namespace

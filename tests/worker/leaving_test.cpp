@@ -63,7 +63,6 @@ class LeavingConversationTest : public ConversationTest {
     start();
     auto welcome = welcome_message();
     welcome.mutable_welcome()->set_lost_after_ms(1'000'000);
-    welcome.mutable_welcome()->set_takes_back(takes_back_);
     receive(welcome);
     receive(study_message(7));
   }
@@ -76,8 +75,6 @@ class LeavingConversationTest : public ConversationTest {
     }
     return leases;
   }
-
-  bool takes_back_ = true;
 };
 
 TEST_F(LeavingConversationTest, AWorkerWhoseTimeIsOverGivesBackWhatIsLeftAndLeaves) {
@@ -144,18 +141,6 @@ TEST_F(LeavingConversationTest, AWorkerThatCouldEndNoFurtherBatchLeavesBeforeIts
   EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
   ASSERT_TRUE(finish());
   EXPECT_EQ(finish()->exit_code, 0);
-}
-
-TEST_F(LeavingConversationTest, AServerThatKnowsNoGivingBackIsSentNone) {
-  takes_back_ = false;
-  leave_within(60'000);
-  receive(batch_message(7, 31));
-  solve(1, 0, 5, false);
-  pass(57'000);
-  EXPECT_TRUE(given_back().empty());
-  receive(stored_message(1));
-  take(conversation_->on_solver_idle(now_ms_));
-  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
 }
 
 TEST_F(LeavingConversationTest, AWorkerWithoutWorkLeavesWhenItWasIdleForSoLong) {

@@ -153,10 +153,9 @@ TEST(SessionTest, ATraceIsSolvedBesideABatchThatTakesLong) {
   order.mutable_trace_order()->set_trace_id(5);
   order.mutable_trace_order()->set_h_m(3.0);
   server.send(order);
-  const auto part = server.wait_for(WorkerMessage::kTracePart).trace_part();
-  EXPECT_EQ(part.trace_id(), 5U);
-  EXPECT_TRUE(part.last());
-  EXPECT_NE(part.result().error().find("H = 3"), std::string::npos);
+  const auto trace = server.wait_for(WorkerMessage::kTrace).trace();
+  EXPECT_EQ(trace.trace_id(), 5U);
+  EXPECT_NE(trace.result().error().find("H = 3"), std::string::npos);
   release.set_value();
   const auto results = server.wait_for(WorkerMessage::kResults).results();
   server.send(stored_message(results.sequence()));

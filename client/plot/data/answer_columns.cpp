@@ -9,7 +9,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client::plot {
 namespace {

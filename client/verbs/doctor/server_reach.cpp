@@ -131,35 +131,30 @@ std::string without_key(std::string text, const std::optional<protocol::KeyFile>
 
 void judge(Findings& found, const protocol::StatusReply& status, double round_trip_s,
            std::chrono::system_clock::time_point half_way) {
-  found.add("version", "version",
-            status.version().empty() ? "not told, as by servers before 0.2.0" : status.version(),
-            status.version().empty() ? nlohmann::ordered_json()
-                                     : nlohmann::ordered_json(status.version()));
+  found.add("version", status.version());
   found.add("round_trip_s", "round trip", shown_milliseconds(round_trip_s), round_trip_s);
   found.add("access", status.access());
   found.add("workers", "workers", shown_count(status.workers()), status.workers());
-  if (!status.version().empty() && status.version() != protocol::version_and_commit()) {
+  if (status.version() != protocol::version_and_commit()) {
     found.odd.push_back(
         fmt::format("The server is oblique-server {}, this client {}: one of them may know what "
                     "the other does not. Install the same on both when it suits.",
                     status.version(), protocol::version_and_commit()));
   }
-  if (status.utc_ms() != 0) {
-    constexpr double kSame_s = 0.01;
-    const double own_s = std::chrono::duration<double>(half_way.time_since_epoch()).count();
-    const double ahead_s = 1e-3 * static_cast<double>(status.utc_ms()) - own_s;
-    found.add("clock_ahead_s", "its clock",
-              std::fabs(ahead_s) < kSame_s ? std::string("the same as ours")
-                                           : fmt::format("{:.2f} s {} ours", std::fabs(ahead_s),
-                                                         ahead_s < 0 ? "behind" : "ahead of"),
-              ahead_s);
-    constexpr double kMostAhead_s = 2.0;
-    if (std::fabs(ahead_s) > kMostAhead_s) {
-      found.odd.push_back(fmt::format(
-          "The clocks of server and client are {:.1f} s apart: results are dated by the server's. "
-          "Have both kept right (NTP).",
-          std::fabs(ahead_s)));
-    }
+  constexpr double kSame_s = 0.01;
+  const double own_s = std::chrono::duration<double>(half_way.time_since_epoch()).count();
+  const double ahead_s = 1e-3 * static_cast<double>(status.utc_ms()) - own_s;
+  found.add("clock_ahead_s", "its clock",
+            std::fabs(ahead_s) < kSame_s ? std::string("the same as ours")
+                                         : fmt::format("{:.2f} s {} ours", std::fabs(ahead_s),
+                                                       ahead_s < 0 ? "behind" : "ahead of"),
+            ahead_s);
+  constexpr double kMostAhead_s = 2.0;
+  if (std::fabs(ahead_s) > kMostAhead_s) {
+    found.odd.push_back(fmt::format(
+        "The clocks of server and client are {:.1f} s apart: results are dated by the server's. "
+        "Have both kept right (NTP).",
+        std::fabs(ahead_s)));
   }
   constexpr double kLong_s = 0.3;
   if (round_trip_s > kLong_s) {

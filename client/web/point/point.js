@@ -251,7 +251,7 @@ function show_trace(place, trace, file) {
   place.replaceChildren(h("h2", {}, trace.fall.rows > 0 ? "The fall and the contact" : "The contact"), body.element, watch.element, key,
     h("div", { class: "two" }, ...plots.map((plot) => plot.element), ...loops.map((loop) => loop.element)),
     h("p", {}, h("button", { type: "button", onclick: () => save_trace(trace, file) }, "Time histories as CSV"), " ",
-      h("span", { class: "weak" }, `${count(trace.rows)}${trace.rows < trace.head.instants ? ` of ${count(trace.head.instants)}` : ""} instants${trace.rows < trace.head.instants ? ", evenly chosen, and the extremes of the forces" : ""}, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
+      h("span", { class: "weak" }, `${count(trace.rows)}${trace.rows < trace.head.instants ? ` of ${count(trace.head.instants)}` : ""} instants${trace.rows < trace.head.instants ? ", evenly chosen" : ""}, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
   watch.begin();
   return [...all, body, watch];
 }

@@ -17,7 +17,7 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 #include "server/web/answers/service_line.h"
 #include "server/web/http/http_message.h"
 

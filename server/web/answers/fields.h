@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "proto/wire/cell.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::server {
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 #include "server/web/answers/fields.h"
 #include "server/web/http/json_answer.h"
 #include "server/web/page/talks.h"

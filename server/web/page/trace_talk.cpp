@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,26 +18,9 @@ constexpr unsigned kAcceptedForLater = 202;
 constexpr unsigned kNoStudy = 404;
 constexpr unsigned kUnprocessable = 422;
 
-/// A trace as it comes, reply by reply.
-struct ComingTrace {
-  std::string study;
-  std::uint64_t point;
-  bool shape;
-  bool fall;
-  protocol::TraceReply head;
-  std::vector<double> values{};
-  std::string states{};
-};
-
-protocol::ClientRequest trace_request(const ComingTrace& trace) {
-  protocol::ClientRequest request;
-  auto& asked = *request.mutable_trace();
-  asked.set_study(trace.study);
-  asked.set_point(trace.point);
-  asked.set_shape(trace.shape);
-  asked.set_fall(trace.fall);
-  asked.set_first_row(trace.states.size());
-  return request;
+bool has_flag(const HttpQuestion& question, const char* name) {
+  const auto field = question.fields.find(name);
+  return field != question.fields.end() && field->second == "1";
 }
 
 nlohmann::ordered_json columns_of(const solver::TraceShape& shape) {
@@ -60,71 +42,59 @@ nlohmann::ordered_json columns_of(const solver::TraceShape& shape) {
   return columns;
 }
 
-HttpAnswer whole(const ComingTrace& trace) {
-  const auto model = protocol::from_message(trace.head.model());
+HttpAnswer answer_of(const protocol::TraceReply& reply, std::uint64_t point, bool has_shape) {
+  const protocol::Trace& trace = reply.trace();
+  const auto model = protocol::from_message(reply.model());
   const solver::TraceShape shape = solver::trace_shape(
-      model.lengths_m.size(), static_cast<std::size_t>(model.elements_per_link), trace.shape);
-  std::string numbers(trace.values.size() * sizeof(double), '\0');
-  std::memcpy(numbers.data(), trace.values.data(), numbers.size());
-  numbers += trace.states;
-  return numbers_answer({{"study", trace.head.study_id()},
-                         {"point", trace.point},
-                         {"H", trace.head.h_m()},
-                         {"mu", trace.head.mu()},
-                         {"e", trace.head.e_star()},
+      model.lengths_m.size(), static_cast<std::size_t>(model.elements_per_link), has_shape);
+  std::string numbers(static_cast<std::size_t>(trace.values_size()) * sizeof(double), '\0');
+  std::memcpy(numbers.data(), trace.values().data(), numbers.size());
+  numbers += trace.states();
+  return numbers_answer({{"study", reply.study_id()},
+                         {"point", point},
+                         {"H", reply.h_m()},
+                         {"mu", reply.mu()},
+                         {"e", reply.e_star()},
                          {"links", shape.links},
                          {"nodes", shape.nodes},
                          {"elements_per_link", model.elements_per_link},
                          {"lengths_m", model.lengths_m},
-                         {"rows", trace.states.size()},
-                         {"instants", protocol::from_message(trace.head.result()).solver.steps + 1},
-                         {"fall_rows", std::ranges::count(trace.states, solver::kFallingCode)},
+                         {"rows", trace.states().size()},
+                         {"instants", trace.instants()},
+                         {"fall_rows", std::ranges::count(trace.states(), solver::kFallingCode)},
                          {"row_numbers", solver::trace_numbers(shape)},
                          {"columns", columns_of(shape)},
                          {"states", solver::kTraceStates},
-                         {"solver_version", trace.head.solver_version()},
-                         {"instruction_set", trace.head.instruction_set()},
-                         {"worker", trace.head.worker()}},
+                         {"solver_version", reply.solver_version()},
+                         {"instruction_set", reply.instruction_set()},
+                         {"worker", reply.worker()}},
                         numbers);
 }
 
 }  // namespace
 
 Talk trace_talk(std::uint64_t study, std::uint64_t point, const HttpQuestion& question) {
-  const auto is_asked_for = [&question](const char* name) {
-    const auto field = question.fields.find(name);
-    return field != question.fields.end() && field->second == "1";
-  };
-  auto trace = std::make_shared<ComingTrace>();
-  trace->point = point;
-  trace->shape = is_asked_for("shape");
-  trace->fall = is_asked_for("fall");
   protocol::ClientRequest first;
   first.mutable_status()->set_study_id(study);
+  protocol::ClientRequest second;  // `every` stays 0: as many instants as fit
+  second.mutable_trace()->set_point(point);
+  second.mutable_trace()->set_shape(has_flag(question, "shape"));
+  second.mutable_trace()->set_fall(has_flag(question, "fall"));
   return {
       first,
-      [trace](const protocol::ClientReply& reply) -> Talk::Next {
+      [second](const protocol::ClientReply& reply) -> Talk::Next {
         if (reply.has_status() && reply.status().studies_size() != 1) {
           return error_answer(kNoStudy, "there is no such study");
         }
         if (reply.has_status()) {
-          trace->study = reply.status().studies(0).name();
-          return trace_request(*trace);
+          protocol::ClientRequest request = second;
+          request.mutable_trace()->set_study(reply.status().studies(0).name());
+          return request;
         }
-        const protocol::TraceReply& part = reply.trace();
-        if (trace->states.empty()) {
-          trace->head = part;
-          trace->head.clear_rows();
-        }
-        if (!part.result().error().empty()) {
-          return error_answer(kUnprocessable, part.result().error());
-        }
-        trace->values.insert(trace->values.end(), part.rows().values().begin(),
-                             part.rows().values().end());
-        trace->states += part.rows().states();
-        const bool is_whole =
-            part.rows().states().empty() || trace->states.size() >= part.total_rows();
-        return is_whole ? Talk::Next(whole(*trace)) : Talk::Next(trace_request(*trace));
+        const protocol::TraceReply& trace = reply.trace();
+        const std::string& error = trace.trace().result().error();
+        return error.empty() ? answer_of(trace, second.trace().point(), second.trace().shape())
+                             : error_answer(kUnprocessable, error);
       },
       json_answer({{"state", "a worker is waited for, or at work: ask again"}}, kAcceptedForLater)};
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "client/formats/row_printer.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client::test {
 

@@ -24,16 +24,16 @@ const std::vector<double> kAwkward{0.1,
                                    5057.6299999999992,
                                    1e22};
 
-protocol::QueryReply rows_of_texts(const std::vector<std::string>& texts) {
-  protocol::QueryReply rows;
-  rows.add_columns("text");
+protocol::Table rows_of_texts(const std::vector<std::string>& texts) {
+  protocol::Table rows;
+  rows.columns.emplace_back("text");
   for (const auto& text : texts) {
-    add_value(*rows.add_rows(), text);
+    add_value(rows.rows.emplace_back(), text);
   }
   return rows;
 }
 
-std::string printed(const protocol::QueryReply& rows, Format format) {
+std::string printed(const protocol::Table& rows, Format format) {
   std::ostringstream out;
   print(out, rows, format);
   return out.str();
@@ -59,10 +59,10 @@ std::vector<std::string> csv_fields(const std::string& text) {
 }
 
 TEST(Csv, HoldsEveryNumberToTheLastBit) {
-  protocol::QueryReply rows;
-  rows.add_columns("x");
+  protocol::Table rows;
+  rows.columns.emplace_back("x");
   for (const double value : kAwkward) {
-    add_value(*rows.add_rows(), value);
+    add_value(rows.rows.emplace_back(), value);
   }
   const auto fields = csv_fields(printed(rows, Format::kCsv));
   ASSERT_EQ(fields.size(), kAwkward.size() + 1);
@@ -84,16 +84,16 @@ TEST(Csv, QuotesWhatWouldBreakALine) {
 
 TEST(Csv, TellsNullFromAnEmptyText) {
   auto rows = rows_of_texts({""});
-  rows.add_rows()->add_values();
+  rows.rows.emplace_back().emplace_back();
   EXPECT_EQ(printed(rows, Format::kCsv), "text\n\"\"\n\n");
 }
 
 TEST(Json, HoldsEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {
-  protocol::QueryReply rows;
-  rows.add_columns("z");
-  rows.add_columns("a");
+  protocol::Table rows;
+  rows.columns.emplace_back("z");
+  rows.columns.emplace_back("a");
   for (const double value : kAwkward) {
-    auto& row = *rows.add_rows();
+    auto& row = rows.rows.emplace_back();
     add_value(row, value);
     add_value(row, std::int64_t{7});
   }
@@ -109,8 +109,8 @@ TEST(Json, HoldsEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {
 
 TEST(Json, IsValidForTextsOfAllSortsForNullAndForNoRows) {
   auto rows = rows_of_texts({"say \"no\"", "two\nlines", "broken \xff utf-8"});
-  rows.add_rows()->add_values();
-  add_value(*rows.add_rows(), std::nan(""));
+  rows.rows.emplace_back().emplace_back();
+  add_value(rows.rows.emplace_back(), std::nan(""));
   const auto back = nlohmann::json::parse(printed(rows, Format::kJson));
   EXPECT_EQ(back[0]["text"], "say \"no\"");
   EXPECT_EQ(back[1]["text"], "two\nlines");
@@ -121,22 +121,22 @@ TEST(Json, IsValidForTextsOfAllSortsForNullAndForNoRows) {
 }
 
 TEST(Json, GivesEachColumnAKeyOfItsOwn) {
-  protocol::QueryReply rows;
-  auto& row = *rows.add_rows();
+  protocol::Table rows;
+  auto& row = rows.rows.emplace_back();
   for (const char* name : {"a", "b", "a", "a", "a_2"}) {
-    rows.add_columns(name);
-    add_value(row, static_cast<std::int64_t>(rows.columns_size()));
+    rows.columns.emplace_back(name);
+    add_value(row, static_cast<std::int64_t>(rows.columns.size()));
   }
   EXPECT_EQ(printed(rows, Format::kJson),
             "[\n{\"a\":1,\"b\":2,\"a_3\":3,\"a_4\":4,\"a_2\":5}\n]\n");
 }
 
 TEST(Table, AlignsNumbersAtThePointAndTextsToTheLeft) {
-  protocol::QueryReply rows;
-  rows.add_columns("kind");
-  rows.add_columns("fn_peak_N");
+  protocol::Table rows;
+  rows.columns.emplace_back("kind");
+  rows.columns.emplace_back("fn_peak_N");
   for (const auto& [mode, force] : {std::pair{"SC SR", 5057.62999}, std::pair{"sC", 12.5}}) {
-    auto& row = *rows.add_rows();
+    auto& row = rows.rows.emplace_back();
     add_value(row, std::string(mode));
     add_value(row, force);
   }
@@ -149,15 +149,15 @@ TEST(Table, AlignsNumbersAtThePointAndTextsToTheLeft) {
 
 TEST(Table, ShowsNullAsADashAndKeepsToOneLineARow) {
   auto rows = rows_of_texts({"two\nlines"});
-  rows.add_rows()->add_values();
+  rows.rows.emplace_back().emplace_back();
   EXPECT_EQ(printed(rows, Format::kTable), "text\n---------\ntwo lines\n-\n");
 }
 
 TEST(Table, ShowsNumbersForReading) {
-  protocol::QueryReply rows;
-  rows.add_columns("x");
+  protocol::Table rows;
+  rows.columns.emplace_back("x");
   for (const double value : {-0.0, 0.1 + 0.2, 14300.0, 7e10}) {
-    add_value(*rows.add_rows(), value);
+    add_value(rows.rows.emplace_back(), value);
   }
   EXPECT_EQ(printed(rows, Format::kTable), "      x\n-------\n    0\n    0.3\n14300\n7e+10\n");
 }
@@ -175,7 +175,7 @@ constexpr const char* kSteering = "\x1b[2J\u009b1m\u202ex\x7f";
 
 TEST(Table, ShowsControlCharactersOfTextsAndColumnsWrittenOut) {
   auto rows = rows_of_texts({kSteering});
-  rows.set_columns(0, "a\x1b");
+  rows.columns[0] = "a\x1b";
   const auto text = printed(rows, Format::kTable);
   EXPECT_NE(text.find("a\\x1b"), std::string::npos) << text;
   EXPECT_NE(text.find("\\x1b[2J\\u009b1m\\u202ex\\x7f"), std::string::npos) << text;
@@ -184,7 +184,7 @@ TEST(Table, ShowsControlCharactersOfTextsAndColumnsWrittenOut) {
 
 TEST(Json, EscapesControlCharactersAndReadsBackTheSame) {
   auto rows = rows_of_texts({kSteering, "\u2066µ🙂"});
-  rows.set_columns(0, "a\u009b");
+  rows.columns[0] = "a\u009b";
   const auto text = printed(rows, Format::kJson);
   EXPECT_EQ(text.find_first_of("\x1b\x7f"), std::string::npos) << text;
   EXPECT_EQ(text.find("\u009b"), std::string::npos) << text;

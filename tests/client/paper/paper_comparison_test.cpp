@@ -38,9 +38,9 @@ PublishedTable small_table() {
 // The third peak is a ripple.
 constexpr const char* kLateRipple = "[[1e-5,4040,2020,1],[2e-5,1000,500,1],[3e-5,990,495,0]]";
 
-void add_point(protocol::QueryReply& rows, double H_m, double mu,
+void add_point(protocol::Table& rows, double H_m, double mu,
                const std::string& peaks = kLateRipple) {
-  auto& row = *rows.add_rows();
+  auto& row = rows.rows.emplace_back();
   add_value(row, std::int64_t{0});
   add_value(row, H_m);
   add_value(row, mu);
@@ -53,7 +53,7 @@ void add_point(protocol::QueryReply& rows, double H_m, double mu,
 
 TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
   const auto table = small_table();
-  protocol::QueryReply rows;
+  protocol::Table rows;
   add_point(rows, 1.0, 1.2);
   const auto differences = compare(table, own_cases(table, rows));
   ASSERT_EQ(differences.size(), 7U);
@@ -70,7 +70,7 @@ TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
 
 TEST(Comparison, LeavesOutPhasesOfARowFromTheFirstRippleOn) {
   const auto table = small_table();
-  protocol::QueryReply rows;
+  protocol::Table rows;
   add_point(rows, 1.0, 1.2, "[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]");
   const auto own = own_cases(table, rows).front().value();
   EXPECT_EQ(own.phases_s, std::vector<double>{1e-4});
@@ -96,7 +96,7 @@ TEST(Comparison, CountsWhatWeDoNotHaveAsMissing) {
 }
 
 TEST(Comparison, RefusesAStudyWithSeveralAnswersToOneCase) {
-  protocol::QueryReply rows;
+  protocol::Table rows;
   add_point(rows, 1.0, 1.2);
   add_point(rows, 1.0, 1.2);
   EXPECT_THROW(own_cases(small_table(), rows), std::runtime_error);
@@ -104,7 +104,7 @@ TEST(Comparison, RefusesAStudyWithSeveralAnswersToOneCase) {
 
 TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
   const auto table = small_table();
-  protocol::QueryReply rows;
+  protocol::Table rows;
   add_point(rows, 1.0, 1.2);
   std::ostringstream out;
   print_comparison(out, table, own_cases(table, rows));
@@ -120,7 +120,7 @@ TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
 TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
   auto table = small_table();
   table.cases[0].mode = "sC sR";
-  protocol::QueryReply rows;
+  protocol::Table rows;
   add_point(rows, 1.0, 1.2);
   std::ostringstream out;
   print_comparison(out, table, own_cases(table, rows));
@@ -136,8 +136,8 @@ TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
 TEST(Comparison, HasOneRowForEachNumber) {
   const auto table = small_table();
   const auto rows = rows_of(table, compare(table, own_cases(table, {})));
-  EXPECT_EQ(rows.rows_size(), 7);
-  EXPECT_EQ(rows.rows(0).values_size(), rows.columns_size());
+  EXPECT_EQ(rows.rows.size(), 7U);
+  EXPECT_EQ(rows.rows[0].size(), rows.columns.size());
 }
 
 }  // namespace

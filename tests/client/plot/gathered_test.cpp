@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "client/plot/data/gathered.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client::plot {
 namespace {

@@ -249,7 +249,7 @@ TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
                        still_working(request, true), protocol::encode(reply)};
   });
   Connection connection(at(server.url(), kLong_ms));
-  EXPECT_EQ(connection.query("SELECT 1").columns(0), "a");
+  EXPECT_EQ(connection.query("SELECT 1").columns.at(0), "a");
 }
 
 TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {

@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/programs.h"
 #include "tests/support/temporary_folder.h"
@@ -114,19 +114,13 @@ TEST(Answers, ThatLackAPartOrAreNotSoundSaySoAndEndWithOne) {
     chunk.set_chunk_rows(1'000'000);
     return std::vector{frame_of(id, chunk)};
   };
-  const auto of_old_times = [](std::uint64_t id, std::uint64_t) {
-    protocol::QueryReply whole;
-    whole.add_columns("point");
-    return std::vector{frame_of(id, whole)};
-  };
   const auto of_more_columns = [](std::uint64_t id, std::uint64_t) {
     protocol::QueryReply wider = protocol::ChunkWriter({"point", "H"}).take();
     wider.set_chunk(2);
     wider.set_ends(true);
     return std::vector{frame_of(id, wider)};
   };
-  for (const auto& answer :
-       {gives(lacking), gives(unsound), gives(of_old_times), gives(of_more_columns)}) {
+  for (const auto& answer : {gives(lacking), gives(unsound), gives(of_more_columns)}) {
     const ScriptedServer server(answer);
     const auto csv = ask(server, {"query", "s", "--format", "csv"});
     EXPECT_EQ(csv.exit_code, 1);

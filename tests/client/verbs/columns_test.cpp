@@ -12,7 +12,7 @@
 #include "client/formats/row_printer.h"
 #include "client/output/columns.h"
 #include "client/output/printer.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "tests/support/programs.h"
 
 namespace oblique::client {
@@ -136,17 +136,15 @@ TEST(Columns, SayTheUnitThatTheirNameEndsIn) {
 }
 
 TEST(Columns, OfShortTimesAreShownInTheUnitsOfTheReport) {
-  protocol::QueryReply rows;
-  for (const char* name : {"duration_s", "slide_m", "wall_s", "H", "max(duration_s)"}) {
-    rows.add_columns(name);
-  }
-  auto& row = *rows.add_rows();
+  protocol::Table rows{.columns = {"duration_s", "slide_m", "wall_s", "H", "max(duration_s)"}};
+  auto& row = rows.rows.emplace_back();
   for (const double value : {0.000543704, 0.00114159, 0.001, 1.0, 0.000543704}) {
     add_value(row, value);
   }
   TextSink out;
-  const auto printer = made_printer(Format::kTable, out, {.shown = shown_columns(rows)});
-  printer->print(protocol::as_chunk(rows));
+  const auto chunk = protocol::chunk_of(rows);
+  const auto printer = made_printer(Format::kTable, out, {.shown = shown_columns(chunk)});
+  printer->print(chunk);
   printer->end();
   out.finish();
   EXPECT_EQ(out.text(),

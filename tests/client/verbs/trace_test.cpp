@@ -1,4 +1,5 @@
 // Points looked at again, by the program itself: here, by a worker, and when neither can.
+#include <algorithm>
 #include <csignal>
 #include <fstream>
 #include <map>
@@ -149,7 +150,8 @@ TEST_F(TraceVerb, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   says({"models", "0", "--format", "csv", "--out", "x.json"}, 2, "contradict each other");
   says({"models", "0", "--format", "jsn"}, 2, "did you mean `json`?");
   says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
-  says({"models", "0", "--here", "--on-worker"}, 2, "--here");
+  says({"models", "0", "--local", "--on-worker"}, 2, "--local");
+  says({"models", "0", "--every", "0"}, 2, "--every");
 }
 
 TEST_F(TraceVerb, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
@@ -192,7 +194,7 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   const auto nobody = ask({"models", "3"});
   EXPECT_EQ(nobody.exit_code, 1);
   EXPECT_THAT(nobody.err, HasSubstr("no worker is connected"));
-  const auto here = ask({"models", "3", "--here", "--out", "here.csv"});
+  const auto here = ask({"models", "3", "--local", "--out", "here.csv"});
   EXPECT_EQ(here.exit_code, 0) << here.err;
   EXPECT_THAT(here.err, HasSubstr("solved here, same as stored."));
 
@@ -207,10 +209,16 @@ TEST_F(TraceVerb, AWorkerSolvesForWhoAsksAServer) {
   EXPECT_EQ(there.out, text_of("here.csv"));
   for (const char* file : {"fall_here.csv", "fall_there.csv"}) {
     const bool is_here = file == std::string_view("fall_here.csv");
-    ask({"models", "3", "--shape", "--fall", is_here ? "--here" : "--on-worker", "--out", file});
+    ask({"models", "3", "--shape", "--fall", is_here ? "--local" : "--on-worker", "--out", file});
   }
   EXPECT_THAT(text_of("fall_here.csv"), StartsWith("t_s,"));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
+  // Each 50th instant, the ends of phases and the last instant, whoever solves it.
+  const auto thinned = ask({"models", "3", "--every", "50"});
+  EXPECT_EQ(thinned.out, ask({"models", "3", "--every", "50", "--local"}).out);
+  const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
+  EXPECT_GT(lines(thinned.out), lines(there.out) / 50);
+  EXPECT_LT(lines(thinned.out), lines(there.out) / 5);
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
   EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 

@@ -78,8 +78,19 @@ TEST(FrameScanTest, MoreResultsThanAMessageHoldsAreTooMany) {
   EXPECT_FALSE(is_of_a_workers_size(results_of(kMostResultsAMessage + 1)));
 }
 
-TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedWhateverIsInIt) {
+TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedButForTheRowsOfATrace) {
   EXPECT_FALSE(is_of_a_workers_size(std::string(kMaxWorkerFrameBytes + 1, '\xff')));
+  WorkerMessage message;
+  Trace& trace = *message.mutable_trace();
+  trace.mutable_values()->Resize(static_cast<int>(kMaxFrameBytes / sizeof(double)) - 100'000, 1.0);
+  EXPECT_TRUE(is_of_a_workers_size(encode(message)));
+  trace.mutable_values()->Resize(static_cast<int>(kMaxFrameBytes / sizeof(double)), 1.0);
+  EXPECT_FALSE(is_of_a_workers_size(encode(message))) << "longer than any frame";
+  trace.clear_values();
+  while (trace.ByteSizeLong() <= kMaxWorkerFrameBytes) {
+    trace.mutable_result()->add_texts(std::string(100'000, 'S'));
+  }
+  EXPECT_FALSE(is_of_a_workers_size(encode(message))) << "these are no rows";
 }
 
 TEST(FrameScanTest, ARecipeWithRoomForItsAxesPasses) {
@@ -91,10 +102,12 @@ TEST(FrameScanTest, ARecipeWithRoomForItsAxesPasses) {
 
 TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
   ClientRequest blocks = submission();
-  blocks.mutable_submit()->mutable_recipe()->add_blocks();
-  EXPECT_FALSE(is_of_a_requests_shape(encode(blocks)));
   ClientRequest axes = submission();
-  axes.mutable_submit()->mutable_recipe()->mutable_blocks(0)->add_axes();
+  for (int i = 0; i < 20; ++i) {
+    blocks.mutable_submit()->mutable_recipe()->add_blocks();
+    axes.mutable_submit()->mutable_recipe()->mutable_blocks(0)->add_axes();
+  }
+  EXPECT_FALSE(is_of_a_requests_shape(encode(blocks)));
   EXPECT_FALSE(is_of_a_requests_shape(encode(axes)));
   EXPECT_FALSE(is_of_a_requests_shape(std::string("\x1a\x7f", 2))) << "cut off";
 }
@@ -102,7 +115,9 @@ TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
 TEST(FrameScanTest, TheRecipeOfAFileIsJudgedAsThatOfARequest) {
   Recipe recipe = submission().submit().recipe();
   EXPECT_TRUE(is_of_a_recipes_shape(recipe.SerializeAsString()));
-  recipe.add_blocks();
+  for (int i = 0; i < 20; ++i) {
+    recipe.add_blocks();
+  }
   EXPECT_FALSE(is_of_a_recipes_shape(recipe.SerializeAsString()));
 }
 

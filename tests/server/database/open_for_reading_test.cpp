@@ -82,12 +82,12 @@ class ReadOnlyFolderTest : public testing::Test {
   }
 };
 
-int rows_of(const std::string& path) {
-  return Reader(path).query("SELECT point FROM results", kNoLimits).rows_size();
+std::size_t rows_of(const std::string& path) {
+  return Reader(path).query("SELECT point FROM results", kNoLimits).rows.size();
 }
 
 TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
-  for (const auto& [name, rows] : {std::pair{"alone", 2}, std::pair{"with_log", 3}}) {
+  for (const auto& [name, rows] : {std::pair{"alone", 2U}, std::pair{"with_log", 3U}}) {
     const std::string file = file_in(name);
     EXPECT_EXIT(as_stranger([&, expected = rows] { return rows_of(file) == expected; }),
                 testing::ExitedWithCode(0), "")

@@ -28,9 +28,8 @@ TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
   ASSERT_TRUE(worker.hello().has_welcome());
   worker.work(30);
   EXPECT_EQ(client.status("a").state(), "done");
-  const auto reply = client.query("SELECT count(*), count(DISTINCT point) FROM results");
-  EXPECT_EQ(reply.query().rows(0).values(0).integer(), 30);
-  EXPECT_EQ(reply.query().rows(0).values(1).integer(), 30);
+  EXPECT_EQ(client.rows("SELECT count(*), count(DISTINCT point) FROM results").rows.at(0),
+            (protocol::Row{std::int64_t{30}, std::int64_t{30}}));
   ClientRequest workers;
   workers.mutable_workers();
   const auto known = client.ask(workers).workers();
@@ -157,7 +156,7 @@ TEST_F(EventLoopTest, ALongQueryHoldsUpNothingElse) {
   other.start_query(kDeaf);
   EXPECT_TRUE(client.submit("a", 10).has_submit());
   EXPECT_EQ(client.status("a").points(), 10U);
-  EXPECT_EQ(client.query("SELECT 3").query().rows(0).values(0).integer(), 3);
+  EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
 }
 
 TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
@@ -176,7 +175,7 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
     EXPECT_TRUE(client.submit("a", 10).has_submit());  // so that the query has arrived
   }
   PretendedClient client(server.client_endpoint());
-  EXPECT_EQ(client.query("SELECT 3").query().rows(0).values(0).integer(), 3);
+  EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
 }
 
 TEST_F(EventLoopTest, TheServerStopsWhateverQueriesDo) {

@@ -50,7 +50,7 @@ class ReuseTest : public testing::Test {
     worker.work(points);
   }
   std::int64_t number(const std::string& sql) {
-    return Reader(path_).query(sql, kNoLimits).rows(0).values(0).integer();
+    return std::get<std::int64_t>(Reader(path_).query(sql, kNoLimits).rows.at(0).at(0));
   }
   void by_hand(const std::string& sql) {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);

@@ -227,16 +227,17 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
     *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
     return ask(request);
   }
-  /// With the rows of the first chunk.
   ClientReply query(const std::string& sql) {
     ClientRequest request;
     request.mutable_query()->set_sql(sql);
     request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
-    ClientReply reply = ask(request);
-    if (reply.has_query()) {
-      *reply.mutable_query() = protocol::as_rows(reply.query());
-    }
-    return reply;
+    return ask(request);
+  }
+  /// The rows of the first chunk.
+  protocol::Table rows(const std::string& sql) {
+    protocol::Table table;
+    protocol::append_rows(query(sql).query(), table);
+    return table;
   }
   /// Asks for what takes minutes, and waits until it is said that the query runs.
   void start_query(const std::string& sql) {

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
@@ -47,7 +47,7 @@ class ReaderTest : public testing::Test {
     return "it ran";
   }
   /// The values of the first row.
-  protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows(0); }
+  protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows.at(0); }
 
   test::TemporaryFolder folder_;
   std::string path_ = folder_.file("studies.db");
@@ -58,17 +58,16 @@ TEST_F(ReaderTest, ValuesHaveTheirTypes) {
       "SELECT 1 AS i, 0.5 AS r, CAST(x'c3a9' AS TEXT) AS t, NULL AS n, x'0aff' AS b,"
       " CAST(x'ff' AS TEXT), CAST(x'eda080' AS TEXT), 'SC' LIKE 'sC', 'SC' LIKE 'S%' ESCAPE '!'",
       {});
-  EXPECT_EQ(reply.columns(1), "r");
-  const auto& row = reply.rows(0);
-  EXPECT_EQ(row.values(0).integer(), 1);
-  EXPECT_EQ(row.values(1).real(), 0.5);
-  EXPECT_EQ(row.values(2).text(), "\xc3\xa9");
-  EXPECT_EQ(row.values(3).kind_case(), protocol::Value::KIND_NOT_SET);
-  EXPECT_EQ(row.values(4).text(), "x'0AFF'");
-  EXPECT_EQ(row.values(5).text(), "x'FF'") << "no UTF-8";
-  EXPECT_EQ(row.values(6).text(), "x'EDA080'") << "no UTF-8";
-  EXPECT_EQ(row.values(7).integer(), 0) << "LIKE is case-sensitive";
-  EXPECT_EQ(row.values(8).integer(), 1);
+  EXPECT_EQ(reply.columns.at(1), "r");
+  using Text = std::string;
+  using Integer = std::int64_t;
+  const protocol::Row expected{Integer{1},        0.5, Text("\xc3\xa9"), std::monostate{},
+                               Text("x'0AFF'"),
+                               Text("x'FF'"),      // no UTF-8
+                               Text("x'EDA080'"),  // no UTF-8
+                               Integer{0},         // LIKE is case-sensitive
+                               Integer{1}};
+  EXPECT_EQ(reply.rows.at(0), expected);
 }
 
 TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
@@ -96,7 +95,7 @@ TEST_F(ReaderTest, StatementsThatWriteOrReachOutsideAreRefused) {
         "SELECT load_extension('/tmp/x.so')"}) {
     EXPECT_NE(refusal_of(sql), "it ran") << sql;
   }
-  EXPECT_EQ(Reader(path_).query("SELECT * FROM results", {}).rows_size(), 3);
+  EXPECT_EQ(Reader(path_).query("SELECT * FROM results", {}).rows.size(), 3U);
 }
 
 TEST_F(ReaderTest, AWrongStatementIsRefusedWithTheReason) {
@@ -127,8 +126,10 @@ TEST_F(ReaderTest, StatementsMayListTablesAndUseJson) {
         "SELECT \"mu\" AS \"my mu\" FROM \"runs\" ORDER BY \"my mu\""}) {
     EXPECT_EQ(refusal_of(sql), "it ran") << sql;
   }
-  EXPECT_EQ(row_of("SELECT sum(value) FROM json_each('[1, 2, 3]')").values(0).integer(), 6);
-  EXPECT_EQ(row_of("SELECT sum(atom) FROM json_tree('[1, [2, 3]]')").values(0).integer(), 6);
+  EXPECT_EQ(row_of("SELECT sum(value) FROM json_each('[1, 2, 3]')"),
+            protocol::Row{std::int64_t{6}});
+  EXPECT_EQ(row_of("SELECT sum(atom) FROM json_tree('[1, [2, 3]]')"),
+            protocol::Row{std::int64_t{6}});
 }
 
 TEST_F(ReaderTest, ARowOrAValueOverItsLimitIsAnError) {
@@ -235,7 +236,7 @@ TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
   const auto last = answer.next();
   EXPECT_THAT(points_of(last), ElementsAre(9));
   EXPECT_TRUE(last.ends());
-  EXPECT_EQ(reader.query("SELECT * FROM results", {}).rows_size(), 10);
+  EXPECT_EQ(reader.query("SELECT * FROM results", {}).rows.size(), 10U);
 }
 
 TEST_F(AnswerTest, HoldsNoTransactionOnceItHasEnded) {

@@ -69,6 +69,26 @@ TEST(ConfigurationOfProgramsTest, ServerAndWorkerRunOnFilesAlone) {
   }
 }
 
+TEST(ConfigurationOfProgramsTest, LimitsOfTheServerArePrintedAndWrongOnesRefused) {
+  const TemporaryFolder folder;
+  for (const std::string key : {"connections", "waiting-out-bytes", "unstored-bytes",
+                                "running-queries", "open-points", "credit"}) {
+    const auto printed = [&](const std::string& value) {
+      Process process(folder, server_program(),
+                      {"--limits-" + key + "=" + value, "--print-config"});
+      const int exit_code = process.wait();
+      return exit_code == 0 ? process.out() : std::to_string(exit_code) + " " + process.err();
+    };
+    const std::string value = key == "waiting-out-bytes" ? "20000000" : "200";
+    EXPECT_NE(printed(value).find(" = " + value + "\n"), std::string::npos) << printed(value);
+    for (const char* wrong : {"-1", "0", "1.5", "99999999999999999999", "all"}) {
+      const std::string said = printed(wrong);
+      EXPECT_TRUE(said.starts_with("2 ")) << said;
+      EXPECT_NE(said.find("--limits-" + key), std::string::npos) << said;
+    }
+  }
+}
+
 TEST(ConfigurationOfProgramsTest, HelpEndsWithTheVariableAndTheKeyThatAnOptionMayAlsoBe) {
   const TemporaryFolder folder;
   for (const auto& [program, words] : std::vector<std::pair<std::string, std::string>>{

@@ -38,6 +38,12 @@ inline constexpr std::string_view kFalling = "falling";
 /// The instants of the fall that a trace has: from release to touch, both ends in, evenly spaced.
 inline constexpr int kFallRows = 121;
 
+/// Whether a phase ends at a row of the contact: compression follows restitution there, or the
+/// reverse. `before` is the state of the row before; empty: there is none.
+inline bool ends_phase(std::string_view before, std::string_view state) {
+  return !before.empty() && before != kFalling && before.back() != state.back();
+}
+
 /// What is wanted of the time histories of a contact, and where they go.
 struct Tracing {
   using Sink = std::function<void(const TraceRow&)>;

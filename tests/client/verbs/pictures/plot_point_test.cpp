@@ -95,8 +95,8 @@ TEST_F(PlotPoint, OfAServerHasTheShapesThatAWorkerSends) {
   EXPECT_THAT(there.out, HasSubstr("at touch"));
   EXPECT_THAT(there.out, HasSubstr("at separation"));
   EXPECT_THAT(there.out, HasSubstr("drop "));
-  EXPECT_THAT(there.out, Not(HasSubstr("--here")));
-  const auto here = ask("--here");
+  EXPECT_THAT(there.out, Not(HasSubstr("--local")));
+  const auto here = ask("--local");
   EXPECT_EQ(here.out, there.out);
 }
 

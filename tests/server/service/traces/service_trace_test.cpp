@@ -1,8 +1,12 @@
-// Traces as the service sees them: who asks, who solves, who is gone.
+// Traces as the service sees them: who requests them, who solves them, who has gone.
+#include <algorithm>
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/recipe/model_message.h"
+#include "server/study/limits.h"
 #include "tests/server/service/service_fixture.h"
 #include "worker/solver/model/trace_columns.h"
 
@@ -21,17 +25,25 @@ class ServiceTraceTest : public ServiceTest {
 
   static ClientRequest trace_request(std::uint64_t id, std::uint64_t point,
                                      const std::string& study = "a") {
-    ClientRequest message = client_request(id);
+    ClientRequest message;
+    message.set_request_id(id);
     message.mutable_trace()->set_study(study);
     message.mutable_trace()->set_point(point);
+    message.mutable_trace()->set_every(1);
     return message;
   }
-  void ask(const ClientRequest& message, const std::string& identity = "client",
-           const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
+  void ask(ClientRequest message, const std::string& identity = "client",
+           const std::shared_ptr<const KeyHolder>& holder = nullptr) {
+    message.set_protocol_version(protocol::kProtocolVersion);
     service_->client_frame(identity, protocol::encode(message), now_, holder);
   }
   void ask(std::uint64_t id, std::uint64_t point, const std::string& identity = "client") {
     ask(trace_request(id, point), identity);
+  }
+  void end(std::uint64_t id, const std::string& identity = "client") {
+    ClientRequest message;
+    message.mutable_end_query()->set_request_id(id);
+    ask(message, identity);
   }
   std::string refusal() { return last_reply().error().message(); }
 
@@ -51,36 +63,28 @@ class ServiceTraceTest : public ServiceTest {
                       [](const ServerToWorker& message) { return message.has_trace_cancel(); }));
   }
 
-  std::uint64_t asked_ = 0;
-
-  static protocol::TracePart part_of(const protocol::TraceOrder& order, std::size_t rows) {
+  static protocol::Trace trace_of(const protocol::TraceOrder& order, const std::string& states) {
     const auto shape = solver::trace_shape(
         static_cast<std::size_t>(order.model().lengths_m_size()),
         static_cast<std::size_t>(order.model().elements_per_link()), order.shape());
-    protocol::TracePart part;
-    part.set_trace_id(order.trace_id());
-    for (std::size_t i = 0; i < rows * solver::trace_numbers(shape); ++i) {
-      part.mutable_rows()->add_values(static_cast<double>(i));
+    protocol::Trace trace;
+    trace.set_trace_id(order.trace_id());
+    for (std::size_t i = 0; i < states.size() * solver::trace_numbers(shape); ++i) {
+      trace.add_values(static_cast<double>(i));
     }
-    part.mutable_rows()->set_states(std::string(rows, '\x02'));
-    return part;
+    trace.set_states(states);
+    *trace.mutable_result() = solved_point(0);
+    return trace;
   }
-  static protocol::TracePart end_of(const protocol::TraceOrder& order, std::size_t rows) {
-    protocol::TracePart part = part_of(order, rows);
-    part.set_last(true);
-    *part.mutable_result() = solved_point(0);
-    return part;
+  static protocol::Trace not_taken(const protocol::TraceOrder& order) {
+    protocol::Trace trace;
+    trace.set_trace_id(order.trace_id());
+    trace.set_not_taken(true);
+    return trace;
   }
-  static protocol::TracePart not_taken(const protocol::TraceOrder& order) {
-    protocol::TracePart part;
-    part.set_trace_id(order.trace_id());
-    part.set_last(true);
-    part.set_not_taken(true);
-    return part;
-  }
-  void worker_sends(const protocol::TracePart& part, const std::string& identity = "worker") {
+  void worker_sends(const protocol::Trace& trace, const std::string& identity = "worker") {
     WorkerMessage message;
-    *message.mutable_trace_part() = part;
+    *message.mutable_trace() = trace;
     worker_says(message, identity);
   }
   void goodbye(const std::string& identity) {
@@ -99,50 +103,44 @@ class ServiceTraceTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheOneWhoAsked) {
+TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheClient) {
   hello();
   credit(2);
-  ask(7, 3);
+  auto request = trace_request(7, 3);
+  request.mutable_trace()->set_fall(true);
+  request.mutable_trace()->set_every(5);
+  ask(request);
   ASSERT_EQ(orders().size(), 1U);
   const auto order = orders()[0];
   EXPECT_EQ(order.h_m(), 1.0);
   EXPECT_DOUBLE_EQ(order.mu(), 3.0 / 99.0);
-  worker_sends(part_of(order, 2));
-  EXPECT_TRUE(ports_.replies.empty());
-  worker_sends(end_of(order, 1));
-  ASSERT_EQ(ports_.replies.size(), 1U);
+  EXPECT_TRUE(order.fall());
+  EXPECT_EQ(order.every(), 5U);
+  worker_sends(trace_of(order, "\4\2\3"));
+  ASSERT_EQ(outbox_.replies.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), 7U);
-  const auto trace = last_reply().trace();
-  EXPECT_EQ(trace.total_rows(), 3U);
-  EXPECT_EQ(trace.rows().states(), std::string(3, '\x02'));
-  EXPECT_EQ(trace.mu(), order.mu());
-  EXPECT_EQ(trace.solver_version(), "1.0");
-  EXPECT_EQ(trace.outputs(), protocol::sent_outputs());
-  EXPECT_EQ(trace.result().reals_size(), solved_point(0).reals_size());
+  const auto reply = last_reply().trace();
+  EXPECT_EQ(reply.trace().SerializeAsString(), trace_of(order, "\4\2\3").SerializeAsString());
+  EXPECT_EQ(reply.mu(), order.mu());
+  EXPECT_EQ(reply.solver_version(), "1.0");
+  EXPECT_EQ(reply.outputs(), protocol::sent_outputs());
 }
 
-TEST_F(ServiceTraceTest, ATraceIsSolvedOnceAndKeptForWhoAsksAgainOrForMore) {
+TEST_F(ServiceTraceTest, ClientsThatWaitForTheSameTraceShareIt) {
   hello();
   ask(7, 3);
   ask(7, 3, "another");
-  ASSERT_EQ(orders().size(), 1U) << "they share it";
-  worker_sends(end_of(orders()[0], 10));
-  EXPECT_EQ(ports_.replies.size(), 2U);
-  auto rest = trace_request(8, 3);
-  rest.mutable_trace()->set_first_row(7);
-  ask(rest);
-  EXPECT_EQ(orders().size(), 1U);
-  EXPECT_EQ(last_reply().trace().rows().states().size(), 3U);
-  EXPECT_EQ(last_reply().trace().total_rows(), 10U);
-  EXPECT_FALSE(last_reply().trace().has_result()) << "it came with the first rows";
-  auto beyond = trace_request(9, 3);
-  beyond.mutable_trace()->set_first_row(UINT64_MAX);
-  ask(beyond);
-  EXPECT_EQ(last_reply().trace().rows().states().size(), 0U);
+  ask(8, 3);
+  ASSERT_EQ(orders().size(), 1U);
+  worker_sends(trace_of(orders()[0], "\2"));
+  EXPECT_EQ(outbox_.replies.size(), 3U);
+  ask(9, 3);
+  EXPECT_EQ(orders().size(), 2U) << "none is kept";
   auto shape = trace_request(10, 3);
   shape.mutable_trace()->set_shape(true);
   ask(shape);
-  EXPECT_EQ(orders().size(), 2U) << "with the shape it is another trace";
+  worker_sends(not_taken(orders()[1]));
+  EXPECT_TRUE(orders()[2].shape()) << "with the shape it is another trace";
 }
 
 TEST_F(ServiceTraceTest, WhatThePointIsIsSaidWithoutAnyWorker) {
@@ -151,10 +149,10 @@ TEST_F(ServiceTraceTest, WhatThePointIsIsSaidWithoutAnyWorker) {
   ask(message);
   EXPECT_EQ(last_reply().trace().mu(), 1.0);
   EXPECT_EQ(last_reply().trace().model().lengths_m_size(), 3);
-  EXPECT_FALSE(last_reply().trace().has_result());
+  EXPECT_FALSE(last_reply().trace().has_trace());
 }
 
-TEST_F(ServiceTraceTest, WhatIsNotThereIsNamed) {
+TEST_F(ServiceTraceTest, WhatDoesNotExistIsNamed) {
   hello();
   ask(trace_request(7, 0, "b"));
   EXPECT_THAT(refusal(), HasSubstr("no study called \"b\""));
@@ -175,16 +173,27 @@ TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainForItMayKill) {
   EXPECT_TRUE(orders().empty());
 }
 
-TEST_F(ServiceTraceTest, APointWithoutAnAnswerIsTriedEachTimeItIsAskedFor) {
+TEST_F(ServiceTraceTest, APointWithoutAnAnswerIsSolvedEachTimeItIsRequested) {
   hello();
   ask(7, 3);
-  protocol::TracePart end = end_of(orders()[0], 0);
-  *end.mutable_result() = protocol::failed_point(0, "it slides for ever");
-  worker_sends(end);
-  EXPECT_EQ(last_reply().trace().result().error(), "it slides for ever");
-  EXPECT_EQ(last_reply().trace().rows().states().size(), 0U);
+  auto trace = trace_of(orders()[0], "\2");
+  *trace.mutable_result() = protocol::failed_point(0, "it slides for ever");
+  worker_sends(trace);
+  EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
+  EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
   ask(8, 3);
   EXPECT_EQ(orders().size(), 2U);
+}
+
+TEST_F(ServiceTraceTest, ATraceThatIsTooLongIsAnsweredWithWhatWouldFit) {
+  hello();
+  ask(7, 3);
+  auto trace = trace_of(orders()[0], "");
+  trace.set_instants(1'000'000);
+  trace.set_every(12);
+  worker_sends(trace);
+  EXPECT_EQ(last_reply().trace().trace().instants(), 1'000'000U);
+  EXPECT_EQ(last_reply().trace().trace().every(), 12U);
 }
 
 TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
@@ -192,11 +201,24 @@ TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
   EXPECT_THAT(refusal(), HasSubstr("no worker is connected"));
 }
 
+TEST_F(ServiceTraceTest, WorkersOfTheVersionOfTheStudysResultsComeFirst) {
+  hello("old", "0.9");
+  ask(7, 3);
+  ASSERT_EQ(orders().size(), 1U) << "another version is better than none";
+  worker_sends(trace_of(orders()[0], "\2"), "old");
+  hello("worker", "1.0");
+  ask(8, 4);
+  EXPECT_EQ(orders().size(), 2U);
+  ask(9, 5);
+  EXPECT_EQ(orders().size(), 2U) << "it waits for the one of the right version";
+  worker_sends(trace_of(orders()[1], "\2"));
+  EXPECT_EQ(orders().size(), 3U);
+}
+
 TEST_F(ServiceTraceTest, AWorkerThatIsLostIsReplacedOnceAndThenThePointIsLeftAlone) {
   hello("one");
   ask(7, 3);
   hello("two");
-  worker_sends(part_of(orders()[0], 5), "one");
   goodbye("one");
   ASSERT_EQ(orders().size(), 2U);
   EXPECT_TRUE(ports_.replies.empty());
@@ -208,16 +230,6 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostIsReplacedOnceAndThenThePointIsLeftAlo
   EXPECT_EQ(orders().size(), 2U);
   ask(9, 4);
   EXPECT_EQ(orders().size(), 3U) << "other points are solved";
-}
-
-TEST_F(ServiceTraceTest, WhatTheLostWorkerHadSentIsNotMixedIn) {
-  hello("one");
-  ask(7, 3);
-  hello("two");
-  worker_sends(part_of(orders()[0], 5), "one");
-  goodbye("one");
-  worker_sends(end_of(orders()[1], 4), "two");
-  EXPECT_EQ(last_reply().trace().total_rows(), 4U);
 }
 
 TEST_F(ServiceTraceTest, AWorkerThatIsSilentIsLostToo) {
@@ -238,12 +250,16 @@ TEST_F(ServiceTraceTest, AWorkerThatDoesNotTakeItLeavesItToAnother) {
   EXPECT_THAT(refusal(), HasSubstr("no worker"));
 }
 
-TEST_F(ServiceTraceTest, NobodyWaitsForTheTraceOfAClientThatIsGone) {
+TEST_F(ServiceTraceTest, IsCancelledWhenAllItsClientsHaveGoneOrEndedTheirRequests) {
   hello();
   ask(7, 3);
-  service_->client_left("client");
+  ask(7, 3, "another");
+  end(8);
+  end(7);
+  EXPECT_EQ(cancels(), 0U);
+  service_->client_left("another");
   EXPECT_EQ(cancels(), 1U);
-  ask(8, 4, "another");
+  ask(8, 4);
   EXPECT_EQ(orders().size(), 1U) << "the worker has not said that it is free";
   worker_sends(not_taken(orders()[0]));
   EXPECT_EQ(orders().size(), 2U);
@@ -273,75 +289,61 @@ TEST_F(ServiceTraceTest, ATraceHasItsTime) {
   EXPECT_EQ(cancels(), 1U);
 }
 
-TEST_F(ServiceTraceTest, OneWhoAsksForManyAtOnceHasAShareAndOthersTheRest) {
-  hello();
+TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
+  for (const char* worker : {"one", "two", "three"}) {
+    hello(worker);
+  }
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(i, i);
   }
-  EXPECT_EQ(ports_.replies.size(), 96U);
+  EXPECT_EQ(outbox_.replies.size(), 100 - limits::kWaitingTracesOfConnection);
   EXPECT_THAT(refusal(), HasSubstr("too many traces"));
+  outbox_.replies.clear();
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(1, i, "client" + std::to_string(i));
   }
-  EXPECT_EQ(ports_.replies.size(), 96U + 40U) << "64 wait in all";
-  EXPECT_EQ(orders().size(), 1U) << "a worker has one at a time";
+  EXPECT_EQ(outbox_.replies.size(),
+            100 - (limits::kWaitingTraces - limits::kWaitingTracesOfConnection));
+  EXPECT_EQ(orders().size(), limits::kRunningTraces);
 }
 
-TEST_F(ServiceTraceTest, WhoAsksAnewForTheTraceThatHeWaitsForTakesNoMoreOfHisShare) {
+TEST_F(ServiceTraceTest, AReaderMayRequestOne) {
   hello();
-  for (std::uint64_t i = 0; i < 100; ++i) {
-    ask(i, 3);
-  }
-  EXPECT_EQ(ports_.replies.size(), 100U - 32U) << "others may wait, too";
-  for (std::uint64_t i = 0; i < 8; ++i) {
-    ask(i, 3 + i % 4, "another");
-  }
-  EXPECT_EQ(ports_.replies.size(), 100U - 32U);
-  ask(9, 9, "another");
-  EXPECT_THAT(refusal(), HasSubstr("too many traces")) << "a fifth trace";
+  ask(trace_request(7, 3), "client",
+      std::make_shared<const KeyHolder>(KeyHolder{"onlooker", protocol::Role::kReader}));
+  EXPECT_EQ(orders().size(), 1U);
 }
 
-TEST_F(ServiceTraceTest, WhoHasAKeyHasOneShareHoweverManyConnectionsThatIs) {
+TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
   hello();
-  const auto reader =
-      std::make_shared<const KeyIdentity>(KeyIdentity{"onlooker", protocol::Role::kReader});
-  for (std::uint64_t i = 0; i < 4; ++i) {
-    ask(trace_request(i, i), "client" + std::to_string(i), reader);
-  }
-  EXPECT_TRUE(ports_.replies.empty()) << "who may only look may look at this too";
-  ask(trace_request(5, 5), "client5", reader);
-  EXPECT_THAT(refusal(), HasSubstr("too many traces"));
-}
-
-TEST_F(ServiceTraceTest, WhatNoWorkerSendsFailsTheTraceAndNothingElse) {
-  hello();
-  const auto with = [&](const std::function<void(protocol::TracePart&)>& change) {
-    ++asked_;
-    ask(asked_, asked_);
-    protocol::TracePart part = end_of(orders().back(), 2);
-    change(part);
-    worker_sends(part);
+  std::uint64_t asked = 0;
+  const auto with = [&](const std::function<void(protocol::Trace&)>& change) {
+    ++asked;
+    ask(asked, asked);
+    protocol::Trace trace = trace_of(orders().back(), "\2\3");
+    change(trace);
+    worker_sends(trace);
     return refusal();
   };
-  EXPECT_THAT(with([](auto& part) { part.mutable_rows()->add_values(1.0); }),
-              HasSubstr("other columns"));
-  EXPECT_THAT(with([](auto& part) { part.mutable_rows()->set_states("\x02\x05"); }),
+  EXPECT_THAT(with([](auto& trace) { trace.add_values(1.0); }), HasSubstr("other columns"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\5"); }),
               HasSubstr("a state that no contact has"));
-  EXPECT_THAT(with([](auto& part) { part.mutable_rows()->set_values(0, std::nan("")); }),
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\4\2"); }),
+              HasSubstr("rows of the fall that were not requested"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\4"); }), HasSubstr("falls again"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_values(0, std::nan("")); }),
               HasSubstr("not finite"));
-  EXPECT_THAT(with([](auto& part) { part.mutable_result()->add_reals(1.0); }),
+  EXPECT_THAT(with([](auto& trace) { trace.mutable_result()->add_reals(1.0); }),
               HasSubstr("sent no trace"));
-  EXPECT_THAT(with([](auto& part) { part.clear_rows(); }), HasSubstr("no instant"));
+  EXPECT_THAT(with([](auto& trace) {
+                trace.clear_values();
+                trace.clear_states();
+              }),
+              HasSubstr("no instant"));
+  worker_sends(trace_of({}, ""));  // of no order
   ask(99, 60);
-  const auto order = orders().back();
-  worker_sends(end_of({}, 0));  // of no order
-  for (int i = 0; i < 60; ++i) {
-    worker_sends(part_of(order, 1000));  // 60 000 rows of 176 bytes are more than 8 MiB
-  }
-  EXPECT_THAT(refusal(), HasSubstr("more rows than a trace may have"));
-  ask(98, 61);
-  EXPECT_NE(orders().back().trace_id(), orders()[orders().size() - 2].trace_id())
-      << "and after its last part the worker gets the next one";
+  worker_sends(trace_of(orders().back(), "\2"));
+  EXPECT_TRUE(last_reply().has_trace());
 }
 
 TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnAThreadOfItsOwn) {

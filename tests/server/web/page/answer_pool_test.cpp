@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "server/web/answers/study_answers.h"
 #include "tests/support/recipes.h"
 

@@ -51,7 +51,7 @@ TEST_F(ServiceLineTest, ATraceThatCameNeedsNoEnd) {
   line_.ask(1, trace_of(7));
   protocol::ClientReply reply;
   reply.set_request_id(1);
-  reply.mutable_trace()->set_total_rows(3);
+  reply.mutable_trace()->set_worker("ann");
   line_.put(protocol::encode(reply));
   ASSERT_TRUE(line_.reply(1));
   line_.forget(1);

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+
+// Rows of answers. A chunk is a QueryReply, which keeps its values column by column and kind by
+// kind: a number is eight bytes that are copied.
+namespace oblique::protocol {
+
+/// Codes of ColumnPart.kinds.
+enum class CellKind : char { kNull = 0, kInteger = 1, kReal = 2, kText = 3 };
+
+/// One value of a row. Only the member that belongs to its kind counts.
+struct Cell {
+  CellKind kind = CellKind::kNull;
+  std::int64_t integer = 0;
+  double real = 0.0;
+  std::string_view text = {};
+};
+
+/// A value that owns its text; std::monostate is NULL.
+using Value = std::variant<std::monostate, std::int64_t, double, std::string>;
+using Row = std::vector<Value>;
+
+/// A short answer, or a table that this program makes.
+struct Table {
+  std::vector<std::string> columns;
+  std::vector<Row> rows = {};
+};
+
+/// Whether the columns of a chunk have as many values as it says. Chunks from outside must pass
+/// this before anything else is done with them.
+bool is_sound(const QueryReply& chunk);
+
+/// The rows of a sound chunk, which must not change meanwhile.
+class ChunkRows {
+ public:
+  explicit ChunkRows(const QueryReply& chunk);
+
+  /// Goes to the next row, at first to the first one; false after the last.
+  bool next();
+  std::size_t columns() const { return cells_.size(); }
+  /// The value of a column in the current row.
+  const Cell& cell(std::size_t column) const { return cells_[column]; }
+
+ private:
+  /// Where the next value of a column is.
+  struct Place {
+    const char* kind;
+    std::size_t kind_step;  // 0: one kind for all rows
+    const std::int64_t* integer;
+    const double* real;
+    const std::uint32_t* text_bytes;
+    const char* text;
+  };
+
+  std::vector<Place> places_;
+  std::vector<Cell> cells_;
+  std::uint64_t rows_left_;
+};
+
+/// Collects rows into chunks. A row is written value by value, in the order of the columns, and
+/// then ended.
+class ChunkWriter {
+ public:
+  explicit ChunkWriter(std::vector<std::string> columns);
+
+  void null() { begin(CellKind::kNull); }
+  void integer(std::int64_t value);
+  void real(double value);
+  void text(std::string_view value);
+  void cell(const Cell& value);
+  /// Throws std::logic_error when the row does not have as many values as there are columns.
+  void end_row();
+
+  /// Complete rows since the last `take`.
+  std::uint64_t rows() const { return rows_; }
+  /// Approximate size of the chunk, including the row that is being written.
+  std::uint64_t bytes() const { return bytes_; }
+
+  /// The rows written since the last call. The caller sets the number of the chunk and whether it
+  /// is the last one.
+  QueryReply take();
+
+ private:
+  ColumnPart& begin(CellKind kind);
+
+  std::vector<std::string> columns_;
+  QueryReply chunk_;
+  std::size_t column_ = 0;  // of the next value
+  std::uint64_t rows_ = 0;
+  std::uint64_t bytes_ = 0;
+};
+
+/// The table as the first and last chunk of an answer.
+QueryReply chunk_of(const Table& table);
+
+/// Appends the rows of a sound chunk and sets the columns.
+void append_rows(const QueryReply& chunk, Table& table);
+
+}  // namespace oblique::protocol

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// Bounds on what peers can make the server hold or do. The six that people may set are options of
+// oblique-server (--limits-KEY, server/program); here are their defaults and all others, each with
+// its reason. Every wait has a bound for one peer and one for all.
+namespace oblique::server::limits {
+
+inline constexpr std::size_t kMiB = std::size_t{1} << 20U;
+
+// ---- Defaults of the options ------------------------------------------------------------------
+
+/// Workers and clients of a large cluster; a connection takes a descriptor and some kilobytes.
+inline constexpr std::size_t kConnections = 4096;
+/// Replies to one peer that it does not read: four of the longest.
+inline constexpr std::size_t kWaitingOutBytes = 64 * kMiB;
+/// Results on their way to the disk: seconds of a fast cluster's work.
+inline constexpr std::size_t kUnstoredBytes = 64 * kMiB;
+/// Each query keeps a process and up to 256 MiB busy.
+inline constexpr std::size_t kRunningQueries = 4;
+/// Points of open studies. A study takes memory by its intervals, not its points; beyond this sums
+/// would come near to overflow.
+inline constexpr std::uint64_t kOpenPoints = 10'000'000'000'000;
+/// Batches that a worker may request at a time. More would wait there while others have none.
+inline constexpr std::uint32_t kCredit = 1024;
+
+// ---- Results ----------------------------------------------------------------------------------
+
+/// Of one worker, so that one that sends fast leaves room for others.
+inline constexpr std::size_t kUnstoredBytesOfWorker = 16 * kMiB;
+/// Messages of one worker: a message without results costs no bytes that are counted above.
+inline constexpr std::size_t kUnstoredMessagesOfWorker = 100'000;
+/// No batch goes out above these, until half is stored: more results would only wait.
+inline constexpr std::size_t kUnstoredBytesToHold = 16 * kMiB;
+inline constexpr std::size_t kUnstoredMessagesToHold = 20'000;
+/// Changes of studies that wait for the disk, a few hundred bytes each.
+inline constexpr std::size_t kUnstoredChanges = 10'000;
+
+// ---- Requests of clients ----------------------------------------------------------------------
+
+/// A longer request is parsed on a thread of its own: parsing it takes over a millisecond.
+inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
+/// Long requests that wait for that thread, which takes up to a second for the longest.
+inline constexpr std::size_t kLongRequests = 64;
+inline constexpr std::size_t kLongRequestBytes = 64 * kMiB;
+/// Of one connection: a correct client has one, and one more of before it connected again.
+inline constexpr std::size_t kLongRequestsOfConnection = 2;
+/// Studies or workers in a reply, which takes the service's thread some milliseconds.
+inline constexpr std::size_t kPageLength = 1000;
+inline constexpr std::size_t kPageBytes = kMiB;
+/// Studies that are neither done nor cancelled, some kilobytes each.
+inline constexpr std::size_t kOpenStudies = 100'000;
+
+// ---- Queries ----------------------------------------------------------------------------------
+
+/// Queries of one client at a time, so that another client's starts at once.
+inline constexpr std::size_t kRunningQueriesOfClient = 2;
+/// Queries that wait, with statements of up to a megabyte.
+inline constexpr std::size_t kWaitingQueries = 64;
+inline constexpr std::size_t kWaitingQueriesOfClient = 16;
+inline constexpr std::size_t kWaitingQueryBytes = 16 * kMiB;
+
+// ---- Traces -----------------------------------------------------------------------------------
+
+/// Traces with workers: each may come back as a message of 16 MiB.
+inline constexpr std::size_t kRunningTraces = 2;
+/// Requests for traces that wait. Of one connection: of the page, which is one for all browsers.
+inline constexpr std::size_t kWaitingTraces = 64;
+inline constexpr std::size_t kWaitingTracesOfConnection = 32;
+/// Time from request to answer, waiting included: the usual one, and what clients can request.
+inline constexpr std::int64_t kTraceTime_ms = 60'000;
+inline constexpr std::int64_t kLongestTraceTime_ms = 600'000;
+
+}  // namespace oblique::server::limits
