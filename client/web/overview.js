@@ -8,9 +8,6 @@ import { change } from "/server.js";
 /** After no answer, and of studies that events do not tell of. */
 const kAskAgain_ms = 3000;
 
-/** What somebody looks at and nobody keeps: see server/web/page. */
-const is_look = (/** @type {any} */ study) => /^look-[0-9a-f]{16}$/.test(study.name);
-
 /** The condition that points meet which failed. */
 export const kFailed = "error IS NOT NULL";
 
@@ -97,7 +94,7 @@ const kWorkerColumns = ["id", "name", "host", "state", "threads", "points_per_s"
 /** Running ones first, then the latest. @param {any[]} studies @param {string} name what names have in them */
 function in_order(studies, name) {
   const rank = (/** @type {any} */ s) => (s.state === "running" ? 0 : s.state === "paused" ? 1 : 2);
-  return studies.filter((s) => !is_look(s) && s.name.toLowerCase().includes(name.toLowerCase())).sort((a, b) => rank(a) - rank(b) || b.id - a.id);
+  return studies.filter((s) => s.name.toLowerCase().includes(name.toLowerCase())).sort((a, b) => rank(a) - rank(b) || b.id - a.id);
 }
 
 /** The server as a whole. @param {any} now */
@@ -182,7 +179,7 @@ function studies_section(place, list, say, filtered) {
       const lines = in_order(known, filter.value);
       table.element.hidden = lines.length === 0;
       none.hidden = lines.length > 0 || !list.was_read;
-      none.textContent = none_text(known.filter((one) => !is_look(one)).length, list.has_more);
+      none.textContent = none_text(known.length, list.has_more);
       table.show(lines, (one) => cells_of(one, place.may_change ? [study_buttons(one, say)] : []));
       more.hidden = !list.has_more;
       unlisted.textContent = unlisted_text(now?.unlisted ?? 0);

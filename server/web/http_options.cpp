@@ -28,10 +28,6 @@ void HttpOptions::add_to(CLI::App& app) {
          "File with the token of the page, 32 to 128 letters and digits, made when it is not "
          "there; without it a token is drawn at each start")
       ->type_name("FILE");
-  app.add_option("--http-plot-program", plot_program_,
-                 "Program `oblique`, which draws the pictures that people take from the page; "
-                 "without it that beside this program")
-      ->type_name("FILE");
 }
 
 std::optional<WebSettings> HttpOptions::settings() const {
@@ -51,7 +47,6 @@ std::optional<WebSettings> HttpOptions::settings() const {
   }
   settings.address = *address;
   settings.page.shows_without_token = shows_to_all_;
-  settings.page.pictures.program = plot_program_;
   if (!token_file_.empty()) {
     settings.page.token = token_of_file(token_file_);
   }

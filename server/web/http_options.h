@@ -27,7 +27,6 @@ class HttpOptions {
   std::vector<std::string> names_;
   bool shows_to_all_ = false;
   std::string token_file_;
-  std::string plot_program_;
   const CLI::Option* address_option_ = nullptr;
 };
 

@@ -20,7 +20,7 @@ constexpr unsigned kServiceUnavailable = 503;
 
 WebSettings with_version(WebSettings settings) {
   settings.page.version = OBLIQUE_VERSION;
-  settings.page.pictures.database = settings.database;
+  settings.page.database = settings.database;
   return settings;
 }
 
@@ -45,13 +45,9 @@ class Web::Parts {
                [this](const HttpServer::Question& question) {
                  return page_.objection_to_change(question);
                },
-               [this](std::uint64_t number) { page_.gone(number); },
-               [this] { return page_.tick(); }}) {}
+               [this](std::uint64_t number) { page_.gone(number); }}) {}
 
-  ~Parts() {  // they wake the HTTP server
-    answers_.stop();
-    drawings_.stop();
-  }
+  ~Parts() { answers_.stop(); }  // it wakes the HTTP server
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
 
@@ -139,8 +135,7 @@ class Web::Parts {
   ServiceLine line_;
   LiveText live_{[this] { return look(); }, began_ms_};
   AnswerPool answers_{line_, [this] { http_.wake(); }};
-  AnswerPool drawings_{line_, [this] { http_.wake(); }};
-  Page page_{settings_.page, {line_, answers_, drawings_, live_}};
+  Page page_{settings_.page, {line_, answers_, live_}};
   HttpServer http_;  // last: its thread uses all the others
 };
 

@@ -86,6 +86,10 @@ class LinePlot {
     this.#step_back();
     this.#plot?.redraw(false);
   }
+  /** As it is drawn. @returns {import("/parts/png.js").Figure} */
+  figure() {
+    return { title: this.of.title, canvas: this.#plot.ctx.canvas, legend: this.element.querySelector(".legend") };
+  }
   close() {
     this.watch.disconnect();
     this.#plot?.destroy();

@@ -94,6 +94,8 @@ export function loop_plot(title, x, y, colour) {
   const watch = new ResizeObserver(draw);
   watch.observe(place);
   return { element: h("figure", { class: "lines" }, h("figcaption", {}, title), place),
+    /** As it is drawn. @returns {import("/parts/png.js").Figure} */
+    figure: () => ({ title, canvas, legend: null }),
     /** @param {number} i */
     point_at(i) {
       if (i === at) return;

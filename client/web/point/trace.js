@@ -28,15 +28,14 @@ const is_for_now = (error) => error instanceof Silence || error.status === 409 |
 
 /**
  * Waits until a worker has solved it again.
- * @param {(ask: (study: number) => Promise<any>) => Promise<any>} of_study asks the study that has the point
- * @param {number} point @param {AbortSignal} signal @param {(text: string, is_bad: boolean) => void} say
+ * @param {number} study @param {number} point @param {AbortSignal} signal @param {(text: string, is_bad: boolean) => void} say
  * @returns {Promise<Trace>}
  */
-export async function trace_of(of_study, point, signal, say) {
+export async function trace_of(study, point, signal, say) {
   for (;;) {
     let pause_ms = kAskAgain_ms;
     try {
-      const answer = await of_study((study) => numbers(`/api/studies/${study}/points/${point}/trace?shape=1&fall=1`, signal));
+      const answer = await numbers(`/api/studies/${study}/points/${point}/trace?shape=1&fall=1`, signal);
       if (answer) return taken_apart(answer);
       say("A worker is waited for, or solves this point again.", false);
     } catch (error) {

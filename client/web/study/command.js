@@ -1,17 +1,17 @@
 // @ts-check
-// A view as the server's picture of it, and as the commands that make it.
+// A view as the commands that make it.
 import { of_file, quoted } from "/parts/format.js";
 import { column_of, joined, within } from "./conditions.js";
 
 /**
  * @typedef {import("./study.js").StudyView} View
- * @typedef {Record<string, string>} Fields of `picture`, as server/web/page has them; empty ones are left out
+ * @typedef {Record<string, string>} Fields what `oblique plot` is told; empty ones are left out
  */
 
 /** The part that is zoomed into, as conditions. @param {View} view */
 function zoomed(view) {
   const { picture } = view;
-  if (!picture || view.solving.is_on) return [];
+  if (!picture) return [];
   return [picture.x, picture.y].map((side, i) => {
     if (view.is(i === 0 ? "x0" : "y0") === "") return "";
     const ends = side.edges ? [side.edges[0], side.edges[side.edges.length - 1]] : [Math.min(...side.values), Math.max(...side.values)];
@@ -36,14 +36,14 @@ export function span_of(view, picture) {
 }
 
 /** @param {View} view @returns {Fields} */
-export function picture_fields(view) {
+function picture_fields(view) {
   const is = (/** @type {string} */ name) => view.is(name);
   const kind = is("pic") === "gathered" ? "scatter" : is("pic");
   const [on_grid, has_map] = [kind === "map" || kind === "lines", view.has_map];
   const at = (on_grid ? view.picture?.head.at ?? [] : []).filter((/** @type {any} */ one) => one.of > 1);
   const [from, to] = kind === "histogram" ? [is("x0"), is("x1")] : is("z") && has_span(view) && view.picture ? span_of(view, view.picture).map(String) : ["", ""];
   return { kind, z: kind === "histogram" ? "" : is("z"), x: is("x"), y: has_map ? is("y") : "", by: kind === "lines" ? is("y") : "",
-    block: on_grid && view.study.blocks.length > 1 && !view.solving.is_on ? view.is("block") : "", at: at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
+    block: on_grid && view.study.blocks.length > 1 ? view.is("block") : "", at: at.map((/** @type {any} */ one) => `${one.key}:${one.value}`).join(","),
     where: joined(is("where"), ...(kind === "histogram" ? [] : zoomed(view))),
     xlog: is("xlog"), ylog: kind === "histogram" ? "" : is("ylog"), zlog: has_map ? is("zlog") : "",
     from, to };
@@ -59,24 +59,11 @@ function flags(of) {
   return found.filter(([, value]) => value !== "");
 }
 
-/** What is solved while somebody looks, as the command that solves it as a study of that name. @param {View} view @param {string} name */
-export function run_command(view, name) {
-  const { axes, where } = view.solving.block;
-  const has = (/** @type {string[]} */ ...keys) => axes.some((/** @type {any} */ axis) => keys.includes(axis.key));
-  // Lengths are said together, unless axes act on all links.
-  const left_out = has("links", "length") ? ["lengths"] : ["links", "length"];
-  const model = view.study.model.filter((/** @type {any} */ one) => !one.usual && one.value !== null && !has(one.key) && !left_out.includes(one.key));
-  const said = (/** @type {any} */ axis) => axis.expression ?? axis.values?.join(",") ?? [axis.from, axis.to, axis.count, ...(axis.spacing ? ["log"] : [])].join(":");
-  const flag = (/** @type {string} */ key, /** @type {any} */ value) => `--${key.replaceAll("_", "-")} ${quoted(String(value))}`;
-  return ["oblique run", flag("name", name), ...axes.map((/** @type {any} */ axis) => flag(axis.key, said(axis))),
-    ...model.map((/** @type {any} */ one) => flag(one.key, one.value)), ...(where ? [flag("where", where)] : [])].join(" ") + of_file(view.place.file);
-}
-
-/** @param {View} view @param {string} [name] of the study */
-export function plot_command(view, name = view.study.name) {
+/** @param {View} view */
+export function plot_command(view) {
   const of = picture_fields(view);
   const ticks = [["xlog", "--log-x"], ["ylog", "--log-y"], ["zlog", "--log-colour"]].filter(([name]) => of[name]).map(([, flag]) => flag);
-  return ["oblique plot", quoted(name), ...flags(of).map(([flag, value]) => `--${flag} ${quoted(value)}`), ...ticks, "--out picture.svg"].join(" ") + of_file(view.place.file);
+  return ["oblique plot", quoted(view.study.name), ...flags(of).map(([flag, value]) => `--${flag} ${quoted(value)}`), ...ticks, "--out picture.svg"].join(" ") + of_file(view.place.file);
 }
 
 /** @param {View} view */

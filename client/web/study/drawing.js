@@ -52,11 +52,9 @@ export function drawing_of(view) {
   const lines_place = h("div", {});
   const legend = h("div", { class: "colours" });
   const said = h("span", {});
-  /** What is solved meanwhile. */
-  const coming = h("span", {});
   /** What stands while a part is shown. */
   const part = h("span", {}, " A part is shown. ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
-  const told = h("p", { class: "weak facts" }, said, coming);
+  const told = h("p", { class: "weak facts" }, said);
   /** @type {any} */
   let lines = null;
   let turn = 0;
@@ -102,9 +100,11 @@ export function drawing_of(view) {
       if (!is_part) part.remove();
       else if (!part.isConnected) told.append(part);
     },
-    /** Cells finer than these are on their way. @param {number} side cells a side; 0: none @param {number} share of them that is solved */
-    tell_coming(side, share) {
-      coming.textContent = side > 0 ? ` ${side} × ${side} are being solved: ${Math.floor(100 * share)} %.` : "";
+    /** The picture as it is drawn, with what colours and lines mean. @returns {import("/parts/png.js").Figure | null} null: it is not drawn yet */
+    figure() {
+      const title = view.study.name;
+      if (view.has_map) return { title, canvas: view.map.base, legend };
+      return lines && { ...lines.figure(), title: `${title}: ${lines.figure().title}` };
     },
     /** Only what is marked is another. */
     mark() {

@@ -55,7 +55,7 @@ export function marking_of(view) {
     if (!picture || (condition === "" && !marks)) return;
     const { signal } = asked = new AbortController();
     try {
-      const found = condition && !view.solving.is_on ? await ask_marks(view, picture, condition, signal) : null;
+      const found = condition ? await ask_marks(view, picture, condition, signal) : null;
       if (signal.aborted || picture !== view.picture) return;
       marks = found;
       view.drawing.mark();

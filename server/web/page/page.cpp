@@ -1,8 +1,6 @@
 #include "server/web/page/page.h"
 
-#include <algorithm>
 #include <charconv>
-#include <exception>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -24,7 +22,6 @@ constexpr unsigned kTryLater = 503;
 
 constexpr std::string_view kApi = "/api/";
 constexpr std::string_view kStudies = "/api/studies";
-constexpr std::string_view kLook = "/api/look";
 constexpr std::string_view kCheck = "/api/check";
 
 /// Browsers wait so long for one answer; what takes longer is asked for again.
@@ -34,11 +31,7 @@ constexpr const char* kHowToEnter =
     "this server shows its page to who has its token: open the address that it printed when it "
     "started, or that `oblique view` prints";
 
-constexpr const char* kTooManyPictures = "too many pictures are asked for at once: ask again later";
-
-constexpr const char* kSolvesHere =
-    "the picture of a point is solved for on the server's machine, which only who has the token "
-    "may ask for: draw it with `oblique plot --server`";
+constexpr const char* kTooManyAnswers = "too many answers are asked for at once: ask again later";
 
 HttpAnswer nothing_there() {
   return error_answer(kNothingThere, "there is nothing here");
@@ -59,33 +52,21 @@ std::optional<std::uint64_t> take_number(std::string_view& text) {
 
 Page::Page(const PageSettings& settings, const Neighbours& neighbours)
     : shows_without_token_(settings.shows_without_token),
-      file_(settings.is_of_file ? settings.pictures.database : ""),
+      file_(settings.is_of_file ? settings.database : ""),
       version_(settings.version),
       key_(settings.token.empty() ? PageKey() : PageKey(settings.token)),
-      at_(neighbours),
-      looks_(neighbours.service, settings.looks_kept),
-      pictures_(settings.pictures) {}
+      at_(neighbours) {}
 
 bool Page::has(const std::string& path) {
   return path.starts_with(kApi) || is_page_file(path);
 }
 
 bool Page::takes_changes(const std::string& path) {
-  if (path == kStudies || path == kLook || path == kCheck || kept_by(path)) {
+  if (path == kStudies || path == kCheck) {
     return true;
   }
   const auto place = place_of(path);
   return place && !place->point && change_talk(place->study, place->part).has_value();
-}
-
-std::optional<std::uint64_t> Page::kept_by(const std::string& path) {
-  std::string_view rest = path;
-  if (!rest.starts_with(kLook) || !rest.substr(kLook.size()).starts_with('/')) {
-    return std::nullopt;
-  }
-  rest.remove_prefix(kLook.size() + 1);
-  const auto study = take_number(rest);
-  return rest == "/keep" ? study : std::nullopt;
 }
 
 std::optional<Page::Place> Page::place_of(const std::string& path) {
@@ -158,18 +139,13 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
       return error_answer(kWrongQuestion, error.what());
     }
   }
-  if (const auto place = place_of(question.path)) {
-    looks_.seen(place->study);  // who waits for it looks at it
-  }
   auto answer = go_on(question, known->second);
   if (!answer && question.waited > kPatience) {
-    answer = known->second.talk
-                 ? known->second.talk->meanwhile
-                 : error_answer(kTryLater, "the server takes too long: ask again later");
-    if (known->second.talk && !known->second.talk->must_end) {
+    answer = known->second ? known->second->meanwhile : too_slow();
+    if (known->second) {
       at_.service.leave(question.number);
     } else {
-      gone(question.number);
+      at_.answers.forget(question.number);
     }
   }
   if (answer) {
@@ -179,33 +155,12 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
 }
 
 void Page::gone(std::uint64_t number) {
-  auto known = under_way_.extract(number);
-  if (!known.empty() && known.mapped().talk && known.mapped().talk->must_end) {
-    left_.emplace(number, std::move(*known.mapped().talk));
-  } else if (!known.empty() && known.mapped().talk) {
+  const auto known = under_way_.extract(number);
+  if (!known.empty() && known.mapped()) {
     at_.service.forget(number);
   } else if (!known.empty()) {
-    known.mapped().pool->forget(number);
+    at_.answers.forget(number);
   }
-}
-
-std::optional<std::chrono::milliseconds> Page::tick() {
-  hear_those_left();
-  const auto looks = looks_.tick();
-  constexpr std::chrono::milliseconds kSoon{100};
-  return left_.empty() ? looks : std::min(looks.value_or(kSoon), kSoon);
-}
-
-/// What comes of them nobody sees.
-void Page::hear_those_left() {
-  std::erase_if(left_, [this](const auto& left) {
-    try {
-      return hear(left.first, left.second).has_value();
-    } catch (const std::exception&) {
-      at_.service.forget(left.first);
-      return true;
-    }
-  });
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
@@ -242,19 +197,11 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
 }
 
 std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const Place& place) {
-  looks_.seen(place.study);
   if (place.point && place.part == "/trace") {
     return begin(question, trace_talk(place.study, *place.point, question));
   }
   if (!place.point && place.part == "rows") {
     return begin(question, rows_talk(place.study, question));
-  }
-  if (place.point && place.part == "/picture" && !is_trusted(question)) {
-    return error_answer(kUnauthorized, kSolvesHere);
-  }
-  if (place.part == (place.point ? "/picture" : "picture")) {
-    return begin(question, at_.drawings,
-                 picture_job(pictures_, place.study, place.point, question.fields));
   }
   std::optional<AnswerPool::Job> job;
   if (place.point && place.part.empty()) {
@@ -266,7 +213,7 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
   } else if (!place.point && place.part == "bins") {
     job = bins_job(place.study, question.fields);
   }
-  return job ? begin(question, at_.answers, std::move(*job)) : nothing_there();
+  return job ? begin(question, std::move(*job)) : nothing_there();
 }
 
 std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
@@ -274,16 +221,7 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
     return begin(question, submit_talk(question));
   }
   if (question.path == kCheck) {
-    return begin(question, at_.answers, check_job(question.body));
-  }
-  if (question.path == kLook) {
-    return begin(question, looks_.begin(question));
-  }
-  if (const auto study = kept_by(question.path)) {
-    auto keeping = looks_.keep(*study, question);
-    auto* const talk = std::get_if<Talk>(&keeping);
-    return talk != nullptr ? begin(question, std::move(*talk))
-                           : std::optional(std::get<HttpAnswer>(std::move(keeping)));
+    return begin(question, check_job(question.body));
   }
   const auto place = place_of(question.path);
   auto talk = place ? change_talk(place->study, place->part) : std::nullopt;
@@ -292,30 +230,26 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
   at_.service.ask(question.number, talk.first);
-  under_way_.emplace(question.number, UnderWay{std::move(talk)});
+  under_way_.emplace(question.number, std::move(talk));
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool& pool,
-                                      AnswerPool::Job job) {
-  if (!pool.submit(question.number, std::move(job))) {
-    return error_answer(kTryLater, kTooManyPictures);
+std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool::Job job) {
+  if (!at_.answers.submit(question.number, std::move(job))) {
+    return error_answer(kTryLater, kTooManyAnswers);
   }
-  under_way_.emplace(question.number, UnderWay{{}, &pool});
+  under_way_.emplace(question.number, std::nullopt);
   return std::nullopt;
 }
 
 std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, const UnderWay& under_way) {
-  return under_way.talk ? hear(question.number, *under_way.talk)
-                        : under_way.pool->take(question.number);
+  return under_way ? hear(question.number, *under_way) : at_.answers.take(question.number);
 }
 
 /// The answer at the end of a talk; nothing while a reply is awaited.
 std::optional<HttpAnswer> Page::hear(std::uint64_t number, const Talk& talk) {
   while (const auto reply = at_.service.reply(number)) {
-    Talk::Next next = !reply->has_error() ? talk.go_on(*reply)
-                      : talk.failed       ? talk.failed(reply->error())
-                                          : failure(reply->error());
+    Talk::Next next = reply->has_error() ? failure(reply->error()) : talk.go_on(*reply);
     auto* const request = std::get_if<protocol::ClientRequest>(&next);
     if (request == nullptr) {
       at_.service.forget(number);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -10,10 +9,8 @@
 #include "server/web/answers/service_line.h"
 #include "server/web/http/http_message.h"
 #include "server/web/page/live_text.h"
-#include "server/web/page/looks.h"
 #include "server/web/page/page_key.h"
 #include "server/web/page/talks.h"
-#include "server/web/pictures/picture_job.h"
 
 namespace oblique::server {
 
@@ -24,9 +21,7 @@ struct PageSettings {
   bool shows_without_token = false;
   /// The server is of one who shows a file, and ends with that: commands read the file.
   bool is_of_file = false;
-  /// A study that was made to be looked at goes when nobody has for so long.
-  std::chrono::milliseconds looks_kept{6000};
-  PictureSettings pictures = {};
+  std::string database;  ///< file
   std::string version;
 };
 
@@ -38,7 +33,6 @@ class Page {
   struct Neighbours {
     ServiceLine& service;
     AnswerPool& answers;
-    AnswerPool& drawings;  ///< where the program that draws is waited for
     LiveText& overview;
   };
 
@@ -54,8 +48,6 @@ class Page {
   /// Nothing: it is asked for again.
   std::optional<HttpAnswer> answer(const HttpQuestion& question);
   void gone(std::uint64_t number);
-  /// Looks after what nobody asks for. Gives the time after which it wants to be called again.
-  std::optional<std::chrono::milliseconds> tick();
 
  private:
   /// A path below /api/studies/, taken apart.
@@ -65,8 +57,6 @@ class Page {
     std::optional<std::uint64_t> point;
   };
   static std::optional<Place> place_of(const std::string& path);
-  /// The study of a path /api/look/ID/keep.
-  static std::optional<std::uint64_t> kept_by(const std::string& path);
 
   bool is_trusted(const HttpQuestion& question) const;
   std::optional<HttpAnswer> enter(const HttpQuestion& question) const;
@@ -75,26 +65,18 @@ class Page {
   std::optional<HttpAnswer> begin_study(const HttpQuestion& question, const Place& place);
   std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
-  std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool& pool,
-                                  AnswerPool::Job job);
-  /// What a request waits for: a reply to a talk or, without one, a job of a pool.
-  struct UnderWay {
-    std::optional<Talk> talk = {};
-    AnswerPool* pool = nullptr;
-  };
+  std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool::Job job);
+  /// What a request waits for: a reply to a talk or, without one, a job of the pool.
+  using UnderWay = std::optional<Talk>;
   std::optional<HttpAnswer> go_on(const HttpQuestion& question, const UnderWay& under_way);
   std::optional<HttpAnswer> hear(std::uint64_t number, const Talk& talk);
-  void hear_those_left();
 
   bool shows_without_token_;
   std::string file_;  // empty: commands ask the server
   std::string version_;
   PageKey key_;
   Neighbours at_;
-  Looks looks_;
-  PictureSettings pictures_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
-  std::map<std::uint64_t, Talk> left_;           // that go on without a browser
 };
 
 }  // namespace oblique::server

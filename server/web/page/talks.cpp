@@ -42,13 +42,6 @@ HttpAnswer no_such_study() {
   return error_answer(kNotFound, "there is no such study");
 }
 
-ClientRequest status_of_all(std::uint64_t after) {
-  ClientRequest request;
-  request.mutable_status()->set_after_study_id(after);
-  request.mutable_status()->set_limit(kMostLines);
-  return request;
-}
-
 HttpAnswer too_slow() {
   return error_answer(kUnavailable, "the server takes too long: ask again later");
 }
@@ -140,9 +133,7 @@ Talk submit_talk(const HttpQuestion& question) {
           },
           error_answer(kUnavailable,
                        "its points take long to judge; it begins by itself when that is done: look "
-                       "for it among the studies"),
-          {},
-          true};
+                       "for it among the studies")};
 }
 
 }  // namespace oblique::server

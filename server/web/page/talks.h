@@ -19,10 +19,6 @@ struct Talk {
   std::function<Next(const protocol::ClientReply&)> go_on;
   /// The answer while the service takes longer than a browser should wait.
   HttpAnswer meanwhile;
-  /// What follows from an error, where that is not its sentence.
-  std::function<Next(const protocol::ErrorReply&)> failed = {};
-  /// It is heard to its end though the browser goes: half of it would leave a study behind.
-  bool must_end = false;
 };
 
 /// That it takes too long.
@@ -32,8 +28,6 @@ HttpAnswer too_slow();
 protocol::ClientRequest status_of_number(std::uint64_t study);
 /// That there is none.
 HttpAnswer no_such_study();
-/// Asks for a page of studies, those with a higher number.
-protocol::ClientRequest status_of_all(std::uint64_t after);
 
 /// A talk about a study of that number. Most requests want its name: `ask` makes one with it, and
 /// `go_on` hears the replies to that.

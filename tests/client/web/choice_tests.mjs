@@ -26,7 +26,7 @@ const choose_by_keys = async (page) => {
 
 test("a large map is asked for with few cells first, and the cell that is chosen in it is the same point in the finer one", async () => {
   const id = await submit("large", { H: [0.5, 1.1, 200], mu: [0.1, 2, 200], e: [0.8, 0.8, 1] }, ["pause"]);
-  const page = await browser.open(`#/study/${id}?pic=map&x=mu&y=H&solve=off`, { early: hold_finer_ones });
+  const page = await browser.open(`#/study/${id}?pic=map&x=mu&y=H`, { early: hold_finer_ones });
   await facts(page, "96 × 96");
   await choose_by_keys(page);
   const [spoken, choice] = [await place(page), await text_of(page, ".choice a")];

@@ -138,6 +138,20 @@ test("in a window of 400 pixels the numbers of a point are in one piece each, an
   await page.close();
 });
 
+test("all plots of a point are saved as one PNG", async () => {
+  const page = await point({ motion: "reduce", early: () => {
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      createImageBitmap(blob).then(({ height }) => { window.height_px = height; });
+      return make.call(URL, blob);
+    };
+  } });
+  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Plots as PNG").click());
+  const [height, sum] = await until(page, () => window.height_px && [window.height_px, [...document.querySelectorAll(".uplot canvas, .loop canvas")].reduce((all, one) => all + one.height, 0)]);
+  assert.ok(height > sum, `${height} ${sum}`);
+  await page.close();
+});
+
 test("loops of more instants than a call has arguments are drawn", async () => {
   const page = await point({ motion: "reduce" });
   assert.equal(await page.evaluate(async () => {

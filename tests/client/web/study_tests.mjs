@@ -84,7 +84,7 @@ test("pickers tell all that can be picked apart", async () => {
 });
 
 test("maps are zoomed by dragging and by keys, and lines, gathered points and histograms are drawn", async () => {
-  const page = await study("#/study/1?solve=off");
+  const page = await study("#/study/1");
   const box = await (await page.$(kMap)).boundingBox();
   await page.mouse.move(box.x + 100, box.y + 40);
   await page.mouse.down();
@@ -146,7 +146,7 @@ test("logarithmic axes of lines and bars are drawn, whatever their ends are", as
 });
 
 test("Back undoes a zoom and another output, and leaves the focus where it was", async () => {
-  const page = await study("#/study/1?solve=off");
+  const page = await study("#/study/1");
   await page.focus(kMap);
   await page.keyboard.press("+");
   await until(page, () => !document.querySelector(".facts").textContent.includes("12 × 7"));
@@ -161,7 +161,7 @@ test("Back undoes a zoom and another output, and leaves the focus where it was",
 });
 
 test("Back finds the address that was left, whatever the view was about to write into it", async () => {
-  const page = await study("#/study/1?solve=off", { early: () => {
+  const page = await study("#/study/1", { early: () => {
     const real = window.setTimeout;
     window.setTimeout = (call, ms, ...given) => {
       if (ms !== 150) return real(call, ms, ...given);
@@ -227,8 +227,6 @@ test("rows are turned a page at a time and sorted, and nothing is truncated unsa
   await other.goBack();
   await until(other, () => document.querySelector(".rows p[role=status]").textContent === "26 to 50 of 252 rows.");
   await other.close();
-  const csv = await page.evaluate(async () => (await fetch(document.querySelector(".rows a[download]").href)).text());
-  assert.equal(csv.trim().split("\r\n").length, 253);
   await page.close();
 });
 

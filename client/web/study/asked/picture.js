@@ -23,7 +23,6 @@ import { json, numbers } from "/server.js";
  * @property {any} head
  * @property {(column: number, row: number) => number | null} point
  * @property {(cell: number) => Empty} why_empty
- * @property {{key: string, value: number}[]} [held] at which values other axes are that vary; without it those of head.at that do
  * @property {Dots} [dots] the points themselves, where they are few; the cells say how many lie where
  *
  * @typedef {"" | "missing" | "failed" | "left_out" | "none" | "filtered"} Empty

@@ -33,7 +33,7 @@ const order_of = (picture) => Array.from(picture.x.values.keys()).sort((a, b) =>
 /** @param {import("../asked/picture.js").Picture} picture @param {How} how */
 export function drawn_lines(picture, how) {
   const plot = line_plot(lines_of(picture, how));
-  return { element: plot.element, go_on: (/** @type {typeof plot.hands} */ hands) => plot.go_on(hands), close: () => plot.close(),
+  return { element: plot.element, go_on: (/** @type {typeof plot.hands} */ hands) => plot.go_on(hands), close: () => plot.close(), figure: () => plot.figure(),
     get hands() {
       return plot.hands;
     },

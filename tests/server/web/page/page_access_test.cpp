@@ -51,8 +51,8 @@ TEST(PageAccess, WithoutTheCookieNothingIsShown) {
   for (const std::string path :
        {"/api/events", "/api/studies", "/api/workers", "/api/studies/1", "/api/studies/1/rows",
         "/api/studies/1/slice?z=fn_peak_N&x=mu", "/api/studies/1/slice?z=fn_peak_N&x=mu&where=1",
-        "/api/studies/1/bins?x=mu&where=1", "/api/studies/1/picture", "/api/studies/1/points/0",
-        "/api/studies/1/points/0/picture", "/api/studies/1/points/0/trace", "/api/anything"}) {
+        "/api/studies/1/bins?x=mu&where=1", "/api/studies/1/points/0",
+        "/api/studies/1/points/0/trace", "/api/anything"}) {
     for (const std::string& cookies :
          {std::string(), std::string("Cookie: oblique-1=1\r\n"),
           right.substr(0, right.size() - 3) + "\r\n",
@@ -86,9 +86,6 @@ TEST(PageAccess, AnOperatorMayLetAllLookAndNoneChange) {
   EXPECT_EQ(status_of_answer(page.ask("POST", "/api/studies/1/pause",
                                       "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
             401);
-  // A picture of a point would be solved for here; that of a study would not.
-  EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies/1/points/0/picture", "")), 401);
-  EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies/1/picture", "")), 404);
 }
 
 TEST(PageAccess, FieldsAreText) {
@@ -126,10 +123,9 @@ TEST(PageAccess, HostilePagesGetAndChangeNothing) {
       {origin + "Origin: http://evil.example\r\n", 403, 403},
   };
   for (const Hostile& one : all) {
-    for (const std::string path :
-         {"/", "/api/events", "/api/studies/1/slice?z=mode&x=mu&where=1",
-          "/api/studies/1/bins?x=mu", "/api/studies/1/rows?where=1", "/api/studies/1/picture",
-          "/api/studies/1/points/0/picture", "/api/studies/1/points/0/trace"}) {
+    for (const std::string path : {"/", "/api/events", "/api/studies/1/slice?z=mode&x=mu&where=1",
+                                   "/api/studies/1/bins?x=mu", "/api/studies/1/rows?where=1",
+                                   "/api/studies/1/points/0/trace"}) {
       // Without an answer to its end, which a stream has not.
       RawHttp browser(page.url());
       browser.send("GET " + path + " HTTP/1.1\r\nHost: " + page.host() + "\r\n" +
@@ -168,7 +164,7 @@ TEST(PageAccess, ALinkOfAnotherSiteOpensThePageAndNothingElse) {
   EXPECT_THAT(with_token, Not(HasSubstr("Set-Cookie")));
   for (const std::string path :
        {"/?", "/?x=1", "/main.js", "/page.css", "/metrics", "/healthz", "/api/session",
-        "/api/studies", "/api/studies/1/rows", "/api/studies/1/picture", "//", "/index.html"}) {
+        "/api/studies", "/api/studies/1/rows", "//", "/index.html"}) {
     const bool is_frame = path == "/?";
     EXPECT_EQ(status_of_answer(page.ask("GET", path, page.cookie_header() + link)),
               is_frame ? 200 : 403)
@@ -189,7 +185,7 @@ TEST(PageAccess, OnlyChangesHaveAnotherMethod) {
        {"/", "/page.css", "/metrics", "/api/session", "/api/studies/1", "/api/studies/1/rows",
         "/api/studies/1/delete", "/api/studies/0/pause", "/api/studies/x/pause",
         "/api/studies/1/pause/", "/api/studies/1/points/1/pause", "/api/studies/1/slice",
-        "/api/studies/1/bins", "/api/studies/1/picture", "/api/studies/1/points/1/picture"}) {
+        "/api/studies/1/bins"}) {
     EXPECT_EQ(status_of_answer(page.ask("POST", path, headers)), 405) << path;
   }
   for (const std::string method : {"PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "get"}) {

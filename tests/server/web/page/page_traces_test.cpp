@@ -69,7 +69,7 @@ class PageTracesAloneTest : public testing::Test {
   ServiceLine line_;
   AnswerPool pool_{line_, [] {}};
   LiveText live_{[] { return std::nullopt; }, 0};
-  Page page_{settings(), Page::Neighbours{line_, pool_, pool_, live_}};
+  Page page_{settings(), Page::Neighbours{line_, pool_, live_}};
 };
 
 TEST_F(PageTracesAloneTest, OneThatTakesLongGoesOnUntilTheBrowserAsksAgainAndEndsWhenItGoes) {
