@@ -120,7 +120,7 @@ class Loop::Parts final : public Outbox {
     return forward_to_worker(identity, protocol::encode(message));
   }
   Delivery forward_to_worker(const std::string& identity, const std::string& frame) override {
-    return sent(network_.send(identity, frame), frame, worker_traffic_);
+    return network_.send(identity, frame);
   }
   bool is_busy(const std::string& identity) const override { return network_.is_busy(identity); }
   bool has_unheard(const std::string& identity) const override {
@@ -136,7 +136,7 @@ class Loop::Parts final : public Outbox {
     if (is_ending_) {
       last_answered_.push_back(identity);
     }
-    return sent(network_.send(identity, frame), frame, client_traffic_) != Delivery::kGone;
+    return network_.send(identity, frame) != Delivery::kGone;
   }
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
@@ -169,16 +169,9 @@ class Loop::Parts final : public Outbox {
   const Web* web() const { return web_.get(); }
 
  private:
-  static Delivery sent(Delivery delivery, std::string_view frame, PortTraffic& traffic) {
-    traffic.sent_bytes += delivery == Delivery::kGone ? 0 : frame.size();
-    return delivery;
-  }
-
   void show() {
     if (web_) {
-      web_->tick({*service_, network_, writer_, clients_, client_traffic_, workers_,
-                  worker_traffic_, ended_connections_},
-                 now().steady_ms);
+      web_->tick({*service_, network_, writer_}, now().steady_ms);
     }
   }
 
@@ -200,8 +193,7 @@ class Loop::Parts final : public Outbox {
   /// True when messages are left that could be taken at once.
   bool take_worker_messages() {
     return take_messages(
-        workers_, worker_traffic_,
-        [this](const std::string& worker) { return service_->has_room_for(worker); },
+        workers_, [this](const std::string& worker) { return service_->has_room_for(worker); },
         [this](const Incoming& incoming) {
           service_->worker_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
         });
@@ -210,19 +202,16 @@ class Loop::Parts final : public Outbox {
   /// The same. Who does not take what it asked for is not asked what it wants next.
   bool take_client_messages() {
     return take_messages(
-        clients_, client_traffic_,
-        [this](const std::string& client) { return !network_.is_busy(client); },
+        clients_, [this](const std::string& client) { return !network_.is_busy(client); },
         [this](const Incoming& incoming) {
           service_->client_frame(incoming.identity, frame_of(incoming), now(), incoming.holder);
         });
   }
 
   template <typename Take>
-  bool take_messages(Network::Port port, PortTraffic& traffic, const Network::MayTake& may_take,
-                     const Take& take) {
+  bool take_messages(Network::Port port, const Network::MayTake& may_take, const Take& take) {
     const auto until = Clock::now() + kShareOfTurn;
     while (const auto incoming = network_.next(port, may_take)) {
-      traffic.received_bytes += incoming->message.body.size();
       take(*incoming);
       if (Clock::now() >= until) {
         return true;
@@ -354,8 +343,6 @@ class Loop::Parts final : public Outbox {
   Network network_;
   Network::Port workers_;
   Network::Port clients_;
-  PortTraffic client_traffic_;
-  PortTraffic worker_traffic_;
   std::unique_ptr<Web> web_;
   std::uint64_t ended_connections_ = 0;
   std::array<std::uint64_t, kRefusalCauses> refused_{};  ///< by cause

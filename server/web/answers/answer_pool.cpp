@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 
 namespace oblique::server {
 namespace {

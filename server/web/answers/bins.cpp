@@ -11,7 +11,7 @@
 
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::server {

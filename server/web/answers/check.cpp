@@ -15,7 +15,7 @@
 #include "proto/recipe/written/written_model.h"
 #include "proto/text.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 

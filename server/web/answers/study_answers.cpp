@@ -13,7 +13,7 @@
 #include "proto/recipe/model_message.h"
 #include "server/query/columns.h"
 #include "server/query/question.h"
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::server {

@@ -1,20 +1,33 @@
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 
 #include <cstddef>
-#include <cstdint>
-#include <utility>
 
 namespace oblique::server {
-namespace {
 
-std::string text_of(const nlohmann::ordered_json& value) {
+std::vector<std::string> HttpRequest::all(const std::string& name) const {
+  std::vector<std::string> values;
+  const auto [begin, end] = headers.equal_range(name);
+  for (auto at = begin; at != end; ++at) {
+    values.push_back(at->second);
+  }
+  return values;
+}
+
+std::string HttpRequest::header(const std::string& name) const {
+  const auto found = headers.find(name);
+  return found == headers.end() ? std::string() : found->second;
+}
+
+std::string json_text(const nlohmann::ordered_json& value) {
   return value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-}  // namespace
+HttpAnswer text_answer(unsigned status, std::string_view sentence) {
+  return {status, "text/plain; charset=utf-8", std::string(sentence) + "\n"};
+}
 
 HttpAnswer json_answer(const nlohmann::ordered_json& value, unsigned status) {
-  return {status, "application/json", text_of(value) + "\n"};
+  return {status, "application/json", json_text(value) + "\n"};
 }
 
 HttpAnswer error_answer(unsigned status, const std::string& sentence) {
@@ -25,7 +38,7 @@ HttpAnswer numbers_answer(const nlohmann::ordered_json& head, const std::string&
   constexpr std::size_t kLengthBytes = 4;
   constexpr std::size_t kAlignment = 8;
   constexpr unsigned kBitsOfByte = 8;
-  std::string text = text_of(head);
+  std::string text = json_text(head);
   text.append((kAlignment - (kLengthBytes + text.size()) % kAlignment) % kAlignment, ' ');
   std::string body;
   body.reserve(kLengthBytes + text.size() + numbers.size());
