@@ -1,6 +1,8 @@
 #include "server/web/http/http_message.h"
 
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 
 namespace oblique::server {
 
@@ -35,16 +37,13 @@ HttpAnswer error_answer(unsigned status, const std::string& sentence) {
 }
 
 HttpAnswer numbers_answer(const nlohmann::ordered_json& head, const std::string& numbers) {
-  constexpr std::size_t kLengthBytes = 4;
   constexpr std::size_t kAlignment = 8;
-  constexpr unsigned kBitsOfByte = 8;
   std::string text = json_text(head);
-  text.append((kAlignment - (kLengthBytes + text.size()) % kAlignment) % kAlignment, ' ');
-  std::string body;
-  body.reserve(kLengthBytes + text.size() + numbers.size());
-  for (unsigned byte = 0; byte < kLengthBytes; ++byte) {
-    body += static_cast<char>((text.size() >> (kBitsOfByte * byte)) & 0xffU);
-  }
+  std::uint32_t length = 0;
+  text.append((kAlignment - (sizeof length + text.size()) % kAlignment) % kAlignment, ' ');
+  length = static_cast<std::uint32_t>(text.size());
+  std::string body(sizeof length, '\0');
+  std::memcpy(body.data(), &length, sizeof length);
   body += text;
   body += numbers;
   return {200, "application/octet-stream", std::move(body)};

@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kHost = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
+const std::string kEnd = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
 /// Repeats the path of a request. /wait is answered after `open`, /wrong and /broken throw, /loud
 /// and /quiet are streams that always, or never, have more.
@@ -76,8 +76,8 @@ TEST(HttpServer, AnswersBothVersionsAndEndsTheConnection) {
   const std::string answer = RawHttp(server.url()).ask("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(status_of_answer(answer), 200);
   EXPECT_EQ(body_of(answer), "/a\n");
-  EXPECT_EQ(body_of(RawHttp(server.url()).ask("GET /b" + kHost + "GET /c" + kHost)), "/b\n");
-  const std::string head = RawHttp(server.url()).ask("HEAD /abc" + kHost);
+  EXPECT_EQ(body_of(RawHttp(server.url()).ask("GET /b" + kEnd + "GET /c" + kEnd)), "/b\n");
+  const std::string head = RawHttp(server.url()).ask("HEAD /abc" + kEnd);
   EXPECT_THAT(head, HasSubstr("Content-Length: 5\r\n"));
   EXPECT_EQ(body_of(head), "");
 }
@@ -86,7 +86,7 @@ TEST(HttpServer, KeepsBrowsersFromUsingAnswersForAnythingElse) {
   const EchoServer server;
   for (const std::string path : {"/", "/wrong", "/quiet"}) {
     RawHttp peer(server.url());
-    peer.send("GET " + path + kHost);
+    peer.send("GET " + path + kEnd);
     const std::string head = peer.read_until("\r\n\r\n");
     for (const std::string header :
          {"Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; ",
@@ -125,7 +125,7 @@ TEST(HttpServer, RefusesWithASentence) {
 TEST(HttpServer, EndsConnectionsThatSendMoreThanAHead) {
   const EchoServer server;
   for (const std::string& bytes :
-       {"GET /" + std::string(1'000'000, 'a') + kHost,
+       {"GET /" + std::string(1'000'000, 'a') + kEnd,
         "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(1'000'000, 'a') + "\r\n\r\n",
         "GET / HTTP/1.1\r\n" + std::string(1'000'000, 'a')}) {
     RawHttp peer(server.url());
@@ -170,7 +170,7 @@ TEST(HttpServer, AnAddressWithItsShareOfConnectionsTakesNoneFromOthers) {
     silent.push_back(std::make_unique<RawHttp>(server.url(), "127.0.0.2"));
     silent.back()->send("GET ");
   }
-  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").ask("GET /a" + kHost), "");
+  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").ask("GET /a" + kEnd), "");
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
 }
 
@@ -182,10 +182,10 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
   RawHttp quiet(server.url());
-  quiet.send("GET /quiet" + kHost);
+  quiet.send("GET /quiet" + kEnd);
   quiet.read_until("\r\n\r\n");
   RawHttp taking_nothing(server.url());
-  taking_nothing.send("GET /loud" + kHost);
+  taking_nothing.send("GET /loud" + kEnd);
   taking_nothing.read_until("\r\n\r\n");
   silent.read_to_the_end();
   halting.read_to_the_end();
@@ -196,18 +196,18 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
 TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
   EchoServer server;
   RawHttp staying(server.url());
-  staying.send("GET /wait" + kHost);
+  staying.send("GET /wait" + kEnd);
   server.wake_until_in_progress(1);
   for (const std::string path : {"/wait", "/quiet", "/loud"}) {
     auto closing = std::make_unique<RawHttp>(server.url());
-    closing->send("GET " + path + kHost);
+    closing->send("GET " + path + kEnd);
     server.wake_until_in_progress(2);
     closing.reset();
     server.wake_until_in_progress(1);
   }
   for (const std::string path : {"/wait", "/quiet"}) {  // browsers may close their half first
     RawHttp halving(server.url());
-    halving.send("GET " + path + kHost);
+    halving.send("GET " + path + kEnd);
     server.wake_until_in_progress(2);
     ::shutdown(halving.number(), SHUT_WR);
     server.wake_until_in_progress(1);
@@ -220,7 +220,7 @@ TEST(HttpServer, APendingAnswerDelaysNoOther) {
   std::vector<std::unique_ptr<RawHttp>> waiting;
   for (int i = 0; i < 20; ++i) {
     waiting.push_back(std::make_unique<RawHttp>(server.url()));
-    waiting.back()->send("GET /wait" + kHost);
+    waiting.back()->send("GET /wait" + kEnd);
   }
   server.wake_until_in_progress(20);
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
@@ -238,23 +238,23 @@ TEST(HttpServer, StreamsAreBounded) {
   std::vector<std::unique_ptr<RawHttp>> tabs;
   for (int i = 0; i < 2; ++i) {
     tabs.push_back(std::make_unique<RawHttp>(server.url()));
-    tabs.back()->send("GET /quiet" + kHost);
+    tabs.back()->send("GET /quiet" + kEnd);
     tabs.back()->read_until("\r\n\r\n");
   }
   EXPECT_EQ(status_of_answer(get(server.url(), "/quiet")), 503);
   tabs.pop_back();
   server.wake_until_in_progress(1);
   RawHttp next(server.url());
-  next.send("GET /quiet" + kHost);
+  next.send("GET /quiet" + kEnd);
   EXPECT_EQ(status_of_answer(next.read_until("\r\n\r\n")), 200);
 }
 
 TEST(HttpServer, StopsWhileRequestsWait) {
   auto server = std::make_unique<EchoServer>();
   RawHttp waiting(server->url());
-  waiting.send("GET /wait" + kHost);
+  waiting.send("GET /wait" + kEnd);
   RawHttp streaming(server->url());
-  streaming.send("GET /quiet" + kHost);
+  streaming.send("GET /quiet" + kEnd);
   RawHttp silent(server->url());
   server->wake_until_in_progress(2);
   server.reset();

@@ -76,80 +76,95 @@ TEST(RequestRules, BeyondLoopbackAnyAddressIsAnsweredAndOnlyNamesThatWereGiven) 
   }
 }
 
-/// Every other refusal: requests to localhost:7602 with these headers, and their status.
-TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
-  const std::pair<std::string, std::string> host{"host", "localhost:7602"};
-  const std::pair<std::string, std::string> origin{"origin", "http://localhost:7602"};
-  const std::pair<std::string, std::string> same{"sec-fetch-site", "same-origin"};
-  const std::pair<std::string, std::string> cross{"sec-fetch-site", "cross-site"};
-  const std::pair<std::string, std::string> tab{"sec-fetch-mode", "navigate"};
-  const std::pair<std::string, std::string> page{"sec-fetch-dest", "document"};
-  struct Row {
-    std::string method;
-    std::string path;
-    Headers headers;
-    unsigned status;
-  };
-  std::vector<Row> rows{
-      {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
-      {"GET", "/", {host, host}, 400},
-      {"GET", "/", {host, {"host", "evil.example"}}, 400},
-      // A body states its length.
-      {"GET", "/", {host, {"content-length", "0"}}, 200},
-      {"GET", "/", {host, {"content-length", "262145"}}, 413},
-      {"GET", "/", {host, {"transfer-encoding", "chunked"}}, 413},
-      {"POST", "/", {host, origin, {"content-length", "262144"}}, 200},
-      {"POST", "/", {host, origin, {"content-length", "262145"}}, 413},
-      {"POST", "/", {host, origin, {"content-length", "99999999999999999999"}}, 413},
-      {"POST", "/", {host, origin, {"content-length", "x"}}, 413},
-      {"POST", "/", {host, origin, {"transfer-encoding", "chunked"}}, 413},
-      // Changes come from a page of this server.
-      {"POST", "/", {host, origin}, 200},
-      {"POST", "/", {host, origin, same}, 200},
-      {"POST", "/", {host}, 403},
-      {"POST", "/", {host, same}, 403},
-      {"POST", "/", {host, origin, origin}, 403},
-      {"POST", "/", {host, origin, {"sec-fetch-site", "none"}}, 403},
-      {"POST", "/", {origin}, 403},
-      // A link on another site opens the page and nothing else.
-      {"GET", "/", {host, cross, tab, page}, 200},
-      {"GET", "/", {host, {"sec-fetch-site", "same-site"}, tab, page}, 200},
-      {"GET", "/?token", {host, cross, tab, page}, 403},
-      {"GET", "/metrics", {host, cross, tab, page}, 403},
-      {"HEAD", "/", {host, cross, tab, page}, 403},
-      {"POST", "/", {host, cross, tab, page}, 403},
-      {"GET", "/", {{"host", "evil.example"}, cross, tab, page}, 403},
-      {"GET", "/", {host, cross, tab, page, {"origin", "null"}}, 403},
-      {"GET", "/", {host, cross, page}, 403},
-      {"GET", "/", {host, cross, tab}, 403},
-      {"GET", "/", {host, cross, cross, tab, page}, 403},
-      {"GET", "/", {host, cross, tab, tab, page}, 403},
-      {"GET", "/", {host, cross, tab, page, page}, 403},
-  };
-  for (const std::string method : {"PUT", "DELETE", "OPTIONS", "TRACE", "get", "BREW"}) {
-    rows.push_back({method, "/", {host, origin}, 405});
-  }
-  for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
-                                  "http://localhost", "http://localhost:7603", ""}) {
-    rows.push_back({"GET", "/", {host, {"origin", other}}, 403});
-    rows.push_back({"POST", "/", {host, {"origin", other}}, 403});
-  }
-  for (const std::string site : {"cross-site", "same-site", "", "None", "Cross-Site"}) {
-    rows.push_back({"GET", "/", {host, {"sec-fetch-site", site}}, 403});
-    rows.push_back({"POST", "/", {host, origin, {"sec-fetch-site", site}}, 403});
-  }
-  for (const std::string site : {"none", "same-origin"}) {  // none: typed into the address bar
-    rows.push_back({"GET", "/", {host, {"sec-fetch-site", site}}, 200});
-  }
-  for (const std::string mode : {"no-cors", "cors", "nested-navigate"}) {
-    rows.push_back({"GET", "/", {host, cross, {"sec-fetch-mode", mode}, page}, 403});
-  }
-  for (const std::string target : {"iframe", "embed", "object", "script", "empty"}) {
-    rows.push_back({"GET", "/", {host, cross, tab, {"sec-fetch-dest", target}}, 403});
-  }
-  for (const Row& row : rows) {
+using Header = std::pair<std::string, std::string>;
+const Header kHost{"host", "localhost:7602"};
+const Header kOrigin{"origin", "http://localhost:7602"};
+
+/// A request to this server.
+struct RequestRow {
+  std::string method;
+  std::string path;
+  Headers headers;
+  unsigned status;
+};
+
+void expect_statuses(const std::vector<RequestRow>& rows) {
+  for (const RequestRow& row : rows) {
     EXPECT_EQ(status_of(row.method, row.path, row.headers), row.status)
         << row.method << ' ' << row.path << ' ' << testing::PrintToString(row.headers);
+  }
+}
+
+TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
+  expect_statuses({
+      {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
+      {"HEAD", "/", {kHost}, 200},
+      {"GET", "/", {kHost, kHost}, 400},
+      {"GET", "/", {kHost, {"host", "evil.example"}}, 400},
+      {"GET", "/", {kHost, {"content-length", "0"}}, 200},
+      {"GET", "/", {kHost, {"content-length", "262145"}}, 413},
+      {"GET", "/", {kHost, {"transfer-encoding", "chunked"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "262144"}}, 200},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "262145"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "99999999999999999999"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "x"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"transfer-encoding", "chunked"}}, 413},
+  });
+  for (const std::string method : {"PUT", "DELETE", "OPTIONS", "TRACE", "get", "BREW"}) {
+    expect_statuses({{method, "/", {kHost, kOrigin}, 405}});
+  }
+}
+
+TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
+  const Header same{"sec-fetch-site", "same-origin"};
+  expect_statuses({
+      {"POST", "/", {kHost, kOrigin}, 200},
+      {"POST", "/", {kHost, kOrigin, same}, 200},
+      {"POST", "/", {kHost}, 403},
+      {"POST", "/", {kHost, same}, 403},
+      {"POST", "/", {kHost, kOrigin, kOrigin}, 403},
+      {"POST", "/", {kHost, kOrigin, {"sec-fetch-site", "none"}}, 403},
+      {"POST", "/", {kOrigin}, 403},
+      {"GET", "/", {kHost, kOrigin}, 200},
+      {"GET", "/", {kHost, same}, 200},
+      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // typed into the address bar
+  });
+  for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
+                                  "http://localhost", "http://localhost:7603", ""}) {
+    expect_statuses({{"GET", "/", {kHost, {"origin", other}}, 403},
+                     {"POST", "/", {kHost, {"origin", other}}, 403},
+                     {"GET", "/", {kHost, kOrigin, {"origin", other}}, 403}});
+  }
+  for (const std::string site : {"cross-site", "same-site", "", "None", "Cross-Site"}) {
+    expect_statuses({{"GET", "/", {kHost, {"sec-fetch-site", site}}, 403},
+                     {"POST", "/", {kHost, kOrigin, {"sec-fetch-site", site}}, 403}});
+  }
+}
+
+TEST(RequestRules, OfOtherSitesOnlyAFollowedLinkToThePageIsAnswered) {
+  const Header cross{"sec-fetch-site", "cross-site"};
+  const Header tab{"sec-fetch-mode", "navigate"};
+  const Header page{"sec-fetch-dest", "document"};
+  expect_statuses({
+      {"GET", "/", {kHost, cross, tab, page}, 200},
+      {"GET", "/", {kHost, {"sec-fetch-site", "same-site"}, tab, page}, 200},
+      {"GET", "/?token", {kHost, cross, tab, page}, 403},
+      {"GET", "/metrics", {kHost, cross, tab, page}, 403},
+      {"HEAD", "/", {kHost, cross, tab, page}, 403},
+      {"POST", "/", {kHost, cross, tab, page}, 403},
+      {"GET", "/", {{"host", "evil.example"}, cross, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, page, {"origin", "null"}}, 403},
+      {"GET", "/", {kHost, cross, page}, 403},
+      {"GET", "/", {kHost, cross, tab}, 403},
+      {"GET", "/", {kHost, cross, cross, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, page, page}, 403},
+  });
+  for (const std::string mode : {"no-cors", "cors", "nested-navigate"}) {
+    expect_statuses({{"GET", "/", {kHost, cross, {"sec-fetch-mode", mode}, page}, 403}});
+  }
+  for (const std::string target : {"iframe", "embed", "object", "script", "empty"}) {
+    expect_statuses({{"GET", "/", {kHost, cross, tab, {"sec-fetch-dest", target}}, 403}});
   }
 }
 
