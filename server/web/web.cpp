@@ -47,10 +47,6 @@ class Web::Parts {
                },
                [this](std::uint64_t number) { page_.gone(number); }}) {}
 
-  ~Parts() { answers_.stop(); }  // it wakes the HTTP server
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
-
   std::string url() const { return http_.url(); }
   std::string page_url() const { return url() + "/?token=" + page_.key().token(); }
 
@@ -132,10 +128,9 @@ class Web::Parts {
   std::string text_;           // the same
   NoticeBoard::Shared told_;   // the same
   std::string overview_;       // the same
-  ServiceLine line_;
+  ServiceClient line_;
   LiveText live_{[this] { return look(); }, began_ms_};
-  AnswerPool answers_{line_, [this] { http_.wake(); }};
-  Page page_{settings_.page, {line_, answers_, live_}};
+  Page page_{settings_.page, {line_, live_}};
   HttpServer http_;  // last: its thread uses all the others
 };
 
@@ -155,7 +150,7 @@ int Web::descriptor() const {
 }
 
 bool Web::is_client(const std::string& identity) {
-  return identity == ServiceLine::kIdentity;
+  return identity == ServiceClient::kIdentity;
 }
 
 std::vector<std::string> Web::take_requests() {

@@ -3,8 +3,10 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,5 +59,9 @@ struct HttpAnswer {
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< beside those of all answers
   std::shared_ptr<HttpStream> stream = {};  ///< instead of the body, where it is not null
 };
+
+/// Returns the answer when it is ready. Called on the HTTP server's thread, again after each wake;
+/// destroyed when the answer was returned or the client has disconnected.
+using PendingAnswer = std::function<std::optional<HttpAnswer>()>;
 
 }  // namespace oblique::server

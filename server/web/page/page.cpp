@@ -18,7 +18,6 @@ constexpr unsigned kWrongQuestion = 400;
 constexpr unsigned kUnauthorized = 401;
 constexpr unsigned kForbidden = 403;
 constexpr unsigned kNothingThere = 404;
-constexpr unsigned kTryLater = 503;
 
 constexpr std::string_view kApi = "/api/";
 constexpr std::string_view kStudies = "/api/studies";
@@ -30,8 +29,6 @@ constexpr std::chrono::milliseconds kPatience{8000};
 constexpr const char* kHowToEnter =
     "this server shows its page to who has its token: open the address that it printed when it "
     "started, or that `oblique view` prints";
-
-constexpr const char* kTooManyAnswers = "too many answers are asked for at once: ask again later";
 
 HttpAnswer nothing_there() {
   return error_answer(kNothingThere, "there is nothing here");
@@ -141,12 +138,9 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
   }
   auto answer = go_on(question, known->second);
   if (!answer && question.waited > kPatience) {
-    answer = known->second ? known->second->meanwhile : too_slow();
-    if (known->second) {
-      at_.service.leave(question.number);
-    } else {
-      at_.answers.forget(question.number);
-    }
+    const auto* const talk = std::get_if<Talk>(&known->second);
+    answer = talk != nullptr ? talk->meanwhile : too_slow();
+    at_.service.leave(question.number);
   }
   if (answer) {
     under_way_.erase(question.number);
@@ -155,12 +149,8 @@ std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
 }
 
 void Page::gone(std::uint64_t number) {
-  const auto known = under_way_.extract(number);
-  if (!known.empty() && known.mapped()) {
-    at_.service.forget(number);
-  } else if (!known.empty()) {
-    at_.answers.forget(number);
-  }
+  under_way_.erase(number);
+  at_.service.forget(number);
 }
 
 std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
@@ -203,17 +193,19 @@ std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const 
   if (!place.point && place.part == "rows") {
     return begin(question, rows_talk(place.study, question));
   }
-  std::optional<AnswerPool::Job> job;
   if (place.point && place.part.empty()) {
-    job = point_job(place.study, *place.point);
-  } else if (!place.point && place.part.empty()) {
-    job = study_job(place.study);
-  } else if (!place.point && place.part == "slice") {
-    job = slice_job(place.study, question.fields);
-  } else if (!place.point && place.part == "bins") {
-    job = bins_job(place.study, question.fields);
+    return begin(question, point_answer(at_.service, place.study, *place.point));
   }
-  return job ? begin(question, std::move(*job)) : nothing_there();
+  if (!place.point && place.part.empty()) {
+    return begin(question, study_answer(at_.service, place.study));
+  }
+  if (!place.point && place.part == "slice") {
+    return begin(question, slice_answer(at_.service, place.study, question.fields));
+  }
+  if (!place.point && place.part == "bins") {
+    return begin(question, bins_answer(at_.service, place.study, question.fields));
+  }
+  return nothing_there();
 }
 
 std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
@@ -221,7 +213,7 @@ std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
     return begin(question, submit_talk(question));
   }
   if (question.path == kCheck) {
-    return begin(question, check_job(question.body));
+    return check_answer(question.body);
   }
   const auto place = place_of(question.path);
   auto talk = place ? change_talk(place->study, place->part) : std::nullopt;
@@ -234,16 +226,14 @@ std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool::Job job) {
-  if (!at_.answers.submit(question.number, std::move(job))) {
-    return error_answer(kTryLater, kTooManyAnswers);
-  }
-  under_way_.emplace(question.number, std::nullopt);
+std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, PendingAnswer pending) {
+  under_way_.emplace(question.number, std::move(pending));
   return std::nullopt;
 }
 
 std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, const UnderWay& under_way) {
-  return under_way ? hear(question.number, *under_way) : at_.answers.take(question.number);
+  const auto* const pending = std::get_if<PendingAnswer>(&under_way);
+  return pending != nullptr ? (*pending)() : hear(question.number, std::get<Talk>(under_way));
 }
 
 /// The answer at the end of a talk; nothing while a reply is awaited.

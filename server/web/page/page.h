@@ -4,9 +4,9 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <variant>
 
-#include "server/web/answers/answer_pool.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_message.h"
 #include "server/web/page/live_text.h"
 #include "server/web/page/page_key.h"
@@ -31,8 +31,7 @@ class Page {
  public:
   /// What the page asks. All of them must outlive it.
   struct Neighbours {
-    ServiceLine& service;
-    AnswerPool& answers;
+    ServiceClient& service;
     LiveText& overview;
   };
 
@@ -65,9 +64,9 @@ class Page {
   std::optional<HttpAnswer> begin_study(const HttpQuestion& question, const Place& place);
   std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
   std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
-  std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool::Job job);
-  /// What a request waits for: a reply to a talk or, without one, a job of the pool.
-  using UnderWay = std::optional<Talk>;
+  std::optional<HttpAnswer> begin(const HttpQuestion& question, PendingAnswer pending);
+  /// What a request waits for.
+  using UnderWay = std::variant<Talk, PendingAnswer>;
   std::optional<HttpAnswer> go_on(const HttpQuestion& question, const UnderWay& under_way);
   std::optional<HttpAnswer> hear(std::uint64_t number, const Talk& talk);
 

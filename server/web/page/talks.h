@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "proto/oblique.pb.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_message.h"
 
 namespace oblique::server {

@@ -66,10 +66,9 @@ class PageTracesAloneTest : public testing::Test {
     return numbers;
   }
 
-  ServiceLine line_;
-  AnswerPool pool_{line_, [] {}};
+  ServiceClient line_;
   LiveText live_{[] { return std::nullopt; }, 0};
-  Page page_{settings(), Page::Neighbours{line_, pool_, live_}};
+  Page page_{settings(), Page::Neighbours{line_, live_}};
 };
 
 TEST_F(PageTracesAloneTest, OneThatTakesLongGoesOnUntilTheBrowserAsksAgainAndEndsWhenItGoes) {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -17,21 +15,17 @@
 namespace oblique::server {
 
 /// The HTTP side as one client of the service: requests go to the loop's thread, and replies back.
-/// Thread-safe.
-class ServiceLine {
+class ServiceClient {
  public:
   /// The identity of this client for the service; no connection has it.
   static constexpr const char* kIdentity = "the page";
 
-  // ---- Called by the HTTP thread and by threads that make answers.
+  // ---- Called by the HTTP server's thread.
   /// A new request number, different from those of HTTP requests.
-  std::uint64_t new_number();
+  std::uint64_t new_number() { return ++last_number_; }
   void ask(std::uint64_t number, protocol::ClientRequest request);
   /// The next reply to request `number`; none if there is none yet.
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
-  /// The same, but waits up to `timeout`.
-  std::optional<protocol::ClientReply> wait_for_reply(std::uint64_t number,
-                                                      std::chrono::milliseconds timeout);
   /// Drops further replies to request `number`, and ends its query or trace.
   void forget(std::uint64_t number);
   /// The same, but a trace continues, because the browser may request it again. Such a request
@@ -57,25 +51,37 @@ class ServiceLine {
     std::uint64_t number;
   };
 
-  /// Decodes received frames and adds them to the replies. mutex_ is not locked while it decodes,
-  /// so that the loop need not wait.
   void decode_frames();
-
-  // Called with mutex_ locked.
-  std::optional<protocol::ClientReply> next_reply(std::uint64_t number);
-  void drop(std::uint64_t number);
   void end(std::uint64_t number);
   void send(protocol::ClientRequest request);
 
   protocol::WakeUp woken_;
-  std::mutex decoding_mutex_;  ///< locked before mutex_; keeps the chunks of an answer in order
   std::mutex mutex_;
-  std::condition_variable replied_;
-  std::uint64_t last_number_ = std::uint64_t{1} << 63U;  // guarded by mutex_
-  std::deque<std::string> requests_;                     // guarded by mutex_
-  std::vector<std::string> frames_;                      // guarded by mutex_
-  std::map<std::uint64_t, Awaited> awaited_;             // guarded by mutex_
-  std::deque<LeftTrace> left_traces_;                    // guarded by mutex_
+  std::deque<std::string> requests_;  // guarded by mutex_
+  std::vector<std::string> frames_;   // guarded by mutex_
+  // Used by the HTTP server's thread only.
+  std::uint64_t last_number_ = std::uint64_t{1} << 63U;
+  std::map<std::uint64_t, Awaited> awaited_;
+  std::deque<LeftTrace> left_traces_;
+};
+
+/// Requests to the service under one number. The destructor ends what the service still does.
+class ServiceExchange {
+ public:
+  explicit ServiceExchange(ServiceClient& service)
+      : service_(service), number_(service.new_number()) {}
+  ~ServiceExchange() { service_.forget(number_); }
+  ServiceExchange(const ServiceExchange&) = delete;
+  ServiceExchange& operator=(const ServiceExchange&) = delete;
+
+  std::uint64_t number() const { return number_; }
+  void send(const protocol::ClientRequest& request) { service_.ask(number_, request); }
+  /// The next reply, if it has come.
+  std::optional<protocol::ClientReply> reply() { return service_.reply(number_); }
+
+ private:
+  ServiceClient& service_;
+  const std::uint64_t number_;
 };
 
 /// The HTTP answer to an error of the service.

@@ -1,4 +1,4 @@
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 
 #include <cstddef>
 #include <utility>
@@ -16,13 +16,7 @@ constexpr std::size_t kMostLeftTraces = 256;
 
 }  // namespace
 
-std::uint64_t ServiceLine::new_number() {
-  const std::lock_guard lock(mutex_);
-  return ++last_number_;
-}
-
-void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
-  const std::lock_guard lock(mutex_);
+void ServiceClient::ask(std::uint64_t number, protocol::ClientRequest request) {
   request.set_request_id(number);
   Awaited& awaited = awaited_[number];
   awaited.is_query = awaited.is_query || request.has_query();
@@ -42,62 +36,8 @@ void ServiceLine::ask(std::uint64_t number, protocol::ClientRequest request) {
   });
 }
 
-std::optional<protocol::ClientReply> ServiceLine::reply(std::uint64_t number) {
+std::optional<protocol::ClientReply> ServiceClient::reply(std::uint64_t number) {
   decode_frames();
-  const std::lock_guard lock(mutex_);
-  return next_reply(number);
-}
-
-std::optional<protocol::ClientReply> ServiceLine::wait_for_reply(
-    std::uint64_t number, std::chrono::milliseconds timeout) {
-  const auto until = std::chrono::steady_clock::now() + timeout;
-  while (true) {
-    const bool is_over = std::chrono::steady_clock::now() >= until;
-    decode_frames();
-    std::unique_lock lock(mutex_);
-    auto reply = next_reply(number);
-    if (reply || is_over) {
-      return reply;
-    }
-    if (frames_.empty()) {
-      replied_.wait_until(lock, until);
-    }
-  }
-}
-
-void ServiceLine::decode_frames() {
-  const std::lock_guard decoding_lock(decoding_mutex_);
-  std::vector<std::string> frames;
-  {
-    const std::lock_guard lock(mutex_);
-    frames.swap(frames_);
-  }
-  std::vector<protocol::ClientReply> replies;
-  for (const std::string& frame : frames) {
-    if (!protocol::decode(frame, replies.emplace_back())) {
-      replies.pop_back();
-    }
-  }
-  if (replies.empty()) {
-    return;
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    for (protocol::ClientReply& reply : replies) {
-      const auto awaited = awaited_.find(reply.request_id());
-      if (awaited == awaited_.end()) {
-        continue;  // a notice of a delay belongs to no request
-      }
-      const bool is_part = reply.has_query() && !reply.query().ends();
-      awaited->second.is_query = awaited->second.is_query && is_part;
-      awaited->second.trace.clear();
-      awaited->second.replies.push_back(std::move(reply));
-    }
-  }
-  replied_.notify_all();
-}
-
-std::optional<protocol::ClientReply> ServiceLine::next_reply(std::uint64_t number) {
   const auto found = awaited_.find(number);
   if (found == awaited_.end() || found->second.replies.empty()) {
     return std::nullopt;
@@ -107,23 +47,39 @@ std::optional<protocol::ClientReply> ServiceLine::next_reply(std::uint64_t numbe
   return reply;
 }
 
-void ServiceLine::forget(std::uint64_t number) {
-  const std::lock_guard lock(mutex_);
-  drop(number);
+void ServiceClient::decode_frames() {
+  std::vector<std::string> frames;
+  {
+    const std::lock_guard lock(mutex_);
+    frames.swap(frames_);
+  }
+  for (const std::string& frame : frames) {
+    protocol::ClientReply reply;
+    if (!protocol::decode(frame, reply)) {
+      continue;
+    }
+    const auto awaited = awaited_.find(reply.request_id());
+    if (awaited == awaited_.end()) {
+      continue;  // a notice of a delay belongs to no request
+    }
+    const bool is_part = reply.has_query() && !reply.query().ends();
+    awaited->second.is_query = awaited->second.is_query && is_part;
+    awaited->second.trace.clear();
+    awaited->second.replies.push_back(std::move(reply));
+  }
 }
 
-void ServiceLine::drop(std::uint64_t number) {
+void ServiceClient::forget(std::uint64_t number) {
   const auto awaited = awaited_.extract(number);
   if (!awaited.empty() && (awaited.mapped().is_query || !awaited.mapped().trace.empty())) {
     end(number);
   }
 }
 
-void ServiceLine::leave(std::uint64_t number) {
-  const std::lock_guard lock(mutex_);
+void ServiceClient::leave(std::uint64_t number) {
   const auto awaited = awaited_.find(number);
   if (awaited == awaited_.end() || awaited->second.trace.empty()) {
-    drop(number);
+    forget(number);
     return;
   }
   left_traces_.push_back({std::move(awaited->second.trace), number});
@@ -133,19 +89,20 @@ void ServiceLine::leave(std::uint64_t number) {
   }
 }
 
-void ServiceLine::end(std::uint64_t number) {
+void ServiceClient::end(std::uint64_t number) {
   protocol::ClientRequest request;
   request.mutable_end_query()->set_request_id(number);
   send(std::move(request));
 }
 
-void ServiceLine::send(protocol::ClientRequest request) {
+void ServiceClient::send(protocol::ClientRequest request) {
   request.set_protocol_version(protocol::kProtocolVersion);
+  const std::lock_guard lock(mutex_);
   requests_.push_back(protocol::encode(request));
   woken_.wake();
 }
 
-std::vector<std::string> ServiceLine::take() {
+std::vector<std::string> ServiceClient::take() {
   woken_.clear();
   const std::lock_guard lock(mutex_);
   std::vector<std::string> some;
@@ -159,12 +116,9 @@ std::vector<std::string> ServiceLine::take() {
   return some;
 }
 
-void ServiceLine::put(std::string frame) {
-  {
-    const std::lock_guard lock(mutex_);
-    frames_.push_back(std::move(frame));
-  }
-  replied_.notify_all();
+void ServiceClient::put(std::string frame) {
+  const std::lock_guard lock(mutex_);
+  frames_.push_back(std::move(frame));
 }
 
 HttpAnswer failure(const protocol::ErrorReply& error) {
