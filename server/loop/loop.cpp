@@ -177,7 +177,7 @@ class Loop::Parts final : public Outbox {
 
   void take_reports() {
     for (const auto& frame : web_ ? web_->take_requests() : std::vector<std::string>()) {
-      service_->client_frame(ServiceLine::kIdentity, frame, now());
+      service_->client_frame(ServiceClient::kIdentity, frame, now());
     }
     for (const auto& report : written_.take()) {
       service_->written(std::get<WriteReport>(report), now());

@@ -63,15 +63,11 @@ HttpAnswer readiness(const Snapshot& snapshot, double free_bytes) {
 Web::Web(WebSettings settings)
     : settings_(std::move(settings)),
       started_ms_(steady_ms()),
-      page_(page_settings_of(settings_), service_, pool_, events_),
+      page_(page_settings_of(settings_), service_, events_),
       http_(settings_.address, {is_loopback(settings_.address.address), settings_.names},
             settings_.limits,
             {[this](const HttpRequest& request) { return answer(request); },
              [this](const HttpRequest& request) { return page_.refuse_change(request); }}) {}
-
-Web::~Web() {
-  pool_.stop();  // it wakes the HTTP server
-}
 
 bool Web::put_reply(const std::string& frame) {
   service_.put(frame);

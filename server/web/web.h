@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/web/answers/answer_pool.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_server.h"
 #include "server/web/page/event_feed.h"
 #include "server/web/page/page.h"
@@ -32,9 +31,6 @@ class Web {
  public:
   /// Answers from now on. Throws std::runtime_error, naming the address, if it cannot.
   explicit Web(WebSettings settings);
-  ~Web();
-  Web(const Web&) = delete;
-  Web& operator=(const Web&) = delete;
 
   /// As http://127.0.0.1:7602.
   std::string url() const { return http_.url(); }
@@ -43,7 +39,9 @@ class Web {
 
   // ---- Called by the event loop.
   /// Whether the page is that client of the service.
-  static bool is_client(const std::string& identity) { return identity == ServiceLine::kIdentity; }
+  static bool is_client(const std::string& identity) {
+    return identity == ServiceClient::kIdentity;
+  }
   /// Readable when the page has requests.
   int descriptor() const { return service_.descriptor(); }
   std::vector<std::string> take_requests() { return service_.take(); }
@@ -59,8 +57,7 @@ class Web {
   const std::int64_t started_ms_;
   std::int64_t published_ms_ = 0;  // used by the event loop only
   SnapshotCache snapshots_;
-  ServiceLine service_;
-  AnswerPool pool_{service_, [this] { http_.wake(); }};
+  ServiceClient service_;
   EventFeed events_{snapshots_};
   Page page_;
   HttpServer http_;  // last: its thread uses the other members

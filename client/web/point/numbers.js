@@ -6,10 +6,20 @@ import { shown } from "/parts/format.js";
 const kProvenance = ["status", "error", "solver_version", "integrator", "instruction_set", "elements_per_link", "tolerance", "dt_s", "steps",
   "wall_s", "closure", "worker_name", "worker_id", "attempt", "solved_at", "reused_from", "model_id"];
 
+/** A list, which a row has as JSON. @param {string} text */
+function list_of(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return ` ${text}`;  // an error may begin as a list does
+  }
+}
+
 /** @param {any} value */
 function text_of(value) {
   if (value === null || value === undefined) return "–";
   if (typeof value === "number") return shown(value, 7);
+  if (typeof value === "string" && value.startsWith("[")) return text_of(list_of(value));
   if (Array.isArray(value)) return value.map((one) => (Array.isArray(one) ? `[${one.map(text_of).join(", ")}]` : text_of(one))).join(", ");
   return String(value);
 }

@@ -6,11 +6,21 @@ import { line_plot } from "/parts/lines.js";
 import { png_of } from "/parts/png.js";
 import { completed } from "/overview.js";
 import { json } from "/server.js";
+import { rows } from "/study/asked/picture.js";
 import { finger } from "./finger.js";
 import { loop_plot } from "./loop.js";
 import { point_numbers } from "./numbers.js";
 import { player } from "./player.js";
 import { trace_of } from "./trace.js";
+
+/** A point with its row, whose values are those that were solved. @param {any} whole the study @param {number} point @param {AbortSignal} signal */
+async function told_of(whole, point, signal) {
+  const select = whole.columns.map((/** @type {any} */ one) => one.name).join(",");
+  const [told, { columns, rows: [values] }] = await Promise.all([json(`/api/studies/${whole.id}/points/${point}`, signal),
+    rows(whole.id, { select, where: `point = ${point}` }, signal)]);
+  const row = values ? Object.fromEntries(columns.map((/** @type {string} */ name, /** @type {number} */ i) => [name, values[i]])) : null;
+  return { ...told, ...(row && { H: row.H, mu: row.mu, e: row.e, left_out: false }), row };
+}
 
 /** What is known of a point without its time histories. @param {any} told @param {any[]} columns */
 function known_of(told, columns) {
@@ -31,8 +41,8 @@ function known_of(told, columns) {
  */
 export async function point_view(root, place, study, point) {
   const { signal } = place;
-  const ask = () => json(`/api/studies/${study}/points/${point}`, signal);
   const whole = await json(`/api/studies/${study}`, signal);
+  const ask = () => told_of(whole, point, signal);
   place.trail([h("a", { href: place.last(`/study/${study}`) }, whole.name), `point ${count(point)}`]);
   let told = await ask();
   const said = h("p", { role: "status", class: "said" }, "A worker solves this point again.");
@@ -47,7 +57,7 @@ export async function point_view(root, place, study, point) {
   const other = (/** @type {number} */ number) => `#/study/${study}/point/${number}`;
   const neighbours = h("div", { class: "row" },
     point > 0 && h("a", { class: "button", href: other(point - 1) }, "Previous point"),
-    point + 1 < whole.numbers && h("a", { class: "button", href: other(point + 1) }, "Next point"));
+    point + 1 < whole.points && h("a", { class: "button", href: other(point + 1) }, "Next point"));
   root.replaceChildren(h("h2", { class: "name" }, `${told.name}, point ${count(point)}`),
     neighbours, facts, pictures, numbers, h("section", {}, ...things_to_take(study, point, told.name, of_file(place.file))));
   /** @type {{close: () => void}[]} */

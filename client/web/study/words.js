@@ -17,7 +17,7 @@ export function facts(picture, kind, study, unit_of) {
     for (const [side, told] of [[picture.x, picture.head.x], [picture.y, picture.head.y]]) {
       if (whole(side, told)) parts.push(`Of ${count(told.last - told.first + 1)} values of ${side.name}, ${count(side.values.length)} are shown, evenly chosen${kind === "lines" ? "" : ": zoom in for the others"}.`);
     }
-    if (blocks > 1) parts.push(`Block ${picture.head.block + 1} of ${count(blocks)}; not shown: ${many(study.numbers - study.blocks[picture.head.block].points, "point")} of the others.`);
+    if (blocks > 1) parts.push(`Block ${picture.head.block + 1} of ${count(blocks)}; not shown: ${many(study.points - study.blocks[picture.head.block].points, "point")} of the others.`);
     for (const one of picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${with_unit(one.value, unit_of(one.key))}.`);
   } else if (picture.dots) {
     parts.push(`${many(picture.head.points, "point")}, each drawn.`);

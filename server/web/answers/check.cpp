@@ -59,29 +59,26 @@ ordered_json json_of(const std::optional<double>& number) {
   return number ? ordered_json(*number) : ordered_json();
 }
 
+}  // namespace
+
 HttpAnswer check_answer(const std::string& body) {
   protocol::SubmitRequest asked = study_of_body(body);
-  try {
+  return parse_request([&] {
     const protocol::PointTable table(std::move(*asked.mutable_recipe()));
     table.judge_points();
     const protocol::StudySize size = protocol::size_of(table);
     return json_answer({{"points", size.points},
-                        {"numbers", table.size()},
                         {"models", size.models},
                         {"falls", size.falls},
                         {"falls_estimated", size.falls_estimated},
                         {"bytes", size.bytes},
                         {"is_counted", !size.points_estimated},
                         {"surely_reached_m", json_of(surely_reached_m(table.recipe()))}});
-  } catch (const solver::InputError& error) {
-    throw std::invalid_argument(error.what());
-  }
+  });
 }
 
-}  // namespace
-
 protocol::SubmitRequest study_of_body(const std::string& body) {
-  // Protobuf refuses deeper JSON too.
+  // Protobuf refuses deeper JSON too. Copying or writing a deeper value would overflow the stack.
   constexpr int kDeepest = 50;
   bool is_deep = false;
   auto whole = nlohmann::json::parse(
@@ -91,8 +88,9 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
         return !is_deep;
       },
       false);
+  const std::string no_study = "the body is no study: ";
   if (is_deep) {
-    throw std::invalid_argument("the body is no study: it is nested too deeply");
+    throw std::invalid_argument(no_study + "it is nested too deeply");
   }
   const bool has_model = whole.is_object() && whole.contains("model");
   const auto written = has_model ? whole["model"] : nlohmann::json();
@@ -103,24 +101,16 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
   const auto read =
       google::protobuf::util::JsonStringToMessage(has_model ? whole.dump() : body, &asked);
   if (!read.ok()) {
-    throw std::invalid_argument("the body is no study: " +
+    throw std::invalid_argument(no_study +
                                 protocol::excerpt({read.message().data(), read.message().size()}));
   }
   if (has_model && (!written.is_object() || asked.recipe().has_model())) {
-    throw std::invalid_argument("the body is no study: its model is said once, as an object");
+    throw std::invalid_argument(no_study + "its model is said once, as an object");
   }
-  try {
-    if (has_model) {
-      *asked.mutable_recipe()->mutable_model() = model_of(written);
-    }
-  } catch (const solver::InputError& error) {
-    throw std::invalid_argument(error.what());
+  if (has_model) {
+    *asked.mutable_recipe()->mutable_model() = parse_request([&] { return model_of(written); });
   }
   return asked;
-}
-
-AnswerPool::Job check_job(const std::string& body) {
-  return [body](const JobContext& /*context*/) { return check_answer(body); };
 }
 
 }  // namespace oblique::server

@@ -4,26 +4,28 @@
 #include <string>
 
 #include "proto/oblique.pb.h"
-#include "server/web/answers/answer_pool.h"
 #include "server/web/answers/fields.h"
+#include "server/web/answers/study_flow.h"
 
-// Answers about a study; server/web/page/README.md lists their fields.
+// Answers about a study; server/web/page/README.md lists their fields. Functions throw
+// std::invalid_argument for a wrong request.
 namespace oblique::server {
 
 /// The recipe of a study and the columns of its results.
-AnswerPool::Job study_job(std::uint64_t study);
-/// A point: its inputs and its row.
-AnswerPool::Job point_job(std::uint64_t study, std::uint64_t point);
+PendingAnswer study_answer(ServiceClient& service, std::uint64_t study);
+/// The inputs of a point as the recipe gives them, and whether the filter leaves it out if it has
+/// no row.
+PendingAnswer point_answer(ServiceClient& service, std::uint64_t study, std::uint64_t point);
 /// One column over one or two axes of a grid.
-AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields);
+PendingAnswer slice_answer(ServiceClient& service, std::uint64_t study, const Fields& fields);
 /// Number of points, and mean of a column, in bins along one or two columns.
-AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields);
+PendingAnswer bins_answer(ServiceClient& service, std::uint64_t study, const Fields& fields);
 
 /// Parses the body of a submission: SubmitRequest in Protobuf's JSON, with a member `model` that
-/// has the keys of study files. Throws std::invalid_argument with a sentence for an invalid body.
+/// has the keys of study files.
 protocol::SubmitRequest study_of_body(const std::string& body);
 
 /// Validates the recipe in the body of a submission; the answer has the size of the study.
-AnswerPool::Job check_job(const std::string& body);
+HttpAnswer check_answer(const std::string& body);
 
 }  // namespace oblique::server

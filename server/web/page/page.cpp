@@ -1,6 +1,5 @@
 #include "server/web/page/page.h"
 
-#include <memory>
 #include <regex>
 #include <string_view>
 #include <utility>
@@ -56,8 +55,8 @@ std::optional<PathChange> parse_change(const std::string& path) {
 
 }  // namespace
 
-Page::Page(PageSettings settings, ServiceLine& service, AnswerPool& pool, EventFeed& events)
-    : settings_(std::move(settings)), service_(service), pool_(pool), events_(events) {}
+Page::Page(PageSettings settings, ServiceClient& service, EventFeed& events)
+    : settings_(std::move(settings)), service_(service), events_(events) {}
 
 bool Page::is_trusted(const HttpRequest& request) const {
   return token().is_in(request.all("cookie"), request.header("host"));
@@ -130,20 +129,22 @@ std::optional<HttpOutcome> Page::read(const HttpRequest& request) {
     return std::nullopt;
   }
   const auto& [study, point, part] = *path;
+  if (point && part.empty()) {
+    return point_answer(service_, study, *point);
+  }
   if (point) {
     return part == "trace"
                ? std::optional<HttpOutcome>(solve_trace(service_, study, *point, request.fields))
-           : part.empty() ? std::optional(run(point_job(study, *point)))
-                          : std::nullopt;
+               : std::nullopt;
   }
   if (part.empty()) {
-    return run(study_job(study));
+    return study_answer(service_, study);
   }
   if (part == "slice") {
-    return run(slice_job(study, request.fields));
+    return slice_answer(service_, study, request.fields);
   }
   if (part == "bins") {
-    return run(bins_job(study, request.fields));
+    return bins_answer(service_, study, request.fields);
   }
   if (part == "rows") {
     return query_rows(service_, study, request.fields);
@@ -156,22 +157,11 @@ std::optional<HttpOutcome> Page::change(const HttpRequest& request) {
     return submit_study(service_, request.body);
   }
   if (request.path == kCheck) {
-    return run(check_job(request.body));
+    return check_answer(request.body);
   }
   const auto change = parse_change(request.path);
   return change ? std::optional<HttpOutcome>(change_study(service_, change->study, change->change))
                 : std::nullopt;
-}
-
-/// Runs a job in the pool, which forgets it when the client has disconnected.
-HttpOutcome Page::run(AnswerPool::Job job) {
-  const std::uint64_t number = service_.new_number();
-  if (!pool_.submit(number, std::move(job))) {
-    return error_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
-                        "too many pictures are asked for at once: ask again later");
-  }
-  const std::shared_ptr<AnswerPool> pool(&pool_, [number](AnswerPool* of) { of->forget(number); });
-  return [pool, number] { return pool->take(number); };
 }
 
 }  // namespace oblique::server

@@ -4,8 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "server/web/answers/answer_pool.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_message.h"
 #include "server/web/page/event_feed.h"
 #include "server/web/page/page_token.h"
@@ -26,7 +25,7 @@ struct PageSettings {
 class Page {
  public:
   /// The references must outlive the page.
-  Page(PageSettings settings, ServiceLine& service, AnswerPool& pool, EventFeed& events);
+  Page(PageSettings settings, ServiceClient& service, EventFeed& events);
 
   const PageToken& token() const { return settings_.token; }
 
@@ -41,11 +40,9 @@ class Page {
   HttpAnswer session(const HttpRequest& request) const;
   std::optional<HttpOutcome> read(const HttpRequest& request);
   std::optional<HttpOutcome> change(const HttpRequest& request);
-  HttpOutcome run(AnswerPool::Job job);
 
   PageSettings settings_;
-  ServiceLine& service_;
-  AnswerPool& pool_;
+  ServiceClient& service_;
   EventFeed& events_;
 };
 

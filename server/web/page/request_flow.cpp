@@ -142,9 +142,9 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
-PendingAnswer study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
-                         std::function<ClientRequest(const std::string&)> request,
-                         OnReply on_reply) {
+PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
+                               std::function<ClientRequest(const std::string&)> request,
+                               OnReply on_reply) {
   ClientRequest first;
   first.mutable_status()->set_study_id(study);
   return request_flow(std::move(exchange), first,
@@ -160,7 +160,7 @@ PendingAnswer study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_
                       });
 }
 
-PendingAnswer list_studies(ServiceLine& service, const Fields& fields) {
+PendingAnswer list_studies(ServiceClient& service, const Fields& fields) {
   ClientRequest request;
   request.mutable_status()->set_after_study_id(FieldReader(fields).whole("after").value_or(0));
   request.mutable_status()->set_limit(lines_of(fields));
@@ -175,7 +175,7 @@ PendingAnswer list_studies(ServiceLine& service, const Fields& fields) {
       });
 }
 
-PendingAnswer list_workers(ServiceLine& service, const Fields& fields) {
+PendingAnswer list_workers(ServiceClient& service, const Fields& fields) {
   ClientRequest request;
   request.mutable_workers()->set_after_worker_id(FieldReader(fields).whole("after").value_or(0));
   request.mutable_workers()->set_limit(lines_of(fields));
@@ -190,7 +190,7 @@ PendingAnswer list_workers(ServiceLine& service, const Fields& fields) {
       });
 }
 
-PendingAnswer query_rows(ServiceLine& service, std::uint64_t study, const Fields& fields) {
+PendingAnswer query_rows(ServiceClient& service, std::uint64_t study, const Fields& fields) {
   const FieldReader reader(fields);
   const std::string format = reader.text("format").value_or("json");
   if (format != "json" && format != "csv") {
@@ -207,7 +207,7 @@ PendingAnswer query_rows(ServiceLine& service, std::uint64_t study, const Fields
   query.set_limit(std::min(reader.whole("limit").value_or(kUsualRows), kMostRows));
   const auto exchange = std::make_shared<ServiceExchange>(service);
   const bool as_csv = format == "csv";
-  return study_flow(
+  return named_study_flow(
       exchange, study,
       [request](const std::string& name) mutable {
         request.mutable_query()->mutable_question()->set_study(name);
@@ -225,7 +225,7 @@ PendingAnswer query_rows(ServiceLine& service, std::uint64_t study, const Fields
       });
 }
 
-PendingAnswer submit_study(ServiceLine& service, const std::string& body) {
+PendingAnswer submit_study(ServiceClient& service, const std::string& body) {
   ClientRequest request;
   *request.mutable_submit() = study_of_body(body);
   return request_flow(std::make_shared<ServiceExchange>(service), request,
@@ -250,9 +250,9 @@ std::optional<protocol::StudyChange> study_change(std::string_view name) {
   return found == kChanges.end() ? std::nullopt : std::optional(found->second);
 }
 
-PendingAnswer change_study(ServiceLine& service, std::uint64_t study,
+PendingAnswer change_study(ServiceClient& service, std::uint64_t study,
                            protocol::StudyChange change) {
-  return study_flow(
+  return named_study_flow(
       std::make_shared<ServiceExchange>(service), study,
       [change](const std::string& name) {
         ClientRequest request;

@@ -10,31 +10,12 @@
 
 #include "proto/oblique.pb.h"
 #include "server/web/answers/fields.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_message.h"
 
 // HTTP requests that the service answers. README.md has their fields. Functions throw
 // std::invalid_argument for a wrong request.
 namespace oblique::server {
-
-/// Requests to the service under one number. The destructor ends what the service still does.
-class ServiceExchange {
- public:
-  explicit ServiceExchange(ServiceLine& service)
-      : service_(service), number_(service.new_number()) {}
-  ~ServiceExchange() { service_.forget(number_); }
-  ServiceExchange(const ServiceExchange&) = delete;
-  ServiceExchange& operator=(const ServiceExchange&) = delete;
-
-  std::uint64_t number() const { return number_; }
-  void send(const protocol::ClientRequest& request) { service_.ask(number_, request); }
-  /// The next reply, if it has come.
-  std::optional<protocol::ClientReply> reply() { return service_.reply(number_); }
-
- private:
-  ServiceLine& service_;
-  const std::uint64_t number_;
-};
 
 /// What follows from a reply: the answer or the next request.
 using NextStep = std::variant<HttpAnswer, protocol::ClientRequest>;
@@ -46,17 +27,18 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange,
 
 /// The same for a study that HTTP identifies by its number and the service by its name: `request`
 /// gets the name from `set_name` before it is sent.
-PendingAnswer study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
-                         std::function<protocol::ClientRequest(const std::string& name)> request,
-                         OnReply on_reply);
+PendingAnswer named_study_flow(
+    std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
+    std::function<protocol::ClientRequest(const std::string& name)> request, OnReply on_reply);
 
-PendingAnswer list_studies(ServiceLine& service, const Fields& fields);
-PendingAnswer list_workers(ServiceLine& service, const Fields& fields);
-PendingAnswer query_rows(ServiceLine& service, std::uint64_t study, const Fields& fields);
-PendingAnswer solve_trace(ServiceLine& service, std::uint64_t study, std::uint64_t point,
+PendingAnswer list_studies(ServiceClient& service, const Fields& fields);
+PendingAnswer list_workers(ServiceClient& service, const Fields& fields);
+PendingAnswer query_rows(ServiceClient& service, std::uint64_t study, const Fields& fields);
+PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint64_t point,
                           const Fields& fields);
-PendingAnswer submit_study(ServiceLine& service, const std::string& body);
-PendingAnswer change_study(ServiceLine& service, std::uint64_t study, protocol::StudyChange change);
+PendingAnswer submit_study(ServiceClient& service, const std::string& body);
+PendingAnswer change_study(ServiceClient& service, std::uint64_t study,
+                           protocol::StudyChange change);
 /// Parses pause, resume, cancel or retry.
 std::optional<protocol::StudyChange> study_change(std::string_view name);
 

@@ -69,7 +69,7 @@ HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::Tr
 
 }  // namespace
 
-PendingAnswer solve_trace(ServiceLine& service, std::uint64_t study, std::uint64_t point,
+PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint64_t point,
                           const Fields& fields) {
   const auto is_set = [&fields](const char* name) {
     const auto field = fields.find(name);
@@ -81,7 +81,7 @@ PendingAnswer solve_trace(ServiceLine& service, std::uint64_t study, std::uint64
   request.set_point(point);
   request.set_shape(with_shape);
   request.set_fall(is_set("fall"));
-  return study_flow(
+  return named_study_flow(
       std::make_shared<ServiceExchange>(service), study,
       [trace](const std::string& name) {
         trace->request.mutable_trace()->set_study(name);

@@ -1,9 +1,7 @@
 // Pictures of the points that meet a condition, of a whole server with a pretended worker.
 #include <bit>
-#include <chrono>
 #include <cstdint>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -110,29 +108,23 @@ TEST_F(PageFiltersTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
 
 /// The query by which a slice of the study `grid` is read.
 protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& recipe) {
-  ServiceLine line;
-  AnswerPool pool(
-      line, [] {}, std::chrono::hours(1));
-  EXPECT_TRUE(pool.submit(1, slice_job(1, fields)));
+  ServiceClient client;
+  const PendingAnswer pending = slice_answer(client, 1, fields);
   while (true) {
-    for (const std::string& frame : line.take()) {
-      ClientRequest request;
-      EXPECT_TRUE(protocol::decode(frame, request));
-      if (request.has_query()) {
-        return request.query().question();
-      }
-      ClientReply reply;
-      reply.set_request_id(request.request_id());
-      if (request.has_status()) {
-        auto& study = *reply.mutable_status()->add_studies();
-        study.set_study_id(1);
-        study.set_name("grid");
-      } else {
-        *reply.mutable_describe()->mutable_recipe() = recipe;
-      }
-      line.put(protocol::encode(reply));
+    ClientRequest request;
+    EXPECT_TRUE(protocol::decode(client.take().at(0), request));
+    if (request.has_query()) {
+      return request.query().question();
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ClientReply reply;
+    reply.set_request_id(request.request_id());
+    if (request.has_status()) {
+      reply.mutable_status()->add_studies()->set_name("grid");
+    } else {
+      *reply.mutable_describe()->mutable_recipe() = recipe;
+    }
+    client.put(protocol::encode(reply));
+    EXPECT_FALSE(pending());
   }
 }
 
