@@ -46,12 +46,11 @@ export async function json(path, signal) {
   return answer.json();
 }
 
-/** A file; `is_cut`: the server sends the first 16 MiB of it. @param {string} path @returns {Promise<{file: Blob, is_cut: boolean}>} */
-export async function file_at(path) {
-  const answer = await asked(path, {});
-  if (!answer.ok) throw await refusal(answer);
-  return { file: await answer.blob(), is_cut: answer.headers.get("X-Oblique-Truncated") === "1" };
-}
+/** Rows of a study. @param {number} study @param {Record<string, string | number>} asked @param {AbortSignal} [signal] */
+export const rows = (study, asked, signal) => json(rows_path(study, asked), signal);
+
+/** @param {number} study @param {Record<string, string | number>} asked */
+export const rows_path = (study, asked) => `/api/studies/${study}/rows?${new URLSearchParams(/** @type {any} */ (asked))}`;
 
 /** Asks for a change. @param {string} path @param {object} [body] @param {AbortSignal} [signal] @returns {Promise<any>} */
 export async function change(path, body, signal) {

@@ -2,7 +2,7 @@
 // The cell or point that is chosen in a picture: spoken, marked in the table, opened.
 import { h } from "/parts/dom.js";
 import { count } from "/parts/format.js";
-import { step_of } from "./asked/dots.js";
+import { step_of } from "./pictures.js";
 import { sentence } from "./words.js";
 
 /** The number of the value that lies nearest. @param {Float64Array} values @param {number} value */
@@ -30,7 +30,7 @@ function cell_of(view, point) {
   return null;
 }
 
-/** Where this picture has what was chosen in another one. @param {View} view @param {import("./asked/picture.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
+/** Where this picture has what was chosen in another one. @param {View} view @param {import("./pictures.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
 function cell_at(view, picture, values) {
   // Bins are made anew: their cells lie near the others'.
   const may_be_near = picture.x.edges !== undefined;

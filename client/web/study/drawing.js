@@ -2,14 +2,14 @@
 // What is drawn of a picture: a map or points on a canvas, lines, bars; with what colours mean and how much is shown.
 import { h, keep_focus } from "/parts/dom.js";
 import { palette } from "/parts/colours.js";
-import { has_span, span_of } from "./command.js";
+import { has_span, span_of } from "./take.js";
 import { part_of } from "./conditions.js";
 import { categories, colour_bar, gaps } from "./drawn/legend.js";
 import { facts } from "./words.js";
 
 /**
  * @typedef {import("./study.js").StudyView} View
- * @typedef {import("./asked/picture.js").Picture} Picture
+ * @typedef {import("./pictures.js").Picture} Picture
  */
 
 /** Colours and scales of a map. @param {View} view @param {Picture} picture @returns {import("./drawn/map.js").Look} */

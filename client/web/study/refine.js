@@ -70,7 +70,8 @@ export function refine_row(view) {
     offer() {
       element.hidden = !view.place.may_change || view.is("pic") !== "map" || !view.picture?.head.x?.stride;
       if (element.hidden) return;
-      const sizes = finer_axes(view).map((axis) => axis.count ?? 1);
-      button.textContent = `Refine to ${sizes.filter((size) => size > 1).map(count).join(" × ") || 1} points`;
+      const axes = finer_axes(view);
+      const size = (/** @type {"x" | "y"} */ side) => axes.find((axis) => axis.key === view.is(side))?.count ?? 1;
+      button.textContent = `Refine to ${count(size("x"))} × ${count(size("y"))} points`;
     } };
 }

@@ -2,8 +2,7 @@
 // How far a study is, and what may be done with it.
 import { h } from "/parts/dom.js";
 import { count } from "/parts/format.js";
-import { json } from "/server.js";
-import { rows } from "./asked/picture.js";
+import { json, rows } from "/server.js";
 import { completed, kFailed, progress_of, study_buttons } from "/overview.js";
 
 /** Of a study that events do not tell of. */

@@ -2,7 +2,7 @@
 // A study: what its address says, the picture, and what belongs to it.
 import { h } from "/parts/dom.js";
 import { in_words, json, Silence } from "/server.js";
-import { ask, steps_to } from "./asked/question.js";
+import { ask, steps_to } from "./pictures.js";
 import { fill_in, varying } from "./axes.js";
 import { choice_of } from "./choice.js";
 import { condition_fields, rounded } from "./conditions.js";
@@ -19,7 +19,7 @@ const kLookAgain_ms = 1500;
 /** After the server did not answer. */
 const kAskAgain_ms = 3000;
 
-/** @typedef {import("./asked/picture.js").Picture} Picture */
+/** @typedef {import("./pictures.js").Picture} Picture */
 
 /**
  * @param {HTMLElement} root @param {import("/main.js").Place} place @param {number} id
@@ -280,14 +280,14 @@ export class StudyView {
     show_takeaways(this);
   }
 
-  /** @param {import("./drawn/brush.js").Rectangle | null} part */
+  /** @param {import("./drawn/map.js").Rectangle | null} part */
   zoom(part) {
     const { picture } = this;
     if (!picture) return;
     if (!part) {
       this.set({ x0: "", x1: "", y0: "", y1: "", ...(this.is("pic") === "lines" ? { from: "", to: "" } : {}) }, true);
     } else {
-      const ends = (/** @type {import("./asked/picture.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
+      const ends = (/** @type {import("./pictures.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
         ? values : cells.map((i) => side.numbers?.[i] ?? 0)).sort((a, b) => a - b).map(String);
       const [x0, x1] = ends(picture.x, [part.from[0], part.to[0]], part.x);
       const [y0, y1] = ends(picture.y, [part.from[1], part.to[1]], part.y);

@@ -1,9 +1,8 @@
 // @ts-check
 // Rows of a study, a page at a time.
-import { h, keep_focus, save_file, tick } from "/parts/dom.js";
+import { h, keep_focus, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
-import { file_at, Silence } from "/server.js";
-import { rows, rows_path } from "./asked/picture.js";
+import { rows, rows_path, Silence } from "/server.js";
 import { joined } from "./conditions.js";
 
 const kPage = 25;
@@ -72,15 +71,14 @@ class RowTable {
     this.table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
     this.back = h("button", { type: "button", onclick: () => this.#turn(-1) }, "Previous");
     this.next = h("button", { type: "button", onclick: () => this.#turn(1) }, "Next");
-    this.file = h("button", { type: "button", onclick: () => this.#save() }, "Table as CSV");
-    this.file_said = h("span", { role: "status", class: "weak" });
+    this.file = h("a", { class: "button", download: "rows.csv" }, "Table as CSV");
     this.only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
       of.keep_all(!is);
       this.begin();
     }));
     this.element = h("section", { class: "rows" }, h("h2", {}, "Points"), this.only,
       h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, this.table),
-      h("div", { class: "row" }, this.back, this.next, this.file, this.file_said), this.said);
+      h("div", { class: "row" }, this.back, this.next, this.file), this.said);
   }
 
   /** Which points are shown. */
@@ -106,32 +104,15 @@ class RowTable {
     this.#asked?.abort();
   }
 
-  #question() {
-    return { where: this.condition(), order: this.of.order() || "point", select: this.of.columns().join(",") };
-  }
-  async #save() {
-    this.file.disabled = true;
-    this.file_said.textContent = "The file is being made.";
-    try {
-      const { file, is_cut } = await file_at(rows_path(this.of.study, { ...this.#question(), limit: kMostInFile, format: "csv" }));
-      save_file("rows.csv", file);
-      this.file_said.textContent = is_cut ? "It is too large for the page and was cut off: oblique query gives all of it." : "";
-    } catch (error) {
-      this.file_said.textContent = "";
-      this.of.wrong(error);
-    }
-    this.file.disabled = false;
-  }
-
   async load() {
     this.#asked?.abort();
     const { signal } = this.#asked = new AbortController();
     const first = Math.min(this.of.page(), kDeepest / kPage - 1) * kPage;
-    const asked = this.#question();
+    const asked = { where: this.condition(), order: this.of.order() || "point", select: this.of.columns().join(",") };
     if (this.#counted !== asked.where) this.#forget_total();
     this.only.hidden = this.of.marked() === "";
     this.only.querySelector("input").checked = !this.of.all();
-    this.file_said.textContent = "";
+    this.file.href = rows_path(this.of.study, { ...asked, limit: kMostInFile, format: "csv" });
     try {
       await this.#show(await rows(this.of.study, { ...asked, limit: first + kPage + 1 }, signal), first, signal);
     } catch (error) {

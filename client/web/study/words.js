@@ -1,9 +1,9 @@
 // @ts-check
 // Pictures in words and numbers.
 import { count, csv_line, shown, with_unit } from "/parts/format.js";
-import { kMostDots } from "./asked/dots.js";
+import { kMostDots } from "./pictures.js";
 
-/** @typedef {import("./asked/picture.js").Picture} Picture */
+/** @typedef {import("./pictures.js").Picture} Picture */
 
 const many = (/** @type {number} */ n, /** @type {string} */ what) => `${count(n)} ${what}${n === 1 ? "" : "s"}`;
 
@@ -56,7 +56,7 @@ export function cells_csv(picture) {
   return lines.join("\r\n") + "\r\n";
 }
 
-/** @param {Picture} picture @param {import("./asked/picture.js").Dots} dots */
+/** @param {Picture} picture @param {import("./pictures.js").Dots} dots */
 function dots_csv(picture, dots) {
   const lines = [["point", picture.x.name, picture.y.name, ...(dots.z ? [picture.z.name] : [])].join(",")];
   dots.points.forEach((point, i) => lines.push([point, dots.x[i], dots.y[i], ...(dots.z ? [dots.z[i] ?? ""] : [])].join(",")));

@@ -65,7 +65,7 @@ struct BinSide {
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
   /// Sets the ends that the user did not give to those of `range`, the range of the column; it is
-  /// empty if no row has a value. Throws std::invalid_argument for wrong ends.
+  /// empty if no row has a value. Equal ends make one bin. Throws std::invalid_argument for wrong ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
     most = typed_most.value_or(range ? range->second : least);
@@ -74,6 +74,7 @@ struct BinSide {
       throw std::invalid_argument(fmt::format(
           "{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
     }
+    bins = most > least ? bins : 1;
   }
   ordered_json json() const {
     return {{"column", column.name}, {"unit", column.unit}, {"least", least},

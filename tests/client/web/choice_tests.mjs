@@ -47,7 +47,7 @@ test("a large map is asked for with few cells first, and the cell that is chosen
 test("a coarse picture comes first when a large map is opened, and never for a few points more", async () => {
   const page = await browser.open("#/");
   const steps = await page.evaluate(async () => {
-    const { steps_to } = await import("/study/asked/question.js");
+    const { steps_to } = await import("/study/pictures.js");
     const axes = ["mu", "H"].map((key) => ({ key, values: 200 }));
     const view = (is_refreshing) => ({ is: (name) => ({ pic: "map", z: "fn_peak_N", x: "mu", y: "H" })[name] ?? "", block: { kind: "grid", axes }, is_refreshing });
     return [view(false), view(true)].map(steps_to);

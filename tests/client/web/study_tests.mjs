@@ -103,35 +103,6 @@ test("maps are zoomed by dragging and by keys, and lines, gathered points and hi
   await page.close();
 });
 
-test("lines that lie on each other are seen by turns, and the legend says which these are", async () => {
-  const page = await study("#/study/1?pic=lines&z=vn_in_m_s&y=e");
-  await until(page, () => document.querySelectorAll(".legend li").length === 3);
-  const legend = () => page.$$eval(".lines .legend li", (all) => all.map((one) => one.textContent));
-  assert.deepEqual(await legend(), ["e = 0.6", "e = 0.8 (lies on e = 0.6)", "e = 1 (lies on e = 0.6)"]);
-  await until(page, () => document.querySelector(".uplot canvas"));
-  const seen = await page.evaluate(async () => {
-    const { ink } = await import("/parts/colours.js");
-    // How a colour lies to white, as edges are mixed with it.
-    const way = ([r, g, b]) => [255 - r, 255 - g, 255 - b].map((one, _, all) => one / Math.hypot(...all));
-    const ways = ["line0", "line1", "line2"].map((name) => way(ink(name).match(/\d+/g).map(Number)));
-    const canvas = document.querySelector(".uplot canvas");
-    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-    const counts = [0, 0, 0];
-    for (let i = 0; i < data.length; i += 4) {
-      const [r, g, b] = [...data.slice(i, i + 3)].map((one) => Math.round(255 + (one - 255) * (data[i + 3] / 255)));
-      if (Math.max(r, g, b) - Math.min(r, g, b) < 60) continue;  // texts and the grid
-      const alike = ways.map((one) => way([r, g, b]).reduce((sum, part, k) => sum + part * one[k], 0));
-      ++counts[alike.indexOf(Math.max(...alike))];
-    }
-    const all = counts.reduce((sum, one) => sum + one);
-    return counts.map((one) => one / all);
-  });
-  for (const share of seen) assert.ok(share > 0.2, String(seen));
-  await page.evaluate(() => { location.hash = "#/study/1?pic=lines&z=vn_out_m_s&y=e"; });
-  await until(page, () => !document.querySelector(".lines .legend").textContent.includes("lies on"));
-  await page.close();
-});
-
 test("logarithmic axes of lines and bars are drawn, whatever their ends are", async () => {
   const page = await browser.open("#/");
   for (const view of ["#/study/1?pic=histogram&x=mu&xlog=1", "#/study/4?pic=histogram&x=mu&xlog=1", "#/study/1?pic=lines&y=e&xlog=1&ylog=1"]) {

@@ -45,18 +45,12 @@ test("the command of each kind of view draws a picture", async () => {
 /** Presses a button by its text. */
 const press = (page, text) => page.evaluate((wanted) => [...document.querySelectorAll("button")].find((one) => one.textContent === wanted).click(), text);
 
-test("the CSV of the table is what the command of the rows gives; a refusal is shown in the server's words", async () => {
-  const page = await study("#/study/1?at=e@2&where=mu%20%3C%201&order=mu%20DESC", { early: keep_saved });
-  await press(page, "Table as CSV");
-  const table = await until(page, () => window.saved);
+test("the CSV of the table is what the command of the rows gives", async () => {
+  const page = await study("#/study/1?at=e@2&where=mu%20%3C%201&order=mu%20DESC");
+  const table = await page.evaluate(async () => (await fetch(document.querySelector(".rows a[download]").href)).text());
   const [, command] = await page.$$eval(".commands code", (all) => all.map((one) => one.textContent));
   const cells = (text) => text.trim().split(/\r?\n/).map((line) => line.split(",").map((cell) => (cell === "" || Number.isNaN(Number(cell)) ? cell : Number(cell))));
   assert.deepEqual(cells(table), cells(made_by(`${command} --format csv`)));
-  await page.evaluate(() => {
-    window.fetch = () => Promise.resolve(new Response('{"error":"ask again later"}', { status: 503 }));
-  });
-  await press(page, "Table as CSV");
-  await until(page, () => document.querySelector("p.said.bad")?.textContent === "ask again later");
   await page.close();
 });
 

@@ -8,7 +8,7 @@ import { line_plot } from "/parts/lines.js";
  *   with how many of each bar are marked, and what to do with a part that somebody marks
  */
 
-/** @param {import("../asked/picture.js").Picture} picture @param {How} how @returns {import("/parts/lines.js").Lines} */
+/** @param {import("../pictures.js").Picture} picture @param {How} how @returns {import("/parts/lines.js").Lines} */
 function lines_of(picture, { as_bars, x_log, y_log, drag_marks, y_ends, zoomed, counts, brushed }) {
   const order = order_of(picture);
   const nx = picture.x.values.length;
@@ -27,23 +27,23 @@ function lines_of(picture, { as_bars, x_log, y_log, drag_marks, y_ends, zoomed, 
     y: { name: as_bars ? "points" : picture.z.name, unit: as_bars ? "" : picture.z.unit, is_log: y_log && !as_bars, ends: y_ends }, series, as_bars, brushed, zoomed, drag_marks, height: 380 };
 }
 
-/** @param {import("../asked/picture.js").Picture} picture */
+/** @param {import("../pictures.js").Picture} picture */
 const order_of = (picture) => Array.from(picture.x.values.keys()).sort((a, b) => picture.x.values[a] - picture.x.values[b]);
 
-/** @param {import("../asked/picture.js").Picture} picture @param {How} how */
+/** @param {import("../pictures.js").Picture} picture @param {How} how */
 export function drawn_lines(picture, how) {
   const plot = line_plot(lines_of(picture, how));
   return { element: plot.element, go_on: (/** @type {typeof plot.hands} */ hands) => plot.go_on(hands), close: () => plot.close(), figure: () => plot.figure(),
     get hands() {
       return plot.hands;
     },
-    /** Another picture in the same plot. @param {import("../asked/picture.js").Picture} other @param {How} how_ @returns {boolean} false: it must be made anew */
+    /** Another picture in the same plot. @param {import("../pictures.js").Picture} other @param {How} how_ @returns {boolean} false: it must be made anew */
     update(other, how_) {
       if (!plot.update(lines_of(other, how_))) return false;
       picture = other;
       return true;
     },
-    /** @param {import("../asked/question.js").Marks | null} marks of the picture's cells */
+    /** @param {import("../pictures.js").Marks | null} marks of the picture's cells */
     mark(marks) {
       const nx = picture.x.values.length;
       plot.mark(marks && Array.from(picture.y.values.keys()).map((row) => order_of(picture).map((i) => marks.cells[row * nx + i])));
