@@ -63,11 +63,10 @@ export async function change(path, body, signal) {
 /**
  * Numbers behind a head: the head, the bytes, and where the numbers begin in them.
  * @param {string} path @param {AbortSignal} [signal]
- * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number} | null>} null: not yet, ask again (traces alone)
+ * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number}>}
  */
 export async function numbers(path, signal) {
   const answer = await asked(path, { signal });
-  if (answer.status === 202) return null;
   if (!answer.ok) throw await refusal(answer);
   const bytes = await answer.arrayBuffer();
   const length = new DataView(bytes).getUint32(0, true);

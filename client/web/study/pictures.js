@@ -128,7 +128,7 @@ const kCells = 24; // a side: what keys move over
 async function dots(study, { x, y, z, where, xlog, ylog, ends }, signal, unit_of) {
   const condition = joined(where, within(x, ends.x0, ends.x1), within(y, ends.y0, ends.y1));
   const answer = await rows(study, { select: ["point", x, y, ...(z ? [z] : [])].join(","), where: condition, limit: kMostDots + 1 }, signal);
-  if (answer.rows.length > kMostDots || answer.truncated) return null;
+  if (answer.rows.length > kMostDots) return null;
   const is_shown = (/** @type {any[]} */ row) => typeof row[1] === "number" && typeof row[2] === "number" && (!xlog || row[1] > 0) && (!ylog || row[2] > 0);
   const told = answer.rows.filter(is_shown);
   const column = (/** @type {number} */ i) => told.map((/** @type {any[]} */ row) => row[i]);
