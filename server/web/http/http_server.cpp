@@ -114,8 +114,10 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
                                MHD_RequestTerminationCode /*why*/) {
     delete static_cast<Exchange*>(std::exchange(*exchange, nullptr));
   };
+  // Not by epoll: there libmicrohttpd 0.9.75 stops serving once the limit of connections is
+  // reached.
   daemon_ = MHD_start_daemon(
-      MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
+      MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_POLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
       nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET,
       ::fcntl(listener.descriptor(), F_DUPFD_CLOEXEC, 0), MHD_OPTION_NOTIFY_COMPLETED,
       static_cast<MHD_RequestCompletedCallback>(on_completed), nullptr,

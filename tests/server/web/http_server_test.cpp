@@ -174,6 +174,22 @@ TEST(HttpServer, AnAddressWithItsShareOfConnectionsTakesNoneFromOthers) {
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
 }
 
+TEST(HttpServer, AnswersAgainWhenTooManyConnectionsHaveEnded) {
+  HttpLimits limits;
+  limits.connections = 4;
+  limits.idle = test::kHangLimit;
+  const EchoServer server(limits);
+  for (int round = 0; round < 3; ++round) {
+    std::vector<std::unique_ptr<RawHttp>> silent;
+    for (int i = 0; i < 10; ++i) {
+      silent.push_back(std::make_unique<RawHttp>(server.url()));
+      silent.back()->send("GET ");
+    }
+    silent.clear();
+    EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
+  }
+}
+
 TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   HttpLimits limits;
   limits.idle = std::chrono::seconds(1);
