@@ -2,7 +2,7 @@
 // All that the page asks of its server; server/web/page/README.md has every path and field.
 
 /** An answer that is an error, with the server's sentence. */
-export class Refusal extends Error {
+class Refusal extends Error {
   /** @param {number} status @param {string} sentence */
   constructor(status, sentence) {
     super(sentence);

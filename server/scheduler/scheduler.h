@@ -151,8 +151,7 @@ class Scheduler {
     Batch batch;
     bool alone;  ///< of suspect points: its worker gets nothing beside it
     std::int64_t granted_ms;
-    LeaseId twin = 0;           ///< of another worker, for what is left of the same batch; 0: none
-    std::int32_t priority = 0;  ///< of the study, when this was granted
+    LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
   };
   /// How a worker gets on with a study.
   struct Pace {
@@ -176,7 +175,6 @@ class Scheduler {
     bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
     ProcessNumber process = kNobody;
     LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
-    LeaseId ahead = 0;                        ///< that it has not asked for; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
     std::int64_t last_heard_ms;
     std::int64_t stored_ms = 0;      ///< when it last stored a point, or began to hold batches
@@ -246,8 +244,6 @@ class Scheduler {
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
   LeaseId serve_free(WorkerId id, Worker& worker, StudyId study);
-  void serve_ahead();
-  bool may_get_ahead(const Worker& worker, StudyId study) const;
   void wake_all();
   bool serve_suspect(WorkerId id, Worker& worker);
   std::optional<Standing> suspect_for(const Study& study, const Worker& worker) const;
@@ -263,7 +259,6 @@ class Scheduler {
   void fill_lanes(Portion& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
   LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch, bool alone);
-  void note_priority(std::int32_t priority, bool is_leased);
   void queue(WorkerId id, const Worker& worker);
 
   /// A point that is to fail, unless it is condemned no more.
@@ -281,11 +276,9 @@ class Scheduler {
   StudyQueue queue_;  // of the studies that have something to hand out
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
-  ReadyLine ready_workers_;                         // with credit
-  ReadyLine full_workers_;                          // without, and with nothing that came ahead
-  std::map<std::int32_t, std::size_t> priorities_;  // leases by priority
-  std::map<std::string, std::size_t> versions_;     // workers by solver version
-  std::size_t draining_ = 0;                        // workers
+  ReadyLine ready_workers_;                      // with credit
+  std::map<std::string, std::size_t> versions_;  // workers by solver version
+  std::size_t draining_ = 0;                     // workers
   std::uint64_t looks_ = 0;
   // By solver version, of its workers, and of all under the empty one; emptied when it may change.
   mutable std::map<std::string, std::optional<std::int64_t>> longest_proven_since_ms_;

@@ -26,46 +26,11 @@ void Scheduler::dispatch() {
     ready_workers_.remove(id);
     queue(id, worker);
   }
-  serve_ahead();
-}
-
-/// A study that comes before all that a worker holds does not wait until some of that has ended:
-/// the worker gets a batch of it at once, besides what it asked for, and the next when that one has
-/// ended.
-void Scheduler::serve_ahead() {
-  const auto is_urgent = [this] {
-    const auto highest = queue_.highest_priority();
-    return highest && !priorities_.empty() && *highest > priorities_.begin()->first;
-  };
-  while (full_workers_.has_awake() && is_urgent()) {
-    const WorkerId id = full_workers_.first_awake();
-    Worker& worker = workers_.at(id);
-    ++looks_;
-    const StudyId study = next_free_study(worker);
-    worker.ahead = may_get_ahead(worker, study) ? serve_free(id, worker, study) : 0;
-    if (worker.ahead != 0) {
-      full_workers_.remove(id);
-    } else {
-      full_workers_.rest(id);
-    }
-  }
-}
-
-bool Scheduler::may_get_ahead(const Worker& worker, StudyId study) const {
-  const bool is_sound = !worker.is_busy && !worker.draining && worker.probe == 0 &&
-                        is_proven(worker) && !is_set_aside(worker) &&
-                        next_suspect_study(worker) == 0;
-  return is_sound && study != 0 && !worker.leases.empty() &&
-         std::ranges::all_of(worker.leases, [&](LeaseId id) {
-           const Lease& lease = leases_.at(id);
-           return !lease.alone && lease.priority < studies_.at(study).priority;
-         });
 }
 
 /// Something has changed for all workers.
 void Scheduler::wake_all() {
   ready_workers_.wake_all();
-  full_workers_.wake_all();
 }
 
 bool Scheduler::serve(WorkerId id, Worker& worker) {
@@ -312,8 +277,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   }
   worker.stored_ms = worker.leases.empty() ? now_ms_ : worker.stored_ms;
   const LeaseId lease = next_lease_++;
-  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0, served.priority});
-  note_priority(served.priority, true);
+  leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_, 0});
   served.leases.insert(lease, batch);
   worker.leases.insert(lease);
   worker.credit -= std::min(worker.credit, 1U);
@@ -328,15 +292,6 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   }
   effects_.emplace_back(std::move(send));
   return lease;
-}
-
-/// A lease of that priority begins or ends.
-void Scheduler::note_priority(std::int32_t priority, bool is_leased) {
-  std::size_t& leases = priorities_[priority];
-  leases = is_leased ? leases + 1 : leases - 1;
-  if (leases == 0) {
-    priorities_.erase(priority);
-  }
 }
 
 }  // namespace oblique::server

@@ -86,18 +86,8 @@ void Scheduler::check_lines() const {
   for (const auto& [id, worker] : workers_) {
     require(ready_workers_.contains(id) == (worker.credit > 0),
             "a worker with credit is not in the line, or one without is");
-    require(!full_workers_.contains(id) || (worker.credit == 0 && worker.ahead == 0),
-            "a worker stands where those stand that have all they asked for, and has not");
-    require(worker.ahead == 0 || worker.leases.contains(worker.ahead),
-            "what a worker got ahead is not one of its leases");
   }
   require(ready_workers_.size() <= workers_.size(), "a worker that is gone stands in the line");
-  require(full_workers_.size() <= workers_.size(), "a worker that is gone stands in a line");
-  std::map<std::int32_t, std::size_t> priorities;
-  for (const auto& [id, lease] : leases_) {
-    ++priorities[lease.priority];
-  }
-  require(priorities == priorities_, "priorities of leases are miscounted");
 }
 
 void Scheduler::check_losses() const {
@@ -106,8 +96,7 @@ void Scheduler::check_losses() const {
     const WorkerProcess& process = processes_.at(worker.process);
     require(process.workers.contains(id), "a worker is not known as one of its process");
     require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
-    require(worker.leases.size() <=
-                settings_.newcomer_batches + worker.solved_batches + (worker.ahead == 0 ? 0U : 1U),
+    require(worker.leases.size() <= settings_.newcomer_batches + worker.solved_batches,
             "a worker has more batches than it has earned");
     require(worker.solved_batches == 0 || process.proven_since_ms,
             "a worker that is not proven has solved batches");

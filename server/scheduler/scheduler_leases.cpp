@@ -23,11 +23,6 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   leases_.erase(id);
   Worker& worker = workers_.at(lease.worker);
   worker.leases.erase(id);
-  note_priority(lease.priority, false);
-  if (worker.ahead == id) {
-    worker.ahead = 0;
-    queue(lease.worker, worker);
-  }
   worker.paces.at(lease.study).held_points -= lease.batch.points;
   ready_workers_.wake(lease.worker);
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {

@@ -49,7 +49,6 @@ Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
   }
   found->second.last_heard_ms = now_ms_;
   ready_workers_.wake(worker);
-  full_workers_.wake(worker);
   return &found->second;
 }
 
@@ -61,13 +60,10 @@ void Scheduler::on(const CreditGiven& event) {
   }
 }
 
-/// To the line in which it is to stand.
+/// Adds a worker with credit to those that are served.
 void Scheduler::queue(WorkerId id, const Worker& worker) {
   if (worker.credit > 0) {
-    full_workers_.remove(id);
     ready_workers_.add(id);
-  } else if (worker.ahead == 0) {
-    full_workers_.add(id);
   }
 }
 
@@ -167,7 +163,6 @@ void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
     end_lease(lease, loss);
   }
   ready_workers_.remove(id);
-  full_workers_.remove(id);
   set_draining(found->second, false);
   threads_ -= found->second.threads;
   if (const auto version = versions_.find(found->second.solver_version); --version->second == 0) {

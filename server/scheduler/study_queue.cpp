@@ -48,15 +48,6 @@ StudyQueue::StudyId StudyQueue::next_free(const std::string& solver_version) con
   return best == nullptr ? 0 : std::get<StudyId>(*best);
 }
 
-std::optional<std::int64_t> StudyQueue::highest_priority() const {
-  std::optional<std::int64_t> highest;
-  for (const auto& [version, ranks] : free_) {
-    const std::int64_t priority = -std::get<0>(*ranks.begin());
-    highest = std::max(highest.value_or(priority), priority);
-  }
-  return highest;
-}
-
 std::optional<double> StudyQueue::least_served(StudyId but) const {
   for (const auto& [served, study] : by_served_) {
     if (study != but) {

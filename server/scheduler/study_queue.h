@@ -34,8 +34,6 @@ class StudyQueue {
   bool empty() const { return places_.empty(); }
   /// The study whose free points a worker with this solver gets next; 0: none.
   StudyId next_free(const std::string& solver_version) const;
-  /// The highest priority of studies with free points; nothing: there are none.
-  std::optional<std::int64_t> highest_priority() const;
   /// The least `served` of the studies with free points, without the one named.
   std::optional<double> least_served(StudyId but) const;
   /// The studies with suspect points, the oldest first.

@@ -33,6 +33,7 @@ const kFills = ["bar", "line1"];
 const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "line7"];
 
 const kHeight = 240;
+
 /** A line as it is drawn. @param {number} look */
 function sample(look) {
   const canvas = h("canvas", { width: 34, height: 10, class: "sample", "aria-hidden": "true" });

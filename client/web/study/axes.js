@@ -27,7 +27,7 @@ export function axis_value(axis, i) {
 }
 
 /** The block that shows most, and the axes that people look at first. @param {Block[]} blocks */
-export function usual_block(blocks) {
+function usual_block(blocks) {
   let best = -1;
   blocks.forEach((block, i) => {
     if (varying(block).length > 0 && (best < 0 || block.points > blocks[best].points)) best = i;
@@ -36,7 +36,7 @@ export function usual_block(blocks) {
 }
 
 /** @param {Block} block @returns {[string, string]} */
-export function usual_axes(block) {
+function usual_axes(block) {
   const keys = varying(block).map((axis) => axis.key);
   const x = keys.includes("mu") ? "mu" : keys.at(-1) ?? "";
   const others = keys.filter((key) => key !== x);

@@ -22,7 +22,7 @@ export function column_of(key) {
 }
 
 /** The number with the fewest digits between two. @param {number} a @param {number} b */
-export function short_between(a, b) {
+function short_between(a, b) {
   const [least, most] = [Math.min(a, b), Math.max(a, b)];
   for (let digits = 1; digits < 17; ++digits) {
     const tried = Number(((least + most) / 2).toPrecision(digits));

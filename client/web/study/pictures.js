@@ -58,6 +58,7 @@ async function slice(study, asked, signal, unit_of) {
   const is_category = head.z.kind === "categories";
   const values = is_category ? new Uint16Array(bytes, cells_at, nx * ny) : new Float32Array(bytes, cells_at, nx * ny);
   const bits = is_category ? null : new Uint32Array(bytes, cells_at, nx * ny);
+  const [least, most] = is_category ? [null, null] : ends_of(values);
   const side = (/** @type {any} */ told, /** @type {Float64Array} */ all) => ({ name: told?.key ?? "", unit: told ? unit_of(told.key) : "",
     values: all, numbers: told ? numbers_of(told, all.length) : [0], is_whole: told?.all_lines ?? true });
   const x = side(head.x, new Float64Array(bytes, begin, nx));
@@ -65,7 +66,7 @@ async function slice(study, asked, signal, unit_of) {
   const x_stride = head.x.stride;
   const y_stride = head.y?.stride ?? 0;
   return {
-    x, y, values, head, dictionary: head.dictionary ?? [], least: head.least ?? null, most: head.most ?? null,
+    x, y, values, head, dictionary: head.dictionary ?? [], least, most,
     z: { name: head.z.name, unit: head.z.unit, is_category },
     point: (column, row) => head.first_point + x.numbers[column] * x_stride + y.numbers[row] * y_stride,
     why_empty(cell) {

@@ -65,7 +65,8 @@ struct BinSide {
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
   /// Sets the ends that the user did not give to those of `range`, the range of the column; it is
-  /// empty if no row has a value. Equal ends make one bin. Throws std::invalid_argument for wrong ends.
+  /// empty if no row has a value. Equal ends make one bin. Throws std::invalid_argument for wrong
+  /// ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
     most = typed_most.value_or(range ? range->second : least);

@@ -178,8 +178,8 @@ class SliceAnswer : public StudyAnswer {
   protocol::StudyQuery query() const;
   void mark_left_out(const ServedStudy& study);
   HttpAnswer answer(std::uint64_t study) const;
-  void append_numbers(ordered_json& head, std::string& numbers) const;
-  void append_codes(ordered_json& head, std::string& numbers) const;
+  std::vector<std::uint32_t> number_bits() const;
+  std::vector<std::uint16_t> codes(ordered_json& head) const;
 
   const Fields fields_;
   const PictureColumn column_;
@@ -277,40 +277,23 @@ HttpAnswer SliceAnswer::answer(std::uint64_t study) const {
                     {"left_out", count(Mark::kLeftOut)},
                     {"missing", count(Mark::kNotSolved)},
                     {"filtered", count(Mark::kFiltered)}};
-  std::string numbers = bytes_of(grid_->x.values) + bytes_of(grid_->y.values);
-  if (column_.is_category) {
-    append_codes(head, numbers);
-  } else {
-    append_numbers(head, numbers);
-  }
-  return numbers_answer(head, numbers);
+  const std::string cells = column_.is_category ? bytes_of(codes(head)) : bytes_of(number_bits());
+  return numbers_answer(head, bytes_of(grid_->x.values) + bytes_of(grid_->y.values) + cells);
 }
 
-/// Adds the least and the largest value to `head`, and the values of the cells to `numbers`.
-void SliceAnswer::append_numbers(ordered_json& head, std::string& numbers) const {
+std::vector<std::uint32_t> SliceAnswer::number_bits() const {
   std::vector<std::uint32_t> bits;
-  head["least"] = head["most"] = nullptr;
-  std::optional<std::pair<float, float>> range;
   for (std::size_t cell = 0; cell < marks_.size(); ++cell) {
-    const float number = numbers_[cell];
-    const bool has_value = marks_[cell] == Mark::kHasValue;
-    bits.push_back(has_value ? std::bit_cast<std::uint32_t>(number)
-                             : kNan + static_cast<std::uint32_t>(marks_[cell]));
-    if (has_value) {
-      range = std::pair(std::min(range ? range->first : number, number),
-                        std::max(range ? range->second : number, number));
-    }
+    bits.push_back(marks_[cell] == Mark::kHasValue
+                       ? std::bit_cast<std::uint32_t>(numbers_[cell])
+                       : kNan + static_cast<std::uint32_t>(marks_[cell]));
   }
-  if (range) {
-    head["least"] = range->first;
-    head["most"] = range->second;
-  }
-  numbers += bytes_of(bits);
+  return bits;
 }
 
-/// Adds the dictionary to `head`, and the codes of the cells to `numbers`. Texts are sorted by
+/// Returns the codes of the cells, and adds their dictionary to `head`. Texts are sorted by
 /// falling frequency, then alphabetically, as in `oblique plot`.
-void SliceAnswer::append_codes(ordered_json& head, std::string& numbers) const {
+std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
   std::vector<std::uint16_t> codes;
   for (const Mark mark : marks_) {
     codes.push_back(static_cast<std::uint16_t>(kLastCode - static_cast<int>(mark)));
@@ -330,7 +313,7 @@ void SliceAnswer::append_codes(ordered_json& head, std::string& numbers) const {
     }
     head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});
   }
-  numbers += bytes_of(codes);
+  return codes;
 }
 
 }  // namespace

@@ -1,15 +1,66 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <utility>
+#include <variant>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/point_table.h"
+#include "proto/wire/chunk_rows.h"
 #include "server/web/answers/fields.h"
-#include "server/web/answers/study_flow.h"
+#include "server/web/answers/service_client.h"
+#include "server/web/http/http_message.h"
 
 // Answers about a study; server/web/page/README.md lists their fields. Functions throw
 // std::invalid_argument for a wrong request.
 namespace oblique::server {
+
+/// A study as reported by the service.
+struct ServedStudy {
+  /// Whether the filter leaves out a point that has no row. In a study that is done it does: the
+  /// worker decided, whose values may differ from those of this machine in the last digit.
+  bool leaves_out(std::uint64_t point) const {
+    return table->has_filter() && (state == "done" || !table->is_left_in(point));
+  }
+
+  std::uint64_t id = 0;
+  std::string name = {};
+  std::string state = {};
+  std::unique_ptr<const protocol::PointTable> table = {};
+};
+
+/// Makes an answer from the rows of queries about a study.
+class StudyAnswer {
+ public:
+  /// `condition` is the user's in the queries. If it is wrong, the error shows it as it was
+  /// written.
+  explicit StudyAnswer(std::string condition = {}) : condition_(std::move(condition)) {}
+  virtual ~StudyAnswer() = default;
+  StudyAnswer(const StudyAnswer&) = delete;
+  StudyAnswer& operator=(const StudyAnswer&) = delete;
+
+  /// The next query, whose study is set by the caller, or the answer. Called first, and after the
+  /// last row of each query.
+  using Next = std::variant<protocol::StudyQuery, HttpAnswer>;
+  virtual Next next(const ServedStudy& study) = 0;
+  virtual void take_row(const protocol::ChunkRows& /*row*/) {}
+  const std::string& condition() const { return condition_; }
+
+ private:
+  const std::string condition_;
+};
+
+using FlowClock = std::chrono::steady_clock;
+
+/// Requests the study and then the queries from the service, one after the other. The queries run
+/// in reader processes; they end when the pending answer is destroyed, or at `deadline`.
+PendingAnswer study_flow(ServiceClient& service, std::uint64_t study,
+                         std::unique_ptr<StudyAnswer> answer,
+                         FlowClock::time_point deadline = FlowClock::now() +
+                                                          std::chrono::seconds(7));
 
 /// The recipe of a study and the columns of its results.
 PendingAnswer study_answer(ServiceClient& service, std::uint64_t study);

@@ -1,4 +1,4 @@
-#include "server/web/answers/study_flow.h"
+#include "server/web/answers/study_answers.h"
 
 #include <optional>
 #include <stdexcept>

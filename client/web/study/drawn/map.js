@@ -15,7 +15,7 @@ import { cell_at, cell_image, cells_of, draw_axes, draw_dots, kMargin, nearest_d
  */
 
 /** Whether cells of the same numbers are the same. @param {import("../pictures.js").Picture} a @param {import("../pictures.js").Picture} b */
-export function have_same_cells(a, b) {
+function have_same_cells(a, b) {
   return [[a.x, b.x], [a.y, b.y]].every(([one, other]) => one.name === other.name && one.values.length === other.values.length
     && one.values.every((value, i) => value === other.values[i]));
 }

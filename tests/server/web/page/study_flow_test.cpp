@@ -1,6 +1,5 @@
-// The HTTP side as a client of the service, which the test plays, and answers made from its
-// replies.
-#include "server/web/answers/study_flow.h"
+// Answers about a study, and the requests for them; the test plays the service.
+#include "server/web/answers/study_answers.h"
 
 #include <cstdint>
 #include <optional>
@@ -13,7 +12,6 @@
 
 #include "proto/frames.h"
 #include "proto/wire/chunk_writer.h"
-#include "server/web/answers/study_answers.h"
 #include "tests/support/recipes.h"
 
 namespace oblique::server {
