@@ -1,15 +1,14 @@
 // @ts-check
 // Studies and workers, live.
-import { all_of, StudyList } from "/listed.js";
-import { copied, h, save } from "/parts/dom.js";
-import { count, csv_line, of_file, time_left } from "/parts/format.js";
-import { change } from "/server.js";
+import { copied, h } from "/parts/dom.js";
+import { count, of_file, time_left } from "/parts/format.js";
+import { change, json } from "/server.js";
 
+/** How many studies are listed at once. */
+const kAtOnce = 200;
+const kMostAtOnce = 1000;
 /** After no answer, and of studies that events do not tell of. */
 const kAskAgain_ms = 3000;
-
-/** What somebody looks at and nobody keeps: see server/web/page. */
-const is_look = (/** @type {any} */ study) => /^look-[0-9a-f]{16}$/.test(study.name);
 
 /** The condition that points meet which failed. */
 export const kFailed = "error IS NOT NULL";
@@ -89,15 +88,10 @@ export function progress_of(study) {
     "aria-label": `${study.name}: settled points` }), percent);
 }
 
-/** @param {any[]} lines @param {string[]} columns */
-const csv_of = (lines, columns) => [columns, ...lines.map((line) => columns.map((name) => line[name]))].map(csv_line).join("\r\n") + "\r\n";
-const kStudyColumns = ["id", "name", "state", "points", "solved", "failed", "left_out", "points_per_s", "priority", "created_at", "submitted_by"];
-const kWorkerColumns = ["id", "name", "host", "state", "threads", "points_per_s", "leased_points", "solved_points", "silent_s", "losses", "solver_version", "instruction_set"];
-
 /** Running ones first, then the latest. @param {any[]} studies @param {string} name what names have in them */
 function in_order(studies, name) {
   const rank = (/** @type {any} */ s) => (s.state === "running" ? 0 : s.state === "paused" ? 1 : 2);
-  return studies.filter((s) => !is_look(s) && s.name.toLowerCase().includes(name.toLowerCase())).sort((a, b) => rank(a) - rank(b) || b.id - a.id);
+  return studies.filter((s) => s.name.toLowerCase().includes(name.toLowerCase())).sort((a, b) => rank(a) - rank(b) || b.id - a.id);
 }
 
 /** The server as a whole. @param {any} now */
@@ -108,13 +102,11 @@ function figures(now) {
   return all.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)));
 }
 
-/** @param {(text: string, is_bad?: boolean) => void} say */
-function workers_section(say) {
+function workers_section() {
   const table = live_table("Workers", ["worker", "state", "#threads", "#points/s", "#solved", "#losses", "solver"]);
   const none = h("p", { class: "weak" }, "No worker is here: start oblique-worker.");
   const unlisted = h("p", { class: "weak" });
-  const file = csv_button("workers", kWorkerColumns, (all) => all, say);
-  return { element: h("section", {}, h("div", { class: "head" }, h("h2", {}, "Workers"), file), table.element, none, unlisted),
+  return { element: h("section", {}, h("h2", {}, "Workers"), table.element, none, unlisted),
     /** @param {any} now the overview, or null */
     draw(now) {
       const there = now?.workers ?? [];
@@ -124,19 +116,8 @@ function workers_section(say) {
         count(w.points_per_s), count(w.solved_points), String(w.losses),
         h("span", { class: "weak" }, `${w.solver_version}, ${w.instruction_set}`)]);
       const hidden = (now?.workers_there ?? 0) - there.length;
-      unlisted.textContent = hidden > 0 ? `${count(hidden)} more workers are not shown; the CSV has all.` : "";
+      unlisted.textContent = hidden > 0 ? `${count(hidden)} more workers are not shown: oblique workers lists all.` : "";
     } };
-}
-
-/** Saves all that the server lists, also what is not shown. @param {"studies" | "workers"} what @param {string[]} columns @param {(all: any[]) => any[]} chosen @param {(text: string, is_bad?: boolean) => void} say */
-function csv_button(what, columns, chosen, say) {
-  return h("button", { type: "button", "aria-label": `${what} as CSV`, onclick: async () => {
-    try {
-      save(`${what}.csv`, "text/csv", csv_of(chosen(await all_of(what)), columns));
-    } catch (error) {
-      say(String(/** @type {Error} */ (error).message), true);
-    }
-  } }, "CSV");
 }
 
 /** A row of the table of studies. @param {any} study @param {any[]} changes what may be done with it */
@@ -160,6 +141,78 @@ const commands_section = (file) => h("section", {}, h("h2", {}, "The same on a c
   ...(file ? [] : [copied("the command of the workers", "oblique workers")]),
   h("p", { class: "weak" }, file ? "Add --format csv for a table in a file." : "Add --server ADDRESS where the server is elsewhere, and --format csv for a file."));
 
+/** The first so many studies. @param {number} wanted @returns {Promise<{found: Map<number, any>, next_after: number}>} next_after 0: these are all */
+async function first_studies(wanted) {
+  const found = new Map();
+  let next_after = 0;
+  do {
+    const page = await json(`/api/studies?limit=${Math.min(wanted - found.size, kMostAtOnce)}&after=${next_after}`);
+    for (const study of page.studies) found.set(study.id, study);
+    next_after = page.next_after;
+  } while (next_after !== 0 && found.size < wanted);
+  return { found, next_after };
+}
+
+/** Studies: as many as somebody wants to see, and those that events tell of. One reading ends before the next begins, so that no older answer replaces a newer one. */
+class StudyList {
+  /** @param {() => void} changed @param {(error: any) => void} failed it did not come */
+  constructor(changed, failed) {
+    this.changed = changed;
+    this.failed = failed;
+    /** @type {Map<number, any>} */
+    this.known = new Map();
+    /** Those of the last event. @type {any[]} */
+    this.told = [];
+    this.was_read = false;
+    this.has_more = false;
+    this.wanted = kAtOnce;
+    this.is_reading = false;
+    this.wants_another = false;
+  }
+
+  /** @param {any[]} studies of an event */
+  take(studies) {
+    this.told = studies;
+    for (const study of studies) this.known.set(study.id, study);
+  }
+
+  more() {
+    this.wanted += kAtOnce;
+    return this.read();
+  }
+
+  /** Reads again, as far as was read before. */
+  async read() {
+    this.wants_another = true;
+    if (this.is_reading) return;
+    this.is_reading = true;
+    try {
+      while (this.wants_another) {
+        this.wants_another = false;
+        await this.#read_once();
+        this.changed();
+      }
+    } catch (error) {
+      this.failed(error);
+    }
+    this.is_reading = false;
+  }
+
+  async #read_once() {
+    const { found, next_after } = await first_studies(this.wanted);
+    // What an event told of stays when it has ended, though it lies beyond.
+    const beyond = next_after === 0 ? [] : [...this.known.keys()].filter((id) => id > next_after);
+    if (beyond.length > 0) {
+      const page = await json(`/api/studies?limit=${kMostAtOnce}&after=${Math.min(...beyond) - 1}`);
+      for (const study of page.studies) if (this.known.has(study.id)) found.set(study.id, study);
+    }
+    this.was_read = true;
+    this.has_more = next_after !== 0;
+    this.known = found;
+    this.take(this.told);
+  }
+}
+
 /**
  * @param {import("/main.js").Place} place @param {StudyList} list @param {(text: string, is_bad?: boolean) => void} say
  * @param {() => void} filtered another part of their names is wanted
@@ -172,17 +225,16 @@ function studies_section(place, list, say, filtered) {
     place.keep(new URLSearchParams(filter.value ? { name: filter.value } : {}));
     filtered();
   } });
-  const file = csv_button("studies", kStudyColumns, (all) => in_order(all, filter.value), say);
   const more = h("button", { type: "button", hidden: true, onclick: () => list.more() }, "More studies");
   const start = place.may_change && h("a", { class: "button", href: "#/new" }, "Start a study");
-  return { element: h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, start, file), table.element, none, unlisted, more),
+  return { element: h("section", {}, h("div", { class: "head" }, h("h2", {}, "Studies"), filter, start), table.element, none, unlisted, more),
     /** @param {any} now the overview, or null */
     draw(now) {
       const known = [...list.known.values()];
       const lines = in_order(known, filter.value);
       table.element.hidden = lines.length === 0;
       none.hidden = lines.length > 0 || !list.was_read;
-      none.textContent = none_text(known.filter((one) => !is_look(one)).length, list.has_more);
+      none.textContent = none_text(known.length, list.has_more);
       table.show(lines, (one) => cells_of(one, place.may_change ? [study_buttons(one, say)] : []));
       more.hidden = !list.has_more;
       unlisted.textContent = unlisted_text(now?.unlisted ?? 0);
@@ -220,7 +272,7 @@ export function overview(root, place) {
   });
   const numbers = h("dl", { class: "figures" });
   const studies = studies_section(place, list, say, draw);
-  const workers = workers_section(say);
+  const workers = workers_section();
   root.append(numbers, said, studies.element, workers.element, commands_section(place.file));
 
   /** What events do not tell of is asked for, and what did not come is asked for again. */

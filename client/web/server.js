@@ -2,7 +2,7 @@
 // All that the page asks of its server; server/web/page/README.md has every path and field.
 
 /** An answer that is an error, with the server's sentence. */
-export class Refusal extends Error {
+class Refusal extends Error {
   /** @param {number} status @param {string} sentence */
   constructor(status, sentence) {
     super(sentence);
@@ -46,12 +46,11 @@ export async function json(path, signal) {
   return answer.json();
 }
 
-/** A file; `is_cut`: the server sends the first 16 MiB of it. @param {string} path @returns {Promise<{file: Blob, is_cut: boolean}>} */
-export async function file_at(path) {
-  const answer = await asked(path, {});
-  if (!answer.ok) throw await refusal(answer);
-  return { file: await answer.blob(), is_cut: answer.headers.get("X-Oblique-Truncated") === "1" };
-}
+/** Rows of a study. @param {number} study @param {Record<string, string | number>} asked @param {AbortSignal} [signal] */
+export const rows = (study, asked, signal) => json(rows_path(study, asked), signal);
+
+/** @param {number} study @param {Record<string, string | number>} asked */
+export const rows_path = (study, asked) => `/api/studies/${study}/rows?${new URLSearchParams(/** @type {any} */ (asked))}`;
 
 /** Asks for a change. @param {string} path @param {object} [body] @param {AbortSignal} [signal] @returns {Promise<any>} */
 export async function change(path, body, signal) {
@@ -64,11 +63,10 @@ export async function change(path, body, signal) {
 /**
  * Numbers behind a head: the head, the bytes, and where the numbers begin in them.
  * @param {string} path @param {AbortSignal} [signal]
- * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number} | null>} null: not yet, ask again (traces alone)
+ * @returns {Promise<{head: any, bytes: ArrayBuffer, begin: number}>}
  */
 export async function numbers(path, signal) {
   const answer = await asked(path, { signal });
-  if (answer.status === 202) return null;
   if (!answer.ok) throw await refusal(answer);
   const bytes = await answer.arrayBuffer();
   const length = new DataView(bytes).getUint32(0, true);

@@ -83,7 +83,7 @@ function others_of(form) {
 }
 
 /** @param {Form} form */
-export function submission_of(form) {
+function submission_of(form) {
   const sample = sample_of(form.sample.trim());
   const axis = (/** @type {string} */ key, /** @type {string} */ text) => axis_of(key, text, sample !== undefined);
   // Single values are part of the model, as those of flags are; model keys come first, by name, then H, mu, e.

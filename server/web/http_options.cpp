@@ -7,7 +7,7 @@
 
 #include "proto/text.h"
 #include "server/web/http/request_rules.h"
-#include "server/web/page/token_file.h"
+#include "server/web/page/page_token.h"
 
 namespace oblique::server {
 
@@ -17,20 +17,16 @@ void HttpOptions::add_to(CLI::App& app) {
                      "Address and port of the page, metrics and health over HTTP; port 0: "
                      "the system picks one; off: none")
           ->type_name("ADDRESS:PORT");
-  app.add_option("--http-name", names_,
-                 "Host name by which HTTP is asked, beside numeric addresses and localhost; may be "
-                 "given again")
+  app.add_option(
+         "--http-name", names_,
+         "Host name of this server besides numeric addresses and localhost; may be repeated")
       ->type_name("HOST");
-  app.add_flag("--http-read-without-token", shows_to_all_,
-               "Show the page to whoever reaches the address; changing something takes the token");
+  app.add_flag("--http-read-without-token", shows_without_token_,
+               "Show the page to everybody who reaches the address; changes still need the token");
   app.add_option(
          "--http-token-file", token_file_,
-         "File with the token of the page, 32 to 128 letters and digits, made when it is not "
-         "there; without it a token is drawn at each start")
-      ->type_name("FILE");
-  app.add_option("--http-plot-program", plot_program_,
-                 "Program `oblique`, which draws the pictures that people take from the page; "
-                 "without it that beside this program")
+         "File with the token of the page, 32 to 128 letters and digits, made if it does not "
+         "exist; without it a token is drawn at each start")
       ->type_name("FILE");
 }
 
@@ -38,24 +34,23 @@ std::optional<WebSettings> HttpOptions::settings() const {
   WebSettings settings;
   for (const std::string& name : names_) {
     const std::string lower = CLI::detail::to_lower(name);
-    if (host_without_port(lower) != lower) {
+    if (lower.empty() || host_without_port(lower) != lower) {
       throw std::runtime_error(
           fmt::format("--http-name {} is no host name, as oblique.example.org without a port",
                       protocol::visible(name)));
     }
     settings.names.insert(lower);
   }
-  const auto address = http_address_of(address_);
+  const auto address = parse_http_address(address_);
   if (!address) {
     return std::nullopt;
   }
   settings.address = *address;
-  settings.page.shows_without_token = shows_to_all_;
-  settings.page.pictures.program = plot_program_;
+  settings.page.shows_without_token = shows_without_token_;
   if (!token_file_.empty()) {
-    settings.page.token = token_of_file(token_file_);
+    settings.page.token = PageToken::from_file(token_file_);
   }
-  // A second server on a machine need not be told that the first one has the port.
+  // A second server on a machine goes on without the default port, which the first one has.
   settings.may_be_missing = address_option_->count() == 0;
   return settings;
 }

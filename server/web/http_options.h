@@ -13,21 +13,20 @@ class Option;
 
 namespace oblique::server {
 
-/// The flags that say what is shown over HTTP, and to whom.
+/// The flags of what is shown over HTTP, and to whom.
 class HttpOptions {
  public:
   /// This must outlive the parsing.
   void add_to(CLI::App& app);
-  /// To be asked after the parsing; nothing: no HTTP. Throws std::runtime_error for what is no
-  /// address and no name.
+  /// Of the parsed flags; nothing: no HTTP. Throws std::runtime_error for an invalid address or
+  /// name.
   std::optional<WebSettings> settings() const;
 
  private:
   std::string address_ = "127.0.0.1:7602";
   std::vector<std::string> names_;
-  bool shows_to_all_ = false;
+  bool shows_without_token_ = false;
   std::string token_file_;
-  std::string plot_program_;
   const CLI::Option* address_option_ = nullptr;
 };
 

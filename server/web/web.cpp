@@ -1,30 +1,22 @@
 #include "server/web/web.h"
 
 #include <chrono>
-#include <optional>
+#include <memory>
 #include <utility>
 
-#include "server/web/health.h"
-#include "server/web/metric_text.h"
-#include "server/web/metrics.h"
-#include "server/web/notice_board.h"
-#include "server/web/overview.h"
-#include "server/web/page/live_text.h"
-#include "server/web/process_numbers.h"
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/text.h"
+#include "server/web/status/metrics.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::server {
 namespace {
 
-constexpr unsigned kNotFound = 404;
-constexpr unsigned kServiceUnavailable = 503;
-
-WebSettings with_version(WebSettings settings) {
-  settings.page.version = OBLIQUE_VERSION;
-  settings.page.pictures.database = settings.database;
-  return settings;
-}
-
-constexpr const char* kPlainText = "text/plain; charset=utf-8";
+constexpr std::int64_t kSnapshotInterval_ms = 500;
+constexpr std::int64_t kLongestTurn_ms = 5000;
+/// With less room than this a server is not ready; 80 000 results take it.
+constexpr double kLeastFree_bytes = 64.0 * 1024 * 1024;
 
 std::int64_t steady_ms() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -32,148 +24,87 @@ std::int64_t steady_ms() {
       .count();
 }
 
+PageSettings page_settings_of(const WebSettings& settings) {
+  PageSettings page = settings.page;
+  page.database = settings.database;
+  page.version = OBLIQUE_VERSION;
+  return page;
+}
+
 }  // namespace
 
-class Web::Parts {
- public:
-  explicit Parts(WebSettings settings)
-      : settings_(with_version(std::move(settings))),
-        http_(settings_.address, {is_loopback(settings_.address.address), settings_.names},
-              settings_.limits,
-              [this](const HttpServer::Question& question) { return answer(question); },
-              {&Page::takes_changes,
-               [this](const HttpServer::Question& question) {
-                 return page_.objection_to_change(question);
-               },
-               [this](std::uint64_t number) { page_.gone(number); },
-               [this] { return page_.tick(); }}) {}
-
-  ~Parts() {  // they wake the HTTP server
-    answers_.stop();
-    drawings_.stop();
+HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms) {
+  const std::int64_t age_ms = now_ms - made_ms;
+  if (age_ms <= kLongestTurn_ms) {
+    return text_answer(MHD_HTTP_OK, "the server runs");
   }
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
-
-  std::string url() const { return http_.url(); }
-  std::string page_url() const { return url() + "/?token=" + page_.key().token(); }
-
-  int descriptor() const { return line_.descriptor(); }
-  std::vector<std::string> take_requests() { return line_.take(); }
-  void put_reply(const std::string& frame) {
-    line_.put(frame);
-    http_.wake();
-  }
-
-  void tick(const SnapshotSources& sources, std::int64_t now_ms) {
-    board_.turned(now_ms);
-    if (board_.is_due(now_ms) && board_.put(take_snapshot(sources, now_ms, board_.is_for_page()))) {
-      http_.wake();
-    }
-  }
-
- private:
-  std::optional<HttpAnswer> answer(const HttpServer::Question& question) {
-    if (question.path == "/healthz") {
-      return health(board_.turned_ms(), steady_ms());
-    }
-    if (Page::has(question.path)) {
-      return page_.answer(question);
-    }
-    const bool wants_metrics = question.path == "/metrics";
-    if (!wants_metrics && question.path != "/readyz") {
-      return HttpAnswer{kNotFound, kPlainText,
-                        "there are a page at /, /metrics, /healthz and /readyz\n"};
-    }
-    const NoticeBoard::Shared latest = board_.latest();
-    const std::int64_t asked_ms = steady_ms() - question.waited.count();
-    const bool is_recent = latest && latest->made_ms >= asked_ms - NoticeBoard::kPause_ms;
-    if (!is_recent && question.waited < settings_.patience) {
-      board_.want();
-      return std::nullopt;
-    }
-    if (!is_recent && !wants_metrics) {
-      return HttpAnswer{kServiceUnavailable, kPlainText, "the server's loop is held up\n"};
-    }
-    if (!latest) {
-      return HttpAnswer{kServiceUnavailable, kPlainText, "the server has just begun\n"};
-    }
-    return wants_metrics ? metrics(latest, *question.counts)
-                         : readiness(*latest, disk_numbers(settings_.database).free_bytes);
-  }
-
-  /// The overview, where it is another one than at the last look; asks for the next.
-  std::optional<std::string> look() {
-    const NoticeBoard::Shared latest = board_.latest();
-    board_.want_for_page();
-    if (!latest || latest == told_ || !latest->is_for_page) {
-      return std::nullopt;
-    }
-    told_ = latest;
-    std::string overview = overview_json(*latest);
-    return overview == std::exchange(overview_, overview) ? std::nullopt : std::optional(overview);
-  }
-
-  /// Written once for each snapshot, however often it is asked for.
-  HttpAnswer metrics(const NoticeBoard::Shared& snapshot, const HttpCounts& counts) {
-    if (snapshot != shown_) {
-      const std::int64_t now_ms = steady_ms();
-      const auto seconds_since = [now_ms](std::int64_t then_ms) {
-        return 1e-3 * static_cast<double>(now_ms - then_ms);
-      };
-      text_ = metrics_text({*snapshot, process_numbers(), disk_numbers(settings_.database), counts,
-                            seconds_since(board_.turned_ms()), seconds_since(began_ms_),
-                            settings_.solver_version});
-      shown_ = snapshot;
-    }
-    return {200, MetricText::kContentType, text_};
-  }
-
-  WebSettings settings_;
-  std::int64_t began_ms_ = steady_ms();
-  NoticeBoard board_{began_ms_};
-  NoticeBoard::Shared shown_;  // of the HTTP server's thread
-  std::string text_;           // the same
-  NoticeBoard::Shared told_;   // the same
-  std::string overview_;       // the same
-  ServiceLine line_;
-  LiveText live_{[this] { return look(); }, began_ms_};
-  AnswerPool answers_{line_, [this] { http_.wake(); }};
-  AnswerPool drawings_{line_, [this] { http_.wake(); }};
-  Page page_{settings_.page, {line_, answers_, drawings_, live_}};
-  HttpServer http_;  // last: its thread uses all the others
-};
-
-Web::Web(WebSettings settings) : parts_(std::make_unique<Parts>(std::move(settings))) {}
-Web::~Web() = default;
-
-std::string Web::url() const {
-  return parts_->url();
+  return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
+                     fmt::format("the server's event loop has not run for {} s",
+                                 solver::fixed_number(1e-3 * static_cast<double>(age_ms), 1)));
 }
 
-std::string Web::page_url() const {
-  return parts_->page_url();
+HttpAnswer readiness(const Snapshot& snapshot, double free_bytes) {
+  if (snapshot.is_stopping) {
+    return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE, "the server stops and hands out nothing");
+  }
+  if (!snapshot.database_fault.empty()) {
+    return text_answer(
+        MHD_HTTP_SERVICE_UNAVAILABLE,
+        "the database takes no results: " + protocol::visible(snapshot.database_fault));
+  }
+  if (free_bytes < kLeastFree_bytes) {
+    return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
+                       fmt::format("the database's disk has {} MB left",
+                                   solver::fixed_number(1e-6 * free_bytes, 0)));
+  }
+  return text_answer(MHD_HTTP_OK, "the server takes work");
 }
 
-int Web::descriptor() const {
-  return parts_->descriptor();
-}
-
-bool Web::is_client(const std::string& identity) {
-  return identity == ServiceLine::kIdentity;
-}
-
-std::vector<std::string> Web::take_requests() {
-  return parts_->take_requests();
-}
+Web::Web(WebSettings settings)
+    : settings_(std::move(settings)),
+      started_ms_(steady_ms()),
+      page_(page_settings_of(settings_), service_, events_),
+      http_(settings_.address, {is_loopback(settings_.address.address), settings_.names},
+            settings_.limits,
+            {[this](const HttpRequest& request) { return answer(request); },
+             [this](const HttpRequest& request) { return page_.refuse_change(request); }}) {}
 
 bool Web::put_reply(const std::string& frame) {
-  parts_->put_reply(frame);
+  service_.put(frame);
+  http_.wake();
   return true;
 }
 
 void Web::tick(const SnapshotSources& sources, std::int64_t now_ms) {
-  parts_->tick(sources, now_ms);
+  if (now_ms - published_ms_ >= kSnapshotInterval_ms) {
+    published_ms_ = now_ms;
+    snapshots_.publish(take_snapshot(sources, now_ms));
+    http_.wake();
+  }
+}
+
+HttpOutcome Web::answer(const HttpRequest& request) {
+  if (auto outcome = page_.answer(request)) {
+    return *std::move(outcome);
+  }
+  const std::string& path = request.path;
+  if (path != "/healthz" && path != "/readyz" && path != "/metrics") {
+    return text_answer(MHD_HTTP_NOT_FOUND, "there are a page at /, /metrics, /healthz and /readyz");
+  }
+  const auto snapshot = snapshots_.latest();
+  HttpAnswer alive = health(snapshot ? snapshot->made_ms : started_ms_, steady_ms());
+  if (alive.status != MHD_HTTP_OK || path == "/healthz") {
+    return alive;
+  }
+  if (!snapshot) {
+    return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE, "the server is starting");
+  }
+  const DiskUsage disk = disk_usage(settings_.database);
+  if (path == "/readyz") {
+    return readiness(*snapshot, disk.free);
+  }
+  return HttpAnswer{MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8",
+                    metrics_text({*snapshot, disk, http_.answers(), settings_.solver_version})};
 }
 
 }  // namespace oblique::server

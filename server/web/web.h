@@ -1,61 +1,73 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
-#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_server.h"
+#include "server/web/page/event_feed.h"
 #include "server/web/page/page.h"
-#include "server/web/snapshot.h"
+#include "server/web/status/snapshot.h"
 
 namespace oblique::server {
 
 struct WebSettings {
   HttpAddress address;
-  /// A server that finds the address taken goes on without, rather than end.
+  /// If the address is taken the server goes on without HTTP.
   bool may_be_missing = false;
-  std::set<std::string> names;  ///< Host names beside addresses and localhost; in lower case
+  std::set<std::string> names;  ///< Host names besides addresses and localhost; in lower case
   HttpLimits limits;
-  /// A loop that makes no snapshot in this time is held up, and the last one is shown.
-  std::chrono::milliseconds patience{2000};
   std::string database;  ///< file
   PageSettings page;
   std::string solver_version;
 };
 
-/// The server over HTTP: metrics, health and readiness for machines, and the page for people. The
-/// loop is asked for a snapshot only when one is to be shown.
+/// The server over HTTP: metrics and health for machines, and the page for people. The event loop
+/// publishes a snapshot twice a second and is not asked for anything else, except by requests to
+/// the service.
 class Web {
  public:
-  /// Answers from now on. Throws std::runtime_error, naming the address, when it cannot.
+  /// Answers from now on. Throws std::runtime_error, naming the address, if it cannot.
   explicit Web(WebSettings settings);
-  ~Web();
-  Web(const Web&) = delete;
-  Web& operator=(const Web&) = delete;
 
   /// As http://127.0.0.1:7602.
-  std::string url() const;
-
+  std::string url() const { return http_.url(); }
   /// The same with the token that lets a browser in.
-  std::string page_url() const;
+  std::string page_url() const { return url() + "/?token=" + page_.token().text(); }
 
-  /// Whether the page is that client of the service; of the loop, as what follows.
-  static bool is_client(const std::string& identity);
+  // ---- Called by the event loop.
+  /// Whether the page is that client of the service.
+  static bool is_client(const std::string& identity) {
+    return identity == ServiceClient::kIdentity;
+  }
   /// Readable when the page has requests.
-  int descriptor() const;
-  std::vector<std::string> take_requests();
-  /// The frame of a reply to the page; true.
+  int descriptor() const { return service_.descriptor(); }
+  std::vector<std::string> take_requests() { return service_.take(); }
+  /// Takes the frame of a reply to the page; true.
   bool put_reply(const std::string& frame);
-
-  /// From the loop, several times a second; costs nothing while nobody asks.
+  /// To be called several times a second.
   void tick(const SnapshotSources& sources, std::int64_t now_ms);
 
  private:
-  class Parts;
-  std::unique_ptr<Parts> parts_;
+  HttpOutcome answer(const HttpRequest& request);
+
+  const WebSettings settings_;
+  const std::int64_t started_ms_;
+  std::int64_t published_ms_ = 0;  // used by the event loop only
+  SnapshotCache snapshots_;
+  ServiceClient service_;
+  EventFeed events_{snapshots_};
+  Page page_;
+  HttpServer http_;  // last: its thread uses the other members
 };
+
+/// Whether the event loop runs: 200 if the latest snapshot, or the start, is recent enough.
+HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms);
+
+/// Whether the server takes work: 200 unless it stops, the database takes no results, or its disk
+/// is almost full.
+HttpAnswer readiness(const Snapshot& snapshot, double free_bytes);
 
 }  // namespace oblique::server

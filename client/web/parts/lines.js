@@ -1,8 +1,9 @@
 // @ts-check
 // Lines over an axis, by uPlot: with keys to move the cursor, a spoken value, and spans shaded behind.
 import { h } from "/parts/dom.js";
-import { shown } from "/parts/format.js";
-import { draw_marked, draw_spans, legend_of, look_of, options_of, uPlot } from "/parts/lines_drawn.js";
+import { ink } from "/parts/colours.js";
+import { heading, shown } from "/parts/format.js";
+import { scale, ticks, tick_text } from "/parts/scale.js";
 
 /**
  * @typedef {{label: string, values: ArrayLike<number | null>, colour?: number}} Series
@@ -21,6 +22,128 @@ import { draw_marked, draw_spans, legend_of, look_of, options_of, uPlot } from "
  * @property {number} [height]
  * @property {(i: number) => void} [moved] the cursor is over value `i`
  */
+
+// A script of its own, which modules come after (index.html): it is minified as no module.
+const uPlot = /** @type {any} */ (globalThis).uPlot;
+
+const kDashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
+/** Each of fewer values is drawn as a point too. */
+const kFewValues = 60;
+const kFills = ["bar", "line1"];
+const kInks = ["line0", "line1", "line2", "line3", "line4", "line5", "line6", "line7"];
+
+const kHeight = 240;
+
+/** A line as it is drawn. @param {number} look */
+function sample(look) {
+  const canvas = h("canvas", { width: 34, height: 10, class: "sample", "aria-hidden": "true" });
+  const context = canvas.getContext("2d");
+  context.strokeStyle = ink(kInks[look]);
+  context.lineWidth = 2.4;
+  context.setLineDash(kDashes[look]);
+  context.moveTo(0, 5);
+  context.lineTo(34, 5);
+  context.stroke();
+  return canvas;
+}
+
+/** Which line is which, where there are several. @param {Lines} of */
+function legend_of(of) {
+  const several = of.series.length > 1 ? of.series : [];
+  return h("ul", { class: "legend" }, ...several.map((one, i) => h("li", {},
+    of.as_bars ? h("span", { class: `shade ink-${kFills[i]}` }) : sample((one.colour ?? i) % 8), one.label)));
+}
+
+/** What of lines is not their numbers, nor follows from these later. @param {Lines} of */
+const look_of = (of) => JSON.stringify([of.title, of.x.name, of.x.unit, of.x.is_log, of.y, of.as_bars, of.spans, of.height, of.x.values.length < kFewValues,
+  of.series.map((one) => [one.label, one.colour])]);
+
+/** What is shown unless somebody zooms: uPlot would round logarithmic ends to powers of ten. @param {Lines["x"]} x @param {number} least @param {number} most */
+function shown_ends({ values, ends }, least, most) {
+  const is_all = least === values[0] && most === values[values.length - 1];
+  const [from, to] = is_all && ends ? ends : [least, most];
+  return to > from ? [from, to] : [from - (Math.abs(from) * 0.05 || 0.5), to + (Math.abs(to) * 0.05 || 0.5)];
+}
+
+/** Both axes. @param {Lines} of @param {number} height */
+function axes_of(of, height) {
+  const axis = { stroke: ink("text"), grid: { stroke: ink("grid"), width: 1 }, ticks: { stroke: ink("weak"), width: 1 },
+    font: "12px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif",
+    // Ticks as those of maps: uPlot's own of logarithmic axes want ends that are powers of ten.
+    splits: (/** @type {any} */ u, /** @type {number} */ i, /** @type {number} */ least, /** @type {number} */ most) => (i === 0
+      ? ticks(scale(least, most, of.x.is_log ?? false), Math.max(u.bbox.width / (window.devicePixelRatio || 1) / 80, 2))
+      : ticks(scale(least, most, of.y.is_log ?? false), Math.max(height / 50, 2))),
+    filter: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits,
+    values: (/** @type {any} */ _, /** @type {number[]} */ splits) => splits.map(tick_text) };
+  return [{ ...axis, label: heading(of.x.name, of.x.unit), labelSize: 22, size: 34 },
+    { ...axis, label: heading(of.y.name, of.y.unit), labelSize: 22, size: 62 }];
+}
+
+/** Lines or bars. @param {Lines} of */
+function series_of(of) {
+  return of.series.map((one, i) => {
+    const look = (one.colour ?? i) % 8;
+    const line = { label: one.label, stroke: ink(kInks[look]), width: 1.6, dash: kDashes[look], spanGaps: false,
+      points: { show: of.x.values.length < kFewValues && !of.as_bars, size: 4 } };
+    return of.as_bars ? { ...line, paths: uPlot.paths.bars({ size: [1, Infinity] }), fill: ink(kFills[i]), dash: [], stroke: ink("weak"), width: 0.5 } : line;
+  });
+}
+
+/** What uPlot is told. @param {() => Lines} now whose numbers may become others, and with them the ends of x @param {number} width */
+function options_of(now, width) {
+  const of = now();
+  const height = of.height ?? kHeight;
+  return { width, height, legend: { show: false }, ms: 1,
+    cursor: { points: { size: 7 }, drag: { x: true, y: of.brushed !== undefined && !of.as_bars, uni: 24, setScale: true },
+      ...(of.zoomed ? { bind: { dblclick: () => () => now().zoomed?.(null) } } : {}) },
+    scales: { x: { time: false, distr: of.x.is_log ? 3 : 1, range: (/** @type {any} */ _, /** @type {number} */ least, /** @type {number} */ most) => shown_ends(now().x, least, most) },
+      y: { distr: of.y.is_log ? 3 : 1, ...(of.y.ends ? { range: of.y.ends } : {}) } },
+    axes: axes_of(of, height), series: [{}, ...series_of(of)] };
+}
+
+/** Behind the lines; bands at their foot. @param {any} u @param {Span[]} spans */
+function draw_spans(u, spans) {
+  for (const span of spans) {
+    const from = Math.max(u.valToPos(span.from, "x", true), u.bbox.left);
+    const to = Math.min(u.valToPos(span.to, "x", true), u.bbox.left + u.bbox.width);
+    if (to <= from) continue;
+    u.ctx.fillStyle = ink(span.ink);
+    const high = span.is_band ? 10 * (window.devicePixelRatio || 1) : u.bbox.height;
+    u.ctx.fillRect(from, u.bbox.top + u.bbox.height - high, to - from, high);
+  }
+}
+
+/** What is marked of a line is thicker, with a disc where it is one value alone or these are few. @param {any} u @param {Lines} of @param {number} k which line @param {ArrayLike<number | boolean>} is */
+function draw_marked(u, of, k, is) {
+  const ratio = window.devicePixelRatio || 1;
+  const { values, colour = k } = of.series[k];
+  const has = (/** @type {number} */ i) => Boolean(is[i]) && typeof values[i] === "number";
+  const place = (/** @type {number} */ i) => [u.valToPos(of.x.values[i], "x", true), u.valToPos(values[i], "y", true)];
+  u.ctx.save();
+  u.ctx.beginPath();
+  u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+  u.ctx.clip();
+  u.ctx.strokeStyle = u.ctx.fillStyle = ink(kInks[colour % 8]);
+  u.ctx.lineWidth = 3.2 * ratio;
+  u.ctx.beginPath();
+  const discs = [];
+  for (let i = 0; i < values.length; ++i) {
+    if (!has(i)) continue;
+    if (has(i - 1)) u.ctx.lineTo(...place(i));
+    else u.ctx.moveTo(...place(i));
+    if (values.length < kFewValues || (!has(i - 1) && !has(i + 1))) discs.push(place(i));
+  }
+  u.ctx.stroke();
+  u.ctx.strokeStyle = ink("text");
+  u.ctx.lineWidth = 1.2 * ratio;
+  for (const [x, y] of discs) {
+    u.ctx.beginPath();
+    u.ctx.arc(x, y, 4 * ratio, 0, 2 * Math.PI);
+    u.ctx.fill();
+    u.ctx.stroke();
+  }
+  u.ctx.restore();
+}
 
 /** A plot of lines or bars, with its legend and what is spoken of it. @param {Lines} of */
 export const line_plot = (of) => new LinePlot(of);
@@ -85,6 +208,10 @@ class LinePlot {
     this.#marked = which;
     this.#step_back();
     this.#plot?.redraw(false);
+  }
+  /** As it is drawn. @returns {import("/parts/png.js").Figure} */
+  figure() {
+    return { title: this.of.title, canvas: this.#plot.ctx.canvas, legend: this.element.querySelector(".legend") };
   }
   close() {
     this.watch.disconnect();

@@ -1,57 +1,66 @@
 // @ts-check
 // A point: its numbers, its contact over time, and the finger moving.
-import { copied, h, named, picker, save } from "/parts/dom.js";
-import { file_link, file_sayer } from "/parts/file_link.js";
+import { copied, h, save, save_file } from "/parts/dom.js";
 import { count, of_file, quoted, shown, with_unit } from "/parts/format.js";
 import { line_plot } from "/parts/lines.js";
+import { png_of } from "/parts/png.js";
 import { completed } from "/overview.js";
-import { json } from "/server.js";
-import { wanted_of } from "/study/asked/between.js";
-import { held_open } from "/study/asked/look.js";
+import { json, rows } from "/server.js";
 import { finger } from "./finger.js";
 import { loop_plot } from "./loop.js";
-import { point_numbers } from "./numbers.js";
 import { player } from "./player.js";
 import { trace_of } from "./trace.js";
 
-const kAskAgain_ms = 300;
-/** So often in a row a study that lies between is not there before that is said. */
-const kGoneAtMost = 40;
+const kProvenance = ["status", "error", "solver_version", "integrator", "instruction_set", "elements_per_link", "tolerance", "dt_s", "steps",
+  "wall_s", "closure", "worker_name", "worker_id", "attempt", "solved_at", "reused_from", "model_id"];
 
-/**
- * Asks the study that has the point; one that lies between those of the study is in a study that may go, and then is
- * begun anew under another number, which takes a moment.
- * @param {() => number} id @param {boolean} is_between @param {AbortSignal} signal
- */
-function asker_of(id, is_between, signal) {
-  return async (/** @type {(study: number) => Promise<any>} */ ask) => {
-    for (let left = is_between ? kGoneAtMost : 0; ; --left) {
-      try {
-        return await ask(id());
-      } catch (error) {
-        if (signal.aborted || left === 0 || /** @type {any} */ (error).status !== 404) throw error;
-      }
-      await pause(signal);
-    }
-  };
-}
-
-/** @param {AbortSignal} signal */
-async function pause(signal) {
-  await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
-  signal.throwIfAborted();
-}
-
-/**
- * A point as the server tells it. One that lies between those of the study is solved first, which takes a moment.
- * @param {ReturnType<typeof asker_of>} of_study @param {number} point @param {boolean} is_between @param {AbortSignal} signal
- */
-async function told_of(of_study, point, is_between, signal) {
-  for (;;) {
-    const told = await of_study((study) => json(`/api/studies/${study}/points/${point}`, signal));
-    if (!is_between || told.row || told.fault || told.left_out) return told;
-    await pause(signal);
+/** A list, which a row has as JSON. @param {string} text */
+function list_of(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return ` ${text}`;  // an error may begin as a list does
   }
+}
+
+/** @param {any} value */
+function text_of(value) {
+  if (value === null || value === undefined) return "–";
+  if (typeof value === "number") return shown(value, 7);
+  if (typeof value === "string" && value.startsWith("[")) return text_of(list_of(value));
+  if (Array.isArray(value)) return value.map((one) => (Array.isArray(one) ? `[${one.map(text_of).join(", ")}]` : text_of(one))).join(", ");
+  return String(value);
+}
+
+/** Browsers break lines behind hyphens, also in numbers with an exponent and in instants. @param {string} text */
+const in_one_piece = (text) => text.split(/(\S*\d(?:e-|T)\d\S*)/).map((part, i) => (i % 2 === 1 ? h("span", { class: "whole" }, part) : part));
+
+/** @param {string} caption @param {[string, string, string, string][]} lines */
+function table(caption, lines) {
+  return h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": caption }, h("table", { class: "values" },
+    h("caption", {}, caption), h("thead", {}, h("tr", {}, ...["name", "value", "unit", "meaning"].map((head) => h("th", { scope: "col" }, head)))),
+    h("tbody", {}, ...lines.map(([name, value, unit, meaning]) => h("tr", {}, h("th", { scope: "row" }, name),
+      h("td", { class: "value" }, ...in_one_piece(value)), h("td", {}, unit), h("td", { class: "weak meaning" }, meaning))))));
+}
+
+/** @param {any} row @param {any[]} columns */
+function point_numbers(row, columns) {
+  const of = (/** @type {(column: any) => boolean} */ wanted) => columns.filter((c) => c.name in row && wanted(c))
+    .map((c) => /** @type {[string, string, string, string]} */ ([c.name, text_of(row[c.name]), c.unit === "1" ? "" : c.unit, c.meaning]));
+  const is_origin = (/** @type {any} */ c) => kProvenance.includes(c.name);
+  return h("section", {}, h("h2", {}, "Numbers"),
+    table("Outputs", of((c) => c.kind === "output" && !is_origin(c) && row[c.name] !== null)),
+    table("Where they come from", of(is_origin)),
+    table("Inputs and model", of((c) => c.kind === "input" && !is_origin(c))));
+}
+
+/** A point with its row, whose values are those that were solved. @param {any} whole the study @param {number} point @param {AbortSignal} signal */
+async function told_of(whole, point, signal) {
+  const select = whole.columns.map((/** @type {any} */ one) => one.name).join(",");
+  const [told, { columns, rows: [values] }] = await Promise.all([json(`/api/studies/${whole.id}/points/${point}`, signal),
+    rows(whole.id, { select, where: `point = ${point}` }, signal)]);
+  const row = values ? Object.fromEntries(columns.map((/** @type {string} */ name, /** @type {number} */ i) => [name, values[i]])) : null;
+  return { ...told, ...(row && { H: row.H, mu: row.mu, e: row.e, left_out: false }), row };
 }
 
 /** What is known of a point without its time histories. @param {any} told @param {any[]} columns */
@@ -67,16 +76,6 @@ function known_of(told, columns) {
   numbers: row ? [point_numbers(row, columns)] : [] };
 }
 
-/** The command that solves a point of no study that stays. @param {any} whole @param {any} wanted @param {any} row */
-function solve_command(whole, wanted, row) {
-  const lengths = (/** @type {string} */ key) => /^(links|lengths?\d*)$/.test(key);
-  const changed = whole.model.filter((/** @type {any} */ one) => !one.usual && one.value !== null).map((/** @type {any} */ one) => one.key);
-  const keys = new Set([...wanted.block.axes.map((/** @type {any} */ axis) => axis.key), ...changed].map((key) => (lengths(key) ? "lengths" : key)));
-  for (const key of ["H", "mu", "e"]) keys.delete(key);
-  const value = (/** @type {string} */ key) => (key === "lengths" ? row.lengths_m.join(",") : row[key === "E" ? "E_Pa" : key]);
-  return ["oblique solve", ...["H", "mu", "e", ...keys].map((key) => `--${key.replaceAll("_", "-")} ${quoted(String(value(key)))}`), "--trace trace.csv"].join(" ");
-}
-
 /**
  * @param {HTMLElement} root @param {import("/main.js").Place} place @param {number} study @param {number} point
  * @returns {Promise<import("/main.js").View>}
@@ -84,68 +83,39 @@ function solve_command(whole, wanted, row) {
 export async function point_view(root, place, study, point) {
   const { signal } = place;
   const whole = await json(`/api/studies/${study}`, signal);
+  const ask = () => told_of(whole, point, signal);
+  place.trail([h("a", { href: place.last(`/study/${study}`) }, whole.name), `point ${count(point)}`]);
+  let told = await ask();
   const said = h("p", { role: "status", class: "said" }, "A worker solves this point again.");
-  /** Of points that lie between those of the study. */
-  const is_between = place.fields.has("between");
-  const side = Number(place.fields.get("side"));
-  const of_view = new URLSearchParams(place.fields);
-  of_view.delete("side");
-  const back = is_between ? `#/study/${study}?${of_view}` : place.last(`/study/${study}`);
-  const trail = (/** @type {string} */ what) => place.trail([h("a", { href: back }, whole.name), what]);
-  /** The study that has the point. */
-  let id = study;
-  /** @type {any} */
-  let wanted = null;
-  /** @type {any} */
-  let told = null;
-  const take = h("section", {});
-  if (is_between) {
-    trail(`between its points, ${count(point)}`);
-    root.append(said);
-    wanted = await wanted_of(whole, place.fields, signal);
-    id = await held_open(wanted, side, signal, (other) => {
-      id = other;
-      show_take();
-    });
-  } else {
-    trail(`point ${count(point)}`);
-  }
-  const of_study = asker_of(() => id, is_between, signal);
-  const name = () => (is_between ? `${whole.name}-between` : told.name);
-  function show_take() {
-    if (told) take.replaceChildren(...things_to_take(id, point, name(), told.row, whole, wanted, of_file(place.file)));
-  }
   const [facts, numbers] = [h("div", {}), h("div", {})];
   function show_known() {
     const known = known_of(told, whole.columns);
     facts.replaceChildren(...known.facts);
     numbers.replaceChildren(...known.numbers);
   }
-  told = await told_of(of_study, point, is_between, signal);
+  show_known();
   const pictures = h("section", { "aria-label": "The contact over time" }, said);
-  const other = (/** @type {number} */ number) => `#/study/${study}/point/${number}${is_between ? `?${place.fields}` : ""}`;
+  const other = (/** @type {number} */ number) => `#/study/${study}/point/${number}`;
   const neighbours = h("div", { class: "row" },
     point > 0 && h("a", { class: "button", href: other(point - 1) }, "Previous point"),
-    point + 1 < (is_between ? side * side : whole.numbers) && h("a", { class: "button", href: other(point + 1) }, "Next point"));
-  show_known();
-  show_take();
-  root.replaceChildren(h("h2", { class: "name" }, is_between ? `${whole.name}, between its points: ${count(point)} of ${side} × ${side}` : `${told.name}, point ${count(point)}`),
-    neighbours, facts, pictures, numbers, take);
+    point + 1 < whole.points && h("a", { class: "button", href: other(point + 1) }, "Next point"));
+  root.replaceChildren(h("h2", { class: "name" }, `${told.name}, point ${count(point)}`),
+    neighbours, facts, pictures, numbers, h("section", {}, ...things_to_take(study, point, told.name, of_file(place.file))));
   /** @type {{close: () => void}[]} */
   const parts = [];
-  trace_of(of_study, point, signal, (text, is_bad) => {
+  trace_of(study, point, signal, (text, is_bad) => {
     said.textContent = text;
     said.className = is_bad ? "said bad" : "said";
   }).then((trace) => {
     if (signal.aborted) return;
-    parts.push(...show_trace(pictures, trace, `${is_between ? name() : `point-${study}`}-${point}.csv`));
+    parts.push(...show_trace(pictures, trace, `${told.name}-${point}`));
   }).catch((error) => {
     if (signal.aborted) return;
     said.className = "said bad";
     said.textContent = `No time histories: ${error.message}`;
   });
   return { take: look_again(study, () => told, async () => {
-    told = await told_of(of_study, point, is_between, signal);
+    told = await ask();
     if (told.row) show_known();
   }), close: () => parts.forEach((part) => part.close()) };
 }
@@ -171,34 +141,13 @@ function look_again(study, told, ask) {
   };
 }
 
-const kPanels = ["forces", "loop", "deformation", "velocities", "energies", "shape"];
-
-/** Its pictures as oblique plot draws them, and the command. @param {number} study @param {number} point @param {string} name @param {string | null} from of which file the command reads it; null: there is none */
-function pictures_to_take(study, point, name, from) {
-  const files = h("div", { class: "row files" });
-  const { said, say } = file_sayer();
-  const command = h("div", {});
-  const choose = (/** @type {string} */ panel) => {
-    const link = (/** @type {string} */ format) => file_link(format.toUpperCase(), `${name}-${point}.${format}`,
-      `/api/studies/${study}/points/${point}/picture?${new URLSearchParams({ ...(panel ? { panel } : {}), format })}`, say);
-    say("");
-    files.replaceChildren(...["svg", "png", "csv"].map(link), said);
-    if (from !== null) command.replaceChildren(copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point}${panel ? ` --panel ${panel}` : ""} --out picture.svg${from}`));
-  };
-  choose("");
-  return [h("div", { class: "row" }, named("pictures, as oblique plot draws them", picker([["", "all"], ...kPanels.map((one) => [one, one])], "", choose)), files), command];
-}
-
-/**
- * @param {number} id of the study that has it @param {number} point @param {string} name @param {any} row null: it is not solved
- * @param {any} whole the study @param {any} wanted what lies between its points; null: it is one of them @param {string} from of which file commands read it
- */
-function things_to_take(id, point, name, row, whole, wanted, from) {
-  const commands = wanted ? [h("p", {}, "The address of this page finds this point again or solves it anew, as does:"), ...(row ? [copied("the command of the point", solve_command(whole, wanted, row))] : [])]
-    : [h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv${from}`),
-      h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'${from}`)];
-  return [h("h2", {}, "Take it with you"), ...pictures_to_take(id, point, name, wanted ? null : from), ...commands,
-    h("a", { class: "button", download: `${name}-${point}-row.csv`, href: `/api/studies/${id}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV")];
+/** @param {number} study @param {number} point @param {string} name of the study @param {string} from of which file commands read it */
+function things_to_take(study, point, name, from) {
+  return [h("h2", {}, "Take it with you"),
+    h("p", {}, "Its pictures, as oblique plot draws them:"), copied("the command of the picture", `oblique plot ${quoted(name)} --point ${point} --out picture.svg${from}`),
+    h("p", {}, "Its time histories:"), copied("the command of the trace", `oblique trace ${quoted(name)} ${point} --out trace.csv${from}`),
+    h("p", {}, "Its row:"), copied("the command of the row", `oblique query ${quoted(name)} --where 'point = ${point}'${from}`),
+    h("a", { class: "button", download: `${name}-${point}-row.csv`, href: `/api/studies/${study}/rows?${new URLSearchParams({ where: `point = ${point}`, format: "csv" })}` }, "Row as CSV")];
 }
 
 /** @param {import("./trace.js").Trace} trace @param {string} name */
@@ -210,8 +159,8 @@ function save_trace(trace, name) {
   save(name, "text/csv", lines.join("\r\n") + "\r\n");
 }
 
-/** @param {HTMLElement} place @param {import("./trace.js").Trace} trace @param {string} file */
-function show_trace(place, trace, file) {
+/** @param {HTMLElement} place @param {import("./trace.js").Trace} trace @param {string} name of files */
+function show_trace(place, trace, name) {
   const times = trace.column("t_s");
   const micro = times.map((t) => t * 1e6);
   const spans = [...trace.phases, ...trace.sticks].map((one) => ({ from: one.from * 1e6, to: one.to * 1e6, ink: one.kind, is_band: one.kind === "stick" }));
@@ -250,8 +199,9 @@ function show_trace(place, trace, file) {
     .map(([ink, text]) => h("li", {}, h("span", { class: `shade ink-${ink}` }), text)));
   place.replaceChildren(h("h2", {}, trace.fall.rows > 0 ? "The fall and the contact" : "The contact"), body.element, watch.element, key,
     h("div", { class: "two" }, ...plots.map((plot) => plot.element), ...loops.map((loop) => loop.element)),
-    h("p", {}, h("button", { type: "button", onclick: () => save_trace(trace, file) }, "Time histories as CSV"), " ",
-      h("span", { class: "weak" }, `${count(trace.rows)}${trace.rows < trace.head.instants ? ` of ${count(trace.head.instants)}` : ""} instants${trace.rows < trace.head.instants ? ", evenly chosen" : ""}, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
+    h("p", {}, h("button", { type: "button", onclick: () => save_trace(trace, `${name}.csv`) }, "Time histories as CSV"), " ",
+      h("button", { type: "button", onclick: async () => save_file(`${name}.png`, await png_of([...plots, ...loops].map((plot) => plot.figure()))) }, "Plots as PNG"), " ",
+      h("span", { class: "weak" }, `${count(trace.rows)}${trace.rows < trace.head.instants ? ` of ${count(trace.head.instants)}` : ""} instants${trace.rows < trace.head.instants ? ", evenly chosen, and the extremes of the forces" : ""}, solved again by ${trace.head.worker}, solver ${trace.head.solver_version}, ${trace.head.instruction_set}.`)));
   watch.begin();
   return [...all, body, watch];
 }

@@ -2,9 +2,8 @@
 // The time histories of a point, column by column.
 import { numbers, Silence } from "/server.js";
 
-const kAskAgain_ms = 300;
 /** After it was refused for what may change: no worker, too many who wait, no answer. */
-const kRefusedAgain_ms = 3000;
+const kAskAgain_ms = 3000;
 
 /**
  * @typedef {{from: number, to: number, kind: "stick" | "compression" | "restitution"}} Interval
@@ -28,23 +27,19 @@ const is_for_now = (error) => error instanceof Silence || error.status === 409 |
 
 /**
  * Waits until a worker has solved it again.
- * @param {(ask: (study: number) => Promise<any>) => Promise<any>} of_study asks the study that has the point
- * @param {number} point @param {AbortSignal} signal @param {(text: string, is_bad: boolean) => void} say
+ * @param {number} study @param {number} point @param {AbortSignal} signal @param {(text: string, is_bad: boolean) => void} say
  * @returns {Promise<Trace>}
  */
-export async function trace_of(of_study, point, signal, say) {
+export async function trace_of(study, point, signal, say) {
+  say("Waiting for a worker, or for it to solve this point again.", false);
   for (;;) {
-    let pause_ms = kAskAgain_ms;
     try {
-      const answer = await of_study((study) => numbers(`/api/studies/${study}/points/${point}/trace?shape=1&fall=1`, signal));
-      if (answer) return taken_apart(answer);
-      say("A worker is waited for, or solves this point again.", false);
+      return taken_apart(await numbers(`/api/studies/${study}/points/${point}/trace?shape=1&fall=1`, signal));
     } catch (error) {
       if (signal.aborted || !is_for_now(error)) throw error;
       say(`No time histories yet: ${/** @type {Error} */ (error).message.replace(/\.$/, "")}. They are asked for again.`, true);
-      pause_ms = kRefusedAgain_ms;
     }
-    await new Promise((go_on) => setTimeout(go_on, pause_ms));
+    await new Promise((go_on) => setTimeout(go_on, kAskAgain_ms));
     signal.throwIfAborted();
   }
 }

@@ -2,7 +2,7 @@
 // The cell or point that is chosen in a picture: spoken, marked in the table, opened.
 import { h } from "/parts/dom.js";
 import { count } from "/parts/format.js";
-import { step_of } from "./asked/dots.js";
+import { step_of } from "./pictures.js";
 import { sentence } from "./words.js";
 
 /** The number of the value that lies nearest. @param {Float64Array} values @param {number} value */
@@ -17,7 +17,7 @@ function nearest(values, value) {
 /** The cell of a point, where the picture shows it. @param {View} view @param {number} point @returns {[number, number] | null} */
 function cell_of(view, point) {
   const { picture } = view;
-  if (!picture || view.solving.is_on) return null;
+  if (!picture) return null;
   const i = picture.dots?.points.indexOf(point) ?? -1;
   if (picture.dots && i >= 0) return [step_of(picture.x, picture.dots.x[i], view.is("xlog") !== ""), step_of(picture.y, picture.dots.y[i], view.is("ylog") !== "")];
   if (!picture.head.x?.stride) return null;
@@ -30,16 +30,16 @@ function cell_of(view, point) {
   return null;
 }
 
-/** Where this picture has what was chosen in another one. @param {View} view @param {import("./asked/picture.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
+/** Where this picture has what was chosen in another one. @param {View} view @param {import("./pictures.js").Picture} picture @param {[number, number]} values @returns {[number, number] | null} */
 function cell_at(view, picture, values) {
-  // What is solved while somebody looks becomes finer, and bins are made anew: their cells lie near the others'.
-  const may_be_near = view.solving.is_on || picture.x.edges !== undefined;
+  // Bins are made anew: their cells lie near the others'.
+  const may_be_near = picture.x.edges !== undefined;
   const cell = [picture.x, picture.y].map((side, i) => (may_be_near ? nearest(side.values, values[i]) : side.values.indexOf(values[i])));
   return cell.includes(-1) ? null : /** @type {[number, number]} */ (cell);
 }
 
-/** @param {string} address @param {number} point @param {string} text what is said beside it */
-const link_of = (address, point, text) => [h("a", { class: "button", href: address }, `Open point ${count(point)}`), h("span", { class: "weak" }, text)];
+/** @param {View} view @param {number} point @param {string} text what is said beside it */
+const link_of = (view, point, text) => [h("a", { class: "button", href: view.address_of(point) }, `Open point ${count(point)}`), h("span", { class: "weak" }, text)];
 
 /** @param {View} view */
 export function choice_of(view) {
@@ -61,8 +61,7 @@ export function choice_of(view) {
       const point = which ?? view.picture?.point(...cell) ?? null;
       line.replaceChildren();
       if (point === null) return;
-      line.replaceChildren(...link_of(view.address_of(point), point, " or press Enter, or click twice"));
-      if (view.solving.is_on) return;
+      line.replaceChildren(...link_of(view, point, " or press Enter, or click twice"));
       view.table.choose(point);
       view.set({ cell: String(point) });
     },
@@ -80,7 +79,7 @@ export function choice_of(view) {
         this.choose(cell, point);
       } else {
         place = null;
-        line.replaceChildren(...link_of(`#/study/${view.study.id}/point/${point}`, point, view.has_map ? " (this picture does not show it)" : ""));
+        line.replaceChildren(...link_of(view, point, view.has_map ? " (this picture does not show it)" : ""));
         view.set({ cell: String(point) });
       }
     },
@@ -95,7 +94,7 @@ export function choice_of(view) {
       if (cell) {
         map.choose(cell);
         this.choose(cell);
-      } else if (view.is("cell") && !view.solving.is_on) {
+      } else if (view.is("cell")) {
         const was = place;
         this.choose_point(Number(view.is("cell")));
         place ??= was;  // a finer one may show it again

@@ -2,8 +2,7 @@
 // Conditions of the query language: which points are looked at, and which are marked. Both stand in the address.
 import { h, named } from "/parts/dom.js";
 import { count } from "/parts/format.js";
-import { Silence } from "/server.js";
-import { rows } from "./asked/picture.js";
+import { rows, Silence } from "/server.js";
 
 /** All of them. @param {...string} conditions those that are empty say nothing */
 export function joined(...conditions) {
@@ -23,7 +22,7 @@ export function column_of(key) {
 }
 
 /** The number with the fewest digits between two. @param {number} a @param {number} b */
-export function short_between(a, b) {
+function short_between(a, b) {
   const [least, most] = [Math.min(a, b), Math.max(a, b)];
   for (let digits = 1; digits < 17; ++digits) {
     const tried = Number(((least + most) / 2).toPrecision(digits));
@@ -41,7 +40,7 @@ export function rounded(value, width) {
 
 /**
  * The part of a side that a rectangle spans, as a condition.
- * @param {import("./asked/picture.js").Side} side @param {number[]} cells first and last, any way round
+ * @param {import("./pictures.js").Side} side @param {number[]} cells first and last, any way round
  * @param {number[]} values where the rectangle ends
  */
 export function part_of(side, cells, values) {

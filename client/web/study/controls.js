@@ -2,7 +2,7 @@
 // What a picture is of: pickers, sliders, scales. A choice goes into the address, and from there into the picture.
 import { h, keep_focus, named, picker, tick } from "/parts/dom.js";
 import { count, heading, shown } from "/parts/format.js";
-import { axis_value, fill_in, unvaried, varying } from "./axes.js";
+import { axis_value, fill_in, varying } from "./axes.js";
 import { colour_controls } from "./drawn/legend.js";
 import { show_takeaways } from "./take.js";
 
@@ -14,17 +14,14 @@ export function show_controls(view) {
   const again = (/** @type {Record<string, string>} */ changes) => {
     // Another output is one of the same part.
     view.set({ ...changes, ...("z" in changes ? {} : { x0: "", x1: "", y0: "", y1: "", cell: "" }) }, true);
-    fill_in(view.fields, view.study, view.place.may_change);
+    fill_in(view.fields, view.study);
     view.place.keep(view.fields);
     view.choice.none();
     show_controls(view);
     view.load();
     view.table.load();
   };
-  const others = view.place.may_change ? unvaried(view.study, view.block) : [];
-  const is_other = (/** @type {string} */ key) => others.some((one) => one.key === key);
-  const may_map = view.grids.some((/** @type {any} */ g) => varying(g.b).length > 1)
-    || (view.place.may_change && view.study.blocks.some((/** @type {any} */ b) => b.kind === "grid"));
+  const may_map = view.grids.some((/** @type {any} */ g) => varying(g.b).length > 1);
   const kinds = [...(may_map ? [["map", "map"]] : []),
     ...(view.grids.length > 0 ? [["lines", "lines"]] : []), ["gathered", "scatter"], ["histogram", "histogram"]];
   const on_grid = kind === "map" || kind === "lines";
@@ -32,7 +29,7 @@ export function show_controls(view) {
     : view.numbers.map((c) => [c.name, heading(c.name, c.unit)]);
   const outputs = view.columns.filter((c) => c.picture === "numbers" || (kind === "map" && c.picture === "categories"))
     .map((c) => [c.name, heading(c.name, c.unit)]);
-  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, ...(is_other(view.is("x")) || (on_grid && pic === "histogram") ? { x: "" } : {}), y: "", from: "", to: "" })))];
+  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, ...(on_grid && pic === "histogram" ? { x: "" } : {}), y: "", from: "", to: "" })))];
   if (kind !== "histogram") {
     parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "none"], ...outputs] : outputs, view.is("z"), (z) => {
       if (z === "") view.fields.set("z", "");
@@ -43,11 +40,9 @@ export function show_controls(view) {
     parts.push(named("block", picker(view.grids.map((/** @type {any} */ g) => [String(g.i), `${g.i + 1}: ${varying(g.b).map((a) => `${a.values} ${a.key}`).join(" × ")}`]),
       view.is("block"), (block) => again({ block, at: "" }))));
   }
-  const asked = kind === "map" ? others.map((one) => [one.key, heading(one.key, one.unit)]) : [];
-  const axis_picker = (/** @type {string[][]} */ own, /** @type {string} */ name, /** @type {(key: string) => void} */ take) => with_others(own, asked, picker([...own, ...asked], view.is(name), take));
-  parts.push(named(kind === "histogram" ? "of" : "across", axis_picker(axes, "x", (x) => again({ x, ...(x === view.is("y") ? { y: on_grid ? view.is("x") : "" } : {}) }))));
-  if (kind !== "histogram" && axes.length + asked.length > 1) {
-    parts.push(named(kind === "lines" ? "a line for each" : "upwards", axis_picker(kind === "lines" ? [["", "none"], ...axes.filter(([k]) => k !== view.is("x"))] : axes, "y",
+  parts.push(named(kind === "histogram" ? "of" : "across", picker(axes, view.is("x"), (x) => again({ x, ...(x === view.is("y") ? { y: on_grid ? view.is("x") : "" } : {}) }))));
+  if (kind !== "histogram" && axes.length > 1) {
+    parts.push(named(kind === "lines" ? "a line for each" : "upwards", picker(kind === "lines" ? [["", "none"], ...axes.filter(([k]) => k !== view.is("x"))] : axes, view.is("y"),
       (y) => again({ y, ...(y === view.is("x") ? { x: view.is("y") } : {}) }))));
   }
   const redraw = (/** @type {Record<string, string>} */ changes) => {
@@ -76,14 +71,6 @@ export function show_controls(view) {
       show_takeaways(view);
     })] : [];
   keep_focus(view.colour_row, () => view.colour_row.replaceChildren(...colours));
-}
-
-/** Below the axes that a study has those that it lacks. @param {string[][]} own @param {string[][]} others @param {HTMLSelectElement} made of both */
-function with_others(own, others, made) {
-  const { value } = made;
-  if (others.length > 0) made.append(h("optgroup", { label: "not in this study: solved here" }, ...[...made.options].slice(own.length)));
-  made.value = value;
-  return made;
 }
 
 /** At which values the other axes are held. @param {View} view @param {boolean} on_grid */

@@ -2,32 +2,50 @@
 // What is drawn of a picture: a map or points on a canvas, lines, bars; with what colours mean and how much is shown.
 import { h, keep_focus } from "/parts/dom.js";
 import { palette } from "/parts/colours.js";
-import { has_span, span_of } from "./command.js";
+import { shown } from "/parts/format.js";
+import { has_span, span_of } from "./take.js";
 import { part_of } from "./conditions.js";
 import { categories, colour_bar, gaps } from "./drawn/legend.js";
 import { facts } from "./words.js";
 
 /**
  * @typedef {import("./study.js").StudyView} View
- * @typedef {import("./asked/picture.js").Picture} Picture
+ * @typedef {import("./pictures.js").Picture} Picture
  */
+
+/** In which order values lie along an axis. @param {Picture} picture */
+const order_of = (picture) => Array.from(picture.x.values.keys()).sort((a, b) => picture.x.values[a] - picture.x.values[b]);
+
+/** A picture as lines or bars, with what is done with a part that is marked or zoomed into. @param {View} view @param {Picture} picture @returns {import("/parts/lines.js").Lines} */
+function lines_of(view, picture) {
+  const { x, y, z } = picture;
+  const as_bars = view.is("pic") === "histogram";
+  const y_log = view.is("ylog") !== "" && !as_bars;
+  const order = order_of(picture);
+  const unit = y.unit && y.unit !== "1" ? ` ${y.unit}` : "";
+  const series = Array.from(y.values.keys()).map((row) => ({
+    label: as_bars ? "all" : y.name ? `${y.name} = ${shown(y.values[row])}${unit}` : z.name,
+    values: order.map((i) => {
+      const value = as_bars ? picture.head.counts[i] : picture.values[row * x.values.length + i];
+      return Number.isFinite(value) && !(y_log && value <= 0) ? value : null;
+    }) }));
+  const counts = view.marking.marks?.counts ?? (view.is("mark") ? [] : null);
+  if (as_bars && counts) series.push({ label: "marked", values: order.map((i) => counts[i] ?? 0) });
+  const xs = order.map((i) => x.values[i]);
+  const ends = x.edges ? [x.edges[0], x.edges[x.edges.length - 1]] : [xs[0], xs[xs.length - 1]];
+  return { title: as_bars ? `How often values of ${x.name} are met` : `${z.name} over ${x.name}`,
+    x: { name: x.name, unit: x.unit, values: xs, is_log: view.is("xlog") !== "" && xs[0] > 0, ends, edges: x.edges },
+    y: { name: as_bars ? "points" : z.name, unit: as_bars ? "" : z.unit, is_log: y_log, ends: !as_bars && has_span(view) ? span_of(view, picture) : undefined },
+    series, as_bars, drag_marks: view.is("drag") === "mark", height: 380, zoomed: (part) => view.zoom_lines(part),
+    brushed: (part, is_further = false) => (as_bars ? view.marking.mark(part ? part_of(x, [], part.x) : "", is_further)
+      : view.marking.mark_lines(part, is_further)) };
+}
 
 /** Colours and scales of a map. @param {View} view @param {Picture} picture @returns {import("./drawn/map.js").Look} */
 function look_of(view, picture) {
   const [from, to] = span_of(view, picture);
   return { colours: palette(), from, to, z_log: view.is("zlog") !== "" && from > 0,
     x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "" };
-}
-
-/** Scales of lines or bars, and what hands do with them. @param {View} view @param {Picture} picture @returns {import("./drawn/drawn_lines.js").How} */
-function how_of(view, picture) {
-  const as_bars = view.is("pic") === "histogram";
-  return { as_bars, x_log: view.is("xlog") !== "", y_log: view.is("ylog") !== "", drag_marks: view.is("drag") === "mark",
-    counts: view.marking.marks?.counts ?? (view.is("mark") ? [] : null),
-    y_ends: !as_bars && has_span(view) ? span_of(view, picture) : undefined,
-    zoomed: (part) => view.zoom_lines(part),
-    brushed: (part, is_further = false) => (as_bars ? view.marking.mark(part ? part_of(picture.x, [], part.x) : "", is_further)
-      : view.marking.mark_lines(part, is_further)) };
 }
 
 /** That no value has a colour of its own, where it is so. @param {View} view @param {Picture} picture */
@@ -52,36 +70,40 @@ export function drawing_of(view) {
   const lines_place = h("div", {});
   const legend = h("div", { class: "colours" });
   const said = h("span", {});
-  /** What is solved meanwhile. */
-  const coming = h("span", {});
   /** What stands while a part is shown. */
   const part = h("span", {}, " A part is shown. ", h("button", { type: "button", onclick: () => view.zoom(null) }, "Show all"));
-  const told = h("p", { class: "weak facts" }, said, coming);
-  /** @type {any} */
-  let lines = null;
+  const told = h("p", { class: "weak facts" }, said);
+  /** Lines or bars. @type {any} */
+  let plot = null;
   let turn = 0;
 
   function end() {
     ++turn;
-    lines?.close();
-    lines = null;
+    plot?.close();
+    plot = null;
     lines_place.replaceChildren();
   }
   /** @param {Picture} picture */
   async function draw_lines(picture) {
     const mine = ++turn;
-    const how = how_of(view, picture);
-    const { drawn_lines } = await import("./drawn/drawn_lines.js");
+    const { line_plot } = await import("/parts/lines.js");
     if (mine !== turn) return;
+    const lines = lines_of(view, picture);
     // The same plot stays under the hands that are at it.
-    if (!lines?.update(picture, how)) {
-      const hands = lines?.hands;
-      lines?.close();
-      lines = drawn_lines(picture, how);
-      lines_place.replaceChildren(lines.element);
-      if (hands) lines.go_on(hands);
+    if (!plot?.update(lines)) {
+      const hands = plot?.hands;
+      plot?.close();
+      plot = line_plot(lines);
+      lines_place.replaceChildren(plot.element);
+      if (hands) plot.go_on(hands);
     }
-    if (!how.as_bars) lines.mark(view.marking.marks);
+    if (!lines.as_bars) mark_lines(picture);
+  }
+  /** @param {Picture} picture */
+  function mark_lines(picture) {
+    const { marks } = view.marking;
+    const nx = picture.x.values.length;
+    plot?.mark(marks && Array.from(picture.y.values.keys()).map((row) => order_of(picture).map((i) => marks.cells[row * nx + i])));
   }
   return { lines_place, legend, told, end,
     /** By the colours and scales that the address says. */
@@ -102,14 +124,16 @@ export function drawing_of(view) {
       if (!is_part) part.remove();
       else if (!part.isConnected) told.append(part);
     },
-    /** Cells finer than these are on their way. @param {number} side cells a side; 0: none @param {number} share of them that is solved */
-    tell_coming(side, share) {
-      coming.textContent = side > 0 ? ` ${side} × ${side} are being solved: ${Math.floor(100 * share)} %.` : "";
+    /** The picture as it is drawn, with what colours and lines mean. @returns {import("/parts/png.js").Figure | null} null: it is not drawn yet */
+    figure() {
+      const title = view.study.name;
+      if (view.has_map) return { title, canvas: view.map.base, legend };
+      return plot && { ...plot.figure(), title: `${title}: ${plot.figure().title}` };
     },
     /** Only what is marked is another. */
     mark() {
       if (view.has_map) view.map.mark(view.marking.marks);
       else if (view.is("pic") === "histogram" && view.picture) draw_lines(view.picture);
-      else lines?.mark(view.marking.marks);
+      else if (view.picture) mark_lines(view.picture);
     } };
 }

@@ -1,10 +1,10 @@
 // @ts-check
 // Conditions that change, and what is marked: by a rectangle over a picture or in words, the same points in all of them.
-import { ask_marks } from "./asked/question.js";
+import { ask_marks } from "./pictures.js";
 import { column_of, joined, part_of, rounded, within } from "./conditions.js";
 import { show_takeaways } from "./take.js";
 
-/** @typedef {import("./asked/picture.js").Picture} Picture */
+/** @typedef {import("./pictures.js").Picture} Picture */
 
 /** A picture shows some of the other axes' values: what is marked is what is seen. @param {any[]} blocks of the study @param {Picture} picture @param {string[]} parts of it */
 function condition_of(blocks, picture, parts) {
@@ -14,7 +14,7 @@ function condition_of(blocks, picture, parts) {
   return joined(...parts, ...held, ...of_block) || `${column_of(picture.x.name)} IS NOT NULL`;
 }
 
-/** What is seen in a rectangle over a map. @param {Picture} picture @param {import("./drawn/brush.js").Rectangle} part */
+/** What is seen in a rectangle over a map. @param {Picture} picture @param {import("./drawn/map.js").Rectangle} part */
 const parts_of_map = ({ x, y }, { from, to, x: across, y: upwards }) => [part_of(x, [from[0], to[0]], across), part_of(y, [from[1], to[1]], upwards)];
 
 /** What is seen of lines in a span of the axis, and of the output where it does not go from below to above; null: no value. @param {Picture} picture @param {import("/parts/lines.js").Part} part */
@@ -31,7 +31,7 @@ function parts_of_lines(picture, part) {
 export function marking_of(view) {
   /** @type {AbortController | null} */
   let asked = null;
-  /** @type {import("./asked/question.js").Marks | null} */
+  /** @type {import("./pictures.js").Marks | null} */
   let marks = null;
 
   /** A step that people go back over. @param {Record<string, string>} conditions where and mark @param {boolean} [is_further] the rectangle of the last step grows */
@@ -55,7 +55,7 @@ export function marking_of(view) {
     if (!picture || (condition === "" && !marks)) return;
     const { signal } = asked = new AbortController();
     try {
-      const found = condition && !view.solving.is_on ? await ask_marks(view, picture, condition, signal) : null;
+      const found = condition ? await ask_marks(view, picture, condition, signal) : null;
       if (signal.aborted || picture !== view.picture) return;
       marks = found;
       view.drawing.mark();
@@ -82,7 +82,7 @@ export function marking_of(view) {
       asked?.abort();
       marks = null;
     },
-    /** @param {import("./drawn/brush.js").Rectangle | null} part of the map; null: nothing @param {boolean} [is_further] keys go on with it */
+    /** @param {import("./drawn/map.js").Rectangle | null} part of the map; null: nothing @param {boolean} [is_further] keys go on with it */
     mark_part(part, is_further = false) {
       mark_seen(part && view.picture && parts_of_map(view.picture, part), is_further);
     },

@@ -2,7 +2,7 @@
 // How far a study is, and what may be done with it.
 import { h } from "/parts/dom.js";
 import { count } from "/parts/format.js";
-import { json } from "/server.js";
+import { json, rows } from "/server.js";
 import { completed, kFailed, progress_of, study_buttons } from "/overview.js";
 
 /** Of a study that events do not tell of. */
@@ -32,8 +32,8 @@ function failure_line(view) {
       if (failed === 0) asked = "";
       if (failed === 0 || stands === asked) return;
       asked = stands;
-      const first = await json(`/api/studies/${id}`).then((study) => study.first_failure, () => null);
-      if (first && stands === asked) why.textContent = `Point ${count(first.point)} failed: ${first.error}${/[.?!]$/.test(first.error) ? "" : "."}`;
+      const first = await rows(id, { select: "point,error", where: kFailed, order: "point", limit: 1 }).then((told) => told.rows[0], () => null);
+      if (first && stands === asked) why.textContent = `Point ${count(first[0])} failed: ${first[1]}${/[.?!]$/.test(first[1]) ? "" : "."}`;
       else if (stands === asked) asked = ""; // with the next that is told
     } };
 }

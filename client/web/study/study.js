@@ -2,7 +2,7 @@
 // A study: what its address says, the picture, and what belongs to it.
 import { h } from "/parts/dom.js";
 import { in_words, json, Silence } from "/server.js";
-import { ask, steps_to } from "./asked/question.js";
+import { ask, steps_to } from "./pictures.js";
 import { fill_in, varying } from "./axes.js";
 import { choice_of } from "./choice.js";
 import { condition_fields, rounded } from "./conditions.js";
@@ -10,7 +10,7 @@ import { show_controls } from "./controls.js";
 import { drawing_of } from "./drawing.js";
 import { MapCanvas } from "./drawn/map.js";
 import { marking_of } from "./marking.js";
-import { solving_panel } from "./solving/panel.js";
+import { refine_row } from "./refine.js";
 import { standing_row } from "./standing.js";
 import { row_table } from "./table.js";
 import { show_takeaways } from "./take.js";
@@ -19,7 +19,7 @@ const kLookAgain_ms = 1500;
 /** After the server did not answer. */
 const kAskAgain_ms = 3000;
 
-/** @typedef {import("./asked/picture.js").Picture} Picture */
+/** @typedef {import("./pictures.js").Picture} Picture */
 
 /**
  * @param {HTMLElement} root @param {import("/main.js").Place} place @param {number} id
@@ -58,7 +58,7 @@ export class StudyView {
     this.is_refreshing = false;
     this.has_moved = false;
     this.is_closed = false;
-    fill_in(this.fields, this.study, place.may_change);
+    fill_in(this.fields, this.study);
   }
 
   is(/** @type {string} */ name) {
@@ -78,14 +78,9 @@ export class StudyView {
   get has_map() {
     return this.is("pic") === "map" || this.is("pic") === "gathered";
   }
-  /** Where a point of the picture is looked at: one that lies between those of the study has the view with it. @param {number} point */
+  /** @param {number} point */
   address_of(point) {
-    const own = `#/study/${this.study.id}/point/${point}`;
-    if (!this.solving.is_on) return own;
-    const fields = new URLSearchParams(this.fields);
-    fields.delete("cell");
-    fields.set("side", String(this.solving.side));
-    return `${own}?${fields}`;
+    return `#/study/${this.study.id}/point/${point}`;
   }
   /** Numbers of the values at which the other axes are held. @returns {Map<string, number>} */
   places() {
@@ -114,7 +109,7 @@ export class StudyView {
     this.drawing = drawing_of(this);
     this.marking = marking_of(this);
     this.choice = choice_of(this);
-    this.solving = solving_panel(this);
+    this.refine = refine_row(this);
     this.table = row_table({ study: this.study.id, points: this.study.points, columns: () => this.row_columns(),
       where: () => this.is("where"), marked: () => this.is("mark"),
       all: () => this.is("all") !== "", keep_all: (all) => {
@@ -129,7 +124,7 @@ export class StudyView {
     this.root.append(h("h2", { class: "name" }, this.study.name), this.standing.element, this.said, this.conditions.element,
       h("div", { class: "beside" },
         h("section", { class: "picture", "aria-label": "Picture" }, this.controls, this.sliders, this.map.element, this.drawing.lines_place,
-          this.choice.spoken, this.choice.line, this.solving.element, this.drawing.legend, this.colour_row, this.drawing.told),
+          this.choice.spoken, this.choice.line, this.refine.element, this.drawing.legend, this.colour_row, this.drawing.told),
         this.table.element),
       h("section", {}, h("h2", {}, "Take it with you"), this.commands));
     show_controls(this);
@@ -142,7 +137,7 @@ export class StudyView {
   /** Another view of the same study, as by the browser's Back. @param {URLSearchParams} fields */
   go_to(fields) {
     this.fields = fields;
-    fill_in(this.fields, this.study, this.place.may_change);
+    fill_in(this.fields, this.study);
     this.say("");
     this.map.let_drag(this.is("drag") === "mark" ? "mark" : "zoom");
     this.choice.none();
@@ -152,21 +147,9 @@ export class StudyView {
     this.conditions.tell();
   }
 
-  /** The study itself, over axes that it has. @param {boolean} is_step that people go back over */
-  show_own(is_step) {
-    const own = varying(this.block).map((axis) => axis.key);
-    const is_own = own.includes(this.is("x")) && own.includes(this.is("y"));
-    this.set({ between: "", cell: "", ...(is_own ? {} : { x: "", y: "", x0: "", x1: "", y0: "", y1: "", pic: own.length > 1 ? "map" : "" }) }, is_step);
-    fill_in(this.fields, this.study, this.place.may_change);
-    this.set({});
-    this.choice.none();
-    show_controls(this);
-  }
-
   close() {
     this.is_closed = true;
     this.standing.close();
-    this.solving.end();
     this.stop_asking();
     this.table.close();
     this.conditions.close();
@@ -195,7 +178,7 @@ export class StudyView {
 
   /** Points were solved since. Where answers take longer than points one refresh ends before the next begins, or none would end. */
   #look_again() {
-    if (this.is_closed || this.solving.is_on) return;
+    if (this.is_closed) return;
     this.has_moved = true;
     if (this.later || this.is_refreshing) return;
     this.later = setTimeout(async () => {
@@ -252,11 +235,6 @@ export class StudyView {
    * would never end. Only the last of what is asked for meanwhile comes.
    */
   async load(waits = false) {
-    if (this.is("between")) {
-      this.solving.go_on();
-      return;
-    }
-    this.solving.end();
     if (this.asked) {
       this.wants_more = true;
       if (!waits) this.asked.abort();
@@ -271,7 +249,6 @@ export class StudyView {
         if (this.wants_more) break;  // the finer one would not be seen
         const picture = await ask(this, cells, signal);
         if (signal.aborted) break;
-        if (this.solving.is_on) return;
         this.loaded_ms = performance.now();
         this.show(picture, kind);
         this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
@@ -298,25 +275,19 @@ export class StudyView {
     this.choice.again();
     if (this.wants_focus && this.has_map) this.map.top.focus({ preventScroll: true });
     this.wants_focus = false;
-    this.solving.offer();
+    this.refine.offer();
     this.marked = this.marking.load();
     show_takeaways(this);
   }
 
-  /** @param {import("./drawn/brush.js").Rectangle | null} part */
+  /** @param {import("./drawn/map.js").Rectangle | null} part */
   zoom(part) {
     const { picture } = this;
     if (!picture) return;
-    if (this.solving.is_on && part) {
-      this.solving.solve(part);
-      return;
-    }
     if (!part) {
-      this.set({ x0: "", x1: "", y0: "", y1: "", between: "", ...(this.is("pic") === "lines" ? { from: "", to: "" } : {}) }, true);
-      fill_in(this.fields, this.study, this.place.may_change);  // axes that the study lacks have ends to begin with
-      this.set({});
+      this.set({ x0: "", x1: "", y0: "", y1: "", ...(this.is("pic") === "lines" ? { from: "", to: "" } : {}) }, true);
     } else {
-      const ends = (/** @type {import("./asked/picture.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
+      const ends = (/** @type {import("./pictures.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
         ? values : cells.map((i) => side.numbers?.[i] ?? 0)).sort((a, b) => a - b).map(String);
       const [x0, x1] = ends(picture.x, [part.from[0], part.to[0]], part.x);
       const [y0, y1] = ends(picture.y, [part.from[1], part.to[1]], part.y);

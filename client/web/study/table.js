@@ -1,10 +1,8 @@
 // @ts-check
 // Rows of a study, a page at a time.
 import { h, keep_focus, tick } from "/parts/dom.js";
-import { file_link, file_sayer } from "/parts/file_link.js";
 import { count, heading, shown } from "/parts/format.js";
-import { Silence } from "/server.js";
-import { rows, rows_path } from "./asked/picture.js";
+import { rows, rows_path, Silence } from "/server.js";
 import { joined } from "./conditions.js";
 
 const kPage = 25;
@@ -73,15 +71,14 @@ class RowTable {
     this.table = h("table", {}, h("caption", { class: "unseen" }, "Points of the study"));
     this.back = h("button", { type: "button", onclick: () => this.#turn(-1) }, "Previous");
     this.next = h("button", { type: "button", onclick: () => this.#turn(1) }, "Next");
-    const { said, say } = file_sayer();
-    this.file = file_link("Table as CSV", "rows.csv", "", say);
+    this.file = h("a", { class: "button", download: "rows.csv" }, "Table as CSV");
     this.only = h("div", { class: "only" }, tick("marked points only", true, (is) => {
       of.keep_all(!is);
       this.begin();
     }));
     this.element = h("section", { class: "rows" }, h("h2", {}, "Points"), this.only,
       h("div", { class: "scroll", tabIndex: 0, role: "region", "aria-label": "Points" }, this.table),
-      h("div", { class: "row" }, this.back, this.next, this.file, said), this.said);
+      h("div", { class: "row" }, this.back, this.next, this.file), this.said);
   }
 
   /** Which points are shown. */

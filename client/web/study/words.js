@@ -1,9 +1,9 @@
 // @ts-check
 // Pictures in words and numbers.
 import { count, csv_line, shown, with_unit } from "/parts/format.js";
-import { kMostDots } from "./asked/dots.js";
+import { kMostDots } from "./pictures.js";
 
-/** @typedef {import("./asked/picture.js").Picture} Picture */
+/** @typedef {import("./pictures.js").Picture} Picture */
 
 const many = (/** @type {number} */ n, /** @type {string} */ what) => `${count(n)} ${what}${n === 1 ? "" : "s"}`;
 
@@ -17,8 +17,8 @@ export function facts(picture, kind, study, unit_of) {
     for (const [side, told] of [[picture.x, picture.head.x], [picture.y, picture.head.y]]) {
       if (whole(side, told)) parts.push(`Of ${count(told.last - told.first + 1)} values of ${side.name}, ${count(side.values.length)} are shown, evenly chosen${kind === "lines" ? "" : ": zoom in for the others"}.`);
     }
-    if (blocks > 1 && picture.head.study === study.id) parts.push(`Block ${picture.head.block + 1} of ${count(blocks)}; not shown: ${many(study.numbers - study.blocks[picture.head.block].points, "point")} of the others.`);
-    for (const one of picture.held ?? picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${with_unit(one.value, unit_of(one.key))}.`);
+    if (blocks > 1) parts.push(`Block ${picture.head.block + 1} of ${count(blocks)}; not shown: ${many(study.points - study.blocks[picture.head.block].points, "point")} of the others.`);
+    for (const one of picture.head.at.filter((/** @type {any} */ a) => a.of > 1)) parts.push(`${one.key} = ${with_unit(one.value, unit_of(one.key))}.`);
   } else if (picture.dots) {
     parts.push(`${many(picture.head.points, "point")}, each drawn.`);
     if (picture.head.without > 0) parts.push(`${many(picture.head.without, "other")} without values that can be shown.`);
@@ -56,7 +56,7 @@ export function cells_csv(picture) {
   return lines.join("\r\n") + "\r\n";
 }
 
-/** @param {Picture} picture @param {import("./asked/picture.js").Dots} dots */
+/** @param {Picture} picture @param {import("./pictures.js").Dots} dots */
 function dots_csv(picture, dots) {
   const lines = [["point", picture.x.name, picture.y.name, ...(dots.z ? [picture.z.name] : [])].join(",")];
   dots.points.forEach((point, i) => lines.push([point, dots.x[i], dots.y[i], ...(dots.z ? [dots.z[i] ?? ""] : [])].join(",")));

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -11,7 +12,7 @@
 
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::server {
@@ -64,7 +65,8 @@ struct BinSide {
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
   /// Sets the ends that the user did not give to those of `range`, the range of the column; it is
-  /// empty if no row has a value. Throws std::invalid_argument for wrong ends.
+  /// empty if no row has a value. Equal ends make one bin. Throws std::invalid_argument for wrong
+  /// ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
     most = typed_most.value_or(range ? range->second : least);
@@ -73,6 +75,7 @@ struct BinSide {
       throw std::invalid_argument(fmt::format(
           "{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
     }
+    bins = most > least ? bins : 1;
   }
   ordered_json json() const {
     return {{"column", column.name}, {"unit", column.unit}, {"least", least},
@@ -94,116 +97,134 @@ BinSide side_of(const FieldReader& fields, const std::string& name) {
           fields.number(name + "1")};
 }
 
-struct Bins {
-  std::vector<std::uint32_t> counts;
-  std::vector<float> means;  ///< of the third column
-  std::uint64_t outside = 0;
+class BinsAnswer : public StudyAnswer {
+ public:
+  explicit BinsAnswer(const Fields& asked);
+
+  Next next(const ServedStudy& study) override;
+  void take_row(const protocol::ChunkRows& row) override;
+
+ private:
+  protocol::StudyQuery query() const;
+  protocol::StudyQuery ends_query() const;
+  protocol::StudyQuery counts_query();
+  void take_ends(const protocol::ChunkRows& row);
+  HttpAnswer answer(std::uint64_t study) const;
+
+  std::vector<BinSide> sides_;
+  std::optional<PictureColumn> z_;  // whose mean is requested
+  bool has_ends_ = false;
+  std::vector<std::uint32_t> counts_;  // empty while the ends are read
+  std::vector<float> means_;
+  std::uint64_t outside_ = 0;
 };
 
+BinsAnswer::BinsAnswer(const Fields& asked) : StudyAnswer(FieldReader(asked).condition()) {
+  const FieldReader fields(asked);
+  sides_.push_back(side_of(fields, "x"));
+  if (fields.text("y")) {
+    sides_.push_back(side_of(fields, "y"));
+  }
+  if (fields.text("z")) {
+    z_ = picture_column(fields, "z", false);
+  }
+}
+
+StudyAnswer::Next BinsAnswer::next(const ServedStudy& study) {
+  if (!std::exchange(has_ends_, true)) {
+    if (!std::ranges::all_of(sides_, &BinSide::has_typed_ends)) {
+      return ends_query();
+    }
+    std::ranges::for_each(sides_, [](BinSide& side) { side.set_ends(std::nullopt); });
+  }
+  return counts_.empty() ? Next(counts_query()) : Next(answer(study.id));
+}
+
 /// A query of the solved points that meet the condition and have a value on all sides.
-protocol::StudyQuery query_of(const ServedStudy& study, const std::string& condition,
-                              const std::vector<BinSide>& sides) {
-  protocol::StudyQuery query;
-  query.set_study(study.name);
+protocol::StudyQuery BinsAnswer::query() const {
   std::string where =
-      condition.empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition);
-  for (const BinSide& side : sides) {
+      condition().empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition());
+  for (const BinSide& side : sides_) {
     where += " AND " + side.has_place_sql();
   }
+  protocol::StudyQuery query;
   query.set_where(where);
   return query;
 }
 
-/// Sets the ends of the sides, by a query unless the user gave all of them.
-void find_ends(const JobContext& context, const ServedStudy& study, const std::string& condition,
-               std::vector<BinSide>& sides) {
-  if (std::ranges::all_of(sides, &BinSide::has_typed_ends)) {
-    std::ranges::for_each(sides, [](BinSide& side) { side.set_ends(std::nullopt); });
-    return;
-  }
-  protocol::StudyQuery query = query_of(study, condition, sides);
-  for (const BinSide& side : sides) {
+protocol::StudyQuery BinsAnswer::ends_query() const {
+  protocol::StudyQuery query = this->query();
+  for (const BinSide& side : sides_) {
     query.add_select(fmt::format("min({0}), max({0})", side.column.name));
   }
-  context.query(query, condition, [&](const protocol::ChunkRows& row) {
-    for (std::size_t i = 0; i < sides.size(); ++i) {
-      const protocol::Cell& least = row.cell(2 * i);
-      sides[i].set_ends(
-          least.kind == protocol::CellKind::kNull
-              ? std::nullopt
-              : std::optional(std::pair(real_of(least), real_of(row.cell(2 * i + 1)))));
-    }
-  });
+  return query;
 }
 
 /// Counts by a query with one row per bin. Rows beyond the ends have the bin NULL.
-Bins count_bins(const JobContext& context, const ServedStudy& study, const std::string& condition,
-                const std::vector<BinSide>& sides, const std::optional<PictureColumn>& z) {
+protocol::StudyQuery BinsAnswer::counts_query() {
   std::size_t size = 1;
   std::string bin;
   std::string is_inside;
-  for (const BinSide& side : sides) {
+  for (const BinSide& side : sides_) {
     bin += fmt::format("{}{} * {}", bin.empty() ? "" : " + ", size, side.bin_sql());
     is_inside += (is_inside.empty() ? "" : " AND ") + side.is_inside_sql();
     size *= side.bins;
   }
-  Bins bins{std::vector<std::uint32_t>(size),
-            std::vector<float>(z ? size : 0, std::numeric_limits<float>::quiet_NaN())};
-  protocol::StudyQuery query = query_of(study, condition, sides);
+  counts_.resize(size);
+  means_.resize(z_ ? size : 0, std::numeric_limits<float>::quiet_NaN());
+  protocol::StudyQuery query = this->query();
   query.add_select(fmt::format("CASE WHEN {} THEN {} END AS bin", is_inside, bin));
   query.add_select("count(*)");
-  if (z) {
-    query.add_select(fmt::format("avg({})", z->name));
+  if (z_) {
+    query.add_select(fmt::format("avg({})", z_->name));
   }
   query.set_group("bin");
-  context.query(query, condition, [&](const protocol::ChunkRows& row) {
-    const auto count = static_cast<std::uint64_t>(row.cell(1).integer);
-    if (row.cell(0).kind == protocol::CellKind::kNull) {
-      bins.outside = count;
-      return;
-    }
-    const auto place = static_cast<std::size_t>(row.cell(0).integer);
-    bins.counts.at(place) = static_cast<std::uint32_t>(count);
-    if (z && row.cell(2).kind != protocol::CellKind::kNull) {
-      bins.means[place] = static_cast<float>(real_of(row.cell(2)));
-    }
-  });
-  return bins;
+  return query;
 }
 
-HttpAnswer bins_answer(const JobContext& context, std::uint64_t id, const Fields& asked) {
-  const FieldReader fields(asked);
-  const std::string condition = fields.condition();
-  std::vector<BinSide> sides{side_of(fields, "x")};
-  if (fields.text("y")) {
-    sides.push_back(side_of(fields, "y"));
+void BinsAnswer::take_row(const protocol::ChunkRows& row) {
+  if (counts_.empty()) {
+    take_ends(row);
+    return;
   }
-  std::optional<PictureColumn> z;
-  if (fields.text("z")) {
-    z = picture_column(fields, "z", false);
+  const auto count = static_cast<std::uint64_t>(row.cell(1).integer);
+  if (row.cell(0).kind == protocol::CellKind::kNull) {
+    outside_ = count;
+    return;
   }
-  const ServedStudy study = context.study(id);
-  find_ends(context, study, condition, sides);
-  const Bins bins = count_bins(context, study, condition, sides, z);
-  std::string numbers(reinterpret_cast<const char*>(bins.counts.data()),
-                      bins.counts.size() * sizeof bins.counts[0]);
-  numbers.append(reinterpret_cast<const char*>(bins.means.data()),
-                 bins.means.size() * sizeof(float));
+  const auto place = static_cast<std::size_t>(row.cell(0).integer);
+  counts_.at(place) = static_cast<std::uint32_t>(count);
+  if (z_ && row.cell(2).kind != protocol::CellKind::kNull) {
+    means_[place] = static_cast<float>(real_of(row.cell(2)));
+  }
+}
+
+void BinsAnswer::take_ends(const protocol::ChunkRows& row) {
+  for (std::size_t i = 0; i < sides_.size(); ++i) {
+    const protocol::Cell& least = row.cell(2 * i);
+    sides_[i].set_ends(
+        least.kind == protocol::CellKind::kNull
+            ? std::nullopt
+            : std::optional(std::pair(real_of(least), real_of(row.cell(2 * i + 1)))));
+  }
+}
+
+HttpAnswer BinsAnswer::answer(std::uint64_t study) const {
   return numbers_answer(
-      {{"study", id},
-       {"x", sides[0].json()},
-       {"y", sides.size() > 1 ? sides[1].json() : ordered_json(nullptr)},
-       {"z", z ? ordered_json(z->name) : ordered_json(nullptr)},
-       {"points", std::accumulate(bins.counts.begin(), bins.counts.end(), std::uint64_t{0})},
-       {"outside", bins.outside},
-       {"most", *std::max_element(bins.counts.begin(), bins.counts.end())}},
-      numbers);
+      {{"study", study},
+       {"x", sides_[0].json()},
+       {"y", sides_.size() > 1 ? sides_[1].json() : ordered_json(nullptr)},
+       {"z", z_ ? ordered_json(z_->name) : ordered_json(nullptr)},
+       {"points", std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0})},
+       {"outside", outside_},
+       {"most", *std::ranges::max_element(counts_)}},
+      bytes_of(counts_) + bytes_of(means_));
 }
 
 }  // namespace
 
-AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields) {
-  return [study, fields](const JobContext& context) { return bins_answer(context, study, fields); };
+PendingAnswer bins_answer(ServiceClient& service, std::uint64_t study, const Fields& fields) {
+  return study_flow(service, study, std::make_unique<BinsAnswer>(fields));
 }
 
 }  // namespace oblique::server

@@ -13,7 +13,6 @@
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
-#include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
@@ -74,12 +73,8 @@ std::uint64_t FieldReader::cells(const std::string& name, std::uint64_t usual) c
 
 std::string FieldReader::condition() const {
   const std::string condition = text("where").value_or("");
-  try {
-    if (!condition.empty()) {
-      check_sql_part("--where", condition);
-    }
-  } catch (const solver::InputError& error) {
-    throw std::invalid_argument(error.what());
+  if (!condition.empty()) {
+    parse_request([&] { check_sql_part("--where", condition, SqlPart::kCondition); });
   }
   return condition;
 }

@@ -3,10 +3,13 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/wire/chunk.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 
@@ -36,6 +39,22 @@ class FieldReader {
  private:
   const Fields& fields_;
 };
+
+/// Calls `parse`; its solver::InputError becomes std::invalid_argument.
+template <typename Parse>
+auto parse_request(const Parse& parse) {
+  try {
+    return parse();
+  } catch (const solver::InputError& error) {
+    throw std::invalid_argument(error.what());
+  }
+}
+
+/// The bytes of numbers, for the end of `numbers_answer`.
+template <typename Number>
+std::string bytes_of(const std::vector<Number>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
+}
 
 /// The value of a cell that is an integer or a real number.
 double real_of(const protocol::Cell& cell);

@@ -1,22 +1,151 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <memory>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/blocks.h"
+#include "proto/text.h"
 #include "server/web/answers/fields.h"
-#include "server/web/answers/grid.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
 
 namespace oblique::server {
 namespace {
 
 using nlohmann::ordered_json;
+using protocol::AxisLayout;
+
+constexpr std::uint64_t kUsualCells = 256;
+
+/// The axis of that key; null if the block has no such axis with values of its own.
+const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key) {
+  const auto axis = std::ranges::find_if(axes, [key](const AxisLayout& layout) {
+    return layout.axis->key() == key && protocol::has_own_values(*layout.axis);
+  });
+  return axis == axes.end() ? nullptr : &*axis;
+}
+
+/// One side of a slice: the values of an axis that are shown.
+struct Side {
+  const AxisLayout* axis = nullptr;  ///< null: the slice is a line
+  std::uint64_t first = 0;           ///< number of the first value in the selected part
+  std::uint64_t last = 0;
+  std::vector<std::uint64_t> numbers = {0};  ///< numbers of the shown values, rising
+  std::vector<double> values = {};           ///< the shown values
+
+  std::uint64_t stride() const { return axis == nullptr ? 0 : axis->stride; }
+  ordered_json json() const {
+    if (axis == nullptr) {
+      return nullptr;
+    }
+    return {{"key", axis->axis->key()}, {"of", axis->values},
+            {"first", first},           {"last", last},
+            {"stride", stride()},       {"all_lines", numbers.size() == last - first + 1}};
+  }
+};
+
+/// Selects the values to show along the side `name`: all, or evenly spaced ones including both
+/// ends.
+Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::string& name) {
+  Side side{&axis};
+  side.first = fields.whole(name + "0").value_or(0);
+  side.last = std::min(fields.whole(name + "1").value_or(axis.values - 1), axis.values - 1);
+  if (side.first > side.last) {
+    throw std::invalid_argument(
+        fmt::format("{0}0 must be below {1}, the number of values of {2}, and at most {0}1", name,
+                    axis.values, axis.axis->key()));
+  }
+  const std::uint64_t steps_there = side.last - side.first;
+  const std::uint64_t shown = std::min(steps_there + 1, fields.cells("n" + name, kUsualCells));
+  const std::uint64_t steps = std::max<std::uint64_t>(shown - 1, 1);
+  side.numbers.clear();
+  for (std::uint64_t i = 0; i < shown; ++i) {
+    // Half is added to round to the nearest value.
+    side.numbers.push_back(side.first +
+                           (shown > 1 ? (2 * i * steps_there + steps) / (2 * steps) : 0));
+    side.values.push_back(protocol::axis_value(*axis.axis, side.numbers.back()));
+  }
+  return side;
+}
+
+/// Parses `at`: numbers of the values at which axes are held, by key.
+std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& axes,
+                                                 const std::string& at) {
+  std::map<std::string, std::uint64_t> held;
+  for (const std::string_view entry : protocol::split(at, ',')) {
+    const std::size_t mark = std::min(entry.find('@'), entry.size());
+    const std::string key(entry.substr(0, mark));
+    const Fields number{{"at", std::string(entry.substr(std::min(mark + 1, entry.size())))}};
+    const AxisLayout* const axis = find(axes, key);
+    if (axis == nullptr || !FieldReader(number).text("at")) {
+      throw std::invalid_argument(
+          fmt::format("at must be KEY@NUMBER of axes of the block, separated by commas; {} is none",
+                      protocol::excerpt(entry)));
+    }
+    held[key] = *FieldReader(number).whole("at");
+    if (held[key] >= axis->values) {
+      throw std::invalid_argument(
+          fmt::format("at: {} has the values 0 to {}", key, axis->values - 1));
+    }
+  }
+  return held;
+}
+
+/// A plane, or a line, through the points of a block whose axes multiply.
+struct Grid {
+  Grid(const protocol::PointTable& table, const FieldReader& fields);
+
+  std::uint64_t block;
+  std::vector<AxisLayout> axes;
+  Side x;
+  Side y;
+  ordered_json at = ordered_json::array();  ///< the axes that are held
+  std::uint64_t first_point;                ///< point of the first values of both axes
+};
+
+Grid::Grid(const protocol::PointTable& table, const FieldReader& fields)
+    : block(fields.whole("block").value_or(0)) {
+  const std::string x_key = fields.text("x").value_or("");
+  const std::string y_key = fields.text("y").value_or("");
+  const auto& blocks = table.recipe().blocks();
+  const auto number = static_cast<int>(std::min<std::uint64_t>(block, 1U << 30U));
+  if (number >= blocks.size() ||
+      protocol::block_kind(blocks[number]) != protocol::BlockKind::kProduct) {
+    throw std::invalid_argument(fmt::format(
+        "block must be the number of a block whose axes multiply, below {}", blocks.size()));
+  }
+  axes = protocol::layout_of(blocks[number]);
+  const AxisLayout* const x_axis = find(axes, x_key);
+  const AxisLayout* const y_axis = find(axes, y_key);
+  if (x_axis == nullptr || x_key == y_key || (!y_key.empty() && y_axis == nullptr)) {
+    throw std::invalid_argument(
+        fmt::format("x must be an axis of block {}, and y none or another one", block));
+  }
+  x = side_of(*x_axis, fields, "x");
+  if (y_axis != nullptr) {
+    y = side_of(*y_axis, fields, "y");
+  }
+  const std::string at_text = fields.text("at").value_or("");
+  auto held = at_text.empty() ? std::map<std::string, std::uint64_t>() : held_values(axes, at_text);
+  first_point = table.block(block).first_point;
+  for (const AxisLayout& axis : axes) {
+    if (&axis != x_axis && &axis != y_axis && protocol::has_own_values(*axis.axis)) {
+      const std::uint64_t value = held[axis.axis->key()];
+      at.push_back({{"key", axis.axis->key()},
+                    {"of", axis.values},
+                    {"number", value},
+                    {"value", protocol::axis_value(*axis.axis, value)}});
+      first_point += value * axis.stride;
+    }
+  }
+}
 
 /// Why a cell has no value. In numbers a mark is the NaN with the bits kNan + mark, in categories
 /// the code 0xffff - mark.
@@ -24,131 +153,152 @@ enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFilte
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// The cells of a picture, row by row.
-struct SliceCells {
-  std::vector<Mark> marks;
-  std::vector<float> numbers;                              ///< values of a column of numbers
-  std::map<std::string, std::vector<std::size_t>> places;  ///< of categories: cells by text
-};
-
-template <typename Number>
-void append(const std::vector<Number>& numbers, std::string& bytes) {
-  if (!numbers.empty()) {
-    bytes.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
-  }
-}
-
 /// The offset of the point number for each cell along a side, as a JSON array.
-std::string offsets_json(const GridSide& side, std::uint64_t first) {
+std::string offsets_json(const Side& side, std::uint64_t first) {
   std::vector<std::uint64_t> offsets;
   for (const std::uint64_t number : side.numbers) {
-    offsets.push_back(first + number * side.stride);
+    offsets.push_back(first + number * side.stride());
   }
   return fmt::format("[{}]", fmt::join(offsets, ","));
 }
 
+class SliceAnswer : public StudyAnswer {
+ public:
+  explicit SliceAnswer(Fields fields)
+      : StudyAnswer(FieldReader(fields).condition()),
+        fields_(std::move(fields)),
+        column_(picture_column(FieldReader(fields_), "z", true)) {}
+
+  Next next(const ServedStudy& study) override;
+  void take_row(const protocol::ChunkRows& row) override;
+
+ private:
+  void list_points();
+  protocol::StudyQuery query() const;
+  void mark_left_out(const ServedStudy& study);
+  HttpAnswer answer(std::uint64_t study) const;
+  std::vector<std::uint32_t> number_bits() const;
+  std::vector<std::uint16_t> codes(ordered_json& head) const;
+
+  const Fields fields_;
+  const PictureColumn column_;
+  std::optional<Grid> grid_;
+  std::vector<std::pair<std::uint64_t, std::size_t>> points_;  // and their cells, by rising point
+  std::size_t next_point_ = 0;  // index of the first one that can have the next row
+  std::vector<Mark> marks_;     // of the cells, row by row
+  std::vector<float> numbers_;  // the same, of a column of numbers
+  std::map<std::string, std::vector<std::size_t>> places_;  // of categories: cells by text
+};
+
+StudyAnswer::Next SliceAnswer::next(const ServedStudy& study) {
+  if (!grid_) {
+    grid_.emplace(*study.table, FieldReader(fields_));
+    list_points();
+    return query();
+  }
+  if (study.table->has_filter()) {
+    mark_left_out(study);
+  }
+  return answer(study.id);
+}
+
+void SliceAnswer::list_points() {
+  for (const std::uint64_t y : grid_->y.numbers) {
+    for (const std::uint64_t x : grid_->x.numbers) {
+      points_.emplace_back(grid_->first_point + x * grid_->x.stride() + y * grid_->y.stride(),
+                           points_.size());
+    }
+  }
+  std::sort(points_.begin(), points_.end());
+  marks_.resize(points_.size());
+  numbers_.resize(points_.size());
+}
+
 /// Selects point, value and mark of the cells that have a row. SQLite looks each point up by key.
-protocol::StudyQuery slice_query(const ServedStudy& study, const GridSlice& slice,
-                                 const std::string& column, const std::string& condition) {
+protocol::StudyQuery SliceAnswer::query() const {
   protocol::StudyQuery query;
-  query.set_study(study.name);
   query.add_select("point");
-  query.add_select(column);
+  query.add_select(column_.name);
   query.add_select(
       fmt::format("CASE {}WHEN error IS NOT NULL THEN {} WHEN {} IS NULL THEN {} ELSE {} END",
-                  condition.empty() ? ""
-                                    : fmt::format("WHEN ({}) IS NOT TRUE THEN {} ", condition,
-                                                  static_cast<int>(Mark::kFiltered)),
-                  static_cast<int>(Mark::kFailed), column, static_cast<int>(Mark::kNoValue),
+                  condition().empty() ? ""
+                                      : fmt::format("WHEN ({}) IS NOT TRUE THEN {} ", condition(),
+                                                    static_cast<int>(Mark::kFiltered)),
+                  static_cast<int>(Mark::kFailed), column_.name, static_cast<int>(Mark::kNoValue),
                   static_cast<int>(Mark::kHasValue)));
   query.set_where(fmt::format(
       "point IN (SELECT y.value + x.value FROM json_each('{}') AS y, json_each('{}') AS x)",
-      offsets_json(slice.y, slice.first_point), offsets_json(slice.x, 0)));
+      offsets_json(grid_->y, grid_->first_point), offsets_json(grid_->x, 0)));
   return query;
 }
 
-/// Point and cell of all cells, by rising point.
-std::vector<std::pair<std::uint64_t, std::size_t>> points_of(const GridSlice& slice) {
-  std::vector<std::pair<std::uint64_t, std::size_t>> points;
-  for (std::size_t row = 0; row < slice.y.numbers.size(); ++row) {
-    for (std::size_t column = 0; column < slice.x.numbers.size(); ++column) {
-      points.emplace_back(slice.point(column, row), points.size());
-    }
+void SliceAnswer::take_row(const protocol::ChunkRows& row) {
+  const auto point = static_cast<std::uint64_t>(row.cell(0).integer);
+  while (next_point_ < points_.size() && points_[next_point_].first < point) {
+    ++next_point_;
   }
-  std::sort(points.begin(), points.end());
-  return points;
+  if (next_point_ == points_.size() || points_[next_point_].first != point) {
+    throw std::runtime_error("a reader process returned another point than it was asked for");
+  }
+  const std::size_t cell = points_[next_point_].second;
+  marks_[cell] = static_cast<Mark>(row.cell(2).integer);
+  if (marks_[cell] == Mark::kHasValue && column_.is_category) {
+    places_[std::string(row.cell(1).text)].push_back(cell);
+  } else if (marks_[cell] == Mark::kHasValue) {
+    numbers_[cell] = static_cast<float>(real_of(row.cell(1)));
+  }
 }
 
-SliceCells read_cells(const JobContext& context, const ServedStudy& study, const GridSlice& slice,
-                      const PictureColumn& column, const std::string& condition) {
-  const auto points = points_of(slice);
-  SliceCells read{std::vector<Mark>(points.size()), std::vector<float>(points.size()), {}};
-  auto place = points.begin();
-  const auto take = [&](const protocol::ChunkRows& row) {
-    const auto point = static_cast<std::uint64_t>(row.cell(0).integer);
-    place =
-        std::find_if(place, points.end(), [&](const auto& each) { return each.first >= point; });
-    if (place == points.end() || place->first != point) {
-      throw std::runtime_error("a reader process returned another point than it was asked for");
-    }
-    const std::size_t cell = place->second;
-    read.marks[cell] = static_cast<Mark>(row.cell(2).integer);
-    if (read.marks[cell] == Mark::kHasValue && column.is_category) {
-      read.places[std::string(row.cell(1).text)].push_back(cell);
-    } else if (read.marks[cell] == Mark::kHasValue) {
-      read.numbers[cell] = static_cast<float>(real_of(row.cell(1)));
-    }
-  };
-  context.query(slice_query(study, slice, column.name, condition), condition, take);
-  if (study.table->has_filter()) {
-    for (const auto& [point, cell] : points) {
-      context.throw_if_over();  // evaluating filters may take long
-      if (read.marks[cell] == Mark::kNotSolved && study.leaves_out(point)) {
-        read.marks[cell] = Mark::kLeftOut;
-      }
+void SliceAnswer::mark_left_out(const ServedStudy& study) {
+  for (const auto& [point, cell] : points_) {
+    if (marks_[cell] == Mark::kNotSolved && study.leaves_out(point)) {
+      marks_[cell] = Mark::kLeftOut;
     }
   }
-  return read;
 }
 
-ordered_json side_json(const GridSide& side) {
-  if (side.key.empty()) {
-    return nullptr;
-  }
-  return {
-      {"key", side.key},       {"of", side.of},
-      {"first", side.first},   {"last", side.last},
-      {"stride", side.stride}, {"all_lines", side.numbers.size() == side.last - side.first + 1}};
+HttpAnswer SliceAnswer::answer(std::uint64_t study) const {
+  const auto count = [this](Mark mark) { return std::ranges::count(marks_, mark); };
+  ordered_json head{{"study", study},
+                    {"block", grid_->block},
+                    {"z",
+                     {{"name", column_.name},
+                      {"unit", column_.unit},
+                      {"kind", column_.is_category ? "categories" : "numbers"}}},
+                    {"x", grid_->x.json()},
+                    {"y", grid_->y.json()},
+                    {"at", grid_->at},
+                    {"nx", grid_->x.numbers.size()},
+                    {"ny", grid_->y.numbers.size()},
+                    {"first_point", grid_->first_point},
+                    {"solved", count(Mark::kHasValue) + count(Mark::kNoValue)},
+                    {"failed", count(Mark::kFailed)},
+                    {"left_out", count(Mark::kLeftOut)},
+                    {"missing", count(Mark::kNotSolved)},
+                    {"filtered", count(Mark::kFiltered)}};
+  const std::string cells = column_.is_category ? bytes_of(codes(head)) : bytes_of(number_bits());
+  return numbers_answer(head, bytes_of(grid_->x.values) + bytes_of(grid_->y.values) + cells);
 }
 
-/// Adds the least and the largest value to `head`, and the values of the cells to `numbers`.
-void append_numbers(const SliceCells& read, ordered_json& head, std::string& numbers) {
+std::vector<std::uint32_t> SliceAnswer::number_bits() const {
   std::vector<std::uint32_t> bits;
-  std::optional<std::pair<float, float>> range;
-  for (std::size_t cell = 0; cell < read.marks.size(); ++cell) {
-    const float number = read.numbers[cell];
-    const bool has_value = read.marks[cell] == Mark::kHasValue;
-    bits.push_back(has_value ? std::bit_cast<std::uint32_t>(number)
-                             : kNan + static_cast<std::uint32_t>(read.marks[cell]));
-    if (has_value) {
-      range = std::pair(std::min(range ? range->first : number, number),
-                        std::max(range ? range->second : number, number));
-    }
+  for (std::size_t cell = 0; cell < marks_.size(); ++cell) {
+    bits.push_back(marks_[cell] == Mark::kHasValue
+                       ? std::bit_cast<std::uint32_t>(numbers_[cell])
+                       : kNan + static_cast<std::uint32_t>(marks_[cell]));
   }
-  head["least"] = range ? ordered_json(range->first) : nullptr;
-  head["most"] = range ? ordered_json(range->second) : nullptr;
-  append(bits, numbers);
+  return bits;
 }
 
-/// Adds the dictionary to `head`, and the codes of the cells to `numbers`. Texts are sorted by
+/// Returns the codes of the cells, and adds their dictionary to `head`. Texts are sorted by
 /// falling frequency, then alphabetically, as in `oblique plot`.
-void append_codes(const SliceCells& read, ordered_json& head, std::string& numbers) {
+std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
   std::vector<std::uint16_t> codes;
-  for (const Mark mark : read.marks) {
+  for (const Mark mark : marks_) {
     codes.push_back(static_cast<std::uint16_t>(kLastCode - static_cast<int>(mark)));
   }
-  std::vector<std::pair<std::string, std::vector<std::size_t>>> ranked(read.places.begin(),
-                                                                       read.places.end());
+  std::vector<std::pair<std::string, std::vector<std::size_t>>> ranked(places_.begin(),
+                                                                       places_.end());
   std::stable_sort(ranked.begin(), ranked.end(), [](const auto& one, const auto& other) {
     return one.second.size() > other.second.size();
   });
@@ -162,55 +312,13 @@ void append_codes(const SliceCells& read, ordered_json& head, std::string& numbe
     }
     head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});
   }
-  append(codes, numbers);
-}
-
-HttpAnswer slice_answer(const JobContext& context, std::uint64_t id, const Fields& asked) {
-  const FieldReader fields(asked);
-  const std::string condition = fields.condition();
-  const PictureColumn column = picture_column(fields, "z", true);
-  const ServedStudy study = context.study(id);
-  const GridSlice slice = grid_slice(*study.table, fields);
-  const SliceCells read = read_cells(context, study, slice, column, condition);
-  const auto count = [&](Mark mark) { return std::ranges::count(read.marks, mark); };
-  ordered_json at = ordered_json::array();
-  for (const GridPlace& place : slice.at) {
-    at.push_back(
-        {{"key", place.key}, {"of", place.of}, {"number", place.number}, {"value", place.value}});
-  }
-  ordered_json head{{"study", id},
-                    {"block", slice.block},
-                    {"z",
-                     {{"name", column.name},
-                      {"unit", column.unit},
-                      {"kind", column.is_category ? "categories" : "numbers"}}},
-                    {"x", side_json(slice.x)},
-                    {"y", side_json(slice.y)},
-                    {"at", std::move(at)},
-                    {"nx", slice.x.numbers.size()},
-                    {"ny", slice.y.numbers.size()},
-                    {"first_point", slice.first_point},
-                    {"solved", count(Mark::kHasValue) + count(Mark::kNoValue)},
-                    {"failed", count(Mark::kFailed)},
-                    {"left_out", count(Mark::kLeftOut)},
-                    {"missing", count(Mark::kNotSolved)},
-                    {"filtered", count(Mark::kFiltered)}};
-  std::string numbers;
-  append(slice.x.values, numbers);
-  append(slice.y.values, numbers);
-  if (column.is_category) {
-    append_codes(read, head, numbers);
-  } else {
-    append_numbers(read, head, numbers);
-  }
-  return numbers_answer(head, numbers);
+  return codes;
 }
 
 }  // namespace
 
-AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields) {
-  return
-      [study, fields](const JobContext& context) { return slice_answer(context, study, fields); };
+PendingAnswer slice_answer(ServiceClient& service, std::uint64_t study, const Fields& fields) {
+  return study_flow(service, study, std::make_unique<SliceAnswer>(fields));
 }
 
 }  // namespace oblique::server

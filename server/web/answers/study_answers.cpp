@@ -2,53 +2,47 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 #include <utility>
 
+#include <google/protobuf/util/json_util.h>
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
+#include "proto/recipe/study_size.h"
+#include "proto/recipe/written.h"
+#include "proto/text.h"
 #include "server/query/columns.h"
-#include "server/web/http/json_answer.h"
+#include "server/web/http/http_message.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
 namespace {
 
 using nlohmann::ordered_json;
-using protocol::Axis;
 
 /// Longer lists of values are not in the answer; slices have the values that they show.
 constexpr std::uint64_t kMostListed = 4096;
 
-ordered_json distribution_json(const protocol::Distribution& from) {
-  constexpr std::array<std::string_view, 3> kNames{"uniform", "log-uniform", "normal"};
-  ordered_json json{{"kind", kNames.at(static_cast<std::size_t>(from.kind()))}};
-  if (from.has_from()) {
-    json["from"] = from.from();
-  }
-  if (from.has_to()) {
-    json["to"] = from.to();
-  }
-  if (from.kind() == protocol::DISTRIBUTION_NORMAL) {
-    json["mean"] = from.mean();
-    json["sd"] = from.sd();
-  }
-  return json;
-}
-
 ordered_json axis_json(const protocol::AxisLayout& layout) {
-  const Axis& axis = *layout.axis;
-  const auto& key = protocol::key_numbered(layout.key);
+  const protocol::Axis& axis = *layout.axis;
   ordered_json json{{"key", axis.key()},
-                    {"unit", key.unit},
-                    {"meaning", key.meaning},
+                    {"unit", protocol::key_numbered(layout.key).unit},
                     {"values", layout.values},
                     {"stride", layout.stride}};
   if (axis.has_distribution()) {
-    json["distribution"] = distribution_json(axis.distribution());
+    constexpr std::array<std::string_view, 3> kKinds{"uniform", "log-uniform", "normal"};
+    json["distribution"] = kKinds.at(static_cast<std::size_t>(axis.distribution().kind()));
   } else if (!axis.expression().empty()) {
     json["expression"] = axis.expression();
   } else if (axis.count() > 0) {
@@ -69,18 +63,11 @@ ordered_json block_json(const protocol::Block& block, const protocol::BlockPlace
   for (const protocol::AxisLayout& layout : protocol::layout_of(block)) {
     axes.push_back(axis_json(layout));
   }
-  ordered_json json{{"kind", kKinds.at(static_cast<std::size_t>(protocol::block_kind(block)))},
-                    {"first_point", place.first_point},
-                    {"points", place.points},
-                    {"where", block.where()},
-                    {"axes", std::move(axes)}};
-  if (block.has_sample()) {
-    constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
-    json["sample"] = {{"kind", kSamples.at(static_cast<std::size_t>(block.sample().kind()))},
-                      {"count", block.sample().count()},
-                      {"seed", block.sample().seed()}};
-  }
-  return json;
+  return {{"kind", kKinds.at(static_cast<std::size_t>(protocol::block_kind(block)))},
+          {"first_point", place.first_point},
+          {"points", place.points},
+          {"where", block.where()},
+          {"axes", std::move(axes)}};
 }
 
 ordered_json columns_json() {
@@ -101,147 +88,160 @@ ordered_json columns_json() {
 /// The model of blocks without model axes, key by key.
 ordered_json model_json(const protocol::Recipe& recipe) {
   const auto model = protocol::unjudged_from_message(recipe.model());
-  const solver::ModelParameters usual;
   ordered_json keys = ordered_json::array();
   for (const solver::ParameterKey& key : solver::model_keys()) {
-    const bool is_word = key.name == "integrator";
-    ordered_json value = is_word ? ordered_json(solver::integrator_name(model.integrator))
-                                 : ordered_json(key.get(model));  // NaN and infinity become null
     keys.push_back({{"key", key.name},
                     {"unit", key.unit},
-                    {"meaning", key.meaning},
-                    {"value", std::move(value)},
-                    {"usual", is_word ? model.integrator == usual.integrator
-                                      : key.get(model) == key.get(usual)}});
+                    {"value", key.name == "integrator"
+                                  ? ordered_json(solver::integrator_name(model.integrator))
+                                  : ordered_json(key.get(model))}});  // NaN becomes null
   }
-  keys.push_back({{"key", "lengths"},
-                  {"unit", "m"},
-                  {"meaning", "of each link, from the pin outwards"},
-                  {"value", model.lengths_m},
-                  {"usual", model.lengths_m == usual.lengths_m}});
+  keys.push_back({{"key", "lengths"}, {"unit", "m"}, {"value", model.lengths_m}});
   return keys;
 }
 
-/// The first failed point and its error; null if none has failed.
-ordered_json first_failure(const JobContext& context, const ServedStudy& study) {
-  if (study.failed == 0) {
-    return nullptr;
-  }
-  protocol::StudyQuery query;
-  query.set_study(study.name);
-  query.add_select("point, error");
-  query.set_where(fmt::format(
-      "point IN (SELECT point FROM results INDEXED BY failed_points WHERE study_id = {} "
-      "AND error IS NOT NULL)",
-      study.id));
-  query.set_limit(1);
-  ordered_json first;
-  context.query(query, [&](const protocol::ChunkRows& row) {
-    first = {{"point", row.cell(0).integer}, {"error", row.cell(1).text}};
-  });
-  return first;
-}
-
-HttpAnswer study_answer(const JobContext& context, std::uint64_t id) {
-  const ServedStudy study = context.study(id);
-  const protocol::Recipe& recipe = study.table->recipe();
-  constexpr int kMostBlocks = 1000;
-  ordered_json blocks = ordered_json::array();
-  for (int i = 0; i < std::min(recipe.blocks_size(), kMostBlocks); ++i) {
-    blocks.push_back(block_json(recipe.blocks(i), study.table->block(static_cast<std::size_t>(i))));
-  }
-  return json_answer({{"id", study.id},
-                      {"name", study.name},
-                      {"state", study.state},
-                      {"points", study.table->size()},
-                      {"numbers", study.table->size()},
-                      {"models", study.table->models()},
-                      {"errors", recipe.errors()},
-                      {"first_failure", first_failure(context, study)},
-                      {"model", model_json(recipe)},
-                      {"blocks", std::move(blocks)},
-                      {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
-                      {"columns", columns_json()},
-                      {"usual_columns", usual_columns(recipe)}});
-}
-
-/// Parses a text as a list; discarded if it is not JSON or is nested deeper than our lists. A
-/// foreign file may have any depth, and copying or writing a deep value would overflow the stack.
-ordered_json list_of(const std::string& text) {
-  constexpr int kDeepest = 3;
-  bool is_too_deep = false;
-  const auto is_kept = [&is_too_deep](int depth, auto, const ordered_json&) {
-    is_too_deep = is_too_deep || depth > kDeepest;
-    return !is_too_deep;
-  };
-  auto list = ordered_json::parse(text, is_kept, false);
-  return is_too_deep ? ordered_json(ordered_json::value_t::discarded) : list;
-}
-
-ordered_json value_of(const protocol::Cell& cell) {
-  switch (cell.kind) {
-    case protocol::CellKind::kInteger:
-      return cell.integer;
-    case protocol::CellKind::kReal:
-      return cell.real;
-    case protocol::CellKind::kNull:
-      return nullptr;
-    case protocol::CellKind::kText:
-      break;
-  }
-  std::string text(cell.text);
-  if (text.starts_with('[')) {
-    auto list = list_of(text);
-    return list.is_discarded() ? ordered_json(std::move(text)) : list;
-  }
-  return text;
-}
-
-HttpAnswer point_answer(const JobContext& context, std::uint64_t id, std::uint64_t number) {
-  const ServedStudy study = context.study(id);
-  if (number >= study.table->size()) {
-    throw JobError(
-        error_answer(404, fmt::format("the study \"{}\" has no point {}", study.name, number)));
-  }
-  const protocol::Point point = study.table->point(number);
-  ordered_json answer{{"study", study.id},
-                      {"name", study.name},
-                      {"point", number},
-                      {"block", study.table->block_of_point(number)},
-                      {"H", point.H_m},
-                      {"mu", point.mu},
-                      {"e", point.e_star},
-                      {"left_out", study.leaves_out(number)},
-                      {"fault", study.table->fault(number)},
-                      {"row", nullptr}};
-  protocol::StudyQuery query;
-  query.set_study(study.name);
-  query.set_where(fmt::format("point = {}", number));
-  for (const Column& column : all_columns()) {
-    query.add_select(column.name);
-  }
-  context.query(query, [&](const protocol::ChunkRows& row) {
-    for (int i = 0; i < query.select_size(); ++i) {
-      answer["row"][query.select(i)] = value_of(row.cell(static_cast<std::size_t>(i)));
+class WholeStudy : public StudyAnswer {
+ public:
+  Next next(const ServedStudy& study) override {
+    const protocol::PointTable& table = *study.table;
+    const protocol::Recipe& recipe = table.recipe();
+    constexpr int kMostBlocks = 1000;
+    ordered_json blocks = ordered_json::array();
+    for (int i = 0; i < std::min(recipe.blocks_size(), kMostBlocks); ++i) {
+      blocks.push_back(block_json(recipe.blocks(i), table.block(static_cast<std::size_t>(i))));
     }
-    // The solved values, because another machine may have rounded a value of the recipe
-    // differently.
-    for (const char* key : {"H", "mu", "e"}) {
-      answer[key] = answer["row"][key];
+    return json_answer({{"id", study.id},
+                        {"name", study.name},
+                        {"state", study.state},
+                        {"points", table.size()},
+                        {"errors", recipe.errors()},
+                        {"model", model_json(recipe)},
+                        {"blocks", std::move(blocks)},
+                        {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
+                        {"columns", columns_json()},
+                        {"usual_columns", usual_columns(recipe)}});
+  }
+};
+
+class OnePoint : public StudyAnswer {
+ public:
+  explicit OnePoint(std::uint64_t point) : point_(point) {}
+
+  Next next(const ServedStudy& study) override {
+    if (point_ >= study.table->size()) {
+      return error_answer(404, fmt::format("the study \"{}\" has no point {}", study.name, point_));
     }
-    answer["left_out"] = false;
-  });
-  return json_answer(answer);
+    const protocol::Point point = study.table->point(point_);
+    return json_answer({{"study", study.id},
+                        {"name", study.name},
+                        {"point", point_},
+                        {"block", study.table->block_of_point(point_)},
+                        {"H", point.H_m},
+                        {"mu", point.mu},
+                        {"e", point.e_star},
+                        {"left_out", study.leaves_out(point_)},
+                        {"fault", study.table->fault(point_)}});
+  }
+
+ private:
+  const std::uint64_t point_;
+};
+
+/// A model from JSON: names of a preset and an integrator, and numbers of single keys.
+protocol::ModelParameters model_of(const nlohmann::json& written) {
+  protocol::WrittenModel model;
+  for (const auto& [key, value] : written.items()) {
+    if (key == protocol::WrittenModel::kPreset && value.is_string()) {
+      model.set_preset(value.get<std::string>());
+    } else if (key == "integrator" && value.is_string()) {
+      model.set(key, static_cast<double>(solver::integrator_named(value.get<std::string>())));
+    } else if (value.is_number()) {
+      model.set(key, value.get<double>());
+    } else {
+      throw solver::InputError("model: " + key + " must be a number; preset and integrator a name");
+    }
+  }
+  return protocol::to_message(model.model());
+}
+
+/// The least drop [m] above which only a computed fall shows whether the tip reaches an H of the
+/// study; none if the tip reaches all of them.
+std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
+  const auto model = protocol::from_message(recipe.model());
+  std::optional<double> least_m;
+  for (const auto& block : recipe.blocks()) {
+    const auto drop_m = protocol::surely_reached_m(model, block);
+    if (drop_m && (!least_m || *drop_m < *least_m)) {
+      least_m = drop_m;
+    }
+  }
+  return least_m;
+}
+
+ordered_json json_of(const std::optional<double>& number) {
+  return number ? ordered_json(*number) : ordered_json();
 }
 
 }  // namespace
 
-AnswerPool::Job study_job(std::uint64_t study) {
-  return [study](const JobContext& context) { return study_answer(context, study); };
+PendingAnswer study_answer(ServiceClient& service, std::uint64_t study) {
+  return study_flow(service, study, std::make_unique<WholeStudy>());
 }
 
-AnswerPool::Job point_job(std::uint64_t study, std::uint64_t point) {
-  return [study, point](const JobContext& context) { return point_answer(context, study, point); };
+PendingAnswer point_answer(ServiceClient& service, std::uint64_t study, std::uint64_t point) {
+  return study_flow(service, study, std::make_unique<OnePoint>(point));
+}
+
+HttpAnswer check_answer(const std::string& body) {
+  protocol::SubmitRequest asked = study_of_body(body);
+  return parse_request([&] {
+    const protocol::PointTable table(std::move(*asked.mutable_recipe()));
+    table.judge_points();
+    const protocol::StudySize size = protocol::size_of(table);
+    return json_answer({{"points", size.points},
+                        {"models", size.models},
+                        {"falls", size.falls},
+                        {"falls_estimated", size.falls_estimated},
+                        {"bytes", size.bytes},
+                        {"is_counted", !size.points_estimated},
+                        {"surely_reached_m", json_of(surely_reached_m(table.recipe()))}});
+  });
+}
+
+protocol::SubmitRequest study_of_body(const std::string& body) {
+  // Protobuf refuses deeper JSON too. Copying or writing a deeper value would overflow the stack.
+  constexpr int kDeepest = 50;
+  bool is_deep = false;
+  auto whole = nlohmann::json::parse(
+      body,
+      [&](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
+        is_deep = is_deep || depth > kDeepest;
+        return !is_deep;
+      },
+      false);
+  const std::string no_study = "the body is no study: ";
+  if (is_deep) {
+    throw std::invalid_argument(no_study + "it is nested too deeply");
+  }
+  const bool has_model = whole.is_object() && whole.contains("model");
+  const auto written = has_model ? whole["model"] : nlohmann::json();
+  if (has_model) {
+    whole.erase("model");
+  }
+  protocol::SubmitRequest asked;
+  const auto read =
+      google::protobuf::util::JsonStringToMessage(has_model ? whole.dump() : body, &asked);
+  if (!read.ok()) {
+    throw std::invalid_argument(no_study +
+                                protocol::excerpt({read.message().data(), read.message().size()}));
+  }
+  if (has_model && (!written.is_object() || asked.recipe().has_model())) {
+    throw std::invalid_argument(no_study + "its model is said once, as an object");
+  }
+  if (has_model) {
+    *asked.mutable_recipe()->mutable_model() = parse_request([&] { return model_of(written); });
+  }
+  return asked;
 }
 
 }  // namespace oblique::server

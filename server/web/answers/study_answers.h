@@ -1,29 +1,82 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <utility>
+#include <variant>
 
 #include "proto/oblique.pb.h"
-#include "server/web/answers/answer_pool.h"
+#include "proto/recipe/point_table.h"
+#include "proto/wire/chunk.h"
 #include "server/web/answers/fields.h"
+#include "server/web/answers/service_client.h"
+#include "server/web/http/http_message.h"
 
-// Answers about a study; server/web/page/README.md lists their fields.
+// Answers about a study; server/web/page/README.md lists their fields. Functions throw
+// std::invalid_argument for a wrong request.
 namespace oblique::server {
 
+/// A study as reported by the service.
+struct ServedStudy {
+  /// Whether the filter leaves out a point that has no row. In a study that is done it does: the
+  /// worker decided, whose values may differ from those of this machine in the last digit.
+  bool leaves_out(std::uint64_t point) const {
+    return table->has_filter() && (state == "done" || !table->is_left_in(point));
+  }
+
+  std::uint64_t id = 0;
+  std::string name = {};
+  std::string state = {};
+  std::unique_ptr<const protocol::PointTable> table = {};
+};
+
+/// Makes an answer from the rows of queries about a study.
+class StudyAnswer {
+ public:
+  /// `condition` is the user's in the queries. If it is wrong, the error shows it as it was
+  /// written.
+  explicit StudyAnswer(std::string condition = {}) : condition_(std::move(condition)) {}
+  virtual ~StudyAnswer() = default;
+  StudyAnswer(const StudyAnswer&) = delete;
+  StudyAnswer& operator=(const StudyAnswer&) = delete;
+
+  /// The next query, whose study is set by the caller, or the answer. Called first, and after the
+  /// last row of each query.
+  using Next = std::variant<protocol::StudyQuery, HttpAnswer>;
+  virtual Next next(const ServedStudy& study) = 0;
+  virtual void take_row(const protocol::ChunkRows& /*row*/) {}
+  const std::string& condition() const { return condition_; }
+
+ private:
+  const std::string condition_;
+};
+
+using FlowClock = std::chrono::steady_clock;
+
+/// Requests the study and then the queries from the service, one after the other. The queries run
+/// in reader processes; they end when the pending answer is destroyed, or at `deadline`.
+PendingAnswer study_flow(ServiceClient& service, std::uint64_t study,
+                         std::unique_ptr<StudyAnswer> answer,
+                         FlowClock::time_point deadline = FlowClock::now() +
+                                                          std::chrono::seconds(7));
+
 /// The recipe of a study and the columns of its results.
-AnswerPool::Job study_job(std::uint64_t study);
-/// A point: its inputs and its row.
-AnswerPool::Job point_job(std::uint64_t study, std::uint64_t point);
+PendingAnswer study_answer(ServiceClient& service, std::uint64_t study);
+/// The inputs of a point as the recipe gives them, and whether the filter leaves it out if it has
+/// no row.
+PendingAnswer point_answer(ServiceClient& service, std::uint64_t study, std::uint64_t point);
 /// One column over one or two axes of a grid.
-AnswerPool::Job slice_job(std::uint64_t study, const Fields& fields);
+PendingAnswer slice_answer(ServiceClient& service, std::uint64_t study, const Fields& fields);
 /// Number of points, and mean of a column, in bins along one or two columns.
-AnswerPool::Job bins_job(std::uint64_t study, const Fields& fields);
+PendingAnswer bins_answer(ServiceClient& service, std::uint64_t study, const Fields& fields);
 
 /// Parses the body of a submission: SubmitRequest in Protobuf's JSON, with a member `model` that
-/// has the keys of study files. Throws std::invalid_argument with a sentence for an invalid body.
+/// has the keys of study files.
 protocol::SubmitRequest study_of_body(const std::string& body);
 
 /// Validates the recipe in the body of a submission; the answer has the size of the study.
-AnswerPool::Job check_job(const std::string& body);
+HttpAnswer check_answer(const std::string& body);
 
 }  // namespace oblique::server

@@ -1,61 +1,67 @@
 #pragma once
 
-#include <chrono>
-#include <cstddef>
-#include <cstdint>
+#include <functional>
 #include <map>
-#include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
-// What is asked over HTTP, and what is answered.
+#include <microhttpd.h>
+#include <nlohmann/json.hpp>
+
+// Requests and answers over HTTP.
 namespace oblique::server {
 
-/// Since the server began.
-struct HttpCounts {
-  std::map<unsigned, std::uint64_t> answers;  ///< by status
-  std::size_t connections = 0;                ///< that are there
-  std::uint64_t ended_as_slow = 0;
-  std::uint64_t ended_for_others = 0;
+struct HttpRequest {
+  std::string method;
+  std::string path;                           ///< without the query string
+  std::map<std::string, std::string> fields;  ///< of the query string, decoded; first of equal
+  std::multimap<std::string, std::string> headers;  ///< names in lower case
+  std::string body;
+  bool has_zero_bytes = false;  ///< in a field
+
+  /// All values of a header.
+  std::vector<std::string> all(const std::string& name) const;
+  /// The first value of a header; empty if it is absent.
+  std::string header(const std::string& name) const;
 };
 
-/// A request that was let in.
-struct HttpQuestion {
-  std::uint64_t number;                       ///< of the request; no other has it
-  std::string method;                         ///< GET, HEAD or POST
-  std::string path;                           ///< without what follows a question mark
-  std::map<std::string, std::string> fields;  ///< what follows it, decoded; of two the first
-  std::string host;                           ///< as its Host header says
-  std::vector<std::string> cookies;           ///< every Cookie header
-  std::string known_tag;                      ///< its If-None-Match
-  std::string seen_event;                     ///< its Last-Event-ID
-  bool takes_gzip = false;
-  std::string body;                    ///< of a change, whole
-  std::chrono::milliseconds waited{};  ///< since it was asked
-  const HttpCounts* counts = nullptr;  ///< never null
-};
-
-/// Bytes that go out on a connection for as long as both ends want. Of the server's thread.
-class HttpStream {
- public:
-  HttpStream() = default;
-  virtual ~HttpStream() = default;
-  HttpStream(const HttpStream&) = delete;
-  HttpStream& operator=(const HttpStream&) = delete;
-
-  /// Whether `next` would give something.
-  virtual bool has_news() = 0;
-  /// What goes out next; empty: nothing now. Throws nothing.
-  virtual std::string next() = 0;
-};
+/// Returns the bytes to send next, empty if there are none yet; nothing at the end. Called on the
+/// HTTP server's thread, again after each wake; destroyed when the connection ends. Throws to break
+/// the answer off.
+using HttpStream = std::function<std::optional<std::string>()>;
 
 struct HttpAnswer {
-  unsigned status;
+  unsigned status;  ///< MHD_HTTP_OK and so on
   std::string content_type;
   std::string body;
-  std::vector<std::pair<std::string, std::string>> headers = {};  ///< beside those of all answers
-  std::shared_ptr<HttpStream> stream = {};  ///< instead of the body, where it is not null
+  std::vector<std::pair<std::string, std::string>> headers = {};  ///< besides those of all answers
+  HttpStream stream = {};                                         ///< replaces the body if set
 };
+
+/// Returns the answer when it is ready. Called on the HTTP server's thread, again after each wake;
+/// destroyed when the answer was returned or the client has disconnected.
+using PendingAnswer = std::function<std::optional<HttpAnswer>()>;
+
+using HttpOutcome = std::variant<HttpAnswer, PendingAnswer>;
+
+/// A sentence as plain text.
+HttpAnswer text_answer(unsigned status, std::string_view sentence);
+
+HttpAnswer json_answer(const nlohmann::ordered_json& value, unsigned status = 200);
+
+/// {"error": sentence}
+HttpAnswer error_answer(unsigned status, const std::string& sentence);
+
+/// Binary numbers after a head that describes them: four bytes with the length of the head, little
+/// endian; the head as JSON, padded with spaces so that the numbers begin at a multiple of eight
+/// bytes; the numbers.
+HttpAnswer numbers_answer(const nlohmann::ordered_json& head, const std::string& numbers);
+
+/// JSON on one line; bytes that are not UTF-8 are replaced.
+std::string json_text(const nlohmann::ordered_json& value);
 
 }  // namespace oblique::server

@@ -2,402 +2,293 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <cerrno>
+#include <cctype>
 #include <cstring>
 #include <exception>
+#include <memory>
 #include <stdexcept>
 #include <string_view>
-#include <thread>
 #include <utility>
 
-#include <microhttpd.h>
+#include <fcntl.h>
 #include <poll.h>
-#include <sys/socket.h>
 
-#include "proto/system/descriptor.h"
 #include "server/network/listener.h"
-#include "server/web/http/http_parts.h"
 
 namespace oblique::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
+/// What a page of ours may load, and who may embed it: only this server.
+constexpr const char* kContentPolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// While the system has no descriptor for a new connection, it is asked again after so long.
-constexpr milliseconds kAcceptPause{100};
-/// Who waits for an answer is asked for again at least so often.
-constexpr milliseconds kLongestWait{200};
-/// New connections in one turn.
-constexpr int kMostAccepted = 64;
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+MHD_Result take_header(void* into, MHD_ValueKind /*kind*/, const char* name, const char* value) {
+  static_cast<HttpRequest*>(into)->headers.emplace(lower(name), value == nullptr ? "" : value);
+  return MHD_YES;
+}
+
+MHD_Result take_field(void* into, MHD_ValueKind /*kind*/, const char* name, std::size_t name_bytes,
+                      const char* value, std::size_t value_bytes) {
+  auto& request = *static_cast<HttpRequest*>(into);
+  const std::string key(name, name_bytes);
+  const std::string text = value == nullptr ? std::string() : std::string(value, value_bytes);
+  request.has_zero_bytes = request.has_zero_bytes || (key + text).find('\0') != std::string::npos;
+  request.fields.try_emplace(key, text);
+  return MHD_YES;
+}
+
+/// Whether the client has closed the connection or its sending half, as browsers do when they no
+/// longer want the answer. libmicrohttpd does not watch a suspended connection.
+bool is_gone(MHD_Connection* connection) {
+  pollfd item{MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
+              POLLRDHUP, 0};
+  return ::poll(&item, 1, 0) > 0;
+}
+
+void add_headers(MHD_Response* response, const HttpAnswer& answer) {
+  const auto add = [response](const char* name, const char* value) {
+    MHD_add_response_header(response, name, value);
+  };
+  add(MHD_HTTP_HEADER_CONTENT_TYPE, answer.content_type.c_str());
+  add(MHD_HTTP_HEADER_CONNECTION, "close");
+  add(MHD_HTTP_HEADER_X_CONTENT_TYPE_OPTIONS, "nosniff");
+  add("Content-Security-Policy", kContentPolicy);
+  add("Cross-Origin-Resource-Policy", "same-origin");
+  add("Cross-Origin-Opener-Policy", "same-origin");
+  add("Cross-Origin-Embedder-Policy", "require-corp");
+  add("Referrer-Policy", "no-referrer");
+  for (const auto& [name, value] : answer.headers) {
+    add(name.c_str(), value.c_str());
+  }
+  if (MHD_get_response_header(response, MHD_HTTP_HEADER_CACHE_CONTROL) == nullptr) {
+    add(MHD_HTTP_HEADER_CACHE_CONTROL, "no-store");
+  }
+  if (answer.status == MHD_HTTP_METHOD_NOT_ALLOWED) {
+    add(MHD_HTTP_HEADER_ALLOW, "GET, HEAD");
+  }
+  if (answer.status == MHD_HTTP_SERVICE_UNAVAILABLE) {
+    add(MHD_HTTP_HEADER_RETRY_AFTER, "1");
+  }
+}
 
 }  // namespace
 
-class HttpServer::Parts {
- public:
-  Parts(const HttpAddress& address, OwnNames names, const HttpLimits& limits, Answer answer,
-        Rules rules)
-      : names_(std::move(names)),
-        limits_(limits),
-        answer_(std::move(answer)),
-        rules_(std::move(rules)),
-        listener_(address.address, address.port),
-        daemon_(
-            MHD_start_daemon(MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME, 0,
-                             nullptr, nullptr, &Parts::asked, this, MHD_OPTION_NOTIFY_CONNECTION,
-                             &Parts::noticed, this, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-                             limits.bytes_of_connection, MHD_OPTION_CONNECTION_LIMIT,
-                             static_cast<unsigned>(2 * limits.connections + limits.streams),
-                             MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END)) {
-    if (daemon_ == nullptr) {
-      throw std::runtime_error("the HTTP server cannot start");
-    }
-    thread_ = std::thread([this] { run(); });
+/// A request and what became of it.
+struct HttpServer::Exchange {
+  HttpRequest request;
+  PendingAnswer pending = {};
+  bool is_answered = false;
+};
+
+/// An answer that is sent piece by piece.
+struct HttpServer::Stream {
+  Stream(HttpServer& of, MHD_Connection* to, HttpStream from)
+      : server(of), connection(to), next(std::move(from)) {
+    ++server.streams_;
   }
-  ~Parts() {
-    is_stopping_ = true;
-    wake_up_.wake();
-    thread_.join();
-    MHD_stop_daemon(daemon_);
-  }
-  Parts(const Parts&) = delete;
-  Parts& operator=(const Parts&) = delete;
+  ~Stream() { --server.streams_; }
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
 
-  const std::string& endpoint() const { return listener_.endpoint(); }
-  void wake() const { wake_up_.wake(); }
-
- private:
-  struct Peer {
-    int descriptor = -1;
-    std::string address;
-    Clock::time_point since;
-    std::optional<Clock::time_point> asked;
-    bool waits = false;     // suspended
-    bool answered = false;  // an answer is under way
-    Asked request = {};     // once its head has come
-    std::shared_ptr<HttpStream> stream = {};
-    std::string unsent = {};  // of the stream
-  };
-  using Peers = std::map<MHD_Connection*, Peer>;
-  using StreamPlace = std::pair<Parts*, MHD_Connection*>;
-
-  void run() {
-    std::array<pollfd, 3> items{
-        {{MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd, POLLIN, 0},
-         {wake_up_.descriptor(), POLLIN, 0},
-         {listener_.descriptor(), POLLIN, 0}}};
-    while (!is_stopping_) {
-      const auto now = rules_.now();
-      const bool accepts = now >= accept_again_;
-      ::poll(items.data(), accepts ? items.size() : items.size() - 1,
-             static_cast<int>(wait_from(now).count()));
-      wake_up_.clear();
-      turn_again_ = rules_.turn();
-      end_overdue(rules_.now());
-      end_gone();
-      accept_all();
-      ask_again();
-      MHD_run(daemon_);
-    }
-    // None may be suspended at the end.
-    ask_again();
-    MHD_run(daemon_);
-  }
-
-  milliseconds wait_from(Clock::time_point now) const {
-    MHD_UNSIGNED_LONG_LONG limit_ms = 0;
-    auto until = now + std::min(limits_.longest, turn_again_.value_or(limits_.longest));
-    if (MHD_get_timeout(daemon_, &limit_ms) == MHD_YES) {
-      until = std::min(until, now + milliseconds(limit_ms));
-    }
-    until = now < accept_again_ ? std::min(until, accept_again_) : until;
-    for (const auto& [connection, peer] : peers_) {
-      until = is_quiet_stream(peer) ? until : std::min(until, peer.since + limits_.longest);
-      until = peer.waits ? std::min(until, now + kLongestWait) : until;
-    }
-    return std::max(milliseconds(0), std::chrono::ceil<milliseconds>(until - now));
-  }
-
-  void accept_all() {
-    for (int i = 0; i < kMostAccepted; ++i) {
-      Listener::Accepted accepted = listener_.accept();
-      if (!accepted.socket.is_open()) {
-        const bool lacks_room = errno == EMFILE || errno == ENFILE || errno == ENOBUFS;
-        accept_again_ = lacks_room ? rules_.now() + kAcceptPause : accept_again_;
-        return;
-      }
-      const int descriptor = accepted.socket.release();
-      accepted_host_ = host_of(accepted.address);
-      make_room_for(accepted_host_);
-      sockaddr_in6 from{};
-      socklen_t bytes = sizeof from;
-      ::getpeername(descriptor, reinterpret_cast<sockaddr*>(&from), &bytes);
-      // It is closed there whether it was taken or not.
-      MHD_add_connection(daemon_, descriptor, reinterpret_cast<sockaddr*>(&from), bytes);
-      MHD_run(daemon_);  // so that it counts, and those that made room do not
-    }
-  }
-
-  void make_room_for(const std::string& address) {
-    std::map<std::string, std::size_t> counts;
-    std::size_t connections = 0;
-    for (const auto& [connection, peer] : peers_) {
-      if (!peer.stream) {
-        ++connections;
-        ++counts[peer.address];
-      }
-    }
-    const auto most = std::max_element(
-        counts.begin(), counts.end(),
-        [](const auto& one, const auto& other) { return one.second < other.second; });
-    if (counts[address] >= limits_.connections_of_one_address) {
-      end_oldest_of(address);
-    } else if (connections >= limits_.connections) {
-      end_oldest_of(most->first);
-    }
-  }
-
-  void end_oldest_of(const std::string& address) {
-    auto oldest = peers_.end();
-    for (auto peer = peers_.begin(); peer != peers_.end(); ++peer) {
-      if (peer->second.address == address && !peer->second.stream &&
-          (oldest == peers_.end() || peer->second.since < oldest->second.since)) {
-        oldest = peer;
-      }
-    }
-    if (oldest != peers_.end()) {
-      ++counts_.ended_for_others;
-      end(oldest, kCrowded);
-    }
-  }
-
-  void end_overdue(Clock::time_point now) {
-    for (auto peer = peers_.begin(); peer != peers_.end();) {
-      const auto this_one = peer++;
-      if (!is_quiet_stream(this_one->second) && now - this_one->second.since >= limits_.longest) {
-        ++counts_.ended_as_slow;
-        end(this_one, kTooSlow);
-      }
-    }
-  }
-
-  /// The library does not look at a connection that waits.
-  void end_gone() {
-    std::vector<int> descriptors;
-    for (const auto& [connection, peer] : peers_) {
-      descriptors.push_back(peer.waits ? peer.descriptor : -1);
-    }
-    auto peer = peers_.begin();
-    for (const bool gone : who_is_gone(descriptors)) {
-      const auto this_one = peer++;
-      if (gone) {
-        end(this_one, {});
-      }
-    }
-  }
-
-  /// It is ours no more; the library finds that its socket has ended.
-  void end(Peers::iterator peer, std::string_view last_words) {
-    if (!peer->second.answered) {
-      static_cast<void>(::send(peer->second.descriptor, last_words.data(), last_words.size(),
-                               MSG_DONTWAIT | MSG_NOSIGNAL));
-    }
-    ::shutdown(peer->second.descriptor, SHUT_RDWR);
-    if (peer->second.waits) {
-      MHD_resume_connection(peer->first);
-    }
-    tell_gone(peer->second);
-    peers_.erase(peer);
-  }
-
-  void tell_gone(const Peer& peer) const {
-    if (peer.asked && !peer.answered) {
-      rules_.gone(peer.request.question.number);
-    }
-  }
-
-  /// A stream whose peer has taken all that there was.
-  static bool is_quiet_stream(const Peer& peer) { return peer.stream && peer.waits; }
-
-  void ask_again() {
-    for (auto& [connection, peer] : peers_) {
-      if (peer.waits && (is_stopping_ || !peer.stream || peer.stream->has_news())) {
-        peer.waits = false;
-        peer.since = peer.stream ? rules_.now() : peer.since;
-        MHD_resume_connection(connection);
-      }
-    }
-  }
-
-  /// The library asks for more of a stream, when what it has was sent.
-  static ssize_t stream_on(void* context, std::uint64_t /*position*/, char* into,
-                           std::size_t most) {
-    const auto& [parts, connection] = *static_cast<StreamPlace*>(context);
-    const auto found = parts->peers_.find(connection);
-    if (found == parts->peers_.end() || parts->is_stopping_) {
-      return MHD_CONTENT_READER_END_OF_STREAM;
-    }
-    Peer& peer = found->second;
-    peer.since = parts->rules_.now();
-    if (peer.unsent.empty()) {
-      peer.unsent = peer.stream->next();
-      peer.waits = peer.unsent.empty();
-    }
-    if (peer.waits) {
-      MHD_suspend_connection(connection);
-      return 0;
-    }
-    const std::size_t count = std::min(most, peer.unsent.size());
-    std::memcpy(into, peer.unsent.data(), count);
-    peer.unsent.erase(0, count);
-    return static_cast<ssize_t>(count);
-  }
-
-  static void noticed(void* self, MHD_Connection* connection, void** /*context*/,
-                      MHD_ConnectionNotificationCode what) {
-    Parts& parts = *static_cast<Parts*>(self);
-    if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
-      if (const auto peer = parts.peers_.find(connection); peer != parts.peers_.end()) {
-        parts.tell_gone(peer->second);
-        parts.peers_.erase(peer);
-      }
-      return;
-    }
-    const int descriptor =
-        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
-    parts.peers_[connection] = {descriptor, parts.accepted_host_, parts.rules_.now(), {}};
-  }
-
-  static MHD_Result asked(void* self, MHD_Connection* connection, const char* url,
-                          const char* method, const char* /*version*/, const char* upload,
-                          std::size_t* upload_bytes, void** state) {
-    Parts& parts = *static_cast<Parts*>(self);
-    const auto peer = parts.peers_.find(connection);
-    if (peer == parts.peers_.end()) {
-      return MHD_NO;  // it was ended
-    }
-    const std::size_t bytes = std::exchange(*upload_bytes, 0);
-    try {
-      if (std::exchange(*state, &parts) == nullptr) {  // the head has come
-        return parts.head_came(peer, method, url);
-      }
-      std::string& body = peer->second.request.question.body;
-      if (bytes == 0) {
-        return parts.answer(peer);
-      }
-      if (peer->second.answered || body.size() + bytes > kMostBodyBytes) {
-        return peer->second.answered ? MHD_YES : MHD_NO;
-      }
-      body.append(upload, bytes);
-      return MHD_YES;
-    } catch (const std::exception&) {
-      return MHD_NO;  // no memory: the connection ends
-    }
-  }
-
-  MHD_Result head_came(Peers::iterator peer, const char* method, const char* path) {
-    Asked& request = peer->second.request;
-    request = asked_on(peer->first, method, path);
-    request.head.takes_changes = rules_.takes_changes(request.question.path);
-    request.question.number = ++last_number_;
-    request.question.counts = &counts_;
-    if (const auto refusal = objection_to(request.head, names_)) {
-      return send(peer, {refusal->status, kPlainText, refusal->sentence + "\n"});
-    }
-    if (request.question.method == "POST") {
-      if (const auto objection = rules_.objection(request.question)) {
-        return send(peer, *objection);
-      }
-    }
-    return MHD_YES;
-  }
-
-  MHD_Result answer(Peers::iterator peer) {
-    const auto now = rules_.now();
-    if (!peer->second.asked) {
-      peer->second.asked = now;
-    }
-    HttpQuestion& question = peer->second.request.question;
-    question.waited = std::chrono::duration_cast<milliseconds>(now - *peer->second.asked);
-    counts_.connections = peers_.size();
-    if (is_stopping_) {
-      return MHD_NO;
-    }
-    if (auto answer = answer_(question)) {
-      return send(peer, std::move(*answer));
-    }
-    peer->second.waits = true;
-    MHD_suspend_connection(peer->first);
-    return MHD_YES;
-  }
-
-  MHD_Result send(Peers::iterator peer, HttpAnswer answer) {
-    const auto streams = static_cast<std::size_t>(std::count_if(
-        peers_.begin(), peers_.end(), [](const auto& other) { return other.second.stream; }));
-    if (answer.stream && streams >= limits_.streams) {
-      return send(peer, {MHD_HTTP_SERVICE_UNAVAILABLE, kPlainText,
-                         "too many pages are open already: close some\n"});
-    }
-    MHD_Response* const response =
-        answer.stream ? streaming(peer->first) : buffered(std::move(answer.body));
-    if (response == nullptr) {
-      return MHD_NO;
-    }
-    add_headers(response, answer);
-    peer->second.stream = answer.stream;
-    const MHD_Result queued = MHD_queue_response(peer->first, answer.status, response);
-    MHD_destroy_response(response);
-    peer->second.answered = true;
-    ++counts_.answers[answer.status];
-    return queued;
-  }
-
-  MHD_Response* streaming(MHD_Connection* connection) {
-    constexpr std::size_t kBlock = 4096;
-    auto place = std::make_unique<StreamPlace>(this, connection);
-    MHD_Response* const response = MHD_create_response_from_callback(
-        MHD_SIZE_UNKNOWN, kBlock, &Parts::stream_on, place.get(),
-        [](void* context) { delete static_cast<StreamPlace*>(context); });
-    if (response != nullptr) {
-      static_cast<void>(place.release());  // the library deletes it
-    }
-    return response;
-  }
-
-  static constexpr const char* kPlainText = "text/plain; charset=utf-8";
-
-  OwnNames names_;
-  HttpLimits limits_;
-  Answer answer_;
-  Rules rules_;
-  Listener listener_;
-  protocol::WakeUp wake_up_;
-  std::atomic<bool> is_stopping_ = false;
-  // Of the thread, from here on.
-  Peers peers_;
-  HttpCounts counts_;
-  std::uint64_t last_number_ = 0;
-  std::optional<milliseconds> turn_again_ = milliseconds(0);
-  std::string accepted_host_;  // of the connection that is being taken
-  Clock::time_point accept_again_{};
-  MHD_Daemon* daemon_;
-  std::thread thread_;  // last: it uses all the others
+  HttpServer& server;
+  MHD_Connection* const connection;
+  HttpStream next;
+  std::string unsent = {};
+  std::size_t sent = 0;  ///< bytes of `unsent`
 };
 
 HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
-                       Answer answer, Rules rules)
-    : parts_(std::make_unique<Parts>(address, std::move(names), limits, std::move(answer),
-                                     std::move(rules))) {}
-HttpServer::~HttpServer() = default;
-
-std::string HttpServer::url() const {
+                       HttpHandlers handlers)
+    : names_(std::move(names)), limits_(limits), handlers_(std::move(handlers)) {
+  const Listener listener(address.address, address.port);
   constexpr std::string_view kTcp = "tcp";
-  return "http" + parts_->endpoint().substr(kTcp.size());
+  url_ = "http" + listener.endpoint().substr(kTcp.size());
+  const auto on_completed = [](void* /*self*/, MHD_Connection* /*connection*/, void** exchange,
+                               MHD_RequestTerminationCode /*why*/) {
+    delete static_cast<Exchange*>(std::exchange(*exchange, nullptr));
+  };
+  // Not by epoll: there libmicrohttpd 0.9.75 stops serving once the limit of connections is
+  // reached.
+  daemon_ = MHD_start_daemon(
+      MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_POLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
+      nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET,
+      ::fcntl(listener.descriptor(), F_DUPFD_CLOEXEC, 0), MHD_OPTION_NOTIFY_COMPLETED,
+      static_cast<MHD_RequestCompletedCallback>(on_completed), nullptr,
+      MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits.bytes_of_connection, MHD_OPTION_CONNECTION_LIMIT,
+      limits.connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits.connections_of_one_address,
+      MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(limits.idle.count()),
+      MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
+  if (daemon_ == nullptr) {
+    throw std::runtime_error("the HTTP server cannot start");
+  }
 }
 
-void HttpServer::wake() const {
-  parts_->wake();
+HttpServer::~HttpServer() {
+  is_stopping_ = true;
+  wake();  // libmicrohttpd stops only if no connection is suspended
+  MHD_stop_daemon(daemon_);
+}
+
+void HttpServer::wake() {
+  ++wakes_;
+  const std::lock_guard lock(mutex_);
+  for (MHD_Connection* const connection : std::exchange(suspended_, {})) {
+    MHD_resume_connection(connection);
+  }
+}
+
+/// `wakes` is the number of wakes before the answer was asked for: a later one was meant for it.
+void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
+  const std::lock_guard lock(mutex_);
+  MHD_suspend_connection(connection);
+  if (wakes_ == wakes) {
+    suspended_.insert(connection);
+  } else {
+    MHD_resume_connection(connection);
+  }
+}
+
+/// Called when the head of a request has come, for each part of its body, after the body, and again
+/// when the connection is resumed.
+MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const char* path,
+                                  const char* method, const char* /*version*/, const char* upload,
+                                  std::size_t* upload_bytes, void** exchange) {
+  auto& server = *static_cast<HttpServer*>(self);
+  try {
+    if (*exchange == nullptr) {
+      auto* const begun = new Exchange;  // deleted by the callback of completed requests
+      *exchange = begun;
+      begun->request.method = method;
+      begun->request.path = path;
+      return server.begin(connection, *begun);
+    }
+    Exchange& known = *static_cast<Exchange*>(*exchange);
+    const std::size_t bytes = std::exchange(*upload_bytes, 0);
+    if (known.is_answered) {
+      return MHD_YES;
+    }
+    if (bytes == 0) {
+      return server.answer(connection, known);
+    }
+    known.request.body.append(upload, bytes);
+    return known.request.body.size() <= kMostBodyBytes ? MHD_YES : MHD_NO;
+  } catch (const std::exception&) {
+    return MHD_NO;  // no memory: the connection ends
+  }
+}
+
+MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
+  HttpRequest& request = exchange.request;
+  MHD_get_connection_values(connection, MHD_HEADER_KIND, take_header, &request);
+  MHD_get_connection_values_n(connection, MHD_GET_ARGUMENT_KIND, take_field, &request);
+  auto refusal = refuse(request, names_);
+  if (!refusal && request.method == "POST") {
+    refusal = handlers_.refuse_change(request);
+  }
+  return refusal ? send(connection, exchange, *std::move(refusal)) : MHD_YES;
+}
+
+MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
+  if (is_stopping_ || (exchange.pending && is_gone(connection))) {
+    return MHD_NO;
+  }
+  const std::uint64_t wakes = wakes_;
+  if (auto answer = poll(exchange)) {
+    return send(connection, exchange, *std::move(answer));
+  }
+  suspend(connection, wakes);
+  return MHD_YES;
+}
+
+std::optional<HttpAnswer> HttpServer::poll(Exchange& exchange) const {
+  try {
+    if (!exchange.pending) {
+      HttpOutcome outcome = handlers_.answer(exchange.request);
+      if (auto* const answer = std::get_if<HttpAnswer>(&outcome)) {
+        return std::move(*answer);
+      }
+      exchange.pending = std::get<PendingAnswer>(std::move(outcome));
+    }
+    return exchange.pending();
+  } catch (const std::invalid_argument& error) {
+    return error_answer(MHD_HTTP_BAD_REQUEST, error.what());
+  } catch (const std::exception& error) {
+    return error_answer(MHD_HTTP_INTERNAL_SERVER_ERROR, error.what());
+  }
+}
+
+MHD_Result HttpServer::send(MHD_Connection* connection, Exchange& exchange, HttpAnswer answer) {
+  if (answer.stream && streams_ >= limits_.streams) {
+    answer = text_answer(MHD_HTTP_SERVICE_UNAVAILABLE, "too many pages are open: close some");
+  }
+  exchange.is_answered = true;
+  exchange.pending = {};
+  MHD_Response* const response = response_of(connection, answer);
+  if (response == nullptr) {
+    return MHD_NO;
+  }
+  add_headers(response, answer);
+  const MHD_Result queued = MHD_queue_response(connection, answer.status, response);
+  MHD_destroy_response(response);
+  ++answers_[answer.status];
+  return queued;
+}
+
+/// Moves the body or the stream out of the answer. Null: there is no memory.
+MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& answer) {
+  if (answer.stream) {
+    constexpr std::size_t kBlock = 4096;
+    auto stream = std::make_unique<Stream>(*this, connection, std::move(answer.stream));
+    MHD_Response* const response = MHD_create_response_from_callback(
+        MHD_SIZE_UNKNOWN, kBlock, &HttpServer::on_stream, stream.get(),
+        [](void* owned) { delete static_cast<Stream*>(owned); });
+    static_cast<void>(response != nullptr ? stream.release() : nullptr);
+    return response;
+  }
+  auto body = std::make_unique<std::string>(std::move(answer.body));
+  MHD_Response* const response = MHD_create_response_from_buffer_with_free_callback_cls(
+      body->size(), body->data(), [](void* owned) { delete static_cast<std::string*>(owned); },
+      body.get());
+  static_cast<void>(response != nullptr ? body.release() : nullptr);
+  return response;
+}
+
+/// Called for more of a stream when all earlier bytes were sent, and again after a wake.
+ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* into,
+                              std::size_t most) {
+  Stream& stream = *static_cast<Stream*>(context);
+  HttpServer& server = stream.server;
+  if (server.is_stopping_ || is_gone(stream.connection)) {
+    return MHD_CONTENT_READER_END_WITH_ERROR;
+  }
+  try {
+    const std::uint64_t wakes = server.wakes_;
+    if (stream.sent == stream.unsent.size()) {
+      auto next = stream.next();
+      if (!next) {
+        return MHD_CONTENT_READER_END_OF_STREAM;
+      }
+      stream.unsent = *std::move(next);
+      stream.sent = 0;
+    }
+    if (stream.unsent.empty()) {
+      server.suspend(stream.connection, wakes);
+      return 0;
+    }
+  } catch (const std::exception&) {
+    return MHD_CONTENT_READER_END_WITH_ERROR;
+  }
+  const std::size_t count = std::min(most, stream.unsent.size() - stream.sent);
+  std::memcpy(into, stream.unsent.data() + stream.sent, count);
+  stream.sent += count;
+  return static_cast<ssize_t>(count);
 }
 
 }  // namespace oblique::server

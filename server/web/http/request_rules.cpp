@@ -1,8 +1,13 @@
 #include "server/web/http/request_rules.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
+#include <regex>
+#include <stdexcept>
 #include <string_view>
+#include <system_error>
+#include <vector>
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -10,15 +15,17 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/web/http/http_address.h"
 
 namespace oblique::server {
 namespace {
 
-constexpr unsigned kBadRequest = 400;
-constexpr unsigned kForbidden = 403;
-constexpr unsigned kMethodNotAllowed = 405;
-constexpr unsigned kContentTooLarge = 413;
+template <typename Number>
+std::optional<Number> whole_number(const std::string& text) {
+  Number number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
+}
 
 bool is_numeric(const std::string& host) {
   in6_addr address{};
@@ -27,124 +34,109 @@ bool is_numeric(const std::string& host) {
 }
 
 bool is_own(const std::string& host, const OwnNames& own) {
-  if (host == "localhost" || own.names.contains(host)) {
-    return true;
-  }
-  return own.is_loopback ? is_loopback(host) : is_numeric(host);
+  return host == "localhost" || own.names.contains(host) ||
+         (own.is_loopback ? is_loopback(host) : is_numeric(host));
 }
 
-std::optional<HttpRefusal> objection_to_hosts(const RequestHead& head, const OwnNames& own) {
-  if (head.hosts.size() > 1) {
-    return HttpRefusal{kBadRequest, "a request has one Host"};
-  }
-  for (const std::string& header : head.hosts) {
-    const auto host = host_without_port(header);
-    if (!host) {
-      return HttpRefusal{kBadRequest, fmt::format("\"{}\" is no Host", protocol::excerpt(header))};
-    }
-    if (!is_own(*host, own)) {
-      return HttpRefusal{
-          kForbidden,
-          fmt::format("this server is not called {}: ask for its address, or start it with "
-                      "--http-name {}",
-                      protocol::excerpt(*host), protocol::excerpt(*host))};
-    }
-  }
-  return std::nullopt;
+/// Whether a header is present once, with this value.
+bool is(const HttpRequest& request, const std::string& header, std::string_view value) {
+  const auto values = request.all(header);
+  return values.size() == 1 && values.front() == value;
 }
 
-/// A page of this server and nobody else's. "null" is of a page without a site.
-bool is_own_origin(const std::string& origin, const RequestHead& head) {
-  constexpr std::string_view kScheme = "http://";
-  return head.hosts.size() == 1 && origin == std::string(kScheme) + head.hosts.front();
+bool all_are(const std::vector<std::string>& values, const std::set<std::string>& allowed) {
+  return std::all_of(values.begin(), values.end(),
+                     [&](const std::string& value) { return allowed.contains(value); });
 }
 
-/// The only one of these headers says this.
-bool is(const std::vector<std::string>& headers, std::string_view word) {
-  return headers.size() == 1 && headers.front() == word;
-}
-
-/// A link on a page of another site that opens a tab or takes one over, which is no page within
-/// that site's.
-bool is_followed_link(const RequestHead& head) {
-  return head.may_be_linked_to && head.method == "GET" && head.origins.empty() &&
-         (is(head.fetch_sites, "cross-site") || is(head.fetch_sites, "same-site")) &&
-         is(head.fetch_modes, "navigate") && is(head.fetch_targets, "document");
-}
-
-std::optional<HttpRefusal> objection_to_change(const RequestHead& head) {
-  if (head.origins.size() != 1 || std::any_of(head.fetch_sites.begin(), head.fetch_sites.end(),
-                                              [](const auto& s) { return s != "same-origin"; })) {
-    return HttpRefusal{kForbidden, "changes come from a page of this server only"};
-  }
-  if (head.has_body && (!head.body_bytes || *head.body_bytes > kMostBodyBytes)) {
-    return HttpRefusal{
-        kContentTooLarge,
-        fmt::format("a change says its length, and has at most {} bytes", kMostBodyBytes)};
-  }
-  return std::nullopt;
+/// A link on a page of another site that opens in a tab, not within that page. Without fields, for
+/// a token in a link that somebody else made must not let the browser in.
+bool is_followed_link(const HttpRequest& request) {
+  return request.path == "/" && request.fields.empty() && request.method == "GET" &&
+         request.all("origin").empty() &&
+         (is(request, "sec-fetch-site", "cross-site") ||
+          is(request, "sec-fetch-site", "same-site")) &&
+         is(request, "sec-fetch-mode", "navigate") && is(request, "sec-fetch-dest", "document");
 }
 
 }  // namespace
 
-std::optional<std::string> host_without_port(const std::string& header) {
-  std::string_view rest = header;
-  std::string_view host;
-  if (rest.starts_with('[')) {
-    const std::size_t end = rest.find(']');
-    if (end == std::string_view::npos) {
-      return std::nullopt;
-    }
-    host = rest.substr(1, end - 1);
-    rest.remove_prefix(end + 1);
-    if (!is_numeric(std::string(host)) || host.find(':') == std::string_view::npos) {
-      return std::nullopt;
-    }
-  } else {
-    host = rest.substr(0, rest.find(':'));
-    rest.remove_prefix(host.size());
-  }
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  const bool has_port = rest.starts_with(':');
-  rest.remove_prefix(has_port ? 1 : 0);
-  constexpr std::size_t kLongestPort = 5;
-  if (host.empty() || (!has_port && !rest.empty()) || rest.size() > kLongestPort ||
-      !std::all_of(rest.begin(), rest.end(), is_digit)) {
-    return std::nullopt;
-  }
-  std::string lower(host);
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  const bool is_plain = std::all_of(lower.begin(), lower.end(), [&](char c) {
-    return (c >= 'a' && c <= 'z') || is_digit(c) || c == '.' || c == '-' || c == '_' || c == ':';
-  });
-  return is_plain ? std::optional(lower) : std::nullopt;
+bool is_loopback(const std::string& address) {
+  in_addr v4{};
+  in6_addr v6{};
+  return (inet_pton(AF_INET, address.c_str(), &v4) == 1 && (ntohl(v4.s_addr) >> 24U) == 127) ||
+         (inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6));
 }
 
-std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames& own) {
-  if (auto refusal = objection_to_hosts(head, own)) {
-    return refusal;
+std::string host_without_port(const std::string& header) {
+  constexpr std::size_t kLongest = 300;  // a name has 253 characters at most
+  static const std::regex kHost(
+      R"((?:\[([0-9a-f.]*:[0-9a-f:.]*)\]|([a-z0-9._-]+))(?::[0-9]{0,5})?)", std::regex::icase);
+  std::smatch found;
+  if (header.size() > kLongest || !std::regex_match(header, found, kHost)) {
+    return {};
   }
-  if (head.has_zero_bytes) {
-    return HttpRefusal{kBadRequest, "fields of a request have no zero bytes"};
+  std::string host = found[1].str() + found[2].str();
+  std::transform(host.begin(), host.end(), host.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return host;
+}
+
+std::optional<HttpAddress> parse_http_address(const std::string& text) {
+  if (text == "off") {
+    return std::nullopt;
   }
-  const bool is_of_ours =
-      std::all_of(head.origins.begin(), head.origins.end(),
-                  [&](const std::string& origin) { return is_own_origin(origin, head); }) &&
-      std::all_of(head.fetch_sites.begin(), head.fetch_sites.end(),
-                  [](const std::string& site) { return site == "same-origin" || site == "none"; });
-  if (!is_of_ours && !is_followed_link(head)) {
-    return HttpRefusal{kForbidden, "pages of other sites get nothing from this server"};
+  const std::string host = host_without_port(text);
+  const std::string address = host == "localhost" ? "127.0.0.1" : host;
+  const auto port = whole_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
+  if (!port || !is_numeric(address)) {
+    throw std::runtime_error(fmt::format(
+        "--http {} is no ADDRESS:PORT, as 127.0.0.1:7602 or [::1]:7602 with a port from 0 to 65535 "
+        "(0: the system picks one), and not \"off\"",
+        protocol::visible(text)));
   }
-  if (head.method == "POST" && head.takes_changes) {
-    return objection_to_change(head);
+  return HttpAddress{address, *port == 0 ? "*" : std::to_string(*port)};
+}
+
+std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own) {
+  const auto hosts = request.all("host");
+  const auto origins = request.all("origin");
+  const auto sites = request.all("sec-fetch-site");
+  if (hosts.size() > 1) {
+    return text_answer(MHD_HTTP_BAD_REQUEST, "a request has one Host");
   }
-  if (head.method != "GET" && head.method != "HEAD") {
-    return HttpRefusal{kMethodNotAllowed, "only GET and HEAD are answered"};
+  if (!hosts.empty() && !is_own(host_without_port(hosts.front()), own)) {
+    const std::string name = protocol::excerpt(hosts.front());
+    return text_answer(MHD_HTTP_FORBIDDEN,
+                       fmt::format("\"{}\" is no name of this server: use its address, or start it "
+                                   "with --http-name and the name without the port",
+                                   name));
   }
-  if (head.has_body) {
-    return HttpRefusal{kContentTooLarge, "a request here has no body"};
+  if (request.has_zero_bytes) {
+    return text_answer(MHD_HTTP_BAD_REQUEST, "fields of a request contain no zero bytes");
+  }
+  const std::set<std::string> own_origins =
+      hosts.empty() ? std::set<std::string>() : std::set{"http://" + hosts.front()};
+  const bool is_from_here =
+      all_are(origins, own_origins) && all_are(sites, {"same-origin", "none"});
+  if (!is_from_here && !is_followed_link(request)) {
+    return text_answer(MHD_HTTP_FORBIDDEN, "pages of other sites get nothing from this server");
+  }
+  if (request.method == "POST") {
+    if (origins.size() != 1 || !all_are(sites, {"same-origin"})) {
+      return text_answer(MHD_HTTP_FORBIDDEN, "changes come from a page of this server only");
+    }
+  } else if (request.method != "GET" && request.method != "HEAD") {
+    return text_answer(MHD_HTTP_METHOD_NOT_ALLOWED, "only GET, HEAD and POST are answered");
+  }
+  const std::string length = request.header("content-length");
+  if (request.headers.contains("transfer-encoding") ||
+      (!length.empty() &&
+       whole_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
+    return text_answer(
+        MHD_HTTP_CONTENT_TOO_LARGE,
+        fmt::format("a body states its length, which is at most {} bytes", kMostBodyBytes));
   }
   return std::nullopt;
 }

@@ -4,51 +4,42 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
+#include "server/web/http/http_message.h"
+
+// Where the server listens, and which requests it refuses before it looks at what they ask for.
 namespace oblique::server {
 
-/// What a request says of itself before it has an answer.
-struct RequestHead {
-  std::string method;
-  bool has_body = false;
-  std::vector<std::string> hosts;        ///< every Host header
-  std::vector<std::string> origins;      ///< every Origin header
-  std::vector<std::string> fetch_sites;  ///< every Sec-Fetch-Site header
-  bool has_zero_bytes = false;           ///< in a field: what follows one is easily overlooked
-  bool takes_changes = false;            ///< something can be changed at its path, by POST
-  std::optional<std::uint64_t> body_bytes = {};  ///< as Content-Length says
-  bool may_be_linked_to = false;                ///< what is there holds nothing and changes nothing
-  std::vector<std::string> fetch_modes = {};    ///< every Sec-Fetch-Mode header
-  std::vector<std::string> fetch_targets = {};  ///< every Sec-Fetch-Dest header
+struct HttpAddress {
+  std::string address = "127.0.0.1";  ///< numeric
+  std::string port = "7602";          ///< "*": the system picks one
 };
 
-/// By what a server may be called in a request. A page of a stranger, opened in a browser on this
-/// machine or near it, can make its own name mean our address (DNS rebinding), and would then read
-/// us as if we were its own site; but it cannot make the browser ask for a name that is not its.
+/// Parses ADDRESS:PORT, as 127.0.0.1:7602, [::1]:7602 or localhost:7602, or "off"; port 0: the
+/// system picks one. Throws std::runtime_error that says what is allowed.
+std::optional<HttpAddress> parse_http_address(const std::string& text);
+
+/// Whether a numeric address is reached from this machine only.
+bool is_loopback(const std::string& address);
+
+/// The host of a Host header in lower case, without port and brackets; empty if it is malformed.
+std::string host_without_port(const std::string& header);
+
+/// Names of this server in a Host header. A hostile page in a browser on this machine can make its
+/// own name resolve to our address (DNS rebinding), and then read us as its own site; it cannot
+/// make the browser send another name than its own.
 struct OwnNames {
-  /// Only this machine reaches the server: addresses of other machines are none of its names.
+  /// Addresses of other machines are no names of a server that listens on loopback.
   bool is_loopback = true;
-  /// Beside numeric addresses and localhost; in lower case.
+  /// Besides numeric addresses and localhost; in lower case.
   std::set<std::string> names;
 };
 
-struct HttpRefusal {
-  unsigned status;
-  std::string sentence;
-};
-
-/// A change has so many bytes at most.
 inline constexpr std::uint64_t kMostBodyBytes = std::uint64_t{256} * 1024;
 
-/// Why the request gets no answer; nothing: it gets one. What changes something must come from a
-/// page of this server, which says so by `Origin`; who else asks, as a program, has the port of the
-/// clients. Of what comes from pages of other sites only a link that somebody follows is answered,
-/// where the head `may_be_linked_to`.
-std::optional<HttpRefusal> objection_to(const RequestHead& head, const OwnNames& own);
-
-/// The host of a Host header, in lower case and without port and brackets: "127.0.0.1" of
-/// "127.0.0.1:7602", "::1" of "[::1]:7602". Nothing when it is malformed.
-std::optional<std::string> host_without_port(const std::string& header);
+/// Why a request is refused; none: it is not. A POST must come from a page of this server, which
+/// its `Origin` says; programs use the clients' port. Of requests from pages of other sites only a
+/// followed link to the page itself, without any field, is answered.
+std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own);
 
 }  // namespace oblique::server

@@ -1,329 +1,167 @@
 #include "server/web/page/page.h"
 
-#include <algorithm>
-#include <charconv>
-#include <exception>
-#include <stdexcept>
+#include <regex>
 #include <string_view>
 #include <utility>
 
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/http/json_answer.h"
 #include "server/web/page/page_files.h"
+#include "server/web/page/request_flow.h"
 
 namespace oblique::server {
 namespace {
 
-constexpr unsigned kSeeOther = 303;
-constexpr unsigned kWrongQuestion = 400;
-constexpr unsigned kUnauthorized = 401;
-constexpr unsigned kForbidden = 403;
-constexpr unsigned kNothingThere = 404;
-constexpr unsigned kTryLater = 503;
-
 constexpr std::string_view kApi = "/api/";
 constexpr std::string_view kStudies = "/api/studies";
-constexpr std::string_view kLook = "/api/look";
 constexpr std::string_view kCheck = "/api/check";
 
-/// Browsers wait so long for one answer; what takes longer is asked for again.
-constexpr std::chrono::milliseconds kPatience{8000};
-
 constexpr const char* kHowToEnter =
-    "this server shows its page to who has its token: open the address that it printed when it "
-    "started, or that `oblique view` prints";
+    "this server shows its page to those who have its token: open the address that it printed when "
+    "it started, or that `oblique view` prints";
 
-constexpr const char* kTooManyPictures = "too many pictures are asked for at once: ask again later";
+/// /api/studies/STUDY[/points/POINT][/PART]
+struct StudyPath {
+  std::uint64_t study = 0;
+  std::optional<std::uint64_t> point;
+  std::string part;
+};
 
-constexpr const char* kSolvesHere =
-    "the picture of a point is solved for on the server's machine, which only who has the token "
-    "may ask for: draw it with `oblique plot --server`";
-
-HttpAnswer nothing_there() {
-  return error_answer(kNothingThere, "there is nothing here");
-}
-
-/// Takes a number from the front; nothing: there is none.
-std::optional<std::uint64_t> take_number(std::string_view& text) {
-  std::uint64_t number = 0;
-  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc()) {
+std::optional<StudyPath> parse_study_path(const std::string& path) {
+  static const std::regex kPath(
+      "/api/studies/([1-9][0-9]{0,18})(?:/points/([0-9]{1,19}))?(?:/([a-z]{1,20}))?");
+  std::smatch found;
+  if (!std::regex_match(path, found, kPath)) {
     return std::nullopt;
   }
-  text.remove_prefix(static_cast<std::size_t>(rest - text.data()));
-  return number;
+  StudyPath parsed{std::stoull(found[1]), {}, found[3]};
+  if (found[2].matched) {
+    parsed.point = std::stoull(found[2]);
+  }
+  return parsed;
+}
+
+/// A change of a study that is named in the path.
+struct PathChange {
+  std::uint64_t study;
+  protocol::StudyChange change;
+};
+
+std::optional<PathChange> parse_change(const std::string& path) {
+  const auto parsed = parse_study_path(path);
+  const auto change = parsed && !parsed->point ? study_change(parsed->part) : std::nullopt;
+  return change ? std::optional(PathChange{parsed->study, *change}) : std::nullopt;
 }
 
 }  // namespace
 
-Page::Page(const PageSettings& settings, const Neighbours& neighbours)
-    : shows_without_token_(settings.shows_without_token),
-      file_(settings.is_of_file ? settings.pictures.database : ""),
-      version_(settings.version),
-      key_(settings.token.empty() ? PageKey() : PageKey(settings.token)),
-      at_(neighbours),
-      looks_(neighbours.service, settings.looks_kept),
-      pictures_(settings.pictures) {}
+Page::Page(PageSettings settings, ServiceClient& service, EventFeed& events)
+    : settings_(std::move(settings)), service_(service), events_(events) {}
 
-bool Page::has(const std::string& path) {
-  return path.starts_with(kApi) || is_page_file(path);
+bool Page::is_trusted(const HttpRequest& request) const {
+  return token().is_in(request.all("cookie"), request.header("host"));
 }
 
-bool Page::takes_changes(const std::string& path) {
-  if (path == kStudies || path == kLook || path == kCheck || kept_by(path)) {
-    return true;
+std::optional<HttpAnswer> Page::refuse_change(const HttpRequest& request) const {
+  const std::string& path = request.path;
+  if (path != kStudies && path != kCheck && !parse_change(path)) {
+    return error_answer(MHD_HTTP_METHOD_NOT_ALLOWED, "nothing can be changed here");
   }
-  const auto place = place_of(path);
-  return place && !place->point && change_talk(place->study, place->part).has_value();
+  return is_trusted(request) ? std::nullopt
+                             : std::optional(error_answer(MHD_HTTP_UNAUTHORIZED, kHowToEnter));
 }
 
-std::optional<std::uint64_t> Page::kept_by(const std::string& path) {
-  std::string_view rest = path;
-  if (!rest.starts_with(kLook) || !rest.substr(kLook.size()).starts_with('/')) {
-    return std::nullopt;
+/// Exchanges the token for a cookie, which removes it from the browser's address and history.
+HttpAnswer Page::enter(const HttpRequest& request) const {
+  if (!token().is(request.fields.at("token"))) {
+    return text_answer(MHD_HTTP_FORBIDDEN,
+                       "that is not the token of this server, which draws another one each time it "
+                       "starts");
   }
-  rest.remove_prefix(kLook.size() + 1);
-  const auto study = take_number(rest);
-  return rest == "/keep" ? study : std::nullopt;
-}
-
-std::optional<Page::Place> Page::place_of(const std::string& path) {
-  std::string_view rest = path;
-  if (!rest.starts_with(kStudies) || rest.size() <= kStudies.size() ||
-      rest.at(kStudies.size()) != '/') {
-    return std::nullopt;
-  }
-  rest.remove_prefix(kStudies.size() + 1);
-  Place place;
-  const auto study = take_number(rest);
-  if (!study || *study == 0 || (!rest.empty() && rest.front() != '/')) {
-    return std::nullopt;
-  }
-  place.study = *study;
-  rest.remove_prefix(rest.empty() ? 0 : 1);
-  constexpr std::string_view kPoints = "points/";
-  if (rest.starts_with(kPoints)) {
-    rest.remove_prefix(kPoints.size());
-    place.point = take_number(rest);
-    if (!place.point) {
-      return std::nullopt;
-    }
-  }
-  place.part = rest;
-  return place;
-}
-
-bool Page::is_trusted(const HttpQuestion& question) const {
-  return key_.is_in(question.cookies, question.host);
-}
-
-std::optional<HttpAnswer> Page::objection_to_change(const HttpQuestion& question) const {
-  return is_trusted(question) ? std::nullopt
-                              : std::optional(error_answer(kUnauthorized, kHowToEnter));
-}
-
-/// A token becomes a cookie, and goes from the browser's address and history.
-std::optional<HttpAnswer> Page::enter(const HttpQuestion& question) const {
-  const auto token = question.fields.find("token");
-  if (question.path != "/" || token == question.fields.end()) {
-    return std::nullopt;
-  }
-  if (!key_.is_token(token->second)) {
-    return HttpAnswer{kForbidden, "text/plain; charset=utf-8",
-                      "that is not the token of this server, which draws another one each time it "
-                      "starts\n"};
-  }
-  return HttpAnswer{kSeeOther,
-                    "text/plain; charset=utf-8",
-                    "",
-                    {{"Location", "/"}, {"Set-Cookie", key_.cookie_for(question.host)}}};
-}
-
-HttpAnswer Page::session(const HttpQuestion& question) const {
-  const bool trusted = is_trusted(question);
-  return json_answer({{"version", version_},
-                      {"may_look", trusted || shows_without_token_},
-                      {"may_change", trusted},
-                      {"file", trusted ? file_ : ""},
-                      {"how_to_enter", trusted ? "" : kHowToEnter}});
-}
-
-std::optional<HttpAnswer> Page::answer(const HttpQuestion& question) {
-  const auto known = under_way_.find(question.number);
-  if (known == under_way_.end()) {
-    try {
-      return begin(question);
-    } catch (const std::invalid_argument& error) {
-      return error_answer(kWrongQuestion, error.what());
-    }
-  }
-  if (const auto place = place_of(question.path)) {
-    looks_.seen(place->study);  // who waits for it looks at it
-  }
-  auto answer = go_on(question, known->second);
-  if (!answer && question.waited > kPatience) {
-    answer = known->second.talk
-                 ? known->second.talk->meanwhile
-                 : error_answer(kTryLater, "the server takes too long: ask again later");
-    if (known->second.talk && !known->second.talk->must_end) {
-      at_.service.leave(question.number);
-    } else {
-      gone(question.number);
-    }
-  }
-  if (answer) {
-    under_way_.erase(question.number);
-  }
+  HttpAnswer answer = text_answer(MHD_HTTP_SEE_OTHER, "");
+  answer.headers = {{"Location", "/"}, {"Set-Cookie", token().cookie_for(request.header("host"))}};
   return answer;
 }
 
-void Page::gone(std::uint64_t number) {
-  auto known = under_way_.extract(number);
-  if (!known.empty() && known.mapped().talk && known.mapped().talk->must_end) {
-    left_.emplace(number, std::move(*known.mapped().talk));
-  } else if (!known.empty() && known.mapped().talk) {
-    at_.service.forget(number);
-  } else if (!known.empty()) {
-    known.mapped().pool->forget(number);
-  }
+HttpAnswer Page::session(const HttpRequest& request) const {
+  const bool trusted = is_trusted(request);
+  return json_answer({{"version", settings_.version},
+                      {"may_look", trusted || settings_.shows_without_token},
+                      {"may_change", trusted},
+                      {"file", trusted && settings_.is_of_file ? settings_.database : ""},
+                      {"how_to_enter", trusted ? "" : kHowToEnter}});
 }
 
-std::optional<std::chrono::milliseconds> Page::tick() {
-  hear_those_left();
-  const auto looks = looks_.tick();
-  constexpr std::chrono::milliseconds kSoon{100};
-  return left_.empty() ? looks : std::min(looks.value_or(kSoon), kSoon);
+std::optional<HttpOutcome> Page::answer(const HttpRequest& request) {
+  if (request.path == "/" && request.fields.contains("token")) {
+    return enter(request);
+  }
+  if (!request.path.starts_with(kApi)) {
+    return file_answer(request);
+  }
+  if (request.path == "/api/session") {
+    return session(request);
+  }
+  if (!settings_.shows_without_token && !is_trusted(request)) {
+    return error_answer(MHD_HTTP_UNAUTHORIZED, kHowToEnter);
+  }
+  if (!is_text(request.fields)) {
+    return error_answer(MHD_HTTP_BAD_REQUEST, "fields of a request are UTF-8");
+  }
+  auto outcome = request.method == "POST" ? change(request) : read(request);
+  return outcome ? std::move(outcome) : error_answer(MHD_HTTP_NOT_FOUND, "there is nothing here");
 }
 
-/// What comes of them nobody sees.
-void Page::hear_those_left() {
-  std::erase_if(left_, [this](const auto& left) {
-    try {
-      return hear(left.first, left.second).has_value();
-    } catch (const std::exception&) {
-      at_.service.forget(left.first);
-      return true;
-    }
-  });
-}
-
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question) {
-  if (auto entered = enter(question)) {
-    return entered;
+std::optional<HttpOutcome> Page::read(const HttpRequest& request) {
+  if (request.path == "/api/events") {
+    HttpAnswer answer{200, "text/event-stream", {}};
+    answer.stream = events_.subscribe(request.header("last-event-id"));
+    return answer;
   }
-  const std::string& path = question.path;
-  if (!path.starts_with(kApi)) {
-    return file_answer(question);
+  if (request.path == kStudies) {
+    return list_studies(service_, request.fields);
   }
-  if (path == "/api/session") {
-    return session(question);
+  if (request.path == "/api/workers") {
+    return list_workers(service_, request.fields);
   }
-  if (!shows_without_token_ && !is_trusted(question)) {
-    return error_answer(kUnauthorized, kHowToEnter);
+  const auto path = parse_study_path(request.path);
+  if (!path) {
+    return std::nullopt;
   }
-  if (!is_text(question.fields)) {
-    return error_answer(kWrongQuestion, "fields of a request are UTF-8");
+  const auto& [study, point, part] = *path;
+  if (point && part.empty()) {
+    return point_answer(service_, study, *point);
   }
-  if (question.method == "POST") {
-    return begin_change(question);
+  if (point) {
+    return part == "trace"
+               ? std::optional<HttpOutcome>(solve_trace(service_, study, *point, request.fields))
+               : std::nullopt;
   }
-  if (path == "/api/events") {
-    return HttpAnswer{200, "text/event-stream", {}, {}, at_.overview.open(question.seen_event)};
+  if (part.empty()) {
+    return study_answer(service_, study);
   }
-  if (path == kStudies) {
-    return begin(question, studies_talk(question));
+  if (part == "slice") {
+    return slice_answer(service_, study, request.fields);
   }
-  if (path == "/api/workers") {
-    return begin(question, workers_talk(question));
+  if (part == "bins") {
+    return bins_answer(service_, study, request.fields);
   }
-  const auto place = place_of(path);
-  return place ? begin_study(question, *place) : nothing_there();
-}
-
-std::optional<HttpAnswer> Page::begin_study(const HttpQuestion& question, const Place& place) {
-  looks_.seen(place.study);
-  if (place.point && place.part == "/trace") {
-    return begin(question, trace_talk(place.study, *place.point, question));
+  if (part == "rows") {
+    return query_rows(service_, study, request.fields);
   }
-  if (!place.point && place.part == "rows") {
-    return begin(question, rows_talk(place.study, question));
-  }
-  if (place.point && place.part == "/picture" && !is_trusted(question)) {
-    return error_answer(kUnauthorized, kSolvesHere);
-  }
-  if (place.part == (place.point ? "/picture" : "picture")) {
-    return begin(question, at_.drawings,
-                 picture_job(pictures_, place.study, place.point, question.fields));
-  }
-  std::optional<AnswerPool::Job> job;
-  if (place.point && place.part.empty()) {
-    job = point_job(place.study, *place.point);
-  } else if (!place.point && place.part.empty()) {
-    job = study_job(place.study);
-  } else if (!place.point && place.part == "slice") {
-    job = slice_job(place.study, question.fields);
-  } else if (!place.point && place.part == "bins") {
-    job = bins_job(place.study, question.fields);
-  }
-  return job ? begin(question, at_.answers, std::move(*job)) : nothing_there();
-}
-
-std::optional<HttpAnswer> Page::begin_change(const HttpQuestion& question) {
-  if (question.path == kStudies) {
-    return begin(question, submit_talk(question));
-  }
-  if (question.path == kCheck) {
-    return begin(question, at_.answers, check_job(question.body));
-  }
-  if (question.path == kLook) {
-    return begin(question, looks_.begin(question));
-  }
-  if (const auto study = kept_by(question.path)) {
-    auto keeping = looks_.keep(*study, question);
-    auto* const talk = std::get_if<Talk>(&keeping);
-    return talk != nullptr ? begin(question, std::move(*talk))
-                           : std::optional(std::get<HttpAnswer>(std::move(keeping)));
-  }
-  const auto place = place_of(question.path);
-  auto talk = place ? change_talk(place->study, place->part) : std::nullopt;
-  return talk ? begin(question, std::move(*talk)) : nothing_there();
-}
-
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, Talk talk) {
-  at_.service.ask(question.number, talk.first);
-  under_way_.emplace(question.number, UnderWay{std::move(talk)});
   return std::nullopt;
 }
 
-std::optional<HttpAnswer> Page::begin(const HttpQuestion& question, AnswerPool& pool,
-                                      AnswerPool::Job job) {
-  if (!pool.submit(question.number, std::move(job))) {
-    return error_answer(kTryLater, kTooManyPictures);
+std::optional<HttpOutcome> Page::change(const HttpRequest& request) {
+  if (request.path == kStudies) {
+    return submit_study(service_, request.body);
   }
-  under_way_.emplace(question.number, UnderWay{{}, &pool});
-  return std::nullopt;
-}
-
-std::optional<HttpAnswer> Page::go_on(const HttpQuestion& question, const UnderWay& under_way) {
-  return under_way.talk ? hear(question.number, *under_way.talk)
-                        : under_way.pool->take(question.number);
-}
-
-/// The answer at the end of a talk; nothing while a reply is awaited.
-std::optional<HttpAnswer> Page::hear(std::uint64_t number, const Talk& talk) {
-  while (const auto reply = at_.service.reply(number)) {
-    Talk::Next next = !reply->has_error() ? talk.go_on(*reply)
-                      : talk.failed       ? talk.failed(reply->error())
-                                          : failure(reply->error());
-    auto* const request = std::get_if<protocol::ClientRequest>(&next);
-    if (request == nullptr) {
-      at_.service.forget(number);
-      return std::get<HttpAnswer>(std::move(next));
-    }
-    at_.service.ask(number, std::move(*request));
+  if (request.path == kCheck) {
+    return check_answer(request.body);
   }
-  return std::nullopt;
+  const auto change = parse_change(request.path);
+  return change ? std::optional<HttpOutcome>(change_study(service_, change->study, change->change))
+                : std::nullopt;
 }
 
 }  // namespace oblique::server

@@ -1,100 +1,49 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 
-#include "server/web/answers/answer_pool.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 #include "server/web/http/http_message.h"
-#include "server/web/page/live_text.h"
-#include "server/web/page/looks.h"
-#include "server/web/page/page_key.h"
-#include "server/web/page/talks.h"
-#include "server/web/pictures/picture_job.h"
+#include "server/web/page/event_feed.h"
+#include "server/web/page/page_token.h"
 
 namespace oblique::server {
 
 struct PageSettings {
-  /// By which a browser is let in; empty: one is drawn.
-  std::string token;
-  /// Who comes without it may look, and change nothing.
-  bool shows_without_token = false;
-  /// The server is of one who shows a file, and ends with that: commands read the file.
+  PageToken token;
+  bool shows_without_token = false;  ///< reading needs no token
+  /// The server belongs to a program that shows a file and ends with it: commands read the file.
   bool is_of_file = false;
-  /// A study that was made to be looked at goes when nobody has for so long.
-  std::chrono::milliseconds looks_kept{6000};
-  PictureSettings pictures = {};
+  std::string database;
   std::string version;
 };
 
-/// The page: its files, and what it asks this server for. README.md has every path. Of the HTTP
-/// server's thread.
+/// The page: its files, and what it asks this server for. README.md has every path. Used by the
+/// HTTP server's thread.
 class Page {
  public:
-  /// What the page asks. All of them must outlive it.
-  struct Neighbours {
-    ServiceLine& service;
-    AnswerPool& answers;
-    AnswerPool& drawings;  ///< where the program that draws is waited for
-    LiveText& overview;
-  };
+  /// The references must outlive the page.
+  Page(PageSettings settings, ServiceClient& service, EventFeed& events);
 
-  Page(const PageSettings& settings, const Neighbours& neighbours);
+  const PageToken& token() const { return settings_.token; }
 
-  const PageKey& key() const { return key_; }
-
-  /// Whether that path is the page's. The others have no token.
-  static bool has(const std::string& path);
-  static bool takes_changes(const std::string& path);
-  /// Why a change is refused before its body is read.
-  std::optional<HttpAnswer> objection_to_change(const HttpQuestion& question) const;
-  /// Nothing: it is asked for again.
-  std::optional<HttpAnswer> answer(const HttpQuestion& question);
-  void gone(std::uint64_t number);
-  /// Looks after what nobody asks for. Gives the time after which it wants to be called again.
-  std::optional<std::chrono::milliseconds> tick();
+  /// Why a POST is refused before its body is read.
+  std::optional<HttpAnswer> refuse_change(const HttpRequest& request) const;
+  /// Nothing: there is nothing at that path. Throws std::invalid_argument for a wrong request.
+  std::optional<HttpOutcome> answer(const HttpRequest& request);
 
  private:
-  /// A path below /api/studies/, taken apart.
-  struct Place {
-    std::uint64_t study = 0;
-    std::string part;  ///< what follows the number
-    std::optional<std::uint64_t> point;
-  };
-  static std::optional<Place> place_of(const std::string& path);
-  /// The study of a path /api/look/ID/keep.
-  static std::optional<std::uint64_t> kept_by(const std::string& path);
+  bool is_trusted(const HttpRequest& request) const;
+  HttpAnswer enter(const HttpRequest& request) const;
+  HttpAnswer session(const HttpRequest& request) const;
+  std::optional<HttpOutcome> read(const HttpRequest& request);
+  std::optional<HttpOutcome> change(const HttpRequest& request);
 
-  bool is_trusted(const HttpQuestion& question) const;
-  std::optional<HttpAnswer> enter(const HttpQuestion& question) const;
-  HttpAnswer session(const HttpQuestion& question) const;
-  std::optional<HttpAnswer> begin(const HttpQuestion& question);
-  std::optional<HttpAnswer> begin_study(const HttpQuestion& question, const Place& place);
-  std::optional<HttpAnswer> begin_change(const HttpQuestion& question);
-  std::optional<HttpAnswer> begin(const HttpQuestion& question, Talk talk);
-  std::optional<HttpAnswer> begin(const HttpQuestion& question, AnswerPool& pool,
-                                  AnswerPool::Job job);
-  /// What a request waits for: a reply to a talk or, without one, a job of a pool.
-  struct UnderWay {
-    std::optional<Talk> talk = {};
-    AnswerPool* pool = nullptr;
-  };
-  std::optional<HttpAnswer> go_on(const HttpQuestion& question, const UnderWay& under_way);
-  std::optional<HttpAnswer> hear(std::uint64_t number, const Talk& talk);
-  void hear_those_left();
-
-  bool shows_without_token_;
-  std::string file_;  // empty: commands ask the server
-  std::string version_;
-  PageKey key_;
-  Neighbours at_;
-  Looks looks_;
-  PictureSettings pictures_;
-  std::map<std::uint64_t, UnderWay> under_way_;  // by number of the request
-  std::map<std::uint64_t, Talk> left_;           // that go on without a browser
+  PageSettings settings_;
+  ServiceClient& service_;
+  EventFeed& events_;
 };
 
 }  // namespace oblique::server

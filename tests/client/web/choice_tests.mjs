@@ -26,7 +26,7 @@ const choose_by_keys = async (page) => {
 
 test("a large map is asked for with few cells first, and the cell that is chosen in it is the same point in the finer one", async () => {
   const id = await submit("large", { H: [0.5, 1.1, 200], mu: [0.1, 2, 200], e: [0.8, 0.8, 1] }, ["pause"]);
-  const page = await browser.open(`#/study/${id}?pic=map&x=mu&y=H&solve=off`, { early: hold_finer_ones });
+  const page = await browser.open(`#/study/${id}?pic=map&x=mu&y=H`, { early: hold_finer_ones });
   await facts(page, "96 × 96");
   await choose_by_keys(page);
   const [spoken, choice] = [await place(page), await text_of(page, ".choice a")];
@@ -47,7 +47,7 @@ test("a large map is asked for with few cells first, and the cell that is chosen
 test("a coarse picture comes first when a large map is opened, and never for a few points more", async () => {
   const page = await browser.open("#/");
   const steps = await page.evaluate(async () => {
-    const { steps_to } = await import("/study/asked/question.js");
+    const { steps_to } = await import("/study/pictures.js");
     const axes = ["mu", "H"].map((key) => ({ key, values: 200 }));
     const view = (is_refreshing) => ({ is: (name) => ({ pic: "map", z: "fn_peak_N", x: "mu", y: "H" })[name] ?? "", block: { kind: "grid", axes }, is_refreshing });
     return [view(false), view(true)].map(steps_to);

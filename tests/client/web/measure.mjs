@@ -90,43 +90,6 @@ async function sliding(view) {
   await page.close();
 }
 
-/** What closed tabs looked at would be solved for six seconds more, and the next click wait for it. */
-async function end_looks(page) {
-  await page.evaluate(async () => {
-    const { studies } = await (await fetch("/api/studies?limit=1000")).json();
-    const looks = studies.filter((one) => one.name.startsWith("look-") && one.state === "running");
-    await Promise.all(looks.map((one) => fetch(`/api/studies/${one.id}/cancel`, { method: "POST", body: "{}" })));
-  });
-}
-
-/** From the click to whole pictures of 33² and 65² points that the study lacks. */
-async function solving(overview, study) {
-  const found = { 33: [], 65: [] };
-  for (let i = 0; i < kSolved; ++i) {
-    const { page } = await opened(`#/study/${study.id}?solve=off&x0=${i + 1}&x1=${i + 12}&y0=${2 * i + 1}&y1=${2 * i + 20}`);
-    const times = await page.evaluate(() => new Promise((take) => {
-      const root = document.querySelector("[data-picture-ms]");
-      const told = {};
-      const begun = performance.now();
-      new MutationObserver(() => {
-        const side = root.dataset.side;
-        if (!Number(side) || told[side]) return;
-        told[side] = -1;
-        requestAnimationFrame(() => setTimeout(() => {
-          told[side] = performance.now() - begun;
-          if (side === "65") take(told);
-        }));
-      }).observe(root, { attributes: true, attributeFilter: ["data-side"] });
-      document.querySelector(".finer").click();
-    }));
-    for (const side of [33, 65]) found[side].push(times[side]);
-    await page.close();
-    await end_looks(overview);
-  }
-  say("33", "solved while one looks, 33 × 33", found[33], 300);
-  say("65", "solved while one looks, 65 × 65", found[65], 1000);
-}
-
 /** A study of 10^9 points, of which some are solved. */
 async function begin_large(page) {
   return page.evaluate(async () => {
@@ -150,7 +113,6 @@ async function measure() {
     modes: () => opening("modes", "the same of modes", `${view}?pic=map&z=mode`),
     scatter: () => opening("scatter", "the same of a scatter", `${view}?pic=gathered&x=mu&y=fn_peak_N`),
     slider: () => sliding(view),
-    solving: () => solving(page, study),
     large: async () => opening("large", "the same of 10^9 points, some solved", `#/study/${await begin_large(page)}`),
   };
   for (const part of parts.length > 0 ? parts : Object.keys(all)) await all[part]();

@@ -191,7 +191,7 @@ const many_studies = () => {
 };
 const row_of = (page, name) => until(page, (wanted) => [...document.querySelectorAll("tbody th")].find((one) => one.textContent === wanted)?.parentElement.textContent, name);
 
-test("of many studies the overview says what was read, keeps what was asked for, and has all of them in its CSV", async () => {
+test("of many studies the overview says what was read, and keeps what was asked for", async () => {
   const page = await browser.open("#/?name=study-430", { is_hurried: true, early: many_studies });
   const says = (what) => until(page, (text) => document.querySelector("main").textContent.includes(text), what);
   const press = (name) => page.evaluate((wanted) => [...document.querySelectorAll("main button")].find((one) => one.textContent === wanted).click(), name);
@@ -216,17 +216,6 @@ test("of many studies the overview says what was read, keeps what was asked for,
   await row_of(page, "study-1");
   await page.goBack();
   await until(page, () => document.querySelector("main input[type=search]").value === "study-44");
-  await page.evaluate(() => {
-    const make = URL.createObjectURL;
-    URL.createObjectURL = (blob) => {
-      blob.text().then((text) => { window.saved = text; });
-      return make.call(URL, blob);
-    };
-    document.querySelector('[aria-label="studies as CSV"]').click();
-  });
-  assert.equal((await until(page, () => window.saved)).trim().split("\r\n").length, 12);
-  await page.evaluate(() => { window.saved = ""; document.querySelector('[aria-label="workers as CSV"]').click(); });
-  assert.match(await until(page, () => window.saved), /^id,name,host,state,threads,.*\r\n\d+,/);
   await page.close();
 });
 

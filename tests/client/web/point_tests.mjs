@@ -56,7 +56,7 @@ test("the time is scrubbed from release through the contact, and the finger and 
       const bytes = await (await fetch(`/api/studies/1/points/100/trace?shape=1${query}`)).arrayBuffer();
       return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, new DataView(bytes).getUint32(0, true))));
     };
-    return [(await head("&fall=1")).fall_rows, (await (await fetch("/api/studies/1/points/100")).json()).row.fall_time_s];
+    return [(await head("&fall=1")).fall_rows, (await (await fetch("/api/studies/1/rows?select=fall_time_s&where=point=100")).json()).rows[0][0]];
   });
   assert.ok(fall[0] > 100);
   assert.equal(await time(page), `\u2212${(fall[1] * 1000).toFixed(0)} ms`);  // released
@@ -138,6 +138,20 @@ test("in a window of 400 pixels the numbers of a point are in one piece each, an
   await page.close();
 });
 
+test("all plots of a point are saved as one PNG", async () => {
+  const page = await point({ motion: "reduce", early: () => {
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      createImageBitmap(blob).then(({ height }) => { window.height_px = height; });
+      return make.call(URL, blob);
+    };
+  } });
+  await page.evaluate(() => [...document.querySelectorAll("button")].find((one) => one.textContent === "Plots as PNG").click());
+  const [height, sum] = await until(page, () => window.height_px && [window.height_px, [...document.querySelectorAll(".uplot canvas, .loop canvas")].reduce((all, one) => all + one.height, 0)]);
+  assert.ok(height > sum, `${height} ${sum}`);
+  await page.close();
+});
+
 test("loops of more instants than a call has arguments are drawn", async () => {
   const page = await point({ motion: "reduce" });
   assert.equal(await page.evaluate(async () => {
@@ -181,7 +195,7 @@ test("a point that is solved while somebody looks at it says so", async () => {
     const real = window.fetch;
     window.fetch = async (path, how) => {
       const answer = await real(path, how);
-      return /\/points\/0$/.test(path) && !window.is_solved ? new Response(JSON.stringify({ ...await answer.json(), row: null })) : answer;
+      return /\/rows\?.*where=point/.test(path) && !window.is_solved ? new Response(JSON.stringify({ ...await answer.json(), rows: [] })) : answer;
     };
   } });
   await until(page, () => document.querySelector("main").textContent.includes("This point is not solved yet."));

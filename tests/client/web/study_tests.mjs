@@ -14,7 +14,7 @@ test("a map shows its cells; pointing at one tells its value, a click chooses it
   await page.mouse.move(box.x + 75, box.y + box.height - 60);
   await until(page, () => /mu 0.1, H 0.5 m: fn_peak_N [\d.]+ N/.test(document.querySelector(".reading").textContent));
   const told = Number((await text_of(page, ".reading")).match(/fn_peak_N ([\d.]+)/)[1]);
-  const stored = await page.evaluate(async () => (await (await fetch("/api/studies/1/points/0")).json()).row.fn_peak_N);
+  const stored = await page.evaluate(async () => (await (await fetch("/api/studies/1/rows?select=fn_peak_N&where=point=0")).json()).rows[0][0]);
   assert.ok(Math.abs(told / stored - 1) < 1e-4, `${told} ${stored}`);
   await page.mouse.click(box.x + 75, box.y + box.height - 60);
   assert.equal(await text_of(page, ".choice a"), "Open point 0");
@@ -84,7 +84,7 @@ test("pickers tell all that can be picked apart", async () => {
 });
 
 test("maps are zoomed by dragging and by keys, and lines, gathered points and histograms are drawn", async () => {
-  const page = await study("#/study/1?solve=off");
+  const page = await study("#/study/1");
   const box = await (await page.$(kMap)).boundingBox();
   await page.mouse.move(box.x + 100, box.y + 40);
   await page.mouse.down();
@@ -103,35 +103,6 @@ test("maps are zoomed by dragging and by keys, and lines, gathered points and hi
   await page.close();
 });
 
-test("lines that lie on each other are seen by turns, and the legend says which these are", async () => {
-  const page = await study("#/study/1?pic=lines&z=vn_in_m_s&y=e");
-  await until(page, () => document.querySelectorAll(".legend li").length === 3);
-  const legend = () => page.$$eval(".lines .legend li", (all) => all.map((one) => one.textContent));
-  assert.deepEqual(await legend(), ["e = 0.6", "e = 0.8 (lies on e = 0.6)", "e = 1 (lies on e = 0.6)"]);
-  await until(page, () => document.querySelector(".uplot canvas"));
-  const seen = await page.evaluate(async () => {
-    const { ink } = await import("/parts/colours.js");
-    // How a colour lies to white, as edges are mixed with it.
-    const way = ([r, g, b]) => [255 - r, 255 - g, 255 - b].map((one, _, all) => one / Math.hypot(...all));
-    const ways = ["line0", "line1", "line2"].map((name) => way(ink(name).match(/\d+/g).map(Number)));
-    const canvas = document.querySelector(".uplot canvas");
-    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-    const counts = [0, 0, 0];
-    for (let i = 0; i < data.length; i += 4) {
-      const [r, g, b] = [...data.slice(i, i + 3)].map((one) => Math.round(255 + (one - 255) * (data[i + 3] / 255)));
-      if (Math.max(r, g, b) - Math.min(r, g, b) < 60) continue;  // texts and the grid
-      const alike = ways.map((one) => way([r, g, b]).reduce((sum, part, k) => sum + part * one[k], 0));
-      ++counts[alike.indexOf(Math.max(...alike))];
-    }
-    const all = counts.reduce((sum, one) => sum + one);
-    return counts.map((one) => one / all);
-  });
-  for (const share of seen) assert.ok(share > 0.2, String(seen));
-  await page.evaluate(() => { location.hash = "#/study/1?pic=lines&z=vn_out_m_s&y=e"; });
-  await until(page, () => !document.querySelector(".lines .legend").textContent.includes("lies on"));
-  await page.close();
-});
-
 test("logarithmic axes of lines and bars are drawn, whatever their ends are", async () => {
   const page = await browser.open("#/");
   for (const view of ["#/study/1?pic=histogram&x=mu&xlog=1", "#/study/4?pic=histogram&x=mu&xlog=1", "#/study/1?pic=lines&y=e&xlog=1&ylog=1"]) {
@@ -146,7 +117,7 @@ test("logarithmic axes of lines and bars are drawn, whatever their ends are", as
 });
 
 test("Back undoes a zoom and another output, and leaves the focus where it was", async () => {
-  const page = await study("#/study/1?solve=off");
+  const page = await study("#/study/1");
   await page.focus(kMap);
   await page.keyboard.press("+");
   await until(page, () => !document.querySelector(".facts").textContent.includes("12 × 7"));
@@ -161,7 +132,7 @@ test("Back undoes a zoom and another output, and leaves the focus where it was",
 });
 
 test("Back finds the address that was left, whatever the view was about to write into it", async () => {
-  const page = await study("#/study/1?solve=off", { early: () => {
+  const page = await study("#/study/1", { early: () => {
     const real = window.setTimeout;
     window.setTimeout = (call, ms, ...given) => {
       if (ms !== 150) return real(call, ms, ...given);
@@ -227,8 +198,6 @@ test("rows are turned a page at a time and sorted, and nothing is truncated unsa
   await other.goBack();
   await until(other, () => document.querySelector(".rows p[role=status]").textContent === "26 to 50 of 252 rows.");
   await other.close();
-  const csv = await page.evaluate(async () => (await fetch(document.querySelector(".rows a[download]").href)).text());
-  assert.equal(csv.trim().split("\r\n").length, 253);
   await page.close();
 });
 

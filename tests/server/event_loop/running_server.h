@@ -20,7 +20,7 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "proto/wire/chunk_writer.h"
+#include "proto/wire/chunk.h"
 #include "server/event_loop/event_loop.h"
 #include "server/query/query_rules.h"
 #include "tests/support/hang_limit.h"

@@ -25,7 +25,7 @@
 #include "proto/frames.h"
 #include "proto/system/descriptor.h"
 #include "proto/system/spawn_plan.h"
-#include "proto/wire/chunk_rows.h"
+#include "proto/wire/chunk.h"
 #include "server/query/query_rules.h"
 #include "server/query/reader_program.h"
 #include "server/store/store.h"

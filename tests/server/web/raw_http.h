@@ -106,9 +106,20 @@ inline int status_of_answer(const std::string& answer) {
   return answer.starts_with("HTTP/1.") ? std::stoi(answer.substr(answer.find(' ') + 1)) : 0;
 }
 
+/// The body, of which chunks are joined.
 inline std::string body_of(const std::string& answer) {
-  const auto at = answer.find("\r\n\r\n");
-  return at == std::string::npos ? "" : answer.substr(at + 4);
+  const auto head = answer.find("\r\n\r\n");
+  std::string rest = head == std::string::npos ? "" : answer.substr(head + 4);
+  if (answer.substr(0, head).find("Transfer-Encoding: chunked") == std::string::npos) {
+    return rest;
+  }
+  std::string body;
+  while (!rest.empty()) {
+    const std::size_t bytes = std::stoull(rest, nullptr, 16);
+    body += rest.substr(rest.find("\r\n") + 2, bytes);
+    rest = bytes == 0 ? "" : rest.substr(rest.find("\r\n") + 2 + bytes + 2);
+  }
+  return body;
 }
 
 }  // namespace oblique::server

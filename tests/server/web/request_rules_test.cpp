@@ -7,45 +7,61 @@
 #include <gtest/gtest.h>
 #include <CLI/CLI.hpp>
 
-#include "server/web/http/http_address.h"
 #include "server/web/http_options.h"
 
 namespace oblique::server {
 namespace {
 
-unsigned status_of(const RequestHead& head, const OwnNames& own = {}) {
-  const auto refusal = objection_to(head, own);
+using Headers = std::multimap<std::string, std::string>;
+
+unsigned status_of(const std::string& method, const std::string& path, const Headers& headers,
+                   const OwnNames& own = {}) {
+  HttpRequest request;
+  request.method = method;
+  request.path = path.substr(0, path.find('?'));
+  request.headers = headers;
+  if (path.find('?') != std::string::npos) {
+    request.fields = {{"token", "x"}};
+  }
+  const auto refusal = refuse(request, own);
   return refusal ? refusal->status : 200;
 }
 
-RequestHead request_for(const std::string& host) {
-  return {"GET", false, {host}, {}, {}};
-}
-
-TEST(RequestRules, AHostIsWhatStandsBeforeThePort) {
-  EXPECT_EQ(host_without_port("127.0.0.1:7602"), "127.0.0.1");
-  EXPECT_EQ(host_without_port("LocalHost"), "localhost");
-  EXPECT_EQ(host_without_port("[::1]:7602"), "::1");
-  EXPECT_EQ(host_without_port("[::1]"), "::1");
-  EXPECT_EQ(host_without_port("localhost:"), "localhost");
-  for (const std::string header :
-       {"", ":80", "[::1", "[]:80", "[localhost]:80", "[127.0.0.1]:80", "localhost:80:80",
-        "localhost:80@evil.example", "localhost:x", "localhost:123456", "localhost evil.example",
-        "localhost/evil", "user@localhost", "::1", "localhost\t", "[::1]evil", "[::1%25lo]:80"}) {
-    EXPECT_EQ(host_without_port(header), std::nullopt) << header;
-  }
-}
-
 TEST(RequestRules, OnLoopbackOnlyNamesOfLoopbackAreAnswered) {
-  for (const std::string host : {"127.0.0.1:7602", "localhost", "localhost:1", "[::1]:7602",
-                                 "127.8.9.10:80", "LOCALHOST:7602"}) {
-    EXPECT_EQ(status_of(request_for(host)), 200U) << host;
+  for (const std::string host : {"127.0.0.1:7602", "localhost", "localhost:1", "localhost:",
+                                 "[::1]:7602", "[::1]", "127.8.9.10:80", "LOCALHOST:7602"}) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", host}}), 200U) << host;
   }
-  for (const std::string host :
-       {"evil.example", "evil.example:7602", "localhost.evil.example",
-        "127.0.0.1.evil.example:7602", "192.168.1.5:7602", "[2001:db8::1]:7602", "0.0.0.0:7602",
-        "localhost.:7602", "2130706433", "127.1", "0x7f.1", "[::ffff:127.0.0.1]:7602"}) {
-    EXPECT_EQ(status_of(request_for(host)), 403U) << host;
+  for (const std::string host : {"evil.example",
+                                 "evil.example:7602",
+                                 "localhost.evil.example",
+                                 "127.0.0.1.evil.example:7602",
+                                 "192.168.1.5:7602",
+                                 "[2001:db8::1]:7602",
+                                 "0.0.0.0:7602",
+                                 "localhost.:7602",
+                                 "2130706433",
+                                 "127.1",
+                                 "0x7f.1",
+                                 "[::ffff:127.0.0.1]:7602",
+                                 "",
+                                 ":80",
+                                 "[::1",
+                                 "[]:80",
+                                 "[localhost]:80",
+                                 "[127.0.0.1]:80",
+                                 "localhost:80:80",
+                                 "localhost:80@evil.example",
+                                 "localhost:x",
+                                 "localhost:123456",
+                                 "localhost evil.example",
+                                 "localhost/evil",
+                                 "user@localhost",
+                                 "::1",
+                                 "localhost\t",
+                                 "[::1]evil",
+                                 "[::1%25lo]:80"}) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", host}}), 403U) << host;
   }
 }
 
@@ -53,85 +69,109 @@ TEST(RequestRules, BeyondLoopbackAnyAddressIsAnsweredAndOnlyNamesThatWereGiven) 
   const OwnNames own{false, {"oblique.lab"}};
   for (const std::string host : {"10.1.2.3:7602", "[2001:db8::1]:7602", "127.0.0.1", "localhost",
                                  "oblique.lab:7602", "Oblique.Lab"}) {
-    EXPECT_EQ(status_of(request_for(host), own), 200U) << host;
+    EXPECT_EQ(status_of("GET", "/", {{"host", host}}, own), 200U) << host;
   }
-  EXPECT_EQ(status_of(request_for("evil.example:7602"), own), 403U);
-  EXPECT_EQ(status_of(request_for("sub.oblique.lab"), own), 403U);
-}
-
-TEST(RequestRules, OneHostOrNone) {
-  EXPECT_EQ(status_of({"GET", false, {}, {}, {}}), 200U);  // HTTP/1.0; no browser leaves it out
-  EXPECT_EQ(status_of({"GET", false, {"localhost", "localhost"}, {}, {}}), 400U);
-  EXPECT_EQ(status_of({"GET", false, {"localhost", "evil.example"}, {}, {}}), 400U);
-  EXPECT_EQ(status_of(request_for("")), 400U);
-}
-
-TEST(RequestRules, PagesOfOthersGetNothing) {
-  const std::string host = "localhost:7602";
-  const auto with_origin = [&](const std::string& origin) {
-    return status_of({"GET", false, {host}, {origin}, {}});
-  };
-  EXPECT_EQ(with_origin("http://localhost:7602"), 200U);
-  for (const std::string origin : {"http://evil.example", "https://localhost:7602", "null",
-                                   "http://localhost", "http://localhost:7603", ""}) {
-    EXPECT_EQ(with_origin(origin), 403U) << origin;
-  }
-  const auto with_site = [&](const std::string& site) {
-    return status_of({"GET", false, {host}, {}, {site}});
-  };
-  EXPECT_EQ(with_site("none"), 200U);  // typed into the address bar
-  EXPECT_EQ(with_site("same-origin"), 200U);
-  for (const std::string site : {"cross-site", "same-site", "", "None"}) {
-    EXPECT_EQ(with_site(site), 403U) << site;
+  for (const std::string host : {"evil.example:7602", "sub.oblique.lab"}) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", host}}, own), 403U) << host;
   }
 }
 
-TEST(RequestRules, OfOtherSitesOnlyALinkThatIsFollowedIsAnswered) {
-  RequestHead link = request_for("localhost:7602");
-  link.fetch_sites = {"cross-site"};
-  link.fetch_modes = {"navigate"};
-  link.fetch_targets = {"document"};
-  EXPECT_EQ(status_of(link), 403U) << "nothing may be linked to but what says so";
-  link.may_be_linked_to = true;
-  EXPECT_EQ(status_of(link), 200U);
-  const auto with = [&link](auto change) {
-    RequestHead changed = link;
-    change(changed);
-    return status_of(changed);
-  };
-  EXPECT_EQ(with([](RequestHead& head) { head.fetch_sites = {"same-site"}; }), 200U);
-  EXPECT_EQ(with([](RequestHead& head) { head.hosts = {"evil.example"}; }), 403U);
-  EXPECT_EQ(with([](RequestHead& head) { head.method = "HEAD"; }), 403U);
-  EXPECT_EQ(with([](RequestHead& head) { head.method = "POST"; }), 403U);
-  EXPECT_EQ(with([](RequestHead& head) { head.origins = {"http://evil.example"}; }), 403U);
-  EXPECT_EQ(with([](RequestHead& head) { head.origins = {"null"}; }), 403U);
-  EXPECT_EQ(with([](RequestHead& head) { head.has_body = true; }), 413U);
-  using Words = std::vector<std::string>;
-  for (const Words& sites : {Words{""}, Words{"cross-site", "cross-site"}, Words{"Cross-Site"}}) {
-    EXPECT_EQ(with([&](RequestHead& head) { head.fetch_sites = sites; }), 403U);
-  }
-  for (const Words& modes : {Words{}, Words{"no-cors"}, Words{"cors"}, Words{"nested-navigate"},
-                             Words{"navigate", "navigate"}}) {
-    EXPECT_EQ(with([&](RequestHead& head) { head.fetch_modes = modes; }), 403U);
-  }
-  for (const Words& targets : {Words{}, Words{"iframe"}, Words{"embed"}, Words{"object"},
-                               Words{"script"}, Words{"empty"}, Words{"document", "document"}}) {
-    EXPECT_EQ(with([&](RequestHead& head) { head.fetch_targets = targets; }), 403U);
+using Header = std::pair<std::string, std::string>;
+const Header kHost{"host", "localhost:7602"};
+const Header kOrigin{"origin", "http://localhost:7602"};
+
+/// A request to this server.
+struct RequestRow {
+  std::string method;
+  std::string path;
+  Headers headers;
+  unsigned status;
+};
+
+void expect_statuses(const std::vector<RequestRow>& rows) {
+  for (const RequestRow& row : rows) {
+    EXPECT_EQ(status_of(row.method, row.path, row.headers), row.status)
+        << row.method << ' ' << row.path << ' ' << testing::PrintToString(row.headers);
   }
 }
 
-TEST(RequestRules, OnlyReadingIsAnswered) {
-  EXPECT_EQ(status_of({"HEAD", false, {"localhost"}, {}, {}}), 200U);
-  for (const std::string method : {"POST", "PUT", "DELETE", "OPTIONS", "TRACE", "get", "BREW"}) {
-    EXPECT_EQ(status_of({method, false, {"localhost"}, {}, {}}), 405U) << method;
+TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
+  expect_statuses({
+      {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
+      {"HEAD", "/", {kHost}, 200},
+      {"GET", "/", {kHost, kHost}, 400},
+      {"GET", "/", {kHost, {"host", "evil.example"}}, 400},
+      {"GET", "/", {kHost, {"content-length", "0"}}, 200},
+      {"GET", "/", {kHost, {"content-length", "262145"}}, 413},
+      {"GET", "/", {kHost, {"transfer-encoding", "chunked"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "262144"}}, 200},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "262145"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "99999999999999999999"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "x"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"transfer-encoding", "chunked"}}, 413},
+  });
+  for (const std::string method : {"PUT", "DELETE", "OPTIONS", "TRACE", "get", "BREW"}) {
+    expect_statuses({{method, "/", {kHost, kOrigin}, 405}});
   }
-  EXPECT_EQ(status_of({"GET", true, {"localhost"}, {}, {}}), 413U);
+}
+
+TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
+  const Header same{"sec-fetch-site", "same-origin"};
+  expect_statuses({
+      {"POST", "/", {kHost, kOrigin}, 200},
+      {"POST", "/", {kHost, kOrigin, same}, 200},
+      {"POST", "/", {kHost}, 403},
+      {"POST", "/", {kHost, same}, 403},
+      {"POST", "/", {kHost, kOrigin, kOrigin}, 403},
+      {"POST", "/", {kHost, kOrigin, {"sec-fetch-site", "none"}}, 403},
+      {"POST", "/", {kOrigin}, 403},
+      {"GET", "/", {kHost, kOrigin}, 200},
+      {"GET", "/", {kHost, same}, 200},
+      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // typed into the address bar
+  });
+  for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
+                                  "http://localhost", "http://localhost:7603", ""}) {
+    expect_statuses({{"GET", "/", {kHost, {"origin", other}}, 403},
+                     {"POST", "/", {kHost, {"origin", other}}, 403},
+                     {"GET", "/", {kHost, kOrigin, {"origin", other}}, 403}});
+  }
+  for (const std::string site : {"cross-site", "same-site", "", "None", "Cross-Site"}) {
+    expect_statuses({{"GET", "/", {kHost, {"sec-fetch-site", site}}, 403},
+                     {"POST", "/", {kHost, kOrigin, {"sec-fetch-site", site}}, 403}});
+  }
+}
+
+TEST(RequestRules, OfOtherSitesOnlyAFollowedLinkToThePageIsAnswered) {
+  const Header cross{"sec-fetch-site", "cross-site"};
+  const Header tab{"sec-fetch-mode", "navigate"};
+  const Header page{"sec-fetch-dest", "document"};
+  expect_statuses({
+      {"GET", "/", {kHost, cross, tab, page}, 200},
+      {"GET", "/", {kHost, {"sec-fetch-site", "same-site"}, tab, page}, 200},
+      {"GET", "/?token", {kHost, cross, tab, page}, 403},
+      {"GET", "/metrics", {kHost, cross, tab, page}, 403},
+      {"HEAD", "/", {kHost, cross, tab, page}, 403},
+      {"POST", "/", {kHost, cross, tab, page}, 403},
+      {"GET", "/", {{"host", "evil.example"}, cross, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, page, {"origin", "null"}}, 403},
+      {"GET", "/", {kHost, cross, page}, 403},
+      {"GET", "/", {kHost, cross, tab}, 403},
+      {"GET", "/", {kHost, cross, cross, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, page, page}, 403},
+  });
+  for (const std::string mode : {"no-cors", "cors", "nested-navigate"}) {
+    expect_statuses({{"GET", "/", {kHost, cross, {"sec-fetch-mode", mode}, page}, 403}});
+  }
+  for (const std::string target : {"iframe", "embed", "object", "script", "empty"}) {
+    expect_statuses({{"GET", "/", {kHost, cross, tab, {"sec-fetch-dest", target}}, 403}});
+  }
 }
 
 TEST(HttpAddress, IsAddressAndPortOrOff) {
-  EXPECT_FALSE(http_address_of("off"));
+  EXPECT_FALSE(parse_http_address("off"));
   const auto text_of = [](const std::string& text) {
-    const auto address = http_address_of(text).value();
+    const auto address = parse_http_address(text).value();
     return address.address + " " + address.port;
   };
   EXPECT_EQ(text_of("127.0.0.1:7602"), "127.0.0.1 7602");
@@ -142,7 +182,7 @@ TEST(HttpAddress, IsAddressAndPortOrOff) {
   for (const std::string text : {"", "on", "OFF", "7602", ":7602", "127.0.0.1", "127.0.0.1:",
                                  "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:+1", "127.0.0.1: 1",
                                  "::1:7602", "[127.0.0.1]:7602", "[::1]", "example.org:7602"}) {
-    EXPECT_THROW(http_address_of(text), std::runtime_error) << text;
+    EXPECT_THROW(parse_http_address(text), std::runtime_error) << text;
   }
 }
 

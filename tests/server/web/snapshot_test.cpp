@@ -1,9 +1,8 @@
-// What the numbers say while a pretended worker and client do things.
-#include "server/web/snapshot.h"
+// Snapshots while a pretended worker and client do things.
+#include "server/web/status/snapshot.h"
 
 #include <gtest/gtest.h>
 
-#include "server/web/notice_board.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
@@ -19,9 +18,7 @@ class TakingStorage final : public Storage {
 
 class SnapshotTest : public ServiceTest {
  protected:
-  Snapshot snapshot() {
-    return take_snapshot({*service_, network_, writer_, 0, {}, 1, {}, 0}, now_.steady_ms);
-  }
+  Snapshot snapshot() { return take_snapshot({*service_, network_, writer_}, now_.steady_ms); }
   void submit(const std::string& name, std::uint64_t points, std::int32_t priority = 0) {
     ClientRequest message = submit_request(name, points);
     message.mutable_submit()->set_priority(priority);
@@ -47,7 +44,6 @@ TEST_F(SnapshotTest, FollowsPointsOnTheirWay) {
   const std::vector<std::uint64_t> points = points_of(last_message().batch());
   const std::uint64_t leased = points.size();
   EXPECT_EQ(snapshot().points_leased, leased);
-  EXPECT_EQ(snapshot().batches_leased, 1U);
   EXPECT_EQ(workers(snapshot(), CrewState::kWorking), 1U);
   now_.steady_ms += 700;
   answer_batch(points.back());  // the last point failed
@@ -55,10 +51,11 @@ TEST_F(SnapshotTest, FollowsPointsOnTheirWay) {
   EXPECT_EQ(after.points_solved, leased - 1);
   EXPECT_EQ(after.points_failed, 1U);
   EXPECT_EQ(after.points_open, 100 - leased);
-  ASSERT_EQ(after.listed.size(), 1U);
-  EXPECT_EQ(after.listed[0].solved, leased - 1);
-  EXPECT_EQ(after.listed[0].failed, 1U);
-  EXPECT_DOUBLE_EQ(after.batch_s.sum(), 0.7);
+  ASSERT_EQ(after.studies.size(), 1U);
+  EXPECT_EQ(after.studies[0].solved(), leased - 1);
+  EXPECT_EQ(after.studies[0].failed(), 1U);
+  ASSERT_EQ(after.workers.size(), 1U);
+  EXPECT_EQ(after.workers[0].solved_points(), leased - 1);
   EXPECT_GT(after.points_per_s, 0.0);
 }
 
@@ -80,21 +77,10 @@ TEST_F(SnapshotTest, CountsOnlyWhatRunsAsOpen) {
   write_all();
   const Snapshot now = snapshot();
   EXPECT_EQ(now.points_open, 10U);
-  EXPECT_EQ(now.studies.at(static_cast<std::size_t>(StudyState::kPaused)), 1U);
-  EXPECT_EQ(now.studies.at(static_cast<std::size_t>(StudyState::kCancelled)), 1U);
-  ASSERT_EQ(now.listed.size(), 2U);
-  EXPECT_EQ(now.listed[1].name, "paused");
-}
-
-TEST_F(SnapshotTest, TellsWhatAKeyHasOpen) {
-  const auto holder = std::make_shared<const KeyIdentity>(KeyIdentity{"lab", protocol::Role::kClient});
-  service_->client_frame("client", protocol::encode(submit_request("a", 10)), now_, holder);
-  write_all();
-  submit("of nobody", 20);
-  const auto open = snapshot().open_by_key;
-  ASSERT_EQ(open.size(), 1U);
-  EXPECT_EQ(open.at("lab").studies, 1U);
-  EXPECT_EQ(open.at("lab").points, 10U);
+  EXPECT_EQ(now.studies_by_state.at(static_cast<std::size_t>(StudyState::kPaused)), 1U);
+  EXPECT_EQ(now.studies_by_state.at(static_cast<std::size_t>(StudyState::kCancelled)), 1U);
+  ASSERT_EQ(now.studies.size(), 2U);
+  EXPECT_EQ(now.studies[1].name(), "paused");
 }
 
 TEST_F(SnapshotTest, ListsTheFiftyStudiesOfTheHighestPriority) {
@@ -102,21 +88,19 @@ TEST_F(SnapshotTest, ListsTheFiftyStudiesOfTheHighestPriority) {
     submit("study " + std::to_string(i), 10, i == 100 ? 5 : 0);
   }
   const Snapshot now = snapshot();
-  ASSERT_EQ(now.listed.size(), kListedStudies);
+  ASSERT_EQ(now.studies.size(), kShownStudies);
   EXPECT_EQ(now.unlisted, 70U);
   EXPECT_EQ(now.points_open, 1200U);
-  EXPECT_EQ(now.listed.front().name, "study 100");
-  EXPECT_EQ(now.listed[1].name, "study 0");
-  EXPECT_EQ(now.listed.back().name, "study 48");
+  EXPECT_EQ(now.studies.front().name(), "study 100");
+  EXPECT_EQ(now.studies[1].name(), "study 0");
+  EXPECT_EQ(now.studies.back().name(), "study 48");
 }
 
 TEST_F(SnapshotTest, LeavesOutAStudyThatIsNotDurable) {
   request(submit_request("a", 10));
-  EXPECT_TRUE(snapshot().listed.empty());
-  EXPECT_EQ(snapshot().writer_jobs, 1U);
+  EXPECT_TRUE(snapshot().studies.empty());
   write_all("disk full");
-  EXPECT_EQ(snapshot().writer_jobs, 0U);
-  EXPECT_EQ(snapshot().studies, (std::array<std::uint64_t, kStudyStates>{}));
+  EXPECT_EQ(snapshot().studies_by_state, (std::array<std::uint64_t, kStudyStates>{}));
 }
 
 TEST_F(SnapshotTest, SaysWhyNothingIsStored) {
@@ -137,32 +121,17 @@ TEST_F(SnapshotTest, TellsHowQueriesStand) {
   EXPECT_EQ(snapshot().queries.running, 1U);
 }
 
-TEST(NoticeBoard, AsksTheLoopOnlyWhenSomebodyWants) {
-  NoticeBoard board(0);
-  EXPECT_FALSE(board.is_due(10'000));
-  EXPECT_EQ(board.latest(), nullptr);
-  board.want();
-  EXPECT_TRUE(board.is_due(10'000));
+TEST(Snapshot, ThreadsAreWantedForOpenPointsOnly) {
   Snapshot snapshot;
-  snapshot.made_ms = 10'000;
-  EXPECT_TRUE(board.put(snapshot));
-  EXPECT_FALSE(board.is_due(20'000));
-  ASSERT_NE(board.latest(), nullptr);
-  EXPECT_EQ(board.latest()->made_ms, 10'000);
-}
-
-TEST(NoticeBoard, TakesTwoSnapshotsASecondAtMost) {
-  NoticeBoard board(0);
-  int made = 0;
-  for (std::int64_t now_ms = 0; now_ms < 10'000; now_ms += 10) {
-    board.want();
-    if (board.is_due(now_ms)) {
-      Snapshot snapshot;
-      snapshot.made_ms = now_ms;
-      made += board.put(snapshot) ? 1 : 0;
-    }
-  }
-  EXPECT_EQ(made, 20);
+  EXPECT_EQ(snapshot.threads_wanted(), 0U);
+  snapshot.points_open = 1'000'000'000;
+  EXPECT_EQ(snapshot.threads_wanted(), 1U);  // the time of a point is unknown
+  snapshot.thread_s_per_point = 1e-9;
+  EXPECT_EQ(snapshot.threads_wanted(), 1U);
+  snapshot.thread_s_per_point = 6e-3;
+  EXPECT_EQ(snapshot.threads_wanted(), 100'000U);
+  snapshot.thread_s_per_point = 1e300;
+  EXPECT_EQ(snapshot.threads_wanted(), 1'000'000'000U);
 }
 
 }  // namespace

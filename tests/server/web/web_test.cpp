@@ -1,74 +1,188 @@
-// The whole server in this process, asked over HTTP while a pretended worker and client do things.
+// Metrics and health, alone and of a whole server while a pretended worker and client do things.
 #include "server/web/web.h"
 
-#include <memory>
-#include <vector>
+#include <chrono>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <regex>
+#include <sstream>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/server/event_loop/running_server.h"
-#include "tests/server/web/prometheus_text.h"
+#include "server/web/status/metrics.h"
+#include "tests/server/loop/running_server.h"
 #include "tests/server/web/raw_http.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 namespace {
 
+struct Metrics {
+  std::map<std::string, std::string> types;
+  std::map<std::string, double> values;  ///< by name and labels, as written
+};
+
+Metrics parse(const std::string& text) {
+  static const std::regex kSample(
+      R"re(([a-z_]+(?:\{[a-z_]+="[^"\\]*"(?:,[a-z_]+="[^"\\]*")*\})?) (NaN|[0-9.e+-]+))re");
+  Metrics metrics;
+  std::string help;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string word;
+    std::string name;
+    words >> word >> word >> name;
+    std::smatch found;
+    if (line.starts_with("# HELP ")) {
+      help = name;
+    } else if (line.starts_with("# TYPE ")) {
+      std::string type;
+      words >> type;
+      EXPECT_EQ(help, name);
+      EXPECT_TRUE(metrics.types.emplace(name, type).second) << line;
+      EXPECT_EQ(name.ends_with("_total"), type == "counter") << line;
+    } else if (std::regex_match(line, found, kSample)) {
+      EXPECT_TRUE(line.starts_with(help)) << line;
+      EXPECT_TRUE(
+          metrics.values.emplace(found[1], std::strtod(found[2].str().c_str(), nullptr)).second)
+          << line;
+    } else {
+      ADD_FAILURE() << line;
+    }
+  }
+  return metrics;
+}
+
+Metrics metrics_of(const Snapshot& snapshot) {
+  return parse(metrics_text({snapshot, {4096.0, 0.0, 1e9}, {{200, 3}, {404, 1}}, "1.0"}));
+}
+
+TEST(Metrics, AreThoseThatTheReadmeLists) {
+  std::map<std::string, std::string> listed;
+  std::ifstream readme(OBLIQUE_WEB_README);
+  const std::regex row(R"(\| `([a-z_]+)` \| (counter|gauge|histogram) \|.*)");
+  for (std::string line; std::getline(readme, line);) {
+    std::smatch found;
+    if (std::regex_match(line, found, row)) {
+      listed.emplace(found[1], found[2]);
+    }
+  }
+  EXPECT_EQ(metrics_of({}).types, listed);
+}
+
+TEST(Metrics, ShowTheSnapshot) {
+  Snapshot snapshot;
+  snapshot.points_open = 1000;
+  snapshot.thread_s_per_point = 0.6;
+  snapshot.commit_s = Histogram({0.1, 1.0});
+  for (const double duration_s : {0.05, 0.1, 0.5, 2.0}) {
+    snapshot.commit_s.observe(duration_s);
+  }
+  snapshot.refusals.at(static_cast<std::size_t>(RefusalCause::kUnknownKey)) = 7;
+  snapshot.database_fault = "disk I/O error";
+  auto values = metrics_of(snapshot).values;
+  EXPECT_EQ(values["oblique_threads_wanted"], 10.0);  // 1000 points of 0.6 s in 60 s
+  EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"0.1\"}"], 2.0);
+  EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"1\"}"], 3.0);
+  EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"+Inf\"}"], 4.0);
+  EXPECT_EQ(values["oblique_commit_duration_seconds_sum"], 2.65);
+  EXPECT_EQ(values["oblique_commit_duration_seconds_count"], 4.0);
+  EXPECT_EQ(values["oblique_peers_refused_total{cause=\"unknown key\"}"], 7.0);
+  EXPECT_EQ(values["oblique_database_writable"], 0.0);
+  EXPECT_EQ(values["oblique_database_bytes{file=\"database\"}"], 4096.0);
+  EXPECT_EQ(values["oblique_http_requests_total{code=\"404\"}"], 1.0);
+}
+
+TEST(Health, IsThatTheEventLoopRuns) {
+  EXPECT_EQ(health(1000, 6000).status, 200U);
+  EXPECT_EQ(health(1000, 8500).status, 503U);
+  EXPECT_EQ(health(1000, 8500).body, "the server's event loop has not run for 7.5 s\n");
+}
+
+TEST(Health, ReadinessNamesWhatIsMissing) {
+  constexpr double kPlenty = 1e12;
+  EXPECT_EQ(readiness({}, kPlenty).status, 200U);
+  EXPECT_EQ(readiness({}, std::numeric_limits<double>::quiet_NaN()).status, 200U);  // unknown
+  Snapshot faulty;
+  faulty.database_fault = "disk I/O error\n\x1b[2J";
+  EXPECT_EQ(readiness(faulty, kPlenty).status, 503U);
+  EXPECT_EQ(readiness(faulty, kPlenty).body,
+            "the database takes no results: disk I/O error\\n\\x1b[2J\n");
+  Snapshot stopping;
+  stopping.is_stopping = true;
+  EXPECT_EQ(readiness(stopping, kPlenty).status, 503U);
+  EXPECT_EQ(readiness({}, 1e6).body, "the database's disk has 1 MB left\n");
+}
+
 WebSettings anywhere() {
   WebSettings settings;
   settings.address = {"127.0.0.1", "*"};
-  settings.limits.longest = test::kHangLimit;
-  settings.patience = test::kHangLimit;
+  settings.limits.idle = test::kHangLimit;
   return settings;
+}
+
+TEST(Web, SaysThatTheServerStartsBeforeTheLoopRuns) {
+  const Web web(anywhere());
+  EXPECT_EQ(body_of(get(web.url(), "/healthz")), "the server runs\n");
+  for (const std::string path : {"/metrics", "/readyz"}) {
+    const std::string answer = get(web.url(), path);
+    EXPECT_EQ(status_of_answer(answer), 503) << path;
+    EXPECT_EQ(body_of(answer), "the server is starting\n") << path;
+  }
 }
 
 class WebTest : public testing::Test {
  protected:
-  std::map<std::string, ParsedMetric> metrics() const {
-    const std::string answer = get(server_.http_url(), "/metrics");
-    EXPECT_EQ(status_of_answer(answer), 200);
-    EXPECT_THAT(answer,
-                testing::HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8"));
-    return parse_prometheus(body_of(answer));
+  /// The answer when the server has started.
+  std::string get_started(const std::string& path) const {
+    std::string answer = get(server_.http_url(), path);
+    while (body_of(answer) == "the server is starting\n") {
+      answer = get(server_.http_url(), path);
+    }
+    return answer;
   }
 
   test::TemporaryFolder folder_;
   RunningServer server_{folder_.file("a.db"), {}, {}, {}, {}, anywhere()};
 };
 
-TEST_F(WebTest, ShowsWhatWasDone) {
+TEST_F(WebTest, MetricsFollowTheServer) {
   PretendedClient client(server_.client_endpoint());
   client.submit("a", 20);
   PretendedWorker worker(server_.worker_endpoint());
   worker.hello();
   worker.work(20);
-  auto now = metrics();  // which may be half a second old
-  while (value_of(now, "oblique_points_solved_total") < 20.0) {
-    now = metrics();
+  const auto values = [this] {
+    const std::string answer = get_started("/metrics");
+    EXPECT_EQ(status_of_answer(answer), 200);
+    EXPECT_THAT(answer,
+                testing::HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8"));
+    return parse(body_of(answer)).values;
+  };
+  auto now = values();  // which may be half a second old
+  while (now["oblique_points_solved_total"] < 20.0) {
+    now = values();
   }
-  EXPECT_EQ(value_of(now, "oblique_points_solved_total"), 20.0);
-  EXPECT_EQ(value_of(now, "oblique_points_open"), 0.0);
-  EXPECT_EQ(value_of(now, "oblique_studies", {{"state", "done"}}), 1.0);
-  EXPECT_EQ(value_of(now, "oblique_commit_rows_sum"), 20.0);
-  EXPECT_GE(value_of(now, "oblique_commit_duration_seconds_count"), 1.0);
-  EXPECT_GE(value_of(now, "oblique_batch_duration_seconds_count"), 1.0);
-  EXPECT_EQ(value_of(now, "oblique_connections", {{"port", "workers"}}), 1.0);
-  EXPECT_EQ(value_of(now, "oblique_connections", {{"port", "clients"}}), 1.0);
-  EXPECT_GT(value_of(now, "oblique_received_bytes_total", {{"port", "workers"}}), 1000.0);
-  EXPECT_GT(value_of(now, "oblique_sent_bytes_total", {{"port", "clients"}}), 0.0);
-  EXPECT_GT(value_of(now, "oblique_database_bytes", {{"file", "database"}}), 0.0);
-  EXPECT_EQ(value_of(now, "oblique_build_info",
-                     {{"version", OBLIQUE_VERSION}, {"solver_version", "1.0"}}),
+  EXPECT_EQ(now["oblique_points_solved_total"], 20.0);
+  EXPECT_EQ(now["oblique_points_open"], 0.0);
+  EXPECT_EQ(now["oblique_studies{state=\"done\"}"], 1.0);
+  EXPECT_EQ(now["oblique_workers{state=\"idle\"}"] + now["oblique_workers{state=\"silent\"}"], 1.0);
+  EXPECT_GE(now["oblique_commit_duration_seconds_count"], 1.0);
+  EXPECT_GT(now["oblique_database_bytes{file=\"database\"}"], 0.0);
+  EXPECT_GT(now["oblique_disk_free_bytes"], 0.0);
+  EXPECT_EQ(now["oblique_build_info{version=\"" + std::string(OBLIQUE_VERSION) +
+                "\",solver_version=\"1.0\"}"],
             1.0);
 }
 
-TEST_F(WebTest, SaysThatItLivesAndTakesWork) {
+TEST_F(WebTest, NamesItsPaths) {
   EXPECT_EQ(body_of(get(server_.http_url(), "/healthz")), "the server runs\n");
-  EXPECT_EQ(body_of(get(server_.http_url(), "/readyz")), "the server takes work\n");
-}
-
-TEST_F(WebTest, SaysWhatThereIs) {
+  EXPECT_EQ(body_of(get_started("/readyz")), "the server takes work\n");
   for (const std::string path : {"/metrics/", "/Metrics", "//metrics", "/../metrics", "*"}) {
     const std::string answer = get(server_.http_url(), path);
     EXPECT_EQ(status_of_answer(answer), 404) << path;
@@ -76,35 +190,8 @@ TEST_F(WebTest, SaysWhatThereIs) {
   }
 }
 
-TEST_F(WebTest, RefusesWhoWasLuredHere) {
-  const std::string answer =
-      RawHttp(server_.http_url()).ask("GET /metrics HTTP/1.1\r\nHost: evil.example\r\n\r\n");
-  EXPECT_EQ(status_of_answer(answer), 403);
-  EXPECT_THAT(answer, testing::Not(testing::HasSubstr("oblique_")));
-}
-
-TEST_F(WebTest, TwoHundredSlowConnectionsHoldUpNeitherWorkNorMetrics) {
-  std::vector<std::unique_ptr<RawHttp>> slow;
-  for (int i = 0; i < 200; ++i) {
-    slow.push_back(std::make_unique<RawHttp>(server_.http_url()));
-    slow.back()->send(i % 2 == 0 ? "G" : "GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
-  }
-  PretendedClient client(server_.client_endpoint());
-  client.submit("a", 20);
-  PretendedWorker worker(server_.worker_endpoint());
-  worker.hello();
-  worker.work(20);
-  const std::map<std::string, std::string> crowded{{"cause", "crowded"}};
-  while (value_of(metrics(), "oblique_http_ended_total", crowded) < 1.0) {
-    // Numbers may be half a second old.
-  }
-  EXPECT_EQ(body_of(get(server_.http_url(), "/healthz")), "the server runs\n");
-}
-
-TEST_F(WebTest, EndsWithTheServerWhileSomeoneAsks) {
+TEST_F(WebTest, StopsWhileAPeerIsSilent) {
   RawHttp silent(server_.http_url());
-  RawHttp asking(server_.http_url());
-  asking.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_EQ(server_.stop().lost_writes, 0U);
 }
 
@@ -119,18 +206,6 @@ TEST(Web, AServerWithoutAPortOfItsOwnGoesOnOnlyIfItMay) {
   EXPECT_EQ(second.http_url(), "");
   EXPECT_EQ(PretendedClient(second.client_endpoint()).submit("a", 5).kind_case(),
             ClientReply::kSubmit);
-}
-
-TEST(Web, SaysThatTheLoopIsHeldUp) {
-  WebSettings settings = anywhere();
-  settings.patience = std::chrono::milliseconds(50);
-  Web web(settings);
-  const std::string metrics = get(web.url(), "/metrics");
-  EXPECT_EQ(status_of_answer(metrics), 503);
-  EXPECT_EQ(body_of(metrics), "the server has just begun\n");
-  const std::string readiness = get(web.url(), "/readyz");
-  EXPECT_EQ(status_of_answer(readiness), 503);
-  EXPECT_EQ(body_of(readiness), "the server's loop is held up\n");
 }
 
 }  // namespace

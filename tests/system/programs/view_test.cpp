@@ -55,7 +55,7 @@ TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
   ASSERT_EQ(made.exit_code, 0) << made.err;
   Process view(folder, client_program(), {"view", "small.db"});
   const Browser browser(printed_url(view));
-  EXPECT_THAT(browser.ask("/"), HasSubstr("<title>oblique</title>"));
+  EXPECT_THAT(browser.ask("/"), HasSubstr("Content-Type: text/html"));
   EXPECT_THAT(browser.ask("/api/studies"), HasSubstr("\"name\":\"small\""));
   std::string trace;
   wait_until("a worker has solved the point again", [&] {

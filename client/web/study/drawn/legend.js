@@ -6,7 +6,7 @@ import { count, heading, shown } from "/parts/format.js";
 import { scale, ticks, tick_text } from "/parts/scale.js";
 
 /**
- * @param {import("../asked/picture.js").Picture} picture @param {import("./cells.js").Look} look
+ * @param {import("../pictures.js").Picture} picture @param {import("./cells.js").Look} look
  */
 export function colour_bar(picture, look) {
   const canvas = h("canvas", { role: "img",
@@ -59,7 +59,7 @@ function swatch(pixel) {
   return canvas;
 }
 
-/** @param {import("../asked/picture.js").Picture} picture */
+/** @param {import("../pictures.js").Picture} picture */
 export function categories(picture) {
   const cells = picture.dictionary.reduce((sum, one) => sum + one.cells, 0);  // that have a kind, as in the files of oblique plot
   const line = (/** @type {{text: string, cells: number}} */ one, /** @type {number} */ code) => h("li", {},
@@ -76,7 +76,7 @@ export function categories(picture) {
     h("ul", {}, ...rest.map((one) => h("li", {}, one.text, h("span", { class: "weak" }, ` ${count(one.cells)} cells`))))));
 }
 
-/** What is missing, in words and pattern. @param {import("../asked/picture.js").Picture} picture */
+/** What is missing, in words and pattern. @param {import("../pictures.js").Picture} picture */
 export function gaps(picture) {
   const dark = is_dark();
   const told = [["missing", "not solved"], ["failed", "failed"], ["left_out", "left out by the study's filter"], ["filtered", "where the condition is not met"]]

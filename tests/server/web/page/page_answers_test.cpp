@@ -109,10 +109,10 @@ TEST_F(PageAnswersTest, AStudyThatDoesNotExistIsNotFound) {
 TEST_F(PageAnswersTest, ASliceIsIndexArithmeticOnTheRecipe) {
   submit_grid();
   solve(24);
-  const Numbers slice = page_.numbers("/api/studies/1/slice?z=fn_peak_N&x=mu&y=H&at=e:0.6");
+  const Numbers slice = page_.numbers("/api/studies/1/slice?z=fn_peak_N&x=mu&y=H&at=e@1");
   EXPECT_EQ(slice.head["nx"], 4);
   EXPECT_EQ(slice.head["ny"], 3);
-  EXPECT_EQ(slice.head["at"][0]["value"], 0.5);  // the nearest
+  EXPECT_EQ(slice.head["at"][0]["value"], 0.5);
   EXPECT_EQ(slice.head["solved"], 12);
   EXPECT_EQ(slice.read<double>(0, 4)[3], 0.6);
   EXPECT_EQ(slice.read<double>(32, 3), (std::vector<double>{1.0, 0.9, 0.8}));
@@ -160,7 +160,6 @@ TEST_F(PageAnswersTest, WhatIsNotSolvedAndWhatIsLeftOutIsMarked) {
   EXPECT_EQ(codes[0], 0xffff);
   EXPECT_EQ(codes[9], 0xfffd);
   const Numbers numbers = page_.numbers("/api/studies/1/slice?z=slide_m&x=mu");
-  EXPECT_EQ(numbers.head["least"], nullptr);
   EXPECT_EQ(numbers.read<std::uint32_t>(80, 10)[0], 0x7fc00000U);
   EXPECT_EQ(numbers.read<std::uint32_t>(80, 10)[9], 0x7fc00002U);
 }
@@ -180,28 +179,12 @@ TEST_F(PageAnswersTest, WhatAStudyThatIsDoneHasNoRowOfWasLeftOutByItsWorker) {
   EXPECT_EQ(page_.json("/api/studies/1/points/4")["left_out"], true);
 }
 
-TEST_F(PageAnswersTest, APointIsToldAsItWasSolved) {
-  protocol::Recipe recipe = grid_recipe();
-  recipe.mutable_blocks(0)->set_where("mu < 0.5");
-  submit("filtered", recipe);
-  EXPECT_EQ(page_.json("/api/studies/1/points/7")["left_out"], true);
-  EXPECT_EQ(page_.json("/api/studies/1/points/7")["mu"], 0.6);
-  solve(24);
-  const auto edited = open_database(page_.database(), SQLITE_OPEN_READWRITE);
-  sqlite3_busy_timeout(edited.get(), 10'000);
-  // As a machine does it that rounds otherwise.
-  execute(edited.get(),
-          "UPDATE results SET checksum = NULL, point = 7, mu = 0.4375 WHERE point = 4");
-  const json point = page_.json("/api/studies/1/points/7");
-  EXPECT_EQ(point["left_out"], false);
-  EXPECT_EQ(point["mu"], 0.4375);
-}
-
 TEST_F(PageAnswersTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
   submit("huge", protocol::recipe_of(
                      {{protocol::range("H", 0.1, 1.0, 1000), protocol::range("mu", 0.0, 2.0, 1000),
                        protocol::range("e", 0.5, 1.0, 1000)}}));
-  const Numbers slice = page_.numbers("/api/studies/1/slice?z=mode&x=mu&y=H&nx=256&ny=256&at=e:1");
+  const Numbers slice =
+      page_.numbers("/api/studies/1/slice?z=mode&x=mu&y=H&nx=256&ny=256&at=e@999");
   EXPECT_EQ(slice.head["nx"], 256);
   EXPECT_EQ(slice.head["missing"], 256 * 256);
   EXPECT_EQ(page_.numbers("/api/studies/1/bins?x=fn_peak_N").head["points"], 0);
@@ -250,7 +233,7 @@ TEST_F(PageAnswersTest, WrongQuestionsAreToldWhatIsAllowed) {
   for (const std::string query :
        {"z=muu&x=mu", "z=peaks&x=mu", "z=mode", "z=mode&x=mu&y=mu", "z=mode&x=k",
         "z=mode&x=mu&nx=0", "z=mode&x=mu&nx=257", "z=mode&x=mu&x0=4", "z=mode&x=mu&at=e",
-        "z=mode&x=mu&at=q:1", "z=mode&x=mu&at=e@2", "z=mode&x=mu&at=e:nan", "z=mode&x=mu&block=1",
+        "z=mode&x=mu&at=q@1", "z=mode&x=mu&at=e@2", "z=mode&x=mu&at=e@x", "z=mode&x=mu&block=1",
         "z=mode&x=mu&at=,"}) {
     const std::string answer = page_.get("/api/studies/1/slice?" + query);
     EXPECT_EQ(status_of_answer(answer), 400) << query;
@@ -265,7 +248,6 @@ TEST_F(PageAnswersTest, RowsAreAskedForAsOnTheCommandLine) {
       "/api/studies/1/rows?select=point,fn_peak_N&where=mu%20%3C%200.1&order=point%20DESC&limit=2");
   EXPECT_EQ(rows["columns"], json({"point", "fn_peak_N"}));
   EXPECT_EQ(rows["units"], json({"", "N"}));
-  EXPECT_EQ(rows["truncated"], false);
   ASSERT_EQ(rows["rows"].size(), 2U);
   EXPECT_EQ(rows["rows"][0][0], 17);
   const std::string csv = page_.get("/api/studies/1/rows?select=point,mode&limit=1&format=csv");
@@ -278,32 +260,19 @@ TEST_F(PageAnswersTest, RowsAreAskedForAsOnTheCommandLine) {
             400);
 }
 
-TEST_F(PageAnswersTest, APointHasItsInputsAndWhereItsRowComesFrom) {
-  submit_grid();
-  const json before = page_.json("/api/studies/1/points/3");
-  EXPECT_EQ(before["row"], nullptr);
-  EXPECT_EQ(before["mu"], 0.2);
-  solve(24);
-  const json after = page_.json("/api/studies/1/points/3");
-  EXPECT_EQ(after["row"]["status"], "solved");
-  EXPECT_EQ(after["row"]["worker_name"], "pretended");
-  EXPECT_EQ(after["row"]["peaks"].size(), 2U);
+TEST_F(PageAnswersTest, APointHasTheInputsOfItsRecipe) {
+  protocol::Recipe recipe = grid_recipe();
+  recipe.mutable_blocks(0)->set_where("mu < 0.5");
+  submit("filtered", recipe);
+  const json point = page_.json("/api/studies/1/points/7");
+  EXPECT_EQ(point["left_out"], true);
+  EXPECT_EQ(point["mu"], 0.6);
+  EXPECT_EQ(point["fault"], "");
+  EXPECT_EQ(page_.json("/api/studies/1/points/3")["left_out"], false);
   EXPECT_EQ(status_of_answer(page_.get("/api/studies/1/points/24")), 404);
   const std::string trace = page_.get("/api/studies/1/points/3/trace");
   EXPECT_EQ(status_of_answer(trace), 409);
   EXPECT_THAT(trace, HasSubstr("no worker is connected"));
-}
-
-TEST_F(PageAnswersTest, ATextThatIsNestedWithoutEndIsAText) {
-  submit_grid();
-  solve(24);
-  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
-  const std::string change =
-      "UPDATE results SET checksum = NULL, error = '" + deep + "' WHERE point = 3";
-  const auto database = open_database(page_.database(), SQLITE_OPEN_READWRITE);
-  sqlite3_busy_timeout(database.get(), 10'000);
-  execute(database.get(), change.c_str());
-  EXPECT_EQ(page_.json("/api/studies/1/points/3")["row"]["error"], deep);
 }
 
 TEST_F(PageAnswersTest, AStudyIsStartedAndChangedFromThePage) {

@@ -1,4 +1,4 @@
-// What the page asks of a study before it starts it, and what it is told of one that failed.
+// What the page asks of a study before it starts it.
 #include <string>
 
 #include <gmock/gmock.h>
@@ -29,7 +29,6 @@ TEST_F(PageCheckTest, AStudyIsJudgedBeforeItIsSubmitted) {
   EXPECT_EQ(all["bytes"], 11 * 970 + 600) << "as of oblique study check";
   const json some = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "mu > 0.45")));
   EXPECT_EQ(some["points"], 6);
-  EXPECT_EQ(some["numbers"], 11);
   const std::string wrong = check(R"("values":[-1])", "");
   EXPECT_EQ(status_of_answer(wrong), 400);
   EXPECT_THAT(wrong, HasSubstr("mu"));
@@ -84,14 +83,6 @@ TEST_F(PageCheckTest, AtMostEightyCharactersOfAWrongKeyAreRepeated) {
     EXPECT_THAT(refused, HasSubstr(key.substr(0, 20)));
     EXPECT_EQ(refused.find(key.substr(0, 81)), std::string::npos) << refused;
   }
-}
-
-TEST_F(PageCheckTest, TheFirstPointThatFailedIsToldWithItsReason) {
-  submit_grid();
-  EXPECT_EQ(page_.json("/api/studies/1")["first_failure"], json());
-  solve(24, {5, 17});
-  EXPECT_EQ(page_.json("/api/studies/1")["first_failure"],
-            json({{"point", 5}, {"error", "failed as 5"}}));
 }
 
 }  // namespace

@@ -19,9 +19,8 @@ inline constexpr const char* kTestToken = "0123456789abcdef0123456789abcdef";
 inline WebSettings page_settings(bool shows_without_token = false) {
   WebSettings settings;
   settings.address = {"127.0.0.1", "*"};
-  settings.limits.longest = test::kHangLimit;
-  settings.patience = test::kHangLimit;
-  settings.page.token = kTestToken;
+  settings.limits.idle = test::kHangLimit;
+  settings.page.token = PageToken(kTestToken);
   settings.page.shows_without_token = shows_without_token;
   return settings;
 }

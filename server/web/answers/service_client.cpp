@@ -1,0 +1,102 @@
+#include "server/web/answers/service_client.h"
+
+#include <cstddef>
+#include <utility>
+
+#include "proto/frames.h"
+#include "server/web/http/http_message.h"
+
+namespace oblique::server {
+namespace {
+
+/// Most frames that `take` returns, so that the loop can serve other clients in between.
+constexpr std::size_t kMostATurn = 8;
+
+}  // namespace
+
+void ServiceClient::ask(std::uint64_t number, protocol::ClientRequest request) {
+  request.set_request_id(number);
+  Awaited& awaited = awaited_[number];
+  awaited.may_end = awaited.may_end || request.has_query() || request.has_trace();
+  send(std::move(request));
+}
+
+std::optional<protocol::ClientReply> ServiceClient::reply(std::uint64_t number) {
+  decode_frames();
+  const auto found = awaited_.find(number);
+  if (found == awaited_.end() || found->second.replies.empty()) {
+    return std::nullopt;
+  }
+  auto reply = std::move(found->second.replies.front());
+  found->second.replies.pop_front();
+  return reply;
+}
+
+void ServiceClient::decode_frames() {
+  std::vector<std::string> frames;
+  {
+    const std::lock_guard lock(mutex_);
+    frames.swap(frames_);
+  }
+  for (const std::string& frame : frames) {
+    protocol::ClientReply reply;
+    if (!protocol::decode(frame, reply)) {
+      continue;
+    }
+    const auto awaited = awaited_.find(reply.request_id());
+    if (awaited == awaited_.end()) {
+      continue;  // a notice of a delay belongs to no request
+    }
+    const bool is_part = reply.has_query() && !reply.query().ends();
+    awaited->second.may_end = awaited->second.may_end && is_part;
+    awaited->second.replies.push_back(std::move(reply));
+  }
+}
+
+void ServiceClient::forget(std::uint64_t number) {
+  const auto awaited = awaited_.extract(number);
+  if (!awaited.empty() && awaited.mapped().may_end) {
+    protocol::ClientRequest request;
+    request.mutable_end_query()->set_request_id(number);
+    send(std::move(request));
+  }
+}
+
+void ServiceClient::send(protocol::ClientRequest request) {
+  request.set_protocol_version(protocol::kProtocolVersion);
+  const std::lock_guard lock(mutex_);
+  requests_.push_back(protocol::encode(request));
+  woken_.wake();
+}
+
+std::vector<std::string> ServiceClient::take() {
+  woken_.clear();
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> some;
+  while (!requests_.empty() && some.size() < kMostATurn) {
+    some.push_back(std::move(requests_.front()));
+    requests_.pop_front();
+  }
+  if (!requests_.empty()) {
+    woken_.wake();
+  }
+  return some;
+}
+
+void ServiceClient::put(std::string frame) {
+  const std::lock_guard lock(mutex_);
+  frames_.push_back(std::move(frame));
+}
+
+HttpAnswer failure(const protocol::ErrorReply& error) {
+  constexpr unsigned kBadRequest = 400;
+  constexpr unsigned kNotFound = 404;
+  constexpr unsigned kConflict = 409;
+  const bool is_unknown = error.message().starts_with("there is no study");
+  return error_answer(is_unknown              ? kNotFound
+                      : error.wrong_request() ? kBadRequest
+                                              : kConflict,
+                      error.message());
+}
+
+}  // namespace oblique::server

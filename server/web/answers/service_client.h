@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "proto/system/descriptor.h"
+#include "server/web/http/http_message.h"
+
+namespace oblique::server {
+
+/// The HTTP side as one client of the service: requests go to the loop's thread, and replies back.
+class ServiceClient {
+ public:
+  /// The identity of this client for the service; no connection has it.
+  static constexpr const char* kIdentity = "the page";
+
+  // ---- Called by the HTTP server's thread.
+  /// A new request number, different from those of HTTP requests.
+  std::uint64_t new_number() { return ++last_number_; }
+  void ask(std::uint64_t number, protocol::ClientRequest request);
+  /// The next reply to request `number`; none if there is none yet.
+  std::optional<protocol::ClientReply> reply(std::uint64_t number);
+  /// Drops further replies to request `number`, and ends its query or trace.
+  void forget(std::uint64_t number);
+
+  // ---- Called by the loop's thread.
+  /// Readable when there are requests to take.
+  int descriptor() const { return woken_.descriptor(); }
+  /// The next few frames of ClientRequest.
+  std::vector<std::string> take();
+  /// Adds a received frame of ClientReply.
+  void put(std::string frame);
+
+ private:
+  struct Awaited {
+    bool may_end = false;  ///< a query or trace whose answer has not ended
+    std::deque<protocol::ClientReply> replies = {};
+  };
+
+  void decode_frames();
+  void send(protocol::ClientRequest request);
+
+  protocol::WakeUp woken_;
+  std::mutex mutex_;
+  std::deque<std::string> requests_;  // guarded by mutex_
+  std::vector<std::string> frames_;   // guarded by mutex_
+  // Used by the HTTP server's thread only.
+  std::uint64_t last_number_ = std::uint64_t{1} << 63U;
+  std::map<std::uint64_t, Awaited> awaited_;
+};
+
+/// Requests to the service under one number. The destructor ends what the service still does.
+class ServiceExchange {
+ public:
+  explicit ServiceExchange(ServiceClient& service)
+      : service_(service), number_(service.new_number()) {}
+  ~ServiceExchange() { service_.forget(number_); }
+  ServiceExchange(const ServiceExchange&) = delete;
+  ServiceExchange& operator=(const ServiceExchange&) = delete;
+
+  std::uint64_t number() const { return number_; }
+  void send(const protocol::ClientRequest& request) { service_.ask(number_, request); }
+  /// The next reply, if it has come.
+  std::optional<protocol::ClientReply> reply() { return service_.reply(number_); }
+
+ private:
+  ServiceClient& service_;
+  const std::uint64_t number_;
+};
+
+/// The HTTP answer to an error of the service.
+HttpAnswer failure(const protocol::ErrorReply& error);
+
+}  // namespace oblique::server

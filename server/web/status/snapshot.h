@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/oblique.pb.h"
+#include "server/network/network.h"
+#include "server/scheduler/scheduler.h"
+#include "server/service/counts/study_states.h"
+#include "server/service/waiting_queries.h"
+#include "server/store/writer.h"
+
+namespace oblique::server {
+
+class Service;
+
+/// The state of the server at one moment, made by the event loop for the HTTP thread. Points are of
+/// studies that run or are paused, unless something else is said.
+struct Snapshot {
+  std::int64_t made_ms = 0;         ///< of the steady clock
+  std::uint64_t points_solved = 0;  ///< stored since the server started
+  std::uint64_t points_failed = 0;  ///< the same
+  std::uint64_t points_open = 0;    ///< of running studies
+  std::uint64_t points_leased = 0;
+  double points_per_s = 0.0;
+  double thread_s_per_point = 0.0;  ///< of the last batches; 0: unknown
+  std::array<std::uint64_t, kStudyStates> studies_by_state{};
+  /// Studies that run or are paused, the highest priority first, then the oldest; at most
+  /// kShownStudies.
+  std::vector<protocol::StudyStatus> studies;
+  std::uint64_t unlisted = 0;                   ///< further ones
+  std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers
+  std::array<Crew, kCrewStates> crews{};        ///< all workers by state
+
+  Histogram commit_s{{}};
+  std::uint64_t writer_bytes = 0;  ///< of results that are not durable yet
+  std::string database_fault;      ///< why the database takes no results; empty: it does
+  bool is_stopping = false;
+  std::array<std::uint64_t, kRefusalCauses> refusals{};  ///< peers by cause
+  QueryCounts queries;
+
+  /// Number of threads that would solve the open points within a minute; 1 while points are open
+  /// and the time of a point is unknown.
+  std::uint64_t threads_wanted() const;
+};
+
+inline constexpr std::size_t kShownStudies = 50;
+inline constexpr std::size_t kShownWorkers = 100;
+
+struct SnapshotSources {
+  const Service& service;
+  const Network& network;
+  const Writer& writer;
+};
+
+/// Costs in proportion to the studies that run or are paused, and to the workers.
+Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms);
+
+/// The latest snapshot, published by the event loop for the HTTP thread.
+class SnapshotCache {
+ public:
+  void publish(Snapshot snapshot) {
+    auto shared = std::make_shared<const Snapshot>(std::move(snapshot));
+    const std::lock_guard lock(mutex_);
+    latest_.swap(shared);
+  }
+  /// Null before the first.
+  std::shared_ptr<const Snapshot> latest() const {
+    const std::lock_guard lock(mutex_);
+    return latest_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Snapshot> latest_;  // guarded by mutex_
+};
+
+}  // namespace oblique::server

@@ -1,0 +1,179 @@
+// Answers about a study, and the requests for them; the test plays the service.
+#include "server/web/answers/study_answers.h"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/frames.h"
+#include "proto/wire/chunk.h"
+#include "tests/support/recipes.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::ClientReply;
+using protocol::ClientRequest;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class StudyFlowTest : public testing::Test {
+ protected:
+  /// The requests since the last call.
+  std::vector<ClientRequest> requested() {
+    std::vector<ClientRequest> requests;
+    for (std::vector<std::string> frames = client_.take(); !frames.empty();
+         frames = client_.take()) {
+      for (const std::string& frame : frames) {
+        EXPECT_TRUE(protocol::decode(frame, requests.emplace_back()));
+      }
+    }
+    return requests;
+  }
+  /// Numbers of the requests that the service is told to end since the last call, in order.
+  std::vector<std::uint64_t> ended() {
+    std::vector<std::uint64_t> numbers;
+    for (const ClientRequest& request : requested()) {
+      if (request.has_end_query()) {
+        numbers.push_back(request.end_query().request_id());
+      }
+    }
+    return numbers;
+  }
+  void reply(std::uint64_t number, ClientReply reply) {
+    reply.set_request_id(number);
+    client_.put(protocol::encode(reply));
+  }
+  /// Answers the requests for the study and its recipe.
+  void describe(const PendingAnswer& pending) {
+    ClientReply status;
+    status.mutable_status()->add_studies()->set_name("a");
+    reply(requested().at(0).request_id(), status);
+    EXPECT_FALSE(pending());
+    ClientReply described;
+    *described.mutable_describe()->mutable_recipe() = protocol::recipe_of(
+        {{protocol::listed("H", {1}), protocol::listed("mu", {1}), protocol::listed("e", {1})}});
+    const auto requests = requested();
+    EXPECT_EQ(requests.at(0).describe().study(), "a");
+    reply(requests.at(0).request_id(), described);
+  }
+  static ClientReply chunk_of(const std::vector<std::int64_t>& points, bool ends) {
+    protocol::ChunkWriter rows({"point"});
+    for (const std::int64_t point : points) {
+      rows.integer(point);
+      rows.end_row();
+    }
+    ClientReply reply;
+    *reply.mutable_query() = rows.take();
+    reply.mutable_query()->set_ends(ends);
+    return reply;
+  }
+  static ClientReply error_of(const std::string& message) {
+    ClientReply reply;
+    reply.mutable_error()->set_message(message);
+    reply.mutable_error()->set_wrong_request(true);
+    return reply;
+  }
+  static ClientRequest trace_of(std::uint64_t point) {
+    ClientRequest request;
+    request.mutable_trace()->set_study("a");
+    request.mutable_trace()->set_point(point);
+    return request;
+  }
+
+  ServiceClient client_;
+};
+
+/// The points of one query.
+class Points : public StudyAnswer {
+ public:
+  using StudyAnswer::StudyAnswer;
+  Next next(const ServedStudy& /*study*/) override {
+    return std::exchange(is_asked_, true) ? Next(HttpAnswer{200, {}, points_})
+                                          : Next(protocol::StudyQuery());
+  }
+  void take_row(const protocol::ChunkRows& row) override {
+    points_ += std::to_string(row.cell(0).integer) + ' ';
+  }
+
+ private:
+  bool is_asked_ = false;
+  std::string points_;
+};
+
+TEST_F(StudyFlowTest, AnAnswerIsMadeOfAllChunksOfAQuery) {
+  const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>());
+  describe(pending);
+  EXPECT_FALSE(pending());
+  const ClientRequest query = requested().at(0);
+  EXPECT_EQ(query.query().question().study(), "a");
+  reply(query.request_id(), chunk_of({1, 2}, false));
+  EXPECT_FALSE(pending());
+  const ClientRequest more = requested().at(0);
+  EXPECT_EQ(more.more_rows().request_id(), query.request_id());
+  EXPECT_EQ(more.more_rows().taken(), 1U);
+  reply(query.request_id(), chunk_of({5}, true));
+  EXPECT_EQ(pending()->body, "1 2 5 ");
+}
+
+TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
+  PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>());
+  describe(pending);
+  EXPECT_FALSE(pending());
+  const ClientRequest query = requested().at(0);
+  pending = nullptr;
+  EXPECT_THAT(ended(), ElementsAre(query.request_id()));
+}
+
+TEST_F(StudyFlowTest, AfterItsDeadlineTheAnswerSaysSo) {
+  const PendingAnswer pending =
+      study_flow(client_, 1, std::make_unique<Points>(), FlowClock::now());
+  EXPECT_EQ(pending()->status, 503U);
+}
+
+TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
+  for (const bool is_condition_wrong : {true, false}) {
+    const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>("muu > 1"));
+    describe(pending);
+    EXPECT_FALSE(pending());
+    const std::uint64_t number = requested().at(0).request_id();
+    reply(number, error_of("wrong in the whole query"));
+    EXPECT_FALSE(pending());
+    EXPECT_EQ(requested().at(0).query().question().where(), "muu > 1");
+    reply(number, is_condition_wrong ? error_of("wrong as written") : chunk_of({}, true));
+    const auto answer = pending();
+    EXPECT_EQ(answer->status, 400U);
+    EXPECT_THAT(answer->body, testing::HasSubstr(is_condition_wrong ? "wrong as written"
+                                                                    : "wrong in the whole query"));
+  }
+}
+
+TEST_F(StudyFlowTest, AnErrorOfTheServiceIsTheAnswer) {
+  const PendingAnswer pending = study_answer(client_, 1);
+  reply(requested().at(0).request_id(), error_of("there is no study \"a\""));
+  EXPECT_EQ(pending()->status, 404U);
+}
+
+TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEnds) {
+  client_.ask(1, trace_of(7));
+  client_.forget(1);
+  EXPECT_THAT(ended(), ElementsAre(1));
+}
+
+TEST_F(StudyFlowTest, ATraceThatCameNeedsNoEnd) {
+  client_.ask(1, trace_of(7));
+  ClientReply whole;
+  whole.mutable_trace()->set_total_rows(3);
+  reply(1, whole);
+  ASSERT_TRUE(client_.reply(1));
+  client_.forget(1);
+  EXPECT_THAT(ended(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace oblique::server
