@@ -18,15 +18,16 @@ class Flow {
  public:
   Flow(ServiceClient& service, std::uint64_t study, std::unique_ptr<StudyAnswer> answer,
        FlowClock::time_point deadline)
-      : exchange_(service), answer_(std::move(answer)), deadline_(deadline) {
+      : service_(service), answer_(std::move(answer)), deadline_(deadline) {
+    exchange_.emplace(service_);
     study_.id = study;
     ClientRequest request;
     request.mutable_status()->set_study_id(study);
-    exchange_.send(request);
+    exchange_->send(request);
   }
 
   std::optional<HttpAnswer> poll() {
-    while (const auto reply = exchange_.reply()) {
+    while (const auto reply = exchange_->reply()) {
       if (auto answer = reply->has_error() ? on_error(reply->error()) : on_reply(*reply)) {
         return answer;
       }
@@ -59,9 +60,9 @@ class Flow {
       return go_on();
     }
     ClientRequest more;
-    more.mutable_more_rows()->set_request_id(exchange_.number());
+    more.mutable_more_rows()->set_request_id(exchange_->number());
     more.mutable_more_rows()->set_taken(++chunks_);
-    exchange_.send(more);
+    exchange_->send(more);
     return std::nullopt;
   }
 
@@ -74,7 +75,7 @@ class Flow {
     study_.state = found.state();
     ClientRequest request;
     request.mutable_describe()->set_study(found.name());
-    exchange_.send(request);
+    exchange_->send(request);
     return std::nullopt;
   }
 
@@ -106,15 +107,18 @@ class Flow {
     return std::nullopt;
   }
 
+  /// Each query has a number of its own, because a late error about the last one may follow.
   void send(protocol::StudyQuery query) {
+    exchange_.emplace(service_);
     query.set_study(study_.name);
     chunks_ = 0;
     ClientRequest request;
     *request.mutable_query()->mutable_question() = std::move(query);
-    exchange_.send(request);
+    exchange_->send(request);
   }
 
-  ServiceExchange exchange_;
+  ServiceClient& service_;
+  std::optional<ServiceExchange> exchange_;
   ServedStudy study_;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;

@@ -89,20 +89,20 @@ class StudyFlowTest : public testing::Test {
   ServiceClient client_;
 };
 
-/// The points of one query.
+/// The points of some queries.
 class Points : public StudyAnswer {
  public:
-  using StudyAnswer::StudyAnswer;
+  explicit Points(int queries = 1, const std::string& condition = {})
+      : StudyAnswer(condition), queries_(queries) {}
   Next next(const ServedStudy& /*study*/) override {
-    return std::exchange(is_asked_, true) ? Next(HttpAnswer{200, {}, points_})
-                                          : Next(protocol::StudyQuery());
+    return queries_-- > 0 ? Next(protocol::StudyQuery()) : Next(HttpAnswer{200, {}, points_});
   }
   void take_row(const protocol::ChunkRows& row) override {
     points_ += std::to_string(row.cell(0).integer) + ' ';
   }
 
  private:
-  bool is_asked_ = false;
+  int queries_;
   std::string points_;
 };
 
@@ -119,6 +119,21 @@ TEST_F(StudyFlowTest, AnAnswerIsMadeOfAllChunksOfAQuery) {
   EXPECT_EQ(more.more_rows().taken(), 1U);
   reply(query.request_id(), chunk_of({5}, true));
   EXPECT_EQ(pending()->body, "1 2 5 ");
+}
+
+TEST_F(StudyFlowTest, ALateErrorAboutAQueryThatHasEndedDoesNotEndTheNext) {
+  const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(2));
+  describe(pending);
+  EXPECT_FALSE(pending());
+  const std::uint64_t first = requested().at(0).request_id();
+  reply(first, chunk_of({1}, false));
+  reply(first, chunk_of({}, true));
+  EXPECT_FALSE(pending());
+  const std::uint64_t second = requested().back().request_id();
+  reply(first, error_of("no answer to that request is under way"));
+  EXPECT_FALSE(pending());
+  reply(second, chunk_of({2}, true));
+  EXPECT_EQ(pending()->body, "1 2 ");
 }
 
 TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
@@ -138,14 +153,15 @@ TEST_F(StudyFlowTest, AfterItsDeadlineTheAnswerSaysSo) {
 
 TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
   for (const bool is_condition_wrong : {true, false}) {
-    const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>("muu > 1"));
+    const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(1, "muu > 1"));
     describe(pending);
     EXPECT_FALSE(pending());
-    const std::uint64_t number = requested().at(0).request_id();
-    reply(number, error_of("wrong in the whole query"));
+    reply(requested().at(0).request_id(), error_of("wrong in the whole query"));
     EXPECT_FALSE(pending());
-    EXPECT_EQ(requested().at(0).query().question().where(), "muu > 1");
-    reply(number, is_condition_wrong ? error_of("wrong as written") : chunk_of({}, true));
+    const ClientRequest alone = requested().at(0);
+    EXPECT_EQ(alone.query().question().where(), "muu > 1");
+    reply(alone.request_id(),
+          is_condition_wrong ? error_of("wrong as written") : chunk_of({}, true));
     const auto answer = pending();
     EXPECT_EQ(answer->status, 400U);
     EXPECT_THAT(answer->body, testing::HasSubstr(is_condition_wrong ? "wrong as written"
