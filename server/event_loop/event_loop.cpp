@@ -11,7 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/database/database_file.h"
-#include "server/web/answers/service_line.h"
+#include "server/web/answers/service_client.h"
 
 namespace oblique::server {
 namespace {
@@ -52,11 +52,6 @@ std::unique_ptr<Web> make_web(const LoopSettings& settings) {
     spdlog::warn("no metrics over HTTP: {}", what);
     return nullptr;
   }
-}
-
-Delivery counted(Delivery delivery, std::string_view frame, PortTraffic& traffic) {
-  traffic.sent_bytes += delivery == Delivery::kGone ? 0 : frame.size();
-  return delivery;
 }
 
 }  // namespace
@@ -110,7 +105,7 @@ EventLoop::EventLoop(LoopSettings settings)
 // ---- Ports -------------------------------------------------------------------------------------
 
 Delivery EventLoop::to_worker(const std::string& identity, const std::string& frame) {
-  return counted(network_.send(identity, frame), frame, worker_traffic_);
+  return network_.send(identity, frame);
 }
 
 bool EventLoop::to_client(const std::string& identity, const std::string& frame) {
@@ -120,7 +115,7 @@ bool EventLoop::to_client(const std::string& identity, const std::string& frame)
   if (is_ending_) {
     last_answered_.push_back(identity);
   }
-  return counted(network_.send(identity, frame), frame, client_traffic_) != Delivery::kGone;
+  return network_.send(identity, frame) != Delivery::kGone;
 }
 
 void EventLoop::add_peers(protocol::WorkersReply& reply) const {
@@ -181,7 +176,7 @@ void EventLoop::tick() {
 
 void EventLoop::take_completions() {
   for (const auto& frame : web_ ? web_->take_requests() : std::vector<std::string>()) {
-    service_->client_frame(ServiceLine::kIdentity, frame, now());
+    service_->client_frame(ServiceClient::kIdentity, frame, now());
   }
   completions_.run();
 }
@@ -189,7 +184,7 @@ void EventLoop::take_completions() {
 /// True when messages are left that could be taken at once.
 bool EventLoop::take_worker_messages() {
   return take_messages(
-      workers_, worker_traffic_, [this](const std::string&) { return service_->has_room(); },
+      workers_, [this](const std::string&) { return service_->has_room(); },
       [this](const Incoming& incoming) {
         service_->worker_frame(incoming.identity, incoming.body, now(), incoming.key);
       });
@@ -198,7 +193,7 @@ bool EventLoop::take_worker_messages() {
 /// The same. A client that does not read its replies must do so before its next request is taken.
 bool EventLoop::take_client_messages() {
   return take_messages(
-      clients_, client_traffic_,
+      clients_,
       [this](const std::string& client) { return !network_.is_busy(client); },
       [this](const Incoming& incoming) {
         service_->client_frame(incoming.identity, incoming.body, now(), incoming.key);
@@ -206,11 +201,9 @@ bool EventLoop::take_client_messages() {
 }
 
 template <typename Take>
-bool EventLoop::take_messages(Network::Port port, PortTraffic& traffic,
-                              const Network::MayTake& may_take, const Take& take) {
+bool EventLoop::take_messages(Network::Port port, const Network::MayTake& may_take, const Take& take) {
   const auto until = Clock::now() + kShareOfTurn;
   while (const auto incoming = network_.next(port, may_take)) {
-    traffic.received_bytes += incoming->body.size();
     take(*incoming);
     if (Clock::now() >= until) {
       return true;
@@ -245,9 +238,7 @@ void EventLoop::check_access() {
 
 void EventLoop::publish() {
   if (web_) {
-    web_->tick({*service_, network_, writer_, clients_, client_traffic_, workers_, worker_traffic_,
-                ended_connections_},
-               now().steady_ms);
+    web_->tick({*service_, network_, writer_}, now().steady_ms);
   }
 }
 

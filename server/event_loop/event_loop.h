@@ -94,8 +94,7 @@ class EventLoop final : private Ports {
   bool take_worker_messages();
   bool take_client_messages();
   template <typename Take>
-  bool take_messages(Network::Port port, PortTraffic& traffic, const Network::MayTake& may_take,
-                     const Take& take);
+  bool take_messages(Network::Port port, const Network::MayTake& may_take, const Take& take);
   void take_completions();
   void note_disconnects();
   void check_access();
@@ -119,8 +118,6 @@ class EventLoop final : private Ports {
   Network network_;
   Network::Port workers_;
   Network::Port clients_;
-  PortTraffic client_traffic_;
-  PortTraffic worker_traffic_;
   std::unique_ptr<Web> web_;
   std::uint64_t ended_connections_ = 0;
   std::array<std::uint64_t, kRefusalCauses> refused_{};  ///< by cause

@@ -247,6 +247,7 @@ Network::Peer* Network::find(const std::string& identity) const {
 }
 
 void Network::collect(std::int64_t now_ms) {
+  now_ms_ = now_ms;
   read_paused_again();
   std::array<epoll_event, 256> events;
   const int count = epoll_wait(epoll_.number(), events.data(), static_cast<int>(events.size()), 0);
@@ -523,8 +524,12 @@ void Network::read_paused_again() {
 }
 
 bool Network::has_unread_input(const std::string& identity) const {
+  // A trace on a slow line takes longer to arrive than a worker may be silent.
+  constexpr std::int64_t kPauseInMessage_ms = 1000;
   const Peer* const peer = find(identity);
-  return peer != nullptr && (peer->is_queued || peer->is_paused);
+  return peer != nullptr &&
+         (peer->is_queued || peer->is_paused ||
+          (peer->held_in_bytes > 0 && now_ms_ - peer->last_input_ms < kPauseInMessage_ms));
 }
 
 std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {

@@ -24,7 +24,7 @@ namespace oblique::server {
 
 /// Bounds on what peers can make the server hold; proto/protocol.md lists them.
 struct NetworkLimits {
-  std::size_t connections = 4096;  ///< at all ports; fewer if the system allows fewer
+  std::size_t connections = limits::kConnections;  ///< at all ports; fewer if the system allows fewer
   /// Messages of all peers that are incomplete or were not taken. One peer has at most one message.
   std::size_t held_in_bytes = std::size_t{512} << 20U;
   /// While a port's messages take this much and one of them waits to be taken, its peers are not
@@ -32,7 +32,7 @@ struct NetworkLimits {
   std::size_t held_in_to_pause_bytes = std::size_t{64} << 20U;
   /// A peer with more unsent output than this is busy.
   std::size_t busy_bytes = std::size_t{4} << 20U;
-  std::size_t waiting_out_bytes = std::size_t{64} << 20U;       ///< unsent output of one peer
+  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;     ///< unsent output of one peer
   std::size_t all_waiting_out_bytes = std::size_t{512} << 20U;  ///< of all peers
   std::int64_t handshake_ms = 10'000;                           ///< for one handshake
   /// A connection with input this recent is not ended to make room for a new one.
@@ -94,7 +94,7 @@ class Network {
   /// Its unsent output exceeds `busy_bytes`.
   bool is_busy(const std::string& identity) const;
   bool is_connected(const std::string& identity) const;
-  /// It has sent something that was not taken.
+  /// It has sent something that was not taken, or a message is coming in.
   bool has_unread_input(const std::string& identity) const;
   /// Sends unsent output, for at most this long.
   void flush(std::chrono::milliseconds longest);
@@ -167,6 +167,7 @@ class Network {
   std::set<Number> handshakes_;       // peers whose handshake is not done, the oldest first
   std::map<std::string, std::set<Number>> handshakes_of_;
   std::size_t held_in_bytes_ = 0;
+  std::int64_t now_ms_ = 0;  // of the last `collect`
   std::size_t waiting_out_bytes_ = 0;
   std::vector<Disconnect> disconnects_;
   std::array<std::uint64_t, kRefusalCauses> refusals_{};

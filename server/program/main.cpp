@@ -29,7 +29,6 @@
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "server/event_loop/event_loop.h"
-#include "server/program/limits.h"
 #include "server/query/reader_program.h"
 #include "server/web/http_options.h"
 #include "worker/solver/model/version.h"
@@ -159,7 +158,7 @@ void add_limits(CLI::App& app, LoopSettings& loop) {
       "Queries that run at a time, each in a process of its own");
   constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 60U;
   add("--limits-open-points", loop.service.bounds.points, 1U, kMostPoints,
-      "Points without a result of all studies that are neither done nor cancelled");
+      "Points of all studies that are neither done nor cancelled");
   add("--limits-credit", loop.service.scheduler.max_credit, 1U, 65'536U,
       "Batches that a worker may request at a time");
 }

@@ -14,6 +14,7 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/system/descriptor.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 

@@ -500,7 +500,6 @@ void Scheduler::on(const ResultsReceived& event) {
   if (event.batch_done) {
     const bool is_solved = is_proven(*worker) && !has_open_points(lease->second);
     worker->solved_batches += is_solved ? 1U : 0U;
-    batch_s_.observe(1e-3 * static_cast<double>(now_ms_ - lease->second.granted_ms));
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.
     end_lease(event.lease, Loss{kNobody, is_proven(*worker) && worker->leases.size() == 1});

@@ -17,7 +17,6 @@
 #include "server/scheduler/study_points.h"
 #include "server/scheduler/study_queue.h"
 #include "server/scheduler/worker_processes.h"
-#include "server/study/histogram.h"
 
 namespace oblique::server {
 
@@ -108,8 +107,6 @@ class Scheduler {
   std::array<Crew, kCrewStates> crews(std::int64_t now_ms, std::int64_t silent_after_ms) const;
   /// Batches that are at workers.
   std::size_t leases() const { return leases_.size(); }
-  /// From handing a batch out to its last result, in s.
-  const Histogram& batch_s() const { return batch_s_; }
   /// Time of a thread that a point takes, over the last results, in s; 0: not known.
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
@@ -280,7 +277,6 @@ class Scheduler {
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
   Effects effects_;  // of the event being handled
-  Histogram batch_s_{{0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0, 1800.0, 7200.0}};
   double pace_s_ = 0.0;  // of threads, for these points; what is longer ago counts less
   double pace_points_ = 0.0;
 };

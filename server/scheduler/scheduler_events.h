@@ -9,6 +9,7 @@
 #include "server/scheduler/loss_history.h"
 #include "server/scheduler/worker_processes.h"
 #include "server/study/interval_set.h"
+#include "server/study/limits.h"
 #include "server/study/study_table.h"
 
 // The events that the scheduler handles and the effects that it requests.
@@ -61,7 +62,7 @@ struct SchedulerSettings {
   std::int64_t shortest_stall_ms = 60'000;
   std::int64_t longest_stall_ms = 3'600'000;
   std::size_t most_absent_processes = 1024;  ///< remembered, of newcomers and of others each
-  std::uint32_t max_credit = 1024;           ///< batches
+  std::uint32_t max_credit = limits::kCredit;  ///< batches
   /// Points a thread in a batch of a filtered study before the worker has solved one: the filter
   /// may keep all of them.
   std::uint64_t unsolved_batch_points = 256;

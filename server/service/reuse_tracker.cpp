@@ -57,7 +57,7 @@ void ReuseTracker::part_stored(StudyId id, const ReusedResults& part, Instant no
   }
   const std::optional<std::uint64_t> next = next_part(id, part, now);
   if (!part.points.empty()) {
-    feed_(PointsTaken{id, part.points, solver_version_}, now);
+    feed_(PointsTaken{id, part.points}, now);
     add_source(id);
   }
   if (stopping_) {

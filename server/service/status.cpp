@@ -25,12 +25,12 @@ std::string reason_to_wait(StudyId id, const Core& core, const StudyCounts& coun
   if (reused.under_way()) {
     return fmt::format("the lookup of results of other studies, {} reused so far", reused.points());
   }
+  if (counts.is_of_other_solver) {
+    return fmt::format("a server with solver version {}, that of its results",
+                       counts.solver_version);
+  }
   if (counts.leased == 0 && core.scheduler.sets_all_aside()) {
     return "a worker";
-  }
-  if (counts.lacks_worker) {
-    return fmt::format("a worker with solver version {}, that of its results",
-                       counts.solver_version);
   }
   const QuietWorkers quiet = core.scheduler.quiet_workers(id, now.steady_ms);
   if (counts.leased > 0 && quiet.quiet_ms >= kQuietAfter_ms) {

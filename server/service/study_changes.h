@@ -11,6 +11,7 @@
 #include "server/service/ports/ports.h"
 #include "server/service/reuse_tracker.h"
 #include "server/service/status.h"
+#include "server/study/limits.h"
 #include "server/study/study_table.h"
 
 namespace oblique::server {
@@ -32,8 +33,8 @@ ReadRequest read_request(std::string_view frame, bool judges = true);
 
 /// Bounds on the studies that are neither done nor cancelled, and on their points.
 struct StudyBounds {
-  std::uint64_t studies = 100'000;
-  std::uint64_t points = 10'000'000'000'000;
+  std::uint64_t studies = limits::kOpenStudies;
+  std::uint64_t points = limits::kOpenPoints;
 };
 
 /// The requests that change a study: submit, grow, pause, resume, cancel, retry, rename, delete.

@@ -160,17 +160,19 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
   workers_.emplace(id, worker);
   ids_[identity] = id;
   greet(id, now);
-  const std::string process = protocol::shortened(hello.process_id(), kLongestWorkerText);
-  input.events.emplace_back(
-      WorkerJoined{id, worker.threads, worker.solver_version, process, !process.empty()});
+  input.events.emplace_back(WorkerJoined{
+      id, worker.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
 }
 
 /// Whether the worker is refused; it gets the reason.
 bool WorkerSessions::refuse(const std::string& identity, const protocol::WorkerHello& hello,
                             Instant now) {
   std::string reason = protocol::objection_to_worker(hello);
-  if (reason.empty() && hello.solver_version().empty()) {
-    reason = "it does not say which version its solver has";
+  if (reason.empty() && hello.solver_version() != settings_.solver_version) {
+    reason = fmt::format(
+        "its solver has version {}, the server's {}: results of a study must come from one "
+        "version; install the server's release of oblique there",
+        plain(hello.solver_version()), settings_.solver_version);
   }
   if (reason.empty()) {
     return false;
@@ -191,7 +193,6 @@ bool WorkerSessions::welcome(WorkerId id, const std::string& identity) {
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
   welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
   welcome.set_database_id(settings_.database_id);
-  welcome.set_takes_back(true);
   return ports_.send(identity, message) != Delivery::kGone;
 }
 
@@ -202,14 +203,6 @@ void WorkerSessions::greet(WorkerId id, Instant now) {
              fmt::format("worker {} ({}, {} threads{}) joins", id, worker.name, worker.threads,
                          worker.key.empty() ? "" : ", key " + worker.key),
              now);
-  if (worker.solver_version != settings_.solver_version) {
-    const std::string text = fmt::format(
-        "worker {}: its solver has version {}, the server's {}: studies with results of another "
-        "version than its own go to other workers",
-        id, worker.solver_version, settings_.solver_version);
-    log_rarely(Severity::kWarning, text, now);
-    notify(id, text);
-  }
   if (settings_.is_insecure) {
     notify(id,
            "the server runs with --insecure: whoever reaches it can use it, and what is sent "
@@ -348,7 +341,6 @@ void WorkerSessions::send(const SendBatch& batch) {
   fields.set_study_id(batch.study);
   fields.set_attempt(batch.attempt);
   fields.set_lease_id(batch.lease);
-  fields.set_priority(batch.priority);
   std::uint64_t reached = 0;
   for (const Interval& range : batch.points) {
     fields.add_ranges(static_cast<std::int64_t>(range.begin - reached));

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/service/ports/ports.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 
@@ -14,7 +15,7 @@ struct LedgerLimits {
   /// Bytes of results and recipes that wait for the disk. Above it no message of a worker is read
   /// and no change of a client accepted; above a quarter no batch is sent, until half of that is
   /// stored.
-  std::size_t bytes = std::size_t{64} << 20U;
+  std::size_t bytes = limits::kUnstoredBytes;
   /// The same for all writes, so that small messages are bounded, too.
   std::size_t writes = 80'000;
 };

@@ -13,7 +13,7 @@
 
 #include "server/database/sqlite.h"
 #include "server/store/changes.h"
-#include "server/study/histogram.h"
+#include "server/store/histogram.h"
 
 namespace oblique::server {
 

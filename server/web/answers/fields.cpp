@@ -74,7 +74,7 @@ std::uint64_t FieldReader::cells(const std::string& name, std::uint64_t usual) c
 std::string FieldReader::condition() const {
   const std::string condition = text("where").value_or("");
   if (!condition.empty()) {
-    parse_request([&] { check_sql_part("--where", condition, SqlPart::kCondition); });
+    parse_request([&] { check_sql_part("--where", condition); });
   }
   return condition;
 }

@@ -33,7 +33,7 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
   std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(shown),
                     ranked.end());
   for (std::size_t i = 0; i < shown; ++i) {
-    snapshot.studies.push_back(to_message(service.study_view(ranked[i].second, {now_ms, 0})));
+    snapshot.studies.push_back(service.study_status(ranked[i].second, {now_ms, 0}));
   }
 }
 
@@ -59,17 +59,13 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms) {
   snapshot.points_per_s = service.points_per_s(now_ms);
   snapshot.thread_s_per_point = scheduler.thread_s_per_point();
   count_studies(service, now_ms, snapshot);
-  for (const WorkerView& worker : service.worker_views(kShownWorkers, {now_ms, 0})) {
-    snapshot.workers.push_back(to_message(worker));
-  }
+  snapshot.workers = service.worker_statuses(kShownWorkers, {now_ms, 0});
   snapshot.crews = scheduler.crews(now_ms, kSilentAfter_ms);
   snapshot.commit_s = sources.writer.commits().duration_s;
   snapshot.writer_bytes = service.ledger().bytes();
   snapshot.database_fault = service.ledger().fault();
   snapshot.is_stopping = service.is_stopping();
-  for (std::size_t cause = 0; cause < kRefusalCauses; ++cause) {
-    snapshot.refusals.at(cause) = sources.network.refusals().at(cause).count;
-  }
+  snapshot.refusals = sources.network.refusals();
   snapshot.queries = service.query_counts();
   return snapshot;
 }

@@ -12,8 +12,8 @@
 #include "proto/oblique.pb.h"
 #include "server/network/network.h"
 #include "server/scheduler/scheduler.h"
-#include "server/service/counts/study_states.h"
-#include "server/service/waiting_queries.h"
+#include "server/service/client_handler.h"
+#include "server/service/study_states.h"
 #include "server/store/writer.h"
 
 namespace oblique::server {

@@ -38,7 +38,7 @@ TEST_F(ServiceTest, AStudyWithResultsOfAnotherSolverWaitsAndSaysForWhat) {
   stored.solver_version = "0.9";
   ServiceSettings settings;
   settings.solver_version = "1.0";
-  service_.emplace(settings, outbox_, std::vector<StoredStudy>{stored}, now_);
+  service_.emplace(settings, ports_, std::vector<StoredStudy>{stored}, now_);
   ClientRequest status;
   status.set_protocol_version(protocol::kProtocolVersion);
   status.mutable_status();

@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "server/web/status/metrics.h"
-#include "tests/server/loop/running_server.h"
+#include "tests/server/event_loop/running_server.h"
 #include "tests/server/web/raw_http.h"
 #include "tests/support/temporary_folder.h"
 

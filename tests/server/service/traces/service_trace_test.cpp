@@ -33,7 +33,7 @@ class ServiceTraceTest : public ServiceTest {
     return message;
   }
   void ask(ClientRequest message, const std::string& identity = "client",
-           const std::shared_ptr<const KeyHolder>& holder = nullptr) {
+           const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     message.set_protocol_version(protocol::kProtocolVersion);
     service_->client_frame(identity, protocol::encode(message), now_, holder);
   }
@@ -117,7 +117,7 @@ TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheCli
   EXPECT_TRUE(order.fall());
   EXPECT_EQ(order.every(), 5U);
   worker_sends(trace_of(order, "\4\2\3"));
-  ASSERT_EQ(outbox_.replies.size(), 1U);
+  ASSERT_EQ(ports_.replies.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), 7U);
   const auto reply = last_reply().trace();
   EXPECT_EQ(reply.trace().SerializeAsString(), trace_of(order, "\4\2\3").SerializeAsString());
@@ -133,7 +133,7 @@ TEST_F(ServiceTraceTest, ClientsThatWaitForTheSameTraceShareIt) {
   ask(8, 3);
   ASSERT_EQ(orders().size(), 1U);
   worker_sends(trace_of(orders()[0], "\2"));
-  EXPECT_EQ(outbox_.replies.size(), 3U);
+  EXPECT_EQ(ports_.replies.size(), 3U);
   ask(9, 3);
   EXPECT_EQ(orders().size(), 2U) << "none is kept";
   auto shape = trace_request(10, 3);
@@ -296,13 +296,13 @@ TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(i, i);
   }
-  EXPECT_EQ(outbox_.replies.size(), 100 - limits::kWaitingTracesOfConnection);
+  EXPECT_EQ(ports_.replies.size(), 100 - limits::kWaitingTracesOfConnection);
   EXPECT_THAT(refusal(), HasSubstr("too many traces"));
-  outbox_.replies.clear();
+  ports_.replies.clear();
   for (std::uint64_t i = 0; i < 100; ++i) {
     ask(1, i, "client" + std::to_string(i));
   }
-  EXPECT_EQ(outbox_.replies.size(),
+  EXPECT_EQ(ports_.replies.size(),
             100 - (limits::kWaitingTraces - limits::kWaitingTracesOfConnection));
   EXPECT_EQ(orders().size(), limits::kRunningTraces);
 }
@@ -310,7 +310,7 @@ TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
 TEST_F(ServiceTraceTest, AReaderMayRequestOne) {
   hello();
   ask(trace_request(7, 3), "client",
-      std::make_shared<const KeyHolder>(KeyHolder{"onlooker", protocol::Role::kReader}));
+      std::make_shared<const KeyIdentity>(KeyIdentity{"onlooker", protocol::Role::kReader}));
   EXPECT_EQ(orders().size(), 1U);
 }
 

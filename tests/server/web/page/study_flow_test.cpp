@@ -184,7 +184,7 @@ TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEnds) {
 TEST_F(StudyFlowTest, ATraceThatCameNeedsNoEnd) {
   client_.ask(1, trace_of(7));
   ClientReply whole;
-  whole.mutable_trace()->set_total_rows(3);
+  whole.mutable_trace()->set_worker("one");
   reply(1, whole);
   ASSERT_TRUE(client_.reply(1));
   client_.forget(1);
