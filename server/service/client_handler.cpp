@@ -14,10 +14,6 @@
 namespace oblique::server {
 namespace {
 
-constexpr const char* kStopping = "the server is stopping: ask again when it runs";
-
-/// Longer requests are read on the check thread.
-constexpr std::size_t kLongestInlineFrame = std::size_t{64} * 1024;
 /// Requests that wait for the check thread, in all and of one client, and their bytes.
 constexpr std::size_t kMostChecks = 64;
 constexpr std::size_t kMostChecksOfClient = 2;
@@ -34,7 +30,7 @@ int page_size(std::uint32_t requested, std::size_t largest) {
 
 void ClientHandler::frame(const std::string& identity, std::string_view frame, Instant now,
                           const std::shared_ptr<const KeyIdentity>& holder) {
-  if (frame.size() > kLongestInlineFrame) {
+  if (frame.size() > limits::kLongestInlineRequest) {
     check({identity, protocol::request_id_of(frame), holder}, frame, now);
     return;
   }

@@ -11,7 +11,7 @@
 #include "server/service/ports/ports.h"
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
-#include "server/service/traces/trace_handler.h"
+#include "server/service/trace_handler.h"
 #include "server/service/worker_sessions.h"
 
 namespace oblique::server {

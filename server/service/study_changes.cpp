@@ -24,10 +24,6 @@ constexpr std::size_t kMostDeferred = 1000;
 /// In place of the state of a study that was deleted.
 constexpr const char* kDeletedState = "deleted";
 
-std::string not_changed(const std::string& error) {
-  return "the change was not stored, the study is as before: " + error;
-}
-
 }  // namespace
 
 std::string unknown_study(const std::string& name, const StudyStates& states) {
@@ -71,31 +67,35 @@ ReadRequest read_request(std::string_view frame, bool judges) {
 
 // ---- Writing -----------------------------------------------------------------------------------
 
-void StudyChanges::write(StudyId id, Pending pending, Change change, OnStored on_stored,
-                         OnRefused on_refused) {
-  pending_.insert_or_assign(id, std::move(pending));
-  const auto end = [this, id](Instant now, const auto& act) {
-    const auto ended = pending_.extract(id);
-    act(ended.mapped());
-    for (const auto& request : ended.mapped().deferred) {
+/// Writes the change. A refusal is the reply to the client, after `on_refused`.
+void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored,
+                         std::function<void()> on_refused) {
+  pending_[id];
+  const auto run_deferred = [](const Pending& ended, Instant now) {
+    for (const auto& request : ended.deferred) {
       request(now);
     }
   };
   core_.ledger.write(
       std::move(change),
-      [end, on_stored = std::move(on_stored)](Instant now) {
-        end(now, [&](const Pending& ended) { on_stored(ended, now); });
+      [this, id, run_deferred, on_stored = std::move(on_stored)](Instant now) {
+        const auto ended = pending_.extract(id);
+        on_stored(now);
+        run_deferred(ended.mapped(), now);
       },
-      [end, on_refused = std::move(on_refused)](const std::string& error, Instant now) {
-        end(now, [&](const Pending& ended) { on_refused(ended, error, now); });
+      [this, client, id, run_deferred, on_refused = std::move(on_refused)](const std::string& error,
+                                                                           Instant now) {
+        const auto ended = pending_.extract(id);
+        on_refused();
+        core_.ports.reply_error(client, (core_.states.contains(id)
+                                             ? "the change was not stored, the study is as before: "
+                                             : "the study was not stored: ") +
+                                            error);
+        if (ended.mapped().is_complete) {
+          finish(id, now);
+        }
+        run_deferred(ended.mapped(), now);
       });
-}
-
-void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored) {
-  write(id, {}, std::move(change), std::move(on_stored),
-        [this, client](const Pending&, const std::string& error, Instant) {
-          core_.ports.reply_error(client, not_changed(error));
-        });
 }
 
 /// Whether the request waits until the change of the study that is being written has an outcome. It
@@ -132,12 +132,6 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     add(client, read, priority, now);
     return;
   }
-  const auto pending = pending_.find(*known);
-  if (pending != pending_.end() && !pending->second.submitters.empty() &&
-      pending->second.table.is_of_the_recipe_of(read.table)) {
-    pending->second.submitters.push_back(client);
-    return;
-  }
   if (defers(client, *known, [this, client, read](Instant then) { submit(client, read, then); })) {
     return;
   }
@@ -162,7 +156,7 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   const bool reuses = !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, {});
   core_.states.add(id,
                    {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
-  const auto on_stored = [this, id, reuses](const Pending& added, Instant then) {
+  const auto on_stored = [this, client, id, reuses](Instant then) {
     core_.states.set_durable(id, then.steady_ms);
     const StudyRecord& study = core_.states.record(id);
     log(id, fmt::format("of {} points begins", study.table.size()));
@@ -172,20 +166,10 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
     if (reuses) {
       core_.reuse.begin(id, then);
     }
-    bool created = true;
-    for (const Client& submitter : added.submitters) {
-      reply_submitted(submitter, id, std::exchange(created, false), then);
-    }
+    reply_submitted(client, id, true, then);
   };
-  const auto on_refused = [this, id](const Pending& refused, const std::string& error, Instant) {
-    core_.states.remove(id);
-    for (const Client& submitter : refused.submitters) {
-      core_.ports.reply_error(submitter, "the study was not stored: " + error);
-    }
-  };
-  write(id, {read.table, {client}},
-        AddStudy{id, name, read.table, created_at, priority, client.key(), reuses}, on_stored,
-        on_refused);
+  write(client, id, AddStudy{id, name, read.table, created_at, priority, client.key(), reuses},
+        on_stored, [this, id] { core_.states.remove(id); });
 }
 
 /// The submitted recipe is not that of the study: appends its further points, or refuses it.
@@ -217,45 +201,33 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
   const protocol::StudyStatus before = study_status(id, core_, now);
   const bool reuses =
       !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, before.solver_version());
-  const auto on_stored = [this, id, priority, points_before, was = before.state(), reuses](
-                             const Pending& grown, Instant then) {
-    core_.states.grow(id, grown.table, priority);
-    log(id, fmt::format("grows from {} to {} points", points_before, grown.table.size()));
+  const auto on_stored = [this, client, id, table = read.table, priority, points_before,
+                          was = before.state(), reuses](Instant then) {
+    core_.states.grow(id, table, priority);
+    log(id, fmt::format("grows from {} to {} points", points_before, table.size()));
     if (reuses) {
       core_.feed(StudyHeld{id, true}, then);
     }
-    core_.feed(StudyGrown{id, grown.table, priority}, then);
+    core_.feed(StudyGrown{id, table, priority}, then);
     if (reuses) {
       core_.reuse.begin(id, then);
     }
     protocol::SubmitReply more;
-    more.set_appended(grown.table.size() - points_before);
+    more.set_appended(table.size() - points_before);
     more.set_was(was);
-    for (const Client& submitter : grown.submitters) {
-      reply_submitted(submitter, id, false, then, more);
-    }
+    reply_submitted(client, id, false, then, more);
   };
-  const auto on_refused = [this, id](const Pending& refused, const std::string& error,
-                                     Instant then) {
-    core_.states.set_doubtful(id);
-    for (const Client& submitter : refused.submitters) {
-      core_.ports.reply_error(submitter, not_changed(error));
-    }
-    if (refused.is_complete) {
-      finish(id, then);
-    }
-  };
-  write(id, {read.table, {client}}, GrowStudy{id, read.table, priority, iso_8601(now), reuses},
-        on_stored, on_refused);
+  write(client, id, GrowStudy{id, read.table, priority, iso_8601(now), reuses}, on_stored,
+        [this, id] { core_.states.set_doubtful(id); });
+  pending_.at(id).grows = true;
 }
 
 void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t priority) {
-  write(client, id, SetPriority{id, priority},
-        [this, client, id, priority](const Pending&, Instant then) {
-          core_.states.set_priority(id, priority);
-          core_.feed(PriorityChanged{id, priority}, then);
-          resume_submitted(client, id, then);
-        });
+  write(client, id, SetPriority{id, priority}, [this, client, id, priority](Instant then) {
+    core_.states.set_priority(id, priority);
+    core_.feed(PriorityChanged{id, priority}, then);
+    resume_submitted(client, id, then);
+  });
 }
 
 /// The study was submitted again as it is.
@@ -331,7 +303,7 @@ void StudyChanges::change_state(const Client& client, StudyId id, StudyState wan
 
 void StudyChanges::set_state(const Client& client, StudyId id, StudyState state,
                              std::function<void(Instant)> reply, Instant now) {
-  const auto on_stored = [this, id, state, reply = std::move(reply)](const Pending&, Instant then) {
+  const auto on_stored = [this, id, state, reply = std::move(reply)](Instant then) {
     core_.states.set_state(id, state);
     if (state == StudyState::kRunning) {
       log(id, "goes on");
@@ -342,11 +314,8 @@ void StudyChanges::set_state(const Client& client, StudyId id, StudyState state,
     }
     reply(then);
   };
-  const auto on_refused = [this, client, id](const Pending&, const std::string& error, Instant) {
-    core_.states.set_doubtful(id);
-    core_.ports.reply_error(client, not_changed(error));
-  };
-  write(id, {}, SetStudyState{id, state, iso_8601(now)}, on_stored, on_refused);
+  write(client, id, SetStudyState{id, state, iso_8601(now)}, on_stored,
+        [this, id] { core_.states.set_doubtful(id); });
 }
 
 void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
@@ -366,7 +335,7 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
     return;
   }
   write(client, id, ForgetFailures{id, failures, iso_8601(now)},
-        [this, client, id, failures](const Pending&, Instant then) {
+        [this, client, id, failures](Instant then) {
           core_.rates.forget(id);  // fewer points are completed now
           core_.states.forget_failures(id, failures, then.steady_ms);
           log(id, fmt::format("tries its failed points again: {}", failures.size()));
@@ -392,21 +361,18 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
   } else {
     core_.states.reserve(id, name);
     write(
-        id, {}, RenameStudy{id, name},
-        [this, client, id, name](const Pending&, Instant then) {
+        client, id, RenameStudy{id, name},
+        [this, client, id, name](Instant then) {
           log(id, fmt::format("is called {} from now on", name));
           core_.states.rename(id, name);
           reply_changed(client, id, 0, then);
         },
-        [this, client, name](const Pending&, const std::string& error, Instant) {
-          core_.states.release(name);
-          core_.ports.reply_error(client, not_changed(error));
-        });
+        [this, name] { core_.states.release(name); });
   }
 }
 
 void StudyChanges::remove(const Client& client, StudyId id) {
-  write(client, id, DeleteStudy{id}, [this, client, id](const Pending&, Instant then) {
+  write(client, id, DeleteStudy{id}, [this, client, id](Instant then) {
     const protocol::StudyStatus last = study_status(id, core_, then);
     log(id, "is deleted");
     core_.rates.forget(id);
@@ -420,8 +386,8 @@ void StudyChanges::remove(const Client& client, StudyId id) {
 
 void StudyChanges::finish(StudyId id, Instant now) {
   const auto pending = pending_.find(id);
-  if (pending != pending_.end() && !pending->second.submitters.empty()) {
-    pending->second.is_complete = true;  // further points are being written
+  if (pending != pending_.end() && pending->second.grows) {
+    pending->second.is_complete = true;
   } else if (core_.states.finish(id)) {
     log(id, "is done");
     core_.ledger.write(SetStudyState{id, StudyState::kDone, iso_8601(now)});

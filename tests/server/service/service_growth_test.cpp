@@ -221,7 +221,7 @@ TEST_F(ServiceGrowthTest, ResultsThatAreWrittenBehindADeletionAreAcknowledged) {
   EXPECT_EQ(last_message().results_stored().sequence(), 1U);
   EXPECT_TRUE(service_->ledger().is_empty());
   service_->tick({now_.steady_ms + 1000, now_.utc_ms});
-  EXPECT_EQ(service_->points_per_s(now_.steady_ms + 1000), 0.0);
+  EXPECT_EQ(service_->rates().points_per_s(now_.steady_ms + 1000), 0.0);
 }
 
 TEST_F(ServiceGrowthTest, TheRecipeOfAStudyIsDescribed) {
