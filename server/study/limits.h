@@ -33,6 +33,9 @@ inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
 /// Studies that are neither done nor cancelled, some kilobytes each.
 inline constexpr std::size_t kOpenStudies = 100'000;
 
+/// Recipes that the page requests at a time, and that it keeps: up to 16 MiB each, and more parsed.
+inline constexpr std::size_t kRecipesOfPage = 4;
+
 // ---- Queries ----------------------------------------------------------------------------------
 
 /// Queries of one client at a time, so that another client's starts at once.
@@ -49,6 +52,8 @@ inline constexpr std::size_t kRunningTraces = 2;
 /// Requests for traces that wait. Of one connection: of the page, which is one for all browsers.
 inline constexpr std::size_t kWaitingTraces = 64;
 inline constexpr std::size_t kWaitingTracesOfConnection = 32;
+/// Traces that the page requests or sends at a time; more wait.
+inline constexpr std::size_t kTracesOfPage = 4;
 /// Time from request to answer, waiting included: the usual one, and what clients can request.
 inline constexpr std::int64_t kTraceTime_ms = 60'000;
 inline constexpr std::int64_t kLongestTraceTime_ms = 600'000;

@@ -1,5 +1,6 @@
 #include "server/web/answers/service_client.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -13,6 +14,20 @@ namespace {
 constexpr std::size_t kMostATurn = 8;
 
 }  // namespace
+
+RecipeCache::Table RecipeCache::find(std::uint64_t study, std::uint64_t points) const {
+  const auto found =
+      std::ranges::find(kept_, study, &std::pair<std::uint64_t, RecipeCache::Table>::first);
+  return found != kept_.end() && found->second->size() == points ? found->second : nullptr;
+}
+
+void RecipeCache::put(std::uint64_t study, Table table) {
+  std::erase_if(kept_, [study](const auto& kept) { return kept.first == study; });
+  kept_.emplace_front(study, std::move(table));
+  if (kept_.size() > limits::kRecipesOfPage) {
+    kept_.pop_back();
+  }
+}
 
 void ServiceClient::ask(std::uint64_t number, protocol::ClientRequest request) {
   request.set_request_id(number);

@@ -3,16 +3,50 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/point_table.h"
 #include "proto/system/descriptor.h"
+#include "server/study/limits.h"
 #include "server/web/http/http_message.h"
 
 namespace oblique::server {
+
+/// So many may do something at a time. Must outlive what it gives.
+class Slots {
+ public:
+  explicit Slots(std::size_t count) : free_(count) {}
+  /// A slot, which is free again when the pointer's last copy is gone. Null: none is free.
+  std::shared_ptr<const void> take() {
+    if (free_ == 0) {
+      return nullptr;
+    }
+    --free_;
+    return {this, [](Slots* slots) { ++slots->free_; }};
+  }
+
+ private:
+  std::size_t free_;
+};
+
+/// The recipes of the last few studies that answers were about.
+class RecipeCache {
+ public:
+  using Table = std::shared_ptr<const protocol::PointTable>;
+
+  /// Null: it is not kept, or the study has other points by now.
+  Table find(std::uint64_t study, std::uint64_t points) const;
+  void put(std::uint64_t study, Table table);
+
+ private:
+  std::deque<std::pair<std::uint64_t, Table>> kept_;  // the latest first
+};
 
 /// The HTTP side as one client of the service: requests go to the loop's thread, and replies back.
 class ServiceClient {
@@ -28,6 +62,10 @@ class ServiceClient {
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
   /// Drops further replies to request `number`, and ends its query or trace.
   void forget(std::uint64_t number);
+  RecipeCache& recipes() { return recipes_; }
+  /// For the requests whose replies take much memory.
+  Slots& recipe_slots() { return recipe_slots_; }
+  Slots& trace_slots() { return trace_slots_; }
 
   // ---- Called by the loop's thread.
   /// Readable when there are requests to take.
@@ -53,6 +91,9 @@ class ServiceClient {
   // Used by the HTTP server's thread only.
   std::uint64_t last_number_ = std::uint64_t{1} << 63U;
   std::map<std::uint64_t, Awaited> awaited_;
+  RecipeCache recipes_;
+  Slots recipe_slots_{limits::kRecipesOfPage};
+  Slots trace_slots_{limits::kTracesOfPage};
 };
 
 /// Requests to the service, one after the other. Each but the ones for more rows has a number of

@@ -192,7 +192,7 @@ class Flow {
  public:
   Flow(ServiceClient& service, std::uint64_t study, std::unique_ptr<StudyAnswer> answer,
        FlowClock::time_point deadline)
-      : exchange_(service), answer_(std::move(answer)), deadline_(deadline) {
+      : service_(service), exchange_(service), answer_(std::move(answer)), deadline_(deadline) {
     study_.id = study;
     ClientRequest request;
     request.mutable_status()->set_study_id(study);
@@ -200,7 +200,12 @@ class Flow {
   }
 
   std::optional<HttpAnswer> poll() {
-    while (const auto reply = exchange_.reply()) {
+    if (waits_for_slot_) {
+      if (auto answer = find_recipe()) {
+        return answer;
+      }
+    }
+    while (auto reply = exchange_.reply()) {
       if (auto answer = reply->has_error() ? on_error(reply->error()) : on_reply(*reply)) {
         return answer;
       }
@@ -212,12 +217,15 @@ class Flow {
   }
 
  private:
-  std::optional<HttpAnswer> on_reply(const ClientReply& reply) {
+  std::optional<HttpAnswer> on_reply(ClientReply& reply) {
     if (reply.has_status()) {
       return on_status(reply.status());
     }
     if (reply.has_describe()) {
-      study_.table = std::make_unique<const protocol::PointTable>(reply.describe().recipe());
+      study_.table = std::make_shared<const protocol::PointTable>(
+          std::move(*reply.mutable_describe()->mutable_recipe()));
+      service_.recipes().put(study_.id, study_.table);
+      slot_.reset();
       return go_on();
     }
     if (error_) {  // the condition alone is not wrong
@@ -243,9 +251,24 @@ class Flow {
     const protocol::StudyStatus& found = status.studies(0);
     study_.name = found.name();
     study_.state = found.state();
-    ClientRequest request;
-    request.mutable_describe()->set_study(found.name());
-    exchange_.send(request);
+    points_ = found.points();
+    return find_recipe();
+  }
+
+  /// In the cache, or requests it unless as many do as may.
+  std::optional<HttpAnswer> find_recipe() {
+    study_.table = service_.recipes().find(study_.id, points_);
+    if (study_.table) {
+      waits_for_slot_ = false;
+      return go_on();
+    }
+    slot_ = service_.recipe_slots().take();
+    waits_for_slot_ = slot_ == nullptr;
+    if (slot_) {
+      ClientRequest request;
+      request.mutable_describe()->set_study(study_.name);
+      exchange_.send(request);
+    }
     return std::nullopt;
   }
 
@@ -282,8 +305,12 @@ class Flow {
     exchange_.send(request);
   }
 
+  ServiceClient& service_;
   ServiceExchange exchange_;
   ServedStudy study_;
+  std::uint64_t points_ = 0;          // of the study
+  std::shared_ptr<const void> slot_;  // while the recipe is requested
+  bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;
   std::optional<HttpAnswer> error_;  // set while the condition runs as it was written

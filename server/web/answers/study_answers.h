@@ -29,7 +29,7 @@ struct ServedStudy {
   std::uint64_t id = 0;
   std::string name = {};
   std::string state = {};
-  std::unique_ptr<const protocol::PointTable> table = {};
+  std::shared_ptr<const protocol::PointTable> table = {};
 };
 
 /// Makes an answer from the rows of queries about a study.

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -40,6 +41,7 @@ struct HttpAnswer {
   std::string body;
   std::vector<std::pair<std::string, std::string>> headers = {};  ///< besides those of all answers
   HttpStream stream = {};                                         ///< replaces the body if set
+  std::shared_ptr<const void> until_sent = {};  ///< destroyed when the body was sent
 };
 
 /// Returns the answer when it is ready. Called on the HTTP server's thread, again after each wake;

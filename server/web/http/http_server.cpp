@@ -252,9 +252,13 @@ MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& an
     static_cast<void>(response != nullptr ? stream.release() : nullptr);
     return response;
   }
-  auto body = std::make_unique<std::string>(std::move(answer.body));
+  struct Body {
+    std::string bytes;
+    std::shared_ptr<const void> until_sent;
+  };
+  auto body = std::make_unique<Body>(Body{std::move(answer.body), std::move(answer.until_sent)});
   MHD_Response* const response = MHD_create_response_from_buffer_with_free_callback_cls(
-      body->size(), body->data(), [](void* owned) { delete static_cast<std::string*>(owned); },
+      body->bytes.size(), body->bytes.data(), [](void* owned) { delete static_cast<Body*>(owned); },
       body.get());
   static_cast<void>(response != nullptr ? body.release() : nullptr);
   return response;

@@ -1,6 +1,7 @@
 #include "server/web/page/request_flow.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -13,6 +14,7 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/wire/chunk.h"
+#include "server/study/limits.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/status/snapshot.h"
 #include "worker/solver/model/trace_columns.h"
@@ -327,18 +329,38 @@ PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint
   request.mutable_trace()->set_point(point);
   request.mutable_trace()->set_shape(with_shape);
   request.mutable_trace()->set_fall(is_set("fall"));
-  return named_study_flow(
-      std::make_shared<ServiceExchange>(service), study,
-      [request](const std::string& name) {
-        protocol::ClientRequest named = request;
-        named.mutable_trace()->set_study(name);
-        return named;
-      },
-      [point, with_shape](const protocol::ClientReply& reply) -> NextStep {
-        const std::string& error = reply.trace().trace().result().error();
-        return error.empty() ? trace_answer(point, with_shape, reply.trace())
-                             : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
-      });
+  const auto begin = [&service, study, point, with_shape,
+                      request](const std::shared_ptr<const void>& slot) {
+    return named_study_flow(
+        std::make_shared<ServiceExchange>(service), study,
+        [request](const std::string& name) {
+          protocol::ClientRequest named = request;
+          named.mutable_trace()->set_study(name);
+          return named;
+        },
+        [point, with_shape, slot](const protocol::ClientReply& reply) -> NextStep {
+          const std::string& error = reply.trace().trace().result().error();
+          HttpAnswer answer = error.empty() ? trace_answer(point, with_shape, reply.trace())
+                                            : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
+          answer.until_sent = slot;
+          return answer;
+        });
+  };
+  using Clock = std::chrono::steady_clock;
+  const auto until = Clock::now() + std::chrono::milliseconds(limits::kTraceTime_ms);
+  return [&service, begin, until, flow = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
+    if (!flow) {
+      const auto slot = service.trace_slots().take();
+      if (!slot) {
+        return Clock::now() < until ? std::nullopt
+                                    : std::optional(error_answer(
+                                          MHD_HTTP_SERVICE_UNAVAILABLE,
+                                          "too many traces are on their way to browsers already"));
+      }
+      flow = begin(slot);
+    }
+    return flow();
+  };
 }
 
 }  // namespace oblique::server

@@ -12,6 +12,8 @@
 
 #include "proto/frames.h"
 #include "proto/wire/chunk.h"
+#include "server/study/limits.h"
+#include "server/web/page/request_flow.h"
 #include "tests/support/recipes.h"
 
 namespace oblique::server {
@@ -143,6 +145,65 @@ TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
   const ClientRequest query = requested().at(0);
   pending = nullptr;
   EXPECT_THAT(ended(), ElementsAre(query.request_id()));
+}
+
+TEST_F(StudyFlowTest, ARecipeIsRequestedOnceUntilTheStudyGrows) {
+  const auto requests_with_points = [&](std::uint64_t points) {
+    const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(0));
+    ClientReply status;
+    status.mutable_status()->add_studies()->set_name("a");
+    status.mutable_status()->mutable_studies(0)->set_points(points);
+    reply(requested().at(0).request_id(), status);
+    const bool is_answered = pending().has_value();
+    const std::size_t requests = requested().size();
+    EXPECT_EQ(is_answered, requests == 0);
+    return requests;
+  };
+  const PendingAnswer first = study_flow(client_, 1, std::make_unique<Points>(0));
+  describe(first);
+  EXPECT_TRUE(first());
+  EXPECT_EQ(requests_with_points(1), 0U);
+  EXPECT_EQ(requests_with_points(2), 1U);
+}
+
+TEST_F(StudyFlowTest, FewRecipesAreRequestedAtATime) {
+  std::vector<PendingAnswer> flows;
+  for (std::uint64_t study = 1; study <= limits::kRecipesOfPage + 1; ++study) {
+    flows.push_back(study_flow(client_, study, std::make_unique<Points>(0)));
+    ClientReply status;
+    status.mutable_status()->add_studies()->set_name("a");
+    reply(requested().at(0).request_id(), status);
+    EXPECT_FALSE(flows.back()());
+    EXPECT_EQ(requested().size(), study <= limits::kRecipesOfPage ? 1U : 0U) << study;
+  }
+  flows.front() = nullptr;
+  EXPECT_FALSE(flows.back()());
+  EXPECT_TRUE(requested().at(0).has_describe());
+}
+
+TEST_F(StudyFlowTest, FewTracesAreRequestedOrSentAtATime) {
+  std::vector<PendingAnswer> flows;
+  for (std::size_t i = 0; i <= limits::kTracesOfPage; ++i) {
+    flows.push_back(solve_trace(client_, 1, i, {}));
+    EXPECT_FALSE(flows.back()());
+  }
+  const auto requests = requested();
+  ASSERT_EQ(requests.size(), limits::kTracesOfPage);
+  ClientReply status;
+  status.mutable_status()->add_studies()->set_name("a");
+  reply(requests.at(0).request_id(), status);
+  EXPECT_FALSE(flows.front()());
+  ClientReply trace;
+  trace.mutable_trace()->mutable_trace()->mutable_result()->set_error("it has none");
+  reply(requested().at(0).request_id(), trace);
+  auto answer = flows.front()();
+  ASSERT_TRUE(answer);
+  flows.front() = nullptr;
+  EXPECT_FALSE(flows.back()());
+  EXPECT_THAT(requested(), IsEmpty()) << "the first is not sent yet";
+  answer.reset();
+  EXPECT_FALSE(flows.back()());
+  EXPECT_EQ(requested().size(), 1U);
 }
 
 TEST_F(StudyFlowTest, AfterItsDeadlineTheAnswerSaysSo) {
