@@ -80,8 +80,8 @@ void TraceRows::move_to(protocol::Trace& trace) {
   if (is_too_long_) {
     // The first instant and the last one are kept with any `every`.
     const std::uint64_t always = always_kept_ + 2;
-    const std::uint64_t room = most_rows() > always ? most_rows() - always : 1;
-    trace.set_every((instants_ + room - 1) / room);
+    const std::uint64_t room = most_rows() > always ? most_rows() - always : 0;
+    trace.set_every(room == 0 ? instants_ + 1 : (instants_ + room - 1) / room);
     return;
   }
   trace.mutable_values()->Add(values_.begin(), values_.end());

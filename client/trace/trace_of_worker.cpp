@@ -68,10 +68,15 @@ SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
                     connection.url(), fault));
   }
   if (trace.states().empty()) {
+    const std::string every =
+        trace.every() > trace.instants()
+            ? std::string()
+            : fmt::format("--every {} gives one in {} and all ends of phases, ", trace.every(),
+                          trace.every());
     throw ServerError(fmt::format(
-        "the trace has {} instants, more than one message of a server can hold: --every {} gives "
-        "one in {} and all ends of phases, --local solves the point in this process and gives all",
-        trace.instants(), trace.every(), trace.every()));
+        "the trace has {} instants, more than one message of a server can hold: {}--local solves "
+        "the point in this process and gives all",
+        trace.instants(), every));
   }
   begin(shape);
   const std::size_t numbers = solver::trace_numbers(shape);

@@ -109,6 +109,12 @@ TEST(TraceRowsTest, ThatAreTooManyAreRefusedWithTheKThatMakesThemFit) {
   }
 }
 
+TEST(TraceRowsTest, ThatFitWithNoKNameOneBeyondAllInstants) {
+  protocol::Trace trace;
+  EXPECT_TRUE(times_of(1, 100, 5, trace).empty());  // the fall, ends of phases and the last
+  EXPECT_EQ(trace.every(), trace.instants() + 1);
+}
+
 TEST(TraceRowsTest, AreChosenEvenlyWhereNoKIsGiven) {
   protocol::Trace trace;
   const auto times = times_of(0, 100'000, 500, trace);
