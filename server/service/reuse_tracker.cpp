@@ -92,6 +92,10 @@ std::optional<std::uint64_t> ReuseTracker::next_part(StudyId id, const ReusedRes
     }
     reused.cut_short = true;
   }
+  if (lookup.begins_again) {
+    lookup = Lookup{now.steady_ms};
+    return 0;
+  }
   return std::nullopt;
 }
 
