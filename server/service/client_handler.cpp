@@ -19,9 +19,11 @@ constexpr std::size_t kMostChecks = 64;
 constexpr std::size_t kMostChecksOfClient = 2;
 constexpr std::size_t kMostCheckedBytes = std::size_t{64} << 20U;
 
-/// Number of entries of a page; 0: as many as there may be.
-int page_size(std::uint32_t requested, std::size_t largest) {
-  return static_cast<int>(requested == 0 ? largest : std::min<std::size_t>(requested, largest));
+/// Studies or workers in a reply, which takes the service's thread some milliseconds; 0 requested:
+/// as many as allowed.
+int page_size(std::uint32_t requested) {
+  constexpr std::uint32_t kMost = 1000;
+  return static_cast<int>(requested == 0 ? kMost : std::min(requested, kMost));
 }
 
 }  // namespace
@@ -302,7 +304,7 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
     core_.ports.reply(client, std::move(reply));
     return;
   }
-  const int most = page_size(request.limit(), settings_.largest_page);
+  const int most = page_size(request.limit());
   std::size_t bytes = 0;
   std::uint64_t last = request.after_study_id();
   while (const auto id = states.durable_after(last)) {
@@ -338,7 +340,7 @@ void ClientHandler::workers(const Client& client, const protocol::WorkersRequest
   if (request.after_worker_id() == 0) {
     core_.ports.add_peers(fields);
   }
-  const int most = page_size(request.limit(), settings_.largest_page);
+  const int most = page_size(request.limit());
   std::uint64_t last = request.after_worker_id();
   while (const auto id = core_.workers.next_after(last)) {
     if (fields.workers_size() == most) {

@@ -141,7 +141,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   } else if (study.priority != priority) {
     set_priority(client, *known, priority);
   } else {
-    resume_submitted(client, *known, now);
+    change_state(client, *known, StudyState::kRunning, submitted_reply(client, *known), now);
   }
 }
 
@@ -226,18 +226,8 @@ void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t p
   write(client, id, SetPriority{id, priority}, [this, client, id, priority](Instant then) {
     core_.states.set_priority(id, priority);
     core_.feed(PriorityChanged{id, priority}, then);
-    resume_submitted(client, id, then);
+    change_state(client, id, StudyState::kRunning, submitted_reply(client, id), then);
   });
-}
-
-/// The study was submitted again as it is.
-void StudyChanges::resume_submitted(const Client& client, StudyId id, Instant now) {
-  const auto reply = [this, client, id](Instant then) { reply_submitted(client, id, false, then); };
-  if (!core_.states.needs_write(id, StudyState::kRunning)) {
-    reply(now);
-  } else if (may_reopen(client, id)) {
-    set_state(client, id, StudyState::kRunning, reply, now);
-  }
 }
 
 // ---- Change ------------------------------------------------------------------------------------
@@ -263,19 +253,20 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
              [this, client, request](Instant then) { change(client, request, then); })) {
     return;
   }
+  const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
   switch (request.change()) {
     case protocol::STUDY_CHANGE_CANCEL:
-      change_state(client, id, StudyState::kCancelled, now);
+      change_state(client, id, StudyState::kCancelled, reply, now);
       break;
     case protocol::STUDY_CHANGE_PAUSE:
       // Nothing of a cancelled study is handed out either.
       change_state(client, id,
                    core_.states.state(id) == StudyState::kCancelled ? StudyState::kCancelled
                                                                     : StudyState::kPaused,
-                   now);
+                   reply, now);
       break;
     case protocol::STUDY_CHANGE_RESUME:
-      change_state(client, id, StudyState::kRunning, now);
+      change_state(client, id, StudyState::kRunning, reply, now);
       break;
     case protocol::STUDY_CHANGE_RETRY:
       retry(client, id, now);
@@ -292,29 +283,28 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
   }
 }
 
-void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted, Instant now) {
-  const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
+/// The reply is sent at once if the study has the state already.
+void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted,
+                                std::function<void(Instant)> reply, Instant now) {
   if (!core_.states.needs_write(id, wanted)) {
     reply(now);
-  } else if (wanted != StudyState::kRunning || may_reopen(client, id)) {
-    set_state(client, id, wanted, reply, now);
+    return;
   }
-}
-
-void StudyChanges::set_state(const Client& client, StudyId id, StudyState state,
-                             std::function<void(Instant)> reply, Instant now) {
-  const auto on_stored = [this, id, state, reply = std::move(reply)](Instant then) {
-    core_.states.set_state(id, state);
-    if (state == StudyState::kRunning) {
+  if (wanted == StudyState::kRunning && !may_reopen(client, id)) {
+    return;
+  }
+  const auto on_stored = [this, id, wanted, reply = std::move(reply)](Instant then) {
+    core_.states.set_state(id, wanted);
+    if (wanted == StudyState::kRunning) {
       log(id, "goes on");
       core_.feed(StudyReopened{id}, then);
     } else {
-      log(id, fmt::format("is {}", state_name(state)));
-      core_.feed(state == StudyState::kPaused ? Event(StudyPaused{id}) : StudyCancelled{id}, then);
+      log(id, fmt::format("is {}", state_name(wanted)));
+      core_.feed(wanted == StudyState::kPaused ? Event(StudyPaused{id}) : StudyCancelled{id}, then);
     }
     reply(then);
   };
-  write(client, id, SetStudyState{id, state, iso_8601(now)}, on_stored,
+  write(client, id, SetStudyState{id, wanted, iso_8601(now)}, on_stored,
         [this, id] { core_.states.set_doubtful(id); });
 }
 

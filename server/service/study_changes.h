@@ -79,10 +79,11 @@ class StudyChanges {
   void grow(const Client& client, StudyId id, const ReadRequest& read, std::int32_t priority,
             Instant now);
   void set_priority(const Client& client, StudyId id, std::int32_t priority);
-  void resume_submitted(const Client& client, StudyId id, Instant now);
-  void set_state(const Client& client, StudyId id, StudyState state,
-                 std::function<void(Instant)> reply, Instant now);
-  void change_state(const Client& client, StudyId id, StudyState wanted, Instant now);
+  void change_state(const Client& client, StudyId id, StudyState wanted,
+                    std::function<void(Instant)> reply, Instant now);
+  std::function<void(Instant)> submitted_reply(const Client& client, StudyId id) {
+    return [this, client, id](Instant now) { reply_submitted(client, id, false, now); };
+  }
   void retry(const Client& client, StudyId id, Instant now);
   void rename(const Client& client, const protocol::ChangeRequest& request, StudyId id,
               Instant now);

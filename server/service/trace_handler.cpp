@@ -16,28 +16,21 @@ namespace oblique::server {
 
 // ---- Clients ----------------------------------------------------------------------------------
 
-/// Why a request of the client cannot wait; empty: it can.
-std::string TraceHandler::objection_to(const Client& client) const {
-  const auto of_connection = std::ranges::count_if(
-      jobs_, [&](const auto& entry) { return entry.second.client.identity == client.identity; });
-  if (is_stopping_) {
-    return kStopping;
-  }
-  if (jobs_.size() >= limits::kWaitingTraces ||
-      static_cast<std::size_t>(of_connection) >= limits::kWaitingTracesOfConnection) {
-    return "too many traces are waited for already: ask again later";
-  }
-  return {};
-}
-
 void TraceHandler::request(const Client& client, const protocol::TraceRequest& request,
                            StudyId study, const StudyTable& table, Instant now) {
   if (std::ranges::any_of(jobs_,
                           [&](const auto& entry) { return entry.second.client == client; })) {
     return;  // the client sent it again
   }
-  if (const std::string objection = objection_to(client); !objection.empty()) {
-    ports_.reply_error(client, objection);
+  const auto of_connection = std::ranges::count_if(
+      jobs_, [&](const auto& entry) { return entry.second.client.identity == client.identity; });
+  const bool is_full =
+      jobs_.size() >= limits::kWaitingTraces ||
+      static_cast<std::size_t>(of_connection) >= limits::kWaitingTracesOfConnection;
+  if (is_stopping_ || is_full) {
+    ports_.reply_error(client, is_stopping_ ? kStopping
+                                            : "too many traces are waited for already: ask again "
+                                              "later");
     return;
   }
   const auto time_ms = request.time_limit_ms() == 0

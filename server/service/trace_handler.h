@@ -63,7 +63,6 @@ class TraceHandler {
   static FoundPoint find_point(const protocol::PointTable& table, std::uint64_t point);
   static FoundPoint find_point(const std::string& recipe_bytes, std::uint64_t point);
   void point_found(std::uint64_t number, const FoundPoint& point);
-  std::string objection_to(const Client& client) const;
   void dispatch();
   void answer(const Job& job, const WorkerRecord& worker, protocol::Trace trace);
   void refuse(Jobs::iterator job, const std::string& reason);

@@ -68,7 +68,7 @@ TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
 
 TEST_F(ServiceTest, AWorkerWithoutASolverVersionOrWithOtherOutputsIsRefused) {
   hello("worker", "");
-  EXPECT_THAT(last_message().refused().reason(), HasSubstr("which version its solver has"));
+  EXPECT_THAT(last_message().refused().reason(), HasSubstr("its solver has version"));
   for (const std::string& outputs : {std::string(), protocol::sent_outputs() + " new_N"}) {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
     message.mutable_hello()->set_outputs(outputs);
