@@ -25,7 +25,7 @@ void TraceHandler::request(const Client& client, const protocol::TraceRequest& r
   const auto of_connection = std::ranges::count_if(
       jobs_, [&](const auto& entry) { return entry.second.client.identity == client.identity; });
   const bool is_full =
-      jobs_.size() >= limits::kWaitingTraces ||
+      jobs_.size() >= limits::kWaitingTraces || checks_ >= limits::kWaitingTraces ||
       static_cast<std::size_t>(of_connection) >= limits::kWaitingTracesOfConnection;
   if (is_stopping_ || is_full) {
     ports_.reply_error(client, is_stopping_ ? kStopping
@@ -48,6 +48,7 @@ void TraceHandler::request(const Client& client, const protocol::TraceRequest& r
   job.order.set_shape(request.shape());
   job.order.set_fall(request.fall());
   job.order.set_every(request.every());
+  const std::weak_ptr is_awaited = job.is_awaited;
   jobs_.emplace(number, std::move(job));
   const std::uint64_t point = request.point();
   if (table.is_made()) {
@@ -55,9 +56,15 @@ void TraceHandler::request(const Client& client, const protocol::TraceRequest& r
   } else if (table.recipe_bytes().size() <= limits::kLongestInlineRequest) {
     point_found(number, find_point(table.recipe_bytes(), point));
   } else {
-    ports_.run_check([this, number, table, point] {
-      FoundPoint found = find_point(table.recipe_bytes(), point);
-      return [this, number, found = std::move(found)](Instant) { point_found(number, found); };
+    ++checks_;
+    ports_.run_check([this, number, table, point, is_awaited]() -> Ports::Completion {
+      if (is_awaited.expired()) {
+        return [this](Instant) { --checks_; };
+      }
+      return [this, number, found = find_point(table.recipe_bytes(), point)](Instant) {
+        --checks_;
+        point_found(number, found);
+      };
     });
   }
 }

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -52,6 +54,7 @@ class TraceHandler {
     std::optional<WorkerId> worker{};   ///< that solves it
     std::set<WorkerId> not_taken_by{};  ///< workers
     bool has_lost_worker = false;
+    std::shared_ptr<const bool> is_awaited = std::make_shared<const bool>(true);
   };
   /// A point of a study; without an objection it exists.
   struct FoundPoint {
@@ -75,6 +78,7 @@ class TraceHandler {
   WorkerSessions& workers_;
   Jobs jobs_;  // by number, which is that of the order; the oldest first
   std::uint64_t last_number_ = 0;
+  std::size_t checks_ = 0;  // on the check thread, those of clients that are gone included
   std::map<WorkerId, std::uint64_t> orders_;  // that workers have not answered
   WorkerId last_worker_ = 0;                  // that got an order
   bool is_stopping_ = false;

@@ -276,6 +276,28 @@ TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
   EXPECT_EQ(orders().size(), limits::kRunningTraces);
 }
 
+TEST_F(ServiceTraceTest, PointsOfClientsThatAreGoneAreNotChecked) {
+  StoredStudy study;
+  study.study_id = 1;
+  study.name = "a";
+  study.table = StudyTable(std::string(limits::kLongestInlineRequest + 1, 'x'), 100);
+  study.state = StudyState::kPaused;
+  start({}, {study});
+  for (std::size_t i = 0; i < limits::kWaitingTraces; ++i) {
+    ask(1, 3, "client");
+    service_->client_left("client");
+  }
+  EXPECT_TRUE(ports_.replies.empty());
+  ask(1, 3, "another");
+  EXPECT_THAT(refusal(), HasSubstr("too many traces")) << "checks that wait are bounded";
+  ports_.replies.clear();
+  run_checks();
+  EXPECT_TRUE(ports_.replies.empty()) << "nobody waits";
+  ask(1, 3, "another");
+  run_checks();
+  EXPECT_THAT(refusal(), HasSubstr("damaged"));
+}
+
 TEST_F(ServiceTraceTest, AReaderMayRequestOne) {
   hello();
   ask(trace_request(7, 3), "client",
