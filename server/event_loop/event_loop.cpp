@@ -184,7 +184,7 @@ void EventLoop::take_completions() {
 /// True when messages are left that could be taken at once.
 bool EventLoop::take_worker_messages() {
   return take_messages(
-      workers_, [this](const std::string&) { return service_->has_room(); },
+      workers_, [this](const std::string& worker) { return service_->has_room(worker); },
       [this](const Incoming& incoming) {
         service_->worker_frame(incoming.identity, incoming.body, now(), incoming.key);
       });

@@ -10,20 +10,14 @@
 
 #include "proto/frames.h"
 #include "proto/wire/frame_scan.h"
+#include "server/study/limits.h"
 
 namespace oblique::server {
 namespace {
 
-/// Requests that wait for the check thread, in all and of one client, and their bytes.
-constexpr std::size_t kMostChecks = 64;
-constexpr std::size_t kMostChecksOfClient = 2;
-constexpr std::size_t kMostCheckedBytes = std::size_t{64} << 20U;
-
-/// Studies or workers in a reply, which takes the service's thread some milliseconds; 0 requested:
-/// as many as allowed.
+/// Studies or workers in a reply; 0 requested: as many as allowed.
 int page_size(std::uint32_t requested) {
-  constexpr std::uint32_t kMost = 1000;
-  return static_cast<int>(requested == 0 ? kMost : std::min(requested, kMost));
+  return static_cast<int>(requested == 0 ? limits::kListed : std::min(requested, limits::kListed));
 }
 
 }  // namespace
@@ -67,7 +61,8 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     core_.ports.reply_error(client, kStopping);
     return;
   }
-  if (of_all >= kMostChecks || of_client >= kMostChecksOfClient || bytes > kMostCheckedBytes) {
+  if (of_all >= limits::kWaitingChecks || of_client >= limits::kWaitingChecksOfClient ||
+      bytes > limits::kWaitingCheckBytes) {
     core_.ports.reply_error(client, "too many long requests wait already: ask again later");
     return;
   }
@@ -130,7 +125,7 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
           "nothing",
           client.key());
     }
-    if (!ledger.has_room()) {
+    if (!ledger.has_room_for_changes()) {
       return "too many changes wait for the disk already: ask again later";
     }
     if (ledger.is_slow()) {
@@ -285,7 +280,6 @@ protocol::StudyStatus ClientHandler::status_of(StudyId id, Instant now) const {
 
 void ClientHandler::status(const Client& client, const protocol::StatusRequest& request,
                            Instant now) {
-  constexpr std::size_t kMostPageBytes = std::size_t{1} << 20U;
   const StudyStates& states = core_.states;
   protocol::ClientReply reply;
   protocol::StatusReply& fields = *reply.mutable_status();
@@ -308,7 +302,7 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
   std::size_t bytes = 0;
   std::uint64_t last = request.after_study_id();
   while (const auto id = states.durable_after(last)) {
-    if (fields.studies_size() == most || bytes > kMostPageBytes) {
+    if (fields.studies_size() == most || bytes > limits::kListedBytes) {
       fields.set_next_after(last);
       break;
     }

@@ -72,8 +72,10 @@ class Service {
   /// Tells workers and clients that the server stops. Results are still stored.
   void stop(Instant now);
 
-  /// Whether messages of workers should be read now. Otherwise they do not count as silent.
-  bool has_room() const { return ledger_.has_room(); }
+  /// Whether messages of that worker should be read now. Otherwise it does not count as silent.
+  bool has_room(const std::string& identity) const {
+    return ledger_.has_room(workers_.id_of(identity));
+  }
   /// Nothing more can be stored, and the server should end.
   bool storage_is_gone() const { return ledger_.is_gone(); }
   bool is_stopping() const { return stopping_ || draining_; }

@@ -268,7 +268,7 @@ void WorkerSessions::tick(const Silence& silent_ms, Instant now) {
       // messages wait here must get a sign of life.
       send(id, sign);
     }
-    if (is_silent && (!ledger_.has_room() || ports_.has_unread_input(worker.identity))) {
+    if (is_silent && (!ledger_.has_room(id) || ports_.has_unread_input(worker.identity))) {
       events_.emplace_back(CreditGiven{id, 0});  // it is not silent: its messages are not read
     }
     if (worker.is_busy && !ports_.is_busy(worker.identity)) {
@@ -284,6 +284,11 @@ std::vector<Event> WorkerSessions::take_events() {
     events.emplace_back(std::move(unreachable));
   }
   return events;
+}
+
+WorkerId WorkerSessions::id_of(const std::string& identity) const {
+  const auto known = ids_.find(identity);
+  return known == ids_.end() ? 0 : known->second;
 }
 
 const WorkerRecord* WorkerSessions::find(WorkerId worker) const {

@@ -18,7 +18,7 @@ namespace oblique::server {
 struct WorkerSessionSettings {
   std::uint32_t heartbeat_interval_ms = 900;
   std::int64_t lost_after_ms = 2800;  ///< the scheduler's
-  std::string solver_version;         ///< workers with another one get a notice
+  std::string solver_version;         ///< workers with another one are refused
   std::string database_id;
   std::uint64_t last_worker_id = 0;  ///< in the database
   bool is_insecure = false;          ///< workers get a notice about it
@@ -84,6 +84,8 @@ class WorkerSessions {
   /// Events that were found while messages were sent: workers that are unreachable or busy.
   std::vector<Event> take_events();
 
+  /// 0: no worker has that connection.
+  WorkerId id_of(const std::string& identity) const;
   /// Null for an unknown worker.
   const WorkerRecord* find(WorkerId worker) const;
   /// The worker of the lowest number above this one.

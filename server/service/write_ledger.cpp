@@ -1,15 +1,22 @@
 #include "server/service/write_ledger.h"
 
 #include <utility>
+#include <variant>
 
 namespace oblique::server {
 
 void WriteLedger::write(Change change, OnStored on_stored, OnRefused on_refused) {
   const std::uint64_t ticket = ++last_ticket_;
   const bool can_be_refused = on_refused != nullptr;
-  const std::size_t bytes = bytes_of(change);
-  writes_.emplace(ticket, Write{std::move(on_stored), std::move(on_refused), bytes});
-  bytes_ += bytes;
+  const auto* const results = std::get_if<AddResults>(&change);
+  const Write write{std::move(on_stored), std::move(on_refused), bytes_of(change),
+                    results == nullptr ? 0 : results->worker_id};
+  load_of(write).bytes += write.bytes;
+  ++load_of(write).writes;
+  if (write.worker != 0) {
+    bytes_of_[write.worker] += write.bytes;
+  }
+  writes_.emplace(ticket, write);
   weigh();
   ports_.write({ticket, std::move(change), can_be_refused});
 }
@@ -20,7 +27,12 @@ void WriteLedger::end(std::uint64_t ticket, const std::optional<std::string>& er
     return;
   }
   const Write& write = found.mapped();
-  bytes_ -= write.bytes;
+  load_of(write).bytes -= write.bytes;
+  --load_of(write).writes;
+  if (const auto of = bytes_of_.find(write.worker);
+      of != bytes_of_.end() && (of->second -= write.bytes) == 0) {
+    bytes_of_.erase(of);
+  }
   weigh();
   if (error && write.on_refused) {
     write.on_refused(*error, now);
@@ -46,9 +58,14 @@ void WriteLedger::tick(std::int64_t now_ms) {
   is_slow_ = now_ms - oldest_since_ms_ >= kSlowAfter_s * kMillisecondsASecond;
 }
 
+bool WriteLedger::has_room(WorkerId worker) const {
+  const auto of = bytes_of_.find(worker);
+  return has_room() && (of == bytes_of_.end() || of->second < limits_.bytes_of_worker);
+}
+
 void WriteLedger::weigh() {
   const std::size_t part = is_behind_ ? 8 : 4;
-  is_behind_ = bytes_ >= limits_.bytes / part || writes_.size() >= limits_.writes / part;
+  is_behind_ = results_.bytes >= limits_.bytes / part || results_.writes >= limits_.writes / part;
 }
 
 }  // namespace oblique::server

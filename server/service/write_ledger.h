@@ -7,18 +7,23 @@
 #include <optional>
 #include <string>
 
+#include "server/scheduler/scheduler_events.h"
 #include "server/service/ports/ports.h"
 #include "server/study/limits.h"
 
 namespace oblique::server {
 
 struct LedgerLimits {
-  /// Bytes of results and recipes that wait for the disk. Above it no message of a worker is read
-  /// and no change of a client accepted; above a quarter no batch is sent, until half of that is
-  /// stored.
+  /// Bytes of results that wait for the disk. Above it no message of a worker is read; above a
+  /// quarter no batch is sent, until half of that is stored.
   std::size_t bytes = limits::kUnstoredBytes;
-  /// The same for all writes, so that small messages are bounded, too.
-  std::size_t writes = 80'000;
+  /// The same for their number, so that small messages are bounded, too.
+  std::size_t writes = limits::kUnstoredWrites;
+  /// Above it no message of that worker is read.
+  std::size_t bytes_of_worker = limits::kUnstoredBytesOfWorker;
+  /// Changes of clients, and bytes of their recipes. Above it no change is accepted.
+  std::size_t changes = limits::kUnstoredChanges;
+  std::size_t bytes_of_changes = limits::kUnstoredBytesOfChanges;
 };
 
 /// The writes whose outcome is not known yet: what follows from each, their size, and whether the
@@ -55,19 +60,35 @@ class WriteLedger {
   /// The file is gone; nothing more can be stored.
   bool is_gone() const { return is_gone_; }
   bool is_empty() const { return writes_.empty(); }
-  std::size_t bytes() const { return bytes_; }
+  /// Of results.
+  std::size_t bytes() const { return results_.bytes; }
 
   /// No batch should be sent: the database accepts nothing, or is far behind.
   bool holds_batches() const { return !fault_.empty() || is_behind_; }
-  /// Whether further messages of workers and changes of clients should be taken.
-  bool has_room() const { return bytes_ < limits_.bytes && writes_.size() < limits_.writes; }
+  /// Whether further messages of workers should be taken.
+  bool has_room() const {
+    return results_.bytes < limits_.bytes && results_.writes < limits_.writes;
+  }
+  /// Of that worker.
+  bool has_room(WorkerId worker) const;
+  /// Whether further changes of clients should be accepted.
+  bool has_room_for_changes() const {
+    return changes_.bytes < limits_.bytes_of_changes && changes_.writes < limits_.changes;
+  }
 
  private:
   struct Write {
     OnStored on_stored;
     OnRefused on_refused;
     std::size_t bytes;
+    WorkerId worker;  ///< whose results they are; 0: nobody's
   };
+  struct Load {
+    std::size_t writes = 0;
+    std::size_t bytes = 0;
+  };
+  /// Of the kind of that write.
+  Load& load_of(const Write& write) { return write.on_refused ? changes_ : results_; }
   void end(std::uint64_t ticket, const std::optional<std::string>& error, Instant now);
   void weigh();
 
@@ -75,7 +96,9 @@ class WriteLedger {
   Ports& ports_;
   std::map<std::uint64_t, Write> writes_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  std::size_t bytes_ = 0;
+  Load results_;                              // and all else that no client waits for
+  Load changes_;                              // of clients
+  std::map<WorkerId, std::size_t> bytes_of_;  // of the workers that have some
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;

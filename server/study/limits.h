@@ -26,10 +26,43 @@ inline constexpr std::uint64_t kOpenPoints = 10'000'000'000'000;
 /// Batches that a worker may request at a time. More would wait there while others have none.
 inline constexpr std::uint32_t kCredit = 1024;
 
+// ---- Connections ------------------------------------------------------------------------------
+
+/// Messages of all peers that are incomplete or were not taken.
+inline constexpr std::size_t kHeldInBytes = 512 * kMiB;
+/// Of one port, above which its peers are not read.
+inline constexpr std::size_t kHeldInToPauseBytes = 64 * kMiB;
+/// A peer with more unsent output is busy: it gets no batch, and its next request waits.
+inline constexpr std::size_t kBusyBytes = 4 * kMiB;
+inline constexpr std::size_t kAllWaitingOutBytes = 512 * kMiB;
+/// Handshakes at a time; of one source half as many, so that it cannot keep others out.
+inline constexpr std::size_t kHandshakes = 1024;
+inline constexpr std::size_t kHandshakesOfSource = kHandshakes / 2;
+
+// ---- Writes -----------------------------------------------------------------------------------
+
+/// Writes that no client waits for, in number: small ones take memory, too.
+inline constexpr std::size_t kUnstoredWrites = 80'000;
+/// Results of one worker, so that others are read while it fills its share.
+inline constexpr std::size_t kUnstoredBytesOfWorker = 16 * kMiB;
+/// Changes of clients, and bytes of their recipes.
+inline constexpr std::size_t kUnstoredChanges = 10'000;
+inline constexpr std::size_t kUnstoredBytesOfChanges = 64 * kMiB;
+/// Requests for one study that wait for a change of it.
+inline constexpr std::size_t kDeferredRequests = 1000;
+
 // ---- Requests of clients ----------------------------------------------------------------------
 
 /// A longer request is parsed on a thread of its own: parsing it takes over a millisecond.
 inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
+/// Such requests that wait, in all and of one client, and their bytes.
+inline constexpr std::size_t kWaitingChecks = 64;
+inline constexpr std::size_t kWaitingChecksOfClient = 2;
+inline constexpr std::size_t kWaitingCheckBytes = 64 * kMiB;
+/// Studies or workers in a reply, and about so many bytes: making it takes the service's thread
+/// some milliseconds.
+inline constexpr std::uint32_t kListed = 1000;
+inline constexpr std::size_t kListedBytes = kMiB;
 /// Studies that are neither done nor cancelled, some kilobytes each.
 inline constexpr std::size_t kOpenStudies = 100'000;
 
@@ -49,7 +82,8 @@ inline constexpr std::size_t kWaitingQueryBytes = 16 * kMiB;
 
 /// Traces with workers: each may come back as a message of 16 MiB.
 inline constexpr std::size_t kRunningTraces = 2;
-/// Requests for traces that wait. Of one connection: of the page, which is one for all browsers.
+/// Requests for traces that wait, and checks of their points. Of one connection: of the page, which
+/// is one for all browsers.
 inline constexpr std::size_t kWaitingTraces = 64;
 inline constexpr std::size_t kWaitingTracesOfConnection = 32;
 /// Traces that the page requests or sends at a time; more wait.

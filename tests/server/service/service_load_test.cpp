@@ -55,12 +55,12 @@ TEST_F(ServiceLoadTest, WorkersAreNotReadWhileTooMuchWaitsForTheDisk) {
   ServiceSettings settings;
   settings.ledger.bytes = 500;
   begin(settings);
-  for (std::uint64_t point = 900; service_->has_room() && point < 1000; ++point) {
+  for (std::uint64_t point = 900; service_->has_room("worker") && point < 1000; ++point) {
     worker_says(one_result(point));
   }
-  EXPECT_FALSE(service_->has_room());
+  EXPECT_FALSE(service_->has_room("worker"));
   write_all();
-  EXPECT_TRUE(service_->has_room());
+  EXPECT_TRUE(service_->has_room("worker"));
 }
 
 TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheServerLives) {

@@ -139,6 +139,7 @@ class FloodedServiceTest : public ServiceTest {
   FloodedServiceTest() {
     ServiceSettings settings;
     settings.ledger.writes = 3;
+    settings.ledger.changes = 3;
     start(settings);
   }
 };

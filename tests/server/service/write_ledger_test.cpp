@@ -7,11 +7,14 @@ namespace {
 
 class WriteLedgerTest : public testing::Test {
  protected:
-  static LedgerLimits small() { return {.bytes = 200, .writes = 24}; }
+  static LedgerLimits small() {
+    return {.bytes = 200, .writes = 24, .bytes_of_worker = 50, .changes = 3};
+  }
 
   /// A results message of so many bytes.
-  void write_results(std::size_t bytes) {
+  void write_results(std::size_t bytes, WorkerId worker = 0) {
     AddResults change{};
+    change.worker_id = worker;
     change.message_bytes = bytes;
     ledger_.write(std::move(change), [this](Instant) { outcomes_.emplace_back("results"); });
   }
@@ -94,14 +97,40 @@ TEST_F(WriteLedgerTest, MessagesAreTakenUntilTheBytesOrWritesAreTooMany) {
   EXPECT_FALSE(ledger_.has_room());
   store_first();
   store_first();
-  ledger_.write(AddStudy{1, "a", StudyTable(std::string(200, 'x'), 1), ""});
-  EXPECT_FALSE(ledger_.has_room()) << "recipes count, too";
-  store_first();
   for (int i = 0; i < 24; ++i) {
     EXPECT_TRUE(ledger_.has_room());
     write_results(0);
   }
   EXPECT_FALSE(ledger_.has_room());
+}
+
+TEST_F(WriteLedgerTest, AWorkerHasAShareOfTheBytes) {
+  write_results(30, 1);
+  write_results(20, 1);
+  EXPECT_FALSE(ledger_.has_room(1));
+  EXPECT_TRUE(ledger_.has_room(2));
+  EXPECT_TRUE(ledger_.has_room());
+  store_first();
+  EXPECT_TRUE(ledger_.has_room(1));
+  write_results(200, 2);
+  EXPECT_FALSE(ledger_.has_room(1)) << "all have too many";
+}
+
+TEST_F(WriteLedgerTest, ResultsAndChangesOfClientsHaveBoundsOfTheirOwn) {
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(ledger_.has_room_for_changes());
+    write_change();
+  }
+  EXPECT_FALSE(ledger_.has_room_for_changes());
+  EXPECT_TRUE(ledger_.has_room());
+  store_first();
+  write_results(200);
+  EXPECT_TRUE(ledger_.has_room_for_changes());
+  EXPECT_FALSE(ledger_.has_room());
+  ledger_.write(
+      AddStudy{1, "a", StudyTable(std::string(limits::kUnstoredBytesOfChanges, 'x'), 1), ""}, {},
+      [](const std::string&, Instant) {});
+  EXPECT_FALSE(ledger_.has_room_for_changes()) << "recipes count, too";
 }
 
 TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
