@@ -24,24 +24,25 @@ namespace oblique::server {
 
 /// Bounds on what peers can make the server hold; proto/protocol.md lists them.
 struct NetworkLimits {
-  std::size_t connections = limits::kConnections;  ///< at all ports; fewer if the system allows fewer
+  std::size_t connections =
+      limits::kConnections;  ///< at all ports; fewer if the system allows fewer
   /// Messages of all peers that are incomplete or were not taken. One peer has at most one message.
-  std::size_t held_in_bytes = std::size_t{512} << 20U;
+  std::size_t held_in_bytes = limits::kHeldInBytes;
   /// While a port's messages take this much and one of them waits to be taken, its peers are not
   /// read: peers that send faster than results are stored wait, and lose no connection.
-  std::size_t held_in_to_pause_bytes = std::size_t{64} << 20U;
+  std::size_t held_in_to_pause_bytes = limits::kHeldInToPauseBytes;
   /// A peer with more unsent output than this is busy.
-  std::size_t busy_bytes = std::size_t{4} << 20U;
-  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;     ///< unsent output of one peer
-  std::size_t all_waiting_out_bytes = std::size_t{512} << 20U;  ///< of all peers
-  std::int64_t handshake_ms = 10'000;                           ///< for one handshake
+  std::size_t busy_bytes = limits::kBusyBytes;
+  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;         ///< unsent output of one peer
+  std::size_t all_waiting_out_bytes = limits::kAllWaitingOutBytes;  ///< of all peers
+  std::int64_t handshake_ms = 10'000;                               ///< for one handshake
   /// A connection with input this recent is not ended to make room for a new one.
   std::int64_t active_ms = 5000;
   /// Handshakes at a time. At the limit the oldest is ended once it has had a tenth of
   /// `handshake_ms`.
-  std::size_t handshakes = 1024;
+  std::size_t handshakes = limits::kHandshakes;
   /// Of these, from one source address at a port with keys.
-  std::size_t handshakes_of_source = 512;
+  std::size_t handshakes_of_source = limits::kHandshakesOfSource;
 };
 
 struct Incoming {

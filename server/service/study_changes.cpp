@@ -19,8 +19,6 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestShownName = 200;
-/// Requests for one study that wait for a change of it.
-constexpr std::size_t kMostDeferred = 1000;
 /// In place of the state of a study that was deleted.
 constexpr const char* kDeletedState = "deleted";
 
@@ -40,11 +38,11 @@ std::string unknown_study(const std::string& name, const StudyStates& states) {
 // ---- Reading -----------------------------------------------------------------------------------
 
 ReadRequest read_request(std::string_view frame, bool judges) {
-  // Padding cannot make much of a shorter frame.
-  constexpr std::size_t kScannedAbove = std::size_t{64} * 1024;
   ReadRequest read;
-  read.is_readable = (frame.size() <= kScannedAbove || protocol::is_of_a_requests_shape(frame)) &&
-                     protocol::decode(frame, read.request);
+  // Padding cannot make much of a shorter frame.
+  read.is_readable =
+      (frame.size() <= limits::kLongestInlineRequest || protocol::is_of_a_requests_shape(frame)) &&
+      protocol::decode(frame, read.request);
   read.request_id = read.is_readable ? read.request.request_id() : protocol::request_id_of(frame);
   if (!read.is_readable || !read.request.has_submit()) {
     return read;
@@ -105,7 +103,7 @@ bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(I
   if (pending == pending_.end()) {
     return false;
   }
-  if (pending->second.deferred.size() >= kMostDeferred) {
+  if (pending->second.deferred.size() >= limits::kDeferredRequests) {
     core_.ports.reply_error(client, "too many changes of that study wait already: ask again later");
   } else {
     pending->second.deferred.push_back(std::move(request));
@@ -388,20 +386,21 @@ void StudyChanges::finish(StudyId id, Instant now) {
 
 /// Whether so many further studies and points may be open; otherwise the client gets the bound.
 bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::uint64_t points) {
-  const auto fits = [&](const char* bound, const char* what, std::uint64_t open, std::uint64_t more,
-                        std::uint64_t most) {
+  const auto fits = [&](const char* what, std::uint64_t open, std::uint64_t more,
+                        std::uint64_t most, const char* option = "") {
     if (open <= most && more <= most - open) {
       return true;
     }
     core_.ports.reply_error(
-        client, fmt::format("{} {} are open, and the bound {} of the server is {}: wait until some "
-                            "studies are done, or cancel some",
-                            open, what, bound, most));
+        client,
+        fmt::format("{} {} are open, and the server allows {}{}: wait until some studies are "
+                    "done, or cancel some",
+                    open, what, most, option));
     return false;
   };
-  return fits("open-studies", "studies", core_.states.unfinished().size(), studies,
-              bounds_.studies) &&
-         fits("open-points", "points", core_.states.open_points(), points, bounds_.points);
+  return fits("studies", core_.states.unfinished().size(), studies, bounds_.studies) &&
+         fits("points", core_.states.open_points(), points, bounds_.points,
+              " (--limits-open-points)");
 }
 
 bool StudyChanges::may_reopen(const Client& client, StudyId id) {

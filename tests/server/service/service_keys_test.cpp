@@ -70,15 +70,16 @@ TEST_F(ServiceKeysTest, AStudyHasTheNameOfTheKeyThatFirstSubmittedIt) {
 }
 
 TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
-  EXPECT_THAT(error_of(submit_request("a", 1001)), HasSubstr("0 points are open, and the bound "
-                                                             "open-points of the server is 1000"));
+  EXPECT_THAT(error_of(submit_request("a", 1001)),
+              HasSubstr("0 points are open, and the server allows 1000 "
+                        "(--limits-open-points)"));
   EXPECT_EQ(error_of(submit_request("a", 600)), "");
   EXPECT_THAT(error_of(submit_request("b", 401)), HasSubstr("open-points"));
   for (const char* name : {"b", "c", "d", "e"}) {
     EXPECT_EQ(error_of(submit_request(name, 1)), "") << name;
   }
-  EXPECT_THAT(error_of(submit_request("f", 1)), HasSubstr("5 studies are open, and the bound "
-                                                          "open-studies"));
+  EXPECT_THAT(error_of(submit_request("f", 1)),
+              HasSubstr("5 studies are open, and the server allows 5:"));
   EXPECT_EQ(error_of(submit_request("a", 600)), "") << "it is open already";
 }
 
