@@ -128,7 +128,7 @@ TEST_F(EventLoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
   large.mutable_submit()->set_name("large");
   large.mutable_submit()->set_priority(1);
   *large.mutable_submit()->mutable_recipe() = protocol::recipe_of({});
-  constexpr int kBlocks = 50'000;
+  constexpr int kBlocks = 10'000;
   for (int i = 0; i < kBlocks; ++i) {
     auto& block = *large.mutable_submit()->mutable_recipe()->add_blocks();
     *block.add_axes() = protocol::range("H", 0.1 + 1e-6 * i, 1.0, 1024);

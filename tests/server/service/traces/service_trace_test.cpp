@@ -201,20 +201,6 @@ TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
   EXPECT_THAT(refusal(), HasSubstr("no worker is connected"));
 }
 
-TEST_F(ServiceTraceTest, WorkersOfTheVersionOfTheStudysResultsComeFirst) {
-  hello("old", "0.9");
-  ask(7, 3);
-  ASSERT_EQ(orders().size(), 1U) << "another version is better than none";
-  worker_sends(trace_of(orders()[0], "\2"), "old");
-  hello("worker", "1.0");
-  ask(8, 4);
-  EXPECT_EQ(orders().size(), 2U);
-  ask(9, 5);
-  EXPECT_EQ(orders().size(), 2U) << "it waits for the one of the right version";
-  worker_sends(trace_of(orders()[1], "\2"));
-  EXPECT_EQ(orders().size(), 3U);
-}
-
 TEST_F(ServiceTraceTest, AWorkerThatIsLostIsReplacedOnceAndThenThePointIsLeftAlone) {
   hello("one");
   ask(7, 3);
