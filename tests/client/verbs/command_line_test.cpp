@@ -301,8 +301,7 @@ TEST(CommandLine, RefusesFilesThatAreNotRegularAndSaysWhatTheyAre) {
     EXPECT_NE(outcome.exit_code, 0) << testing::PrintToString(arguments);
     EXPECT_NE(outcome.err.find(says), std::string::npos) << outcome.err;
   }
-  const auto doctor =
-      test::run_oblique(folder, {"doctor", "--no-timing", "--timeout", "600", "--db", "./pipe"});
+  const auto doctor = test::run_oblique(folder, {"doctor", "--db", "./pipe"});
   EXPECT_NE(doctor.out.find("/pipe is a pipe"), std::string::npos) << doctor.out;
 }
 
