@@ -3,7 +3,6 @@
 import csv
 import doctest
 import importlib
-import json
 import os
 import pickle
 import subprocess
@@ -131,9 +130,8 @@ def test_what_a_report_of_a_defect_should_tell_is_what_the_doctor_tells():
     said = subprocess.run([sys.executable, "-m", "oblique"], capture_output=True, text=True, check=True)
     assert said.stdout == oblique.about() + "\n"
     lines = dict(line.split(maxsplit=1) for line in said.stdout.splitlines())
-    doctor = json.loads(run_oblique("doctor", "--json", "--no-timing", "--timeout", "600"))
     assert "oblique " + lines["oblique"] == run_oblique("--version").strip()
-    assert lines["built"] == "{compiler}, {type}".format(**doctor["programs"]["built"])
+    assert f"built with {lines['built']}; " in run_oblique("doctor")
     assert lines["instructions"] == oblique._core.instruction_set()
     assert lines["NumPy"] == np.__version__
 

@@ -117,27 +117,6 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   }
 }
 
-TEST(CommandLine, AutoscaleWantsTheVariablesThatItsScriptNeeds) {
-  const test::TemporaryFolder folder;
-  std::ofstream(folder.path() / "jobs") << "server=${OBLIQUE_WORKER_SERVER:?\"needed\"}\n"
-                                        << "keys=${OBLIQUE_WORKER_KEYS:-}\n";
-  ASSERT_EQ(test::run_oblique(folder, {"keygen", "keys"}).exit_code, 0);
-  const auto look = [&folder](const test::Environment& environment) {
-    return test::Process(
-               folder, test::client_program(),
-               {"autoscale", "slurm", "--max", "1", "--dry-run", "--script", "jobs", "--keys",
-                "keys/reader.key", "--server", "tcp://127.0.0.1:1", "--timeout", "0.1"},
-               environment)
-        .outcome();
-  };
-  const auto refused = look({});
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_NE(refused.err.find("OBLIQUE_WORKER_SERVER is not set"), std::string::npos) << refused.err;
-  const auto warned = look({{"OBLIQUE_WORKER_SERVER", "tcp://127.0.0.1:2"}});
-  EXPECT_NE(warned.exit_code, 2) << warned.err;
-  EXPECT_NE(warned.err.find("OBLIQUE_WORKER_KEYS is not set"), std::string::npos) << warned.err;
-}
-
 TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
   const auto help = test::run_oblique({"--help"});
   EXPECT_EQ(help.exit_code, 0);
@@ -322,8 +301,7 @@ TEST(CommandLine, RefusesFilesThatAreNotRegularAndSaysWhatTheyAre) {
     EXPECT_NE(outcome.exit_code, 0) << testing::PrintToString(arguments);
     EXPECT_NE(outcome.err.find(says), std::string::npos) << outcome.err;
   }
-  const auto doctor =
-      test::run_oblique(folder, {"doctor", "--no-timing", "--timeout", "600", "--db", "./pipe"});
+  const auto doctor = test::run_oblique(folder, {"doctor", "--db", "./pipe"});
   EXPECT_NE(doctor.out.find("/pipe is a pipe"), std::string::npos) << doctor.out;
 }
 
