@@ -1,27 +1,21 @@
-#include "client/python/solving.h"
-
 #include <malloc.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "client/python/conversions.h"
-#include "client/python/given_keys.h"
-#include "client/python/interpreter_lock.h"
-#include "client/python/interruptible.h"
-#include "client/python/result_arrays.h"
-#include "proto/program/origin/origin.h"
+#include <pybind11/stl.h>
+
+#include "client/python/calls.h"
+#include "client/python/given_points.h"
+#include "client/python/results.h"
 #include "proto/recipe/keys.h"
 #include "proto/system/limits_of_group.h"
-#include "worker/solver/library/falls_kept.h"
-#include "worker/solver/library/point_runs.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
@@ -33,13 +27,14 @@ namespace {
 
 namespace py = pybind11;
 
-/// The only point that was given. Throws InputError for what is wrong with its model.
+/// A single point with its model.
 struct OnePoint {
   ModelParameters model;
   Point point;
 };
-OnePoint one_point(const GivenKeys& keys) {
-  GivenPoints given = points_of(keys);
+
+OnePoint one_point(const py::dict& keys) {
+  GivenPoints given = points_of(keys_of(keys, 1));
   if (!given.faults.front().empty()) {
     throw InputError(given.faults.front());
   }
@@ -58,7 +53,7 @@ py::dict with_point(const Point& point, const py::dict& outputs) {
 }
 
 py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
-  const OnePoint one = one_point(keys_of(keys, 1));
+  const OnePoint one = one_point(keys);
   const auto result = interruptibly<CaseResult>([one, falls, errors](const std::atomic<bool>&) {
     const Finger finger(one.model, falls);
     const Point& point = one.point;
@@ -71,7 +66,7 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
   return with_point(one.point, dict_of(result));
 }
 
-/// Instants of a trace, number behind number.
+/// Instants of a trace, one after the other.
 struct Instants {
   CaseResult result;
   std::vector<double> numbers;
@@ -79,7 +74,7 @@ struct Instants {
 };
 
 py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape) {
-  const OnePoint one = one_point(keys_of(keys, 1));
+  const OnePoint one = one_point(keys);
   auto instants = interruptibly<Instants>([one, falls, fall, shape](const std::atomic<bool>& stop) {
     Instants rows;
     Tracing tracing;
@@ -117,7 +112,7 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
   return py::make_tuple(with_point(one.point, dict_of(instants.result)), columns);
 }
 
-/// Lets signals and `progress` (None: nobody) end it.
+/// Reports to `progress` (or None) and lets signals and what it raises end the work.
 std::function<bool(std::size_t)> goes_on(WithoutLock& others_run, std::size_t points,
                                          bool has_signals, const py::object& progress) {
   if (!has_signals && progress.is_none()) {
@@ -138,6 +133,7 @@ std::function<bool(std::size_t)> goes_on(WithoutLock& others_run, std::size_t po
 
 py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
                     std::size_t threads, bool errors, const py::object& progress) {
+  refuse_forked_child();
   const GivenKeys given_keys = keys_of(keys, count);
   const bool has_signals = is_main_thread();
   ResultArrays arrays(count);
@@ -172,7 +168,7 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
   if (!progress.is_none()) {
     progress(count, count);
   }
-  py::dict all = dict_of(std::move(arrays));
+  py::dict all = arrays.dict();
   std::vector<double> H_m;
   std::vector<double> mu;
   std::vector<double> e;
@@ -187,14 +183,13 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
   return all;
 }
 
-/// (name, group, column, unit, meaning, list, member, where) of each output.
+/// (name, group, column, list, member, where) of each output.
 py::list fields() {
   py::list all;
   for (const auto& field : solver::result_fields()) {
     const auto* part = std::get_if<solver::ListPart>(&field.value);
     all.append(py::make_tuple(std::string(field.name), std::string(field.group),
-                              std::string(field.column), std::string(field.unit),
-                              std::string(field.meaning),
+                              std::string(field.column),
                               part == nullptr ? "" : std::string(part->list->column),
                               part == nullptr ? "" : std::string(part->member),
                               part == nullptr ? "" : std::string(part->where)));
@@ -205,10 +200,9 @@ py::list fields() {
 }  // namespace
 
 void add_solving(py::module_& module) {
-  py::class_<Falls>(module, "Falls")
-      .def(py::init(
-          [] { return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory); }))
-      .def("is_at_rest", [](const Falls& falls) { return falls.cache()->falls.is_at_rest(); });
+  py::class_<Falls>(module, "Falls").def(py::init([] {
+    return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory);
+  }));
   module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));
   module.def("solve_many", &solve_many, py::arg("falls"), py::arg("keys"), py::arg("points"),
@@ -216,23 +210,12 @@ void add_solving(py::module_& module) {
   // What threads have freed is kept for them otherwise.
   module.def("give_memory_back", [] { malloc_trim(0); });
   module.def("version", &version);
-  module.def("origin", [] {
-    const auto origin = protocol::origin();
-    return std::map<std::string, std::string>{{"version", protocol::version_and_commit()},
-                                              {"compiler", origin.compiler},
-                                              {"build_type", origin.build_type}};
-  });
-  module.def("instruction_set", &instruction_set);
   module.def("fields", &fields);
   module.def("trace_states", [] {
     return std::vector<std::string>(solver::kTraceStates.begin(), solver::kTraceStates.end());
   });
   module.def("note_on_value", [](const std::string& key, double value) {
     return protocol::is_axis_key(key) ? solver::note_on_value(protocol::axis_key(key), value) : "";
-  });
-  module.def("integrator_names", [] {
-    const auto names = solver::integrator_names();
-    return std::vector<std::string>(names.begin(), names.end());
   });
 }
 

@@ -2,19 +2,68 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any, Iterator, Optional
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._named import Named, Plain
 
 if TYPE_CHECKING:
     import pandas
 
-Floats = npt.NDArray[np.float64]
-Texts = npt.NDArray[np.object_]
+
+class Named:
+    """Named values, as attributes, as ``result["fn_peak_N"]`` and by ``_asdict()``."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.__dict__.update(values)
+
+    def _asdict(self) -> dict[str, Any]:
+        """All values by name, groups as dicts of their own."""
+        return {
+            name: value._asdict() if isinstance(value, Named) else value
+            for name, value in self.__dict__.items()
+            if not name.startswith("_")
+        }
+
+    def __getitem__(self, name: str) -> Any:
+        if not isinstance(name, str):
+            raise TypeError(
+                f"a {type(self).__name__} has fields, not places: take one by its name, "
+                "as [\"fn_peak_N\"], and then its elements"
+            )
+        if name.startswith("_") or name not in self.__dict__:
+            raise KeyError(f"no field {name!r}: there are {', '.join(self)}")
+        return getattr(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._asdict())
+
+    def __repr__(self) -> str:
+        values = ", ".join(
+            f"{name}={value!r}" for name, value in self.__dict__.items() if not name.startswith("_")
+        )
+        return f"{type(self).__name__}({values})"
+
+
+class Plain(Named):
+    """Named values that are no arrays, and may be compared."""
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self.__dict__ == other.__dict__
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def array_of(column: Any) -> npt.NDArray[Any]:
+    """The column of an extension's answer: an array, or a list of texts and None."""
+    if not isinstance(column, list):
+        array: npt.NDArray[Any] = column
+        return array
+    texts = np.empty(len(column), dtype=object)
+    texts[:] = column
+    return texts
 
 
 class Energy(Plain):
@@ -111,16 +160,16 @@ class Result(Plain):
 _GROUPS: dict[str, type[Named]] = {"energy": Energy, "errors": Errors, "solver": Solver}
 
 
-class ManyGroup(Named):
-    """One of the groups ``energy``, ``errors`` and ``solver`` of many results: arrays by the names
-    of :class:`Energy`, :class:`Errors` and :class:`Solver`."""
+class Arrays(Named):
+    """Named arrays, as the groups ``energy``, ``errors`` and ``solver`` of many results."""
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self)}")
+        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
 
 
-class ManyResults(Named):
-    """Many impacts: the fields of :class:`Result`, each an array of the shape of the input.
+class ManyResults(Arrays):
+    """Many impacts: the fields of :class:`Result`, each an array of the shape of the input; groups
+    have arrays by the names of :class:`Energy`, :class:`Errors` and :class:`Solver`.
 
     Where a point has no result its numbers are NaN, its texts None, its lists empty, and ``error``
     says why; ``failed`` marks such points. Lists are arrays of arrays (``fn_peaks_N``,
@@ -135,56 +184,14 @@ class ManyResults(Named):
     'mu = -1 is not allowed: mu must be >= 0'
     """
 
-    H: Floats
-    mu: Floats
-    e: Floats
-    fall_time_s: Floats
-    impact_x_m: Floats
-    vt_in_m_s: Floats
-    vn_in_m_s: Floats
-    duration_s: Floats
-    fn_peak_N: Floats
-    ft_peak_N: Floats
-    fn_peaks_N: npt.NDArray[np.object_]
-    ft_peaks_N: npt.NDArray[np.object_]
-    major_peaks_N: npt.NDArray[np.object_]
-    major_peak_1_N: Floats
-    major_peak_2_N: Floats
-    major_peak_3_N: Floats
-    major_peak_1_t_s: Floats
-    major_peak_2_t_s: Floats
-    major_peak_3_t_s: Floats
-    impulse_n_Ns: Floats
-    impulse_t_Ns: Floats
-    slide_m: Floats
-    vt_out_m_s: Floats
-    vn_out_m_s: Floats
-    mode: Texts
-    major_mode: Texts
-    margin: Floats
-    margin_event: Texts
-    stick_total_s: Floats
-    stick_intervals_s: npt.NDArray[np.object_]
-    phases: npt.NDArray[np.object_]
-    reaction_peaks: npt.NDArray[np.object_]
-    energy: ManyGroup
-    errors: ManyGroup
-    solver: ManyGroup
-    error: Texts
-    failed: npt.NDArray[np.bool_]
-
     def __init__(self, values: dict[str, Any], shape: tuple[int, ...]) -> None:
         lists = values.pop("lists")
 
         def shaped(column: Any) -> Any:
-            if isinstance(column, list):
-                texts = np.empty(len(column), dtype=object)
-                texts[:] = column
-                column = texts
-            return column.reshape(shape)
+            return array_of(column).reshape(shape)
 
         named: dict[str, Any] = {key: shaped(values[key]) for key in ("H", "mu", "e")}
-        for name, group, _, _, _, list_name, _, _ in _core.fields():
+        for name, group, _, list_name, _, _ in _core.fields():
             if list_name:
                 named[name] = None  # its place; made when it is asked for
             elif group:
@@ -192,7 +199,7 @@ class ManyResults(Named):
             else:
                 named[name] = shaped(values[name])
         for group in _GROUPS:
-            named[group] = ManyGroup(named[group])
+            named[group] = Arrays(named[group])
         named["error"] = shaped(values["error"])
         named["failed"] = np.asarray(named["error"] != None)  # noqa: E711  element by element
         named["_lists"] = lists
@@ -205,9 +212,6 @@ class ManyResults(Named):
             value = self._list(name)
             self.__dict__[name] = value
         return value
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -224,14 +228,9 @@ class ManyResults(Named):
         return super()._asdict()
 
     def __repr__(self) -> str:
-        failed = int(self.failed.sum())
-        return (
-            f"<{self.failed.size} results of shape {self.shape}"
-            + (f", {failed} failed" if failed else "")
-            + ": "
-            + ", ".join(name for name in self.__dict__ if not name.startswith("_"))
-            + ">"
-        )
+        failed = f", {self.failed.sum()} failed" if self.failed.any() else ""
+        names = ", ".join(name for name in self.__dict__ if not name.startswith("_"))
+        return f"<{self.failed.size} results of shape {self.shape}{failed}: {names}>"
 
     def ragged(self, name: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
         """A list of all points as one array: those of point i (of the flattened input) are
@@ -242,15 +241,12 @@ class ManyResults(Named):
         >>> offsets.tolist(), len(values)
         ([0, 3, 7], 7)
         """
-        for field, _, _, _, _, list_name, member, where in _core.fields():
+        for field, _, _, list_name, member, where in _core.fields():
             if field == name and list_name:
-                return self._ragged(list_name, member, where)
-        lists = ", ".join(field[0] for field in _core.fields() if field[5])
-        raise ValueError(f"{name!r} is no list: lists are {lists}")
-
-    def _ragged(
-        self, list_name: str, member: str, where: str
-    ) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
+                break
+        else:
+            lists = ", ".join(field[0] for field in _core.fields() if field[3])
+            raise ValueError(f"{name!r} is no list: lists are {lists}")
         packed = self.__dict__["_lists"][list_name]
         offsets: npt.NDArray[np.int64] = packed["offsets"]
         if not member:
@@ -275,7 +271,7 @@ class ManyResults(Named):
         import pandas
 
         columns: dict[str, npt.NDArray[Any]] = {"H": self.H, "mu": self.mu, "e": self.e}
-        for name, group, column, _, _, list_name, _, _ in _core.fields():
+        for name, group, column, list_name, _, _ in _core.fields():
             if not list_name:
                 columns[column] = getattr(getattr(self, group) if group else self, name)
         columns["error"] = self.error
@@ -297,34 +293,12 @@ def _elements(list_name: str, packed: dict[str, Any]) -> npt.NDArray[Any]:
     return elements
 
 
-class Trace(Named):
+class Trace(Arrays):
     """Time histories of one contact: an array a column (``t_s``, ``fn_N``, ``x_m``, ...; forces on
     joints ``R0x_N`` ..., and where the shape was asked for ``node0x_m`` ...), and the ``result``.
 
     ``state`` is SC, SR, sC or sR from each instant on, and "falling" before touch.
     """
-
-    t_s: Floats
-    fn_N: Floats
-    ft_N: Floats
-    uy_m: Floats
-    ux_m: Floats
-    xP_m: Floats
-    vP_m_s: Floats
-    x_m: Floats
-    y_m: Floats
-    vt_m_s: Floats
-    vn_m_s: Floats
-    state: npt.NDArray[np.str_]
-    kinetic_J: Floats
-    strain_J: Floats
-    gravity_J: Floats
-    momentum_x_Ns: Floats
-    momentum_y_Ns: Floats
-    result: Result
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
 
     def __len__(self) -> int:
         return len(self.t_s)
