@@ -29,64 +29,7 @@ py::dict group_of(py::dict& all, std::string_view group) {
   return all[name];
 }
 
-py::object object_of(const Cell& cell) {
-  if (const auto* text = std::get_if<std::string_view>(&cell)) {
-    return text_of(*text);
-  }
-  if (const auto* flag = std::get_if<bool>(&cell)) {
-    return py::bool_(*flag);
-  }
-  return py::float_(std::get<double>(cell));
-}
-
-py::object object_of(const solver::ResultList& list, std::span<const Cell> element) {
-  py::dict named;
-  py::list plain;
-  for (std::size_t i = 0; i < element.size(); ++i) {
-    if (list.has_names) {
-      named[text_of(list.members[i])] = object_of(element[i]);
-    } else {
-      plain.append(object_of(element[i]));
-    }
-  }
-  return list.has_names ? py::object(std::move(named)) : py::object(std::move(plain));
-}
-
-std::size_t place_of(const solver::ResultList& list, std::string_view member) {
-  std::size_t place = 0;
-  while (list.members[place] != member) {
-    ++place;
-  }
-  return place;
-}
-
-py::object object_of(const CaseResult& result, const solver::ListPart& part) {
-  py::list elements;
-  part.list->each(result, [&](std::span<const Cell> element) {
-    if (part.where.empty() || std::get<bool>(element[place_of(*part.list, part.where)])) {
-      elements.append(part.member.empty() ? object_of(*part.list, element)
-                                          : object_of(element[place_of(*part.list, part.member)]));
-    }
-  });
-  return elements;
-}
-
-template <class T>
-py::object object_of(const CaseResult& result, const Member<T>& member) {
-  const T* value = member.of(result);
-  return value == nullptr ? py::object(py::none()) : py::cast(*value);
-}
-
 }  // namespace
-
-py::dict dict_of(const CaseResult& result) {
-  py::dict all;
-  for (const auto& field : solver::result_fields()) {
-    group_of(all, field.group)[text_of(field.name)] =
-        std::visit([&](const auto& value) { return object_of(result, value); }, field.value);
-  }
-  return all;
-}
 
 void Texts::set(std::size_t point, std::string_view text) {
   auto known = known_.find(text);

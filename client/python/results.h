@@ -26,9 +26,6 @@ pybind11::array_t<T> array_of(std::vector<T>&& values) {
   return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(owned->size()), owned->data(), owner);
 }
 
-/// One result with the names of `oblique solve --json`, without H, mu and e.
-pybind11::dict dict_of(const solver::CaseResult& result);
-
 /// Texts of many points; equal ones are stored once.
 class Texts {
  public:
@@ -54,9 +51,9 @@ class ResultArrays {
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// As dict_of, with an array for each number, a list of str and None for each text, and `error`.
-  /// `lists` has an array for each member of a list, and the `offsets` of the points. Moves the
-  /// numbers out.
+  /// The names of `oblique solve --json` with an array for each number, a list of str and None for
+  /// each text, and `error`. `lists` has an array for each member of a list, and the `offsets` of
+  /// the points. Moves the numbers out.
   pybind11::dict dict();
 
  private:

@@ -41,15 +41,27 @@ OnePoint one_point(const py::dict& keys) {
   return {std::move(given.models.front()), given.points.front()};
 }
 
-py::dict with_point(const Point& point, const py::dict& outputs) {
-  py::dict all;
-  all["H"] = point.H_m;
-  all["mu"] = point.mu;
-  all["e"] = point.e;
-  for (const auto& [name, value] : outputs) {
-    all[name] = value;
+/// The outputs with H, mu and e of the points.
+py::dict with_points(ResultArrays& arrays, const std::vector<Point>& points) {
+  py::dict all = arrays.dict();
+  std::vector<double> H_m;
+  std::vector<double> mu;
+  std::vector<double> e;
+  for (const Point& point : points) {
+    H_m.push_back(point.H_m);
+    mu.push_back(point.mu);
+    e.push_back(point.e);
   }
+  all["H"] = array_of(std::move(H_m));
+  all["mu"] = array_of(std::move(mu));
+  all["e"] = array_of(std::move(e));
   return all;
+}
+
+py::dict dict_of(const OnePoint& one, const CaseResult& result) {
+  ResultArrays arrays(1);
+  arrays.set(0, result);
+  return with_points(arrays, {one.point});
 }
 
 py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
@@ -63,10 +75,10 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
     }
     return solved;
   });
-  return with_point(one.point, dict_of(result));
+  return dict_of(one, result);
 }
 
-/// Instants of a trace, one after the other.
+/// Instants of a trace: the numbers of one after those of the other, and the states.
 struct Instants {
   CaseResult result;
   std::vector<double> numbers;
@@ -93,23 +105,9 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
   });
   const auto headings = solver::trace_headings(solver::trace_shape(
       one.model.lengths_m.size(), static_cast<std::size_t>(one.model.elements_per_link), shape));
-  const std::size_t width = headings.size() - 1;  // the state is no number
-  const std::size_t rows = instants.states.size();
-  py::dict columns;
-  std::size_t place = 0;
-  for (const std::string& heading : headings) {
-    if (heading == "state") {
-      columns["state"] = array_of(std::move(instants.states));
-      continue;
-    }
-    std::vector<double> column(rows);
-    for (std::size_t i = 0; i < rows; ++i) {
-      column[i] = instants.numbers[i * width + place];
-    }
-    columns[py::str(heading)] = array_of(std::move(column));
-    ++place;
-  }
-  return py::make_tuple(with_point(one.point, dict_of(instants.result)), columns);
+  return py::make_tuple(dict_of(one, instants.result), headings,
+                        array_of(std::move(instants.numbers)),
+                        array_of(std::move(instants.states)));
 }
 
 /// Reports to `progress` (or None) and lets signals and what it raises end the work.
@@ -168,28 +166,17 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
   if (!progress.is_none()) {
     progress(count, count);
   }
-  py::dict all = arrays.dict();
-  std::vector<double> H_m;
-  std::vector<double> mu;
-  std::vector<double> e;
-  for (const Point& point : given.points) {
-    H_m.push_back(point.H_m);
-    mu.push_back(point.mu);
-    e.push_back(point.e);
-  }
-  all["H"] = array_of(std::move(H_m));
-  all["mu"] = array_of(std::move(mu));
-  all["e"] = array_of(std::move(e));
-  return all;
+  return with_points(arrays, given.points);
 }
 
-/// (name, group, column, list, member, where) of each output.
+/// (name, group, column, is_whole, list, member, where) of each output.
 py::list fields() {
   py::list all;
   for (const auto& field : solver::result_fields()) {
     const auto* part = std::get_if<solver::ListPart>(&field.value);
     all.append(py::make_tuple(std::string(field.name), std::string(field.group),
                               std::string(field.column),
+                              std::holds_alternative<solver::Member<std::int64_t>>(field.value),
                               part == nullptr ? "" : std::string(part->list->column),
                               part == nullptr ? "" : std::string(part->member),
                               part == nullptr ? "" : std::string(part->where)));

@@ -153,8 +153,21 @@ class Result(Plain):
     errors: Errors
     solver: Solver
 
-    def __init__(self, values: dict[str, Any]) -> None:
-        super().__init__({**values, **{name: _GROUPS[name](values[name]) for name in _GROUPS}})
+    def __init__(self, many: "ManyResults") -> None:
+        values: dict[str, Any] = {key: many[key].item() for key in ("H", "mu", "e")}
+        groups: dict[str, dict[str, Any]] = {group: {} for group in _GROUPS}
+        for name, group, _, is_whole, list_name, _, _ in _core.fields():
+            value = many[group][name] if group else many[name]
+            if list_name:
+                value = [
+                    dict(zip(one.dtype.names, one.tolist())) if one.dtype.names else one.tolist()
+                    for one in value.item()
+                ]
+            else:
+                value = value.item()
+                value = None if value != value else int(value) if is_whole else value
+            (groups[group] if group else values)[name] = value
+        super().__init__({**values, **{name: kind(groups[name]) for name, kind in _GROUPS.items()}})
 
 
 _GROUPS: dict[str, type[Named]] = {"energy": Energy, "errors": Errors, "solver": Solver}
@@ -191,7 +204,7 @@ class ManyResults(Arrays):
             return array_of(column).reshape(shape)
 
         named: dict[str, Any] = {key: shaped(values[key]) for key in ("H", "mu", "e")}
-        for name, group, _, list_name, _, _ in _core.fields():
+        for name, group, _, _, list_name, _, _ in _core.fields():
             if list_name:
                 named[name] = None  # its place; made when it is asked for
             elif group:
@@ -241,11 +254,11 @@ class ManyResults(Arrays):
         >>> offsets.tolist(), len(values)
         ([0, 3, 7], 7)
         """
-        for field, _, _, list_name, member, where in _core.fields():
+        for field, _, _, _, list_name, member, where in _core.fields():
             if field == name and list_name:
                 break
         else:
-            lists = ", ".join(field[0] for field in _core.fields() if field[3])
+            lists = ", ".join(field[0] for field in _core.fields() if field[4])
             raise ValueError(f"{name!r} is no list: lists are {lists}")
         packed = self.__dict__["_lists"][list_name]
         offsets: npt.NDArray[np.int64] = packed["offsets"]
@@ -271,7 +284,7 @@ class ManyResults(Arrays):
         import pandas
 
         columns: dict[str, npt.NDArray[Any]] = {"H": self.H, "mu": self.mu, "e": self.e}
-        for name, group, column, list_name, _, _ in _core.fields():
+        for name, group, column, _, list_name, _, _ in _core.fields():
             if not list_name:
                 columns[column] = getattr(getattr(self, group) if group else self, name)
         columns["error"] = self.error

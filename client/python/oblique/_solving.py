@@ -69,7 +69,7 @@ def solve(
     values = {"H": H, "mu": mu, "e": e, **model}
     _require_one_value_each("solve", values)
     keys, _ = _keys(values, preset, lengths)
-    return Result(_core.solve(_falls, keys, errors))
+    return Result(ManyResults(_core.solve(_falls, keys, errors), ()))
 
 
 def trace(
@@ -95,9 +95,11 @@ def trace(
     values = {"H": H, "mu": mu, "e": e, **model}
     _require_one_value_each("trace", values)
     keys, _ = _keys(values, preset, lengths)
-    result, columns = _core.trace(_falls, keys, fall, shape)
-    columns["state"] = np.array(_core.trace_states())[columns["state"]]
-    return Trace({**columns, "result": Result(result)})
+    result, headings, numbers, states = _core.trace(_falls, keys, fall, shape)
+    rows = iter(np.ascontiguousarray(numbers.reshape(len(states), -1).T))
+    names = np.array(_core.trace_states())
+    columns = {name: names[states] if name == "state" else next(rows) for name in headings}
+    return Trace({**columns, "result": Result(ManyResults(result, ()))})
 
 
 def solve_many(
