@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -5,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <pybind11/numpy.h>
@@ -26,38 +28,31 @@ namespace {
 namespace py = pybind11;
 using protocol::CellKind;
 
-/// One column of an answer. Numbers are in `reals`, and whole ones also in `integers`.
+using Value = std::variant<std::monostate, std::int64_t, double, std::string>;
+
+/// One column of an answer.
 struct Column {
   std::string name;
   std::string unit;  ///< SI; empty for pure numbers and texts
-  bool has_text = false;
-  bool has_real = false;
-  bool has_null = false;
-  bool has_integer = false;
-  std::vector<CellKind> kinds;
-  std::vector<std::int64_t> integers;
-  std::vector<double> reals;       ///< NaN for what is no number
-  std::vector<std::string> texts;  ///< as long as the others once there is a text
+  std::vector<Value> values;
+
+  template <class Kind>
+  bool has() const {
+    return std::any_of(values.begin(), values.end(),
+                       [](const Value& value) { return std::holds_alternative<Kind>(value); });
+  }
 };
 
-void add_cell(Column& column, const protocol::Cell& cell) {
-  const bool is_text = cell.kind == CellKind::kText;
-  const bool is_integer = cell.kind == CellKind::kInteger;
-  const bool is_real = cell.kind == CellKind::kReal;
-  if (is_text && !column.has_text) {
-    column.texts.resize(column.kinds.size());
-  }
-  column.has_text = column.has_text || is_text;
-  column.has_real = column.has_real || is_real;
-  column.has_integer = column.has_integer || is_integer;
-  column.has_null = column.has_null || cell.kind == CellKind::kNull;
-  column.kinds.push_back(cell.kind);
-  column.integers.push_back(is_integer ? cell.integer : 0);
-  column.reals.push_back(is_real      ? cell.real
-                         : is_integer ? static_cast<double>(cell.integer)
-                                      : std::numeric_limits<double>::quiet_NaN());
-  if (column.has_text) {
-    column.texts.emplace_back(is_text ? cell.text : std::string_view());
+Value value_of(const protocol::Cell& cell) {
+  switch (cell.kind) {
+    case CellKind::kInteger:
+      return cell.integer;
+    case CellKind::kReal:
+      return cell.real;
+    case CellKind::kText:
+      return std::string(cell.text);
+    default:
+      return {};
   }
 }
 
@@ -81,14 +76,12 @@ std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryReque
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();
     for (int i = static_cast<int>(columns.size()); i < chunk.columns_size(); ++i) {
-      Column& column = columns.emplace_back();
-      column.name = chunk.columns(i);
-      column.unit = i < chunk.units_size() ? chunk.units(i) : "";
+      columns.push_back({chunk.columns(i), i < chunk.units_size() ? chunk.units(i) : "", {}});
     }
     protocol::ChunkRows rows(chunk);
     while (rows.next()) {
       for (std::size_t i = 0; i < columns.size(); ++i) {
-        add_cell(columns[i], rows.cell(i));
+        columns[i].values.push_back(value_of(rows.cell(i)));
       }
     }
     ends = chunk.ends();
@@ -96,34 +89,31 @@ std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryReque
   return columns;
 }
 
-py::object object_of(const Column& column, std::size_t row) {
-  switch (column.kinds[row]) {
-    case CellKind::kInteger:
-      return py::int_(column.integers[row]);
-    case CellKind::kReal:
-      return py::float_(column.reals[row]);
-    case CellKind::kText:
-      return py::str(column.texts[row]);
-    default:
-      return py::none();
-  }
-}
-
 /// int64 where all values are whole numbers, else float64 with NaN for NULL; a list where some are
 /// texts.
-py::object values_of(Column&& column) {
+py::object values_of(const Column& column) {
   const auto kind = server::kind_of_values(column.name);
-  const bool has_number = column.has_integer || column.has_real;
-  if (column.has_text || (!has_number && kind == CellKind::kText)) {
-    py::list values(column.kinds.size());
-    for (std::size_t i = 0; i < column.kinds.size(); ++i) {
-      values[i] = object_of(column, i);
-    }
-    return values;
+  const bool has_real = column.has<double>();
+  const bool has_number = has_real || column.has<std::int64_t>();
+  if (column.has<std::string>() || (!has_number && kind == CellKind::kText)) {
+    return py::cast(column.values);
   }
-  const bool is_real = column.has_real || column.has_null || kind == CellKind::kReal;
-  return is_real ? py::object(array_of(std::move(column.reals)))
-                 : py::object(array_of(std::move(column.integers)));
+  std::vector<std::int64_t> integers;
+  std::vector<double> reals;
+  const bool are_integers = !has_real && !column.has<std::monostate>() && kind != CellKind::kReal;
+  for (const Value& value : column.values) {
+    const auto* integer = std::get_if<std::int64_t>(&value);
+    const auto* real = std::get_if<double>(&value);
+    if (are_integers) {
+      integers.push_back(*integer);
+    } else {
+      reals.push_back(real      ? *real
+                      : integer ? static_cast<double>(*integer)
+                                : std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  return are_integers ? py::object(array_of(std::move(integers)))
+                      : py::object(array_of(std::move(reals)));
 }
 
 /// A database file. Every call opens it anew, so that calls of several threads share nothing.
@@ -192,11 +182,11 @@ class Database {
 
   /// (name, unit, values) of each column.
   py::list ask(const protocol::QueryRequest& request) {
-    auto columns = with_reader<std::vector<Column>>(
+    const auto columns = with_reader<std::vector<Column>>(
         [request](server::Reader& reader) { return answer_to(reader, request); });
     py::list all;
-    for (Column& column : columns) {
-      all.append(py::make_tuple(column.name, column.unit, values_of(std::move(column))));
+    for (const Column& column : columns) {
+      all.append(py::make_tuple(column.name, column.unit, values_of(column)));
     }
     return all;
   }

@@ -34,22 +34,14 @@ py::dict group_of(py::dict& all, std::string_view group) {
 void Texts::set(std::size_t point, std::string_view text) {
   auto known = known_.find(text);
   if (known == known_.end()) {
-    known = known_.emplace(text, static_cast<std::uint32_t>(texts_.size())).first;
+    known = known_.emplace(text, static_cast<std::int32_t>(texts_.size())).first;
     texts_.emplace_back(text);
   }
   codes_[point] = known->second;
 }
 
-py::list Texts::list() const {
-  std::vector<py::str> each;
-  for (const std::string& text : texts_) {
-    each.push_back(text_of(text));
-  }
-  py::list list(codes_.size());
-  for (std::size_t i = 0; i < codes_.size(); ++i) {
-    list[i] = codes_[i] == kNone ? py::object(py::none()) : py::object(each[codes_[i]]);
-  }
-  return list;
+py::tuple Texts::tuple() const {
+  return py::make_tuple(texts_, array_of(std::vector(codes_)));
 }
 
 ResultArrays::ResultArrays(std::size_t points) : errors_(points) {
@@ -150,7 +142,7 @@ py::dict ResultArrays::dict() {
     }
     py::object column;
     if (std::holds_alternative<Member<std::string>>(value)) {
-      column = texts_.at(i).list();
+      column = texts_.at(i).tuple();
     } else {
       column = array_of(std::move(numbers_[i]));
     }
@@ -161,7 +153,7 @@ py::dict ResultArrays::dict() {
     lists[text_of(list.list->column)] = dict_of(list);
   }
   all["lists"] = lists;
-  all["error"] = errors_.list();
+  all["error"] = errors_.tuple();
   return all;
 }
 

@@ -29,16 +29,15 @@ pybind11::array_t<T> array_of(std::vector<T>&& values) {
 /// Texts of many points; equal ones are stored once.
 class Texts {
  public:
-  explicit Texts(std::size_t points) : codes_(points, kNone) {}
+  explicit Texts(std::size_t points) : codes_(points, -1) {}
 
   void set(std::size_t point, std::string_view text);
-  /// str or None for each point.
-  pybind11::list list() const;
+  /// The texts, and for each point the index of its text, or -1.
+  pybind11::tuple tuple() const;
 
  private:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> codes_;
-  std::map<std::string, std::uint32_t, std::less<>> known_;
+  std::vector<std::int32_t> codes_;
+  std::map<std::string, std::int32_t, std::less<>> known_;
   std::vector<std::string> texts_;
 };
 
@@ -51,8 +50,8 @@ class ResultArrays {
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// The names of `oblique solve --json` with an array for each number, a list of str and None for
-  /// each text, and `error`. `lists` has an array for each member of a list, and the `offsets` of
+  /// The names of `oblique solve --json` with an array for each number, a tuple of Texts for each
+  /// text, and `error`. `lists` has an array for each member of a list, and the `offsets` of
   /// the points. Moves the numbers out.
   pybind11::dict dict();
 

@@ -7,16 +7,17 @@ import re
 import warnings
 from typing import TYPE_CHECKING, Any, Iterator, Optional, Sequence, Union
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._results import Plain, array_of
+from ._results import Named
 
 if TYPE_CHECKING:
     import pandas
 
 
-class Study(Plain):
+class Study(Named):
     """A study of a database and where it stands."""
 
     study_id: int
@@ -43,7 +44,8 @@ class Answer:
             unique, number = name, 2
             while unique in self._columns:
                 unique, number = f"{name}_{number}", number + 1
-            self._columns[unique] = array_of(values)
+            is_text = isinstance(values, list)
+            self._columns[unique] = np.array(values, dtype=object) if is_text else values
             self.units[unique] = unit
 
     def keys(self) -> list[str]:
@@ -134,7 +136,7 @@ class Database:
 
     def studies(self) -> list[Study]:
         """All studies, in the order in which they came."""
-        return [Study(study) for study in self._database.studies()]
+        return [Study(**study) for study in self._database.studies()]
 
 
 def _joined(names: Union[str, Sequence[str]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Iterator, Optional
 
 import numpy as np
@@ -13,11 +14,11 @@ if TYPE_CHECKING:
     import pandas
 
 
-class Named:
+class Named(SimpleNamespace):
     """Named values, as attributes, as ``result["fn_peak_N"]`` and by ``_asdict()``."""
 
-    def __init__(self, values: dict[str, Any]) -> None:
-        self.__dict__.update(values)
+    def __reduce__(self) -> tuple[Any, ...]:  # copies and pickles without __init__
+        return SimpleNamespace.__new__, (type(self),), self.__dict__
 
     def _asdict(self) -> dict[str, Any]:
         """All values by name, groups as dicts of their own."""
@@ -40,33 +41,13 @@ class Named:
     def __iter__(self) -> Iterator[str]:
         return iter(self._asdict())
 
-    def __repr__(self) -> str:
-        values = ", ".join(
-            f"{name}={value!r}" for name, value in self.__dict__.items() if not name.startswith("_")
-        )
-        return f"{type(self).__name__}({values})"
+
+def text_array(texts: list[str], codes: npt.NDArray[np.int32]) -> npt.NDArray[np.object_]:
+    """The text of each code; None for -1."""
+    return np.array([*texts, None], dtype=object)[codes]
 
 
-class Plain(Named):
-    """Named values that are no arrays, and may be compared."""
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and self.__dict__ == other.__dict__
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-def array_of(column: Any) -> npt.NDArray[Any]:
-    """The column of an extension's answer: an array, or a list of texts and None."""
-    if not isinstance(column, list):
-        array: npt.NDArray[Any] = column
-        return array
-    texts = np.empty(len(column), dtype=object)
-    texts[:] = column
-    return texts
-
-
-class Energy(Plain):
+class Energy(Named):
     """Energy balance of a contact [J]; what is lost is positive."""
 
     kinetic_in_J: float
@@ -79,7 +60,7 @@ class Energy(Plain):
     closure: float
 
 
-class Errors(Plain):
+class Errors(Named):
     """Estimated errors, as fractions of the output's scale; None unless asked for."""
 
     mode_same: Optional[int]
@@ -93,7 +74,7 @@ class Errors(Plain):
     v_out: Optional[float]
 
 
-class Solver(Plain):
+class Solver(Named):
     """How a result was got. Two are equal whatever time they took."""
 
     integrator: str
@@ -111,7 +92,7 @@ class Solver(Plain):
     __hash__ = None  # type: ignore[assignment]
 
 
-class Result(Plain):
+class Result(Named):
     """One impact, with the fields of ``oblique solve --json`` (``oblique columns`` tells them all).
 
     SI units; times count from touch. Fields are attributes, ``_asdict()`` gives all of them.
@@ -167,7 +148,7 @@ class Result(Plain):
                 value = value.item()
                 value = None if value != value else int(value) if is_whole else value
             (groups[group] if group else values)[name] = value
-        super().__init__({**values, **{name: kind(groups[name]) for name, kind in _GROUPS.items()}})
+        super().__init__(**values, **{name: kind(**groups[name]) for name, kind in _GROUPS.items()})
 
 
 _GROUPS: dict[str, type[Named]] = {"energy": Energy, "errors": Errors, "solver": Solver}
@@ -201,7 +182,7 @@ class ManyResults(Arrays):
         lists = values.pop("lists")
 
         def shaped(column: Any) -> Any:
-            return array_of(column).reshape(shape)
+            return (text_array(*column) if isinstance(column, tuple) else column).reshape(shape)
 
         named: dict[str, Any] = {key: shaped(values[key]) for key in ("H", "mu", "e")}
         for name, group, _, _, list_name, _, _ in _core.fields():
@@ -212,12 +193,12 @@ class ManyResults(Arrays):
             else:
                 named[name] = shaped(values[name])
         for group in _GROUPS:
-            named[group] = Arrays(named[group])
+            named[group] = Arrays(**named[group])
         named["error"] = shaped(values["error"])
         named["failed"] = np.asarray(named["error"] != None)  # noqa: E711  element by element
         named["_lists"] = lists
         named["_shape"] = shape
-        super().__init__(named)
+        super().__init__(**named)
 
     def __getattribute__(self, name: str) -> Any:
         value = super().__getattribute__(name)

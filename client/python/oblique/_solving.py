@@ -99,7 +99,7 @@ def trace(
     rows = iter(np.ascontiguousarray(numbers.reshape(len(states), -1).T))
     names = np.array(_core.trace_states())
     columns = {name: names[states] if name == "state" else next(rows) for name in headings}
-    return Trace({**columns, "result": Result(ManyResults(result, ()))})
+    return Trace(**columns, result=Result(ManyResults(result, ())))
 
 
 def solve_many(
