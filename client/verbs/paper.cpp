@@ -50,8 +50,7 @@ protocol::Table rows_of_study(Source& source, const std::string& study) {
       server::sql_text(study) + " AND status = 'solved'");
 }
 
-std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
-                                             const PaperFlags& flags) {
+OwnCases cases_of(const PublishedTable& published, const PaperFlags& flags) {
   if (!flags.database.empty()) {
     return own_cases(published, rows_of_study(*open_database(flags.database), flags.study));
   }

@@ -193,15 +193,15 @@ bool EventLoop::take_worker_messages() {
 /// The same. A client that does not read its replies must do so before its next request is taken.
 bool EventLoop::take_client_messages() {
   return take_messages(
-      clients_,
-      [this](const std::string& client) { return !network_.is_busy(client); },
+      clients_, [this](const std::string& client) { return !network_.is_busy(client); },
       [this](const Incoming& incoming) {
         service_->client_frame(incoming.identity, incoming.body, now(), incoming.key);
       });
 }
 
 template <typename Take>
-bool EventLoop::take_messages(Network::Port port, const Network::MayTake& may_take, const Take& take) {
+bool EventLoop::take_messages(Network::Port port, const Network::MayTake& may_take,
+                              const Take& take) {
   const auto until = Clock::now() + kShareOfTurn;
   while (const auto incoming = network_.next(port, may_take)) {
     take(*incoming);

@@ -46,7 +46,6 @@ struct KeyIdentity {
   bool operator==(const KeyIdentity&) const = default;
 };
 
-
 using AuthResult = std::variant<std::shared_ptr<const KeyIdentity>, Refusal>;
 
 /// Decides which keys are admitted at a port.

@@ -24,7 +24,8 @@ namespace oblique::server {
 
 /// Bounds on what peers can make the server hold; proto/protocol.md lists them.
 struct NetworkLimits {
-  std::size_t connections = limits::kConnections;  ///< at all ports; fewer if the system allows fewer
+  std::size_t connections =
+      limits::kConnections;  ///< at all ports; fewer if the system allows fewer
   /// Messages of all peers that are incomplete or were not taken. One peer has at most one message.
   std::size_t held_in_bytes = std::size_t{512} << 20U;
   /// While a port's messages take this much and one of them waits to be taken, its peers are not

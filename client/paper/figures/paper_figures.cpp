@@ -139,12 +139,12 @@ double normal_deformation(const TraceRow& row) {
 /// Where phases end, on our curve at the end of our phase of the same number.
 std::vector<KnownPoint> published_ends(const PaperCase& one) {
   std::vector<KnownPoint> known;
-  const OwnCase own = own_case(*one.history.result);
+  const CaseNumbers own = own_case(*one.history.result);
   double published_s = 0.0;
   double own_s = 0.0;
-  for (std::size_t i = 0; i < std::min(own.phases_s.size(), one.published.phases_ms.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(own.phases_ms.size(), one.published.phases_ms.size()); ++i) {
     published_s += one.published.phases_ms[i] * kMilli;
-    own_s += own.phases_s[i];
+    own_s += own.phases_ms[i] * kMilli;
     known.push_back({published_s, value_at(one, own_s, normal_deformation), kPublished});
   }
   return known;
