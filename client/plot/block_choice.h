@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "client/plot/data/study_axes.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/study_shape.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client::plot {

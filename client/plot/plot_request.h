@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/data/study_axes.h"
-#include "client/plot/figures/figure.h"
+#include "client/plot/figure.h"
+#include "client/plot/study_shape.h"
 #include "client/service/source.h"
 
 namespace oblique::client::plot {

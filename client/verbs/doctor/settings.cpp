@@ -86,7 +86,7 @@ void add_key(Findings& found, const std::string& file) {
 }
 
 void add_drawing_program(Findings& found) {
-  constexpr const char* kProgram = "rsvg-convert";
+  constexpr const char* kProgram = "gnuplot";
   const std::string path = variable("PATH");
   for (const std::string_view folder : protocol::split(path, ':')) {
     const auto program = std::filesystem::path(folder) / kProgram;
@@ -95,8 +95,7 @@ void add_drawing_program(Findings& found) {
       return;
     }
   }
-  found.add(kProgram, kProgram, "is not there; only pictures as PNG need it (librsvg2-bin)",
-            nullptr);
+  found.add(kProgram, kProgram, "is not there; pictures need it (gnuplot-nox)", nullptr);
 }
 
 }  // namespace

@@ -125,7 +125,7 @@ void add_form(const FieldReader& fields, std::vector<std::string>& flags) {
 }  // namespace
 
 PictureFormat picture_format(const FieldReader& fields) {
-  constexpr std::array<std::string_view, 4> kFormats{"svg", "png", "csv", "gnuplot"};
+  constexpr std::array<std::string_view, 4> kFormats{"svg", "png", "csv", "gp"};
   constexpr std::array<std::string_view, 4> kTypes{
       "image/svg+xml", "image/png", "text/csv; charset=utf-8", "text/plain; charset=utf-8"};
   std::string name = one_of(fields, "format", "svg", kFormats);

@@ -7,8 +7,8 @@
 
 #include "client/plot/axis_choice.h"
 #include "client/plot/block_choice.h"
-#include "client/plot/data/study_axes.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/study_shape.h"
 #include "client/study/study_file.h"
 #include "worker/solver/model/errors.h"
 
