@@ -7,7 +7,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/plot/block_choice.h"
 #include "client/plot/figure.h"
 #include "proto/suggestion.h"
 #include "proto/text.h"
@@ -172,7 +171,7 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
     condition.sql = fmt::format("point >= {} AND point < {}", shape.block.first_point,
                                 shape.block.first_point + shape.block.points);
     condition.sql_without_where = condition.sql;
-    condition.shown.push_back(block_in_words(shape));
+    condition.shown.push_back(fmt::format("block {} of {}", shape.block.number + 1, shape.blocks));
   }
   if (!request.where.empty()) {
     add_term(condition.sql, fmt::format("({})", request.where));

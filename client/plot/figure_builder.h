@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/answer_columns.h"
 #include "client/plot/axis_choice.h"
 #include "client/plot/figure.h"
 #include "client/plot/gathered.h"

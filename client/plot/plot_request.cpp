@@ -8,6 +8,7 @@
 
 #include "client/plot/axis_choice.h"
 #include "client/plot/figure_builder.h"
+#include "client/plot/study_shape.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 

@@ -13,26 +13,11 @@
 namespace oblique::client::plot {
 namespace {
 
-constexpr std::size_t kMostLines = 120;     // more cannot be told apart
 constexpr std::size_t kMostNamedLines = 8;  // more are coloured by their value
 constexpr std::size_t kMostMarked = 60;     // points of a line that has marks
 constexpr std::size_t kMostDots = 4000;     // more are gathered in cells
 constexpr std::size_t kMostNames = 16;      // of a histogram of texts
 constexpr double kMostBins = 100.0;
-
-/// The first, the last and a regular choice between them.
-void thin_lines(Figure& figure, std::vector<Curve>& curves) {
-  if (curves.size() <= kMostLines) {
-    return;
-  }
-  figure.notes.push_back(fmt::format("{} of {} lines are drawn, at equal distances.", kMostLines,
-                                     shown_count(curves.size())));
-  std::vector<Curve> kept;
-  for (std::size_t i = 0; i < kMostLines; ++i) {
-    kept.push_back(std::move(curves[i * (curves.size() - 1) / (kMostLines - 1)]));
-  }
-  curves = std::move(kept);
-}
 
 /// Cells for values along an axis. Of few different values, as of a grid, there are fewer cells
 /// than values: otherwise empty cells were stripes.
@@ -147,7 +132,6 @@ Figure FigureBuilder::lines() {
   const bool is_whole_axis = x.axis != nullptr && shape_.is_grid;
   auto gathered = gathered_lines(answer[0], answer[1], by ? &answer[2] : nullptr,
                                  is_whole_axis ? x.axis->values : std::vector<double>());
-  thin_lines(figure, gathered.curves);
   std::vector<double> xs;
   std::vector<double> ys;
   std::vector<double> bys;

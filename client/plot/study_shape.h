@@ -1,12 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "client/plot/plot_request.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client::plot {
@@ -14,7 +14,7 @@ namespace oblique::client::plot {
 /// A key of a study that the recipe gives values to.
 struct StudyAxis {
   std::string key;     ///< as studies write it: "E"
-  std::string column;  ///< as questions do: "E_Pa"; for single lengths an expression
+  std::string column;  ///< as queries do: "E_Pa"; for single lengths an expression
   /// Values of the chosen block, rising; none where they are drawn from a distribution or follow
   /// from others, or are more than kMostListed.
   std::vector<double> values = {};
@@ -24,6 +24,7 @@ struct StudyAxis {
 
   /// Whether it has more than one value in the chosen block.
   bool varies() const { return !is_listed || values.size() > 1; }
+  bool is_named(std::string_view name) const { return name == key || name == column; }
 };
 inline constexpr std::uint64_t kMostListed = 100'000;
 
@@ -49,15 +50,11 @@ struct StudyShape {
   std::vector<const StudyAxis*> varying() const;
 };
 
-/// The column of questions that a key is.
-std::string column_of_key(const std::string& key);
-
-/// The block with the most points of those that `is_meant`; nothing: there is none.
-std::optional<BlockOfStudy> largest_block(
-    const protocol::Recipe& recipe, const std::function<bool(const protocol::Block&)>& is_meant);
-
-/// Of a recipe that was judged, with the axes of that block: of its points alone (`is_alone`), or
-/// of those of all blocks.
-StudyShape shape_of(const protocol::Recipe& recipe, const BlockOfStudy& block, bool is_alone);
+/// The study as a picture of it needs it. Of several blocks a map, or lines, show one: that of
+/// `--block`, else that with the most points of those in which the axes vary that are asked for and
+/// which have what `--at` holds. Where there is none, where that block is no grid, with `--block
+/// all`, and of points and histograms unless a block is named, all of them are shown. Throws
+/// solver::InputError for a block that the study does not have, and for a recipe without points.
+StudyShape shape_for(const protocol::Recipe& recipe, const PlotRequest& request);
 
 }  // namespace oblique::client::plot

@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/block_choice.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/study_shape.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/picture_flags.h"

@@ -12,7 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/block_choice.h"
+#include "client/plot/study_shape.h"
 #include "client/study/study_file.h"
 #include "proto/wire/chunk_writer.h"
 #include "worker/solver/model/errors.h"
@@ -177,18 +177,6 @@ TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
   EXPECT_FALSE(few.colours);
   ASSERT_EQ(few.panels[0].curves.size(), 5U);
   EXPECT_EQ(few.panels[0].curves[2].name, "e = 0.2");
-}
-
-TEST(Lines, TooManyToTellApartAreThinnedAndThatIsSaid) {
-  Rows rows;
-  for (int i = 0; i < 1000; ++i) {
-    rows.push_back({1.0, 5.0, 1.0 * i});
-  }
-  const Figure figure =
-      figure_from({.lines = "fn_peak_N", .x = "mu", .by = "e"}, {"mu", "fn_peak_N", "e"}, rows);
-  EXPECT_EQ(figure.panels[0].curves.size(), 120U);
-  EXPECT_EQ(figure.panels[0].curves.back().by, 999.0);
-  EXPECT_THAT(figure.notes, Contains(HasSubstr("120 of 1,000 lines are drawn")));
 }
 
 TEST(Lines, CountTheirGaps) {

@@ -33,10 +33,17 @@ std::string script(const Figure& figure) {
 std::vector<std::pair<std::string, Figure>> all_figures() {
   Figure log_lines = test::lines_of(3, 5);
   log_lines.panels[0].x.is_logarithmic = true;
+  Figure coloured_lines = test::lines_of(9, 5);
+  coloured_lines.colours = axis_of("e", "");
+  for (Curve& curve : coloured_lines.panels[0].curves) {
+    curve.is_coloured_by = true;
+  }
   return {{"map of numbers", test::gappy_map()},
+          {"map of many numbers", test::map_of(test::counted_cells(150, 150))},
           {"map of categories", test::category_map()},
           {"lines", test::lines_of(3, 5)},
           {"logarithmic lines", log_lines},
+          {"coloured lines", coloured_lines},
           {"points", test::some_dots()},
           {"histogram", test::some_bars()},
           {"histogram of texts", test::named_bars()},
@@ -55,7 +62,7 @@ set border 15 lc rgb '#556070' lw 1
 set tics out nomirror textcolor rgb '#1b1f24'
 set key noenhanced Left reverse samplen 3.2 spacing 1.15
 set style textbox opaque fillcolor rgb '#ffffff' noborder margins 0.3,0.3
-set xlabel offset 0,0.7
+set xlabel offset 0,0.4
 set cblabel offset 1.2,0
 set grid back lt 1 lc rgb '#d9dfe6' lw 0.8
 unset colorbox
@@ -80,8 +87,8 @@ set format y '% h'
 set yrange [0:200]
 set key rmargin top vertical
 $data1 << EOD
-0.01 100
-0.02 200
+0.01 100 0
+0.02 200 0
 EOD
 plot $data1 using 1:2 with linespoints lc rgb '#0067a5' dt solid pt 6 lw 1.7 ps 0.7 notitle
 )");
@@ -128,12 +135,14 @@ TEST(GnuplotScript, MergesNeighboursOfOneCategory) {
   EXPECT_THAT(text, HasSubstr("\n0 0.55 0 1.5 0.55 0.6 0 "));
 }
 
-TEST(GnuplotScript, OfManyEvenCellsIsAnImage) {
-  EXPECT_THAT(script(test::map_of(test::counted_cells(150, 150))), HasSubstr("with image"));
+TEST(GnuplotScript, OfManyCellsIsAnImageAlsoWhereTheyAreUneven) {
   EXPECT_THAT(script(test::gappy_map()), Not(HasSubstr("with image")));
+  EXPECT_THAT(script(test::map_of(test::counted_cells(150, 150))), HasSubstr("with image"));
   Cells uneven = test::counted_cells(150, 150);
-  uneven.x_edges.back() += 1.0;
-  EXPECT_THAT(script(test::map_of(uneven)), Not(HasSubstr("with image")));
+  for (double& edge : uneven.x_edges) {
+    edge = 0.1 * edge * edge;
+  }
+  EXPECT_THAT(script(test::map_of(uneven)), HasSubstr("axes x2y2 with image"));
 }
 
 TEST(GnuplotScript, DrawsLinesThatDifferInColourDashesAndMarks) {
