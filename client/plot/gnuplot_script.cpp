@@ -288,7 +288,9 @@ class ScriptWriter {
         "set key noenhanced Left reverse samplen 3.2 spacing 1.15\n"
         "set style textbox opaque fillcolor rgb '#ffffff' noborder margins 0.3,0.3\n";
     if (!is_text_) {
-      out_ += "set xlabel offset 0,0.4\nset cblabel offset 1.2,0\n";
+      // Nearer to the ticks where the key of a panel follows.
+      out_ += fmt::format("set xlabel offset 0,{}\nset cblabel offset 1.2,0\n",
+                          figure_.panels.size() > 1 ? "0.8" : "0.4");
     }
     if (!is_map_ && !is_text_) {
       out_ += "set grid back lt 1 lc rgb '#d9dfe6' lw 0.8\n";
