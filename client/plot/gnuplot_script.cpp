@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <initializer_list>
 #include <utility>
 #include <vector>
 
@@ -351,12 +353,13 @@ class ScriptWriter {
     out_ += fmt::format("set origin {:.4f}, {:.4f}\nset size {} {:.4f}, {:.4f}\n",
                         width * static_cast<double>(index % columns), bottom + height * from_below,
                         panel.has_equal_aspect ? "ratio -1" : "noratio", width, height);
-    const double title_height = panel.title.empty() ? metrics_.margin : 1.6 * metrics_.line;
+    const double title_height =
+        panel.title.empty() ? metrics_.margin : (is_text_ ? 2.0 : 1.6) * metrics_.line;
     out_ += fmt::format("set tmargin at screen {:.4f}\n", top - title_height / size_.height);
     if (!panel.title.empty()) {
       out_ +=
-          fmt::format("set label {} at graph 0, graph 1 left offset 0, character 0.8 noenhanced\n",
-                      gnuplot_text(panel.title));
+          fmt::format("set label {} at graph 0, graph 1 left offset 0, character {} noenhanced\n",
+                      gnuplot_text(panel.title), is_text_ ? "1" : "0.8");
     }
   }
 
