@@ -80,9 +80,9 @@ const char* name_of(Quantity quantity) {
   }
 }
 
-void add_header(protocol::QueryReply& table, const std::vector<std::string>& columns) {
+void add_header(protocol::Table& table, const std::vector<std::string>& columns) {
   for (const auto& column : columns) {
-    table.add_columns(column);
+    table.columns.emplace_back(column);
   }
 }
 
@@ -115,7 +115,7 @@ void print_forces(std::ostream& out, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
   constexpr std::array<const char*, 3> kPeaks{"1st", "2nd", "3rd"};
   out << "Peaks of the contact forces (Tab. 2): ours / published [kN] / difference [%]\n\n";
-  protocol::QueryReply table;
+  protocol::Table table;
   add_header(table, {"H", "mu", "e*", "force", kPeaks[0], kPeaks[1], kPeaks[2]});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
     if (published.cases[i].fn_kN.empty()) {
@@ -123,7 +123,7 @@ void print_forces(std::ostream& out, const PublishedTable& published,
     }
     for (const auto& [quantity, name] :
          {std::pair(Quantity::kFn, "F_n"), std::pair(Quantity::kFt, "F_t")}) {
-      auto& row = *table.add_rows();
+      auto& row = table.rows.emplace_back();
       add_case(row, published.cases[i]);
       add_value(row, std::string(name));
       for (std::size_t peak = 0; peak < kPeaks.size(); ++peak) {
@@ -138,11 +138,11 @@ void print_durations(std::ostream& out, const PublishedTable& published,
                      const std::vector<Difference>& differences) {
   out << "\nDurations of compression and restitution (section 4.2): ours / published [ms] / "
          "difference [%]\n\n";
-  protocol::QueryReply table;
+  protocol::Table table;
   add_header(table, {"H", "mu", "e*", "phase", "ours / published / difference"});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
     for (std::size_t phase = 0; phase < published.cases[i].phases_ms.size(); ++phase) {
-      auto& row = *table.add_rows();
+      auto& row = table.rows.emplace_back();
       add_case(row, published.cases[i]);
       add_value(
           row, fmt::format("{} {}", phase / 2 + 1, phase % 2 == 0 ? "compression" : "restitution"));
@@ -155,11 +155,11 @@ void print_durations(std::ostream& out, const PublishedTable& published,
 void print_sticks(std::ostream& out, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
   out << "\nTime in stick (section 4.3): ours / published [ms] / difference [%]\n\n";
-  protocol::QueryReply table;
+  protocol::Table table;
   add_header(table, {"H", "mu", "e*", "ours / published / difference"});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
     if (published.cases[i].stick_ms) {
-      auto& row = *table.add_rows();
+      auto& row = table.rows.emplace_back();
       add_case(row, published.cases[i]);
       add_value(row, beside(differences, i, Quantity::kStick, 0, 3));
     }
@@ -199,15 +199,15 @@ void print_other_modes(std::ostream& out, const PublishedTable& published, const
 
 void print_modes_table(std::ostream& out, const PublishedTable& published, const OwnCases& own) {
   out << "Peaks and modes, ripples merged (Figs. 4 to 6)\n\n";
-  protocol::QueryReply table;
+  protocol::Table table;
   add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_case(row, published.cases[i]);
     if (own[i]) {
       add_value(row, static_cast<std::int64_t>(own[i]->fn_kN.size()));
     } else {
-      row.add_values();
+      row.emplace_back();
     }
     add_value(row, std::int64_t{published_peaks(published.cases[i])});
     add_value(row, own[i] ? own[i]->mode : std::string("not solved"));

@@ -162,13 +162,13 @@ std::string largest_and_median(const OutputStudy& output, std::size_t level) {
 
 void print_cells(const std::vector<Level>& levels, const std::vector<OutputStudy>& outputs,
                  const std::function<std::string(const OutputStudy&, std::size_t)>& cell) {
-  protocol::QueryReply table;
-  table.add_columns("output");
+  protocol::Table table;
+  table.columns.emplace_back("output");
   for (const auto& level : levels) {
-    table.add_columns(level.name);
+    table.columns.emplace_back(level.name);
   }
   for (const auto& output : outputs) {
-    auto& row = *table.add_rows();
+    auto& row = table.rows.emplace_back();
     add_value(row, output.name);
     for (std::size_t level = 0; level < levels.size(); ++level) {
       add_value(row, cell(output, level));
@@ -384,10 +384,10 @@ std::vector<StepErrors> step_errors(const StepCase& of) {
 }
 
 void study_steps() {
-  protocol::QueryReply table;
+  protocol::Table table;
   for (const char* column : {"model", "points", "step [us]", "of limit", "peaks", "each peak",
                              "duration", "slide", "stick [s]", "exit [m/s]", "> 5 ns", "grazing"}) {
-    table.add_columns(column);
+    table.columns.emplace_back(column);
   }
   const auto cases = step_cases();
   std::vector<std::future<std::vector<StepErrors>>> solving;
@@ -399,7 +399,7 @@ void study_steps() {
     for (std::size_t j = 0; j < all.size(); ++j) {
       const double factor = cases[i].factors[j];
       const auto& errors = all[j];
-      auto& row = *table.add_rows();
+      auto& row = table.rows.emplace_back();
       add_value(row, factor == 1.0 ? cases[i].name
                                    : fmt::format("{}, {} h", cases[i].name, exact_number(factor)));
       add_value(row, static_cast<std::int64_t>(cases[i].points));
