@@ -133,7 +133,7 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
 /// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies"}, saved);
-  for (const std::string table : {"models", "workers", "retries"}) {
+  for (const std::string table : {"models", "workers"}) {
     copy_rows(from, to, {.table = table}, saved);
   }
   // Rows of lost studies are not copied, because they have no meaning without the recipe.
@@ -156,7 +156,6 @@ void mend(sqlite3* database) {
                                 kStudyChecksum, model_checksum_sql()));
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
-          "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies);"
           // Rows keep the number of a lost worker, so that their checksums stay right. If all other
           // workers have one solver version, it is used for the lost worker too.
           "INSERT INTO workers"

@@ -264,7 +264,7 @@ Diagnosis diagnose_contents(sqlite3* database) {
   if (!found.faults.empty()) {
     return found;  // the other checks need all tables
   }
-  for (const std::string table : {"results", "completed_ranges", "retries", "reused_points"}) {
+  for (const std::string table : {"results", "completed_ranges", "reused_points"}) {
     append(found.faults, database,
            fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
                        " ', which does not exist' FROM {0} WHERE study_id NOT IN"

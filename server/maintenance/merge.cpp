@@ -281,16 +281,8 @@ class SourceMerge {
     differing.reset();
   }
 
-  /// Copies the table `retries`, and unites the completed points.
+  /// Unites the completed points.
   void finish(std::uint64_t source_id, const StudyRow& target) {
-    execute_with(
-        database_,
-        "INSERT INTO main.retries (study_id, first_point, points, attempt, retried_at)"
-        " SELECT ?2, first_point, points, attempt, retried_at FROM source.retries"
-        " WHERE study_id = ?1 AND (first_point, points, attempt, retried_at) NOT IN"
-        " (SELECT first_point, points, attempt, retried_at FROM main.retries WHERE study_id = ?2)"
-        " ORDER BY source.retries.rowid",
-        source_id, target.id);
     CompletedRanges ranges(database_);
     completed_points(source_, source_id).for_each([&](const Interval& points) {
       ranges.add(target.id, points);

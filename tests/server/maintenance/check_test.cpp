@@ -107,7 +107,7 @@ TEST_F(MaintenanceTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) 
 TEST_F(MaintenanceTest, EveryTableThatIsMissingOrHasOtherColumnsIsNamed) {
   store_.reset();
   for (const std::string table : {"about", "studies", "models", "workers", "results",
-                                  "completed_ranges", "reused_points", "deletions", "retries"}) {
+                                  "completed_ranges", "reused_points", "deletions"}) {
     for (const std::string change : {"DROP TABLE ", "ALTER TABLE "}) {
       const std::string copy = folder_.file("changed_" + table + ".db");
       std::filesystem::copy_file(path_, copy, std::filesystem::copy_options::overwrite_existing);

@@ -163,8 +163,8 @@ TEST_F(MergeTest, WhatWasMergedBeforeIsPassedOver) {
   EXPECT_EQ(again.results_known, 5U);
   EXPECT_EQ(text("all",
                  "SELECT (SELECT count(*) FROM studies) || (SELECT count(*) FROM models) ||"
-                 " (SELECT count(*) FROM workers) || (SELECT count(*) FROM retries)"),
-            "1111");
+                 " (SELECT count(*) FROM workers)"),
+            "111");
   store("one", {{.first = 6, .end = 8, .worker = "late"}});
   EXPECT_EQ(merge("one").results_added, 2U);
 }
@@ -276,7 +276,7 @@ TEST_F(MergeTest, AStudyThatWouldKeepAServerFromStartingRefusesTheWholeDatabase)
 TEST_F(MergeTest, TablesThatAServerDoesNotMakeRefuseTheWholeDatabase) {
   int number = 0;
   for (const char* change : {"ALTER TABLE studies ADD COLUMN big BLOB AS (zeroblob(100000000))",
-                             "DROP TABLE retries", "ALTER TABLE results RENAME TO stored"}) {
+                             "DROP TABLE reused_points", "ALTER TABLE results RENAME TO stored"}) {
     const std::string source = "source" + std::to_string(++number);
     store(source, {{.end = 3}});
     texts(source, change);

@@ -54,7 +54,7 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   { const Store next(path_); }  // a start deletes what no row refers to
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
   for (const char* table :
-       {"studies", "models", "workers", "results", "completed_ranges", "deletions", "retries"}) {
+       {"studies", "models", "workers", "results", "completed_ranges", "deletions"}) {
     Statement count(database.get(), std::string("SELECT count(*) FROM ") + table);
     ASSERT_TRUE(count.step());
     EXPECT_EQ(count.integer(0), 0) << table;

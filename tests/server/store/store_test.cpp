@@ -162,28 +162,12 @@ TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
   EXPECT_THAT(rows("SELECT count(*), count(DISTINCT definition) FROM models"), ElementsAre("8|8"));
 }
 
-TEST_F(StoreTest, AttemptsOfFailuresAreKnownAfterARestartAlsoWhenTheFailuresAreForgotten) {
+TEST_F(StoreTest, FailuresThatWereNotForgottenAreKnownAfterARestart) {
   const auto study = study_of(10);
-  const auto failed_in = [&](std::uint32_t attempt, const std::vector<std::uint64_t>& points) {
-    AddResults change = failed(study, points);
-    change.attempt = attempt;
-    return change;
-  };
-  IntervalSet retried(2, 6);
-  retried.insert(8);
-  commit({study, worker(1), failed_in(1, {2, 3, 5}), failed_in(2, {4, 8, 9})});
-  commit({ForgetFailures{1, retried, "later"}});
-  commit({failed_in(3, {4})});
+  commit({study, worker(1), failed(study, {2, 3, 5, 9}), ForgetFailures{1, IntervalSet(2, 5), ""}});
   close();
-  std::map<std::uint64_t, std::uint32_t> attempts;
-  store().studies().at(0).attempts.for_each([&](const Interval& interval, std::uint32_t number) {
-    for (std::uint64_t point = interval.begin; point < interval.end; ++point) {
-      attempts[point] = number;
-    }
-  });
-  EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{
-                          {2, 1}, {3, 1}, {4, 3}, {5, 1}, {8, 2}, {9, 2}}));
-  EXPECT_THAT(rows("SELECT count(*) FROM retries"), ElementsAre("4")) << "neighbours share a row";
+  EXPECT_EQ(store().studies().at(0).failures.within(0, 10),
+            (std::vector<Interval>{{5, 6}, {9, 10}}));
 }
 
 TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
