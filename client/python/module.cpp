@@ -6,7 +6,7 @@
 #include "client/python/database.h"
 #include "client/python/solving.h"
 #include "server/database/sqlite.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 /// What the package oblique (folder oblique/) is made over.

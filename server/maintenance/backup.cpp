@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/database/open_for_reading.h"
+#include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/check.h"
 #include "server/store/completed_ranges.h"
@@ -173,17 +173,16 @@ void mend(sqlite3* database) {
 
 }  // namespace
 
-std::string copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
-  const OpenedForReading source = open_stored(from);
+void copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
+  const DatabaseHandle source = open_stored(from);
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-  copy_pages(source.database.get(), copy.get(), to);
+  copy_pages(source.get(), copy.get(), to);
   // So that the copy is one file, without a log.
   execute(copy.get(), "PRAGMA journal_mode = DELETE");
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());
   }
-  return source.remark;
 }
 
 void back_up(const std::string& from, const std::string& to) {
@@ -195,7 +194,7 @@ void back_up(const std::string& from, const std::string& to) {
 
 Salvaged salvage(const std::string& from, const std::string& to) {
   check_is_new(to);
-  const DatabaseHandle source = open_for_reading(from).database;
+  const DatabaseHandle source = open_for_reading(from);
   // So that SQLite reads a file that is shorter than its first page says.
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_tables(source.get(), from);

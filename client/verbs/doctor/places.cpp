@@ -11,7 +11,6 @@
 
 #include "client/output/human_units.h"
 #include "server/database/database_file.h"
-#include "server/database/open_for_reading.h"
 #include "server/database/sqlite.h"
 
 namespace oblique::client::doctor {
@@ -52,7 +51,7 @@ std::optional<std::uint64_t> number(sqlite3* database, const std::string& sql) {
 }
 
 void add_contents(Findings& found, const std::string& file) {
-  const auto opened = server::open_without_traces(file);
+  const auto opened = server::open_for_reading(file);
   sqlite3* database = opened.get();
   const Glance glance(database);
   if (server::identify(database, file) == server::DatabaseKind::kEmpty) {

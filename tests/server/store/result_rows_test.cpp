@@ -53,34 +53,6 @@ TEST_F(ResultRowsTest, ColumnsAreThoseOfTheTable) {
   EXPECT_THAT(columns, UnorderedElementsAreArray(model_columns()));
 }
 
-TEST_F(ResultRowsTest, EveryOutputIsAColumnOfItsTypeAndTheViewForPeopleShowsIt) {
-  const auto shown = columns_of("runs");
-  const auto typed = rows("SELECT name || ' ' || type FROM pragma_table_info('results')");
-  const auto expect = [&](std::string_view column, const std::string& type) {
-    EXPECT_THAT(typed, Contains(fmt::format("{} {}", column, type)));
-    EXPECT_THAT(shown, Contains(std::string(column)));
-  };
-  solver::for_each_stored<double>(
-      [&](const auto& field, const auto&) { expect(field.column, "REAL"); });
-  solver::for_each_stored<std::int64_t>(
-      [&](const auto& field, const auto&) { expect(field.column, "INTEGER"); });
-  solver::for_each_stored<std::string>(
-      [&](const auto& field, const auto&) { expect(field.column, "TEXT"); });
-  for (const auto& field : solver::result_fields()) {
-    if (field.sent_with != solver::SentWith::kResult) {
-      EXPECT_THAT(shown, Contains(std::string(field.column)));
-    }
-  }
-  for (const solver::ResultList* list : solver::result_lists()) {
-    expect(list->column, "TEXT");
-    std::vector<std::string> members{"study_id", "point", "seq"};
-    members.insert(members.end(), list->members.begin(), list->members.end());
-    if (list->column != "ft_peaks") {
-      EXPECT_THAT(columns_of(std::string(list->column)), UnorderedElementsAreArray(members));
-    }
-  }
-}
-
 TEST_F(ResultRowsTest, ScalarsKeepEveryBit) {
   std::vector<protocol::PointResult> results;
   for (std::uint64_t point = 0; point < 50; ++point) {

@@ -155,16 +155,6 @@ TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRows
       << "a model that was deleted comes again";
 }
 
-TEST_F(StudyDeletionTest, AModelOfADeletedStudyMayBeUsedBeforeTheNextStart) {
-  add_solved(1, table_with_k(1e7, 5));
-  commit({DeleteStudy{1}});
-  clear_all(100);
-  add_solved(2, table_with_k(1e7, 5));
-  reopen();
-  EXPECT_EQ(rows_in("runs"), 5);
-  EXPECT_EQ(rows_in("workers"), 1);
-}
-
 TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
   add_solved(1, table_of(2000));
   add_solved(2, table_of(2000));
