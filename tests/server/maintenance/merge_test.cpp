@@ -142,7 +142,8 @@ TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
   EXPECT_EQ(again.results_known, 13U);
   EXPECT_EQ(again.studies_added + again.results_added, 0U) << "it was merged before";
   EXPECT_EQ(text("all", "SELECT (SELECT count(*) FROM models) || (SELECT count(*) FROM workers)"),
-            "12") << "equal workers are one";
+            "12")
+      << "equal workers are one";
 }
 
 TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndItIsDoneWhenNoneIsLeft) {

@@ -361,15 +361,5 @@ TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
   EXPECT_TRUE(add("d", half)) << "running queries do not count";
 }
 
-TEST_F(QueryQueueTest, ARemovedQueryIsNeverStarted) {
-  add("a");
-  add("a");
-  add("b");
-  queue_.remove(1);
-  queue_.remove(3);
-  queue_.remove(99);
-  EXPECT_EQ(start(), Names{"a:2"});
-}
-
 }  // namespace
 }  // namespace oblique::server

@@ -13,7 +13,6 @@ namespace oblique::server {
 namespace {
 
 using testing::ElementsAre;
-using testing::IsEmpty;
 
 class CompletedRangesTest : public StoreFixture {
  protected:

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,7 +14,6 @@
 namespace oblique::server {
 namespace {
 
-using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::UnorderedElementsAreArray;
@@ -158,19 +156,6 @@ TEST_F(ResultRowsTest, AFailedPointHasAReasonAndNoOutputs) {
   EXPECT_THAT(
       rows(fmt::format("SELECT coalesce({}) IS NULL FROM runs", fmt::join(output_columns(), ", "))),
       ElementsAre("1"));
-}
-
-TEST_F(ResultRowsTest, ARowThatBreaksARuleOfTheTableIsAnError) {
-  store();
-  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  ResultInsert insert(database.get());
-  const AddResults change = results_of(study_of(1), {});
-  protocol::Point inputs{0, std::numeric_limits<double>::quiet_NaN(), 0.5, 1.0};
-  EXPECT_THROW(insert.run(change, solved_point(0), inputs, 1), StorageError)
-      << "SQLite stores a NaN as NULL";
-  inputs.H_m = 1.0;
-  insert.run(change, solved_point(0), inputs, 1);
-  EXPECT_THAT(rows("SELECT status, count(*) FROM results"), ElementsAre("solved|1"));
 }
 
 TEST_F(ResultRowsTest, AGridTakesLessThan850BytesAPointWithAllIndices) {

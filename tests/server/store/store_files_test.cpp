@@ -15,7 +15,6 @@ namespace oblique::server {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
 using testing::IsEmpty;
 
 class StoreFilesTest : public StoreFixture {
