@@ -17,7 +17,6 @@
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"
 #include "server/query/columns.h"
-#include "server/query/query_rules.h"
 #include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 

@@ -8,7 +8,7 @@
 
 #include "client/python/calls.h"
 #include "server/database/sqlite.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::python {

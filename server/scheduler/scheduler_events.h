@@ -86,7 +86,6 @@ struct StudyAdded {
   bool paused = false;
   std::int32_t priority = 0;
   std::string solver_version{};  ///< of its results; empty without results
-  PointAttempts attempts{};      ///< of points that failed, now or before a retry
   bool held = false;
   std::uint64_t left_out = 0;  ///< number of settled points that a filter leaves out
 };
@@ -120,7 +119,6 @@ struct PriorityChanged {
 struct FailuresForgotten {
   StudyId study;
   IntervalSet points;
-  PointAttempts attempts{};  ///< in which they failed
 };
 /// It is durable that the study has further points after its earlier ones, and runs.
 struct StudyGrown {

@@ -22,7 +22,7 @@
 #include "proto/result_message.h"
 #include "proto/wire/chunk.h"
 #include "server/event_loop/event_loop.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 
