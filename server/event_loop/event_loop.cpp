@@ -76,7 +76,7 @@ EventLoop::EventLoop(LoopSettings settings)
                  });
                }),
       checks_([this](Completion done) {
-        completions_.put([this, done = std::move(done)] { service_->check_done(done, now()); });
+        completions_.put([this, done = std::move(done)] { done(now()); });
       }),
       network_(settings.network),
       workers_(network_.listen(access_.address(), settings.worker_port,

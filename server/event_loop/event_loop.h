@@ -2,25 +2,97 @@
 
 #include <array>
 #include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
+#include <thread>
+#include <utility>
 #include <vector>
 
-#include "server/event_loop/check_thread.h"
+#include "proto/system/descriptor.h"
 #include "server/network/access.h"
 #include "server/network/network.h"
 #include "server/query/query_pool.h"
+#include "server/service/ports/ports.h"
 #include "server/service/service.h"
 #include "server/store/store.h"
 #include "server/store/writer.h"
 #include "server/web/web.h"
 
 namespace oblique::server {
+
+/// Work that other threads leave for the event loop, which a descriptor wakes.
+class CompletionQueue {
+ public:
+  using Completion = std::function<void()>;
+
+  /// Thread-safe.
+  void put(Completion completion) {
+    const std::lock_guard lock(mutex_);
+    completions_.push_back(std::move(completion));
+    woken_.wake();
+  }
+  /// Called by the loop: runs everything that was put before.
+  void run() {
+    woken_.clear();
+    std::vector<Completion> completions;
+    {
+      const std::lock_guard lock(mutex_);
+      completions.swap(completions_);
+    }
+    for (const Completion& completion : completions) {
+      completion();
+    }
+  }
+  /// Readable when there is something to run.
+  int descriptor() const { return woken_.descriptor(); }
+
+ private:
+  protocol::WakeUp woken_;
+  std::mutex mutex_;
+  std::vector<Completion> completions_;  // guarded by mutex_
+};
+
+/// Runs checks that take long, in order, on a thread of its own. How many wait is bounded by those
+/// who submit them. The destructor drops the checks that wait, and waits for the one that runs.
+class CheckThread {
+ public:
+  /// `done` is called on the thread after each check.
+  explicit CheckThread(std::function<void(Ports::Completion)> done)
+      : done_(std::move(done)), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+  void submit(Ports::Check check) {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back(std::move(check));
+    wake_.notify_all();
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (wake_.wait(lock, stop, [this] { return !waiting_.empty(); }) && !stop.stop_requested()) {
+      const Ports::Check check = std::move(waiting_.front());
+      waiting_.pop_front();
+      lock.unlock();
+      done_(check());
+      lock.lock();
+    }
+  }
+
+  const std::function<void(Ports::Completion)> done_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::deque<Ports::Check> waiting_;  // guarded by mutex_
+  std::jthread thread_;               // last: it uses the other members
+};
 
 /// The state of the loop, as the service manager gets it.
 struct LoopState {

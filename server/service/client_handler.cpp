@@ -14,18 +14,16 @@
 namespace oblique::server {
 namespace {
 
-constexpr const char* kStopping = "the server is stopping: ask again when it runs";
-
-/// Longer requests are read on the check thread.
-constexpr std::size_t kLongestInlineFrame = std::size_t{64} * 1024;
 /// Requests that wait for the check thread, in all and of one client, and their bytes.
 constexpr std::size_t kMostChecks = 64;
 constexpr std::size_t kMostChecksOfClient = 2;
 constexpr std::size_t kMostCheckedBytes = std::size_t{64} << 20U;
 
-/// Number of entries of a page; 0: as many as there may be.
-int page_size(std::uint32_t requested, std::size_t largest) {
-  return static_cast<int>(requested == 0 ? largest : std::min<std::size_t>(requested, largest));
+/// Studies or workers in a reply, which takes the service's thread some milliseconds; 0 requested:
+/// as many as allowed.
+int page_size(std::uint32_t requested) {
+  constexpr std::uint32_t kMost = 1000;
+  return static_cast<int>(requested == 0 ? kMost : std::min(requested, kMost));
 }
 
 }  // namespace
@@ -34,7 +32,7 @@ int page_size(std::uint32_t requested, std::size_t largest) {
 
 void ClientHandler::frame(const std::string& identity, std::string_view frame, Instant now,
                           const std::shared_ptr<const KeyIdentity>& holder) {
-  if (frame.size() > kLongestInlineFrame) {
+  if (frame.size() > limits::kLongestInlineRequest) {
     check({identity, protocol::request_id_of(frame), holder}, frame, now);
     return;
   }
@@ -306,7 +304,7 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
     core_.ports.reply(client, std::move(reply));
     return;
   }
-  const int most = page_size(request.limit(), settings_.largest_page);
+  const int most = page_size(request.limit());
   std::size_t bytes = 0;
   std::uint64_t last = request.after_study_id();
   while (const auto id = states.durable_after(last)) {
@@ -342,7 +340,7 @@ void ClientHandler::workers(const Client& client, const protocol::WorkersRequest
   if (request.after_worker_id() == 0) {
     core_.ports.add_peers(fields);
   }
-  const int most = page_size(request.limit(), settings_.largest_page);
+  const int most = page_size(request.limit());
   std::uint64_t last = request.after_worker_id();
   while (const auto id = core_.workers.next_after(last)) {
     if (fields.workers_size() == most) {

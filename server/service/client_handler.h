@@ -11,7 +11,7 @@
 #include "server/service/ports/ports.h"
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
-#include "server/service/traces/trace_handler.h"
+#include "server/service/trace_handler.h"
 #include "server/service/worker_sessions.h"
 
 namespace oblique::server {
@@ -20,7 +20,6 @@ struct ClientHandlerSettings {
   /// Interval of the messages that a request waits or runs. A failure to send one shows that the
   /// client is gone.
   std::int64_t still_working_every_ms = 1000;
-  std::size_t largest_page = 1000;  ///< studies or workers in one reply
   std::string access = "loopback";  ///< as StatusReply.access
   std::string version{};            ///< as StatusReply.version
 };

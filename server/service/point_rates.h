@@ -1,37 +1,71 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <map>
 
 namespace oblique::server {
 
-/// Points per second over the last seconds, by study or worker. Only those whose count changed
-/// lately are kept, so that the others cost nothing.
+/// Points per second over the last seconds, by study or worker.
 class PointRates {
  public:
   using Id = std::uint64_t;
-  /// Returns how many points of a study are completed, or a worker has solved.
-  using Count = std::function<std::uint64_t(Id)>;
 
-  /// The count will change. It was `count` at all times since `since_ms`.
-  void begin(Id id, std::uint64_t count, std::int64_t since_ms, std::int64_t now_ms);
-  /// To be called several times a second.
-  void sample(const Count& count, std::int64_t now_ms);
-  void forget(Id id) { samples_.erase(id); }
+  /// Points were completed. None was between `since_ms` and the first call for this ID.
+  void add(Id id, std::uint64_t points, std::int64_t since_ms, std::int64_t now_ms) {
+    Recent& recent = recent_.try_emplace(id, Recent{since_ms}).first->second;
+    if (recent.points.empty() || now_ms - recent.points.back().at_ms >= kResolution_ms) {
+      recent.points.push_back({now_ms, 0});
+    }
+    recent.points.back().points += points;
+    while (now_ms - recent.points.front().at_ms >= kSpan_ms) {
+      recent.points.pop_front();
+    }
+  }
+  void forget(Id id) { recent_.erase(id); }
+  /// Frees IDs without recent points. To be called now and then.
+  void forget_old(std::int64_t now_ms) {
+    std::erase_if(recent_, [now_ms](const auto& entry) {
+      return now_ms - entry.second.points.back().at_ms >= kSpan_ms;
+    });
+  }
 
-  double points_per_s(Id id, std::uint64_t count, std::int64_t now_ms) const;
+  double points_per_s(Id id, std::int64_t now_ms) const {
+    const auto found = recent_.find(id);
+    return found == recent_.end() ? 0.0 : rate_of(found->second, now_ms);
+  }
   /// The sum of all.
-  double points_per_s(const Count& count, std::int64_t now_ms) const;
+  double points_per_s(std::int64_t now_ms) const {
+    double sum = 0.0;
+    for (const auto& [id, recent] : recent_) {
+      sum += rate_of(recent, now_ms);
+    }
+    return sum;
+  }
 
  private:
+  static constexpr std::int64_t kSpan_ms = 5000;
+  static constexpr std::int64_t kResolution_ms = 100;
   struct Sample {
     std::int64_t at_ms;
-    std::uint64_t count;
+    std::uint64_t points;
   };
-  /// The first sample is the last one before the time span, or at its start.
-  std::map<Id, std::deque<Sample>> samples_;
+  struct Recent {
+    std::int64_t since_ms;
+    std::deque<Sample> points{};  ///< the oldest first
+  };
+
+  static double rate_of(const Recent& recent, std::int64_t now_ms) {
+    std::uint64_t points = 0;
+    for (const Sample& sample : recent.points) {
+      points += now_ms - sample.at_ms < kSpan_ms ? sample.points : 0;
+    }
+    const std::int64_t span_ms = std::min(kSpan_ms, now_ms - recent.since_ms);
+    return span_ms <= 0 ? 0.0 : 1000.0 * static_cast<double>(points) / static_cast<double>(span_ms);
+  }
+
+  std::map<Id, Recent> recent_;
 };
 
 }  // namespace oblique::server

@@ -139,7 +139,7 @@ void ReuseTracker::end_stored(StudyId id, Instant now) {
     reused_.erase(id);
   }
   feed_(StudyHeld{id, false}, now);
-  on_end_(id, now);
+  on_end_(now);
 }
 
 bool ReuseTracker::is_under_way(StudyId id) const {

@@ -28,10 +28,10 @@ class ReuseTracker {
   static constexpr std::uint64_t kMostProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
 
-  /// Results of `solver_version` are reused; empty: none. `on_end` is called after the lookup of a
-  /// study. The references must outlive this.
+  /// Results of `solver_version` are reused; empty: none. `on_end` is called after each lookup.
+  /// The references must outlive this.
   ReuseTracker(std::string solver_version, Ports& ports, const StudyStates& states,
-               WriteLedger& ledger, Feed feed, std::function<void(StudyId, Instant)> on_end)
+               WriteLedger& ledger, Feed feed, std::function<void(Instant)> on_end)
       : solver_version_(std::move(solver_version)),
         ports_(ports),
         states_(states),
@@ -82,7 +82,7 @@ class ReuseTracker {
   const StudyStates& states_;
   WriteLedger& ledger_;
   Feed feed_;
-  std::function<void(StudyId, Instant)> on_end_;
+  std::function<void(Instant)> on_end_;
   std::set<StudyId> sources_;
   std::map<StudyId, Reused> reused_;
   bool stopping_ = false;

@@ -34,10 +34,7 @@ Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<Stor
       reuse_(
           settings.solver_version, ports, states_, ledger_,
           [this](const Event& event, Instant then) { feed(event, then); },
-          [this](StudyId id, Instant then) {
-            rates_.forget(id);  // the reused points were not solved
-            changes_.release_replies(then);
-          }),
+          [this](Instant then) { changes_.release_replies(then); }),
       bad_frames_(ports),
       workers_({settings.heartbeat_interval_ms, settings.scheduler.lost_after_ms,
                 settings.solver_version, settings.database_id, settings.last_worker_id,
@@ -48,7 +45,7 @@ Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<Stor
           ledger_, reuse_,        workers_,
           rates_,  worker_rates_, [this](const Event& event, Instant then) { feed(event, then); }},
       changes_(settings.last_study_id, settings.bounds, core_),
-      traces_(settings.solver_version, ports, settings.clients.still_working_every_ms),
+      traces_(settings.solver_version, settings.clients.still_working_every_ms, ports, workers_),
       clients_(settings.clients, core_, bad_frames_, changes_, traces_) {
   for (StoredStudy& study : studies) {
     restore(std::move(study), settings.only_study, now);
@@ -91,23 +88,6 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
   }
   handle_worker_events(now);
   hold_or_release_batches(now);
-  send_traces();
-}
-
-void Service::client_frame(const std::string& identity, std::string_view frame, Instant now,
-                           const std::shared_ptr<const KeyIdentity>& holder) {
-  clients_.frame(identity, frame, now, holder);
-  send_traces();
-}
-
-void Service::client_left(std::string_view identity) {
-  clients_.client_left(identity);
-  send_traces();
-}
-
-void Service::check_done(const Ports::Completion& completion, Instant now) {
-  completion(now);
-  send_traces();
 }
 
 void Service::tick(Instant now) {
@@ -115,15 +95,9 @@ void Service::tick(Instant now) {
   feed(Tick{}, now);
   ledger_.tick(now.steady_ms);
   clients_.tick(now);
-  send_traces();
   changes_.release_replies(now);
-  rates_.sample([this](StudyId id) { return completed_of(id); }, now.steady_ms);
-  // The count of a worker that is gone stays at 0.
-  worker_rates_.sample(
-      [this](WorkerId id) {
-        return scheduler_.knows_worker(id) ? scheduler_.solved_points(id) : 0;
-      },
-      now.steady_ms);
+  rates_.forget_old(now.steady_ms);
+  worker_rates_.forget_old(now.steady_ms);
 }
 
 void Service::drain(Instant now) {
@@ -140,11 +114,6 @@ void Service::stop(Instant now) {
   hold_or_release_batches(now);
   workers_.stop();
   clients_.stop();
-  send_traces();
-}
-
-double Service::points_per_s(std::int64_t now_ms) const {
-  return rates_.points_per_s([this](StudyId id) { return completed_of(id); }, now_ms);
 }
 
 protocol::StudyStatus Service::study_status(StudyId id, Instant now) const {
@@ -175,15 +144,17 @@ void Service::handle(const Event& event, Instant now, protocol::Results* results
                            [&](const StoreResults& effect) { store(effect, *results, now); },
                            [&](const StoreFailure& effect) { store(effect, now); },
                            [&](const DropWorker& effect) {
-                             traces_.left(effect.worker);
                              workers_.drop(effect, now);
+                             traces_.worker_left(effect.worker);
                            },
                            [&](const StudyFinished& effect) { changes_.finish(effect.study, now); },
                            [&](const auto& message) { workers_.send(message); }};
   for (const Effect& effect : scheduler_.handle(event, now.steady_ms)) {
     std::visit(perform, effect);
   }
-  update_traces(event);
+  if (const auto* left = std::get_if<WorkerLeft>(&event)) {
+    traces_.worker_left(left->worker);
+  }
 }
 
 /// The events that were found while messages were sent to workers.
@@ -212,19 +183,6 @@ void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& messa
       result = protocol::failed_point(result.point(), fault);
       event.outcomes[i].failed = true;
     }
-  }
-}
-
-/// Workers solve traces, too.
-void Service::update_traces(const Event& event) {
-  if (const auto* joined = std::get_if<WorkerJoined>(&event)) {
-    if (const WorkerRecord* worker = workers_.find(joined->worker)) {
-      traces_.joined(joined->worker, worker->name, worker->instruction_set);
-    }
-  } else if (const auto* left = std::get_if<WorkerLeft>(&event)) {
-    traces_.left(left->worker);
-  } else if (const auto* busy = std::get_if<WorkerBusy>(&event)) {
-    traces_.set_busy(busy->worker, busy->is_busy);
   }
 }
 
@@ -286,20 +244,20 @@ void Service::results_stored(const ResultsStored& event, Instant now) {
     feed(event, now);  // the study was deleted, and the database dropped these
     return;
   }
+  std::uint64_t solved = 0;
   for (const PointOutcome& outcome : event.outcomes) {
     if (outcome.failed) {
       states_.point_failed(id, outcome.point);
     }
-    ++(outcome.failed ? stored_points_.failed : stored_points_.solved);
+    solved += outcome.failed ? 0 : 1;
   }
-  if (!event.outcomes.empty() || !event.left_out.empty()) {
-    rates_.begin(id, completed_of(id), states_.record(id).since_ms, now.steady_ms);
-  }
+  stored_points_.solved += solved;
+  stored_points_.failed += event.outcomes.size() - solved;
+  rates_.add(id, event.outcomes.size() + event.left_out.size(), states_.record(id).since_ms,
+             now.steady_ms);
+  worker_rates_.add(event.worker, solved, 0, now.steady_ms);
   if (!event.outcomes.empty()) {
     reuse_.add_source(id);
-  }
-  if (scheduler_.knows_worker(event.worker)) {
-    worker_rates_.begin(event.worker, scheduler_.solved_points(event.worker), 0, now.steady_ms);
   }
   feed(event, now);
 }

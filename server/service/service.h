@@ -15,7 +15,7 @@
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
 #include "server/service/study_states.h"
-#include "server/service/traces/trace_handler.h"
+#include "server/service/trace_handler.h"
 #include "server/service/worker_sessions.h"
 #include "server/service/write_ledger.h"
 #include "server/store/store.h"
@@ -56,12 +56,13 @@ class Service {
   void worker_frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::shared_ptr<const KeyIdentity>& holder = nullptr);
   void client_frame(const std::string& identity, std::string_view frame, Instant now,
-                    const std::shared_ptr<const KeyIdentity>& holder = nullptr);
+                    const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
+    clients_.frame(identity, frame, now, holder);
+  }
   /// The connection of that client is gone.
-  void client_left(std::string_view identity);
+  void client_left(std::string_view identity) { clients_.client_left(identity); }
   void written(const WriteReport& report, Instant now);
   void query_report(QueryReport report) { clients_.query_report(std::move(report)); }
-  void check_done(const Ports::Completion& completion, Instant now);
   /// To be called several times a second.
   void tick(Instant now);
   /// Hands out nothing and accepts no study any more; results are stored as before.
@@ -84,7 +85,6 @@ class Service {
   QueryCounts query_counts() const { return clients_.query_counts(); }
   const StoredPoints& stored_points() const { return stored_points_; }
   std::uint64_t bad_frames() const { return bad_frames_.total(); }
-  double points_per_s(std::int64_t now_ms) const;
   /// Of a durable study.
   protocol::StudyStatus study_status(StudyId id, Instant now) const;
   std::vector<protocol::WorkerStatus> worker_statuses(std::size_t most, Instant now) const;
@@ -97,13 +97,6 @@ class Service {
   void handle_worker_events(Instant now);
   void fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const;
   void hold_or_release_batches(Instant now);
-  void update_traces(const Event& event);
-  void send_traces() {
-    for (const auto& [worker, message] : traces_.take_messages()) {
-      workers_.send(worker, message);
-    }
-  }
-  std::uint64_t completed_of(StudyId id) const { return scheduler_.points(id).settled; }
   void store(const StoreResults& effect, protocol::Results& message, Instant now);
   void store(const StoreFailure& effect, Instant now);
   void write_results(AddResults change, ResultsStored event);

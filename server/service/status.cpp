@@ -72,7 +72,7 @@ protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
   status.set_submitted_by(record.submitted_by);
   const protocol::TakenOver reused = core.reuse.status(id);
   if (state == StudyState::kRunning) {
-    status.set_points_per_s(core.rates.points_per_s(id, completed, now.steady_ms));
+    status.set_points_per_s(core.rates.points_per_s(id, now.steady_ms));
     if (completed < counts.points) {
       status.set_waits_for(reason_to_wait(id, core, counts, reused, now));
     }
@@ -100,7 +100,7 @@ protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now)
   status.set_proven(counts.is_proven);
   status.set_key(worker.key);
   status.set_host(worker.host);
-  status.set_points_per_s(core.worker_rates.points_per_s(id, counts.solved_points, now.steady_ms));
+  status.set_points_per_s(core.worker_rates.points_per_s(id, now.steady_ms));
   status.set_state(worker_state(counts, worker.is_busy));
   return status;
 }

@@ -24,10 +24,6 @@ constexpr std::size_t kMostDeferred = 1000;
 /// In place of the state of a study that was deleted.
 constexpr const char* kDeletedState = "deleted";
 
-std::string not_changed(const std::string& error) {
-  return "the change was not stored, the study is as before: " + error;
-}
-
 }  // namespace
 
 std::string unknown_study(const std::string& name, const StudyStates& states) {
@@ -71,31 +67,35 @@ ReadRequest read_request(std::string_view frame, bool judges) {
 
 // ---- Writing -----------------------------------------------------------------------------------
 
-void StudyChanges::write(StudyId id, Pending pending, Change change, OnStored on_stored,
-                         OnRefused on_refused) {
-  pending_.insert_or_assign(id, std::move(pending));
-  const auto end = [this, id](Instant now, const auto& act) {
-    const auto ended = pending_.extract(id);
-    act(ended.mapped());
-    for (const auto& request : ended.mapped().deferred) {
+/// Writes the change. A refusal is the reply to the client, after `on_refused`.
+void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored,
+                         std::function<void()> on_refused) {
+  pending_[id];
+  const auto run_deferred = [](const Pending& ended, Instant now) {
+    for (const auto& request : ended.deferred) {
       request(now);
     }
   };
   core_.ledger.write(
       std::move(change),
-      [end, on_stored = std::move(on_stored)](Instant now) {
-        end(now, [&](const Pending& ended) { on_stored(ended, now); });
+      [this, id, run_deferred, on_stored = std::move(on_stored)](Instant now) {
+        const auto ended = pending_.extract(id);
+        on_stored(now);
+        run_deferred(ended.mapped(), now);
       },
-      [end, on_refused = std::move(on_refused)](const std::string& error, Instant now) {
-        end(now, [&](const Pending& ended) { on_refused(ended, error, now); });
+      [this, client, id, run_deferred, on_refused = std::move(on_refused)](const std::string& error,
+                                                                           Instant now) {
+        const auto ended = pending_.extract(id);
+        on_refused();
+        core_.ports.reply_error(client, (core_.states.contains(id)
+                                             ? "the change was not stored, the study is as before: "
+                                             : "the study was not stored: ") +
+                                            error);
+        if (ended.mapped().is_complete) {
+          finish(id, now);
+        }
+        run_deferred(ended.mapped(), now);
       });
-}
-
-void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored) {
-  write(id, {}, std::move(change), std::move(on_stored),
-        [this, client](const Pending&, const std::string& error, Instant) {
-          core_.ports.reply_error(client, not_changed(error));
-        });
 }
 
 /// Whether the request waits until the change of the study that is being written has an outcome. It
@@ -132,12 +132,6 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     add(client, read, priority, now);
     return;
   }
-  const auto pending = pending_.find(*known);
-  if (pending != pending_.end() && !pending->second.submitters.empty() &&
-      pending->second.table.is_of_the_recipe_of(read.table)) {
-    pending->second.submitters.push_back(client);
-    return;
-  }
   if (defers(client, *known, [this, client, read](Instant then) { submit(client, read, then); })) {
     return;
   }
@@ -147,7 +141,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   } else if (study.priority != priority) {
     set_priority(client, *known, priority);
   } else {
-    resume_submitted(client, *known, now);
+    change_state(client, *known, StudyState::kRunning, submitted_reply(client, *known), now);
   }
 }
 
@@ -160,8 +154,9 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
   const bool reuses = !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, {});
-  core_.states.add(id, {name, read.table, created_at, priority, {}, now.steady_ms, client.key()});
-  const auto on_stored = [this, id, reuses](const Pending& added, Instant then) {
+  core_.states.add(id,
+                   {name, read.table, created_at, priority, {}, now.steady_ms, client.key()});
+  const auto on_stored = [this, client, id, reuses](Instant then) {
     core_.states.set_durable(id, then.steady_ms);
     const StudyRecord& study = core_.states.record(id);
     log(id, fmt::format("of {} points begins", study.table.size()));
@@ -171,20 +166,10 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
     if (reuses) {
       core_.reuse.begin(id, then);
     }
-    bool created = true;
-    for (const Client& submitter : added.submitters) {
-      reply_submitted(submitter, id, std::exchange(created, false), then);
-    }
+    reply_submitted(client, id, true, then);
   };
-  const auto on_refused = [this, id](const Pending& refused, const std::string& error, Instant) {
-    core_.states.remove(id);
-    for (const Client& submitter : refused.submitters) {
-      core_.ports.reply_error(submitter, "the study was not stored: " + error);
-    }
-  };
-  write(id, {read.table, {client}},
-        AddStudy{id, name, read.table, created_at, priority, client.key(), reuses}, on_stored,
-        on_refused);
+  write(client, id, AddStudy{id, name, read.table, created_at, priority, client.key(), reuses},
+        on_stored, [this, id] { core_.states.remove(id); });
 }
 
 /// The submitted recipe is not that of the study: appends its further points, or refuses it.
@@ -216,55 +201,33 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
   const protocol::StudyStatus before = study_status(id, core_, now);
   const bool reuses =
       !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, before.solver_version());
-  const auto on_stored = [this, id, priority, points_before, was = before.state(), reuses](
-                             const Pending& grown, Instant then) {
-    core_.states.grow(id, grown.table, priority);
-    log(id, fmt::format("grows from {} to {} points", points_before, grown.table.size()));
+  const auto on_stored = [this, client, id, table = read.table, priority, points_before,
+                          was = before.state(), reuses](Instant then) {
+    core_.states.grow(id, table, priority);
+    log(id, fmt::format("grows from {} to {} points", points_before, table.size()));
     if (reuses) {
       core_.feed(StudyHeld{id, true}, then);
     }
-    core_.feed(StudyGrown{id, grown.table, priority}, then);
+    core_.feed(StudyGrown{id, table, priority}, then);
     if (reuses) {
       core_.reuse.begin(id, then);
     }
     protocol::SubmitReply more;
-    more.set_appended(grown.table.size() - points_before);
+    more.set_appended(table.size() - points_before);
     more.set_was(was);
-    for (const Client& submitter : grown.submitters) {
-      reply_submitted(submitter, id, false, then, more);
-    }
+    reply_submitted(client, id, false, then, more);
   };
-  const auto on_refused = [this, id](const Pending& refused, const std::string& error,
-                                     Instant then) {
-    core_.states.set_doubtful(id);
-    for (const Client& submitter : refused.submitters) {
-      core_.ports.reply_error(submitter, not_changed(error));
-    }
-    if (refused.is_complete) {
-      finish(id, then);
-    }
-  };
-  write(id, {read.table, {client}}, GrowStudy{id, read.table, priority, iso_8601(now), reuses},
-        on_stored, on_refused);
+  write(client, id, GrowStudy{id, read.table, priority, iso_8601(now), reuses}, on_stored,
+        [this, id] { core_.states.set_doubtful(id); });
+  pending_.at(id).grows = true;
 }
 
 void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t priority) {
-  write(client, id, SetPriority{id, priority},
-        [this, client, id, priority](const Pending&, Instant then) {
-          core_.states.set_priority(id, priority);
-          core_.feed(PriorityChanged{id, priority}, then);
-          resume_submitted(client, id, then);
-        });
-}
-
-/// The study was submitted again as it is.
-void StudyChanges::resume_submitted(const Client& client, StudyId id, Instant now) {
-  const auto reply = [this, client, id](Instant then) { reply_submitted(client, id, false, then); };
-  if (!core_.states.needs_write(id, StudyState::kRunning)) {
-    reply(now);
-  } else if (may_reopen(client, id)) {
-    set_state(client, id, StudyState::kRunning, reply, now);
-  }
+  write(client, id, SetPriority{id, priority}, [this, client, id, priority](Instant then) {
+    core_.states.set_priority(id, priority);
+    core_.feed(PriorityChanged{id, priority}, then);
+    change_state(client, id, StudyState::kRunning, submitted_reply(client, id), then);
+  });
 }
 
 // ---- Change ------------------------------------------------------------------------------------
@@ -290,19 +253,20 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
              [this, client, request](Instant then) { change(client, request, then); })) {
     return;
   }
+  const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
   switch (request.change()) {
     case protocol::STUDY_CHANGE_CANCEL:
-      change_state(client, id, StudyState::kCancelled, now);
+      change_state(client, id, StudyState::kCancelled, reply, now);
       break;
     case protocol::STUDY_CHANGE_PAUSE:
       // Nothing of a cancelled study is handed out either.
       change_state(client, id,
                    core_.states.state(id) == StudyState::kCancelled ? StudyState::kCancelled
                                                                     : StudyState::kPaused,
-                   now);
+                   reply, now);
       break;
     case protocol::STUDY_CHANGE_RESUME:
-      change_state(client, id, StudyState::kRunning, now);
+      change_state(client, id, StudyState::kRunning, reply, now);
       break;
     case protocol::STUDY_CHANGE_RETRY:
       retry(client, id, now);
@@ -319,33 +283,29 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
   }
 }
 
-void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted, Instant now) {
-  const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
+/// The reply is sent at once if the study has the state already.
+void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted,
+                                std::function<void(Instant)> reply, Instant now) {
   if (!core_.states.needs_write(id, wanted)) {
     reply(now);
-  } else if (wanted != StudyState::kRunning || may_reopen(client, id)) {
-    set_state(client, id, wanted, reply, now);
+    return;
   }
-}
-
-void StudyChanges::set_state(const Client& client, StudyId id, StudyState state,
-                             std::function<void(Instant)> reply, Instant now) {
-  const auto on_stored = [this, id, state, reply = std::move(reply)](const Pending&, Instant then) {
-    core_.states.set_state(id, state);
-    if (state == StudyState::kRunning) {
+  if (wanted == StudyState::kRunning && !may_reopen(client, id)) {
+    return;
+  }
+  const auto on_stored = [this, id, wanted, reply = std::move(reply)](Instant then) {
+    core_.states.set_state(id, wanted);
+    if (wanted == StudyState::kRunning) {
       log(id, "goes on");
       core_.feed(StudyReopened{id}, then);
     } else {
-      log(id, fmt::format("is {}", state_name(state)));
-      core_.feed(state == StudyState::kPaused ? Event(StudyPaused{id}) : StudyCancelled{id}, then);
+      log(id, fmt::format("is {}", state_name(wanted)));
+      core_.feed(wanted == StudyState::kPaused ? Event(StudyPaused{id}) : StudyCancelled{id}, then);
     }
     reply(then);
   };
-  const auto on_refused = [this, client, id](const Pending&, const std::string& error, Instant) {
-    core_.states.set_doubtful(id);
-    core_.ports.reply_error(client, not_changed(error));
-  };
-  write(id, {}, SetStudyState{id, state, iso_8601(now)}, on_stored, on_refused);
+  write(client, id, SetStudyState{id, wanted, iso_8601(now)}, on_stored,
+        [this, id] { core_.states.set_doubtful(id); });
 }
 
 void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
@@ -365,7 +325,7 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
     return;
   }
   write(client, id, ForgetFailures{id, failures, iso_8601(now)},
-        [this, client, id, failures](const Pending&, Instant then) {
+        [this, client, id, failures](Instant then) {
           core_.rates.forget(id);  // fewer points are completed now
           core_.states.forget_failures(id, failures, then.steady_ms);
           log(id, fmt::format("tries its failed points again: {}", failures.size()));
@@ -391,21 +351,18 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
   } else {
     core_.states.reserve(id, name);
     write(
-        id, {}, RenameStudy{id, name},
-        [this, client, id, name](const Pending&, Instant then) {
+        client, id, RenameStudy{id, name},
+        [this, client, id, name](Instant then) {
           log(id, fmt::format("is called {} from now on", name));
           core_.states.rename(id, name);
           reply_changed(client, id, 0, then);
         },
-        [this, client, name](const Pending&, const std::string& error, Instant) {
-          core_.states.release(name);
-          core_.ports.reply_error(client, not_changed(error));
-        });
+        [this, name] { core_.states.release(name); });
   }
 }
 
 void StudyChanges::remove(const Client& client, StudyId id) {
-  write(client, id, DeleteStudy{id}, [this, client, id](const Pending&, Instant then) {
+  write(client, id, DeleteStudy{id}, [this, client, id](Instant then) {
     const protocol::StudyStatus last = study_status(id, core_, then);
     log(id, "is deleted");
     core_.rates.forget(id);
@@ -419,8 +376,8 @@ void StudyChanges::remove(const Client& client, StudyId id) {
 
 void StudyChanges::finish(StudyId id, Instant now) {
   const auto pending = pending_.find(id);
-  if (pending != pending_.end() && !pending->second.submitters.empty()) {
-    pending->second.is_complete = true;  // further points are being written
+  if (pending != pending_.end() && pending->second.grows) {
+    pending->second.is_complete = true;
   } else if (core_.states.finish(id)) {
     log(id, "is done");
     core_.ledger.write(SetStudyState{id, StudyState::kDone, iso_8601(now)});

@@ -58,9 +58,8 @@ class StudyChanges {
  private:
   /// A change of a study that is being written.
   struct Pending {
-    StudyTable table{};                ///< that is added or grown to; none: another change
-    std::vector<Client> submitters{};  ///< that submitted this table
-    bool is_complete = false;          ///< the points of before are completed meanwhile
+    bool grows = false;        ///< further points are being written
+    bool is_complete = false;  ///< the points of before are completed meanwhile
     std::vector<std::function<void(Instant)>> deferred{};  ///< later requests
   };
   /// A reply to a submission that waits until results are reused.
@@ -70,21 +69,21 @@ class StudyChanges {
     protocol::ClientReply reply;
     std::int64_t until_ms;
   };
-  using OnStored = std::function<void(const Pending&, Instant)>;
-  using OnRefused = std::function<void(const Pending&, const std::string& error, Instant)>;
+  using OnStored = std::function<void(Instant)>;
 
-  void write(StudyId id, Pending pending, Change change, OnStored on_stored, OnRefused on_refused);
-  /// The same for a change that one client waits for.
-  void write(const Client& client, StudyId id, Change change, OnStored on_stored);
+  void write(
+      const Client& client, StudyId id, Change change, OnStored on_stored,
+      std::function<void()> on_refused = [] {});
   bool defers(const Client& client, StudyId id, std::function<void(Instant)> request);
   void add(const Client& client, const ReadRequest& read, std::int32_t priority, Instant now);
   void grow(const Client& client, StudyId id, const ReadRequest& read, std::int32_t priority,
             Instant now);
   void set_priority(const Client& client, StudyId id, std::int32_t priority);
-  void resume_submitted(const Client& client, StudyId id, Instant now);
-  void set_state(const Client& client, StudyId id, StudyState state,
-                 std::function<void(Instant)> reply, Instant now);
-  void change_state(const Client& client, StudyId id, StudyState wanted, Instant now);
+  void change_state(const Client& client, StudyId id, StudyState wanted,
+                    std::function<void(Instant)> reply, Instant now);
+  std::function<void(Instant)> submitted_reply(const Client& client, StudyId id) {
+    return [this, client, id](Instant now) { reply_submitted(client, id, false, now); };
+  }
   void retry(const Client& client, StudyId id, Instant now);
   void rename(const Client& client, const protocol::ChangeRequest& request, StudyId id,
               Instant now);

@@ -7,26 +7,29 @@
 
 namespace oblique::server {
 
-void StudyStates::count(StudyId id, const Study& study) {
-  ++counts_.at(static_cast<std::size_t>(study.state));
-  if (study.state == StudyState::kRunning || study.state == StudyState::kPaused) {
-    unfinished_.insert(id);
-    open_points_ += study.record.table.size();
-  }
-}
-
-void StudyStates::discount(StudyId id, const Study& study) {
-  --counts_.at(static_cast<std::size_t>(study.state));
-  if (unfinished_.erase(id) != 0) {
-    open_points_ -= study.record.table.size();
-  }
-}
-
 void StudyStates::move(StudyId id, StudyState state) {
-  Study& study = studies_.at(id);
-  discount(id, study);
-  study.state = state;
-  count(id, study);
+  studies_.at(id).state = state;
+  if (state == StudyState::kRunning || state == StudyState::kPaused) {
+    unfinished_.insert(id);
+  } else {
+    unfinished_.erase(id);
+  }
+}
+
+std::array<std::uint64_t, kStudyStates> StudyStates::counts() const {
+  std::array<std::uint64_t, kStudyStates> counts{};
+  for (const auto& [id, study] : studies_) {
+    ++counts.at(static_cast<std::size_t>(study.state));
+  }
+  return counts;
+}
+
+std::uint64_t StudyStates::open_points() const {
+  std::uint64_t points = 0;
+  for (const StudyId id : unfinished_) {
+    points += record(id).table.size();
+  }
+  return points;
 }
 
 void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
@@ -40,7 +43,8 @@ void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
 
 void StudyStates::add(StudyId id, StudyRecord record) {
   ids_.emplace(record.name, id);
-  count(id, studies_.emplace(id, Study{std::move(record)}).first->second);
+  studies_.emplace(id, Study{std::move(record)});
+  unfinished_.insert(id);
 }
 
 void StudyStates::set_durable(StudyId id, std::int64_t now_ms) {
@@ -51,7 +55,7 @@ void StudyStates::set_durable(StudyId id, std::int64_t now_ms) {
 
 void StudyStates::remove(StudyId id) {
   const auto study = studies_.find(id);
-  discount(id, study->second);
+  unfinished_.erase(id);
   ids_.erase(study->second.record.name);
   studies_.erase(study);
 }
@@ -116,12 +120,10 @@ void StudyStates::rename(StudyId id, const std::string& name) {
 
 void StudyStates::grow(StudyId id, const StudyTable& table, std::int32_t priority) {
   Study& study = studies_.at(id);
-  discount(id, study);
   study.record.table = table;
   study.record.priority = priority;
-  study.state = StudyState::kRunning;
   study.is_doubtful = false;
-  count(id, study);
+  move(id, StudyState::kRunning);
 }
 
 void StudyStates::point_failed(StudyId id, std::uint64_t point) {

@@ -57,11 +57,11 @@ class StudyStates {
   bool is_open(StudyId id) const { return unfinished_.contains(id); }
 
   /// Studies by state, by the values of StudyState.
-  const std::array<std::uint64_t, kStudyStates>& counts() const { return counts_; }
+  std::array<std::uint64_t, kStudyStates> counts() const;
   /// Numbers of the open studies.
   const std::set<StudyId>& unfinished() const { return unfinished_; }
   /// Points of the open studies.
-  std::uint64_t open_points() const { return open_points_; }
+  std::uint64_t open_points() const;
 
   /// Whether the state must be written: the study has another one, or a refused write made it
   /// doubtful, because what the disk took of it may count after a crash. A done study keeps its
@@ -94,15 +94,11 @@ class StudyStates {
     bool is_durable = false;
   };
 
-  void count(StudyId id, const Study& study);
-  void discount(StudyId id, const Study& study);
   void move(StudyId id, StudyState state);
 
   std::map<StudyId, Study> studies_;
   std::map<std::string, StudyId, std::less<>> ids_;  // by name
-  std::array<std::uint64_t, kStudyStates> counts_{};
   std::set<StudyId> unfinished_;
-  std::uint64_t open_points_ = 0;
 };
 
 }  // namespace oblique::server

@@ -141,11 +141,28 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
     forget(old);  // it begins anew, and what it held is free again
     input.events.emplace_back(WorkerLeft{old});
   }
-  if (refuse(identity, hello, now)) {
+  std::string objection = protocol::objection_to_worker(hello);
+  if (objection.empty() && hello.solver_version() != settings_.solver_version) {
+    objection = fmt::format(
+        "its solver has version {}, the server's {}: results of a study must come from one "
+        "version; install the server's release of oblique there",
+        plain(hello.solver_version()), settings_.solver_version);
+  }
+  protocol::ServerToWorker reply;
+  if (!objection.empty()) {
+    log_rarely(Severity::kWarning, fmt::format("a worker is refused: {}", objection), now);
+    reply.mutable_refused()->set_reason(objection);
+    ports_.send(identity, reply);
     return;
   }
   const WorkerId id = ++settings_.last_worker_id;
-  if (!welcome(id, identity)) {
+  auto& welcome = *reply.mutable_welcome();
+  welcome.set_protocol_version(protocol::kProtocolVersion);
+  welcome.set_worker_id(id);
+  welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
+  welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
+  welcome.set_database_id(settings_.database_id);
+  if (ports_.send(identity, reply) == Delivery::kGone) {
     return;
   }
   const WorkerRecord worker{identity,
@@ -162,38 +179,6 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
   greet(id, now);
   input.events.emplace_back(WorkerJoined{
       id, worker.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
-}
-
-/// Whether the worker is refused; it gets the reason.
-bool WorkerSessions::refuse(const std::string& identity, const protocol::WorkerHello& hello,
-                            Instant now) {
-  std::string reason = protocol::objection_to_worker(hello);
-  if (reason.empty() && hello.solver_version() != settings_.solver_version) {
-    reason = fmt::format(
-        "its solver has version {}, the server's {}: results of a study must come from one "
-        "version; install the server's release of oblique there",
-        plain(hello.solver_version()), settings_.solver_version);
-  }
-  if (reason.empty()) {
-    return false;
-  }
-  log_rarely(Severity::kWarning, fmt::format("a worker is refused: {}", reason), now);
-  protocol::ServerToWorker reply;
-  reply.mutable_refused()->set_reason(reason);
-  ports_.send(identity, reply);
-  return true;
-}
-
-/// False when the worker is gone already.
-bool WorkerSessions::welcome(WorkerId id, const std::string& identity) {
-  protocol::ServerToWorker message;
-  auto& welcome = *message.mutable_welcome();
-  welcome.set_protocol_version(protocol::kProtocolVersion);
-  welcome.set_worker_id(id);
-  welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
-  welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
-  welcome.set_database_id(settings_.database_id);
-  return ports_.send(identity, message) != Delivery::kGone;
 }
 
 /// Logs that the worker joined, and sends it the notices that concern it.

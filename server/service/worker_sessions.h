@@ -94,8 +94,6 @@ class WorkerSessions {
  private:
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
              const std::string& key, WorkerInput& input);
-  bool refuse(const std::string& identity, const protocol::WorkerHello& hello, Instant now);
-  bool welcome(WorkerId id, const std::string& identity);
   void greet(WorkerId id, Instant now);
   void results(WorkerId worker, protocol::Results results, WorkerInput& input);
   void give_up(WorkerId worker, const std::string& why, WorkerInput& input);

@@ -14,21 +14,18 @@ void WriteLedger::write(Change change, OnStored on_stored, OnRefused on_refused)
   ports_.write({ticket, std::move(change), can_be_refused});
 }
 
-void WriteLedger::stored(std::uint64_t ticket, Instant now) {
-  if (const auto found = writes_.extract(ticket)) {
-    discount(found.mapped());
-    if (found.mapped().on_stored) {
-      found.mapped().on_stored(now);
-    }
+void WriteLedger::end(std::uint64_t ticket, const std::optional<std::string>& error, Instant now) {
+  const auto found = writes_.extract(ticket);
+  if (!found) {
+    return;
   }
-}
-
-void WriteLedger::refused(std::uint64_t ticket, const std::string& error, Instant now) {
-  if (const auto found = writes_.extract(ticket)) {
-    discount(found.mapped());
-    if (found.mapped().on_refused) {
-      found.mapped().on_refused(error, now);
-    }
+  const Write& write = found.mapped();
+  bytes_ -= write.bytes;
+  weigh();
+  if (error && write.on_refused) {
+    write.on_refused(*error, now);
+  } else if (!error && write.on_stored) {
+    write.on_stored(now);
   }
 }
 
@@ -47,11 +44,6 @@ void WriteLedger::tick(std::int64_t now_ms) {
     oldest_since_ms_ = now_ms;
   }
   is_slow_ = now_ms - oldest_since_ms_ >= kSlowAfter_s * kMillisecondsASecond;
-}
-
-void WriteLedger::discount(const Write& write) {
-  bytes_ -= write.bytes;
-  weigh();
 }
 
 void WriteLedger::weigh() {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "server/service/ports/ports.h"
@@ -33,8 +34,10 @@ class WriteLedger {
   /// reported at once, because a client waits; without it the change is tried until it is durable.
   void write(Change change, OnStored on_stored = {}, OnRefused on_refused = {});
   /// The outcome of a write. Unknown tickets are ignored.
-  void stored(std::uint64_t ticket, Instant now);
-  void refused(std::uint64_t ticket, const std::string& error, Instant now);
+  void stored(std::uint64_t ticket, Instant now) { end(ticket, std::nullopt, now); }
+  void refused(std::uint64_t ticket, const std::string& error, Instant now) {
+    end(ticket, error, now);
+  }
   /// The database is gone: refuses all writes, in order.
   void abandon(const std::string& error, Instant now);
 
@@ -52,7 +55,6 @@ class WriteLedger {
   /// The file is gone; nothing more can be stored.
   bool is_gone() const { return is_gone_; }
   bool is_empty() const { return writes_.empty(); }
-  std::size_t jobs() const { return writes_.size(); }
   std::size_t bytes() const { return bytes_; }
 
   /// No batch should be sent: the database accepts nothing, or is far behind.
@@ -66,7 +68,7 @@ class WriteLedger {
     OnRefused on_refused;
     std::size_t bytes;
   };
-  void discount(const Write& write);
+  void end(std::uint64_t ticket, const std::optional<std::string>& error, Instant now);
   void weigh();
 
   LedgerLimits limits_;

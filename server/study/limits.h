@@ -26,30 +26,10 @@ inline constexpr std::uint64_t kOpenPoints = 10'000'000'000'000;
 /// Batches that a worker may request at a time. More would wait there while others have none.
 inline constexpr std::uint32_t kCredit = 1024;
 
-// ---- Results ----------------------------------------------------------------------------------
-
-/// Of one worker, so that one that sends fast leaves room for others.
-inline constexpr std::size_t kUnstoredBytesOfWorker = 16 * kMiB;
-/// Messages of one worker: a message without results costs no bytes that are counted above.
-inline constexpr std::size_t kUnstoredMessagesOfWorker = 100'000;
-/// No batch goes out above these, until half is stored: more results would only wait.
-inline constexpr std::size_t kUnstoredBytesToHold = 16 * kMiB;
-inline constexpr std::size_t kUnstoredMessagesToHold = 20'000;
-/// Changes of studies that wait for the disk, a few hundred bytes each.
-inline constexpr std::size_t kUnstoredChanges = 10'000;
-
 // ---- Requests of clients ----------------------------------------------------------------------
 
 /// A longer request is parsed on a thread of its own: parsing it takes over a millisecond.
 inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
-/// Long requests that wait for that thread, which takes up to a second for the longest.
-inline constexpr std::size_t kLongRequests = 64;
-inline constexpr std::size_t kLongRequestBytes = 64 * kMiB;
-/// Of one connection: a correct client has one, and one more of before it connected again.
-inline constexpr std::size_t kLongRequestsOfConnection = 2;
-/// Studies or workers in a reply, which takes the service's thread some milliseconds.
-inline constexpr std::size_t kPageLength = 1000;
-inline constexpr std::size_t kPageBytes = kMiB;
 /// Studies that are neither done nor cancelled, some kilobytes each.
 inline constexpr std::size_t kOpenStudies = 100'000;
 

@@ -7,7 +7,6 @@
 
 #include "server/web/answers/service_client.h"
 #include "server/web/http/http_server.h"
-#include "server/web/page/event_feed.h"
 #include "server/web/page/page.h"
 #include "server/web/status/snapshot.h"
 

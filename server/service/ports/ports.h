@@ -38,6 +38,9 @@ struct Client {
   bool operator==(const Client&) const = default;
 };
 
+/// The reply to requests of clients that end with the server.
+inline constexpr const char* kStopping = "the server is stopping: ask again when it runs";
+
 enum class Severity { kInfo, kWarning, kError };
 
 /// Network, writer, query pool, check thread and log as the service uses them. The event loop

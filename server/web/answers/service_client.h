@@ -55,23 +55,36 @@ class ServiceClient {
   std::map<std::uint64_t, Awaited> awaited_;
 };
 
-/// Requests to the service under one number. The destructor ends what the service still does.
+/// Requests to the service, one after the other. Each but the ones for more rows has a number of
+/// its own, because a late error about the last one may follow. The destructor ends what the
+/// service still does.
 class ServiceExchange {
  public:
-  explicit ServiceExchange(ServiceClient& service)
-      : service_(service), number_(service.new_number()) {}
+  explicit ServiceExchange(ServiceClient& service) : service_(service) {}
   ~ServiceExchange() { service_.forget(number_); }
   ServiceExchange(const ServiceExchange&) = delete;
   ServiceExchange& operator=(const ServiceExchange&) = delete;
 
-  std::uint64_t number() const { return number_; }
-  void send(const protocol::ClientRequest& request) { service_.ask(number_, request); }
+  void send(const protocol::ClientRequest& request) {
+    service_.forget(number_);
+    number_ = service_.new_number();
+    chunks_ = 0;
+    service_.ask(number_, request);
+  }
+  /// One more chunk of the answer to the query was taken.
+  void request_more_rows() {
+    protocol::ClientRequest more;
+    more.mutable_more_rows()->set_request_id(number_);
+    more.mutable_more_rows()->set_taken(++chunks_);
+    service_.ask(number_, more);
+  }
   /// The next reply, if it has come.
   std::optional<protocol::ClientReply> reply() { return service_.reply(number_); }
 
  private:
   ServiceClient& service_;
-  const std::uint64_t number_;
+  std::uint64_t number_ = 0;
+  std::uint64_t chunks_ = 0;
 };
 
 /// The HTTP answer to an error of the service.

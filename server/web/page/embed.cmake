@@ -30,7 +30,7 @@ foreach(name IN LISTS NAMES)
   math(EXPR number "${number} + 1")
 endforeach()
 file(WRITE ${OUT} "// Made by embed.cmake.
-#include \"server/web/page/page_files.h\"
+#include \"server/web/page/page.h\"
 
 namespace oblique::server {
 namespace {

@@ -1,16 +1,21 @@
 #include "server/web/page/page.h"
 
+#include <algorithm>
 #include <regex>
 #include <string_view>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+#include <chrono>
+
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/page/page_files.h"
 #include "server/web/page/request_flow.h"
 
 namespace oblique::server {
 namespace {
+
+constexpr std::chrono::seconds kKeepAlive{15};
 
 constexpr std::string_view kApi = "/api/";
 constexpr std::string_view kStudies = "/api/studies";
@@ -51,6 +56,31 @@ std::optional<PathChange> parse_change(const std::string& path) {
   const auto parsed = parse_study_path(path);
   const auto change = parsed && !parsed->point ? study_change(parsed->part) : std::nullopt;
   return change ? std::optional(PathChange{parsed->study, *change}) : std::nullopt;
+}
+
+/// The file at the request's path, / being the page itself; 304 if the browser has it. None: there
+/// is no such file.
+std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
+  const auto files = page_files();
+  const auto file = std::ranges::find_if(files, [&](const PageFile& one) {
+    return one.path == (request.path == "/" ? "/index.html" : request.path);
+  });
+  if (file == files.end()) {
+    return std::nullopt;
+  }
+  // The browser keeps the file, and asks each time whether it has changed.
+  HttpAnswer answer{MHD_HTTP_OK,
+                    std::string(file->content_type),
+                    {},
+                    {{"ETag", std::string(file->tag)},
+                     {"Cache-Control", "no-cache"},
+                     {"Content-Encoding", "gzip"}}};
+  if (request.header("if-none-match").find(file->tag) != std::string::npos) {
+    answer.status = MHD_HTTP_NOT_MODIFIED;
+  } else {
+    answer.body.assign(file->gzipped.begin(), file->gzipped.end());
+  }
+  return answer;
 }
 
 }  // namespace
@@ -162,6 +192,40 @@ std::optional<HttpOutcome> Page::change(const HttpRequest& request) {
   const auto change = parse_change(request.path);
   return change ? std::optional<HttpOutcome>(change_study(service_, change->study, change->change))
                 : std::nullopt;
+}
+
+// ---- Events ----------------------------------------------------------------------------------
+
+HttpStream EventFeed::subscribe(const std::string& last_event_id) {
+  using Clock = std::chrono::steady_clock;
+  return [this, sent_id = last_event_id,
+          sent_at = Clock::now()]() mutable -> std::optional<std::string> {
+    refresh();
+    const auto now = Clock::now();
+    if (sent_id != id_ && !id_.empty()) {
+      sent_id = id_;
+      sent_at = now;
+      return fmt::format("id: {}\nevent: overview\ndata: {}\n\n", id_, overview_);
+    }
+    if (now - sent_at >= kKeepAlive) {
+      sent_at = now;
+      return ": keep-alive\n\n";
+    }
+    return "";
+  };
+}
+
+void EventFeed::refresh() {
+  const auto latest = snapshots_.latest();
+  if (latest == seen_) {
+    return;
+  }
+  seen_ = latest;
+  std::string overview = overview_json(*latest);
+  if (overview != overview_) {
+    overview_ = std::move(overview);
+    id_ = std::to_string(latest->made_ms);  // unique: a restarted server goes on with the clock
+  }
 }
 
 }  // namespace oblique::server

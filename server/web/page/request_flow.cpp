@@ -2,14 +2,20 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <map>
+#include <memory>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "proto/recipe/model_message.h"
 #include "proto/wire/chunk.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/status/status_json.h"
+#include "server/web/status/snapshot.h"
+#include "worker/solver/model/trace_columns.h"
 
 namespace oblique::server {
 namespace {
@@ -106,23 +112,67 @@ class RowStream {
       text_ += as_csv_ ? csv_line(values) : (rows_ == 0 ? "" : ",\n") + json_text(values);
     }
     has_ended_ = chunk.ends();
-    if (has_ended_) {
-      text_ += as_csv_ ? "" : "]}\n";
-      return;
+    if (!has_ended_) {
+      exchange_->request_more_rows();
+    } else if (!as_csv_) {
+      text_ += "]}\n";
     }
-    ClientRequest more;
-    more.mutable_more_rows()->set_request_id(exchange_->number());
-    more.mutable_more_rows()->set_taken(++chunks_);
-    exchange_->send(more);
   }
 
   std::shared_ptr<ServiceExchange> exchange_;
   bool as_csv_;
   std::string text_;  // not sent yet
-  std::uint64_t chunks_ = 0;
   std::uint64_t rows_ = 0;
   bool has_ended_ = false;
 };
+
+ordered_json columns_of(const solver::TraceShape& shape) {
+  ordered_json columns = ordered_json::array();
+  for (const solver::TraceColumn& column : solver::trace_columns()) {
+    std::size_t count = 1;
+    if (const auto* vectors = std::get_if<solver::TraceVectors>(&column.value)) {
+      constexpr std::size_t kAxes = 2;
+      count = kAxes * (vectors->of_links ? shape.links : shape.nodes);
+    }
+    const bool is_number = !std::holds_alternative<std::string solver::TraceRow::*>(column.value);
+    if (is_number && count > 0) {
+      columns.push_back({{"name", column.name},
+                         {"unit", column.unit},
+                         {"meaning", column.meaning},
+                         {"numbers", count}});
+    }
+  }
+  return columns;
+}
+
+HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::TraceReply& reply) {
+  const protocol::Trace& trace = reply.trace();
+  const auto model = protocol::from_message(reply.model());
+  const solver::TraceShape shape = solver::trace_shape(
+      model.lengths_m.size(), static_cast<std::size_t>(model.elements_per_link), with_shape);
+  const std::string& states = trace.states();
+  std::string numbers(static_cast<std::size_t>(trace.values_size()) * sizeof(double), '\0');
+  std::memcpy(numbers.data(), trace.values().data(), numbers.size());
+  return numbers_answer({{"study", reply.study_id()},
+                         {"point", point},
+                         {"H", reply.h_m()},
+                         {"mu", reply.mu()},
+                         {"e", reply.e_star()},
+                         {"links", shape.links},
+                         {"nodes", shape.nodes},
+                         {"elements_per_link", model.elements_per_link},
+                         {"lengths_m", model.lengths_m},
+                         {"rows", states.size()},
+                         {"instants", trace.instants()},
+                         {"fall_rows", std::ranges::count(states, solver::kFallingCode)},
+                         {"row_numbers", solver::trace_numbers(shape)},
+                         {"columns", columns_of(shape)},
+                         {"states", solver::kTraceStates},
+                         {"solver_version", reply.solver_version()},
+                         {"instruction_set", reply.instruction_set()},
+                         {"worker", reply.worker()}},
+                        numbers + states);
+}
 
 }  // namespace
 
@@ -263,6 +313,31 @@ PendingAnswer change_study(ServiceClient& service, std::uint64_t study,
       [](const ClientReply& reply) -> NextStep {
         return json_answer(
             {{"study", study_json(reply.change().study())}, {"retried", reply.change().retried()}});
+      });
+}
+
+PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint64_t point,
+                          const Fields& fields) {
+  const auto is_set = [&fields](const char* name) {
+    const auto field = fields.find(name);
+    return field != fields.end() && field->second == "1";
+  };
+  const bool with_shape = is_set("shape");
+  protocol::ClientRequest request;  // `every` stays 0: as many instants as fit
+  request.mutable_trace()->set_point(point);
+  request.mutable_trace()->set_shape(with_shape);
+  request.mutable_trace()->set_fall(is_set("fall"));
+  return named_study_flow(
+      std::make_shared<ServiceExchange>(service), study,
+      [request](const std::string& name) {
+        protocol::ClientRequest named = request;
+        named.mutable_trace()->set_study(name);
+        return named;
+      },
+      [point, with_shape](const protocol::ClientReply& reply) -> NextStep {
+        const std::string& error = reply.trace().trace().result().error();
+        return error.empty() ? trace_answer(point, with_shape, reply.trace())
+                             : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
       });
 }
 

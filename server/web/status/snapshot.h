@@ -1,5 +1,7 @@
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -61,6 +63,13 @@ struct SnapshotSources {
 
 /// Costs in proportion to the studies that run or are paused, and to the workers.
 Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms);
+
+/// With `left_s`, the time left [s]; null while it is unknown.
+nlohmann::ordered_json study_json(const protocol::StudyStatus& study);
+nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker);
+
+/// What the page shows of a server, as one line.
+std::string overview_json(const Snapshot& snapshot);
 
 /// The latest snapshot, published by the event loop for the HTTP thread.
 class SnapshotCache {

@@ -1,4 +1,4 @@
-#include "server/web/status/status_json.h"
+#include "server/web/status/snapshot.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/web/page/page_files.h"
+#include "server/web/page/page.h"
 #include "server/web/page/page_token.h"
 #include "tests/server/web/page/page_study.h"
 
