@@ -8,7 +8,6 @@
 
 #include "client/paper/published_toml.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/written.h"
 #include "worker/solver/model/parameters.h"

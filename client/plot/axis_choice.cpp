@@ -9,7 +9,6 @@
 #include "client/output/human_units.h"
 #include "client/plot/block_choice.h"
 #include "client/plot/figures/quantity.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"

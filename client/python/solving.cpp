@@ -18,7 +18,7 @@
 #include "client/python/interruptible.h"
 #include "client/python/result_arrays.h"
 #include "proto/program/origin/origin.h"
-#include "proto/recipe/keys.h"
+#include "proto/recipe/blocks.h"
 #include "proto/system/limits_of_group.h"
 #include "worker/solver/library/falls_kept.h"
 #include "worker/solver/library/point_runs.h"

@@ -21,7 +21,6 @@
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/small_file.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 

@@ -14,7 +14,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/checks.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"

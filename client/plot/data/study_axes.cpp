@@ -5,7 +5,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "server/query/columns.h"
 
 namespace oblique::client::plot {

@@ -18,7 +18,7 @@
 #include "client/plot/figures/svg_figure.h"
 #include "client/plot/files/figure_table.h"
 #include "client/service/child_process.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 

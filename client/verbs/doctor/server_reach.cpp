@@ -20,7 +20,6 @@
 #include "client/output/human_units.h"
 #include "client/service/connection.h"
 #include "proto/address.h"
-#include "proto/keys/curve_key.h"
 #include "proto/keys/key_file.h"
 #include "proto/program/origin/origin.h"
 #include "proto/system/descriptor.h"
