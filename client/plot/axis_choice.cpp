@@ -8,7 +8,6 @@
 
 #include "client/output/human_units.h"
 #include "client/plot/figure.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"

@@ -18,7 +18,6 @@
 #include "client/plot/figure_table.h"
 #include "client/plot/gnuplot_script.h"
 #include "client/service/child_process.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"

@@ -8,7 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 

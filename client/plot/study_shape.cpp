@@ -8,7 +8,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"

@@ -12,7 +12,6 @@
 
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::python {

@@ -14,7 +14,7 @@
 #include "client/python/calls.h"
 #include "client/python/given_points.h"
 #include "client/python/results.h"
-#include "proto/recipe/keys.h"
+#include "proto/recipe/blocks.h"
 #include "proto/system/limits_of_group.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/fall_model.h"

@@ -25,7 +25,6 @@
 #include "proto/program/origin/origin.h"
 #include "proto/text.h"
 #include "server/database/database_file.h"
-#include "server/database/open_for_reading.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/solve.h"
 

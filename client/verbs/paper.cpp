@@ -18,7 +18,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <variant>
 
-#include "proto/keys/curve_key.h"
+#include "proto/keys/key_file.h"
 
 namespace oblique::server {
 

@@ -18,7 +18,7 @@
 
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/suggestion.h"
+#include "proto/text.h"
 
 namespace oblique::server {
 
