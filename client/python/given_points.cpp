@@ -10,6 +10,7 @@
 #include <pybind11/stl.h>
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
@@ -60,16 +61,21 @@ void add_key(GivenKeys& given, const std::string& name, const py::handle& value)
   given.axes[number] = std::move(axis);
 }
 
-/// Adds the model of the point that `values` is at, or its fault.
-void add_model(GivenPoints& all, const protocol::BlockPoints& values,
+/// Adds the model with these values of `keys`, or its fault.
+void add_model(GivenPoints& all, const std::vector<double>& values,
                const std::vector<std::size_t>& keys, const ModelParameters& base) {
   std::string fault;
-  ModelParameters model = values.model();
+  ModelParameters model = base;
   try {
     for (std::size_t i = 0; i < keys.size(); ++i) {
       const auto& key = protocol::key_numbered(keys[i]);
-      solver::check_value(key, values.values()[i]);
-      if (protocol::link_of_key(keys[i]).value_or(0) >= model.lengths_m.size()) {
+      solver::check_value(key, values[i]);
+      const auto link = protocol::link_of_key(keys[i]);
+      if (!link) {
+        key.set(model, values[i]);
+      } else if (*link < model.lengths_m.size()) {
+        model.lengths_m[*link] = values[i];
+      } else {
         throw InputError(fmt::format("{} is the length of a link that there is not: there are {}",
                                      key.name, model.lengths_m.size()));
       }
@@ -119,20 +125,23 @@ GivenPoints points_of(const GivenKeys& given) {
   }
   protocol::Block block = protocol::block_of(std::move(axes));
   block.set_zip(true);
-  protocol::BlockPoints values(base, block);
+  protocol::Recipe recipe;
+  *recipe.mutable_model() = protocol::to_message(base);
+  *recipe.add_blocks() = std::move(block);
+  const protocol::PointTable table(std::move(recipe));
   std::map<std::vector<std::uint64_t>, std::size_t> known;  // models, by the bits of their values
   all.points.reserve(given.points);
   for (std::size_t i = 0; i < given.points; ++i) {
-    values.go_to(i);
+    const std::vector<double> values = table.values(i);
     std::vector<std::uint64_t> bits;  // of NaN too
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
-      bits.push_back(std::bit_cast<std::uint64_t>(values.values()[j]));
+      bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
     }
     const auto [model, is_new] = known.try_emplace(std::move(bits), all.models.size());
     if (is_new) {
       add_model(all, values, model_keys, base);
     }
-    const auto point = values.values().last(protocol::kPointKeyOrder.size());
+    const auto point = std::span(values).last(protocol::kPointKeyOrder.size());
     all.points.push_back({point[0], point[1], point[2], model->second});
   }
   return all;
