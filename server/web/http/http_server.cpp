@@ -124,9 +124,9 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
   // reached.
   daemon_ = MHD_start_daemon(
       MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_POLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
-      nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET,
-      socket, MHD_OPTION_NOTIFY_COMPLETED, static_cast<MHD_RequestCompletedCallback>(on_completed),
-      nullptr, MHD_OPTION_NOTIFY_CONNECTION, &HttpServer::on_connection, this,
+      nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET, socket,
+      MHD_OPTION_NOTIFY_COMPLETED, static_cast<MHD_RequestCompletedCallback>(on_completed), nullptr,
+      MHD_OPTION_NOTIFY_CONNECTION, &HttpServer::on_connection, this,
       MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits.bytes_of_connection, MHD_OPTION_CONNECTION_LIMIT,
       limits.connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits.connections_of_one_address,
       MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(limits.idle.count()),
@@ -169,11 +169,16 @@ void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*
   }
   const int socket =
       MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
-  server.transfers_.insert_or_assign(connection, Transfer{socket, due});
+  try {
+    server.transfers_.insert_or_assign(connection, Transfer{socket, due});
+  } catch (const std::exception&) {
+    ::shutdown(socket, SHUT_RDWR);  // no memory: the connection ends
+  }
 }
 
 HttpServer::Time HttpServer::due_for(std::size_t bytes) const {
-  return handlers_.now() + limits_.idle + std::chrono::seconds(bytes / limits_.least_bytes_a_second);
+  return handlers_.now() + limits_.idle +
+         std::chrono::seconds(bytes / limits_.least_bytes_a_second);
 }
 
 void HttpServer::set_due(MHD_Connection* connection, Time due) {
