@@ -123,11 +123,8 @@ class Database {
       throw std::filesystem::filesystem_error(
           "", file_, std::make_error_code(std::errc::no_such_file_or_directory));
     }
-    remark_ = server::Reader(file_).remark();
+    const server::Reader reader(file_);  // throws if it is no database of oblique
   }
-
-  /// Says how the database is read, if that is unusual; else empty.
-  const std::string& remark() const { return remark_; }
 
   py::list query(const std::string& study, const std::string& where, const std::string& select,
                  const std::string& group, const std::string& order,
@@ -190,7 +187,6 @@ class Database {
   }
 
   const std::string file_;
-  std::string remark_;
 };
 
 }  // namespace
@@ -198,7 +194,6 @@ class Database {
 void add_database(py::module_& module) {
   py::class_<Database>(module, "Database")
       .def(py::init<const std::string&>(), py::arg("file"))
-      .def("remark", &Database::remark)
       .def("query", &Database::query)
       .def("sql", &Database::sql)
       .def("studies", &Database::studies);

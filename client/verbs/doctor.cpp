@@ -219,7 +219,7 @@ void check_database(Diagnosis& diagnosis, const std::string& named_file) {
     return;
   }
   try {
-    const auto database = server::open_without_traces(file);
+    const auto database = server::open_for_reading(file);
     if (server::identify(database.get(), file) == server::DatabaseKind::kEmpty) {
       diagnosis.ok(kCheck, file + " is empty");
       return;

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from typing import TYPE_CHECKING, Any, Iterator, Optional, Sequence, Union
 
 import numpy as np
@@ -88,7 +87,7 @@ class Answer:
 class Database:
     """A database of results, opened for reading only: it may be asked while a server or a run
     writes it. Raises FileNotFoundError where there is none, and DatabaseError where there is
-    something else. What is unusual in how it is read is a warning.
+    something else.
 
         db = oblique.Database("oblique.db")
         friction = db.query("friction", where="e = 1", select="mu, fn_peak_N")
@@ -98,8 +97,6 @@ class Database:
     def __init__(self, file: Union[str, "os.PathLike[str]"] = "oblique.db") -> None:
         self.file = os.fspath(file)
         self._database = _core.Database(self.file)
-        if remark := self._database.remark():
-            warnings.warn(remark, stacklevel=2)
 
     def __repr__(self) -> str:
         return f"oblique.Database({self.file!r})"
