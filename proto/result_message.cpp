@@ -50,18 +50,12 @@ bool is_absent(const std::string& value) {
   return value.empty();
 }
 
-void add_scalars(const CaseResult& result, PointResult& message) {
-  for_each_sent<double>([&](const ResultField&, const Member<double>& member) {
-    const double* value = member.of(result);
-    message.add_reals(value != nullptr ? *value : kNoNumber);
-  });
-  for_each_sent<std::int64_t>([&](const ResultField&, const Member<std::int64_t>& member) {
-    const std::int64_t* value = member.of(result);
-    message.add_whole_numbers(value != nullptr ? *value : kNoWholeNumber);
-  });
-  for_each_sent<std::string>([&](const ResultField&, const Member<std::string>& member) {
-    const std::string* value = member.of(result);
-    message.add_texts(value != nullptr ? *value : std::string());
+/// Appends the scalars of type T.
+template <class T, class Values>
+void add_scalars(const CaseResult& result, const T& absent, Values& values) {
+  for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
+    const T* value = member.of(result);
+    *values.Add() = value != nullptr ? *value : absent;
   });
 }
 
@@ -206,7 +200,9 @@ bool is_too_long(const std::string& text) {
 PointResult to_message(std::uint64_t point, const CaseResult& result) {
   PointResult message;
   message.set_point(point);
-  add_scalars(result, message);
+  add_scalars(result, kNoNumber, *message.mutable_reals());
+  add_scalars(result, kNoWholeNumber, *message.mutable_whole_numbers());
+  add_scalars(result, std::string(), *message.mutable_texts());
   add_lists(result, message);
   return message;
 }

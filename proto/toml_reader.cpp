@@ -7,7 +7,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 

@@ -169,7 +169,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false).description(""));
   app.add_option("--until", ending.until,
-                 "Be gone by then: a time, as 2026-11-22T05:00:00Z (without a zone it is local), "
+                 "Be gone by then: a time in UTC, as 2026-11-22T05:00:00Z, "
                  "or a duration from now, as 90m")
       ->type_name("TIME")
       ->check(objection_to_until);

@@ -2,16 +2,63 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
+
+#include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
 
 using solver::CaseResult;
+using solver::fixed_number;
+using Kind = ContactChange::Kind;
 
+constexpr double kMicro = 1e6;
 constexpr double kRoundingFraction = 1e-9;
+
+Extrapolation monotone(double last, double before, double value, double highest_order) {
+  const double order = std::log2(before / last);
+  const double believed = std::min(order, highest_order);
+  // |last|, unless it is smaller than theory lets it be.
+  const double difference =
+      std::copysign(std::max(std::abs(last), std::abs(before) * std::exp2(-highest_order)), last);
+  const double correction = difference / (std::exp2(believed) - 1.0);
+  return {.trend = Trend::kMonotone,
+          .limit = value + correction,
+          .order = order,
+          .error = std::abs(correction)};
+}
+
+// Peak, valley, peak, ..., peak.
+std::vector<double> turn_times(const CaseResult& result) {
+  std::vector<double> times;
+  for (std::size_t i = 0; i + 1 < result.phases.size(); ++i) {
+    times.push_back(result.phases[i].t1_s);
+  }
+  return times;
+}
+
+// Start, end, start, ..., end. A contact that begins or ends in stick has these ends too, so that
+// lengths are even whatever the first and the last state.
+std::vector<double> stick_times(const CaseResult& result) {
+  std::vector<double> times;
+  for (const auto& stick : result.stick_intervals) {
+    times.insert(times.end(), {stick.t0_s, stick.t1_s});
+  }
+  return times;
+}
+
+void add_lone(std::vector<ContactChange>& changes, const std::vector<double>& coarser,
+              const std::vector<double>& finer, Kind even, Kind odd) {
+  const bool in_finer = finer.size() > coarser.size();
+  const auto& longer = in_finer ? finer : coarser;
+  for (const std::size_t i : lone_pairs(longer, in_finer ? coarser : finer)) {
+    changes.push_back({i % 2 == 0 ? even : odd, longer[i], longer[i + 1], in_finer});
+  }
+}
 
 // The states of `mode` ("sC sR sC sR") up to the peak of that number, from 0: all up to the first
 // restitution after it, or up to the last one before compression starts again.
@@ -58,6 +105,102 @@ OutputConvergence output_convergence(const Output& finest,
 }
 
 }  // namespace
+
+Extrapolation extrapolate(std::span<const double> values, double highest_order, double resolution) {
+  const double value = values.back();
+  Extrapolation result{.trend = Trend::kTooFew, .limit = value, .order = {}, .error = {}};
+  if (values.size() < 2) {
+    return result;
+  }
+  const double last = value - values[values.size() - 2];
+  result.error = std::max(std::abs(last), resolution);
+  if (values.size() < 3) {
+    return result;
+  }
+  const double before = values[values.size() - 2] - values[values.size() - 3];
+  if (std::abs(last) <= resolution) {
+    result.trend = Trend::kRounding;
+    result.error = resolution;
+  } else if (!(std::abs(last) < std::abs(before) * std::exp2(-kLeastOrder))) {
+    result.trend = Trend::kUnsettled;
+    result.error = std::max(std::abs(last), std::abs(before));
+  } else if ((last > 0.0) != (before > 0.0)) {
+    result.trend = Trend::kOscillating;
+    result.error = std::max(std::abs(last), std::abs(before) * std::exp2(-highest_order));
+  } else {
+    result = monotone(last, before, value, highest_order);
+  }
+  return result;
+}
+
+std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
+                                    const std::vector<double>& shorter) {
+  const std::size_t columns = shorter.size() + 1;
+  // cost[i * columns + j]: the first i of `longer` against the first j of `shorter`.
+  std::vector<double> cost((longer.size() + 1) * columns, std::numeric_limits<double>::infinity());
+  cost[0] = 0.0;
+  const auto matched = [&](std::size_t i, std::size_t j) {
+    return i > 0 && j > 0
+               ? cost[(i - 1) * columns + j - 1] + std::abs(longer[i - 1] - shorter[j - 1])
+               : std::numeric_limits<double>::infinity();
+  };
+  const auto skipped = [&](std::size_t i, std::size_t j) {
+    return i > 1 ? cost[(i - 2) * columns + j] : std::numeric_limits<double>::infinity();
+  };
+  for (std::size_t i = 1; i <= longer.size(); ++i) {
+    for (std::size_t j = 0; j < columns; ++j) {
+      cost[i * columns + j] = std::min(matched(i, j), skipped(i, j));
+    }
+  }
+  std::vector<std::size_t> lone;
+  std::size_t i = longer.size();
+  std::size_t j = shorter.size();
+  while (i > 0) {
+    if (matched(i, j) <= skipped(i, j)) {
+      --i;
+      --j;
+    } else {
+      i -= 2;
+      lone.push_back(i);
+    }
+  }
+  std::reverse(lone.begin(), lone.end());
+  return lone;
+}
+
+std::vector<ContactChange> changes_between(const CaseResult& coarser, const CaseResult& finer) {
+  std::vector<ContactChange> changes;
+  add_lone(changes, turn_times(coarser), turn_times(finer), Kind::kRestitution, Kind::kCompression);
+  if (changes.empty()) {
+    for (std::size_t i = 0; i < coarser.peaks.size() && i < finer.peaks.size(); ++i) {
+      if (coarser.peaks[i].major != finer.peaks[i].major) {
+        const double t_s = finer.peaks[i].t_s;
+        changes.push_back({Kind::kRipple, t_s, t_s, finer.peaks[i].major});
+      }
+    }
+  }
+  add_lone(changes, stick_times(coarser), stick_times(finer), Kind::kStick, Kind::kSlip);
+  return changes;
+}
+
+const char* name_of(Kind kind) {
+  constexpr const char* kNames[]{"compression", "restitution", "stick", "slip", "ripple"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::string described(const ContactChange& change) {
+  if (change.kind == Kind::kRipple) {
+    return fmt::format("a peak of F_n at {} us, near the depth at which ripples are merged",
+                       fixed_number(change.t0_s * kMicro, 2));
+  }
+  const char* cause = change.kind == Kind::kStick  ? "P's velocity grazes 0"
+                      : change.kind == Kind::kSlip ? "|F_t| grazes mu F_n"
+                                                   : "V_n grazes 0";
+  return fmt::format("a {} of {} us, from {} to {} us ({})", name_of(change.kind),
+                     solver::readable_number((change.t1_s - change.t0_s) * kMicro, 3),
+                     fixed_number(change.t0_s * kMicro, 2), fixed_number(change.t1_s * kMicro, 2),
+                     cause);
+}
 
 std::vector<Output> outputs_of(const CaseResult& result) {
   const std::string& mode = result.major_mode;
@@ -107,8 +250,9 @@ PointConvergence convergence_of(std::span<const CaseResult> results, double high
     point.outputs.push_back(output_convergence(output, levels, highest_order));
   }
   for (std::size_t i = 1; i < results.size(); ++i) {
-    for (const auto& change : changes_between(results[i - 1], results[i])) {
-      point.changes.push_back({i, change});
+    for (auto& change : changes_between(results[i - 1], results[i])) {
+      change.finer_level = i;
+      point.changes.push_back(change);
     }
   }
   const auto same_mode = [&](std::size_t back) {

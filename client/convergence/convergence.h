@@ -6,11 +6,76 @@
 #include <string>
 #include <vector>
 
-#include "client/convergence/contact_changes.h"
-#include "client/convergence/richardson.h"
 #include "worker/solver/model/case_result.h"
 
 namespace oblique::client {
+
+/// How values behave whose mesh or step is halved from one to the next.
+enum class Trend {
+  kTooFew,       ///< fewer than three values: nothing can be said
+  kRounding,     ///< the last two values are the same but for rounding
+  kMonotone,     ///< the last two differences have one sign, and the last is smaller
+  kOscillating,  ///< the last difference is smaller and of the other sign
+  kUnsettled,    ///< the last difference is not or hardly smaller: no limit to be seen
+};
+
+/// What a sequence v_1, v_2, ..., v_m says of its limit by Richardson's extrapolation. With
+/// d_1 = v_{m-1} - v_{m-2} and d_2 = v_m - v_{m-1}:
+///
+///   order p = log2 |d_1 / d_2|,   limit = v_m + d_2 / (2^p - 1),   error = |limit - v_m|
+///
+/// for monotone values. Where p exceeds the order P that theory promises, the last difference is
+/// small by luck: then d_2 is not believed to be smaller than d_1 2^-P, and p = P is used for the
+/// error. Oscillating values are not extrapolated: limit = v_m, error = max(|d_2|, |d_1| 2^-P).
+/// For unsettled values, those of an order below kLeastOrder among them, the error is the larger
+/// difference, which bounds nothing.
+inline constexpr double kLeastOrder = 0.4;
+struct Extrapolation {
+  Trend trend = Trend::kTooFew;
+  double limit = 0.0;
+  std::optional<double> order;  ///< observed; where the differences have one sign and fall
+  std::optional<double> error;  ///< estimated, of the last value; with two values or more
+};
+
+/// Extrapolates `values`, coarsest first; not empty. `highest_order` is P. Differences below
+/// `resolution` (in the values' unit) are rounding.
+Extrapolation extrapolate(std::span<const double> values, double highest_order, double resolution);
+
+/// A part of one contact that another solution of the same point does not have: the mark of an
+/// event that grazes its condition, as a V_n that touches zero and may or may not pass it.
+struct ContactChange {
+  enum class Kind {
+    kCompression,  ///< two turns: compression starts again for a while
+    kRestitution,  ///< two turns: restitution for a while, then compression goes on
+    kStick,        ///< P comes to rest for a while
+    kSlip,         ///< P slides for a while between two sticks
+    kRipple,       ///< no event: a peak near the depth at which ripples are merged
+  };
+  Kind kind;
+  double t0_s;  ///< since touch
+  double t1_s;
+  bool in_finer;                ///< whether the finer solution has it, or the coarser
+  std::size_t finer_level = 0;  ///< number of the finer solution's level
+};
+
+/// What one of two solutions of a point has and the other has not, turns first, in the order of
+/// time. Events of one kind are put beside each other in their order, and those stay alone whose
+/// leaving out brings the times of the others closest together. Empty when both have the same
+/// events and the same major peaks.
+std::vector<ContactChange> changes_between(const solver::CaseResult& coarser,
+                                           const solver::CaseResult& finer);
+
+/// "a restitution of 5.97 us, from 187.58 to 193.55 us (V_n grazes 0)".
+std::string described(const ContactChange& change);
+
+/// "restitution", "stick", ...
+const char* name_of(ContactChange::Kind kind);
+
+/// Given two ascending lists of times whose lengths differ by an even number: the first index of
+/// each pair of neighbours to leave out of `longer` so that the sum of |differences| to `shorter`
+/// is least.
+std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
+                                    const std::vector<double>& shorter);
 
 /// A scalar that a contact gives.
 struct Output {
@@ -40,16 +105,10 @@ struct OutputConvergence {
   double finest() const { return *values.back(); }
 };
 
-/// What one level has and the next finer one has not, or the other way round.
-struct LevelChange {
-  std::size_t finer;  ///< number of the finer level
-  ContactChange change;
-};
-
 /// One point over the levels.
 struct PointConvergence {
   std::vector<OutputConvergence> outputs;
-  std::vector<LevelChange> changes;
+  std::vector<ContactChange> changes;  ///< from each level to the next
   /// Whether the finest three levels have one mode, ripples merged: outputs have a limit to be seen
   /// only then.
   bool has_one_mode = false;

@@ -15,59 +15,40 @@ namespace oblique::client {
 namespace {
 
 using nlohmann::ordered_json;
-using solver::fixed_number;
 using solver::readable_number;
 
 constexpr double kMicroseconds = 1e6;
 constexpr double kPercent = 100.0;
-/// PEFRL and the cubic elements are of order 4; generalized-alpha is of order 2.
-constexpr double kHighOrder = 4.0;
-constexpr double kLowOrder = 2.0;
-
-double highest_order(const std::string& what, const solver::ModelParameters& model) {
-  const bool is_low = what == "step" && model.integrator == solver::Integrator::kGeneralizedAlpha;
-  return is_low ? kLowOrder : kHighOrder;
-}
+/// Differences that do not fall count as settled below this part of the output's scale: a fine mesh
+/// carries ever faster vibrations, which leave outputs wavering at about this level.
+constexpr double kSettled = 1e-3;
 
 bool is_settled(const OutputConvergence& output) {
   const auto& extrapolation = output.extrapolation;
-  switch (extrapolation.trend) {
-    case Trend::kTooFew:
-      return false;
-    case Trend::kUnsettled:
-      return *extrapolation.error <= kSettled * output.scale;
-    default:
-      return true;
+  if (extrapolation.trend == Trend::kUnsettled) {
+    return *extrapolation.error <= kSettled * output.scale;
   }
+  return extrapolation.trend != Trend::kTooFew;
 }
 
-const char* remark_on(const OutputConvergence& output) {
+/// What a trend is called in JSON, and the remark on it in the table.
+struct TrendNames {
+  const char* name;
+  const char* remark;
+};
+
+TrendNames names_of(const OutputConvergence& output) {
   switch (output.extrapolation.trend) {
     case Trend::kTooFew:
-      return "other mode before";
+      return {"too few values", "other mode before"};
     case Trend::kRounding:
-      return "rounding only";
-    case Trend::kOscillating:
-      return "oscillates";
-    case Trend::kUnsettled:
-      return is_settled(output) ? "wavers" : "does not settle";
-    default:
-      return "";
-  }
-}
-
-const char* name_of(Trend trend) {
-  switch (trend) {
-    case Trend::kTooFew:
-      return "too few values";
-    case Trend::kRounding:
-      return "rounding";
+      return {"rounding", "rounding only"};
     case Trend::kMonotone:
-      return "monotone";
+      return {"monotone", ""};
     case Trend::kOscillating:
-      return "oscillating";
+      return {"oscillating", "oscillates"};
     default:
-      return "unsettled";
+      return {"unsettled", is_settled(output) ? "wavers" : "does not settle"};
   }
 }
 
@@ -114,16 +95,16 @@ void print_outputs(std::ostream& out, const Refinement& refinement) {
     add_rough(row, times(extrapolation.error, shown.per_unit));
     const auto error = relative(output);
     add_rough(row, error ? std::optional(kPercent * *error) : std::nullopt);
-    add_value(row, std::string(remark_on(output)));
+    add_value(row, std::string(names_of(output).remark));
   }
   print(out, table, Format::kTable);
 }
 
-std::string change_sentence(const Refinement& refinement, const LevelChange& change) {
-  const auto& finer = refinement.levels[change.finer].level.name;
-  const auto& coarser = refinement.levels[change.finer - 1].level.name;
-  return fmt::format("{} has {}; {} has not", change.change.in_finer ? finer : coarser,
-                     described(change.change), change.change.in_finer ? coarser : finer);
+std::string change_sentence(const Refinement& refinement, const ContactChange& change) {
+  const auto& finer = refinement.levels[change.finer_level].level.name;
+  const auto& coarser = refinement.levels[change.finer_level - 1].level.name;
+  return fmt::format("{} has {}; {} has not", change.in_finer ? finer : coarser, described(change),
+                     change.in_finer ? coarser : finer);
 }
 
 std::string names_of_unsettled(const PointConvergence& convergence) {
@@ -154,6 +135,14 @@ class Worst {
   std::string name_;
   std::optional<double> error_;
 };
+
+void print_modes(std::ostream& out, const Refinement& refinement) {
+  out << "\nmode, ripples merged\n";
+  for (const auto& [level, result, wall_s] : refinement.levels) {
+    out << fmt::format("  {:<8} {}  ({} us steps)\n", level.name, result.major_mode,
+                       readable_number(result.solver.dt_s * kMicroseconds, 3));
+  }
+}
 
 void print_verdict(std::ostream& out, const Refinement& refinement) {
   const auto& convergence = refinement.convergence;
@@ -189,14 +178,6 @@ ordered_json json_of_value(const std::optional<double>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 
-ordered_json json_of_level(const Refinement& refinement, std::size_t i) {
-  const auto& level = refinement.levels[i];
-  const auto& result = refinement.result(i);
-  return {{"name", level.level.name},   {"elements_per_link", level.level.model.elements_per_link},
-          {"dt_s", result.solver.dt_s}, {"wall_s", level.wall_s},
-          {"mode", result.mode},        {"major_mode", result.major_mode}};
-}
-
 ordered_json json_of(const OutputConvergence& output) {
   ordered_json values = ordered_json::array();
   for (const auto& value : output.values) {
@@ -209,7 +190,7 @@ ordered_json json_of(const OutputConvergence& output) {
           {"limit", extrapolation.limit},
           {"order", json_of_value(extrapolation.order)},
           {"error", json_of_value(extrapolation.error)},
-          {"trend", name_of(extrapolation.trend)}};
+          {"trend", names_of(output).name}};
 }
 
 double fall_tolerance(const Refinement& step) {
@@ -220,11 +201,11 @@ using FallChanges = std::vector<std::pair<std::string, std::optional<double>>>;
 
 // Relative changes of the outputs; nothing when the mode is another one.
 std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {
-  const auto& exact = exact_fall.results[step.point];
-  if (step.result(0).major_mode != exact.major_mode) {
+  const auto& exact = exact_fall.result;
+  if (step.levels.front().result.major_mode != exact.major_mode) {
     return std::nullopt;
   }
-  const auto ours = outputs_of(step.result(0));
+  const auto ours = outputs_of(step.levels.front().result);
   const auto truth = outputs_of(exact);
   FallChanges changes;
   for (std::size_t i = 0; i < truth.size() && i < ours.size(); ++i) {
@@ -235,18 +216,17 @@ std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedL
 
 }  // namespace
 
-Refinement refinement_of(std::string what, const std::vector<SolvedLevel>& levels,
-                         std::size_t point) {
+Refinement refinement_of(std::string what, std::vector<SolvedLevel> levels) {
+  constexpr double kHighOrder = 4.0;  // of PEFRL and the cubic elements
+  constexpr double kLowOrder = 2.0;   // of generalized-alpha
+  const bool is_low = what == "step" && levels.front().level.model.integrator ==
+                                            solver::Integrator::kGeneralizedAlpha;
   std::vector<solver::CaseResult> results;
-  results.reserve(levels.size());
   for (const auto& level : levels) {
-    results.push_back(level.results[point]);
+    results.push_back(level.result);
   }
-  const double order = highest_order(what, levels.front().level.model);
-  return {.what = std::move(what),
-          .levels = levels,
-          .convergence = convergence_of(results, order),
-          .point = point};
+  auto convergence = convergence_of(results, is_low ? kLowOrder : kHighOrder);
+  return {std::move(what), std::move(levels), std::move(convergence)};
 }
 
 bool converges(const Refinement& refinement) {
@@ -291,19 +271,15 @@ ordered_json json_of_fall(const Refinement& step, const SolvedLevel& exact_fall)
           {"outputs", outputs}};
 }
 
-void print_modes(std::ostream& out, const Refinement& refinement) {
-  out << "\nmode, ripples merged\n";
-  for (std::size_t i = 0; i < refinement.levels.size(); ++i) {
-    const auto& result = refinement.result(i);
-    out << fmt::format("  {:<8} {}  ({} us steps)\n", refinement.levels[i].level.name,
-                       result.major_mode, readable_number(result.solver.dt_s * kMicroseconds, 3));
-  }
-}
-
 ordered_json json_of(const Refinement& refinement) {
   ordered_json levels = ordered_json::array();
-  for (std::size_t i = 0; i < refinement.levels.size(); ++i) {
-    levels.push_back(json_of_level(refinement, i));
+  for (const auto& [level, result, wall_s] : refinement.levels) {
+    levels.push_back({{"name", level.name},
+                      {"elements_per_link", level.model.elements_per_link},
+                      {"dt_s", result.solver.dt_s},
+                      {"wall_s", wall_s},
+                      {"mode", result.mode},
+                      {"major_mode", result.major_mode}});
   }
   ordered_json outputs = ordered_json::array();
   for (const auto& output : refinement.convergence.outputs) {
@@ -311,45 +287,18 @@ ordered_json json_of(const Refinement& refinement) {
   }
   ordered_json changes = ordered_json::array();
   for (const auto& change : refinement.convergence.changes) {
-    const auto& [kind, t0_s, t1_s, in_finer] = change.change;
-    changes.push_back({{"finer", refinement.levels[change.finer].level.name},
-                       {"coarser", refinement.levels[change.finer - 1].level.name},
-                       {"kind", name_of(kind)},
-                       {"t0_s", t0_s},
-                       {"t1_s", t1_s},
-                       {"in_finer", in_finer}});
+    changes.push_back({{"finer", refinement.levels[change.finer_level].level.name},
+                       {"coarser", refinement.levels[change.finer_level - 1].level.name},
+                       {"kind", name_of(change.kind)},
+                       {"t0_s", change.t0_s},
+                       {"t1_s", change.t1_s},
+                       {"in_finer", change.in_finer}});
   }
   return {{"refined", refinement.what},
           {"converges", converges(refinement)},
           {"levels", levels},
           {"outputs", outputs},
           {"changes", changes}};
-}
-
-void print_errors(std::ostream& out, const Refinement& refinement) {
-  protocol::Table table;
-  table.columns.emplace_back("output");
-  for (const auto& level : refinement.levels) {
-    table.columns.emplace_back(level.level.name + " [%]");
-  }
-  for (const char* column : {"finest", "limit", "order"}) {
-    table.columns.emplace_back(column);
-  }
-  for (const auto& output : refinement.convergence.outputs) {
-    auto& row = table.rows.emplace_back();
-    const auto shown = shown_column(output.name);
-    add_value(row, shown.heading);
-    for (const auto& value : output.values) {
-      const auto error = relative_error(value, output.extrapolation.limit);
-      add_value(row, error   ? fixed_number(kPercent * *error, 3)
-                     : value ? std::string("-")
-                             : std::string("other mode"));
-    }
-    add_value(row, output.finest() * shown.per_unit);
-    add_value(row, output.extrapolation.limit * shown.per_unit);
-    add_rough(row, output.extrapolation.order);
-  }
-  print(out, table, Format::kTable);
 }
 
 }  // namespace oblique::client

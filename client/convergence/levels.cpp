@@ -4,18 +4,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <list>
-#include <memory>
+#include <future>
 #include <mutex>
-#include <numeric>
-#include <optional>
-#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/convergence/parallel.h"
 #include "worker/solver/chain/chain.h"
-#include "worker/solver/falls.h"
+#include "worker/solver/fall_cache.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
 
@@ -23,64 +18,29 @@ namespace oblique::client {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using solver::CaseResult;
 
 /// Whether the fall chooses its steps by the tolerance and has none to halve.
 bool falls_by_accuracy(const solver::ModelParameters& model) {
   return model.integrator == solver::Integrator::kExplicit && model.dt_fall_s == 0.0;
 }
 
-// Long computations begin first, so that no core is left alone with one at the end.
-std::vector<std::size_t> dearest_first(const std::vector<Level>& levels) {
-  std::vector<std::size_t> turns(levels.size());
-  std::iota(turns.rbegin(), turns.rend(), std::size_t{0});
-  std::stable_sort(turns.begin(), turns.end(), [&](std::size_t a, std::size_t b) {
-    return levels[a].model.elements_per_link > levels[b].model.elements_per_link;
-  });
-  return turns;
+SolvedLevel solved_level(const Level& level, const ContactPoint& point, solver::FallCache& falls,
+                         WorkLine& line) {
+  const auto started = Clock::now();
+  solver::FallOutcome fall;
+  {
+    const auto falling = line.begin(level.name + ": fall");
+    fall = falls.fall(level.model);
+  }
+  if (!fall.fallen) {
+    throw solver::SolveError(fall.error);
+  }
+  const auto touching = line.begin(level.name + ": contact");
+  const solver::Finger finger(level.model, fall.fallen);
+  SolvedLevel solved{level, finger.solve(point.H_m, point.mu, point.e_star)};
+  solved.wall_s = std::chrono::duration<double>(Clock::now() - started).count();
+  return solved;
 }
-
-/// The falls of some levels, each solved when it is first asked for. From any thread; who asks for
-/// one that another thread solves waits for it.
-class FallsOfLevels {
- public:
-  /// Over the fall that the level shares with others. Throws what the solver throws.
-  solver::Finger finger(const Level& level, WorkLine& line) {
-    Entry& entry = entry_of(level.model);
-    const auto falling = line.begin([&level, &chain = *entry.chain] {
-      return fmt::format("{}: {}", level.name,
-                         fall_so_far(level.model, chain.fall_progress().drop_m()));
-    });
-    std::call_once(entry.once, [&entry] {
-      entry.fall = solver::solve_falls({&entry.chain, 1}).front();
-    });
-    if (!entry.fall.fallen) {
-      throw solver::SolveError(entry.fall.error);
-    }
-    return {level.model, entry.fall.fallen};
-  }
-
- private:
-  struct Entry {
-    explicit Entry(const solver::ModelParameters& model)
-        : chain(std::make_shared<const solver::PreparedChain>(model)) {}
-    std::shared_ptr<const solver::PreparedChain> chain;
-    std::once_flag once;
-    solver::FallOutcome fall;
-  };
-
-  Entry& entry_of(const solver::ModelParameters& model) {
-    const std::lock_guard lock(mutex_);
-    const auto falling = solver::fall_model(model);
-    const auto known = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
-      return entry.chain->model() == falling;
-    });
-    return known == entries_.end() ? entries_.emplace_back(model) : *known;
-  }
-
-  std::mutex mutex_;
-  std::list<Entry> entries_;
-};
 
 }  // namespace
 
@@ -123,60 +83,36 @@ std::vector<Level> step_levels(const solver::ModelParameters& model, double e_st
 }
 
 std::optional<Level> exact_fall_level(const Level& level) {
+  constexpr double kPart = 0.1;
+  constexpr double kTightest = 1e-9;  // that models may have
   if (!falls_by_accuracy(level.model)) {
     return std::nullopt;
   }
   Level exact{"exact fall", level.model};
   const double solved_for = std::min(level.model.tolerance, solver::ModelParameters().tolerance);
-  exact.model.tolerance = std::max(kExactFall * solved_for, kTightestFall);
+  exact.model.tolerance = std::max(kPart * solved_for, kTightest);
   return exact;
 }
 
-std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels,
-                                      const std::vector<ContactPoint>& points, WorkLine& line,
+std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels, const ContactPoint& point,
+                                      WorkLine& line,
                                       const std::function<void(const SolvedLevel&)>& after_each) {
-  std::vector<SolvedLevel> solved(levels.size());
-  const auto turns = dearest_first(levels);
-  FallsOfLevels falls;
-  std::mutex telling;
-  for_each_in_parallel(levels.size(), [&](std::size_t turn) {
-    const auto started = Clock::now();
-    auto& mine = solved[turns[turn]];
-    mine.level = levels[turns[turn]];
-    const auto finger = falls.finger(mine.level, line);
-    const auto touching = line.begin(mine.level.name + ": contact");
-    mine.results = contacts_of(finger, points);
-    mine.wall_s = std::chrono::duration<double>(Clock::now() - started).count();
-    const std::lock_guard lock(telling);
-    after_each(mine);
-  });
-  return solved;
-}
-
-std::vector<CaseResult> contacts_of(const solver::Finger& finger,
-                                    const std::vector<ContactPoint>& points) {
-  std::vector<CaseResult> results(points.size());
-  std::size_t next = 0;
-  std::size_t failed = points.size();
-  finger.solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        if (next == points.size()) {
-          return std::nullopt;
-        }
-        const auto& point = points[next];
-        return solver::PointRequest{next++, point.H_m, point.mu, point.e_star};
-      },
-      [&](solver::PointOutcome&& outcome) {
-        if (outcome.result) {
-          results[outcome.number] = std::move(*outcome.result);
-        } else {
-          failed = std::min<std::size_t>(failed, outcome.number);
-        }
-      });
-  if (failed < points.size()) {
-    results[failed] = finger.solve(points[failed].H_m, points[failed].mu, points[failed].e_star);
+  solver::FallCache falls;
+  std::mutex reporting;
+  std::vector<std::future<SolvedLevel>> running;
+  for (const auto& level : levels) {
+    running.push_back(std::async(std::launch::async, [&] {
+      auto solved = solved_level(level, point, falls, line);
+      const std::lock_guard lock(reporting);
+      after_each(solved);
+      return solved;
+    }));
   }
-  return results;
+  std::vector<SolvedLevel> solved;
+  for (auto& level : running) {
+    solved.push_back(level.get());
+  }
+  return solved;
 }
 
 }  // namespace oblique::client

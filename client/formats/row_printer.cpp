@@ -11,7 +11,7 @@
 #include "client/formats/json_printer.h"
 #include "client/formats/new_file.h"
 #include "client/formats/table_printer.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -7,7 +7,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/usual_ranges.h"

@@ -1,11 +1,13 @@
 #include "client/paper/paper_comparison.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
 #include "client/output/printer.h"
@@ -16,16 +18,12 @@
 namespace oblique::client {
 namespace {
 
-constexpr double kKilo = 1e3;
+using solver::exact_number;
+using solver::fixed_number;
+using solver::signed_number;
 
-void add_differences(std::vector<Difference>& all, std::size_t case_index, Quantity quantity,
-                     const std::vector<double>& published, const std::vector<double>& ours,
-                     double scale) {
-  for (std::size_t i = 0; i < published.size(); ++i) {
-    all.push_back({case_index, quantity, i, published[i],
-                   i < ours.size() ? std::optional(ours[i] * scale) : std::nullopt});
-  }
-}
+constexpr double kKilo = 1.0 / 1e3;  // per unit
+constexpr double kMilli = 1e3;       // per unit
 
 // Values of files and databases went through decimal text; nothing closer is told apart.
 bool same(double a, double b) {
@@ -34,27 +32,39 @@ bool same(double a, double b) {
 
 // Rows do not have F_n at valleys, so they do not say which turns a ripple takes with it: phases
 // are known up to the peak before the first ripple.
-OwnCase own_case(const protocol::Row& row) {
-  OwnCase own{.fn_N = {},
-              .ft_N = {},
-              .phases_s = {},
-              .stick_total_s = std::get<double>(row[6]),
-              .major_mode = std::get<std::string>(row[7])};
+CaseNumbers own_case(const protocol::Row& row) {
+  CaseNumbers own;
+  own.mode = std::get<std::string>(row[7]);
+  own.stick_ms = std::get<double>(row[6]) * kMilli;
   const auto peaks = nlohmann::json::parse(std::get<std::string>(row[4]));
   const auto phases = nlohmann::json::parse(std::get<std::string>(row[5]));
   std::size_t known_phases = phases.size();
   for (std::size_t i = 0; i < peaks.size(); ++i) {
     if (peaks[i].at(3).get<int>() != 0) {
-      own.fn_N.push_back(peaks[i].at(1));
-      own.ft_N.push_back(peaks[i].at(2));
+      own.fn_kN.push_back(peaks[i].at(1).get<double>() * kKilo);
+      own.ft_kN.push_back(peaks[i].at(2).get<double>() * kKilo);
     } else {
       known_phases = std::min(known_phases, 2 * i == 0 ? 0 : 2 * i - 1);
     }
   }
   for (std::size_t i = 0; i < known_phases; ++i) {
-    own.phases_s.push_back(phases[i].at(2).get<double>() - phases[i].at(1).get<double>());
+    own.phases_ms.push_back((phases[i].at(2).get<double>() - phases[i].at(1).get<double>()) *
+                            kMilli);
   }
   return own;
+}
+
+std::vector<double> values_of(const CaseNumbers& numbers, Quantity quantity) {
+  switch (quantity) {
+    case Quantity::kFn:
+      return numbers.fn_kN;
+    case Quantity::kFt:
+      return numbers.ft_kN;
+    case Quantity::kPhase:
+      return numbers.phases_ms;
+    default:
+      return numbers.stick_ms ? std::vector{*numbers.stick_ms} : std::vector<double>{};
+  }
 }
 
 const char* name_of(Quantity quantity) {
@@ -70,18 +80,200 @@ const char* name_of(Quantity quantity) {
   }
 }
 
+void add_header(protocol::Table& table, const std::vector<std::string>& columns) {
+  for (const auto& column : columns) {
+    table.columns.emplace_back(column);
+  }
+}
+
+void add_case(protocol::Row& row, const PublishedCase& published) {
+  add_value(row, published.H_m);
+  add_value(row, published.mu);
+  add_value(row, published.e_star);
+}
+
+// "5.058 / 5.07 / -0.24", or what there is of it.
+std::string beside(const std::vector<Difference>& differences, std::size_t case_index,
+                   Quantity quantity, std::size_t index, int decimals) {
+  const auto found =
+      std::find_if(differences.begin(), differences.end(), [&](const Difference& difference) {
+        return difference.case_index == case_index && difference.quantity == quantity &&
+               difference.index == index;
+      });
+  if (found == differences.end()) {
+    return {};
+  }
+  const auto published = fixed_number(found->published, decimals);
+  if (!found->ours) {
+    return fmt::format("- / {}", published);
+  }
+  return fmt::format("{} / {} / {}", fixed_number(*found->ours, decimals + 1), published,
+                     signed_number(*found->percent(), 2));
+}
+
+void print_forces(std::ostream& out, const PublishedTable& published,
+                  const std::vector<Difference>& differences) {
+  constexpr std::array<const char*, 3> kPeaks{"1st", "2nd", "3rd"};
+  out << "Peaks of the contact forces (Tab. 2): ours / published [kN] / difference [%]\n\n";
+  protocol::Table table;
+  add_header(table, {"H", "mu", "e*", "force", kPeaks[0], kPeaks[1], kPeaks[2]});
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    if (published.cases[i].fn_kN.empty()) {
+      continue;
+    }
+    for (const auto& [quantity, name] :
+         {std::pair(Quantity::kFn, "F_n"), std::pair(Quantity::kFt, "F_t")}) {
+      auto& row = table.rows.emplace_back();
+      add_case(row, published.cases[i]);
+      add_value(row, std::string(name));
+      for (std::size_t peak = 0; peak < kPeaks.size(); ++peak) {
+        add_value(row, beside(differences, i, quantity, peak, 2));
+      }
+    }
+  }
+  print(out, table, Format::kTable);
+}
+
+void print_durations(std::ostream& out, const PublishedTable& published,
+                     const std::vector<Difference>& differences) {
+  out << "\nDurations of compression and restitution (section 4.2): ours / published [ms] / "
+         "difference [%]\n\n";
+  protocol::Table table;
+  add_header(table, {"H", "mu", "e*", "phase", "ours / published / difference"});
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    for (std::size_t phase = 0; phase < published.cases[i].phases_ms.size(); ++phase) {
+      auto& row = table.rows.emplace_back();
+      add_case(row, published.cases[i]);
+      add_value(
+          row, fmt::format("{} {}", phase / 2 + 1, phase % 2 == 0 ? "compression" : "restitution"));
+      add_value(row, beside(differences, i, Quantity::kPhase, phase, 3));
+    }
+  }
+  print(out, table, Format::kTable);
+}
+
+void print_sticks(std::ostream& out, const PublishedTable& published,
+                  const std::vector<Difference>& differences) {
+  out << "\nTime in stick (section 4.3): ours / published [ms] / difference [%]\n\n";
+  protocol::Table table;
+  add_header(table, {"H", "mu", "e*", "ours / published / difference"});
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    if (published.cases[i].stick_ms) {
+      auto& row = table.rows.emplace_back();
+      add_case(row, published.cases[i]);
+      add_value(row, beside(differences, i, Quantity::kStick, 0, 3));
+    }
+  }
+  print(out, table, Format::kTable);
+}
+
+std::string place_of(const PublishedCase& in) {
+  return fmt::format("H = {}, mu = {}, e* = {}", exact_number(in.H_m), exact_number(in.mu),
+                     exact_number(in.e_star));
+}
+
+// Says plainly which published modes are not ours.
+void print_other_modes(std::ostream& out, const PublishedTable& published, const OwnCases& own) {
+  std::string others;
+  std::size_t solved = 0;
+  std::size_t same = 0;
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    const auto& in = published.cases[i];
+    if (!own[i]) {
+      continue;
+    }
+    ++solved;
+    if (own[i]->mode == in.mode) {
+      ++same;
+      continue;
+    }
+    others += fmt::format("- {}: {} ({} peaks), published {} ({})\n", place_of(in), own[i]->mode,
+                          own[i]->fn_kN.size(), in.mode, published_peaks(in));
+  }
+  if (solved == 0) {
+    return;
+  }
+  out << fmt::format("\nThe mode is the published one in {} of {} cases solved", same, solved);
+  out << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
+}
+
+void print_modes_table(std::ostream& out, const PublishedTable& published, const OwnCases& own) {
+  out << "Peaks and modes, ripples merged (Figs. 4 to 6)\n\n";
+  protocol::Table table;
+  add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
+  for (std::size_t i = 0; i < published.cases.size(); ++i) {
+    auto& row = table.rows.emplace_back();
+    add_case(row, published.cases[i]);
+    if (own[i]) {
+      add_value(row, static_cast<std::int64_t>(own[i]->fn_kN.size()));
+    } else {
+      row.emplace_back();
+    }
+    add_value(row, std::int64_t{published_peaks(published.cases[i])});
+    add_value(row, own[i] ? own[i]->mode : std::string("not solved"));
+    add_value(row, own[i] && own[i]->mode == published.cases[i].mode ? std::string("the same")
+                                                                     : published.cases[i].mode);
+  }
+  print(out, table, Format::kTable);
+}
+
+std::string place_of(const PublishedTable& published, const Difference& difference) {
+  const auto& in = published.cases[difference.case_index];
+  std::string what;
+  switch (difference.quantity) {
+    case Quantity::kFn:
+      what = fmt::format("peak {} of F_n", difference.index + 1);
+      break;
+    case Quantity::kFt:
+      what = fmt::format("peak {} of F_t", difference.index + 1);
+      break;
+    case Quantity::kPhase:
+      what = fmt::format("{} {}", difference.index % 2 == 0 ? "compression" : "restitution",
+                         difference.index / 2 + 1);
+      break;
+    case Quantity::kStick:
+      what = "time in stick";
+      break;
+  }
+  return what + " at " + place_of(in);
+}
+
+void print_differences_summary(std::ostream& out, const PublishedTable& published,
+                               const std::vector<Difference>& differences) {
+  const auto summary = summary_of(differences);
+  out << fmt::format("\n{} trustworthy published numbers", differences.size());
+  if (summary.missing > 0) {
+    out << fmt::format(", {} of them without ours", summary.missing);
+  }
+  if (summary.largest) {
+    out << fmt::format(
+        ": rms difference {} %, largest {} % ({})", fixed_number(summary.rms_percent, 2),
+        fixed_number(summary.largest_percent, 2), place_of(published, *summary.largest));
+  }
+  out << "\n";
+}
+
+void print_misprints(std::ostream& out, const PublishedTable& published) {
+  out << "\nNot counted, for they are misprinted:\n\n";
+  for (const auto& misprint : published.misprints) {
+    out << "- " << misprint.where << ": ";
+    for (std::size_t i = 0; i < misprint.printed.size(); ++i) {
+      out << (i > 0 ? "; " : "") << misprint.printed[i];
+    }
+    out << "\n    " << misprint.why << "\n";
+  }
+}
+
 }  // namespace
 
-OwnCase own_case(const solver::CaseResult& result) {
-  OwnCase own{.fn_N = {},
-              .ft_N = {},
-              .phases_s = {},
-              .stick_total_s = result.stick_total_s,
-              .major_mode = result.major_mode};
+CaseNumbers own_case(const solver::CaseResult& result) {
+  CaseNumbers own;
+  own.mode = result.major_mode;
+  own.stick_ms = result.stick_total_s * kMilli;
   for (const auto& peak : result.peaks) {
     if (peak.major) {
-      own.fn_N.push_back(peak.fn_N);
-      own.ft_N.push_back(peak.ft_N);
+      own.fn_kN.push_back(peak.fn_N * kKilo);
+      own.ft_kN.push_back(peak.ft_N * kKilo);
     }
   }
   std::vector<double> turns_N;
@@ -92,7 +284,7 @@ OwnCase own_case(const solver::CaseResult& result) {
   double start_s = 0.0;
   for (std::size_t i = 0; i < result.phases.size(); ++i) {
     if (i == survives.size() || survives[i]) {
-      own.phases_s.push_back(result.phases[i].t1_s - start_s);
+      own.phases_ms.push_back((result.phases[i].t1_s - start_s) * kMilli);
       start_s = result.phases[i].t1_s;
     }
   }
@@ -103,19 +295,16 @@ std::optional<double> Difference::percent() const {
   return ours ? std::optional(100.0 * (*ours - published) / published) : std::nullopt;
 }
 
-std::vector<Difference> compare(const PublishedTable& table,
-                                const std::vector<std::optional<OwnCase>>& own) {
+std::vector<Difference> compare(const PublishedTable& table, const OwnCases& own) {
   std::vector<Difference> all;
   for (std::size_t i = 0; i < table.cases.size(); ++i) {
-    const auto& published = table.cases[i];
-    const auto ours = own[i].value_or(OwnCase{});
-    add_differences(all, i, Quantity::kFn, published.fn_kN, ours.fn_N, 1.0 / kKilo);
-    add_differences(all, i, Quantity::kFt, published.ft_kN, ours.ft_N, 1.0 / kKilo);
-    add_differences(all, i, Quantity::kPhase, published.phases_ms, ours.phases_s, kKilo);
-    if (published.stick_ms) {
-      add_differences(all, i, Quantity::kStick, {*published.stick_ms},
-                      own[i] ? std::vector<double>{ours.stick_total_s} : std::vector<double>{},
-                      kKilo);
+    for (const auto quantity : {Quantity::kFn, Quantity::kFt, Quantity::kPhase, Quantity::kStick}) {
+      const auto published = values_of(table.cases[i], quantity);
+      const auto ours = own[i] ? values_of(*own[i], quantity) : std::vector<double>{};
+      for (std::size_t j = 0; j < published.size(); ++j) {
+        all.push_back({i, quantity, j, published[j],
+                       j < ours.size() ? std::optional(ours[j]) : std::nullopt});
+      }
     }
   }
   return all;
@@ -143,10 +332,10 @@ DifferenceSummary summary_of(const std::vector<Difference>& differences) {
   return summary;
 }
 
-std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
-    const PublishedTable& table, std::span<const solver::Finger> fingers) {
+std::vector<OwnCases> solved_cases(const PublishedTable& table,
+                                   std::span<const solver::Finger> fingers) {
   const std::size_t cases = table.cases.size();
-  std::vector own(fingers.size(), std::vector<std::optional<OwnCase>>(cases));
+  std::vector own(fingers.size(), OwnCases(cases));
   std::size_t next = 0;
   std::string error;
   solver::solve_points(
@@ -171,9 +360,8 @@ std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
   return own;
 }
 
-std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
-                                              const protocol::Table& rows) {
-  std::vector<std::optional<OwnCase>> own(table.cases.size());
+OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows) {
+  OwnCases own(table.cases.size());
   for (std::size_t i = 0; i < table.cases.size(); ++i) {
     const auto& published = table.cases[i];
     for (const auto& row : rows.rows) {
@@ -211,6 +399,22 @@ protocol::Table rows_of(const PublishedTable& table, const std::vector<Differenc
     }
   }
   return reply;
+}
+
+void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases& own) {
+  print_modes_table(out, table, own);
+  print_other_modes(out, table, own);
+}
+
+void print_comparison(std::ostream& out, const PublishedTable& table, const OwnCases& own) {
+  const auto differences = compare(table, own);
+  print_forces(out, table, differences);
+  print_durations(out, table, differences);
+  print_sticks(out, table, differences);
+  out << '\n';
+  print_modes(out, table, own);
+  print_differences_summary(out, table, differences);
+  print_misprints(out, table);
 }
 
 }  // namespace oblique::client

@@ -16,17 +16,11 @@
 
 namespace oblique::client {
 
-/// What we have for one published case, ripples merged.
-struct OwnCase {
-  std::vector<double> fn_N;      ///< F_n at each major peak
-  std::vector<double> ft_N;      ///< largest |F_t| around each major peak
-  std::vector<double> phases_s;  ///< how long each lasts
-  double stick_total_s;
-  std::string major_mode;
-};
+/// A case's numbers of a result.
+CaseNumbers own_case(const solver::CaseResult& result);
 
-/// What a comparison needs of a result.
-OwnCase own_case(const solver::CaseResult& result);
+/// Our numbers for each published case; nothing for one that is not solved.
+using OwnCases = std::vector<std::optional<CaseNumbers>>;
 
 enum class Quantity { kFn, kFt, kPhase, kStick };
 
@@ -43,8 +37,7 @@ struct Difference {
 };
 
 /// Every counted published number beside ours; `own` has one entry a case.
-std::vector<Difference> compare(const PublishedTable& table,
-                                const std::vector<std::optional<OwnCase>>& own);
+std::vector<Difference> compare(const PublishedTable& table, const OwnCases& own);
 
 /// Root mean square and largest size of the differences [%].
 struct DifferenceSummary {
@@ -58,23 +51,20 @@ DifferenceSummary summary_of(const std::vector<Difference>& differences);
 
 /// Solves the cases with each finger, all side by side: a list for each. Throws solver::SolveError
 /// when one cannot be solved.
-std::vector<std::vector<std::optional<OwnCase>>> solved_cases(
-    const PublishedTable& table, std::span<const solver::Finger> fingers);
+std::vector<OwnCases> solved_cases(const PublishedTable& table,
+                                   std::span<const solver::Finger> fingers);
 
 /// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
 /// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the
 /// first ripple on are left out. Throws std::runtime_error when a case has several points.
-std::vector<std::optional<OwnCase>> own_cases(const PublishedTable& table,
-                                              const protocol::Table& rows);
+OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows);
 
 /// Prints the tables for people: forces, durations, stick times, modes and where they are not the
 /// published ones, summary, misprints.
-void print_comparison(std::ostream& out, const PublishedTable& table,
-                      const std::vector<std::optional<OwnCase>>& own);
+void print_comparison(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
 /// Of these, peaks and modes alone.
-void print_modes(std::ostream& out, const PublishedTable& table,
-                 const std::vector<std::optional<OwnCase>>& own);
+void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
 /// The differences as rows, one a published number, for CSV and JSON.
 protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences);

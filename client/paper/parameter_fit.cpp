@@ -1,6 +1,8 @@
 #include "client/paper/parameter_fit.h"
 
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <unsupported/Eigen/LevenbergMarquardt>
@@ -21,6 +23,26 @@ constexpr double kSmallestStep = 1e-5;
 constexpr double kSmallestGain = 1e-3;
 /// Of a parameter, for derivatives: the outputs are smooth to about 1e-7 of themselves.
 constexpr double kDifferenceStep = 1e-4;
+
+/// Every published number beside what each of the models gives. Falls that `falls` does not keep
+/// are solved together.
+std::vector<std::vector<Difference>> differences_of(const PublishedTable& published,
+                                                    std::span<const solver::ModelParameters> models,
+                                                    solver::FallCache& falls) {
+  std::vector<solver::Finger> fingers;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const auto fall = falls.fall(models[i], models.subspan(i));
+    if (!fall.fallen) {
+      throw solver::SolveError(fall.error);
+    }
+    fingers.emplace_back(models[i], fall.fallen);
+  }
+  std::vector<std::vector<Difference>> differences;
+  for (const auto& cases : solved_cases(published, fingers)) {
+    differences.push_back(compare(published, cases));
+  }
+  return differences;
+}
 
 /// r_i(x) = ours_i / published_i - 1 with the parameters start exp(x).
 class Residuals : public Eigen::DenseFunctor<double> {
@@ -79,32 +101,15 @@ class Residuals : public Eigen::DenseFunctor<double> {
 
 }  // namespace
 
-std::vector<std::vector<Difference>> differences_of(const PublishedTable& published,
-                                                    std::span<const solver::ModelParameters> models,
-                                                    solver::FallCache& falls) {
-  std::vector<solver::Finger> fingers;
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    const auto fall = falls.fall(models[i], models.subspan(i));
-    if (!fall.fallen) {
-      throw solver::SolveError(fall.error);
-    }
-    fingers.emplace_back(models[i], fall.fallen);
-  }
-  std::vector<std::vector<Difference>> differences;
-  for (const auto& cases : solved_cases(published, fingers)) {
-    differences.push_back(compare(published, cases));
-  }
-  return differences;
-}
-
 FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,
                        const std::function<void(const FitStep&)>& after_each) {
   solver::FallCache falls;
-  const auto differences_at = [&](const solver::ModelParameters& model) {
-    return differences_of(published, {&model, 1}, falls).front();
+  const auto step_at = [&](int iteration, const solver::ModelParameters& model) {
+    auto differences = differences_of(published, {&model, 1}, falls).front();
+    const auto summary = summary_of(differences);
+    return FitStep{iteration, model, std::move(differences), summary};
   };
-  FitStep step{.iteration = 0, .model = start, .differences = differences_at(start), .summary = {}};
-  step.summary = summary_of(step.differences);
+  FitStep step = step_at(0, start);
   after_each(step);
   Residuals residuals(published, start, static_cast<int>(step.differences.size()), falls);
   Eigen::LevenbergMarquardt<Residuals> method(residuals);
@@ -119,11 +124,7 @@ FitStep fit_parameters(const PublishedTable& published, const solver::ModelParam
           fmt::format("the fit has found no minimum after {} iterations", kMostIterations));
     }
     status = method.minimizeOneStep(x);
-    step = {.iteration = step.iteration + 1,
-            .model = residuals.model_at(x),
-            .differences = differences_at(residuals.model_at(x)),
-            .summary = {}};
-    step.summary = summary_of(step.differences);
+    step = step_at(step.iteration + 1, residuals.model_at(x));
     after_each(step);
   }
   return step;

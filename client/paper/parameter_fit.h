@@ -2,13 +2,11 @@
 
 #include <array>
 #include <functional>
-#include <span>
 #include <string_view>
 #include <vector>
 
 #include "client/paper/paper_comparison.h"
 #include "client/paper/published_table.h"
-#include "worker/solver/fall_cache.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
@@ -23,12 +21,6 @@ struct FitStep {
   std::vector<Difference> differences;  ///< from every published number
   DifferenceSummary summary;
 };
-
-/// Every published number beside what each of the models gives. Falls that `falls` does not keep
-/// are solved together. Throws solver::InputError or SolveError when a model cannot be solved.
-std::vector<std::vector<Difference>> differences_of(const PublishedTable& published,
-                                                    std::span<const solver::ModelParameters> models,
-                                                    solver::FallCache& falls);
 
 /// Fits the parameters of kFittedKeys, from where `start` has them, so that the sum of squared
 /// relative differences from all published numbers is least (Levenberg-Marquardt on the logarithms

@@ -7,9 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/plot/block_choice.h"
-#include "client/plot/figures/quantity.h"
-#include "proto/suggestion.h"
+#include "client/plot/figure.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
@@ -89,8 +87,10 @@ At judged_at(const std::string& text, const StudyShape& shape) {
   return {axis, nearest};
 }
 
-Quantity quantity_of_axis(const StudyAxis& axis) {
-  return quantity_of(axis.key == "E" ? axis.column : axis.key, server::unit_of_column(axis.column));
+std::string value_of_axis(const StudyAxis& axis, double value) {
+  return shown_value(
+      axis_of(axis.key == "E" ? axis.column : axis.key, server::unit_of_column(axis.column)),
+      value);
 }
 
 void add_term(std::string& sql, const std::string& term) {
@@ -107,7 +107,7 @@ void add_condition(Condition& condition, const StudyAxis& axis, double value) {
   if (axis.varies()) {
     fix(condition, axis, value);
   }
-  condition.shown.push_back(shown_value(quantity_of_axis(axis), value));
+  condition.shown.push_back(value_of_axis(axis, value));
 }
 
 bool is_drawn(const std::vector<ChosenAxis>& drawn, const StudyAxis& axis) {
@@ -170,7 +170,7 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
     condition.sql = fmt::format("point >= {} AND point < {}", shape.block.first_point,
                                 shape.block.first_point + shape.block.points);
     condition.sql_without_where = condition.sql;
-    condition.shown.push_back(block_in_words(shape));
+    condition.shown.push_back(fmt::format("block {} of {}", shape.block.number + 1, shape.blocks));
   }
   if (!request.where.empty()) {
     add_term(condition.sql, fmt::format("({})", request.where));
@@ -205,7 +205,7 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
           fmt::format("{} has {}; {} = {} is drawn, and --at {}=VALUE draws another.", axis.key,
                       values_in_words(axis), axis.key, readable_number(value), axis.key));
     }
-    condition.shown.push_back(shown_value(quantity_of_axis(axis), value));
+    condition.shown.push_back(value_of_axis(axis, value));
   }
   return condition;
 }

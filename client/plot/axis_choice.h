@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/data/study_axes.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/study_shape.h"
 
 namespace oblique::client::plot {
 

@@ -7,7 +7,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/plot/axis_choice.h"
-#include "client/plot/drawing.h"
+#include "client/plot/figure_builder.h"
+#include "client/plot/study_shape.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
@@ -120,15 +121,11 @@ void check_range(const PlotRequest& request) {
 Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& request,
                  const Tell& tell) {
   check_range(request);
-  Drawing drawing(source, shape, request, tell);
-  Figure figure = !request.map.empty()       ? drawing.map()
-                  : !request.lines.empty()   ? drawing.lines()
-                  : !request.scatter.empty() ? drawing.scattered()
-                                             : drawing.counts();
-  if (figure.is_empty) {
-    tell("No point of the picture has a value: nothing is drawn in it.");
-  }
-  return figure;
+  FigureBuilder builder(source, shape, request, tell);
+  return !request.map.empty()       ? builder.map()
+         : !request.lines.empty()   ? builder.lines()
+         : !request.scatter.empty() ? builder.scatter()
+                                    : builder.histogram();
 }
 
 }  // namespace oblique::client::plot

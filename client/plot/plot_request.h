@@ -4,11 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/data/study_axes.h"
-#include "client/plot/figures/figure.h"
+#include "client/plot/figure.h"
 #include "client/service/source.h"
 
 namespace oblique::client::plot {
+
+struct StudyShape;
 
 /// What to draw of a study, as flags say it. Texts are SQL over the columns of queries. At most one
 /// of the first four is given; with none of them what suits the study is drawn.

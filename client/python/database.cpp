@@ -1,27 +1,22 @@
-#include "client/python/database.h"
-
-#include <unistd.h>
-
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include "client/python/conversions.h"
-#include "client/python/interruptible.h"
-#include "client/python/query_columns.h"
+#include "client/python/calls.h"
+#include "client/python/results.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"
 #include "server/query/columns.h"
-#include "server/query/query_rules.h"
 #include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
@@ -31,74 +26,35 @@ namespace {
 namespace py = pybind11;
 using protocol::CellKind;
 
-/// A database file that several threads of one process may ask, one after another.
-class SharedReader {
- public:
-  explicit SharedReader(const std::string& file) : file_(std::filesystem::absolute(file).string()) {
-    if (!std::filesystem::exists(file_)) {
-      throw std::filesystem::filesystem_error(
-          "", file_, std::make_error_code(std::errc::no_such_file_or_directory));
-    }
-    open();
+using Value = std::variant<std::monostate, std::int64_t, double, std::string>;
+
+/// One column of an answer.
+struct Column {
+  std::string name;
+  std::string unit;  ///< SI; empty for pure numbers and texts
+  std::vector<Value> values;
+
+  template <class Kind>
+  bool has() const {
+    return std::any_of(values.begin(), values.end(),
+                       [](const Value& value) { return std::holds_alternative<Kind>(value); });
   }
-
-  /// As an absolute path.
-  const std::string& file() const { return file_; }
-  bool is_of_this_process() const { return process_ == getpid(); }
-
-  /// Lets `ask` have the reader, unless `stop` was set before its turn.
-  template <class Ask>
-  auto with_reader(const std::atomic<bool>& stop, const Ask& ask) {
-    const std::lock_guard lock(mutex_);
-    if (is_interrupted_) {  // for good
-      open();
-    }
-    const struct Asking {
-      SharedReader& shared;
-      Asking(SharedReader& all, const std::atomic<bool>& stop) : shared(all) {
-        shared.set_asking(&stop);
-      }
-      ~Asking() { shared.set_asking(nullptr); }
-    } asking(*this, stop);
-    if (stop) {
-      throw Stopped();
-    }
-    return ask(*reader_);
-  }
-
-  /// What there is to say of how it is read; mostly nothing.
-  const std::string& remark() const { return reader_->remark(); }
-
-  /// Ends what was asked with `stop`, with an error.
-  void interrupt(const std::atomic<bool>& stop) {
-    const std::lock_guard lock(asking_mutex_);
-    if (asking_ == &stop) {
-      is_interrupted_ = true;
-      reader_->interrupt();
-    }
-  }
-
- private:
-  void set_asking(const std::atomic<bool>* stop) {
-    const std::lock_guard lock(asking_mutex_);
-    asking_ = stop;
-  }
-
-  void open() {
-    reader_ = std::make_unique<server::Reader>(file_);
-    is_interrupted_ = false;
-  }
-
-  const std::string file_;
-  std::mutex mutex_;
-  std::unique_ptr<server::Reader> reader_;
-  const pid_t process_ = getpid();
-  bool is_interrupted_ = false;
-  std::mutex asking_mutex_;
-  const std::atomic<bool>* asking_ = nullptr;  ///< who has the reader
 };
 
-/// Throws InputError for a study that there is not, with the nearest.
+Value value_of(const protocol::Cell& cell) {
+  switch (cell.kind) {
+    case CellKind::kInteger:
+      return cell.integer;
+    case CellKind::kReal:
+      return cell.real;
+    case CellKind::kText:
+      return std::string(cell.text);
+    default:
+      return {};
+  }
+}
+
+/// Throws InputError for a study that does not exist, with the nearest name.
 server::Answer begun(server::Reader& reader, const protocol::QueryRequest& request) {
   try {
     return reader.answer(request, server::kNoLimits);
@@ -112,57 +68,63 @@ server::Answer begun(server::Reader& reader, const protocol::QueryRequest& reque
   }
 }
 
-QueryColumns answer_to(SharedReader& shared, const protocol::QueryRequest& request,
-                       const std::atomic<bool>& stop) {
-  return shared.with_reader(stop, [&](server::Reader& reader) {
-    QueryColumns columns;
-    server::Answer answer = begun(reader, request);
-    for (bool ends = false; !ends;) {
-      const protocol::QueryReply chunk = answer.next();
-      columns.add(chunk);
-      ends = chunk.ends();
+std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryRequest& request) {
+  std::vector<Column> columns;
+  server::Answer answer = begun(reader, request);
+  for (bool ends = false; !ends;) {
+    const protocol::QueryReply chunk = answer.next();
+    for (int i = static_cast<int>(columns.size()); i < chunk.columns_size(); ++i) {
+      columns.push_back({chunk.columns(i), i < chunk.units_size() ? chunk.units(i) : "", {}});
     }
-    return columns;
-  });
-}
-
-py::object object_of(const AnswerColumn& column, std::size_t row) {
-  switch (static_cast<CellKind>(column.kinds[row])) {
-    case CellKind::kInteger:
-      return py::int_(column.integers[row]);
-    case CellKind::kReal:
-      return py::float_(column.reals[row]);
-    case CellKind::kText:
-      return py::str(column.texts[row]);
-    default:
-      return py::none();
+    protocol::ChunkRows rows(chunk);
+    while (rows.next()) {
+      for (std::size_t i = 0; i < columns.size(); ++i) {
+        columns[i].values.push_back(value_of(rows.cell(i)));
+      }
+    }
+    ends = chunk.ends();
   }
+  return columns;
 }
 
-/// Whole numbers that are all there are int64, other numbers float64 with NaN where there is none,
-/// and all else a list.
-py::object values_of(AnswerColumn&& column) {
+/// int64 where all values are whole numbers, else float64 with NaN for NULL; a list where some are
+/// texts.
+py::object values_of(const Column& column) {
   const auto kind = server::kind_of_values(column.name);
-  const bool has_number = std::any_of(column.kinds.begin(), column.kinds.end(), [](char each) {
-    return static_cast<CellKind>(each) != CellKind::kNull;
-  });
-  if (column.has_text || (!has_number && kind == CellKind::kText)) {
-    py::list values(column.kinds.size());
-    for (std::size_t i = 0; i < column.kinds.size(); ++i) {
-      values[i] = object_of(column, i);
-    }
-    return values;
+  const bool has_real = column.has<double>();
+  const bool has_number = has_real || column.has<std::int64_t>();
+  if (column.has<std::string>() || (!has_number && kind == CellKind::kText)) {
+    return py::cast(column.values);
   }
-  const bool is_real = column.has_real || column.has_null || kind == CellKind::kReal;
-  return is_real ? py::object(array_of(std::move(column.reals)))
-                 : py::object(array_of(std::move(column.integers)));
+  std::vector<std::int64_t> integers;
+  std::vector<double> reals;
+  const bool are_integers = !has_real && !column.has<std::monostate>() && kind != CellKind::kReal;
+  for (const Value& value : column.values) {
+    const auto* integer = std::get_if<std::int64_t>(&value);
+    const auto* real = std::get_if<double>(&value);
+    if (are_integers) {
+      integers.push_back(*integer);
+    } else {
+      reals.push_back(real      ? *real
+                      : integer ? static_cast<double>(*integer)
+                                : std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  return are_integers ? py::object(array_of(std::move(integers)))
+                      : py::object(array_of(std::move(reals)));
 }
 
+/// A database file. Every call opens it anew, so that calls of several threads share nothing.
 class Database {
  public:
-  explicit Database(const std::string& file) : shared_(std::make_shared<SharedReader>(file)) {}
-
-  std::string remark() { return shared()->remark(); }
+  explicit Database(const std::string& file) : file_(std::filesystem::absolute(file).string()) {
+    refuse_forked_child();
+    if (!std::filesystem::exists(file_)) {
+      throw std::filesystem::filesystem_error(
+          "", file_, std::make_error_code(std::errc::no_such_file_or_directory));
+    }
+    const server::Reader reader(file_);  // throws if it is no database of oblique
+  }
 
   py::list query(const std::string& study, const std::string& where, const std::string& select,
                  const std::string& group, const std::string& order,
@@ -190,54 +152,41 @@ class Database {
 
   /// A dict for each study.
   py::list studies() {
-    using Studies = std::vector<protocol::StudyStatus>;
-    const auto found = interruptibly<Studies>([shared = shared()](const std::atomic<bool>& stop) {
-      return shared->with_reader(stop,
-                                 [](server::Reader& reader) { return reader.study_status(); });
-    });
+    const auto found = with_reader<std::vector<protocol::StudyStatus>>(
+        [](server::Reader& reader) { return reader.study_status(); });
     py::list all;
     for (const protocol::StudyStatus& study : found) {
-      py::dict named;
-      named["study_id"] = study.study_id();
-      named["name"] = study.name();
-      named["state"] = study.state();
-      named["points"] = study.points();
-      named["solved"] = study.solved();
-      named["failed"] = study.failed();
-      named["left_out"] = study.left_out();
-      named["created_at"] = study.created_at();
-      named["solver_version"] = study.solver_version();
-      all.append(named);
+      using namespace py::literals;
+      all.append(py::dict("study_id"_a = study.study_id(), "name"_a = study.name(),
+                          "state"_a = study.state(), "points"_a = study.points(),
+                          "solved"_a = study.solved(), "failed"_a = study.failed(),
+                          "left_out"_a = study.left_out(), "created_at"_a = study.created_at(),
+                          "solver_version"_a = study.solver_version()));
     }
     return all;
   }
 
  private:
-  /// The reader of this process. That of the parent is left alone behind a fork: SQLite's files may
-  /// not be carried over, and threads that are not here may have locked it.
-  const std::shared_ptr<SharedReader>& shared() {
-    if (!shared_->is_of_this_process()) {
-      auto own = std::make_shared<SharedReader>(shared_->file());
-      static_cast<void>(new std::shared_ptr(std::exchange(shared_, std::move(own))));
-    }
-    return shared_;
+  template <class Result>
+  Result with_reader(const std::function<Result(server::Reader&)>& read) {
+    refuse_forked_child();
+    const auto reader = std::make_shared<server::Reader>(file_);
+    return interruptibly<Result>([reader, read](const std::atomic<bool>&) { return read(*reader); },
+                                 [reader] { reader->interrupt(); });
   }
 
   /// (name, unit, values) of each column.
   py::list ask(const protocol::QueryRequest& request) {
-    auto answer = interruptibly<QueryColumns>(
-        [shared = shared(), request](const std::atomic<bool>& stop) {
-          return answer_to(*shared, request, stop);
-        },
-        [shared = shared()](const std::atomic<bool>& stop) { shared->interrupt(stop); });
+    const auto columns = with_reader<std::vector<Column>>(
+        [request](server::Reader& reader) { return answer_to(reader, request); });
     py::list all;
-    for (AnswerColumn& column : answer.columns()) {
-      all.append(py::make_tuple(column.name, column.unit, values_of(std::move(column))));
+    for (const Column& column : columns) {
+      all.append(py::make_tuple(column.name, column.unit, values_of(column)));
     }
     return all;
   }
 
-  std::shared_ptr<SharedReader> shared_;
+  const std::string file_;
 };
 
 }  // namespace
@@ -245,7 +194,6 @@ class Database {
 void add_database(py::module_& module) {
   py::class_<Database>(module, "Database")
       .def(py::init<const std::string&>(), py::arg("file"))
-      .def("remark", &Database::remark)
       .def("query", &Database::query)
       .def("sql", &Database::sql)
       .def("studies", &Database::studies);

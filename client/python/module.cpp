@@ -1,17 +1,66 @@
+#include <unistd.h>
+
 #include <exception>
 #include <filesystem>
+#include <stdexcept>
 
 #include <pybind11/pybind11.h>
 
-#include "client/python/database.h"
-#include "client/python/solving.h"
+#include "client/python/calls.h"
 #include "server/database/sqlite.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
-/// What the package oblique (folder oblique/) is made over.
+namespace oblique::python {
+namespace {
+
+bool python_ends() {
+#if PY_VERSION_HEX >= 0x030D0000
+  return Py_IsFinalizing() != 0;
+#else
+  return _Py_IsFinalizing() != 0;
+#endif
+}
+
+[[noreturn]] void block_for_good() {
+  while (true) {
+    pause();
+  }
+}
+
+}  // namespace
+
+void WithoutLock::take() noexcept {
+  if (python_ends()) {
+    block_for_good();
+  }
+  try {
+    PyEval_RestoreThread(state_);
+  } catch (...) {  // pthread_exit of a Python that began to end just then
+    block_for_good();
+  }
+}
+
+bool is_main_thread() {
+  const auto main = pybind11::module_::import("threading").attr("main_thread")();
+  return main.attr("ident").cast<unsigned long>() == PyThread_get_thread_ident();
+}
+
+void refuse_forked_child() {
+  static const pid_t process = getpid();
+  if (getpid() != process) {
+    throw std::runtime_error(
+        "oblique cannot be used in the child of a fork: start processes with "
+        "multiprocessing.set_start_method(\"spawn\")");
+  }
+}
+
+}  // namespace oblique::python
+
+/// The extension below the package oblique (folder oblique/).
 PYBIND11_MODULE(_core, module) {
   namespace py = pybind11;
+  oblique::python::refuse_forked_child();
   py::register_exception<oblique::solver::SolveError>(module, "SolveError", PyExc_ArithmeticError);
   static PyObject* const database_error =
       py::register_exception<oblique::server::StorageError>(module, "DatabaseError").ptr();

@@ -1,27 +1,21 @@
-#include "client/python/solving.h"
-
 #include <malloc.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "client/python/conversions.h"
-#include "client/python/given_keys.h"
-#include "client/python/interpreter_lock.h"
-#include "client/python/interruptible.h"
-#include "client/python/result_arrays.h"
-#include "proto/program/origin/origin.h"
-#include "proto/recipe/keys.h"
+#include <pybind11/stl.h>
+
+#include "client/python/calls.h"
+#include "client/python/given_points.h"
+#include "client/python/results.h"
+#include "proto/recipe/blocks.h"
 #include "proto/system/limits_of_group.h"
-#include "worker/solver/library/falls_kept.h"
-#include "worker/solver/library/point_runs.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
@@ -33,32 +27,45 @@ namespace {
 
 namespace py = pybind11;
 
-/// The only point that was given. Throws InputError for what is wrong with its model.
+/// A single point with its model.
 struct OnePoint {
   ModelParameters model;
   Point point;
 };
-OnePoint one_point(const GivenKeys& keys) {
-  GivenPoints given = points_of(keys);
+
+OnePoint one_point(const py::dict& keys) {
+  GivenPoints given = points_of(keys_of(keys, 1));
   if (!given.faults.front().empty()) {
     throw InputError(given.faults.front());
   }
   return {std::move(given.models.front()), given.points.front()};
 }
 
-py::dict with_point(const Point& point, const py::dict& outputs) {
-  py::dict all;
-  all["H"] = point.H_m;
-  all["mu"] = point.mu;
-  all["e"] = point.e;
-  for (const auto& [name, value] : outputs) {
-    all[name] = value;
+/// The outputs with H, mu and e of the points.
+py::dict with_points(ResultArrays& arrays, const std::vector<Point>& points) {
+  py::dict all = arrays.dict();
+  std::vector<double> H_m;
+  std::vector<double> mu;
+  std::vector<double> e;
+  for (const Point& point : points) {
+    H_m.push_back(point.H_m);
+    mu.push_back(point.mu);
+    e.push_back(point.e);
   }
+  all["H"] = array_of(std::move(H_m));
+  all["mu"] = array_of(std::move(mu));
+  all["e"] = array_of(std::move(e));
   return all;
 }
 
+py::dict dict_of(const OnePoint& one, const CaseResult& result) {
+  ResultArrays arrays(1);
+  arrays.set(0, result);
+  return with_points(arrays, {one.point});
+}
+
 py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
-  const OnePoint one = one_point(keys_of(keys, 1));
+  const OnePoint one = one_point(keys);
   const auto result = interruptibly<CaseResult>([one, falls, errors](const std::atomic<bool>&) {
     const Finger finger(one.model, falls);
     const Point& point = one.point;
@@ -68,10 +75,10 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
     }
     return solved;
   });
-  return with_point(one.point, dict_of(result));
+  return dict_of(one, result);
 }
 
-/// Instants of a trace, number behind number.
+/// Instants of a trace: the numbers of one after those of the other, and the states.
 struct Instants {
   CaseResult result;
   std::vector<double> numbers;
@@ -79,7 +86,7 @@ struct Instants {
 };
 
 py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape) {
-  const OnePoint one = one_point(keys_of(keys, 1));
+  const OnePoint one = one_point(keys);
   auto instants = interruptibly<Instants>([one, falls, fall, shape](const std::atomic<bool>& stop) {
     Instants rows;
     Tracing tracing;
@@ -98,26 +105,12 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
   });
   const auto headings = solver::trace_headings(solver::trace_shape(
       one.model.lengths_m.size(), static_cast<std::size_t>(one.model.elements_per_link), shape));
-  const std::size_t width = headings.size() - 1;  // the state is no number
-  const std::size_t rows = instants.states.size();
-  py::dict columns;
-  std::size_t place = 0;
-  for (const std::string& heading : headings) {
-    if (heading == "state") {
-      columns["state"] = array_of(std::move(instants.states));
-      continue;
-    }
-    std::vector<double> column(rows);
-    for (std::size_t i = 0; i < rows; ++i) {
-      column[i] = instants.numbers[i * width + place];
-    }
-    columns[py::str(heading)] = array_of(std::move(column));
-    ++place;
-  }
-  return py::make_tuple(with_point(one.point, dict_of(instants.result)), columns);
+  return py::make_tuple(dict_of(one, instants.result), headings,
+                        array_of(std::move(instants.numbers)),
+                        array_of(std::move(instants.states)));
 }
 
-/// Lets signals and `progress` (None: nobody) end it.
+/// Reports to `progress` (or None) and lets signals and what it raises end the work.
 std::function<bool(std::size_t)> goes_on(WithoutLock& others_run, std::size_t points,
                                          bool has_signals, const py::object& progress) {
   if (!has_signals && progress.is_none()) {
@@ -138,6 +131,7 @@ std::function<bool(std::size_t)> goes_on(WithoutLock& others_run, std::size_t po
 
 py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
                     std::size_t threads, bool errors, const py::object& progress) {
+  refuse_forked_child();
   const GivenKeys given_keys = keys_of(keys, count);
   const bool has_signals = is_main_thread();
   ResultArrays arrays(count);
@@ -172,29 +166,17 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
   if (!progress.is_none()) {
     progress(count, count);
   }
-  py::dict all = dict_of(std::move(arrays));
-  std::vector<double> H_m;
-  std::vector<double> mu;
-  std::vector<double> e;
-  for (const Point& point : given.points) {
-    H_m.push_back(point.H_m);
-    mu.push_back(point.mu);
-    e.push_back(point.e);
-  }
-  all["H"] = array_of(std::move(H_m));
-  all["mu"] = array_of(std::move(mu));
-  all["e"] = array_of(std::move(e));
-  return all;
+  return with_points(arrays, given.points);
 }
 
-/// (name, group, column, unit, meaning, list, member, where) of each output.
+/// (name, group, column, is_whole, list, member, where) of each output.
 py::list fields() {
   py::list all;
   for (const auto& field : solver::result_fields()) {
     const auto* part = std::get_if<solver::ListPart>(&field.value);
     all.append(py::make_tuple(std::string(field.name), std::string(field.group),
-                              std::string(field.column), std::string(field.unit),
-                              std::string(field.meaning),
+                              std::string(field.column),
+                              std::holds_alternative<solver::Member<std::int64_t>>(field.value),
                               part == nullptr ? "" : std::string(part->list->column),
                               part == nullptr ? "" : std::string(part->member),
                               part == nullptr ? "" : std::string(part->where)));
@@ -205,10 +187,9 @@ py::list fields() {
 }  // namespace
 
 void add_solving(py::module_& module) {
-  py::class_<Falls>(module, "Falls")
-      .def(py::init(
-          [] { return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory); }))
-      .def("is_at_rest", [](const Falls& falls) { return falls.cache()->falls.is_at_rest(); });
+  py::class_<Falls>(module, "Falls").def(py::init([] {
+    return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory);
+  }));
   module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));
   module.def("solve_many", &solve_many, py::arg("falls"), py::arg("keys"), py::arg("points"),
@@ -216,23 +197,12 @@ void add_solving(py::module_& module) {
   // What threads have freed is kept for them otherwise.
   module.def("give_memory_back", [] { malloc_trim(0); });
   module.def("version", &version);
-  module.def("origin", [] {
-    const auto origin = protocol::origin();
-    return std::map<std::string, std::string>{{"version", protocol::version_and_commit()},
-                                              {"compiler", origin.compiler},
-                                              {"build_type", origin.build_type}};
-  });
-  module.def("instruction_set", &instruction_set);
   module.def("fields", &fields);
   module.def("trace_states", [] {
     return std::vector<std::string>(solver::kTraceStates.begin(), solver::kTraceStates.end());
   });
   module.def("note_on_value", [](const std::string& key, double value) {
     return protocol::is_axis_key(key) ? solver::note_on_value(protocol::axis_key(key), value) : "";
-  });
-  module.def("integrator_names", [] {
-    const auto names = solver::integrator_names();
-    return std::vector<std::string>(names.begin(), names.end());
   });
 }
 

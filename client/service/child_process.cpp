@@ -14,8 +14,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <memory>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 namespace oblique::client {
@@ -222,6 +224,26 @@ std::string ChildProcess::output(std::size_t most_bytes) const {
   const auto got = pread(output_.number(), text.data(), text.size(), 0);
   text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, got)));
   return text;
+}
+
+std::string output_of(ChildSettings settings, const std::function<bool()>& keep_waiting) {
+  constexpr std::chrono::milliseconds kPause{5};
+  constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
+  settings.keep_output = true;
+  ChildProcess child(settings);
+  while (child.is_running()) {
+    if (keep_waiting && !keep_waiting()) {
+      throw ProcessError(fmt::format("stopped waiting for {}", settings.program.string()));
+    }
+    std::this_thread::sleep_for(kPause);
+  }
+  if (!child.succeeded()) {
+    auto words = child.last_words();
+    std::replace(words.begin(), words.end(), '\n', ' ');
+    throw ProcessError(fmt::format("{} {}{}{}", settings.program.string(), child.ending(),
+                                   words.empty() ? "" : ": ", words));
+  }
+  return child.output(kMostBytes);
 }
 
 std::filesystem::path sibling_program(const std::string& name) {

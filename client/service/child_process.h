@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -82,6 +83,11 @@ class ChildProcess {
   Descriptor errors_;          ///< the file that keeps its standard error
   Descriptor output_;          ///< the file that keeps its standard output
 };
+
+/// Runs a program to its end and returns what it wrote to standard output, at most 16 MiB. Throws
+/// ProcessError, with the end of its standard error, when it cannot be started or fails, and when
+/// `keep_waiting`, which is called many times a second, returns false: then the program is killed.
+std::string output_of(ChildSettings settings, const std::function<bool()>& keep_waiting = {});
 
 /// The program called `name` beside our own. Throws ProcessError when it is not there.
 std::filesystem::path sibling_program(const std::string& name);

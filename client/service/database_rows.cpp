@@ -5,7 +5,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/service/time_guard.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -1,12 +1,10 @@
 #include "client/service/source.h"
 
-#include <iostream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "client/service/database_rows.h"
-#include "proto/text.h"
 #include "proto/wire/chunk.h"
 #include "server/database/database_file.h"
 #include "server/query/reader.h"
@@ -22,9 +20,6 @@ class DatabaseSource : public Source {
     limits_.time_limit_ms = timeout_ms;
     // One for the whole process, which has nothing else in SQLite.
     sqlite3_hard_heap_limit64(kHeapBytes);
-    if (!reader_.remark().empty()) {
-      std::cerr << fmt::format("{}.\n", protocol::visible(reader_.remark()));
-    }
   }
 
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {

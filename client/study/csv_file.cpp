@@ -8,7 +8,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/small_file.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 

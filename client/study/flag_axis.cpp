@@ -9,11 +9,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/expression.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/written.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 

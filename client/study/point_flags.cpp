@@ -12,10 +12,8 @@
 #include "proto/program/usage.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/written.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 

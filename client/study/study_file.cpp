@@ -20,7 +20,6 @@
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written.h"
 #include "proto/small_file.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 
 namespace oblique::client {

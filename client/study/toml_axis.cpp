@@ -9,9 +9,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/keys.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/written.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 
 namespace oblique::client {
 namespace {

@@ -12,9 +12,7 @@
 
 #include "client/study/toml_axis.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/written.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 
 namespace oblique::client {

@@ -14,7 +14,7 @@
 #include "client/formats/row_printer.h"
 #include "client/output/case_report.h"
 #include "client/output/trace_table.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {

@@ -1,27 +1,30 @@
+#include "client/verbs/autoscale.h"
+
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
-#include <iostream>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/autoscale/autoscaler.h"
-#include "client/autoscale/slurm_engine.h"
+#include "client/output/human_units.h"
+#include "client/service/child_process.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/small_file.h"
-#include "proto/suggestion.h"
+#include "proto/study_counts.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
@@ -30,34 +33,89 @@ namespace {
 
 constexpr const char* kAutoscaleExamples = R"(Examples:
   oblique autoscale slurm --max 10 --script oblique-workers.sbatch
-  oblique autoscale slurm --min 1 --max 20 --target 1800 --sbatch-args "--partition=short -A lab7"
-  oblique autoscale slurm --max 10 --dry-run          what it would do now
-  oblique autoscale slurm --max 10 --once             one look, for cron
-  oblique autoscale slurm --retire                    has all of its jobs leave
+  oblique autoscale slurm --min 1 --max 20 --sbatch-args "--partition=short -A lab7"
+  oblique autoscale slurm --max 10 --points-per-job 500    for points that take long
+  oblique autoscale slurm --max 10 --dry-run               what it would submit now
+  oblique autoscale slurm --max 10 --once                  one round, for cron
 Before, for the workers of the jobs:
   export OBLIQUE_WORKER_SERVER=tcp://head:7601 OBLIQUE_WORKER_KEYS=~/oblique/worker.key
 
-Submits jobs with workers (deploy/slurm) while points are open, as many as settle them within the
-target, and has those leave that idle. Ctrl-C leaves the jobs running; started again it finds them.)";
+At every interval, counts the open points of the server and its own jobs in Slurm, and submits the
+jobs that are missing. Jobs end by themselves when their workers find no work (--idle-exit of
+oblique-worker; 10 minutes in deploy/slurm's script). Ctrl-C leaves the jobs in the queue; to end
+them: scancel --name NAME.)";
 
-constexpr std::array<std::string_view, 1> kEngines{"slurm"};
+constexpr std::array<std::string_view, 1> kSystems{"slurm"};
 
 struct AutoscaleFlags {
-  std::string engine;
-  std::optional<std::size_t> most;
-  ScalingSettings scaling;
-  SlurmSettings slurm;
-  std::string sbatch_arguments;
-  double poll_s = 15.0;
+  std::string system;
+  JobLimits limits;
+  std::string script;            // empty: not given
+  std::string sbatch_arguments;  // separated by spaces
+  std::string job_name;          // empty: not given
+  double interval_s = 30.0;
   bool once = false;
-  bool only_tells = false;
-  bool retires = false;
+  bool dry_run = false;
   SourceFlags source;
 };
 
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+std::string counted_jobs(std::size_t count) {
+  return fmt::format("{} {}", count, count == 1 ? "job" : "jobs");
 }
+
+/// Jobs of one name in Slurm, through `squeue` and `sbatch`.
+class SlurmJobs {
+ public:
+  /// `keep_waiting` may end the wait for `squeue`.
+  SlurmJobs(std::string name, std::string script, const std::string& sbatch_arguments,
+            std::function<bool()> keep_waiting)
+      : name_(std::move(name)), keep_waiting_(std::move(keep_waiting)) {
+    for (const auto argument : protocol::split(sbatch_arguments, ' ')) {
+      if (!argument.empty()) {
+        arguments_.emplace_back(argument);
+      }
+    }
+    arguments_.insert(arguments_.end(), {"--parsable", "--job-name=" + name_, std::move(script)});
+  }
+
+  const std::string& name() const { return name_; }
+
+  /// Number of our jobs that are pending or running.
+  std::size_t count() const {
+    const auto list =
+        run("squeue", {"--noheader", "--me", "--array", "--name=" + name_, "--format=%T"}, true);
+    std::size_t jobs = 0;
+    for (const auto state : protocol::split(list, '\n')) {
+      jobs += !state.empty() && state != "COMPLETING" ? 1U : 0U;
+    }
+    return jobs;
+  }
+
+  /// Submits a job and returns its number.
+  std::string submit() const {
+    const auto answer = run("sbatch", arguments_, false);
+    return answer.substr(0, answer.find_first_of(";\n"));
+  }
+
+  /// The command of `submit`.
+  std::string submission() const { return fmt::format("sbatch {}", fmt::join(arguments_, " ")); }
+
+ private:
+  std::string run(const std::string& program, const std::vector<std::string>& arguments,
+                  bool may_stop) const {
+    try {
+      // SQUEUE_PARTITION and similar variables would hide jobs, and more would be submitted.
+      return output_of({.program = program, .arguments = arguments, .hidden_variables = "SQUEUE_"},
+                       may_stop ? keep_waiting_ : nullptr);
+    } catch (const ProgramNotFound&) {
+      throw ProcessError(program + " is not in PATH: run this where Slurm's commands work");
+    }
+  }
+
+  std::string name_;
+  std::vector<std::string> arguments_;  // of sbatch
+  std::function<bool()> keep_waiting_;
+};
 
 /// The script that is installed with the programs; empty where none is.
 std::string installed_script() {
@@ -67,198 +125,193 @@ std::string installed_script() {
   return std::filesystem::exists(script) ? script.string() : std::string();
 }
 
-bool is_set(const char* variable) {
-  const char* value = std::getenv(variable);
-  return value != nullptr && *value != '\0';
-}
-
-/// Jobs whose script has no server to go to would fail one after the other.
+/// Refuses a script whose jobs would fail for want of a variable, and warns of a missing key.
 void check_variables(const AutoscaleFlags& flags, const std::string& script) {
   constexpr const char* kServer = "OBLIQUE_WORKER_SERVER";
   constexpr const char* kKeys = "OBLIQUE_WORKER_KEYS";
-  const auto is_given = [&flags](const char* variable) {
-    // --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=..." will do too.
+  const auto is_set = [](const char* variable) {
+    const char* value = std::getenv(variable);
+    return value != nullptr && *value != '\0';
+  };
+  const auto is_given = [&](const char* variable) {
+    // It may also be passed by --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=...".
     return is_set(variable) || flags.sbatch_arguments.find(variable) != std::string::npos;
   };
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   const std::string text = protocol::read_small_file(script, "the script", kMostBytes);
   if (text.find(fmt::format("${{{}:?", kServer)) != std::string::npos && !is_given(kServer)) {
-    throw solver::InputError(
-        fmt::format("{} is not set, and {} needs it: export {}=tcp://HOST:7601, where the server "
-                    "awaits workers",
-                    kServer, script, kServer));
+    throw solver::InputError(fmt::format(
+        "{0} is not set, and {1} needs it: export {0}=tcp://HOST:7601, the server's address for "
+        "workers",
+        kServer, script));
   }
   const bool has_keys = !flags.source.keys.empty() || is_set("OBLIQUE_KEYS");
   if (has_keys && text.find(kKeys) != std::string::npos && !is_given(kKeys)) {
-    tell_line(
-        fmt::format("{} is not set, and this server has keys: without a worker's key file "
-                    "the workers of the jobs are turned away.",
-                    kKeys));
+    tell_line(fmt::format(
+        "{} is not set, and this server has keys: it refuses workers without a key file.", kKeys));
   }
 }
 
-SlurmSettings slurm_settings(const AutoscaleFlags& flags, const std::string& server_url) {
-  auto settings = flags.slurm;
-  for (const auto argument : protocol::split(flags.sbatch_arguments, ' ')) {
-    if (!argument.empty()) {
-      settings.sbatch_arguments.emplace_back(argument);
-    }
-  }
-  settings.comment = "oblique autoscale for " + server_url;
-  if (settings.script.empty()) {
-    settings.script = installed_script();
-  }
-  const bool submits = !flags.retires;
-  if (submits && settings.script.empty()) {
-    throw solver::InputError(
-        "--script FILE is needed: no script is installed beside this program. It is "
-        "deploy/slurm/oblique-workers.sbatch in the source tree");
-  }
-  if (submits) {
-    check_variables(flags, settings.script);
-  }
-  return settings;
-}
-
-ScalingSettings scaling_settings(const AutoscaleFlags& flags) {
-  auto settings = flags.scaling;
-  if (!flags.most) {
-    throw solver::InputError("--max is needed: the most jobs that there may be at a time");
-  }
-  settings.most = *flags.most;
-  if (settings.least > settings.most) {
+/// Checks what the flags say together and returns the batch script.
+std::string checked_script(const AutoscaleFlags& flags) {
+  if (flags.limits.least > flags.limits.most) {
     throw solver::InputError(fmt::format("--min {} is not allowed: it is more than --max {}",
-                                         settings.least, settings.most));
+                                         flags.limits.least, flags.limits.most));
   }
-  if (flags.once || flags.only_tells) {
-    // There is no later look that could know better.
-    settings.cool_down_s = 0.0;
-    settings.rate.settle_s = 0.0;
+  if (flags.job_name.find(',') != std::string::npos) {
+    throw solver::InputError(
+        fmt::format("--name {} is not allowed: squeue reads a name with a comma as several names",
+                    protocol::visible(flags.job_name)));
   }
-  return settings;
-}
-
-int retire(Engine& engine, const AutoscaleFlags& flags, protocol::StopSignals& stop) {
-  const auto wait = [&](double seconds) {
-    return !flags.once && !stop.wait(std::chrono::nanoseconds(std::llround(seconds * 1e9)));
-  };
-  try {
-    if (retire_all(engine, flags.scaling.patience_s, wait, tell_line)) {
-      std::cerr << "No job is left.\n";
-      return kDone;
+  for (const auto argument : protocol::split(flags.sbatch_arguments, ' ')) {
+    if (argument.starts_with("--array") || argument.starts_with("-a")) {
+      throw solver::InputError(
+          fmt::format("--sbatch-args {} is not allowed: each submission is one job", argument));
     }
-  } catch (const Interrupted&) {
-    return stop.exit_code();
   }
-  return flags.once ? kDone : stop.exit_code();
+  const std::string script = flags.script.empty() ? installed_script() : flags.script;
+  if (script.empty()) {
+    throw solver::InputError(
+        "--script FILE is needed: no script is installed with this program. The source tree has "
+        "deploy/slurm/oblique-workers.sbatch");
+  }
+  check_variables(flags, script);
+  return script;
 }
 
-int keep_scaling(Autoscaler& autoscaler, const AutoscaleFlags& flags, protocol::StopSignals& stop) {
-  do {
-    autoscaler.look(now_s());
-  } while (!stop.wait(std::chrono::nanoseconds(std::llround(flags.poll_s * 1e9))));
-  throw Interrupted("");
+/// One round: submits the jobs that are missing; with `dry_run`, prints the command instead.
+void submit_missing(Connection& connection, const SlurmJobs& slurm, const AutoscaleFlags& flags) {
+  const auto open = open_points(connection.status(""));
+  const auto jobs = slurm.count();
+  const auto missing = jobs_to_submit(open, jobs, flags.limits);
+  const auto found = fmt::format("{} points are open and {} pending or running", shown_count(open),
+                                 counted_jobs(jobs) + (jobs == 1 ? " is" : " are"));
+  if (flags.dry_run) {
+    tell_line(missing == 0 ? fmt::format("{}: would submit nothing", found)
+                           : fmt::format("{}: would submit {} with: {}", found,
+                                         counted_jobs(missing), slurm.submission()));
+    return;
+  }
+  if (missing > 0) {
+    tell_line(fmt::format("{}: submitting {}", found, counted_jobs(missing)));
+  }
+  for (std::size_t i = 0; i < missing; ++i) {
+    tell_line(fmt::format("submitted job {}", slurm.submit()));
+  }
+}
+
+/// Runs `round` until a signal comes. An error of the first round is thrown; later ones are
+/// reported once and retried, because server and Slurm may be away for a while.
+void repeat(const std::function<void()>& round, double interval_s, protocol::StopSignals& stop) {
+  const std::chrono::nanoseconds interval(std::llround(interval_s * 1e9));
+  round();
+  bool is_failing = false;
+  while (!stop.wait(interval)) {
+    try {
+      round();
+      if (std::exchange(is_failing, false)) {
+        tell_line("the last round succeeded again");
+      }
+    } catch (const std::exception& error) {
+      if (!stop.requested() && !std::exchange(is_failing, true)) {
+        tell_line(
+            fmt::format("{}; trying again every {}", error.what(), shown_duration(interval_s)));
+      }
+    }
+  }
 }
 
 int autoscale(const AutoscaleFlags& flags) {
   const auto server = connection_settings(flags.source);
-  const auto scaling = flags.retires ? flags.scaling : scaling_settings(flags);
-  auto slurm = slurm_settings(flags, server.server_url);
+  const auto script = checked_script(flags);
+  const auto default_name = "oblique@" + server.server_url.substr(server.server_url.rfind('/') + 1);
   protocol::StopSignals stop;  // before any thread starts
-  const auto goes_on = [&stop] { return !stop.requested(); };
-  SlurmEngine engine(std::move(slurm), goes_on);
-  if (flags.retires) {
-    return retire(engine, flags, stop);
-  }
-  Connection connection(server, goes_on);
-  const auto ask = [&] {
-    return demand_of(connection.status(""), connection.workers(),
-                     [&](const std::string& name) { return engine.job_of_worker(name); });
-  };
-  Autoscaler autoscaler(scaling, engine, ask, tell_line);
+  const auto keep_waiting = [&stop] { return !stop.requested(); };
+  Connection connection(server, keep_waiting);
+  const SlurmJobs slurm(flags.job_name.empty() ? default_name : flags.job_name, script,
+                        flags.sbatch_arguments, keep_waiting);
+  const auto round = [&] { submit_missing(connection, slurm, flags); };
   try {
-    if (flags.once || flags.only_tells) {
-      return autoscaler.look(now_s(), flags.only_tells) ? kDone : kFailed;
+    if (flags.once || flags.dry_run) {
+      round();
+      return kDone;
     }
-    return keep_scaling(autoscaler, flags, stop);
-  } catch (const Interrupted&) {
-    std::cerr << fmt::format(
-        "Stopped. {} on; to have them leave: oblique autoscale slurm --retire\n",
-        autoscaler.jobs() == 1 ? std::string("1 job goes")
-                               : fmt::format("{} jobs go", autoscaler.jobs()));
-    return stop.exit_code();
+    repeat(round, flags.interval_s, stop);
+  } catch (const std::exception&) {
+    if (!stop.requested()) {
+      throw;
+    }
   }
-}
-
-void add_slurm_flags(CLI::App& verb, AutoscaleFlags& flags) {
-  verb.add_option("--script", flags.slurm.script,
-                  "batch script that runs workers; default: the one installed with this program")
-      ->type_name("FILE");
-  verb.add_option("--sbatch-args", flags.sbatch_arguments,
-                  "more arguments of sbatch, with spaces between them")
-      ->type_name("ARGS");
-  verb.add_option("--name", flags.slurm.job_name,
-                  "name of the jobs; autoscalers of one name and server share them")
-      ->type_name("NAME")
-      ->capture_default_str();
-}
-
-void add_scaling_flags(CLI::App& verb, AutoscaleFlags& flags) {
-  constexpr std::size_t kMostJobs = 10'000;
-  constexpr double kDay_s = 86'400.0;
-  auto& scaling = flags.scaling;
-  verb.add_option("--min", scaling.least, "jobs that are kept, whatever there is to do")
-      ->check(CLI::Range(std::size_t{0}, kMostJobs))
-      ->type_name("N")
-      ->capture_default_str();
-  verb.add_option("--max", flags.most, "most jobs at a time; REQUIRED unless --retire")
-      ->check(CLI::Range(std::size_t{1}, kMostJobs))
-      ->type_name("N");
-  verb.add_option("--target", scaling.target_s, "what is open should be done in so long [s]")
-      ->check(protocol::number_between(1.0, 365.0 * kDay_s))
-      ->type_name("SECONDS")
-      ->capture_default_str();
-  verb.add_option("--poll", flags.poll_s, "time between looks [s]")
-      ->check(protocol::number_between(0.1, kDay_s))
-      ->type_name("SECONDS")
-      ->capture_default_str();
-  verb.add_option("--cool-down", scaling.cool_down_s,
-                  "time between submissions, and before jobs too many are retired [s]")
-      ->check(protocol::number_between(0.0, kDay_s))
-      ->type_name("SECONDS")
-      ->capture_default_str();
-  verb.add_option("--forget", scaling.forget_after_s,
-                  "a job that is not listed and has no worker is forgotten after so long [s]")
-      ->check(protocol::number_between(0.0, kDay_s))
-      ->type_name("SECONDS")
-      ->capture_default_str();
+  tell_line(
+      fmt::format("Stopped. Jobs that are pending or running go on; to end them: "
+                  "scancel --name {}",
+                  slurm.name()));
+  return stop.exit_code();
 }
 
 }  // namespace
 
+std::uint64_t open_points(const protocol::StatusReply& status) {
+  std::uint64_t open = 0;
+  for (const auto& study : status.studies()) {
+    // The server's words for a study that any worker would help.
+    const bool needs_workers = study.waits_for().empty() || study.waits_for() == "a worker";
+    if (study.state() == "running" && needs_workers) {
+      open += study.points() - std::min(study.points(), protocol::completed_points(study));
+    }
+  }
+  return open;
+}
+
+std::size_t jobs_to_submit(std::uint64_t open_points, std::size_t jobs, const JobLimits& limits) {
+  const std::uint64_t needed =
+      open_points / limits.points_per_job + (open_points % limits.points_per_job > 0 ? 1 : 0);
+  const auto wanted = std::clamp<std::uint64_t>(needed, limits.least, limits.most);
+  return static_cast<std::size_t>(wanted) - std::min<std::size_t>(jobs, wanted);
+}
+
 void add_autoscale(CLI::App& app, Command& command) {
+  constexpr double kDay_s = 86'400.0;
   auto flags = std::make_shared<AutoscaleFlags>();
-  auto* verb = app.add_subcommand(
-      "autoscale", "Submit jobs with workers to a cluster while there is work, and retire them");
+  auto* verb = app.add_subcommand("autoscale",
+                                  "Submit jobs with workers to a cluster while points are open");
   verb->footer(kAutoscaleExamples);
-  auto* engine = verb->add_option("ENGINE", flags->engine, "what runs the jobs: slurm")->required();
-  protocol::note_choices(engine, kEngines);
-  engine
+  auto* system = verb->add_option("SYSTEM", flags->system, "batch system: slurm")->required();
+  protocol::note_choices(system, kSystems)
       ->check([](const std::string& name) {
-        return name == kEngines[0] ? std::string()
-                                   : fmt::format("there is no `{}`{}: jobs are run by {}", name,
-                                                 protocol::did_you_mean(name, kEngines),
-                                                 protocol::joined(kEngines));
+        return name == kSystems[0] ? std::string()
+                                   : fmt::format("`{}` is not allowed: it must be slurm", name);
       })
       ->type_name("");
-  add_scaling_flags(*verb, *flags);
-  add_slurm_flags(*verb, *flags);
-  auto* once = verb->add_flag("--once", flags->once, "look once, for cron");
-  auto* dry_run =
-      verb->add_flag("--dry-run", flags->only_tells, "look once and say what would be done");
-  verb->add_flag("--retire", flags->retires, "have all of its jobs leave, and wait until they have")
-      ->excludes(dry_run);
-  once->excludes(dry_run);
+  verb->add_option("--min", flags->limits.least, "least number of jobs, even without open points")
+      ->check(protocol::whole_number_from(0))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--max", flags->limits.most, "largest number of jobs")
+      ->required()
+      ->check(protocol::whole_number_from(1))
+      ->type_name("N");
+  verb->add_option("--points-per-job", flags->limits.points_per_job,
+                   "open points for each of which a job is wanted")
+      ->check(protocol::whole_number_from(1))
+      ->type_name("N")
+      ->capture_default_str();
+  verb->add_option("--interval", flags->interval_s, "time between rounds [s]")
+      ->check(protocol::number_between(0.1, kDay_s))
+      ->type_name("SECONDS")
+      ->capture_default_str();
+  verb->add_option("--script", flags->script,
+                   "batch script that runs workers; default: the one installed with this program")
+      ->type_name("FILE");
+  verb->add_option("--sbatch-args", flags->sbatch_arguments,
+                   "more arguments of sbatch, separated by spaces")
+      ->type_name("ARGS");
+  verb->add_option("--name", flags->job_name,
+                   "name of the jobs, by which they are counted; default: oblique@HOST:PORT")
+      ->type_name("NAME");
+  auto* once = verb->add_flag("--once", flags->once, "one round, for cron");
+  verb->add_flag("--dry-run", flags->dry_run, "one round that only prints what it would submit")
+      ->excludes(once);
   add_server_flags(*verb, flags->source);
   verb->callback([flags, &command] { command = [flags] { return autoscale(*flags); }; });
 }

@@ -1,4 +1,3 @@
-#include <chrono>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -8,7 +7,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/output/progress.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
@@ -48,23 +46,7 @@ bool is_confirmed(const protocol::StudyStatus& study, const std::string& place) 
 
 /// In a database file. Prints a note when rows are left to the next server.
 void delete_from(const std::string& database, const protocol::StudyStatus& study) {
-  Progress progress(std::cerr, true);
-  const bool draws = isatty(STDERR_FILENO) != 0;
-  const std::uint64_t rows = study.solved() + study.failed();
-  const auto began = std::chrono::steady_clock::now();
-  const bool is_merged =
-      server::delete_study(database, study.study_id(), [&](std::uint64_t deleted) {
-        if (!draws) {
-          return;
-        }
-        const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - began;
-        progress.update({.study = study.name(),
-                         .points = rows,
-                         .settled = std::min(deleted, rows),
-                         .elapsed_s = elapsed.count()});
-      });
-  progress.finish();
-  if (!is_merged) {
+  if (!server::delete_study(database, study.study_id())) {
     std::cerr << fmt::format(
         "Another program reads {}: the next server deletes what is left of the study.\n", database);
   }

@@ -1,153 +1,322 @@
 #include <unistd.h>
 
-#include <chrono>
+#include <algorithm>
+#include <cstdint>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
-#include <vector>
+#include <string_view>
+#include <thread>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/output/human_units.h"
+#include "client/service/child_process.h"
 #include "client/service/source.h"
-#include "client/verbs/doctor/examination.h"
-#include "client/verbs/doctor/machine.h"
-#include "client/verbs/doctor/places.h"
-#include "client/verbs/doctor/programs.h"
-#include "client/verbs/doctor/server_reach.h"
-#include "client/verbs/doctor/settings.h"
-#include "client/verbs/doctor/solving_time.h"
+#include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
-#include "proto/program/usage.h"
+#include "proto/keys/key_file.h"
+#include "proto/program/origin/origin.h"
+#include "proto/text.h"
+#include "server/database/database_file.h"
+#include "server/database/sqlite.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::client {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr const char* kDoctorExamples = R"(Examples:
   oblique doctor
-  oblique doctor > doctor.txt                  for a defect report: look at it first
-  oblique doctor --db friction.db --json
+  oblique doctor > doctor.txt                  for a defect report
+  oblique doctor --db friction.db
   oblique doctor --server tcp://hub:7600 --keys client.key
 
-Says what this machine has, what works and what is odd, within some 2 s; it writes no file and
-changes nothing. The home folder is shown as ~, the machine's name and all keys are left out.
-Exit code 1 where something cannot work: a server that does not answer, a key that is refused, a
-database that cannot be read. A database is not searched for damage: `oblique check` does that.)";
+Checks versions, processor, speed of the solver, the database and its disk, the key file and the
+server. Each line begins with ok, warning or error; warnings and errors name the remedy. Nothing is
+written or changed. Exit code 1 with an error: a server that does not answer or refuses the key, a
+database that cannot be read. `oblique check` searches a database for damage.)";
 
 struct DoctorFlags {
   std::string database;  // empty: not given
-  std::string server;    // empty: not given
-  std::string keys;      // empty: not given
-  bool json = false;
-  bool with_host_name = false;
-  bool leaves_out_timing = false;
-  double timeout_s = 1.8;
+  SourceFlags source;
 };
 
-doctor::Findings silence(const std::string& key, const std::string& what) {
-  doctor::Findings findings{key, key};
-  findings.broken.push_back(fmt::format(
-      "{} did not answer within the time of this look: it hangs, or the machine has much to do. "
-      "Give it more with --timeout SECONDS.",
-      what));
-  return findings;
+/// Prints one line for each finding, at once.
+class Diagnosis {
+ public:
+  void ok(std::string_view check, const std::string& text) { print("ok", check, text); }
+  void warning(std::string_view check, const std::string& text) { print("warning", check, text); }
+  void error(std::string_view check, const std::string& text) {
+    print("error", check, text);
+    has_error_ = true;
+  }
+  bool has_error() const { return has_error_; }
+
+ private:
+  static void print(std::string_view state, std::string_view check, const std::string& text) {
+    std::cout << fmt::format("{:<7}  {:<9}  {}\n", state, check, protocol::visible(text))
+              << std::flush;
+  }
+
+  bool has_error_ = false;
+};
+
+void check_program_beside(Diagnosis& diagnosis, const std::string& name) {
+  constexpr const char* kCheck = "versions";
+  try {
+    const auto program = sibling_program(name);
+    std::string line = output_of({.program = program, .arguments = {"--version"}});
+    line.resize(std::min(line.find('\n'), line.size()));
+    if (line == fmt::format("{} {}", name, protocol::version_and_commit())) {
+      diagnosis.ok(kCheck, name + " is of the same build");
+    } else {
+      diagnosis.warning(kCheck, fmt::format("{} is of another build than this program: install all "
+                                            "programs of one version",
+                                            line));
+    }
+  } catch (const ProcessError& error) {
+    diagnosis.warning(
+        kCheck, fmt::format("`oblique run` and `oblique view` do not work: {}", error.what()));
+  }
 }
 
-/// All parts at once, so that none waits for another.
-doctor::Report examined(const DoctorFlags& flags, bool& has_silent_part) {
-  // Parts that end by themselves do so before it is said that they hang.
-  constexpr double kOfTheirOwn = 0.8;
-  const auto start = Clock::now();
-  const auto after = [start](double seconds) {
-    return start +
-           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  };
-  const auto end = after(flags.timeout_s);
-  const auto own_end = after(kOfTheirOwn * flags.timeout_s);
-  const std::string database = flags.database.empty() ? DatabaseSettings().file : flags.database;
-  const bool is_named = !flags.database.empty();
-  const doctor::ServerMeant server{
-      flags.server.empty() ? doctor::variable("OBLIQUE_SERVER") : flags.server,
-      flags.keys.empty() ? doctor::variable("OBLIQUE_KEYS") : flags.keys};
+void check_versions(Diagnosis& diagnosis) {
+  const auto origin = protocol::origin();
+  diagnosis.ok("versions", fmt::format("oblique {}, built with {}, {}; SQLite {}",
+                                       protocol::version_and_commit(), origin.compiler,
+                                       origin.build_type, sqlite3_libversion()));
+  if (origin.build_type != "Release") {
+    diagnosis.warning("versions",
+                      "a program that is not built as Release is slow: build it with "
+                      "-DCMAKE_BUILD_TYPE=Release");
+  }
+  for (const char* name : {"oblique-server", "oblique-worker"}) {
+    check_program_beside(diagnosis, name);
+  }
+}
 
-  std::vector<doctor::Examination> parts;
-  parts.emplace_back(silence("programs", "A program beside this one"),
-                     [own_end] { return doctor::examine_programs(own_end); });
-  parts.emplace_back(silence("machine", "The system"),
-                     [&flags] { return doctor::examine_machine(flags.with_host_name); });
-  if (!flags.leaves_out_timing) {
-    parts.emplace_back(silence("solver", "The solver"), doctor::examine_solver);
+/// The processor's name, as /proc/cpuinfo has it.
+std::string processor_name() {
+  std::ifstream lines("/proc/cpuinfo");
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("model name") && line.find(": ") != std::string::npos) {
+      return line.substr(line.find(": ") + 2);
+    }
   }
-  parts.emplace_back(silence("disk", "The disk of the database"),
-                     [database] { return doctor::examine_disk(database); });
-  if (is_named || std::filesystem::exists(database)) {
-    parts.emplace_back(silence("database", "The database"), [database, is_named] {
-      return doctor::examine_database(database, is_named);
-    });
+  return "unknown processor";
+}
+
+void check_processor(Diagnosis& diagnosis) {
+  const std::string set = solver::instruction_set();
+  diagnosis.ok("processor", fmt::format("{}; {} of {} threads may be used; the solver uses {}",
+                                        processor_name(), std::thread::hardware_concurrency(),
+                                        sysconf(_SC_NPROCESSORS_ONLN), set));
+  if (set != "avx512" && set != "avx2") {
+    diagnosis.warning(
+        "processor",
+        "the solver is more than twice as fast with AVX2: in a virtual machine, let it "
+        "have the processor type of its host");
   }
-  if (!server.url.empty()) {
-    parts.emplace_back(
-        silence("server", fmt::format("The server {}, or who knows its address,", server.url)),
-        [server, own_end] { return doctor::examine_server(server, own_end); });
+}
+
+/// Processor time of this thread [s]: other programs on the machine do not change it.
+double cpu_time_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  constexpr double kNano = 1e-9;
+  return static_cast<double>(time.tv_sec) + kNano * static_cast<double>(time.tv_nsec);
+}
+
+/// Processor time of a point of the preset `paper` in vector lanes, without its fall [s].
+double measured_point_s() {
+  constexpr std::uint64_t kPoints = 600;
+  const solver::Finger finger(solver::preset("paper"));
+  (void)finger.solve(1.0, 0.4, 1.0);  // solves the fall
+  const double start_s = cpu_time_s();
+  std::uint64_t next = 0;
+  finger.solve_points(
+      [&next]() -> std::optional<solver::PointRequest> {
+        if (next == kPoints) {
+          return std::nullopt;
+        }
+        const double part = static_cast<double>(next) / static_cast<double>(kPoints);
+        return solver::PointRequest{next++, 1.0, 0.1 + 1.9 * part, 1.0 - 0.5 * part};
+      },
+      [](solver::PointOutcome&& outcome) {
+        if (!outcome.result) {
+          throw std::runtime_error("a point of the preset paper fails: " + outcome.error);
+        }
+      });
+  return (cpu_time_s() - start_s) / static_cast<double>(kPoints);
+}
+
+void check_solver(Diagnosis& diagnosis) {
+  const std::string set = solver::instruction_set();
+  // Measured on processors of 2023; see tests/bench/README.md.
+  const double reference_s = set == "avx512" ? 0.07e-3 : set == "avx2" ? 0.12e-3 : 0.30e-3;
+  constexpr double kSlow = 3.0;
+  const double point_s = measured_point_s();
+  const auto text = fmt::format("{:.3f} ms of processor time a point; reference for {}: {:.2f} ms",
+                                1e3 * point_s, set, 1e3 * reference_s);
+  if (point_s > kSlow * reference_s) {
+    diagnosis.warning("solver", text +
+                                    ": the processor is old, throttled or shared with other "
+                                    "virtual machines, or this is not a Release build");
+  } else {
+    diagnosis.ok("solver", text);
   }
-  parts.emplace_back(silence("settings", "A key file's disk"),
-                     [keys = flags.keys] { return doctor::examine_settings(keys); });
-  doctor::Report report;
-  for (auto& part : parts) {
-    report.push_back(part.findings(end));
-    has_silent_part = has_silent_part || part.is_silent();
+}
+
+/// The disk on which the database `file` is or would be; false if there is no such folder.
+bool check_disk(Diagnosis& diagnosis, const std::string& file) {
+  constexpr const char* kCheck = "disk";
+  std::error_code error;
+  const auto path = std::filesystem::weakly_canonical(std::filesystem::absolute(file), error);
+  const auto folder = path.parent_path();
+  const auto space = std::filesystem::space(folder, error);
+  if (error) {
+    diagnosis.error(kCheck, fmt::format("there is no folder {}: create it, or name another --db",
+                                        folder.string()));
+    return false;
   }
-  return report;
+  constexpr std::uint64_t kLittleSpace = 500'000'000;
+  const bool exists = std::filesystem::exists(path, error);
+  if (access(folder.c_str(), W_OK) != 0 || (exists && access(path.c_str(), W_OK) != 0)) {
+    diagnosis.warning(kCheck, fmt::format("this user cannot write to {}: to solve a study, name a "
+                                          "--db in another folder",
+                                          exists ? path.string() : folder.string()));
+  } else if (space.available < kLittleSpace) {
+    diagnosis.warning(kCheck,
+                      fmt::format("{} has only {} free: a million results take about 650 MB, and "
+                                  "studies wait while the disk is full",
+                                  folder.string(), shown_bytes(space.available)));
+  } else {
+    diagnosis.ok(kCheck, fmt::format("{} is writable and has {} free", folder.string(),
+                                     shown_bytes(space.available)));
+  }
+  if (const auto objection = server::objection_to_shared_disk(path.string()); !objection.empty()) {
+    diagnosis.warning(kCheck, objection);
+  }
+  return true;
+}
+
+void check_database(Diagnosis& diagnosis, const std::string& named_file) {
+  constexpr const char* kCheck = "database";
+  const std::string file = named_file.empty() ? DatabaseSettings().file : named_file;
+  if (!check_disk(diagnosis, file)) {
+    return;
+  }
+  if (std::error_code error; !std::filesystem::exists(file, error)) {
+    const auto text = fmt::format("there is no database {}", file);
+    named_file.empty() ? diagnosis.ok(kCheck, text + " yet; `oblique run` creates it")
+                       : diagnosis.error(kCheck, text + ": correct --db");
+    return;
+  }
+  try {
+    const auto database = server::open_for_reading(file);
+    if (server::identify(database.get(), file) == server::DatabaseKind::kEmpty) {
+      diagnosis.ok(kCheck, file + " is empty");
+      return;
+    }
+    server::Statement studies(database.get(), "SELECT count(*) FROM studies");
+    studies.step();
+    diagnosis.ok(
+        kCheck,
+        fmt::format("{}: schema {}, {} {}, {}", file, server::kSchemaVersion, studies.integer(0),
+                    studies.integer(0) == 1 ? "study" : "studies",
+                    server::is_in_use(file) ? "in use by a server" : "not in use by a server"));
+  } catch (const server::StorageError& error) {
+    diagnosis.error(kCheck, error.what());
+  }
+}
+
+std::string variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? std::string() : std::string(value);
+}
+
+/// False if a key file is named that cannot be used.
+bool check_key(Diagnosis& diagnosis, const DoctorFlags& flags) {
+  const std::string file = flags.source.keys.empty() ? variable("OBLIQUE_KEYS") : flags.source.keys;
+  if (file.empty()) {
+    diagnosis.ok("key", "no key file is named; a server with keys needs --keys or OBLIQUE_KEYS");
+    return true;
+  }
+  try {
+    const auto key = protocol::read_key_file(file);
+    diagnosis.ok(
+        "key", fmt::format("{} holds the {} key {}", file, protocol::name_of(key.role), key.name));
+    return true;
+  } catch (const std::exception& error) {
+    diagnosis.error("key", error.what());
+    return false;
+  }
+}
+
+void check_server(Diagnosis& diagnosis, const DoctorFlags& flags) {
+  constexpr const char* kCheck = "server";
+  if (flags.source.server.empty() && variable("OBLIQUE_SERVER").empty()) {
+    diagnosis.ok(kCheck, "not checked; --server URL or OBLIQUE_SERVER names one");
+    return;
+  }
+  try {
+    Connection connection(connection_settings(flags.source));
+    const auto status = connection.greeting();
+    diagnosis.ok(kCheck,
+                 fmt::format("{} answers{}: oblique-server {}, {} workers", connection.url(),
+                             status.access() == "keys" ? " and admits the key" : "",
+                             status.version(), shown_count(status.workers())));
+    if (status.version() != protocol::version_and_commit()) {
+      diagnosis.warning(kCheck,
+                        fmt::format("this program is {}: install one version on both machines",
+                                    protocol::version_and_commit()));
+    }
+    if (status.access() == "insecure") {
+      diagnosis.warning(kCheck,
+                        "anyone who reaches the server may use it (--insecure): make keys "
+                        "with `oblique keygen`");
+    }
+    if (status.draining()) {
+      diagnosis.warning(kCheck,
+                        "the server is about to end: studies go on when it is started again");
+    } else if (status.workers() == 0) {
+      diagnosis.warning(kCheck, "studies wait for a worker: start oblique-worker");
+    }
+  } catch (const std::exception& error) {
+    diagnosis.error(kCheck, error.what());
+  }
 }
 
 int diagnose(const DoctorFlags& flags) {
-  bool has_silent_part = false;
-  const auto report = examined(flags, has_silent_part);
-  if (flags.json) {
-    std::cout << doctor::json_of(report).dump(2, ' ', false,
-                                              nlohmann::json::error_handler_t::replace)
-              << '\n';
-  } else {
-    constexpr std::size_t kUsualWidth = 80;
-    doctor::print(std::cout, report, kUsualWidth);
+  Diagnosis diagnosis;
+  check_versions(diagnosis);
+  check_processor(diagnosis);
+  check_solver(diagnosis);
+  check_database(diagnosis, flags.database);
+  if (check_key(diagnosis, flags)) {
+    check_server(diagnosis, flags);
   }
-  const int code = doctor::is_anything_broken(report) ? kFailed : kDone;
-  if (has_silent_part) {  // its thread hangs in the system, and nobody can end it
-    std::cout.flush();
-    std::_Exit(code);
-  }
-  return code;
+  return diagnosis.has_error() ? kFailed : kDone;
 }
 
 }  // namespace
 
 void add_doctor(CLI::App& app, Command& command) {
   auto flags = std::make_shared<DoctorFlags>();
-  auto* verb = app.add_subcommand("doctor", "Say what this machine has and what is odd");
+  auto* verb = app.add_subcommand("doctor", "Check programs, processor, database, key and server");
   verb->footer(kDoctorExamples);
   verb->add_option("--db", flags->database,
-                   fmt::format("database to look at; default: {} when it is in this folder",
-                               DatabaseSettings().file))
+                   fmt::format("database to check; default: {}", DatabaseSettings().file))
       ->type_name("FILE");
-  verb->add_option("--server", flags->server,
-                   "address of a server to ask; default: OBLIQUE_SERVER, else none")
-      ->type_name("URL");
-  verb->add_option("--keys", flags->keys,
-                   "key file for a server that has keys; default: OBLIQUE_KEYS, else none")
-      ->type_name("FILE");
-  constexpr double kShortest_s = 0.1;
-  constexpr double kLongest_s = 3600.0;
-  verb->add_option("--timeout", flags->timeout_s, "longest wait for all of it [s]")
-      ->type_name("SECONDS")
-      ->capture_default_str()
-      ->check(protocol::number_between(kShortest_s, kLongest_s));
-  verb->add_flag("--json", flags->json, "print one JSON object");
-  verb->add_flag("--no-timing", flags->leaves_out_timing,
-                 "solve nothing: leave out how long a case takes");
-  verb->add_flag("--host-name", flags->with_host_name, "say the name of this machine too");
+  add_server_flags(*verb, flags->source);
+  verb->get_option("--server")
+      ->description("address of a server to check; default: OBLIQUE_SERVER, else none");
   verb->callback([flags, &command] { command = [flags] { return diagnose(*flags); }; });
 }
 

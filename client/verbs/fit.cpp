@@ -12,7 +12,7 @@
 #include "client/paper/parameter_fit.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"
 

@@ -9,7 +9,7 @@
 #include "client/output/printer.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/trace_columns.h"

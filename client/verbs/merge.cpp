@@ -1,4 +1,3 @@
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -6,12 +5,9 @@
 #include <system_error>
 #include <vector>
 
-#include <unistd.h>
-
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
-#include "client/output/progress.h"
 #include "client/service/source.h"
 #include "client/verbs/verbs.h"
 #include "proto/text.h"
@@ -37,7 +33,7 @@ at work on the database of --db.)";
 struct MergeFlags {
   std::vector<std::string> sources;
   DatabaseSettings target;
-  server::MergeSettings settings;
+  std::string rename_prefix;
   bool allow_network_disk = false;
 };
 
@@ -100,15 +96,7 @@ void merge_one(server::Merger& merger, const std::string& source, const MergeFla
         "A server is at work on {}: what it stores from now on comes when it is merged again.\n",
         source);
   }
-  Progress progress(std::cerr, isatty(STDERR_FILENO) != 0);
-  const auto began = std::chrono::steady_clock::now();
-  const auto merged = merger.merge(source, flags.settings, [&](auto looked_at, auto rows) {
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - began;
-    progress.update(
-        {.study = source, .points = rows, .settled = looked_at, .elapsed_s = elapsed.count()});
-  });
-  progress.finish();
-  tell(source, flags.target.file, merged);
+  tell(source, flags.target.file, merger.merge(source, flags.rename_prefix));
 }
 
 int merge(const MergeFlags& flags) {
@@ -138,7 +126,7 @@ void add_merge(CLI::App& app, Command& command) {
   verb->add_option("--db", flags->target.file, "the database that they are merged into")
       ->type_name("FILE")
       ->capture_default_str();
-  verb->add_option("--rename-prefix", flags->settings.rename_prefix,
+  verb->add_option("--rename-prefix", flags->rename_prefix,
                    "goes before the names of studies whose names other recipes have")
       ->type_name("PREFIX");
   verb->add_flag("--allow-network-disk", flags->allow_network_disk,

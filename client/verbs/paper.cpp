@@ -11,14 +11,14 @@
 #include "client/output/work_line.h"
 #include "client/paper/figures/paper_figures.h"
 #include "client/paper/paper_comparison.h"
-#include "client/plot/files/picture_file.h"
+#include "client/plot/picture_file.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
@@ -50,8 +50,7 @@ protocol::Table rows_of_study(Source& source, const std::string& study) {
       server::sql_text(study) + " AND status = 'solved'");
 }
 
-std::vector<std::optional<OwnCase>> cases_of(const PublishedTable& published,
-                                             const PaperFlags& flags) {
+OwnCases cases_of(const PublishedTable& published, const PaperFlags& flags) {
   if (!flags.database.empty()) {
     return own_cases(published, rows_of_study(*open_database(flags.database), flags.study));
   }
@@ -82,11 +81,11 @@ int draw_figures(const PaperFlags& flags) {
     const auto touching = line.begin(fmt::format("{} contacts", published.cases.size()));
     groups = solved_groups(published, finger);
   }
-  for (const auto& [name, sheet] : paper_figures(groups)) {
+  for (const auto& [name, figure] : paper_figures(groups)) {
     const auto file = (std::filesystem::path(flags.figures) / (name + ".svg")).string();
-    plot::write_picture(plot::svg_of(sheet, plot::usual_size(sheet)), plot::PictureFormat::kSvg,
-                        file);
-    std::cerr << fmt::format("{}: {}\n", file, sheet.title);
+    plot::write_picture(plot::picture_of(figure, plot::PictureFormat::kSvg),
+                        plot::PictureFormat::kSvg, file);
+    std::cerr << fmt::format("{}: {}\n", file, figure.title);
   }
   return kDone;
 }

@@ -6,23 +6,21 @@
 
 #include "client/formats/pager.h"
 #include "client/formats/sink.h"
-#include "client/plot/terminal/terminal_figure.h"
 #include "proto/program/usage.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 
 void add_picture_flags(CLI::App& verb, PictureFlags& flags) {
-  verb.add_option(
-          "--size", flags.size,
-          "width and height in pixels, of PNG twice as many; higher where a legend needs it")
+  verb.add_option("--size", flags.size, "width and height in pixels, of PNG twice as many")
       ->type_name("WxH")
       ->default_str("760x520");
   verb.add_option("--out", flags.out, "output file, written atomically")->type_name("FILE");
-  auto* format = verb.add_option("--format", flags.format,
-                                 "svg, png, csv or gnuplot; default: as the name of --out ends. "
-                                 "Without --out it goes to standard output")
-                     ->type_name("FORMAT");
+  auto* format =
+      verb.add_option("--format", flags.format,
+                      "svg, pdf, png, gp (a gnuplot script) or csv; default: as the name of "
+                      "--out ends. Without --out it goes to standard output")
+          ->type_name("FORMAT");
   protocol::note_choices(format, plot::picture_format_names());
   verb.add_flag("--show", flags.show, "draw on the terminal");
 }
@@ -40,25 +38,24 @@ PictureChoice picture_choice(const PictureFlags& flags) {
 void refuse_pipe(const PictureFlags& flags) {
   if (flags.out.empty() && flags.format.empty() && !flags.show && terminal_size().lines == 0) {
     throw solver::InputError(
-        "standard output is no terminal: name a file for the picture with --out FILE.svg (or .png, "
-        ".csv), or draw it in characters with --show");
+        "standard output is no terminal: name a file for the picture with --out FILE.svg (or .pdf, "
+        ".png, .gp, .csv), or draw it in characters with --show");
   }
 }
 
-plot::Size picture_size(const PictureFlags& flags, const plot::Size& own) {
-  return flags.size.empty() ? own : plot::size_of(flags.size);
+std::optional<plot::Size> picture_size(const PictureFlags& flags) {
+  return flags.size.empty() ? std::nullopt : std::optional(plot::size_of(flags.size));
 }
 
-void put_out(const PictureFlags& flags, const plot::Figure& figure,
-             const std::function<std::string(plot::PictureFormat)>& made) {
+void put_out(const PictureFlags& flags, const plot::Figure& figure) {
   const PictureChoice choice = picture_choice(flags);
   if (choice.is_shown) {
     std::cout.flush();
-    write_all(STDOUT_FILENO, plot::text_of(figure, plot::look_of_standard_output()),
-              "standard output");
+    write_all(STDOUT_FILENO, plot::text_of(figure), "standard output");
   }
   if (choice.is_written) {
-    plot::write_picture(made(choice.format), choice.format, flags.out);
+    plot::write_picture(plot::picture_of(figure, choice.format, picture_size(flags)), choice.format,
+                        flags.out);
   }
 }
 

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <functional>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "client/plot/figures/figure.h"
-#include "client/plot/files/picture_file.h"
+#include "client/plot/figure.h"
+#include "client/plot/picture_file.h"
 
 namespace oblique::client {
 
@@ -32,11 +32,11 @@ PictureChoice picture_choice(const PictureFlags& flags);
 /// Throws solver::InputError where the flags leave open where a picture goes, and standard output
 /// is no terminal.
 void refuse_pipe(const PictureFlags& flags);
-/// The size asked for, else `own`.
-plot::Size picture_size(const PictureFlags& flags, const plot::Size& own);
 
-/// Shows the figure on the terminal, writes the picture, or both. `made` gives the picture.
-void put_out(const PictureFlags& flags, const plot::Figure& figure,
-             const std::function<std::string(plot::PictureFormat)>& made);
+/// The size asked for; none: the picture's own.
+std::optional<plot::Size> picture_size(const PictureFlags& flags);
+
+/// Shows the figure on the terminal, writes the picture, or both.
+void put_out(const PictureFlags& flags, const plot::Figure& figure);
 
 }  // namespace oblique::client

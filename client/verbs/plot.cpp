@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "client/plot/block_choice.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/study_shape.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/picture_flags.h"
@@ -30,8 +30,9 @@ OUTPUT and COL are columns of `oblique query`, or SQL expressions over them, as 
 KEY is an axis of the study. Axes without --at are held at their first value, and a message says
 which. Of several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those
 that most points have. Cells without a result are hatched, failed ones crossed. Where points lie
-scattered, or are too many to draw each, cells gather them, and the picture says so. PNG needs
-rsvg-convert. Without --out the picture is drawn on the terminal. --range and --at are in SI units.
+scattered, or are too many to draw each, cells gather them, and the picture says so. Pictures are
+drawn by gnuplot (Debian: gnuplot-nox); --out FILE.gp writes its script, and needs none. Without
+--out the picture is drawn on the terminal. --range and --at are in SI units.
 A point is solved again for its time histories, here when the database is a file or the point is of
 no study, and by a worker of the server otherwise.)";
 
@@ -51,19 +52,16 @@ protocol::Recipe recipe_for(const PlotFlags& flags, Source& source) {
 }
 
 int plot_study(const PlotFlags& flags) {
-  const auto size = picture_size(flags.picture, {});
   const auto source = open_source(flags.source);
   const auto shape = plot::shape_for(recipe_for(flags, *source), flags.request);
-  const auto figure =
-      plot::figure_of(*source, shape, plot::completed(flags.request, shape), tell_line);
-  put_out(flags.picture, figure,
-          [&](plot::PictureFormat format) { return plot::picture_of(figure, format, size); });
+  put_out(flags.picture,
+          plot::figure_of(*source, shape, plot::completed(flags.request, shape), tell_line));
   return kDone;
 }
 
 int plot_what_is_meant(PlotFlags& flags) {
   static_cast<void>(picture_choice(flags.picture));
-  static_cast<void>(picture_size(flags.picture, {}));
+  static_cast<void>(picture_size(flags.picture));
   plot::check(flags.request);
   refuse_pipe(flags.picture);
   flags.point.study = flags.request.study;

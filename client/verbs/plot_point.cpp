@@ -11,7 +11,7 @@
 
 #include "client/output/human_units.h"
 #include "client/output/work_line.h"
-#include "client/plot/point/panels.h"
+#include "client/plot/point_figure.h"
 #include "client/service/watching.h"
 #include "client/trace/stored_row.h"
 #include "client/trace/trace_of_worker.h"
@@ -239,10 +239,7 @@ int plot_point(const PointPictureFlags& flags, const PictureFlags& picture,
   const auto panel = plot::point_panel_named(flags.panel);
   const auto history =
       flags.study.empty() ? history_of_values(flags) : history_of_study(flags, source);
-  const auto sheet = plot::sheet_of(history, panel);
-  const auto size = picture_size(picture, plot::usual_size(sheet));
-  put_out(picture, plot::flattened(sheet),
-          [&](plot::PictureFormat format) { return plot::picture_of(sheet, format, size); });
+  put_out(picture, plot::point_figure(history, panel));
   return kDone;
 }
 

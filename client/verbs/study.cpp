@@ -20,7 +20,6 @@
 #include "proto/program/process.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/study_size.h"
 #include "proto/recipe/written.h"
 #include "worker/solver/model/number.h"
 

@@ -15,7 +15,6 @@
 
 #include "client/output/human_units.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/lanes/lane_stepper.h"

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/study_size.h"
 
 namespace oblique::client {
 

@@ -1,6 +1,6 @@
 #!/bin/sh
-# A campaign on a Slurm cluster, from its login node: a server here, workers in jobs that come while there is
-# work and leave when there is none. Stopped with Ctrl-C and started again, it goes on where it was.
+# A campaign on a Slurm cluster, from its login node: a server here, and jobs with workers while points are
+# open. Stopped with Ctrl-C and started again, it goes on where it was.
 #   sh campaign.sh STUDY.toml [MOST-JOBS]
 # HOST is the name by which the nodes reach this machine; the database must not lie on a network disk.
 set -eu
@@ -16,12 +16,14 @@ oblique-server --listen '*' --keys keys/server.key --db campaign.db 2> server.lo
 server=$!
 export OBLIQUE_SERVER="tcp://$host:$client_port" OBLIQUE_KEYS="$PWD/keys/client.key"
 export OBLIQUE_WORKER_SERVER="tcp://$host:$worker_port" OBLIQUE_WORKER_KEYS="$PWD/keys/worker.key"
-scaling=
+jobs="oblique@$host:$client_port" scaling=
 end() {
   code=$?
   [ "$code" = 0 ] || tail -n 3 server.log >&2
   [ -z "$scaling" ] || kill "$scaling" 2> /dev/null || true
-  oblique autoscale slurm --retire --quiet || true
+  # Workers deliver what they have solved before their job ends.
+  scancel --quiet --name="$jobs" || true
+  while [ -n "$(squeue --noheader --me --name="$jobs")" ]; do sleep 1; done
   kill "$server" 2> /dev/null || true
   wait
 }
@@ -34,7 +36,7 @@ study=$(basename "$file" .toml)
 oblique submit "$file" --name "$study"
 
 # More of sbatch's arguments, as a partition or an account: --sbatch-args "--partition=short --account=lab7"
-oblique autoscale slurm --max "$most" ${SBATCH_ARGS:+--sbatch-args "$SBATCH_ARGS"} 2> autoscale.log &
+oblique autoscale slurm --name "$jobs" --max "$most" ${SBATCH_ARGS:+--sbatch-args "$SBATCH_ARGS"} 2> autoscale.log &
 scaling=$!
 
 oblique watch "$study"

@@ -15,7 +15,6 @@
 
 #include "proto/program/usage.h"
 #include "proto/small_file.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "proto/toml_reader.h"
 #include "worker/solver/model/errors.h"

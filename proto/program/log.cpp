@@ -14,7 +14,7 @@
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/formatter.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
@@ -50,11 +50,7 @@ class LineFormatter : public spdlog::formatter {
     } else if (form_ == Form::kJournal) {
       add(fmt::format("<{}>{}", syslog_level(message.level), visible(text)));
     } else {
-      add(fmt::format("{} {} ", time, program));
-      message.color_range_start = line.size();
-      add(level);
-      message.color_range_end = line.size();
-      add(": " + visible(text));
+      add(fmt::format("{} {} {}: {}", time, program, level, visible(text)));
     }
     add("\n");
   }
@@ -88,11 +84,8 @@ bool journal_reads_standard_error() {
 }  // namespace
 
 void set_up_log(const std::string& program, const LogSettings& settings) {
-  const char* no_colour = std::getenv("NO_COLOR");
-  const bool wants_none = no_colour != nullptr && *no_colour != '\0';
-  auto logger = std::make_shared<spdlog::logger>(
-      program, std::make_shared<spdlog::sinks::stderr_color_sink_mt>(
-                   wants_none ? spdlog::color_mode::never : spdlog::color_mode::automatic));
+  auto logger =
+      std::make_shared<spdlog::logger>(program, std::make_shared<spdlog::sinks::stderr_sink_mt>());
   logger->set_formatter(std::make_unique<LineFormatter>(settings.format == "json" ? Form::kJson
                                                         : journal_reads_standard_error()
                                                             ? Form::kJournal

@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdlib>
+#include <cmath>
 #include <ctime>
 #include <iostream>
 #include <iterator>
+#include <map>
 #include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/suggestion.h"
 #include "proto/text.h"
 
 namespace oblique::protocol {
@@ -36,43 +36,6 @@ std::vector<std::string> known_words(const CLI::App& verb) {
 
 bool has_verbs(const CLI::App& verb) {
   return !verb.get_subcommands([](const CLI::App*) { return true; }).empty();
-}
-
-constexpr std::int64_t kDay_s = 86'400;
-constexpr std::int64_t kLongest_s = 36'525 * kDay_s;
-
-std::optional<std::int64_t> duration_s(std::string_view text) {
-  std::int64_t value = -1;
-  const auto* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
-  const std::string_view unit(end, static_cast<std::size_t>(last - end));
-  const std::int64_t unit_s = unit.empty() || unit == "s" ? 1
-                              : unit == "m"               ? 60
-                              : unit == "h"               ? 3600
-                              : unit == "d"               ? kDay_s
-                                                          : 0;
-  const bool is_duration =
-      error == std::errc() && unit_s > 0 && value >= 0 && value <= kLongest_s / unit_s;
-  return is_duration ? std::optional(value * unit_s) : std::nullopt;
-}
-
-/// Seconds since 1970 of a time in ISO 8601.
-std::optional<std::int64_t> moment_s(const std::string& text) {
-  std::tm parts{};
-  const char* rest = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &parts);
-  const bool is_local = rest != nullptr && *rest == '\0';
-  if (rest != nullptr && !is_local) {
-    rest = strptime(rest, "%z", &parts);
-  }
-  if (rest == nullptr || *rest != '\0') {
-    return std::nullopt;
-  }
-  const std::tm written = parts;
-  parts.tm_isdst = -1;
-  const std::int64_t moment = is_local ? std::mktime(&parts) : timegm(&parts) - written.tm_gmtoff;
-  // A day that the month does not have has become one of the next month.
-  const bool is_sound = parts.tm_mday == written.tm_mday && std::abs(written.tm_gmtoff) < kDay_s;
-  return is_sound ? std::optional(moment) : std::nullopt;
 }
 
 /// The name of a check that is never active and that help does not show: CLI11 keeps no other notes
@@ -119,20 +82,27 @@ CLI::Validator whole_number_from(std::int64_t least) {
       "");
 }
 
-std::optional<std::chrono::milliseconds> time_until(std::string_view text,
+std::optional<std::chrono::milliseconds> time_until(const std::string& text,
                                                     std::chrono::system_clock::time_point now) {
   using std::chrono::milliseconds;
-  using std::chrono::seconds;
-  if (const auto duration = duration_s(text)) {
-    return seconds(*duration);
+  constexpr double kLongest_s = 1e9;
+  std::tm parts{};
+  const char* const end = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  if (end != nullptr && *end == '\0') {
+    const int day = parts.tm_mday;
+    const milliseconds left = std::chrono::seconds(timegm(&parts)) -
+                              std::chrono::floor<milliseconds>(now.time_since_epoch());
+    // A day that the month does not have has become one of the next month.
+    return parts.tm_mday == day ? std::optional(left) : std::nullopt;
   }
-  const auto moment = moment_s(std::string(text));
-  if (!moment) {
-    return std::nullopt;
-  }
-  const auto now_ms = std::chrono::duration_cast<milliseconds>(now.time_since_epoch());
-  const milliseconds left = seconds(*moment) - now_ms;
-  return std::chrono::abs(left) <= seconds(kLongest_s) ? std::optional(left) : std::nullopt;
+  static const std::map<char, double> kUnits_s{{'s', 1.0}, {'m', 60.0}, {'h', 3600.0}};
+  const auto unit_s = kUnits_s.find(text.empty() ? ' ' : text.back());
+  double value = 0.0;
+  const bool is_duration = unit_s != kUnits_s.end() &&
+                           CLI::detail::lexical_cast(text.substr(0, text.size() - 1), value) &&
+                           value >= 0.0 && value * unit_s->second <= kLongest_s;
+  return is_duration ? std::optional(milliseconds(std::llround(value * unit_s->second * 1000.0)))
+                     : std::nullopt;
 }
 
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices) {

@@ -30,10 +30,10 @@ CLI::Validator number_between(double least, double largest);
 /// A check for whole numbers of 64 bits that are at least `least`.
 CLI::Validator whole_number_from(std::int64_t least);
 
-/// The time from `now` to `text`, negative for the past. `text` is a time in ISO 8601, as
-/// 2026-11-22T05:00:00Z, 2026-11-22T06:00:00+01:00 or, in local time, 2026-11-22T05:00:00; or a
-/// duration: 5400, 5400s, 90m, 2h, 1d. Nothing for other text, and for more than a hundred years.
-std::optional<std::chrono::milliseconds> time_until(std::string_view text,
+/// The time from `now` to `text`, negative for the past. `text` is a time in UTC, as
+/// 2026-11-22T05:00:00Z, or a duration in seconds, minutes or hours, as 90m. Nothing for other
+/// text.
+std::optional<std::chrono::milliseconds> time_until(const std::string& text,
                                                     std::chrono::system_clock::time_point now);
 
 /// Notes the values that an option may have, for completion; the reader of the value checks it.

@@ -15,7 +15,6 @@
 #include "proto/frames.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/expression.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/sampling.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"

@@ -9,7 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/suggestion.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::expressions {
@@ -105,13 +105,6 @@ std::string_view name_at(std::string_view text) {
   return text.substr(0, static_cast<std::size_t>(end - text.begin()));
 }
 
-[[noreturn]] void throw_foreign(char c) {
-  throw InputError(c == '='   ? "`=` is no operator: `==` compares, and nothing is assigned"
-                   : c == '?' ? "`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose"
-                   : c > ' ' && c <= '~' ? fmt::format("`{}` means nothing in it", c)
-                                         : "it has a character that means nothing in it");
-}
-
 }  // namespace
 
 /// Parses by precedence climbing. Each function appends the steps of the text that it reads.
@@ -154,12 +147,9 @@ class Expression::Parser {
     if (c == '\0' || c == ')' || c == ',') {
       return nullptr;
     }
-    if (!word.empty() || is_digit(c) || c == '.' || c == '(' || c == '!') {
-      const std::string_view what = word.empty() ? rest_.substr(0, 1) : word;
-      throw InputError(
-          fmt::format("an operator is missing before `{}`", what.substr(0, kLongestQuoted)));
-    }
-    throw_foreign(c);
+    throw InputError(c == '='   ? "`=` is no operator: `==` compares"
+                     : c == '?' ? "`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose"
+                                : fmt::format("an operator is missing before {}", quoted_next()));
   }
 
   /// Reads a value and all following operations that bind at least as strongly as `weakest`.
@@ -196,19 +186,19 @@ class Expression::Parser {
       read_operations(kNot);
       to_.steps_.push_back({[](const double* x) { return std::isnan(*x) ? *x : *x == 0.0; }, 1});
     } else if (word.empty() || word == "and" || word == "or") {
-      throw_no_value(c, word);
+      throw InputError(c == '\0' ? "a value is missing at its end"
+                                 : fmt::format("a value is missing before {}", quoted_next()));
     } else {
       read_name(word);
     }
   }
 
-  [[noreturn]] void throw_no_value(char c, std::string_view word) const {
-    if (word.empty() && std::string_view("\0<>!&|*/^),", 11).find(c) == std::string_view::npos) {
-      throw_foreign(c);
-    }
-    throw InputError(c == '\0' ? "a value is missing at its end"
-                               : fmt::format("a value is missing before `{}`",
-                                             word.empty() ? rest_.substr(0, 1) : word));
+  /// The name or character that follows, for a message.
+  std::string quoted_next() const {
+    const std::size_t bytes =
+        std::max(name_at(rest_).size(), protocol::first_character(rest_).bytes);
+    return fmt::format("`{}`", protocol::excerpt(rest_.substr(0, std::max<std::size_t>(bytes, 1)),
+                                                 kLongestQuoted));
   }
 
   void close() {

@@ -9,9 +9,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
-#include "proto/recipe/keys.h"
-#include "proto/suggestion.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 

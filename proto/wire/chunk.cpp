@@ -1,42 +1,53 @@
 #include "proto/wire/chunk.h"
 
-#include <algorithm>
-#include <array>
-#include <numeric>
+#include <bit>
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 
 namespace oblique::protocol {
 namespace {
 
-constexpr std::size_t kKinds = 4;
-/// A value takes at least a byte while a chunk is made, so no sound chunk has more rows.
-constexpr std::uint64_t kMostRows = std::uint64_t{1} << 24U;
-/// What a value costs in a chunk besides its own bytes: its kind, and the length of a text.
-constexpr std::uint64_t kKindBytes = 1;
-constexpr std::uint64_t kLengthBytes = 2;
+static_assert(std::endian::native == std::endian::little, "cells are copied as they are in memory");
 
-bool is_sound_part(const ColumnPart& part, std::uint64_t rows) {
-  const std::string& kinds = part.kinds();
-  const bool has_one_for_all = kinds.size() == 1 && rows != 1;
-  if (!has_one_for_all && kinds.size() != rows) {
+template <class Number>
+void append(std::string& bytes, Number number) {
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+/// Moves a number from the beginning of `bytes`; false when these are too few.
+template <class Number>
+bool take(std::string_view& bytes, Number& number) {
+  if (bytes.size() < sizeof number) {
     return false;
   }
-  std::array<std::uint64_t, kKinds> count{};
-  for (const char kind : kinds) {
-    const auto place = static_cast<unsigned char>(kind);
-    if (place >= kKinds) {
-      return false;
-    }
-    count.at(place) += has_one_for_all ? rows : 1;
+  std::memcpy(&number, bytes.data(), sizeof number);
+  bytes.remove_prefix(sizeof number);
+  return true;
+}
+
+/// Moves a cell from the beginning of `bytes`; false when there is no whole one.
+bool take_cell(std::string_view& bytes, Cell& cell) {
+  if (!take(bytes, cell.kind)) {
+    return false;
   }
-  const auto of = [&count](CellKind kind) { return count.at(static_cast<std::size_t>(kind)); };
-  const std::uint64_t bytes =
-      std::accumulate(part.text_bytes().begin(), part.text_bytes().end(), std::uint64_t{0});
-  return static_cast<std::uint64_t>(part.integers_size()) == of(CellKind::kInteger) &&
-         static_cast<std::uint64_t>(part.reals_size()) == of(CellKind::kReal) &&
-         static_cast<std::uint64_t>(part.text_bytes_size()) == of(CellKind::kText) &&
-         part.texts().size() == bytes;
+  std::uint32_t length = 0;
+  switch (cell.kind) {
+    case CellKind::kNull:
+      return true;
+    case CellKind::kInteger:
+      return take(bytes, cell.integer);
+    case CellKind::kReal:
+      return take(bytes, cell.real);
+    case CellKind::kText:
+      if (!take(bytes, length) || bytes.size() < length) {
+        return false;
+      }
+      cell.text = bytes.substr(0, length);
+      bytes.remove_prefix(length);
+      return true;
+  }
+  return false;
 }
 
 Value value_of(const Cell& cell) {
@@ -67,95 +78,55 @@ Cell cell_of(const Value& value) {
 }  // namespace
 
 bool is_sound(const QueryReply& chunk) {
-  return chunk.parts_size() == chunk.columns_size() &&
-         (chunk.chunk_rows() == 0 || chunk.parts_size() > 0) && chunk.chunk_rows() <= kMostRows &&
-         std::all_of(chunk.parts().begin(), chunk.parts().end(), [&](const ColumnPart& part) {
-           return is_sound_part(part, chunk.chunk_rows());
-         });
+  const auto columns = static_cast<std::uint64_t>(chunk.columns_size());
+  std::string_view rest = chunk.cells();
+  if (columns == 0 || chunk.chunk_rows() > rest.size() / columns) {  // a cell has a byte at least
+    return chunk.chunk_rows() == 0 && rest.empty();
+  }
+  Cell cell;
+  for (std::uint64_t left = chunk.chunk_rows() * columns; left > 0; --left) {
+    if (!take_cell(rest, cell)) {
+      return false;
+    }
+  }
+  return rest.empty();
 }
 
 ChunkRows::ChunkRows(const QueryReply& chunk)
-    : cells_(static_cast<std::size_t>(chunk.columns_size())), rows_left_(chunk.chunk_rows()) {
-  places_.reserve(cells_.size());
-  for (const ColumnPart& part : chunk.parts()) {
-    places_.push_back({part.kinds().data(), part.kinds().size() == 1 ? 0U : 1U,
-                       part.integers().data(), part.reals().data(), part.text_bytes().data(),
-                       part.texts().data()});
-  }
-}
+    : rest_(chunk.cells()),
+      cells_(static_cast<std::size_t>(chunk.columns_size())),
+      rows_left_(chunk.chunk_rows()) {}
 
 bool ChunkRows::next() {
   if (rows_left_ == 0) {
     return false;
   }
   --rows_left_;
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    Place& place = places_[i];
-    Cell& cell = cells_[i];
-    cell.kind = static_cast<CellKind>(*place.kind);
-    place.kind += place.kind_step;
-    switch (cell.kind) {
-      case CellKind::kNull:
-        break;
-      case CellKind::kInteger:
-        cell.integer = *place.integer++;
-        break;
-      case CellKind::kReal:
-        cell.real = *place.real++;
-        break;
-      case CellKind::kText:
-        cell.text = std::string_view(place.text, *place.text_bytes);
-        place.text += *place.text_bytes++;
-        break;
-    }
+  for (Cell& cell : cells_) {
+    static_cast<void>(take_cell(rest_, cell));
   }
   return true;
 }
 
-ChunkWriter::ChunkWriter(std::vector<std::string> columns) : columns_(std::move(columns)) {
-  (void)take();
-}
-
-ColumnPart& ChunkWriter::begin(CellKind kind) {
-  if (column_ >= columns_.size()) {
-    throw std::logic_error("a row has more values than there are columns");
-  }
-  ColumnPart& part = *chunk_.mutable_parts(static_cast<int>(column_++));
-  part.mutable_kinds()->push_back(static_cast<char>(kind));
-  bytes_ += kKindBytes;
-  return part;
-}
-
-void ChunkWriter::integer(std::int64_t value) {
-  begin(CellKind::kInteger).add_integers(value);
-  bytes_ += sizeof value;
-}
-
-void ChunkWriter::real(double value) {
-  begin(CellKind::kReal).add_reals(value);
-  bytes_ += sizeof value;
-}
-
-void ChunkWriter::text(std::string_view value) {
-  ColumnPart& part = begin(CellKind::kText);
-  part.add_text_bytes(static_cast<std::uint32_t>(value.size()));
-  part.mutable_texts()->append(value);
-  bytes_ += value.size() + kLengthBytes;
-}
+ChunkWriter::ChunkWriter(std::vector<std::string> columns) : columns_(std::move(columns)) {}
 
 void ChunkWriter::cell(const Cell& value) {
+  if (column_++ >= columns_.size()) {
+    throw std::logic_error("a row has more values than there are columns");
+  }
+  cells_.push_back(static_cast<char>(value.kind));
   switch (value.kind) {
     case CellKind::kNull:
-      null();
       break;
     case CellKind::kInteger:
-      integer(value.integer);
+      append(cells_, value.integer);
       break;
     case CellKind::kReal:
-      real(value.real);
+      append(cells_, value.real);
       break;
     case CellKind::kText:
-      text(value.text);
+      append(cells_, static_cast<std::uint32_t>(value.text.size()));
+      cells_.append(value.text);
       break;
   }
 }
@@ -169,22 +140,12 @@ void ChunkWriter::end_row() {
 }
 
 QueryReply ChunkWriter::take() {
-  for (ColumnPart& part : *chunk_.mutable_parts()) {
-    std::string& kinds = *part.mutable_kinds();
-    if (!kinds.empty() && kinds.find_first_not_of(kinds.front()) == std::string::npos) {
-      kinds.resize(1);
-    }
-  }
-  chunk_.set_chunk_rows(rows_);
-  QueryReply taken = std::exchange(chunk_, {});
-  for (const std::string& column : columns_) {
-    chunk_.add_columns(column);
-    chunk_.add_parts();
-  }
+  QueryReply chunk;
+  chunk.mutable_columns()->Assign(columns_.begin(), columns_.end());
+  chunk.set_cells(std::exchange(cells_, {}));
+  chunk.set_chunk_rows(std::exchange(rows_, 0));
   column_ = 0;
-  rows_ = 0;
-  bytes_ = 0;
-  return taken;
+  return chunk;
 }
 
 QueryReply chunk_of(const Table& table) {

@@ -9,11 +9,10 @@
 
 #include "proto/oblique.pb.h"
 
-// Rows of answers. A chunk is a QueryReply, which keeps its values column by column and kind by
-// kind: a number is eight bytes that are copied.
+// Rows of answers. A chunk is a QueryReply, which has them cell by cell.
 namespace oblique::protocol {
 
-/// Codes of ColumnPart.kinds.
+/// Codes of kinds in QueryReply.cells.
 enum class CellKind : char { kNull = 0, kInteger = 1, kReal = 2, kText = 3 };
 
 /// One value of a row. Only the member that belongs to its kind counts.
@@ -34,8 +33,8 @@ struct Table {
   std::vector<Row> rows = {};
 };
 
-/// Whether the columns of a chunk have as many values as it says. Chunks from outside must pass
-/// this before anything else is done with them.
+/// Whether a chunk has the cells of as many rows as it says. Chunks from outside must pass this
+/// before anything else is done with them.
 bool is_sound(const QueryReply& chunk);
 
 /// The rows of a sound chunk, which must not change meanwhile.
@@ -50,17 +49,7 @@ class ChunkRows {
   const Cell& cell(std::size_t column) const { return cells_[column]; }
 
  private:
-  /// Where the next value of a column is.
-  struct Place {
-    const char* kind;
-    std::size_t kind_step;  // 0: one kind for all rows
-    const std::int64_t* integer;
-    const double* real;
-    const std::uint32_t* text_bytes;
-    const char* text;
-  };
-
-  std::vector<Place> places_;
+  std::string_view rest_;  ///< the cells of the rows to come
   std::vector<Cell> cells_;
   std::uint64_t rows_left_;
 };
@@ -71,31 +60,29 @@ class ChunkWriter {
  public:
   explicit ChunkWriter(std::vector<std::string> columns);
 
-  void null() { begin(CellKind::kNull); }
-  void integer(std::int64_t value);
-  void real(double value);
-  void text(std::string_view value);
+  void null() { cell({}); }
+  void integer(std::int64_t value) { cell({.kind = CellKind::kInteger, .integer = value}); }
+  void real(double value) { cell({.kind = CellKind::kReal, .real = value}); }
+  void text(std::string_view value) { cell({.kind = CellKind::kText, .text = value}); }
+  /// Throws std::logic_error when the row has a value for each column already.
   void cell(const Cell& value);
   /// Throws std::logic_error when the row does not have as many values as there are columns.
   void end_row();
 
   /// Complete rows since the last `take`.
   std::uint64_t rows() const { return rows_; }
-  /// Approximate size of the chunk, including the row that is being written.
-  std::uint64_t bytes() const { return bytes_; }
+  /// Size of the chunk's cells, including the row that is being written.
+  std::uint64_t bytes() const { return cells_.size(); }
 
   /// The rows written since the last call. The caller sets the number of the chunk and whether it
   /// is the last one.
   QueryReply take();
 
  private:
-  ColumnPart& begin(CellKind kind);
-
   std::vector<std::string> columns_;
-  QueryReply chunk_;
+  std::string cells_;
   std::size_t column_ = 0;  // of the next value
   std::uint64_t rows_ = 0;
-  std::uint64_t bytes_ = 0;
 };
 
 /// The table as the first and last chunk of an answer.

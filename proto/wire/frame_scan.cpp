@@ -1,6 +1,5 @@
 #include "proto/wire/frame_scan.h"
 
-#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -24,9 +23,8 @@ CodedInputStream stream_of(std::string_view bytes) {
 /// What a message holds at a path of field numbers.
 struct Found {
   std::size_t fields = 0;
-  std::size_t bytes = 0;    ///< of texts, packed lists and messages
-  std::size_t numbers = 0;  ///< in packed lists or alone
-  bool is_whole = true;     ///< every message on the path could be read to its end
+  std::size_t bytes = 0;  ///< of texts, packed lists and messages
+  bool is_whole = true;   ///< every message on the path could be read to its end
 };
 
 void find(std::string_view message, std::span<const int> path, Found& found) {
@@ -55,11 +53,6 @@ void find(std::string_view message, std::span<const int> path, Found& found) {
     }
     ++found.fields;
     found.bytes += bytes.size();
-    // The last byte of each number in a packed list has no continuation bit.
-    const auto last_bytes = std::count_if(bytes.begin(), bytes.end(), [](char byte) {
-      return (static_cast<unsigned char>(byte) & 0x80U) == 0;
-    });
-    found.numbers += bytes.empty() ? 1 : static_cast<std::size_t>(last_bytes);
   }
   found.is_whole = found.is_whole && in.ConsumedEntireMessage();
 }
@@ -93,11 +86,7 @@ bool is_of_a_workers_size(std::string_view frame) {
   const auto rows = find(frame, {Message::kTraceFieldNumber, Trace::kValuesFieldNumber}).bytes +
                     find(frame, {Message::kTraceFieldNumber, Trace::kStatesFieldNumber}).bytes;
   const auto results = find(frame, {Message::kResultsFieldNumber, Results::kResultsFieldNumber});
-  const auto leases =
-      find(frame, {Message::kHeartbeatFieldNumber, Heartbeat::kLeaseIdsFieldNumber}).numbers +
-      find(frame, {Message::kGiveBackFieldNumber, GiveBack::kLeaseIdsFieldNumber}).numbers;
-  return frame.size() - rows <= kMaxWorkerFrameBytes && results.fields <= kMostResultsAMessage &&
-         leases <= kMostLeasesAHeartbeat;
+  return frame.size() - rows <= kMaxWorkerFrameBytes && results.fields <= kMostResultsAMessage;
 }
 
 bool is_of_a_recipes_shape(std::string_view recipe) {

@@ -14,8 +14,8 @@ inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024
 /// Most results in one message; a sound worker sends 1,000.
 inline constexpr std::size_t kMostResultsAMessage = 10'000;
 /// Most leases that a heartbeat names: a worker keeps 50,000 results that are not acknowledged, and
-/// holds at most 1,024 batches.
-inline constexpr std::size_t kMostLeasesAHeartbeat = 65'536;
+/// holds at most 1,024 batches. To be checked after parsing, for a lease needs little more memory.
+inline constexpr int kMostLeasesAHeartbeat = 65'536;
 
 /// Whether the frame holds no more than a correct worker sends. One that cannot be parsed may pass.
 bool is_of_a_workers_size(std::string_view frame);

@@ -17,7 +17,6 @@
 
 #include "proto/small_file.h"
 #include "proto/system/descriptor.h"
-#include "server/database/sqlite.h"
 
 namespace oblique::server {
 namespace {
@@ -25,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr mode_t kOwnerOnly = 0600;
+constexpr int kBusyTimeout_ms = 5000;
 
 struct FileSystem {
   unsigned long type;  // f_type of statfs(2)
@@ -71,6 +71,34 @@ struct flock servers_lock() {
   return lock;
 }
 
+/// The path as a URI of SQLite, in which only these letters have a meaning.
+std::string as_uri(const std::string& path) {
+  std::string uri = "file:";
+  for (const char letter : fs::absolute(path).string()) {
+    uri += letter == '%'   ? "%25"
+           : letter == '?' ? "%3f"
+           : letter == '#' ? "%23"
+                           : std::string(1, letter);
+  }
+  return uri;
+}
+
+/// Opens a database without files beside it.
+DatabaseHandle open_alone(const std::string& path) {
+  std::error_code none;
+  const bool has_log = fs::file_size(path + "-wal", none) > 0 && !none;
+  // SQLite ignores the log of an immutable database. With a log, the database is opened without
+  // locks and in exclusive mode, in which SQLite keeps the index of the log in memory.
+  DatabaseHandle database =
+      open_database(as_uri(path) + (has_log ? "?vfs=unix-none" : "?immutable=1"),
+                    SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+  if (has_log) {
+    execute(database.get(), "PRAGMA locking_mode = EXCLUSIVE");
+    sqlite3_db_config(database.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  }
+  return database;
+}
+
 }  // namespace
 
 void check_path(const std::string& path) {
@@ -79,6 +107,30 @@ void check_path(const std::string& path) {
     throw StorageError(path + " is " + protocol::kind_of_file(about.st_mode) +
                        ": a database is a regular file");
   }
+}
+
+DatabaseHandle open_for_reading(const std::string& path) {
+  check_path(path);
+  if (!fs::exists(path)) {
+    throw StorageError("there is no database " + path);
+  }
+  DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
+  sqlite3_busy_timeout(database.get(), kBusyTimeout_ms);
+  const int code = sqlite3_exec(database.get(), "PRAGMA schema_version", nullptr, nullptr, nullptr);
+  const unsigned kind = static_cast<unsigned>(code) & 0xffU;
+  const bool lacks_files = kind == SQLITE_CANTOPEN || kind == SQLITE_READONLY;
+  if (lacks_files && ::access(fs::absolute(path).parent_path().c_str(), W_OK) != 0) {
+    return open_alone(path);
+  }
+  return database;
+}
+
+DatabaseHandle open_stored(const std::string& path) {
+  DatabaseHandle database = open_for_reading(path);
+  if (identify(database.get(), path) == DatabaseKind::kEmpty) {
+    throw StorageError(path + " is empty: no study was ever stored in it");
+  }
+  return database;
 }
 
 std::string file_system_of(const std::string& path) {

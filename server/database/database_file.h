@@ -4,11 +4,23 @@
 
 #include <sys/stat.h>
 
-// Files of databases, as the operating system sees them.
+#include "server/database/sqlite.h"
+
+// Files of databases: how they are opened, locked and completed.
 namespace oblique::server {
 
 /// Throws StorageError when `path` exists and is not a regular file.
 void check_path(const std::string& path);
+
+/// Opens the database at `path` for reading only; does not check whether it is ours. SQLite may
+/// create an index of the write-ahead log beside it. In a folder that cannot be written the
+/// database is read without that file, including the rows in the log. Throws StorageError when
+/// there is no such file or it cannot be opened.
+DatabaseHandle open_for_reading(const std::string& path);
+
+/// As `open_for_reading`; throws StorageError, which says what was found, unless the file is a
+/// database of ours with tables.
+DatabaseHandle open_stored(const std::string& path);
 
 /// Name of the file system that holds `path`, such as "ext4"; its number for one without a name
 /// here, "unknown" when unknown. `path` need not exist.

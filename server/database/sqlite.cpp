@@ -3,7 +3,6 @@
 #include <array>
 #include <bit>
 #include <cerrno>
-#include <new>
 
 #include <zlib.h>
 
@@ -28,67 +27,47 @@ constexpr const char* kWayOut =
   throw StorageError("the database failed: " + reason);
 }
 
-/// Appends a word, least significant byte first.
-void append_word(std::string& bytes, char type, std::uint64_t word) {
-  std::array<char, 9> added{type};
-  for (std::size_t i = 1; i < added.size(); ++i) {
-    added[i] = static_cast<char>(word & 0xffU);
-    word >>= 8U;
-  }
-  bytes.append(added.data(), added.size());
+uLong crc_of(uLong sum, const void* bytes, std::size_t size) {
+  return crc32_z(sum, static_cast<const Bytef*>(bytes), size);
 }
 
-void append_value(std::string& bytes, sqlite3_value* value) {
+/// The checksum of the bytes of `sum`, of a type and of a word, least significant byte first.
+uLong crc_of_word(uLong sum, char type, std::uint64_t word) {
+  std::array<char, 9> bytes{type};
+  for (std::size_t i = 1; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<char>(word & 0xffU);
+    word >>= 8U;
+  }
+  return crc_of(sum, bytes.data(), bytes.size());
+}
+
+uLong crc_of_value(uLong sum, sqlite3_value* value) {
   switch (const int type = sqlite3_value_type(value); type) {
     case SQLITE_INTEGER:
-      append_word(bytes, 'i', static_cast<std::uint64_t>(sqlite3_value_int64(value)));
-      break;
+      return crc_of_word(sum, 'i', static_cast<std::uint64_t>(sqlite3_value_int64(value)));
     case SQLITE_FLOAT: {
       const double real = sqlite3_value_double(value);
       // SQLite may store a zero without its sign.
-      append_word(bytes, 'r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
-      break;
+      return crc_of_word(sum, 'r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
     }
     case SQLITE_TEXT:
     case SQLITE_BLOB: {
       const void* data = sqlite3_value_blob(value);
       const auto size = static_cast<std::size_t>(sqlite3_value_bytes(value));
-      append_word(bytes, type == SQLITE_TEXT ? 't' : 'b', size);
-      bytes.append(size == 0 ? "" : static_cast<const char*>(data), size);
-      break;
+      sum = crc_of_word(sum, type == SQLITE_TEXT ? 't' : 'b', size);
+      return size == 0 ? sum : crc_of(sum, data, size);
     }
     default:
-      bytes += 'n';
+      return crc_of(sum, "n", 1);
   }
 }
 
 void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
-  auto& bytes = *static_cast<std::string*>(sqlite3_user_data(context));  // keeps its capacity
-  bytes.clear();
-  try {
-    for (int i = 0; i < count; ++i) {
-      append_value(bytes, values[i]);
-    }
-  } catch (const std::bad_alloc&) {
-    sqlite3_result_error_nomem(context);
-    return;
+  uLong sum = 0;
+  for (int i = 0; i < count; ++i) {
+    sum = crc_of_value(sum, values[i]);
   }
-  const auto sum =
-      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<z_size_t>(bytes.size()));
   sqlite3_result_int64(context, static_cast<sqlite3_int64>(sum));
-}
-
-void add_row_checksum(sqlite3* database) {
-  auto bytes = std::make_unique<std::string>();
-  constexpr int kAnyNumber = -1;
-  // SQLite owns the object from here on, also when this fails.
-  const int code = sqlite3_create_function_v2(
-      database, "row_checksum", kAnyNumber, SQLITE_UTF8 | SQLITE_DETERMINISTIC, bytes.release(),
-      row_checksum, nullptr, nullptr,
-      [](void* object) { delete static_cast<std::string*>(object); });
-  if (code != SQLITE_OK) {
-    throw StorageError(std::string("no checksums can be computed: ") + sqlite3_errmsg(database));
-  }
 }
 
 }  // namespace
@@ -116,7 +95,12 @@ DatabaseHandle open_database(const std::string& path, int flags) {
     throw StorageError("cannot open the database " + path + ": " +
                        (raw != nullptr ? sqlite3_errmsg(raw) : sqlite3_errstr(code)));
   }
-  add_row_checksum(raw);
+  constexpr int kAnyNumber = -1;
+  if (sqlite3_create_function_v2(raw, "row_checksum", kAnyNumber,
+                                 SQLITE_UTF8 | SQLITE_DETERMINISTIC, nullptr, row_checksum, nullptr,
+                                 nullptr, nullptr) != SQLITE_OK) {
+    throw StorageError(std::string("no checksums can be computed: ") + sqlite3_errmsg(raw));
+  }
   return database;
 }
 
@@ -220,26 +204,16 @@ std::int64_t pragma(sqlite3* database, const std::string& name) {
   return statement.step() ? statement.integer(0) : 0;
 }
 
-std::string tables_found(sqlite3* database) {
-  Statement statement(database, "SELECT name FROM sqlite_schema WHERE type = 'table' LIMIT 4");
-  std::string names;
-  for (int count = 0; statement.step(); ++count) {
-    names += count == 0 ? "" : ", ";
-    names += count < 3 ? statement.text(0) : "...";
-  }
-  return names.empty() ? "no tables" : "tables " + names;
-}
-
 }  // namespace
 
 DatabaseKind identify(sqlite3* database, const std::string& path) {
   std::int64_t application_id = 0;
   std::int64_t version = 0;
-  std::string tables;
+  bool has_tables = false;
   try {
     application_id = pragma(database, "application_id");
     version = pragma(database, "user_version");
-    tables = tables_found(database);
+    has_tables = Statement(database, "SELECT 1 FROM sqlite_schema").step();
   } catch (const StorageError&) {
     const int code = sqlite3_errcode(database);
     throw StorageError(code == SQLITE_NOTADB
@@ -247,12 +221,12 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
                            : "cannot read the database " + path + ": " + sqlite3_errmsg(database) +
                                  (code == SQLITE_CORRUPT ? kWayOut : ""));
   }
-  if (application_id == 0 && version == 0 && tables == "no tables") {
+  if (application_id == 0 && version == 0 && !has_tables) {
     return DatabaseKind::kEmpty;
   }
   if (application_id != kApplicationId) {
     throw StorageError(path + " is a database of another program (application id " +
-                       std::to_string(application_id) + ", " + tables + "): choose another file");
+                       std::to_string(application_id) + "): choose another file");
   }
   if (version != kSchemaVersion) {
     throw StorageError(path + " has schema " + std::to_string(version) +

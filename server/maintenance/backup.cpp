@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "server/database/open_for_reading.h"
+#include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/check.h"
 #include "server/store/completed_ranges.h"
@@ -133,7 +133,7 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
 /// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies"}, saved);
-  for (const std::string table : {"models", "workers", "retries"}) {
+  for (const std::string table : {"models", "workers"}) {
     copy_rows(from, to, {.table = table}, saved);
   }
   // Rows of lost studies are not copied, because they have no meaning without the recipe.
@@ -156,7 +156,6 @@ void mend(sqlite3* database) {
                                 kStudyChecksum, model_checksum_sql()));
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
-          "DELETE FROM retries WHERE study_id NOT IN (SELECT study_id FROM studies);"
           // Rows keep the number of a lost worker, so that their checksums stay right. If all other
           // workers have one solver version, it is used for the lost worker too.
           "INSERT INTO workers"
@@ -174,17 +173,16 @@ void mend(sqlite3* database) {
 
 }  // namespace
 
-std::string copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
-  const OpenedForReading source = open_stored(from);
+void copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
+  const DatabaseHandle source = open_stored(from);
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
-  copy_pages(source.database.get(), copy.get(), to);
+  copy_pages(source.get(), copy.get(), to);
   // So that the copy is one file, without a log.
   execute(copy.get(), "PRAGMA journal_mode = DELETE");
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());
   }
-  return source.remark;
 }
 
 void back_up(const std::string& from, const std::string& to) {
@@ -196,7 +194,7 @@ void back_up(const std::string& from, const std::string& to) {
 
 Salvaged salvage(const std::string& from, const std::string& to) {
   check_is_new(to);
-  const DatabaseHandle source = open_for_reading(from).database;
+  const DatabaseHandle source = open_for_reading(from);
   // So that SQLite reads a file that is shorter than its first page says.
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_tables(source.get(), from);

@@ -13,10 +13,9 @@ namespace oblique::server {
 /// damaged page.
 void back_up(const std::string& from, const std::string& to);
 
-/// Copies the database at `from` into a draft, as one checked file without a log. Returns a remark
-/// if `from` was read in an unusual way (open_for_reading), else an empty text. Throws as `back_up`
-/// does; `to` is the name of the copy in error messages.
-std::string copy_into(const DraftFile& draft, const std::string& from, const std::string& to);
+/// Copies the database at `from` into a draft, as one checked file without a log. Throws as
+/// `back_up` does; `to` is the name of the copy in error messages.
+void copy_into(const DraftFile& draft, const std::string& from, const std::string& to);
 
 /// Counts of what could be read of a damaged database.
 struct Salvaged {

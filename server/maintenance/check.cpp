@@ -12,7 +12,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written.h"
-#include "server/database/open_for_reading.h"
+#include "server/database/database_file.h"
 #include "server/store/completed_ranges.h"
 #include "server/store/result_rows.h"
 #include "server/store/schema.h"
@@ -264,7 +264,7 @@ Diagnosis diagnose_contents(sqlite3* database) {
   if (!found.faults.empty()) {
     return found;  // the other checks need all tables
   }
-  for (const std::string table : {"results", "completed_ranges", "retries", "reused_points"}) {
+  for (const std::string table : {"results", "completed_ranges", "reused_points"}) {
     append(found.faults, database,
            fmt::format("SELECT DISTINCT 'table {0}: refers to study number ' || study_id ||"
                        " ', which does not exist' FROM {0} WHERE study_id NOT IN"
@@ -283,25 +283,13 @@ Diagnosis diagnose_contents(sqlite3* database) {
 }
 
 Diagnosis diagnose(const std::string& path) {
-  const OpenedForReading opened = open_stored(path);
-  sqlite3* database = opened.database.get();
-  Diagnosis found;
-  if (!opened.remark.empty()) {
-    found.remarks.push_back(opened.remark);
-  }
-  found.faults = faults_of_pages(database);
-  if (!found.faults.empty()) {
-    return found;  // damaged pages make every other answer meaningless
+  const DatabaseHandle opened = open_stored(path);
+  sqlite3* database = opened.get();
+  if (auto faults = faults_of_pages(database); !faults.empty()) {
+    return {std::move(faults), {}};  // damaged pages make every other answer meaningless
   }
   execute(database, "BEGIN");  // so that rows and counts agree while a server writes
-  for (const std::string& view : missing_views(database)) {
-    found.faults.push_back(
-        fmt::format("the view {} is missing: the next server on this file creates it", view));
-  }
-  Diagnosis contents = diagnose_contents(database);
-  std::move(contents.faults.begin(), contents.faults.end(), std::back_inserter(found.faults));
-  std::move(contents.remarks.begin(), contents.remarks.end(), std::back_inserter(found.remarks));
-  return found;
+  return diagnose_contents(database);
 }
 
 }  // namespace oblique::server

@@ -13,7 +13,7 @@ struct Diagnosis {
   std::vector<std::string> remarks;  ///< unfinished studies, and checks that were not possible
 };
 
-/// Checks the database at `path`: its pages, indices, tables and views, and its contents as
+/// Checks the database at `path`: its pages and indices, and its contents as
 /// `diagnose_contents` does. Throws StorageError when it is not a database of ours.
 Diagnosis diagnose(const std::string& path);
 

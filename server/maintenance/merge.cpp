@@ -62,9 +62,7 @@ class Attached {
   sqlite3* database_;
 };
 
-// Rows of a study are merged in parts. Parameters: ?1 the study's number in the source, ?2 in the
-// target; points above ?3 and up to ?4.
-constexpr const char* kPart = "i.study_id = ?1 AND i.point > ?3 AND i.point <= ?4";
+// Parameters of the statements on rows: ?1 the study's number in the source, ?2 in the target.
 
 /// Selects the points that are solved in both with different outputs. The time that the solver took
 /// is not compared.
@@ -80,17 +78,13 @@ std::string differing_sql() {
   return fmt::format(
       "SELECT i.point FROM source.results AS i"
       " CROSS JOIN main.results AS t ON t.study_id = ?2 AND t.point = i.point"
-      " WHERE {} AND i.error IS NULL AND t.error IS NULL AND ({}) IS NOT ({})",
-      kPart, outputs("i"), outputs("t"));
+      " WHERE i.study_id = ?1 AND i.error IS NULL AND t.error IS NULL AND ({}) IS NOT ({})",
+      outputs("i"), outputs("t"));
 }
 
-std::string remove_failed_sql() {
-  return fmt::format(
-      "DELETE FROM main.results WHERE study_id = ?2 AND point > ?3 AND point <= ?4"
-      " AND error IS NOT NULL AND point IN"
-      " (SELECT i.point FROM source.results AS i WHERE {} AND i.error IS NULL)",
-      kPart);
-}
+constexpr const char* kRemoveFailed =
+    "DELETE FROM main.results WHERE study_id = ?2 AND error IS NOT NULL AND point IN"
+    " (SELECT i.point FROM source.results AS i WHERE i.study_id = ?1 AND i.error IS NULL)";
 
 std::string insert_sql() {
   std::vector<std::string> values;
@@ -104,9 +98,9 @@ std::string insert_sql() {
       "INSERT INTO main.results ({0}, checksum)"
       " SELECT {1}, CASE WHEN i.checksum IS NOT NULL THEN row_checksum({1}) END"
       " FROM source.results AS i CROSS JOIN temp.model_map AS m ON m.source = i.model_id"
-      " LEFT JOIN temp.worker_map AS w ON w.source = i.worker_id WHERE {2}"
+      " LEFT JOIN temp.worker_map AS w ON w.source = i.worker_id WHERE i.study_id = ?1"
       " ON CONFLICT (study_id, point) DO NOTHING",
-      fmt::join(result_columns(), ", "), fmt::join(values, ", "), kPart);
+      fmt::join(result_columns(), ", "), fmt::join(values, ", "));
 }
 
 /// Merges one source, in a transaction of the caller.
@@ -117,7 +111,7 @@ class SourceMerge {
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
   /// Throws MergeRefused for a study that has no place in the target.
-  void run(const Merger::Progress& progress) {
+  void run() {
     std::vector<std::pair<std::uint64_t, StudyRow>> places;  // of studies of the source
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
     while (list.step()) {
@@ -125,17 +119,12 @@ class SourceMerge {
       places.emplace_back(study.id, place_of(study));
     }
     copy_models_and_workers();
-    Statement count(
-        source_, "SELECT count(*) FROM results WHERE study_id IN (SELECT study_id FROM studies)");
-    count.step();
-    const std::uint64_t rows = count.number(0);
-    std::uint64_t merged_rows = 0;
-    progress(merged_rows, rows);
+    Statement count(source_, "SELECT count(*) FROM results WHERE study_id = ?");
     for (const auto& [source_id, target] : places) {
-      merge_rows(source_id, target, [&](std::uint64_t part) {
-        merged_rows += part;
-        progress(merged_rows, rows);
-      });
+      count.reset();
+      count.bind_all(source_id);
+      count.step();
+      merge_rows(source_id, target, count.number(0));
       finish(source_id, target);
     }
   }
@@ -236,38 +225,18 @@ class SourceMerge {
     copy("worker", worker, worker);
   }
 
-  /// Calls `part_is_done` with the number of rows of each part.
-  template <class PartIsDone>
-  void merge_rows(std::uint64_t source_id, const StudyRow& target, const PartIsDone& part_is_done) {
-    Statement part(source_,
-                   "SELECT count(*), max(point) FROM (SELECT point FROM results"
-                   " WHERE study_id = ?1 AND point > ?2 ORDER BY point LIMIT 4096)");
+  void merge_rows(std::uint64_t source_id, const StudyRow& target, std::uint64_t rows) {
     Statement differing(database_, differing_sql());
-    Statement remove_failed(database_, remove_failed_sql());
-    Statement insert(database_, insert_sql());
-    for (std::int64_t last = -1;;) {
-      const std::int64_t before = last;
-      part.reset();
-      part.bind_all(source_id, before);
-      part.step();
-      const std::uint64_t rows = part.number(0);
-      if (rows == 0) {
-        return;
-      }
-      last = part.integer(1);
-      const auto changed_by = [&](Statement& statement) {
-        statement.bind_all(source_id, target.id, before, last);
-        statement.run();
-        return static_cast<std::uint64_t>(sqlite3_changes64(database_));
-      };
-      differing.bind_all(source_id, target.id, before, last);
-      note_differing(differing, target.name);
-      merged_.failures_replaced += changed_by(remove_failed);
-      const std::uint64_t added = changed_by(insert);
-      merged_.results_added += added;
-      merged_.results_known += rows - added;
-      part_is_done(rows);
-    }
+    differing.bind_all(source_id, target.id);
+    note_differing(differing, target.name);
+    const auto changed_by = [&](const std::string& sql) {
+      execute_with(database_, sql, source_id, target.id);
+      return static_cast<std::uint64_t>(sqlite3_changes64(database_));
+    };
+    merged_.failures_replaced += changed_by(kRemoveFailed);
+    const std::uint64_t added = changed_by(insert_sql());
+    merged_.results_added += added;
+    merged_.results_known += rows - added;
   }
 
   void note_differing(Statement& differing, const std::string& study) {
@@ -278,19 +247,10 @@ class SourceMerge {
                                               study, differing.number(0)));
       }
     }
-    differing.reset();
   }
 
-  /// Copies the table `retries`, and unites the completed points.
+  /// Unites the completed points.
   void finish(std::uint64_t source_id, const StudyRow& target) {
-    execute_with(
-        database_,
-        "INSERT INTO main.retries (study_id, first_point, points, attempt, retried_at)"
-        " SELECT ?2, first_point, points, attempt, retried_at FROM source.retries"
-        " WHERE study_id = ?1 AND (first_point, points, attempt, retried_at) NOT IN"
-        " (SELECT first_point, points, attempt, retried_at FROM main.retries WHERE study_id = ?2)"
-        " ORDER BY source.retries.rowid",
-        source_id, target.id);
     CompletedRanges ranges(database_);
     completed_points(source_, source_id).for_each([&](const Interval& points) {
       ranges.add(target.id, points);
@@ -313,21 +273,17 @@ class SourceMerge {
 
 }  // namespace
 
-Merged Merger::merge(const std::string& source, const MergeSettings& settings,
-                     const Progress& progress) {
+Merged Merger::merge(const std::string& source, const std::string& rename_prefix) {
   const DraftFile copy(path_ + ".merging");
-  const std::string remark = copy_into(copy, source, copy.path());
+  copy_into(copy, source, copy.path());
   Merged merged;
-  if (!remark.empty()) {
-    merged.remarks.push_back(remark);
-  }
   try {
     const DatabaseHandle opened = open_sound_source(copy.path());
     const Attached attached(target_.connection(), copy.path());
     // Changed pages beyond the cache are written to the log.
     execute(target_.connection(), "PRAGMA main.cache_size = -65536");
     target_.write([&] {
-      SourceMerge(target_.connection(), opened.get(), settings.rename_prefix, merged).run(progress);
+      SourceMerge(target_.connection(), opened.get(), rename_prefix, merged).run();
       target_.check();
     });
   } catch (const MergeRefused& error) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -9,12 +8,6 @@
 #include "server/store/store.h"
 
 namespace oblique::server {
-
-struct MergeSettings {
-  /// Prefix for the name of a study if the target has a study of that name with another recipe.
-  /// Empty: such a source is refused.
-  std::string rename_prefix;
-};
 
 /// What the merge of one database changed.
 struct Merged {
@@ -43,15 +36,13 @@ class Merger {
   /// Opens the target, or makes it, and locks it against servers. Throws StorageError.
   explicit Merger(const std::string& target) : target_(target), path_(target) {}
 
-  /// Called repeatedly with the number of rows merged so far.
-  using Progress = std::function<void(std::uint64_t merged, std::uint64_t rows)>;
-
   /// Merges the state of the database `source` at one instant, in one transaction: everything or,
   /// if this throws or the process ends, nothing. A source that was merged before adds only new
   /// rows. Needs room for a copy of the source beside the target. Throws StorageError for files
   /// that cannot be read or written and for damaged rows, and MergeRefused. `source` must not be
-  /// the target.
-  Merged merge(const std::string& source, const MergeSettings& settings, const Progress& progress);
+  /// the target. `rename_prefix` goes before the name of a study if the target has a study of that
+  /// name with another recipe; empty: such a source is refused.
+  Merged merge(const std::string& source, const std::string& rename_prefix = {});
 
   /// Moves all changes into the one file of the target. False when a reader prevents it.
   bool finish() { return target_.merge_log(); }

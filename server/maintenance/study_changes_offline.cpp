@@ -1,13 +1,10 @@
 #include "server/maintenance/study_changes_offline.h"
 
-#include <chrono>
-#include <thread>
-
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/checks.h"
 #include "proto/recipe/written.h"
-#include "server/database/open_for_reading.h"
+#include "server/database/database_file.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -15,35 +12,13 @@ namespace {
 
 /// The recipe of a study. Throws StudyRefused when there is no such study.
 std::string recipe_bytes(const std::string& path, std::uint64_t study_id) {
-  const OpenedForReading opened = open_stored(path);
-  Statement find(opened.database.get(), "SELECT recipe FROM studies WHERE study_id = ?");
+  const DatabaseHandle database = open_stored(path);
+  Statement find(database.get(), "SELECT recipe FROM studies WHERE study_id = ?");
   find.bind_all(study_id);
   if (!find.step()) {
     throw StudyRefused(fmt::format("the study is no longer in {}", path));
   }
   return find.text(0);
-}
-
-/// Deletes the rows of deleted studies. False when readers prevent it for 3 seconds.
-bool clear_all_away(Store& store, const RowsDeleted& deleted) {
-  constexpr std::size_t kRowsAtOnce = 4096;
-  constexpr std::chrono::milliseconds kPause{100};
-  constexpr int kMostPauses = 30;
-  for (int pauses = 0; pauses < kMostPauses;) {
-    switch (store.clear_away(kRowsAtOnce)) {
-      case ClearedAway::kAll:
-        return true;
-      case ClearedAway::kPart:
-        pauses = 0;
-        deleted(store.cleared_rows());
-        break;
-      case ClearedAway::kMustWait:
-        ++pauses;
-        std::this_thread::sleep_for(kPause);
-        break;
-    }
-  }
-  return false;
 }
 
 }  // namespace
@@ -66,12 +41,17 @@ void rename_study(const std::string& path, std::uint64_t study_id, const std::st
   store.merge_log();
 }
 
-bool delete_study(const std::string& path, std::uint64_t study_id, const RowsDeleted& deleted) {
+bool delete_study(const std::string& path, std::uint64_t study_id) {
+  constexpr std::size_t kRowsAtOnce = 4096;
   (void)recipe_bytes(path, study_id);
   Store store(path);
   const Change change = DeleteStudy{study_id};
   store.commit({&change, 1});
-  return clear_all_away(store, deleted) && store.merge_log();
+  ClearedAway cleared = ClearedAway::kPart;
+  while (cleared == ClearedAway::kPart) {
+    cleared = store.clear_away(kRowsAtOnce);
+  }
+  return cleared == ClearedAway::kAll && store.merge_log();
 }
 
 protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id) {

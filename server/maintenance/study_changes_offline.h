@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <stdexcept>
 #include <string>
 
@@ -21,14 +20,11 @@ class StudyRefused : public std::runtime_error {
 /// the name, or when the name is not allowed.
 void rename_study(const std::string& path, std::uint64_t study_id, const std::string& name);
 
-/// Called repeatedly with the number of rows deleted so far.
-using RowsDeleted = std::function<void(std::uint64_t rows)>;
-
 /// Deletes a study with all its results. If the process ends early, the study is gone and the next
 /// server deletes the remaining rows. False if rows remain or the write-ahead log could not be
 /// merged, because another program keeps reading the database. Throws StudyRefused when there is no
 /// study of that number.
-bool delete_study(const std::string& path, std::uint64_t study_id, const RowsDeleted& deleted);
+bool delete_study(const std::string& path, std::uint64_t study_id);
 
 /// The recipe of a study. Only reads; a server may use the database. Throws StudyRefused when there
 /// is no study of that number.

@@ -117,8 +117,10 @@ class KeyList {
   /// Throws solver::InputError when the list cannot be read.
   explicit KeyList(std::string path) : path_(std::move(path)), keys_(read()) {}
 
+  using Time = std::filesystem::file_time_type;
+
   /// Reads the file again if it may have changed. True if the keys have.
-  bool reload();
+  bool reload(Time now);
   /// Null if the key is not listed.
   std::shared_ptr<const KeyIdentity> find(const protocol::CurveKey& key) const {
     const auto found = keys_.find(key);
@@ -128,7 +130,6 @@ class KeyList {
   std::string text() const { return fmt::format("admits the {} keys of {}", keys_.size(), path_); }
 
  private:
-  using Time = std::filesystem::file_time_type;
   Keys read() const {
     Keys keys;
     const protocol::AuthorizedKeys listed = protocol::read_authorized_keys(path_);
@@ -145,19 +146,20 @@ class KeyList {
   std::string fault_;  // why the list could not be read the last time; empty if it could
 };
 
-bool KeyList::reload() {
+bool KeyList::reload(Time now) {
   // File systems record times in steps of up to a second or two: a second change may not show.
   constexpr std::chrono::seconds kStep{2};
   std::error_code missing;
   const Time written = std::filesystem::last_write_time(path_, missing);
-  const bool is_recent = written > Time::clock::now() - kStep;
+  const bool is_recent = written > now - kStep;
   if (std::exchange(written_, written) == written && !is_recent && fault_.empty()) {
     return false;
   }
   try {
     Keys keys = read();
     if (keys.empty() && !keys_.empty() && is_recent) {
-      return false;  // an editor may have emptied the file before it writes
+      written_ = Time::min();  // to read it again: an editor may have emptied it before it writes
+      return false;
     }
     const bool had_fault = !std::exchange(fault_, {}).empty();
     keys.swap(keys_);
@@ -222,7 +224,7 @@ std::optional<PortSecurity> AccessControl::security(PortRole port) const {
   return PortSecurity{server_, std::make_shared<const RoleFilter>(list_, port)};
 }
 
-bool AccessControl::refresh(std::int64_t now_ms) {
+bool AccessControl::refresh(std::int64_t now_ms, std::filesystem::file_time_type file_now) {
   constexpr std::int64_t kRefreshInterval_ms = 500;
   constexpr std::int64_t kWarningInterval_ms = 600'000;
   if (mode_ == AccessMode::kInsecure && now_ms >= next_warning_ms_) {
@@ -237,7 +239,7 @@ bool AccessControl::refresh(std::int64_t now_ms) {
     return false;
   }
   next_refresh_ms_ = now_ms + kRefreshInterval_ms;
-  return list_->reload();
+  return list_->reload(file_now);
 }
 
 }  // namespace oblique::server

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <variant>
 
-#include "proto/keys/curve_key.h"
+#include "proto/keys/key_file.h"
 
 namespace oblique::server {
 
@@ -45,7 +45,6 @@ struct KeyIdentity {
 
   bool operator==(const KeyIdentity&) const = default;
 };
-
 
 using AuthResult = std::variant<std::shared_ptr<const KeyIdentity>, Refusal>;
 

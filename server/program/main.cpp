@@ -29,7 +29,7 @@
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "server/event_loop/event_loop.h"
-#include "server/query/reader_program.h"
+#include "server/query/query_pool.h"
 #include "server/web/http_options.h"
 #include "worker/solver/model/version.h"
 

@@ -9,7 +9,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"

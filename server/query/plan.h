@@ -8,7 +8,7 @@
 #include <sqlite3.h>
 
 #include "proto/oblique.pb.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 
 namespace oblique::server {
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "worker/solver/model/fall_model.h"
 
 namespace oblique::server {

@@ -53,7 +53,6 @@ void Scheduler::on(const StudyAdded& event) {
       Study{StudyPoints(event.table, event.settled, event.left_out, settings_.loss_limits),
             event.failed, event.cancelled, event.paused, false, event.priority,
             least_served(event.study), event.solver_version});
-  studies_.at(event.study).points.count_attempts(event.attempts);
   studies_.at(event.study).held = event.held;
   finish_if_complete(event.study);
   requeue(event.study);
@@ -149,7 +148,6 @@ void Scheduler::on(const FailuresForgotten& event) {
     return;
   }
   study->failed -= std::min(study->failed, study->points.reopen(event.points));
-  study->points.count_attempts(event.attempts);
   study->overlaps = !study->leases.empty();  // the lease that a point failed in may still be there
   if (study->leases.empty() && !study->points.has_results()) {
     study->solver_version.clear();

@@ -92,8 +92,8 @@ class Scheduler {
   bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
   bool knows_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
-  /// How often a worker was looked at, whether there is something for it: what dispatch has cost.
-  std::uint64_t looks() const { return looks_; }
+  /// How often dispatch has examined a worker, which is what dispatch costs.
+  std::uint64_t examined_workers() const { return examined_workers_; }
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
@@ -246,7 +246,6 @@ class Scheduler {
   double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
   void set_draining(Worker& worker, bool is_draining);
-  double target_s() const;
   BatchSize portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
   void fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
@@ -269,14 +268,14 @@ class Scheduler {
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // with credit
   std::size_t draining_ = 0;  // workers
-  std::uint64_t looks_ = 0;
+  std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;
   bool seeks_stragglers_ = false;  // of the event being handled: they are sought at ticks only
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
-  Effects effects_;  // of the event being handled
+  Effects effects_;      // of the event being handled
   double pace_s_ = 0.0;  // of threads, for these points; what is longer ago counts less
   double pace_points_ = 0.0;
 };

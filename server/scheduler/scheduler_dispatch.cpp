@@ -12,13 +12,13 @@ void Scheduler::dispatch() {
   }
   const auto has_work = [this] { return seeks_stragglers_ || !queue_.empty(); };
   if (seeks_stragglers_) {
-    // Another worker looks first each time, in case this one may have no straggler there is.
+    // Each tick another worker comes first, in case this one may not help any straggler.
     ready_workers_.rotate();
   }
   while (ready_workers_.has_active() && has_work()) {
     const WorkerId id = ready_workers_.first_active();
     Worker& worker = workers_.at(id);
-    ++looks_;
+    ++examined_workers_;
     if (!serve(id, worker)) {
       ready_workers_.park(id);
       continue;
@@ -94,8 +94,7 @@ bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
   });
   if (longest == leases_.end() ||
       now_ms_ - longest->second.granted_ms < settings_.straggler_after_ms) {
-    seeks_stragglers_ =
-        false;  // the next worker looks at the next tick: looking at all leases costs
+    seeks_stragglers_ = false;  // searching all leases costs: the next search is at the next tick
     return false;
   }
   Lease& straggler = longest->second;
@@ -168,12 +167,6 @@ void Scheduler::set_draining(Worker& worker, bool is_draining) {
   }
 }
 
-/// Time that a batch takes.
-double Scheduler::target_s() const {
-  return std::max(settings_.batch_target_s,
-                  static_cast<double>(workers_.size()) / settings_.most_batches_per_s);
-}
-
 /// How many points the worker should get of the study.
 BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lanes) const {
   const auto known = worker.paces.find(id);
@@ -181,12 +174,13 @@ BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_la
   std::uint64_t points = settings_.first_batch_points * worker.threads;
   std::uint64_t fewest = 1;
   if (pace.s_per_point() > 0.0) {
-    const double by_pace = target_s() * worker.threads / pace.s_per_point();
+    const double by_pace = settings_.batch_target_s * worker.threads / pace.s_per_point();
     const auto largest = static_cast<double>(
         std::min(settings_.largest_batch_points * worker.threads,
                  settings_.growth * std::max<std::uint64_t>(pace.last_batch_points, 1)));
     points = static_cast<std::uint64_t>(std::min(by_pace, largest));
-    fewest = static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / target_s());
+    fewest =
+        static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / settings_.batch_target_s);
   }
   if (studies_.at(id).points.has_filter()) {  // it may leave in all of the next batch
     const double in_time =
@@ -214,7 +208,7 @@ void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::ui
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);
   const bool has_models = points.has_models();
-  if (!has_models && pace.s_per_point() * lanes <= target_s()) {
+  if (!has_models && pace.s_per_point() * lanes <= settings_.batch_target_s) {
     return;  // of quick points of one model a batch has enough
   }
   // Not more than its part of all that is open, of which it may hold something already: at the end
@@ -229,7 +223,8 @@ void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::ui
   wanted.points =
       std::max(wanted.points, std::min(static_cast<std::uint64_t>(a_thread) * threads, share));
   if (has_models && s_per_point > 0.0) {
-    const double in_time = std::max(settings_.models_batch_s, target_s()) * threads / s_per_point;
+    const double in_time =
+        std::max(settings_.models_batch_s, settings_.batch_target_s) * threads / s_per_point;
     const std::uint64_t grown =
         settings_.growth *
         std::min(pace.last_batch_points, settings_.largest_batch_points * threads);
@@ -251,8 +246,9 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   Pace& pace = worker.paces[study];
   const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
   // Whatever a worker says of its pace, no batch is to make its study wait for ever.
-  const double counted_s = std::clamp(takes_s, target_s(), settings_.lanes_batch_s + target_s());
-  served.served += counted_s / target_s();
+  const double counted_s = std::clamp(takes_s, settings_.batch_target_s,
+                                      settings_.lanes_batch_s + settings_.batch_target_s);
+  served.served += counted_s / settings_.batch_target_s;
   if (served.solver_version.empty()) {
     served.solver_version = settings_.solver_version;
   }

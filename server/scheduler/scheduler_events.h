@@ -23,9 +23,7 @@ struct SchedulerSettings {
   std::string solver_version{};
   /// A worker silent for longer is lost: three missed heartbeats, noticed within 3 s.
   std::int64_t lost_after_ms = 2800;
-  double batch_target_s = 0.1;  ///< duration of a batch once a worker's pace is known
-  /// Batches take longer when all workers together would ask for more.
-  double most_batches_per_s = 10'000;
+  double batch_target_s = 0.1;                ///< duration of a batch once a worker's pace is known
   std::uint64_t first_batch_points = 4;       ///< a thread, for a worker of unknown pace
   std::uint64_t largest_batch_points = 4096;  ///< a thread
   /// Points, or falls of models, that a thread solves side by side in nearly the time of one. A
@@ -61,7 +59,7 @@ struct SchedulerSettings {
   double stall_factor = 10.0;
   std::int64_t shortest_stall_ms = 60'000;
   std::int64_t longest_stall_ms = 3'600'000;
-  std::size_t most_absent_processes = 1024;  ///< remembered, of newcomers and of others each
+  std::size_t most_absent_processes = 4096;    ///< that are gone and remembered
   std::uint32_t max_credit = limits::kCredit;  ///< batches
   /// Points a thread in a batch of a filtered study before the worker has solved one: the filter
   /// may keep all of them.
@@ -88,7 +86,6 @@ struct StudyAdded {
   bool paused = false;
   std::int32_t priority = 0;
   std::string solver_version{};  ///< of its results; empty without results
-  PointAttempts attempts{};      ///< of points that failed, now or before a retry
   bool held = false;
   std::uint64_t left_out = 0;  ///< number of settled points that a filter leaves out
 };
@@ -122,7 +119,6 @@ struct PriorityChanged {
 struct FailuresForgotten {
   StudyId study;
   IntervalSet points;
-  PointAttempts attempts{};  ///< in which they failed
 };
 /// It is durable that the study has further points after its earlier ones, and runs.
 struct StudyGrown {

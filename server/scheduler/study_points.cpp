@@ -268,22 +268,6 @@ std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
   return reopened;
 }
 
-void StudyPoints::count_attempts(const PointAttempts& attempts) {
-  // Workers may say any number; what is added to it must not overflow.
-  constexpr std::uint32_t kMostAttempts = 1'000'000'000;
-  attempts.for_each([this](const Interval& counted, std::uint32_t times) {
-    order_.places(IntervalSet(counted.begin, counted.end)).for_each([&](const Interval& places) {
-      for (const Interval& interval : fresh_.within(places.begin, places.end)) {
-        fresh_.erase(interval.begin, interval.end);
-        returned(Standing::kSound)
-            .emplace(interval.begin,
-                     History{interval.end, times < kMostAttempts ? times : kMostAttempts, {}, 0});
-        returned_points_ += interval.end - interval.begin;
-      }
-    });
-  });
-}
-
 std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& order,
                            const Interval& free, const BatchSize& wanted) {
   const Interval group = order.group_at(table, free.begin);

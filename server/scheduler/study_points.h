@@ -109,10 +109,6 @@ class StudyPoints {
   /// The settled ones among these points become fresh. Returns how many they were.
   std::uint64_t reopen(const IntervalSet& points);
 
-  /// The fresh ones among these points were leased so often before, by an earlier run of the server
-  /// or before they were reopened.
-  void count_attempts(const PointAttempts& attempts);
-
   bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
   bool has_filter() const { return table_->has_filter(); }
   /// Whether all of them are points of the study in blocks with a filter.

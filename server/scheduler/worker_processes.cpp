@@ -11,7 +11,7 @@ ProcessNumber WorkerProcesses::join(const std::string& id, WorkerId worker) {
   if (known != numbers_.end()) {
     WorkerProcess& process = processes_.at(known->second);
     if (process.workers.empty()) {
-      std::erase(absent_like(process), known->second);
+      std::erase(absent_, known->second);
     }
     process.workers.insert(worker);
     return known->second;
@@ -34,12 +34,10 @@ void WorkerProcesses::leave(ProcessNumber number, WorkerId worker) {
     forget(number);
     return;
   }
-  Absent& absent = absent_like(process);
-  absent.push_back(number);
-  if (absent.size() > most_absent_) {
-    const ProcessNumber first = absent.front();
-    absent.pop_front();
-    forget(first);
+  absent_.push_back(number);
+  if (absent_.size() > most_absent_) {
+    forget(absent_.front());
+    absent_.pop_front();
   }
 }
 
@@ -70,14 +68,12 @@ void WorkerProcesses::check_invariants() const {
     }
     if (process.workers.empty()) {
       ++absent;
-      const Absent& list = process.proven_since_ms ? absent_proven_ : absent_newcomers_;
-      if (std::count(list.begin(), list.end(), number) != 1) {
+      if (std::count(absent_.begin(), absent_.end(), number) != 1) {
         throw std::logic_error("an absent process is not remembered once");
       }
     }
   }
-  if (absent != absent_proven_.size() + absent_newcomers_.size() ||
-      std::max(absent_proven_.size(), absent_newcomers_.size()) > most_absent_) {
+  if (absent != absent_.size() || absent > most_absent_) {
     throw std::logic_error("the wrong processes are remembered");
   }
 }

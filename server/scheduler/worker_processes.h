@@ -26,12 +26,10 @@ struct WorkerProcess {
   std::set<StudyId> in_histories{};  ///< studies with points whose history it may be in
 };
 
-/// The processes behind the workers, those that are gone too, for they may come back. Of the latter
-/// only so many are remembered, the latest ones, and those that never solved anything apart from
-/// the others: who vanishes again and again under new names makes forget only his like.
+/// The processes behind the workers, including processes that are gone and may come back.
 class WorkerProcesses {
  public:
-  /// `most_absent` of either kind are remembered.
+  /// Of the processes that are gone the latest `most_absent` are remembered.
   explicit WorkerProcesses(std::size_t most_absent) : most_absent_(most_absent) {}
 
   /// A connection of the process `id`; an empty one is a process of its own. Returns its number.
@@ -53,18 +51,13 @@ class WorkerProcesses {
   void check_invariants() const;
 
  private:
-  using Absent = std::deque<ProcessNumber>;  // the one that left first in front
-  Absent& absent_like(const WorkerProcess& process) {
-    return process.proven_since_ms ? absent_proven_ : absent_newcomers_;
-  }
   void forget(ProcessNumber number);
 
   std::size_t most_absent_;
   ProcessNumber last_number_ = kNobody;
   std::map<ProcessNumber, WorkerProcess> processes_;
   std::map<std::string, ProcessNumber> numbers_;  // by id
-  Absent absent_proven_;
-  Absent absent_newcomers_;
+  std::deque<ProcessNumber> absent_;              // the one that left first in front
 };
 
 }  // namespace oblique::server

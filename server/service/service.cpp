@@ -64,7 +64,7 @@ void Service::restore(StoredStudy study, const std::string& only_study, Instant 
   feed(StudyAdded{id, study.table, std::move(study.completed), study.failures.size(),
                   study.state == StudyState::kCancelled,
                   study.state == StudyState::kPaused || is_excluded, study.priority,
-                  study.solver_version, std::move(study.attempts), looks_up, study.left_out},
+                  study.solver_version, looks_up, study.left_out},
        now);
   if (looks_up) {
     reuse_.begin(id, now);
@@ -234,13 +234,11 @@ void Service::store(const StoreFailure& effect, Instant now) {
 }
 
 void Service::write_results(AddResults change, ResultsStored event) {
-  const std::uint32_t attempt = change.attempt;
-  ledger_.write(std::move(change), [this, event = std::move(event), attempt](Instant now) {
-    results_stored(event, attempt, now);
-  });
+  ledger_.write(std::move(change),
+                [this, event = std::move(event)](Instant now) { results_stored(event, now); });
 }
 
-void Service::results_stored(const ResultsStored& event, std::uint32_t attempt, Instant now) {
+void Service::results_stored(const ResultsStored& event, Instant now) {
   const StudyId id = event.study;
   if (!states_.contains(id)) {
     feed(event, now);  // the study was deleted, and the database dropped these
@@ -249,7 +247,7 @@ void Service::results_stored(const ResultsStored& event, std::uint32_t attempt, 
   std::uint64_t solved = 0;
   for (const PointOutcome& outcome : event.outcomes) {
     if (outcome.failed) {
-      states_.point_failed(id, outcome.point, attempt);
+      states_.point_failed(id, outcome.point);
     }
     solved += outcome.failed ? 0 : 1;
   }

@@ -102,7 +102,7 @@ class Service {
   void store(const StoreResults& effect, protocol::Results& message, Instant now);
   void store(const StoreFailure& effect, Instant now);
   void write_results(AddResults change, ResultsStored event);
-  void results_stored(const ResultsStored& event, std::uint32_t attempt, Instant now);
+  void results_stored(const ResultsStored& event, Instant now);
   void restore(StoredStudy study, const std::string& only_study, Instant now);
 
   Ports& ports_;

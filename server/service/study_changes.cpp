@@ -152,8 +152,7 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
   const bool reuses = !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, {});
-  core_.states.add(id,
-                   {name, read.table, created_at, priority, {}, {}, now.steady_ms, client.key()});
+  core_.states.add(id, {name, read.table, created_at, priority, {}, now.steady_ms, client.key()});
   const auto on_stored = [this, client, id, reuses](Instant then) {
     core_.states.set_durable(id, then.steady_ms);
     const StudyRecord& study = core_.states.record(id);
@@ -327,7 +326,7 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
           core_.rates.forget(id);  // fewer points are completed now
           core_.states.forget_failures(id, failures, then.steady_ms);
           log(id, fmt::format("tries its failed points again: {}", failures.size()));
-          core_.feed(FailuresForgotten{id, failures, core_.states.record(id).attempts}, then);
+          core_.feed(FailuresForgotten{id, failures}, then);
           reply_changed(client, id, failures.size(), then);
         });
 }

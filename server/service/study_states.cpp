@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/suggestion.h"
+#include "proto/text.h"
 
 namespace oblique::server {
 
@@ -35,7 +35,7 @@ std::uint64_t StudyStates::open_points() const {
 void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const bool lacks_rows = stored.completed.size() < stored.table.size();
   add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.priority,
-                        stored.failures, stored.attempts, now_ms, stored.submitted_by});
+                        stored.failures, now_ms, stored.submitted_by});
   move(stored.study_id,
        stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state);
   set_durable(stored.study_id, now_ms);
@@ -126,10 +126,8 @@ void StudyStates::grow(StudyId id, const StudyTable& table, std::int32_t priorit
   move(id, StudyState::kRunning);
 }
 
-void StudyStates::point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt) {
-  StudyRecord& record = studies_.at(id).record;
-  record.failures.insert(point);
-  record.attempts.set({point, point + 1}, attempt);
+void StudyStates::point_failed(StudyId id, std::uint64_t point) {
+  studies_.at(id).record.failures.insert(point);
 }
 
 void StudyStates::forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms) {

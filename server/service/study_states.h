@@ -25,7 +25,6 @@ struct StudyRecord {
   std::string created_at;
   std::int32_t priority = 0;
   IntervalSet failures;        ///< points whose rows say failed
-  PointAttempts attempts;      ///< of points that failed, also of those that are retried
   std::int64_t since_ms{};     ///< start of the time over which its rate is known
   std::string submitted_by{};  ///< name of the key; empty: without keys
 };
@@ -83,7 +82,7 @@ class StudyStates {
   void set_priority(StudyId id, std::int32_t priority) {
     studies_.at(id).record.priority = priority;
   }
-  void point_failed(StudyId id, std::uint64_t point, std::uint32_t attempt);
+  void point_failed(StudyId id, std::uint64_t point);
   /// The failures are forgotten: a study that was done runs.
   void forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms);
 

@@ -67,7 +67,12 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
                                   const std::string& key) {
   WorkerInput input;
   const auto known = ids_.find(identity);
-  if (!protocol::is_of_a_workers_size(frame)) {  // checked before it is parsed
+  protocol::WorkerMessage message;
+  const bool is_small = protocol::is_of_a_workers_size(frame);  // checked before it is parsed
+  const bool is_read = is_small && protocol::decode(frame, message);
+  const int lease_count =
+      message.heartbeat().lease_ids_size() + message.give_back().lease_ids_size();
+  if (!is_small || lease_count > protocol::kMostLeasesAHeartbeat) {
     if (known == ids_.end()) {
       bad_frames_.count("a worker");
     } else {
@@ -75,9 +80,8 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
     }
     return input;
   }
-  protocol::WorkerMessage message;
   using Kind = protocol::WorkerMessage;
-  if (!protocol::decode(frame, message) || message.kind_case() == Kind::KIND_NOT_SET) {
+  if (!is_read || message.kind_case() == Kind::KIND_NOT_SET) {
     bad_frames_.count("a worker");
     return input;
   }

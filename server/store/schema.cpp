@@ -21,32 +21,21 @@ std::string description(sqlite3* database, const std::string& table) {
   return text.step() ? text.text(0) : "";
 }
 
-/// The tables of this schema by name, with their descriptions, and its views.
-struct Objects {
-  std::map<std::string, std::string> tables;
-  std::vector<std::string> views;
-};
-
-const Objects& our_objects() {
-  static const Objects kObjects = [] {
+/// The tables of this schema by name, with their descriptions.
+const std::map<std::string, std::string>& our_tables() {
+  static const std::map<std::string, std::string> kTables = [] {
     const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
     execute(database.get(), kSchemaSql);
-    execute(database.get(), kViewsSql);
-    Objects objects;
-    Statement list(database.get(),
-                   "SELECT type, name FROM sqlite_schema WHERE type IN ('table', 'view')"
-                   " AND name NOT LIKE 'sqlite_%'");
+    std::map<std::string, std::string> tables;
+    Statement list(
+        database.get(),
+        "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'");
     while (list.step()) {
-      const std::string name = list.text(1);
-      if (list.text(0) == "view") {
-        objects.views.push_back(name);
-      } else {
-        objects.tables[name] = description(database.get(), name);
-      }
+      tables[list.text(0)] = description(database.get(), list.text(0));
     }
-    return objects;
+    return tables;
   }();
-  return kObjects;
+  return kTables;
 }
 
 std::string random_id() {
@@ -77,24 +66,10 @@ void create_views(sqlite3* database) {
 
 std::vector<std::string> differing_tables(sqlite3* database) {
   std::vector<std::string> names;
-  for (const auto& [table, columns] : our_objects().tables) {
+  for (const auto& [table, columns] : our_tables()) {
     if (description(database, table) != columns) {
       names.push_back(table);
     }
-  }
-  return names;
-}
-
-std::vector<std::string> missing_views(sqlite3* database) {
-  std::vector<std::string> names;
-  Statement find(database,
-                 "SELECT 1 FROM sqlite_schema WHERE type = 'view' AND name = ? COLLATE NOCASE");
-  for (const std::string& view : our_objects().views) {
-    find.bind_all(view);
-    if (!find.step()) {
-      names.push_back(view);
-    }
-    find.reset();
   }
   return names;
 }

@@ -19,9 +19,6 @@ void create_views(sqlite3* database);
 /// StorageError.
 std::vector<std::string> differing_tables(sqlite3* database);
 
-/// The views of this schema that the database lacks. Throws StorageError.
-std::vector<std::string> missing_views(sqlite3* database);
-
 /// An SQL expression for the highest study number that was ever given; 0: none. Rows of a study
 /// whose row in `studies` was deleted by hand count too.
 inline constexpr const char* kLastStudyId =

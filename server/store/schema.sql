@@ -117,12 +117,3 @@ CREATE TABLE reused_points (
 CREATE TABLE deletions (
   study_id    INTEGER PRIMARY KEY -- number of the study
 ) STRICT;
-
--- Failed points whose rows `retry` removed, as ranges of one attempt. For a point in several rows the last counts.
-CREATE TABLE retries (
-  study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
-  first_point INTEGER NOT NULL, -- first point of the range
-  points      INTEGER NOT NULL, -- number of points
-  attempt     INTEGER NOT NULL, -- attempt that failed; the next has a higher number
-  retried_at  TEXT NOT NULL     -- UTC, ISO 8601
-) STRICT;

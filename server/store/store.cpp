@@ -152,8 +152,8 @@ bool Store::merge_log() {
 void Store::add(const DeleteStudy& change) {
   for (const char* sql :
        {"INSERT OR IGNORE INTO deletions (study_id) VALUES (?1)",
-        "DELETE FROM retries WHERE study_id = ?1", "DELETE FROM reused_points WHERE study_id = ?1",
-        "DELETE FROM studies WHERE study_id = ?1", "UPDATE about SET has_orphans = 1 WHERE ?1"}) {
+        "DELETE FROM reused_points WHERE study_id = ?1", "DELETE FROM studies WHERE study_id = ?1",
+        "UPDATE about SET has_orphans = 1 WHERE ?1"}) {
     execute_with(database_.get(), sql, change.study_id);
   }
 }
@@ -231,22 +231,11 @@ void Store::add(const ForgetFailures& change) {
     return;
   }
   ranges_->flush();
-  // Consecutive failed points of one attempt have the same difference of point and row number.
-  Statement note(database_.get(),
-                 "INSERT INTO retries (study_id, first_point, points, attempt, retried_at)"
-                 " SELECT ?1, min(point), count(*), attempt, ?4 FROM"
-                 " (SELECT point, attempt,"
-                 " point - row_number() OVER (PARTITION BY attempt ORDER BY point) AS run"
-                 " FROM results INDEXED BY failed_points WHERE study_id = ?1"
-                 " AND point >= ?2 AND point < ?3 AND error IS NOT NULL)"
-                 " GROUP BY attempt, run");
   Statement forget(database_.get(),
                    "DELETE FROM results INDEXED BY failed_points WHERE study_id = ?1"
                    " AND point >= ?2 AND point < ?3 AND error IS NOT NULL RETURNING point");
   IntervalSet forgotten;
   change.points.for_each([&](const Interval& interval) {
-    note.bind_all(change.study_id, interval.begin, interval.end, change.changed_at);
-    note.run();
     forget.bind_all(change.study_id, interval.begin, interval.end);
     while (forget.step()) {
       forgotten.insert(forget.number(0));

@@ -29,7 +29,6 @@ struct StoredStudy {
   std::string solver_version;  ///< of its results; empty: there are none
   IntervalSet completed;
   IntervalSet failures;        ///< completed points that failed
-  PointAttempts attempts{};    ///< of failed points, and of those whose failure `retry` removed
   std::string submitted_by{};  ///< name of the key; empty: without keys
   bool reuses = false;         ///< the lookup of results in other studies has not ended
   std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out

@@ -78,32 +78,21 @@ std::string objection_to(const StoredStudy& study) {
   return {};
 }
 
-/// Reads the failed points of all studies, and the attempts in which points failed.
+/// Reads the failed points of all studies.
 void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
   std::map<std::uint64_t, StoredStudy*> by_number;
   for (StoredStudy& study : studies) {
     by_number[study.study_id] = &study;
   }
-  const auto read = [&](const char* sql, bool is_failed) {
-    Statement row(database, sql);
-    while (row.step()) {
-      const auto study = by_number.find(row.number(0));
-      if (study == by_number.end()) {
-        continue;
-      }
-      const Interval points{row.number(1), row.number(1) + row.number(2)};
-      study->second->attempts.set(points, static_cast<std::uint32_t>(row.integer(3)));
-      if (is_failed) {
-        study->second->failures.insert(points.begin, points.end);
-      }
+  Statement row(database,
+                "SELECT study_id, point FROM results INDEXED BY failed_points"
+                " WHERE error IS NOT NULL ORDER BY study_id, point");
+  while (row.step()) {
+    const auto study = by_number.find(row.number(0));
+    if (study != by_number.end()) {
+      study->second->failures.insert(row.number(1));
     }
-  };
-  // Retries are read first, because a failed row of the same point is newer.
-  read("SELECT study_id, first_point, points, attempt FROM retries ORDER BY rowid", false);
-  read(
-      "SELECT study_id, point, 1, attempt FROM results INDEXED BY failed_points"
-      " WHERE error IS NOT NULL ORDER BY study_id, point",
-      true);
+  }
 }
 
 }  // namespace

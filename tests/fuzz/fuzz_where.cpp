@@ -6,9 +6,8 @@
 
 #include <unistd.h>
 
-#include "server/database/open_for_reading.h"
+#include "server/database/database_file.h"
 #include "server/query/plan.h"
-#include "server/query/query_rules.h"
 #include "server/query/reader.h"
 #include "server/query/sql_text.h"
 #include "server/store/store.h"
@@ -32,8 +31,7 @@ Opened& opened() {
   oblique::server::Store store(path);
   store.commit(std::vector<Change>{oblique::server::AddStudy{1, "a", oblique::server::table_of(100),
                                                              "2024-01-01T00:00:00.000Z"}});
-  static Opened files{oblique::server::Reader(path),
-                      oblique::server::open_for_reading(path).database};
+  static Opened files{oblique::server::Reader(path), oblique::server::open_for_reading(path)};
   files.reader.query("SELECT 1", {});
   oblique::server::restrict_to_reading(files.database.get());
   for (const char* suffix : {"", "-wal", "-shm"}) {

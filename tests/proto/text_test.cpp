@@ -1,6 +1,8 @@
 #include "proto/text.h"
 
+#include <array>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -52,6 +54,24 @@ TEST(Excerpt, HasAtMostSoManyBytesOfWholeCharacters) {
   EXPECT_EQ(excerpt("\u03bc\u03bc", 3), "\u03bc...");
   EXPECT_EQ(shortened("a\xc3\xa9", 2), "a");
   EXPECT_EQ(shortened("a\xc3\xa9", 3), "a\xc3\xa9");
+}
+
+constexpr std::array<std::string_view, 5> kNames{"mu", "e", "H", "tip_mass", "elements_per_link"};
+
+TEST(Suggestion, FindsTheNameThatAMistypedWordIsNearTo) {
+  for (const auto& [word, name] : std::vector<std::pair<std::string_view, std::string_view>>{
+           {"tip_mas", "tip_mass"},
+           {"elements-per-link", "elements_per_link"},
+           {"MU", "mu"},
+           {"restitution", ""},
+           {"z", ""}}) {
+    EXPECT_EQ(nearest(word, kNames), name);
+  }
+  EXPECT_EQ(did_you_mean("zz", kNames), "");
+  EXPECT_EQ(did_you_mean("muu", kNames), " (did you mean `mu`?)");
+  EXPECT_EQ(joined(kNames), "mu, e, H, tip_mass, elements_per_link");
+  EXPECT_EQ(unknown_key(std::string(10'000'000, 'k'), kNames),
+            "unknown key `" + std::string(80, 'k') + "...`");
 }
 
 }  // namespace

@@ -38,11 +38,6 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
     return {nullptr, std::move(fault)};
   }
   std::unique_lock lock(mutex_);
-  const struct Asker {
-    std::size_t& askers;
-    explicit Asker(std::size_t& all) : askers(++all) {}
-    ~Asker() { --askers; }
-  } asker(askers_);
   while (true) {
     const auto found = find(falling);
     if (found != entries_.end() && found->outcome) {
@@ -65,11 +60,6 @@ std::optional<FallOutcome> FallCache::kept_fall(const ModelParameters& model) {
     return std::nullopt;
   }
   return use(found);
-}
-
-bool FallCache::is_at_rest() const {
-  const std::unique_lock lock(mutex_, std::try_to_lock);
-  return lock.owns_lock() && askers_ == 0;
 }
 
 FallCache::Entries::iterator FallCache::find(const ModelParameters& falling) {

@@ -43,10 +43,6 @@ class FallCache {
   /// The fall of `model` when it is kept; solves and waits for nothing.
   std::optional<FallOutcome> kept_fall(const ModelParameters& model);
 
-  /// Whether no thread is in a call. The child of a fork may go on with a cache that was at rest,
-  /// and has to leave another one as it is: its threads are not there to end what they had begun.
-  bool is_at_rest() const;
-
  private:
   struct Entry {
     ModelParameters model;               ///< as fall_model() gives it
@@ -65,8 +61,7 @@ class FallCache {
 
   const Bounds bounds_;
   const Solve solve_;
-  mutable std::mutex mutex_;
-  std::size_t askers_ = 0;  ///< threads in fall()
+  std::mutex mutex_;
   std::condition_variable solved_;
   Entries entries_;              ///< the one used last comes first
   std::size_t usual_bytes_ = 0;  ///< of falls solved lately

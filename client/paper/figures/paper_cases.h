@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "client/paper/published_table.h"
-#include "client/plot/point/history.h"
+#include "client/plot/point_figure.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {

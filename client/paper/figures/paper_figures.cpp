@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/paper/paper_comparison.h"
-#include "client/plot/point/panels.h"
+#include "client/plot/point_figure.h"
 
 namespace oblique::client {
 namespace {
@@ -19,7 +19,6 @@ using plot::Curve;
 using plot::Figure;
 using plot::KnownPoint;
 using plot::Panel;
-using plot::Sheet;
 using solver::TraceRow;
 
 constexpr const char* kPublished = "published";
@@ -73,23 +72,36 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
     longest_s = std::max(longest_s, known.x);
     all.push_back({.name = {}, .x = {known.x}, .y = {known.y}});
   }
-  panel.x = plot::time_axis(1.02 * longest_s);  // marks at the end are whole
+  panel.x = plot::time_axis(1.03 * longest_s);  // marks at the end are whole
   panel.y = plot::axis_around(plan.label, plan.name, plan.per_unit, all, false);
   return panel;
 }
 
-/// A sheet of the groups, lettered as the paper's.
-Sheet sheet_of_groups(std::string title, const std::vector<const PaperGroup*>& groups,
-                      const std::function<std::vector<Panel>(const PaperGroup&)>& panels_of) {
-  Sheet sheet{.title = std::move(title)};
+using PanelsOf = std::function<std::vector<Panel>(const PaperGroup&)>;
+
+/// The panels of the groups, lettered as the paper's: the groups of a row beside each other, panels
+/// of one group below each other.
+Figure figure_of_groups(std::string title, std::size_t columns,
+                        const std::vector<const PaperGroup*>& groups, const PanelsOf& panels_of) {
+  Figure figure{.title = std::move(title), .columns = columns, .panel_size = {520.0, 340.0}};
   char letter = 'a';
-  for (const PaperGroup* group : groups) {
-    Figure part;
-    part.panels = panels_of(*group);
-    part.panels.front().title = fmt::format("({}) {}", letter++, group->title);
-    sheet.parts.push_back(std::move(part));
+  for (std::size_t first = 0; first < groups.size(); first += columns) {
+    std::vector<std::vector<Panel>> parts;
+    for (std::size_t i = first; i < std::min(first + columns, groups.size()); ++i) {
+      parts.push_back(panels_of(*groups[i]));
+      parts.back().front().title = fmt::format("({}) {}", letter++, groups[i]->title);
+      for (std::size_t k = 0; k + 1 < parts.back().size(); ++k) {
+        parts.back()[k].has_key = false;
+        parts.back()[k].x.label.clear();
+      }
+    }
+    for (std::size_t k = 0; k < parts.front().size(); ++k) {
+      for (auto& part : parts) {
+        figure.panels.push_back(std::move(part[k]));
+      }
+    }
   }
-  return sheet;
+  return figure;
 }
 
 std::vector<const PaperGroup*> all_groups(const PaperGroups& groups) {
@@ -139,12 +151,12 @@ double normal_deformation(const TraceRow& row) {
 /// Where phases end, on our curve at the end of our phase of the same number.
 std::vector<KnownPoint> published_ends(const PaperCase& one) {
   std::vector<KnownPoint> known;
-  const OwnCase own = own_case(*one.history.result);
+  const CaseNumbers own = own_case(*one.history.result);
   double published_s = 0.0;
   double own_s = 0.0;
-  for (std::size_t i = 0; i < std::min(own.phases_s.size(), one.published.phases_ms.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(own.phases_ms.size(), one.published.phases_ms.size()); ++i) {
     published_s += one.published.phases_ms[i] * kMilli;
-    own_s += own.phases_s[i];
+    own_s += own.phases_ms[i] * kMilli;
     known.push_back({published_s, value_at(one, own_s, normal_deformation), kPublished});
   }
   return known;
@@ -160,42 +172,42 @@ std::vector<KnownPoint> published_stick(const PaperCase& one) {
 // ---- The figures ------------------------------------------------------------------------------
 
 /// Panels beside each other have one scale.
-void share_axes(std::vector<Figure>& parts) {
-  Panel& first = parts.front().panels.front();
-  for (const Figure& part : parts) {
-    first.x.range = plot::united(first.x.range, part.panels.front().x.range);
-    first.y.range = plot::united(first.y.range, part.panels.front().y.range);
+void share_axes(std::vector<Panel>& panels) {
+  plot::Range x = panels.front().x.range;
+  plot::Range y = panels.front().y.range;
+  for (const Panel& panel : panels) {
+    x = plot::united(x, panel.x.range);
+    y = plot::united(y, panel.y.range);
   }
-  for (Figure& part : parts) {
-    part.panels.front().x.range = first.x.range;
-    part.panels.front().y.range = first.y.range;
+  for (Panel& panel : panels) {
+    panel.x.range = x;
+    panel.y.range = y;
   }
 }
 
-Sheet hysteresis(const PaperGroup& over_e) {
-  Sheet sheet{.title = "Fig. 3: normal force against deformation",
-              .subtitle =
-                  "H = 1 m, \u03bc = 0.4. Slopes are k in compression and k/e*\u00b2 in "
-                  "restitution. Diamonds: published peaks, at our deformation",
-              .columns = 3,
-              .part = {400.0, 360.0}};
+Figure hysteresis(const PaperGroup& over_e) {
+  Figure figure{.title = "Fig. 3: normal force against deformation",
+                .subtitle =
+                    "H = 1 m, \u03bc = 0.4. Slopes are k in compression and k/e*\u00b2 in "
+                    "restitution. Diamonds: published peaks, at our deformation",
+                .columns = 3,
+                .panel_size = {400.0, 360.0}};
   char letter = 'a';
   for (auto one = over_e.cases.rbegin(); one != over_e.cases.rend(); ++one) {
-    Figure part = figure_of(one->history, plot::PointPanel::kLoop, false);
-    Panel& panel = part.panels.front();
+    Panel panel = panel_of(one->history, plot::PointPanel::kLoop);
     panel.title = fmt::format("({}) {}", letter++, name_in_group(*one, over_e.key));
     for (const KnownPoint& known : published_fn(*one)) {
       panel.known.push_back({-value_at(*one, known.x, normal_deformation), known.y, known.name});
     }
-    sheet.parts.push_back(std::move(part));
+    figure.panels.push_back(std::move(panel));
   }
-  share_axes(sheet.parts);
-  return sheet;
+  share_axes(figure.panels);
+  return figure;
 }
 
-Sheet forces(const PaperGroups& groups) {
-  Sheet sheet = sheet_of_groups(
-      "Fig. 4: normal and tangential contact forces", all_groups(groups),
+Figure forces(const PaperGroups& groups) {
+  Figure figure = figure_of_groups(
+      "Fig. 4: normal and tangential contact forces", 2, all_groups(groups),
       [](const PaperGroup& group) {
         return std::vector<Panel>{
             group_panel(group, {"normal force F_n [N]", "fn_N", 1.0,
@@ -203,37 +215,38 @@ Sheet forces(const PaperGroups& groups) {
             group_panel(group, {"tangential force F_t [N]", "ft_N", 1.0,
                                 [](const TraceRow& row) { return row.ft_N; }, published_ft})};
       });
-  sheet.subtitle = "Diamonds: published peaks (Tab. 2), at the instants of ours";
-  sheet.part = {520.0, 460.0};
-  return sheet;
+  figure.subtitle = "Diamonds: published peaks (Tab. 2), at the instants of ours";
+  figure.panel_size = {520.0, 250.0};
+  return figure;
 }
 
-Sheet deformation(const PaperGroups& groups) {
-  Sheet sheet = sheet_of_groups(
-      "Fig. 5: deformation of the normal element", all_groups(groups), [](const PaperGroup& group) {
-        return std::vector<Panel>{
-            group_panel(group, {"normal deformation u_y [\u00b5m]", "uy_m", plot::kMicro,
-                                normal_deformation, published_ends})};
-      });
-  sheet.subtitle =
+Figure deformation(const PaperGroups& groups) {
+  Figure figure =
+      figure_of_groups("Fig. 5: deformation of the normal element", 2, all_groups(groups),
+                       [](const PaperGroup& group) {
+                         return std::vector<Panel>{group_panel(
+                             group, {"normal deformation u_y [\u00b5m]", "uy_m", plot::kMicro,
+                                     normal_deformation, published_ends})};
+                       });
+  figure.subtitle =
       "Diamonds: published ends of compression and restitution (section 4.2), at our deformation";
-  return sheet;
+  return figure;
 }
 
-Sheet velocity_of_P(const PaperGroups& groups) {
-  Sheet sheet = sheet_of_groups(
-      "Fig. 6: tangential velocity of P", all_groups(groups), [](const PaperGroup& group) {
+Figure velocity_of_P(const PaperGroups& groups) {
+  Figure figure = figure_of_groups(
+      "Fig. 6: tangential velocity of P", 2, all_groups(groups), [](const PaperGroup& group) {
         return std::vector<Panel>{
             group_panel(group, {"velocity of P [m/s]", "vP_m_s", 1.0,
                                 [](const TraceRow& row) { return row.vP_m_s; }, published_stick})};
       });
-  sheet.subtitle = "P sticks where it is 0. Diamonds: published ends of stick (section 4.3)";
-  return sheet;
+  figure.subtitle = "P sticks where it is 0. Diamonds: published ends of stick (section 4.3)";
+  return figure;
 }
 
-Sheet trajectory(const PaperGroups& groups) {
-  Sheet sheet = sheet_of_groups(
-      "Fig. 7: path of the fingertip during contact",
+Figure trajectory(const PaperGroups& groups) {
+  Figure figure = figure_of_groups(
+      "Fig. 7: path of the fingertip during contact", 3,
       {&groups.over_e, &groups.over_small_mu, &groups.over_large_mu}, [](const PaperGroup& group) {
         Panel panel;
         for (std::size_t i = 0; i < group.cases.size(); ++i) {
@@ -249,10 +262,9 @@ Sheet trajectory(const PaperGroups& groups) {
                                     panel.curves, false);
         return std::vector<Panel>{std::move(panel)};
       });
-  sheet.subtitle = "The tip touches at the right, and slides to the left";
-  sheet.columns = 3;
-  sheet.part = {400.0, 360.0};
-  return sheet;
+  figure.subtitle = "The tip touches at the right, and slides to the left";
+  figure.panel_size = {400.0, 360.0};
+  return figure;
 }
 
 }  // namespace

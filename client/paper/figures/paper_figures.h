@@ -4,14 +4,14 @@
 #include <vector>
 
 #include "client/paper/figures/paper_cases.h"
-#include "client/plot/sheets/sheet.h"
+#include "client/plot/figure.h"
 
 namespace oblique::client {
 
 /// One of the paper's figures as we draw it.
 struct PaperFigure {
   std::string name;  ///< of its file, without ending: "fig4_forces"
-  plot::Sheet sheet;
+  plot::Figure figure;
 };
 
 /// Figs. 3 to 7, each curve solved by us and published numbers as diamonds. The paper publishes no

@@ -11,21 +11,17 @@ Units are SI and stand at the end of names: ``fn_peak_N``, ``duration_s``.
   and out, and :func:`trace` gives the time histories of one.
 * :class:`Database` asks the results that studies have left, also while a server writes them.
 
-* :func:`about` tells what a report of a defect should.
-
 All of it may be called from several threads at once and lets other threads run meanwhile. Nothing
 stays behind a call but falls that later ones use again (:func:`forget_falls` gives their memory
 back), and, where Ctrl-C ended it in the middle of a long fall, the thread that solves that.
 
-After ``os.fork`` the child may go on, also behind such a Ctrl-C, with the falls of its parent where
-no thread was at any. While another thread asks a :class:`Database` or solves, memory or files that
-it has locked may stay so in the child: there ``multiprocessing`` with "spawn" is safe, and always.
+The child of a fork cannot use it: calls raise RuntimeError there. Start processes with
+``multiprocessing.set_start_method("spawn")``; ``subprocess`` is not affected.
 """
 
 from __future__ import annotations
 
 from . import _core
-from ._about import about
 from ._core import DatabaseError, SolveError
 from ._database import Answer, Database, Study
 from ._solving import forget_falls, solve, solve_many, trace
@@ -51,7 +47,6 @@ __all__ = [
     "Solver",
     "Study",
     "Trace",
-    "about",
     "forget_falls",
     "solve",
     "solve_many",

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import os
 import re
-import warnings
 from typing import TYPE_CHECKING, Any, Iterator, Optional, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._named import Plain
+from ._results import Named
 
 if TYPE_CHECKING:
     import pandas
 
 
-class Study(Plain):
+class Study(Named):
     """A study of a database and where it stands."""
 
     study_id: int
@@ -44,11 +43,8 @@ class Answer:
             unique, number = name, 2
             while unique in self._columns:
                 unique, number = f"{name}_{number}", number + 1
-            if isinstance(values, list):
-                texts = np.empty(len(values), dtype=object)
-                texts[:] = values
-                values = texts
-            self._columns[unique] = values
+            is_text = isinstance(values, list)
+            self._columns[unique] = np.array(values, dtype=object) if is_text else values
             self.units[unique] = unit
 
     def keys(self) -> list[str]:
@@ -91,7 +87,7 @@ class Answer:
 class Database:
     """A database of results, opened for reading only: it may be asked while a server or a run
     writes it. Raises FileNotFoundError where there is none, and DatabaseError where there is
-    something else. What is unusual in how it is read is a warning.
+    something else.
 
         db = oblique.Database("oblique.db")
         friction = db.query("friction", where="e = 1", select="mu, fn_peak_N")
@@ -101,8 +97,6 @@ class Database:
     def __init__(self, file: Union[str, "os.PathLike[str]"] = "oblique.db") -> None:
         self.file = os.fspath(file)
         self._database = _core.Database(self.file)
-        if remark := self._database.remark():
-            warnings.warn(remark, stacklevel=2)
 
     def __repr__(self) -> str:
         return f"oblique.Database({self.file!r})"
@@ -124,10 +118,13 @@ class Database:
         """
         if limit is not None and limit < 0:
             raise ValueError(f"limit = {limit} is not allowed: limit must be >= 0")
-        with _PythonNames():
+        try:
             columns = self._database.query(
                 study, where, _joined(select), _joined(group), _joined(order), limit
             )
+        except ValueError as error:  # which names the flags of the program
+            text = re.sub(r"--(where|select|group|order|limit)\b", r"\1", str(error))
+            raise ValueError(text) from None
         return Answer(columns)
 
     def sql(self, statement: str) -> Answer:
@@ -136,20 +133,8 @@ class Database:
 
     def studies(self) -> list[Study]:
         """All studies, in the order in which they came."""
-        return [Study(study) for study in self._database.studies()]
+        return [Study(**study) for study in self._database.studies()]
 
 
 def _joined(names: Union[str, Sequence[str]]) -> str:
     return names if isinstance(names, str) else ", ".join(names)
-
-
-class _PythonNames:
-    """Flags that an error speaks of as the arguments that they are here."""
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: Optional[BaseException], trace: object) -> None:
-        if isinstance(error, ValueError):
-            text = re.sub(r"--(where|select|group|order|limit)\b", r"\1", str(error))
-            raise ValueError(text) from None

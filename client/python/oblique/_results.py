@@ -2,22 +2,52 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, Iterator, Optional
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._named import Named, Plain
 
 if TYPE_CHECKING:
     import pandas
 
-Floats = npt.NDArray[np.float64]
-Texts = npt.NDArray[np.object_]
+
+class Named(SimpleNamespace):
+    """Named values, as attributes, as ``result["fn_peak_N"]`` and by ``_asdict()``."""
+
+    def __reduce__(self) -> tuple[Any, ...]:  # copies and pickles without __init__
+        return SimpleNamespace.__new__, (type(self),), self.__dict__
+
+    def _asdict(self) -> dict[str, Any]:
+        """All values by name, groups as dicts of their own."""
+        return {
+            name: value._asdict() if isinstance(value, Named) else value
+            for name, value in self.__dict__.items()
+            if not name.startswith("_")
+        }
+
+    def __getitem__(self, name: str) -> Any:
+        if not isinstance(name, str):
+            raise TypeError(
+                f"a {type(self).__name__} has fields, not places: take one by its name, "
+                "as [\"fn_peak_N\"], and then its elements"
+            )
+        if name.startswith("_") or name not in self.__dict__:
+            raise KeyError(f"no field {name!r}: there are {', '.join(self)}")
+        return getattr(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._asdict())
 
 
-class Energy(Plain):
+def text_array(texts: list[str], codes: npt.NDArray[np.int32]) -> npt.NDArray[np.object_]:
+    """The text of each code; None for -1."""
+    return np.array([*texts, None], dtype=object)[codes]
+
+
+class Energy(Named):
     """Energy balance of a contact [J]; what is lost is positive."""
 
     kinetic_in_J: float
@@ -30,7 +60,7 @@ class Energy(Plain):
     closure: float
 
 
-class Errors(Plain):
+class Errors(Named):
     """Estimated errors, as fractions of the output's scale; None unless asked for."""
 
     mode_same: Optional[int]
@@ -44,7 +74,7 @@ class Errors(Plain):
     v_out: Optional[float]
 
 
-class Solver(Plain):
+class Solver(Named):
     """How a result was got. Two are equal whatever time they took."""
 
     integrator: str
@@ -62,7 +92,7 @@ class Solver(Plain):
     __hash__ = None  # type: ignore[assignment]
 
 
-class Result(Plain):
+class Result(Named):
     """One impact, with the fields of ``oblique solve --json`` (``oblique columns`` tells them all).
 
     SI units; times count from touch. Fields are attributes, ``_asdict()`` gives all of them.
@@ -104,23 +134,36 @@ class Result(Plain):
     errors: Errors
     solver: Solver
 
-    def __init__(self, values: dict[str, Any]) -> None:
-        super().__init__({**values, **{name: _GROUPS[name](values[name]) for name in _GROUPS}})
+    def __init__(self, many: "ManyResults") -> None:
+        values: dict[str, Any] = {key: many[key].item() for key in ("H", "mu", "e")}
+        groups: dict[str, dict[str, Any]] = {group: {} for group in _GROUPS}
+        for name, group, _, is_whole, list_name, _, _ in _core.fields():
+            value = many[group][name] if group else many[name]
+            if list_name:
+                value = [
+                    dict(zip(one.dtype.names, one.tolist())) if one.dtype.names else one.tolist()
+                    for one in value.item()
+                ]
+            else:
+                value = value.item()
+                value = None if value != value else int(value) if is_whole else value
+            (groups[group] if group else values)[name] = value
+        super().__init__(**values, **{name: kind(**groups[name]) for name, kind in _GROUPS.items()})
 
 
 _GROUPS: dict[str, type[Named]] = {"energy": Energy, "errors": Errors, "solver": Solver}
 
 
-class ManyGroup(Named):
-    """One of the groups ``energy``, ``errors`` and ``solver`` of many results: arrays by the names
-    of :class:`Energy`, :class:`Errors` and :class:`Solver`."""
+class Arrays(Named):
+    """Named arrays, as the groups ``energy``, ``errors`` and ``solver`` of many results."""
 
     def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self)}")
+        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
 
 
-class ManyResults(Named):
-    """Many impacts: the fields of :class:`Result`, each an array of the shape of the input.
+class ManyResults(Arrays):
+    """Many impacts: the fields of :class:`Result`, each an array of the shape of the input; groups
+    have arrays by the names of :class:`Energy`, :class:`Errors` and :class:`Solver`.
 
     Where a point has no result its numbers are NaN, its texts None, its lists empty, and ``error``
     says why; ``failed`` marks such points. Lists are arrays of arrays (``fn_peaks_N``,
@@ -135,56 +178,14 @@ class ManyResults(Named):
     'mu = -1 is not allowed: mu must be >= 0'
     """
 
-    H: Floats
-    mu: Floats
-    e: Floats
-    fall_time_s: Floats
-    impact_x_m: Floats
-    vt_in_m_s: Floats
-    vn_in_m_s: Floats
-    duration_s: Floats
-    fn_peak_N: Floats
-    ft_peak_N: Floats
-    fn_peaks_N: npt.NDArray[np.object_]
-    ft_peaks_N: npt.NDArray[np.object_]
-    major_peaks_N: npt.NDArray[np.object_]
-    major_peak_1_N: Floats
-    major_peak_2_N: Floats
-    major_peak_3_N: Floats
-    major_peak_1_t_s: Floats
-    major_peak_2_t_s: Floats
-    major_peak_3_t_s: Floats
-    impulse_n_Ns: Floats
-    impulse_t_Ns: Floats
-    slide_m: Floats
-    vt_out_m_s: Floats
-    vn_out_m_s: Floats
-    mode: Texts
-    major_mode: Texts
-    margin: Floats
-    margin_event: Texts
-    stick_total_s: Floats
-    stick_intervals_s: npt.NDArray[np.object_]
-    phases: npt.NDArray[np.object_]
-    reaction_peaks: npt.NDArray[np.object_]
-    energy: ManyGroup
-    errors: ManyGroup
-    solver: ManyGroup
-    error: Texts
-    failed: npt.NDArray[np.bool_]
-
     def __init__(self, values: dict[str, Any], shape: tuple[int, ...]) -> None:
         lists = values.pop("lists")
 
         def shaped(column: Any) -> Any:
-            if isinstance(column, list):
-                texts = np.empty(len(column), dtype=object)
-                texts[:] = column
-                column = texts
-            return column.reshape(shape)
+            return (text_array(*column) if isinstance(column, tuple) else column).reshape(shape)
 
         named: dict[str, Any] = {key: shaped(values[key]) for key in ("H", "mu", "e")}
-        for name, group, _, _, _, list_name, _, _ in _core.fields():
+        for name, group, _, _, list_name, _, _ in _core.fields():
             if list_name:
                 named[name] = None  # its place; made when it is asked for
             elif group:
@@ -192,12 +193,12 @@ class ManyResults(Named):
             else:
                 named[name] = shaped(values[name])
         for group in _GROUPS:
-            named[group] = ManyGroup(named[group])
+            named[group] = Arrays(**named[group])
         named["error"] = shaped(values["error"])
         named["failed"] = np.asarray(named["error"] != None)  # noqa: E711  element by element
         named["_lists"] = lists
         named["_shape"] = shape
-        super().__init__(named)
+        super().__init__(**named)
 
     def __getattribute__(self, name: str) -> Any:
         value = super().__getattribute__(name)
@@ -205,9 +206,6 @@ class ManyResults(Named):
             value = self._list(name)
             self.__dict__[name] = value
         return value
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -224,14 +222,9 @@ class ManyResults(Named):
         return super()._asdict()
 
     def __repr__(self) -> str:
-        failed = int(self.failed.sum())
-        return (
-            f"<{self.failed.size} results of shape {self.shape}"
-            + (f", {failed} failed" if failed else "")
-            + ": "
-            + ", ".join(name for name in self.__dict__ if not name.startswith("_"))
-            + ">"
-        )
+        failed = f", {self.failed.sum()} failed" if self.failed.any() else ""
+        names = ", ".join(name for name in self.__dict__ if not name.startswith("_"))
+        return f"<{self.failed.size} results of shape {self.shape}{failed}: {names}>"
 
     def ragged(self, name: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
         """A list of all points as one array: those of point i (of the flattened input) are
@@ -242,15 +235,12 @@ class ManyResults(Named):
         >>> offsets.tolist(), len(values)
         ([0, 3, 7], 7)
         """
-        for field, _, _, _, _, list_name, member, where in _core.fields():
+        for field, _, _, _, list_name, member, where in _core.fields():
             if field == name and list_name:
-                return self._ragged(list_name, member, where)
-        lists = ", ".join(field[0] for field in _core.fields() if field[5])
-        raise ValueError(f"{name!r} is no list: lists are {lists}")
-
-    def _ragged(
-        self, list_name: str, member: str, where: str
-    ) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
+                break
+        else:
+            lists = ", ".join(field[0] for field in _core.fields() if field[4])
+            raise ValueError(f"{name!r} is no list: lists are {lists}")
         packed = self.__dict__["_lists"][list_name]
         offsets: npt.NDArray[np.int64] = packed["offsets"]
         if not member:
@@ -275,7 +265,7 @@ class ManyResults(Named):
         import pandas
 
         columns: dict[str, npt.NDArray[Any]] = {"H": self.H, "mu": self.mu, "e": self.e}
-        for name, group, column, _, _, list_name, _, _ in _core.fields():
+        for name, group, column, _, list_name, _, _ in _core.fields():
             if not list_name:
                 columns[column] = getattr(getattr(self, group) if group else self, name)
         columns["error"] = self.error
@@ -297,34 +287,12 @@ def _elements(list_name: str, packed: dict[str, Any]) -> npt.NDArray[Any]:
     return elements
 
 
-class Trace(Named):
+class Trace(Arrays):
     """Time histories of one contact: an array a column (``t_s``, ``fn_N``, ``x_m``, ...; forces on
     joints ``R0x_N`` ..., and where the shape was asked for ``node0x_m`` ...), and the ``result``.
 
     ``state`` is SC, SR, sC or sR from each instant on, and "falling" before touch.
     """
-
-    t_s: Floats
-    fn_N: Floats
-    ft_N: Floats
-    uy_m: Floats
-    ux_m: Floats
-    xP_m: Floats
-    vP_m_s: Floats
-    x_m: Floats
-    y_m: Floats
-    vt_m_s: Floats
-    vn_m_s: Floats
-    state: npt.NDArray[np.str_]
-    kinetic_J: Floats
-    strain_J: Floats
-    gravity_J: Floats
-    momentum_x_Ns: Floats
-    momentum_y_Ns: Floats
-    result: Result
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
 
     def __len__(self) -> int:
         return len(self.t_s)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import operator
-import os
 import warnings
 from typing import Any, Callable, Optional, Sequence, SupportsIndex, Union
 
@@ -19,7 +18,6 @@ Number = Union[float, int, "np.floating[Any]", "np.integer[Any]"]
 Value = Union[Number, str]
 
 _falls = _core.Falls()  # of all calls: a model's fall is solved once
-_left_behind: list[_core.Falls] = []
 #: Threads that one call may have.
 MOST_THREADS = 1024
 
@@ -31,17 +29,6 @@ def forget_falls() -> None:
     global _falls
     _falls = _core.Falls()
     _core.give_memory_back()
-
-
-def _leave_threads_behind() -> None:
-    """In the child of a fork, where threads of the parent will never end what they are at."""
-    global _falls
-    if not _falls.is_at_rest():
-        _left_behind.append(_falls)  # whose end would wait for them
-        _falls = _core.Falls()
-
-
-os.register_at_fork(after_in_child=_leave_threads_behind)
 
 
 def solve(
@@ -79,9 +66,10 @@ def solve(
       ...
     ValueError: unknown key `tip_mas` (did you mean `tip_mass`?): ...
     """
-    keys = _one_value_each("solve", {"H": H, "mu": mu, "e": e, **model}, preset, lengths)
-    _warn_of_units(keys)
-    return Result(_core.solve(_falls, keys, errors))
+    values = {"H": H, "mu": mu, "e": e, **model}
+    _require_one_value_each("solve", values)
+    keys, _ = _keys(values, preset, lengths)
+    return Result(ManyResults(_core.solve(_falls, keys, errors), ()))
 
 
 def trace(
@@ -104,11 +92,14 @@ def trace(
     >>> round(float(contact.fn_N.max()), 1), contact.state[0]
     (4909.4, 'sC')
     """
-    keys = _one_value_each("trace", {"H": H, "mu": mu, "e": e, **model}, preset, lengths)
-    _warn_of_units(keys)
-    result, columns = _core.trace(_falls, keys, fall, shape)
-    columns["state"] = np.array(_core.trace_states())[columns["state"]]
-    return Trace({**columns, "result": Result(result)})
+    values = {"H": H, "mu": mu, "e": e, **model}
+    _require_one_value_each("trace", values)
+    keys, _ = _keys(values, preset, lengths)
+    result, headings, numbers, states = _core.trace(_falls, keys, fall, shape)
+    rows = iter(np.ascontiguousarray(numbers.reshape(len(states), -1).T))
+    names = np.array(_core.trace_states())
+    columns = {name: names[states] if name == "state" else next(rows) for name in headings}
+    return Trace(**columns, result=Result(ManyResults(result, ())))
 
 
 def solve_many(
@@ -142,32 +133,15 @@ def solve_many(
     >>> stiff.fn_peak_N.round(0)
     array([3545., 4450., 5581.])
     """
-    given: dict[str, Any] = {}
-    arrays: dict[str, npt.NDArray[Any]] = {}
-    for name, value in {"H": H, "mu": mu, "e": e, **model}.items():
-        if isinstance(value, str):
-            given[name] = value
-        else:
-            arrays[name] = _numbers(name, value)
-    try:
-        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items() if array.ndim)
-        raise ValueError(f"these shapes do not fit each other: {shapes}") from None
-    for name, array in arrays.items():
-        if array.ndim == 0:
-            given[name] = float(array)
-        else:
-            given[name] = np.ascontiguousarray(np.broadcast_to(array, shape).ravel())
+    keys, shape = _keys({"H": H, "mu": mu, "e": e, **model}, preset, lengths)
     points = math.prod(shape)
-    count = 0 if threads is None else _whole_threads(threads)
-    _add_model(given, preset, lengths)
-    _warn_of_units(given)
-    many = _core.solve_many(_falls, given, points, count, errors, progress)
+    many = _core.solve_many(_falls, keys, points, _threads(threads), errors, progress)
     return ManyResults(many, shape)
 
 
-def _whole_threads(threads: SupportsIndex) -> int:
+def _threads(threads: Optional[SupportsIndex]) -> int:
+    if threads is None:
+        return 0
     try:
         count = 0 if isinstance(threads, (bool, np.bool_)) else operator.index(threads)
     except TypeError:
@@ -180,47 +154,48 @@ def _whole_threads(threads: SupportsIndex) -> int:
     return count
 
 
-def _one_value_each(
-    name: str, keys: dict[str, Any], preset: str, lengths: Optional[Sequence[Number]]
-) -> dict[str, Any]:
-    given: dict[str, Any] = {}
-    for key, value in keys.items():
-        if isinstance(value, str):
-            given[key] = value
-            continue
-        array = _numbers(key, value)
-        if array.ndim:
-            raise ValueError(
-                f"{key} has {array.size} values: {name} takes one; oblique.solve_many takes arrays"
-            )
-        given[key] = float(array)
-    _add_model(given, preset, lengths)
-    return given
-
-
-def _warn_of_units(given: dict[str, Any]) -> None:
-    """A warning for each key with a value that is likely to be in another unit."""
-    for key, values in given.items():
-        numbers = np.atleast_1d([] if isinstance(values, str) else values)
-        numbers = numbers[np.isfinite(numbers)]
-        ends = [numbers.min(), numbers.max()] if numbers.size else []
-        name = "length" if key == "lengths" else key
-        notes = [_core.note_on_value(name, end) for end in ends]
-        if any(notes):
-            warnings.warn(next(filter(None, notes)), stacklevel=3)
-
-
-def _add_model(
-    given: dict[str, Any], preset: str, lengths: Optional[Sequence[Number]]
-) -> None:
+def _keys(
+    values: dict[str, Any], preset: str, lengths: Optional[Sequence[Number]]
+) -> tuple[dict[str, Any], tuple[int, ...]]:
+    """What the extension takes, which checks it: floats, texts and flat arrays, and their common
+    shape. Warns of values that are likely to be in another unit."""
     if not isinstance(preset, str):
         raise ValueError(f"preset = {preset!r} is not allowed: preset must be a name, as \"paper\"")
-    given["preset"] = preset
+    keys = dict(values)
+    arrays = {key: _array(key, v) for key, v in values.items() if not isinstance(v, str)}
+    try:
+        shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{key} {array.shape}" for key, array in arrays.items() if array.ndim)
+        raise ValueError(f"these shapes do not fit each other: {shapes}") from None
+    for key, array in arrays.items():
+        _warn_of_units(key, array)
+        keys[key] = np.broadcast_to(array, shape).ravel() if array.ndim else array.item()
+    keys["preset"] = preset
     if lengths is not None:
-        values = _numbers("lengths", lengths)
-        if values.ndim != 1 or not values.size:
+        array = _array("lengths", lengths)
+        if array.ndim != 1 or not array.size:
             raise ValueError("lengths must be the length of each link, as [0.4, 0.4, 0.3]")
-        given["lengths"] = values.tolist()
+        _warn_of_units("length", array)
+        keys["lengths"] = array.tolist()
+    return keys, shape
+
+
+def _require_one_value_each(name: str, values: dict[str, Any]) -> None:
+    for key, value in values.items():
+        if np.ndim(value):
+            raise ValueError(
+                f"{key} has {np.size(value)} values: {name} takes one; "
+                "oblique.solve_many takes arrays"
+            )
+
+
+def _warn_of_units(key: str, array: npt.NDArray[Any]) -> None:
+    numbers = array[np.isfinite(array)] if array.dtype.kind == "f" else array[:0]
+    ends = [numbers.min(), numbers.max()] if numbers.size else []
+    for note in filter(None, (_core.note_on_value(key, end) for end in ends)):
+        warnings.warn(note, stacklevel=4)
+        break
 
 
 def _without_masks(value: Any) -> Any:
@@ -235,29 +210,17 @@ def _without_masks(value: Any) -> Any:
     return value
 
 
-def _shown(value: Any) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 100 else text[:97] + "..."
-
-
-def _numbers(name: str, value: Any) -> npt.NDArray[np.float64]:
+def _array(name: str, value: Any) -> npt.NDArray[Any]:
     array = np.asarray(_without_masks(value))
-    if value is None or array.dtype.kind == "O" and None in array.ravel().tolist():
-        raise ValueError(f"{name} = None is not allowed: {name} must be a number or numbers")
     if name == "integrator" and array.dtype.kind == "U":
-        names = _core.integrator_names()
-        unknown = [text for text in array.ravel().tolist() if text not in names]
-        if unknown:
-            raise ValueError(
-                f"integrator = {unknown[0]!r} is not allowed: integrator must be "
-                + ", ".join(names)
-            )
-        array = np.vectorize(names.index, otypes=[float])(array)
-    if array.dtype.kind == "O":
+        return array
+    if array.dtype.kind == "O" and None not in array.ravel().tolist():
         try:
             array = array.astype(np.float64)
         except (TypeError, ValueError, OverflowError):
             pass
     if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name} = {_shown(value)} is not allowed: {name} must be a number or numbers")
+        text = " ".join(repr(value).split())
+        text = text if len(text) <= 100 else text[:97] + "..."
+        raise ValueError(f"{name} = {text} is not allowed: {name} must be a number or numbers")
     return array.astype(np.float64)

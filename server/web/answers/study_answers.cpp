@@ -15,10 +15,8 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/study_size.h"
 #include "proto/recipe/written.h"
 #include "proto/text.h"
 #include "server/query/columns.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -12,6 +13,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/socket.h>
 
 #include "server/network/listener.h"
 
@@ -114,13 +116,17 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
                                MHD_RequestTerminationCode /*why*/) {
     delete static_cast<Exchange*>(std::exchange(*exchange, nullptr));
   };
+  const int socket = ::fcntl(listener.descriptor(), F_DUPFD_CLOEXEC, 0);
+  if (socket < 0) {
+    throw std::runtime_error("cannot listen at " + url_ + ": " + std::strerror(errno));
+  }
   // Not by epoll: there libmicrohttpd 0.9.75 stops serving once the limit of connections is
   // reached.
   daemon_ = MHD_start_daemon(
       MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_POLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
-      nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET,
-      ::fcntl(listener.descriptor(), F_DUPFD_CLOEXEC, 0), MHD_OPTION_NOTIFY_COMPLETED,
-      static_cast<MHD_RequestCompletedCallback>(on_completed), nullptr,
+      nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET, socket,
+      MHD_OPTION_NOTIFY_COMPLETED, static_cast<MHD_RequestCompletedCallback>(on_completed), nullptr,
+      MHD_OPTION_NOTIFY_CONNECTION, &HttpServer::on_connection, this,
       MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits.bytes_of_connection, MHD_OPTION_CONNECTION_LIMIT,
       limits.connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits.connections_of_one_address,
       MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(limits.idle.count()),
@@ -138,10 +144,46 @@ HttpServer::~HttpServer() {
 
 void HttpServer::wake() {
   ++wakes_;
+  const Time now = handlers_.now();
   const std::lock_guard lock(mutex_);
   for (MHD_Connection* const connection : std::exchange(suspended_, {})) {
     MHD_resume_connection(connection);
   }
+  for (const auto& [connection, transfer] : transfers_) {
+    if (transfer.due <= now) {
+      ::shutdown(transfer.socket, SHUT_RDWR);  // libmicrohttpd sees it and closes the connection
+    }
+  }
+}
+
+/// For libmicrohttpd each byte that comes or goes begins the idle time anew: it alone lets a peer
+/// that sends one now and then stay for ever.
+void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*context*/,
+                               MHD_ConnectionNotificationCode what) {
+  auto& server = *static_cast<HttpServer*>(self);
+  const Time due = server.due_for(0);
+  const std::lock_guard lock(server.mutex_);
+  if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
+    server.transfers_.erase(connection);  // its socket is still open
+    return;
+  }
+  const int socket =
+      MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+  try {
+    server.transfers_.insert_or_assign(connection, Transfer{socket, due});
+  } catch (const std::exception&) {
+    ::shutdown(socket, SHUT_RDWR);  // no memory: the connection ends
+  }
+}
+
+HttpServer::Time HttpServer::due_for(std::size_t bytes) const {
+  return handlers_.now() + limits_.idle +
+         std::chrono::seconds(bytes / limits_.least_bytes_a_second);
+}
+
+void HttpServer::set_due(MHD_Connection* connection, Time due) {
+  const std::lock_guard lock(mutex_);
+  transfers_.at(connection).due = due;
 }
 
 /// `wakes` is the number of wakes before the answer was asked for: a later one was meant for it.
@@ -192,14 +234,20 @@ MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
   if (!refusal && request.method == "POST") {
     refusal = handlers_.refuse_change(request);
   }
-  return refusal ? send(connection, exchange, *std::move(refusal)) : MHD_YES;
+  if (refusal) {
+    return send(connection, exchange, *std::move(refusal));
+  }
+  const std::string length = request.header("content-length");
+  set_due(connection, due_for(length.empty() ? 0 : std::stoul(length)));  // `refuse` has read it
+  return MHD_YES;
 }
 
 MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
+  const std::uint64_t wakes = wakes_;  // read first: whoever stops wakes afterwards
   if (is_stopping_ || (exchange.pending && is_gone(connection))) {
     return MHD_NO;
   }
-  const std::uint64_t wakes = wakes_;
+  set_due(connection, Time::max());
   if (auto answer = poll(exchange)) {
     return send(connection, exchange, *std::move(answer));
   }
@@ -228,6 +276,7 @@ MHD_Result HttpServer::send(MHD_Connection* connection, Exchange& exchange, Http
   if (answer.stream && streams_ >= limits_.streams) {
     answer = text_answer(MHD_HTTP_SERVICE_UNAVAILABLE, "too many pages are open: close some");
   }
+  set_due(connection, answer.stream ? Time::max() : due_for(answer.body.size()));
   exchange.is_answered = true;
   exchange.pending = {};
   MHD_Response* const response = response_of(connection, answer);
@@ -269,11 +318,11 @@ ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* i
                               std::size_t most) {
   Stream& stream = *static_cast<Stream*>(context);
   HttpServer& server = stream.server;
+  const std::uint64_t wakes = server.wakes_;  // read first, as in `answer`
   if (server.is_stopping_ || is_gone(stream.connection)) {
     return MHD_CONTENT_READER_END_WITH_ERROR;
   }
   try {
-    const std::uint64_t wakes = server.wakes_;
     if (stream.sent == stream.unsent.size()) {
       auto next = stream.next();
       if (!next) {

@@ -26,8 +26,10 @@ struct HttpLimits {
   /// A connection's memory for request line, headers and the headers of the answer.
   std::size_t bytes_of_connection = std::size_t{16} * 1024;
   /// A connection that neither sends nor takes anything for this long is closed; not while the
-  /// server has nothing to say.
+  /// server has nothing to say. The head of a request must come within this time of connecting.
   std::chrono::seconds idle{10};
+  /// Bodies and answers, but for streams, have `idle` and a second for that many bytes.
+  std::size_t least_bytes_a_second = std::size_t{4} * 1024;
 };
 
 /// Called on the server's thread.
@@ -36,6 +38,8 @@ struct HttpHandlers {
   std::function<HttpOutcome(const HttpRequest&)> answer;
   /// Why a POST is refused, before its body is read; none: it is answered.
   std::function<std::optional<HttpAnswer>(const HttpRequest&)> refuse_change;
+  /// Called on any thread.
+  std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
 /// Answers GET, HEAD and POST over HTTP/1.0 and 1.1 on libmicrohttpd's thread. A request whose
@@ -53,7 +57,7 @@ class HttpServer {
   /// As http://127.0.0.1:7602, with the actual port.
   const std::string& url() const { return url_; }
   /// Calls all pending answers and streams again; those whose client has disconnected are
-  /// destroyed. From any thread; does not block.
+  /// destroyed. Ends connections whose time is up. From any thread; does not block.
   void wake();
   /// Number of answers by status. For the handlers.
   const std::map<unsigned, std::uint64_t>& answers() const { return answers_; }
@@ -61,10 +65,17 @@ class HttpServer {
  private:
   struct Exchange;
   struct Stream;
+  using Time = std::chrono::steady_clock::time_point;
+  struct Transfer {
+    int socket;
+    Time due;  ///< when the request, or the answer, must have come through
+  };
 
   static MHD_Result on_request(void* self, MHD_Connection* connection, const char* path,
                                const char* method, const char* version, const char* upload,
                                std::size_t* upload_bytes, void** exchange);
+  static void on_connection(void* self, MHD_Connection* connection, void** context,
+                            MHD_ConnectionNotificationCode what);
   static ssize_t on_stream(void* stream, std::uint64_t position, char* into, std::size_t most);
 
   MHD_Result begin(MHD_Connection* connection, Exchange& exchange);
@@ -73,6 +84,9 @@ class HttpServer {
   MHD_Result send(MHD_Connection* connection, Exchange& exchange, HttpAnswer answer);
   MHD_Response* response_of(MHD_Connection* connection, HttpAnswer& answer);
   void suspend(MHD_Connection* connection, std::uint64_t wakes);
+  /// When that many bytes must have been transferred, beginning now.
+  Time due_for(std::size_t bytes) const;
+  void set_due(MHD_Connection* connection, Time due);
 
   const OwnNames names_;
   const HttpLimits limits_;
@@ -83,7 +97,8 @@ class HttpServer {
   std::atomic<bool> is_stopping_ = false;
   std::atomic<std::uint64_t> wakes_ = 0;
   std::mutex mutex_;
-  std::set<MHD_Connection*> suspended_;  // guarded by mutex_
+  std::set<MHD_Connection*> suspended_;            // guarded by mutex_
+  std::map<MHD_Connection*, Transfer> transfers_;  // of all connections; the same
   MHD_Daemon* daemon_ = nullptr;
 };
 

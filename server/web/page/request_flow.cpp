@@ -199,17 +199,25 @@ PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::u
                                OnReply on_reply) {
   ClientRequest first;
   first.mutable_status()->set_study_id(study);
-  return request_flow(std::move(exchange), first,
-                      [request = std::move(request),
-                       on_reply = std::move(on_reply)](const ClientReply& reply) -> NextStep {
-                        if (!reply.has_status()) {
-                          return on_reply(reply);
-                        }
-                        if (reply.status().studies_size() != 1) {
-                          return error_answer(MHD_HTTP_NOT_FOUND, "there is no such study");
-                        }
-                        return request(reply.status().studies(0).name());
-                      });
+  exchange->send(first);
+  return
+      [exchange = std::move(exchange), request = std::move(request), on_reply = std::move(on_reply),
+       named = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
+        if (!named) {
+          const auto reply = exchange->reply();
+          if (!reply) {
+            return std::nullopt;
+          }
+          if (reply->has_error()) {
+            HttpAnswer answer = failure(reply->error());
+            return answer.status == MHD_HTTP_NOT_FOUND
+                       ? error_answer(MHD_HTTP_NOT_FOUND, "there is no such study")
+                       : answer;
+          }
+          named = request_flow(exchange, request(reply->status().studies(0).name()), on_reply);
+        }
+        return named();
+      };
 }
 
 PendingAnswer list_studies(ServiceClient& service, const Fields& fields) {

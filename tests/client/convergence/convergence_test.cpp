@@ -19,6 +19,176 @@ namespace {
 
 using solver::CaseResult;
 
+constexpr double kNoRounding = 0.0;
+
+// limit + c h^p for h = 1, 1/2, 1/4, ...
+std::vector<double> sequence(double limit, double c, double p, int values) {
+  std::vector<double> all;
+  for (int i = 0; i < values; ++i) {
+    all.push_back(limit + c * std::exp2(-p * i));
+  }
+  return all;
+}
+
+TEST(Richardson, FindsOrderLimitAndErrorOfAPureErrorTermExactly) {
+  for (const double order : {0.5, 1.0, 2.0, 3.7}) {
+    const auto values = sequence(7.0, -3.0, order, 4);
+    const auto found = extrapolate(values, 4.0, kNoRounding);
+    EXPECT_EQ(found.trend, Trend::kMonotone);
+    EXPECT_NEAR(found.order.value(), order, 1e-12);
+    EXPECT_NEAR(found.limit, 7.0, 1e-12);
+    EXPECT_NEAR(found.error.value(), 7.0 - values.back(), 1e-12);
+  }
+}
+
+TEST(Richardson, UsesTheFinestThreeValuesOnly) {
+  auto values = sequence(1.0, 1.0, 2.0, 3);
+  values.insert(values.begin(), 1000.0);
+  EXPECT_NEAR(extrapolate(values, 4.0, kNoRounding).limit, 1.0, 1e-12);
+}
+
+TEST(Richardson, ErrorEstimateIsRightToLeadingOrderWhenAHigherTermIsPresent) {
+  // v(h) = 2 + h^2 + h^3: on h = 1/16, 1/32, 1/64 the next term is h = 1/64 of the first.
+  std::vector<double> values;
+  for (const double h : {1.0 / 16, 1.0 / 32, 1.0 / 64}) {
+    values.push_back(2.0 + h * h + h * h * h);
+  }
+  const auto found = extrapolate(values, 4.0, kNoRounding);
+  const double error = values.back() - 2.0;
+  EXPECT_NEAR(found.error.value(), error, 0.1 * error);
+  EXPECT_NEAR(found.order.value(), 2.0, 0.1);
+}
+
+TEST(Richardson, DoesNotBelieveALastDifferenceThatIsSmallByLuck) {
+  // Differences 16 and 1e-6: an order of 24, which no method of order 2 has.
+  const std::vector<double> values{0.0, 16.0, 16.000001};
+  const auto found = extrapolate(values, 2.0, kNoRounding);
+  EXPECT_GT(found.order.value(), 20.0);
+  EXPECT_DOUBLE_EQ(found.error.value(), 16.0 / 4.0 / 3.0);
+}
+
+TEST(Richardson, DoesNotExtrapolateValuesThatOscillate) {
+  const std::vector<double> values{0.0, 8.0, 6.0};
+  const auto found = extrapolate(values, 4.0, kNoRounding);
+  EXPECT_EQ(found.trend, Trend::kOscillating);
+  EXPECT_FALSE(found.order);
+  EXPECT_EQ(found.limit, 6.0);
+  EXPECT_EQ(found.error, 2.0);
+}
+
+TEST(Richardson, SaysSoWhenDifferencesDoNotFall) {
+  const std::vector<double> values{0.0, 1.0, 2.0};
+  const auto found = extrapolate(values, 4.0, kNoRounding);
+  EXPECT_EQ(found.trend, Trend::kUnsettled);
+  EXPECT_EQ(found.error, 1.0);
+  EXPECT_FALSE(found.order);
+}
+
+TEST(Richardson, TakesDifferencesBelowTheResolutionForRounding) {
+  const std::vector<double> values{1.0, 1.0 + 1e-12, 1.0 - 1e-12};
+  const auto found = extrapolate(values, 4.0, 1e-11);
+  EXPECT_EQ(found.trend, Trend::kRounding);
+  EXPECT_EQ(found.error, 1e-11);
+  const std::vector<double> zeros{0.0, 0.0, 0.0};
+  EXPECT_EQ(extrapolate(zeros, 4.0, kNoRounding).trend, Trend::kRounding);
+}
+
+TEST(Richardson, SaysNothingOfALimitFromFewerThanThreeValues) {
+  const std::vector<double> two{1.0, 3.0};
+  EXPECT_EQ(extrapolate(two, 4.0, kNoRounding).trend, Trend::kTooFew);
+  EXPECT_EQ(extrapolate(two, 4.0, kNoRounding).error, 2.0);
+  const std::vector<double> one{1.0};
+  EXPECT_FALSE(extrapolate(one, 4.0, kNoRounding).error);
+}
+
+using Kind = ContactChange::Kind;
+using solver::PhaseKind;
+
+// A contact with these turns (peak, valley, peak, ...) that ends at 100 us.
+CaseResult with_turns(const std::vector<double>& turns_us) {
+  CaseResult result{};
+  double start_s = 0.0;
+  for (std::size_t i = 0; i <= turns_us.size(); ++i) {
+    const double end_s = (i < turns_us.size() ? turns_us[i] : 100.0) * 1e-6;
+    const bool compression = i % 2 == 0;
+    result.phases.push_back(
+        {compression ? PhaseKind::kCompression : PhaseKind::kRestitution, start_s, end_s, 0.0});
+    if (compression) {
+      result.peaks.push_back({end_s, 1000.0, 0.0, true});
+    }
+    start_s = end_s;
+  }
+  result.duration_s = start_s;
+  return result;
+}
+
+CaseResult with_sticks(const std::vector<solver::StickInterval>& sticks) {
+  auto result = with_turns({50.0});
+  result.stick_intervals = sticks;
+  return result;
+}
+
+TEST(LonePairs, AreThoseWhoseLeavingOutBringsTheOthersClosest) {
+  using Pairs = std::vector<std::size_t>;
+  EXPECT_EQ(lone_pairs({}, {}), Pairs{});
+  EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0}, {1.1, 2.1, 3.1}), Pairs{});
+  EXPECT_EQ(lone_pairs({1.0, 5.0, 5.1, 9.0}, {1.0, 9.0}), Pairs{1});
+  EXPECT_EQ(lone_pairs({1.0, 1.1, 5.0}, {5.0}), Pairs{0});
+  EXPECT_EQ(lone_pairs({1.0, 5.0, 5.1}, {1.0}), Pairs{1});
+  EXPECT_EQ(lone_pairs({1.0, 1.1, 3.0, 5.0, 5.1}, {3.0}), (Pairs{0, 3}));
+  EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0, 4.0}, {}), (Pairs{0, 2}));
+  EXPECT_EQ(lone_pairs({1.0, 4.0, 6.0, 8.0}, {4.0, 6.0}), Pairs{0}) << "never two single ones";
+}
+
+TEST(ContactChanges, AreNoneWhereOnlyTimesDiffer) {
+  EXPECT_TRUE(changes_between(with_turns({20, 50, 80}), with_turns({22, 57, 79})).empty());
+  EXPECT_TRUE(
+      changes_between(with_sticks({{1e-5, 2e-5}}), with_sticks({{1.2e-5, 2.2e-5}})).empty());
+}
+
+TEST(ContactChanges, FindACompressionThatComesWithTheFinerLevel) {
+  const auto changes = changes_between(with_turns({20}), with_turns({20, 60, 62}));
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_EQ(changes[0].kind, Kind::kCompression);
+  EXPECT_DOUBLE_EQ(changes[0].t0_s, 60e-6);
+  EXPECT_DOUBLE_EQ(changes[0].t1_s, 62e-6);
+  EXPECT_TRUE(changes[0].in_finer);
+  EXPECT_EQ(described(changes[0]), "a compression of 2 us, from 60.00 to 62.00 us (V_n grazes 0)");
+}
+
+TEST(ContactChanges, FindARestitutionThatGoesWithTheFinerLevel) {
+  const auto changes = changes_between(with_turns({20, 21, 30, 50, 80}), with_turns({31, 51, 80}));
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_EQ(changes[0].kind, Kind::kRestitution);
+  EXPECT_DOUBLE_EQ(changes[0].t0_s, 20e-6);
+  EXPECT_FALSE(changes[0].in_finer);
+}
+
+TEST(ContactChanges, FindSticksAndSlipsWhereverTheyAre) {
+  const auto last_stick =
+      changes_between(with_sticks({{0.0, 3e-5}}), with_sticks({{0.0, 3.1e-5}, {9e-5, 1e-4}}));
+  ASSERT_EQ(last_stick.size(), 1U);
+  EXPECT_EQ(last_stick[0].kind, Kind::kStick);
+  EXPECT_DOUBLE_EQ(last_stick[0].t0_s, 9e-5);
+
+  const auto slip =
+      changes_between(with_sticks({{0.0, 5e-5}}), with_sticks({{0.0, 2e-5}, {2.1e-5, 5e-5}}));
+  ASSERT_EQ(slip.size(), 1U);
+  EXPECT_EQ(slip[0].kind, Kind::kSlip);
+  EXPECT_DOUBLE_EQ(slip[0].t0_s, 2e-5);
+  EXPECT_DOUBLE_EQ(slip[0].t1_s, 2.1e-5);
+}
+
+TEST(ContactChanges, FindAPeakThatIsARippleOnOneLevelOnly) {
+  auto ripple = with_turns({20, 50, 60});
+  ripple.peaks[1].major = false;
+  const auto changes = changes_between(with_turns({20, 50, 60}), ripple);
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_EQ(changes[0].kind, Kind::kRipple);
+  EXPECT_DOUBLE_EQ(changes[0].t0_s, 60e-6);
+  EXPECT_FALSE(changes[0].in_finer);
+}
+
 constexpr double kHighestOrder = 4.0;
 
 // A contact of two peaks on step h, whose every output is its limit plus h^2 of itself.
@@ -177,15 +347,15 @@ TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
 
 TEST(FallSentence, NamesTheOutputThatTheFallMovesMost) {
   Refinement step{.what = "step", .levels = {}, .convergence = {}};
-  step.levels.push_back({.level = {"dt", {}}, .results = {second_order(0.0)}, .wall_s = 0.0});
-  SolvedLevel exact{.level = {"exact fall", {}}, .results = {second_order(0.0)}, .wall_s = 0.0};
+  step.levels.push_back({.level = {"dt", {}}, .result = second_order(0.0), .wall_s = 0.0});
+  SolvedLevel exact{.level = {"exact fall", {}}, .result = second_order(0.0), .wall_s = 0.0};
   exact.level.model.tolerance = 1e-6;
-  exact.results[0].vt_out_m_s *= 1.0 + 1e-6;
+  exact.result.vt_out_m_s *= 1.0 + 1e-6;
   EXPECT_EQ(fall_sentence(step, exact),
             "The fall, solved for 1e-05, changes outputs by 0.0001 % (vt_out_m_s) at most beside "
             "one solved for 1e-06.\n");
   EXPECT_EQ(json_of_fall(step, exact)["same_mode"], true);
-  exact.results[0].major_mode = "sC sR";
+  exact.result.major_mode = "sC sR";
   EXPECT_NE(fall_sentence(step, exact).find("gives another"), std::string::npos);
   EXPECT_EQ(json_of_fall(step, exact)["same_mode"], false);
 }
@@ -234,9 +404,9 @@ TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
   model.elements_per_link = 2;
   std::ostringstream shown;
   WorkLine line(shown);
-  const auto levels =
-      solve_levels(step_levels(model, 1.0, 2), {{1.0, 0.4, 1.0}}, line, [](const SolvedLevel&) {});
-  const auto refinement = refinement_of("step", levels, 0);
+  const auto refinement = refinement_of(
+      "step",
+      solve_levels(step_levels(model, 1.0, 2), {1.0, 0.4, 1.0}, line, [](const SolvedLevel&) {}));
   EXPECT_TRUE(converges(refinement));
   // The exit speed converges last and is far above rounding; 3.8 is what is asked of the method.
   const auto& vn_out = named(refinement.convergence, "vn_out_m_s");
@@ -248,7 +418,7 @@ Refinement refinement_with(const std::vector<CaseResult>& results) {
   Refinement refinement{.what = "step", .levels = {}, .convergence = {}};
   for (std::size_t i = 0; i < results.size(); ++i) {
     refinement.levels.push_back(
-        {.level = {"dt/" + std::to_string(1 << i), {}}, .results = {results[i]}, .wall_s = 0.0});
+        {.level = {"dt/" + std::to_string(1 << i), {}}, .result = results[i], .wall_s = 0.0});
   }
   refinement.convergence = convergence_of(results, kHighestOrder);
   return refinement;

@@ -10,7 +10,7 @@
 #include "client/formats/row_printer.h"
 #include "proto/wire/chunk.h"
 
-namespace oblique::client::test {
+namespace oblique::test {
 
 using TestCell = std::variant<std::nullptr_t, std::int64_t, double, std::string>;
 using TestRows = std::vector<std::vector<TestCell>>;
@@ -36,10 +36,10 @@ inline protocol::QueryReply chunk_of(const std::vector<std::string>& columns,
 }
 
 /// The chunks, one after another, as text.
-inline std::string printed(Format format, const std::vector<protocol::QueryReply>& chunks,
-                           PrinterSettings settings = {}) {
-  TextSink sink;
-  const auto printer = made_printer(format, sink, std::move(settings));
+inline std::string printed(client::Format format, const std::vector<protocol::QueryReply>& chunks,
+                           client::PrinterSettings settings = {}) {
+  client::TextSink sink;
+  const auto printer = client::made_printer(format, sink, std::move(settings));
   for (const auto& chunk : chunks) {
     printer->print(chunk);
   }
@@ -48,4 +48,4 @@ inline std::string printed(Format format, const std::vector<protocol::QueryReply
   return sink.text();
 }
 
-}  // namespace oblique::client::test
+}  // namespace oblique::test

@@ -6,9 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "client/plot/axis_choice.h"
-#include "client/plot/block_choice.h"
-#include "client/plot/data/study_axes.h"
 #include "client/plot/plot_request.h"
+#include "client/plot/study_shape.h"
 #include "client/study/study_file.h"
 #include "worker/solver/model/errors.h"
 

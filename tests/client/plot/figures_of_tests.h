@@ -2,31 +2,32 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <map>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "client/plot/figures/charts.h"
-#include "client/plot/figures/figure.h"
-#include "client/plot/figures/maps.h"
+#include "client/plot/figure.h"
 
 namespace oblique::client::plot::test {
 
-inline MapAxes usual_axes() {
-  return {quantity_of("mu", ""), quantity_of("H", "m")};
+inline Figure figure_with(Panel panel) {
+  Figure figure{.title = "friction: a picture", .subtitle = "e = 0.9, 100 points"};
+  figure.panels.push_back(std::move(panel));
+  return figure;
+}
+
+inline Panel panel_over_mu_and_H() {
+  Panel panel;
+  panel.x = axis_of("mu", "");
+  panel.y = axis_of("H", "m");
+  return panel;
 }
 
 /// Cells n by m, all solved, with the values 0, 1, 2, ...
 inline Cells counted_cells(std::size_t columns, std::size_t rows) {
   Cells cells;
-  for (std::size_t i = 0; i <= columns; ++i) {
-    cells.x_edges.push_back(0.1 * static_cast<double>(i));
-  }
-  for (std::size_t i = 0; i <= rows; ++i) {
-    cells.y_edges.push_back(0.5 + 0.05 * static_cast<double>(i));
-  }
+  cells.x_edges = Scale({0.0, 0.1 * static_cast<double>(columns)}).edges(columns);
+  cells.y_edges = Scale({0.5, 0.5 + 0.05 * static_cast<double>(rows)}).edges(rows);
   for (std::size_t i = 0; i < columns * rows; ++i) {
     cells.values.push_back(static_cast<double>(i));
   }
@@ -34,93 +35,110 @@ inline Cells counted_cells(std::size_t columns, std::size_t rows) {
   return cells;
 }
 
-inline Figure titled(Figure figure) {
-  figure.title = "friction: a picture";
-  figure.subtitle = "e = 0.9, 100 points";
+inline Figure map_of(Cells cells) {
+  Panel panel = panel_over_mu_and_H();
+  panel.x.range = {cells.x_edges.front(), cells.x_edges.back()};
+  panel.y.range = {cells.y_edges.front(), cells.y_edges.back()};
+  const bool has_numbers = cells.names.empty();
+  FigureAxis colours = axis_of("duration_s", "s");
+  colours.range = Scale(range_of(cells.values)).range();
+  cells.name = has_numbers ? colours.name : "major_mode";
+  panel.cells = std::move(cells);
+  Figure figure = figure_with(std::move(panel));
+  if (has_numbers) {
+    figure.colours = colours;
+  }
   return figure;
 }
 
-/// A heat map with a cell that has no result, one that failed, and one without a value.
+/// A map of numbers with a cell that is not solved, one that is left out, one that failed and one
+/// without a value.
 inline Figure gappy_map() {
   Cells cells = counted_cells(6, 4);
-  cells.states[3] = CellState::kNoResult;
-  cells.states[4] = CellState::kNoResult;
-  cells.states[10] = CellState::kFailed;
-  cells.states[20] = CellState::kNoValue;
-  for (const std::size_t i : {3U, 4U, 10U, 20U}) {
-    cells.values[i] = std::nan("");
+  const std::vector<std::pair<std::size_t, CellState>> gaps{{3, CellState::kNoResult},
+                                                            {4, CellState::kFiltered},
+                                                            {10, CellState::kFailed},
+                                                            {20, CellState::kNoValue}};
+  for (const auto& [cell, state] : gaps) {
+    cells.states[cell] = state;
+    cells.values[cell] = std::nan("");
   }
-  return titled(heat_map(usual_axes(), quantity_of("duration_s", "s"), std::move(cells)));
+  return map_of(std::move(cells));
 }
 
-/// A map of modes with a point a cell.
-inline Figure modes_of(Cells cells, std::vector<std::string> names) {
-  std::map<std::string, std::uint64_t> points;
-  for (const std::string& name : names) {
-    ++points[name];
+/// A map of three categories, the last of which stands for others, with one cell not solved.
+inline Figure category_map(const std::string& name = "SC sR") {
+  Cells cells = counted_cells(30, 20);
+  for (std::size_t i = 0; i < cells.values.size(); ++i) {
+    cells.values[i] = i % 30 < 15 ? 0.0 : i < 500 ? 1.0 : 2.0;
+    cells.names.push_back(cells.values[i] == 0.0 ? name : cells.values[i] == 1.0 ? "sC" : "rare");
   }
-  return kind_map(usual_axes(), "major_mode", std::move(cells), std::move(names), points, "modes");
+  cells.states[0] = CellState::kNoResult;
+  cells.categories = {{name, 300}, {"sC", 250}, {"2 other modes", 50, true}};
+  return map_of(std::move(cells));
 }
 
-/// A map of so many kinds in stripes, the first widest.
-inline Figure striped_kinds(std::size_t kinds) {
-  Cells cells = counted_cells(60, 40);
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < 2400; ++i) {
-    const std::size_t kind = i % 60 < 20 ? 0 : 1 + (i % 60 - 20) * kinds / 40 % kinds;
-    std::string name = "SC sR";
-    for (std::size_t k = 0; k < kind % 6; ++k) {
-      name += k % 2 == 0 ? " sC" : " SR";
-    }
-    names.push_back(name + " " + std::to_string(kind));
-  }
-  return titled(modes_of(std::move(cells), std::move(names)));
-}
-
-inline Figure lines_of_count(std::size_t lines, std::size_t points = 12) {
-  std::vector<Series> series;
+inline Figure lines_of(std::size_t lines, std::size_t points) {
+  Panel panel;
+  panel.x = axis_of("mu", "");
+  panel.y = axis_of("duration_s", "s");
+  panel.x.range = {0.01, 0.01 * static_cast<double>(points)};
+  panel.y.range = {0.0, 1e-4 * static_cast<double>(lines * points)};
   for (std::size_t i = 0; i < lines; ++i) {
-    Series line{.by = 0.1 * static_cast<double>(i + 1), .x = {}, .y = {}};
-    for (std::size_t k = 0; k < points; ++k) {
-      line.x.push_back(0.01 * static_cast<double>(k + 1));
-      line.y.push_back(1e-4 * static_cast<double>((i + 1) * (k + 1)));
+    Curve curve{.stroke = i, .has_marks = true};
+    if (lines > 1) {
+      curve.by = 0.1 * static_cast<double>(i + 1);
+      curve.name = shown_value(axis_of("e", ""), *curve.by);
+      panel.by_name = "e";
     }
-    series.push_back(std::move(line));
+    for (std::size_t k = 0; k < points; ++k) {
+      curve.x.push_back(0.01 * static_cast<double>(k + 1));
+      curve.y.push_back(1e-4 * static_cast<double>((i + 1) * (k + 1)));
+    }
+    panel.curves.push_back(std::move(curve));
   }
-  return titled(line_chart(quantity_of("mu", ""), quantity_of("duration_s", "s"),
-                           lines > 1 ? std::optional(quantity_of("e", "")) : std::nullopt,
-                           std::move(series), {}));
+  return figure_with(std::move(panel));
 }
 
-inline Figure dots_of_count(std::size_t count) {
+inline Figure some_dots() {
+  Panel panel = panel_over_mu_and_H();
   Dots dots;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto at = static_cast<double>(i);
-    dots.x.push_back(std::fmod(at * 0.618, 1.0));
-    dots.y.push_back(std::fmod(at * 0.414, 1.0) * 5000.0);
-    dots.shades.push_back(at);
+  for (int i = 0; i < 50; ++i) {
+    dots.x.push_back(std::fmod(i * 0.618, 1.0));
+    dots.y.push_back(i == 7 ? std::nan("") : std::fmod(i * 0.414, 1.0));
+    dots.shades.push_back(i);
   }
-  return titled(scatter(quantity_of("mu", ""), quantity_of("fn_peak_N", "N"), quantity_of("H", "m"),
-                        dots, {}));
+  panel.dots = std::move(dots);
+  Figure figure = figure_with(std::move(panel));
+  figure.colours = axis_of("fn_peak_N", "N");
+  figure.colours->range = {0.0, 49.0};
+  return figure;
 }
 
-inline Figure histogram_of_count(std::size_t count) {
-  std::vector<double> values;
-  for (std::size_t i = 0; i < count; ++i) {
-    values.push_back(std::fmod(static_cast<double>(i) * 0.618, 1.0) * 2e-4 + 3e-4);
-  }
-  return titled(histogram(quantity_of("duration_s", "s"), values, {}));
+inline Figure some_bars() {
+  Panel panel = panel_over_mu_and_H();
+  panel.y = {.label = "points", .name = "points", .range = {0.0, 5.0}};
+  panel.bars = Bars{.edges = {0.0, 0.5, 1.0, 1.5}, .heights = {1.0, 4.0, 0.0}};
+  return figure_with(std::move(panel));
 }
 
-/// What a point's picture is made of: panels below each other with spans, curves and known points,
-/// and a drawing with one scale both ways.
+inline Figure named_bars(const std::string& name = "SC sR") {
+  Panel panel;
+  panel.x = {.label = "points", .name = "points", .range = {0.0, 5.0}};
+  panel.y = axis_of("mode", "");
+  panel.bars = Bars{.heights = {4.0, 1.0}, .names = {name, "other: 3"}};
+  return figure_with(std::move(panel));
+}
+
+/// Two panels as of a point: with spans, curves with a gap, published numbers, and one scale.
 inline Figure panels() {
-  Figure figure;
   Panel forces;
+  forces.title = "Forces";
   forces.x = {"time from touch [\u00b5s]", "t_s", {0.0, 350e-6}, false, 1e6};
   forces.y = {"force [N]", "force_N", {0.0, 5000.0}};
-  forces.spans = {
-      {0.0, 70e-6, 2, "stick"}, {70e-6, 170e-6, 0, "compression"}, {200e-6, 350e-6, 2, "stick"}};
+  forces.spans = {{0.0, 70e-6, Span::Kind::kCompression},
+                  {70e-6, 170e-6, Span::Kind::kRestitution},
+                  {0.0, 50e-6, Span::Kind::kStick}};
   Curve normal{.name = "F_n"};
   Curve tangential{.name = "F_t", .stroke = 1};
   for (int i = 0; i <= 35; ++i) {
@@ -132,23 +150,16 @@ inline Figure panels() {
   }
   forces.curves = {normal, tangential};
   forces.known = {{57e-6, 4282.0, "published"}};
-  Panel energy = forces;
-  energy.y = {"energy [J]", "energy_J", {-1e-6, 1e-6}};
-  energy.curves = {{.name = "closure", .x = {0.0, 350e-6}, .y = {-1e-6, 1e-6}, .stroke = 2}};
-  energy.known.clear();
-  energy.share = 0.5;
   Panel shape;
   shape.title = "shape at touch";
   shape.x = {"x [m]", "x_m", {-0.1, 1.2}};
   shape.y = {"y [m]", "y_m", {-1.0, 0.1}};
   shape.has_equal_aspect = true;
-  shape.curves = {{.name = "finger",
-                   .x = {0.0, 0.4, 0.6, 0.585},
-                   .y = {0.0, -0.1, -0.5, -1.0},
-                   .stroke = 3,
-                   .has_marks = true}};
-  figure.panels = {forces, energy, shape};
-  return titled(figure);
+  shape.curves = {{.name = "finger", .x = {0.0, 0.4, 0.6}, .y = {0.0, -0.1, -0.5}, .stroke = 3}};
+  Figure figure = figure_with(std::move(forces));
+  figure.columns = 2;
+  figure.panels.push_back(std::move(shape));
+  return figure;
 }
 
 }  // namespace oblique::client::plot::test

@@ -1,6 +1,7 @@
 // Rows of answers gathered in cells and lines.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/data/gathered.h"
+#include "client/plot/gathered.h"
 #include "proto/wire/chunk.h"
 
 namespace oblique::client::plot {
@@ -118,8 +119,7 @@ TEST(Cells, OfTextsHaveNames) {
   const auto value = texts({"SC sR", ""});
   const auto status = texts({"solved", "solved"});
   const auto gathered = gathered_on({x, y, value, status}, {1, 2}, {1}, false, false);
-  EXPECT_TRUE(gathered.has_names);
-  EXPECT_EQ(gathered.names[0], "SC sR");
+  EXPECT_EQ(gathered.cells.names[0], "SC sR");
   EXPECT_EQ(gathered.mixed_cells, 0U);
   EXPECT_EQ(gathered.cells.states[1], CellState::kNoValue);
 }
@@ -130,7 +130,8 @@ TEST(Cells, WithSeveralTextsHaveThatOfMostOfTheirPointsAndAreCounted) {
   const auto value = texts({"rare", "SC", "", "SC", "SC", "rare", "SC"});
   const auto status = texts(std::vector<std::string>(7, "solved"));
   const auto gathered = gathered_on({x, y, value, status}, {1, 2, 3}, {1}, false, false);
-  EXPECT_THAT(gathered.names, ElementsAre("SC", "rare", "SC")) << "of equally many the first met";
+  EXPECT_THAT(gathered.cells.names, ElementsAre("SC", "rare", "SC"))
+      << "of equally many the first met";
   EXPECT_EQ(gathered.mixed_cells, 2U);
   EXPECT_EQ(gathered.most_in_a_cell, 3U);
 }
@@ -141,7 +142,7 @@ TEST(Cells, OfTextsCountThePointsOfEachTextAlsoWhereOthersHaveTheCell) {
   const auto value = texts({"SC", "SC", "rare", "SC"});
   const auto status = texts(std::vector<std::string>(4, "solved"));
   const auto gathered = gathered_on({x, y, value, status}, {1, 2}, {1}, false, false);
-  EXPECT_THAT(gathered.names, ElementsAre("SC", "SC"));
+  EXPECT_THAT(gathered.cells.names, ElementsAre("SC", "SC"));
   EXPECT_EQ(gathered.points_of_name,
             (std::map<std::string, std::uint64_t>{{"SC", 3}, {"rare", 1}}));
 }
@@ -155,20 +156,21 @@ TEST(Bins, HoldAllScatteredPointsThoseAtTheEndsIncluded) {
   }
   const auto x = numbers(xs);
   const auto y = numbers(ys);
-  const auto status = texts(std::vector<std::string>(1000, "solved"));
-  const auto gathered = gathered_in_bins({x, y, x, status}, 8, 5, false, false);
+  const AnswerColumn no_status;
+  const auto gathered =
+      gathered_in_bins({x, y, x, no_status}, Scale(range_of(xs)), 8, Scale(range_of(ys)), 5);
   EXPECT_EQ(gathered.points, 1000U);
+  EXPECT_EQ(std::accumulate(gathered.counts.begin(), gathered.counts.end(), 0U), 1000U);
   EXPECT_EQ(gathered.cells.states.size(), 40U);
-  EXPECT_GT(gathered.most_in_a_cell, 10U);
 }
 
-TEST(Bins, OfNoPointsAndOfOneAreCellsAllTheSame) {
-  const auto none = numbers({});
-  const auto no_status = texts({});
-  EXPECT_EQ(gathered_in_bins({none, none, none, no_status}, 8, 8, false, false).points, 0U);
-  const auto one = numbers({3.0});
-  const auto status = texts({"solved"});
-  EXPECT_EQ(gathered_in_bins({one, one, one, status}, 8, 8, true, false).points, 1U);
+TEST(Bins, WithoutARowHaveNoPoint) {
+  const auto x = numbers({1.0, 2.0});
+  const AnswerColumn no_status;
+  const auto gathered =
+      gathered_in_bins({x, x, x, no_status}, Scale({1.0, 2.0}), 2, Scale({1.0, 2.0}), 2);
+  EXPECT_THAT(gathered.cells.states, ElementsAre(CellState::kSolved, CellState::kNoPoint,
+                                                 CellState::kNoPoint, CellState::kSolved));
 }
 
 TEST(AxisValues, AreThoseOfTheStudyAndOthersThatRowsHave) {
@@ -180,18 +182,18 @@ TEST(GatheredLines, RiseAndHaveGapsWherePointsFailedOrAreNotSolvedYet) {
   const auto y = numbers({40, 10, std::nan(""), 1, 4});
   const auto by = numbers({0.5, 0.5, 0.5, 1, 1});
   const auto gathered = gathered_lines(x, y, &by, {1, 2, 3, 4, 5});
-  ASSERT_EQ(gathered.series.size(), 2U);
-  EXPECT_EQ(gathered.series[0].by, 0.5);
-  EXPECT_THAT(gathered.series[0].x, ElementsAre(1, 2, 3, 4));
-  EXPECT_THAT(gathered.series[0].y, ElementsAre(10, testing::IsNan(), testing::IsNan(), 40));
+  ASSERT_EQ(gathered.curves.size(), 2U);
+  EXPECT_EQ(gathered.curves[0].by, 0.5);
+  EXPECT_THAT(gathered.curves[0].x, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(gathered.curves[0].y, ElementsAre(10, testing::IsNan(), testing::IsNan(), 40));
   EXPECT_EQ(gathered.gaps, 4U);
   EXPECT_EQ(gathered.most_at_a_place, 1U);
 }
 
 TEST(GatheredLines, OfSeveralPointsAtAPlaceHaveTheirMean) {
   const auto gathered = gathered_lines(numbers({1, 1, 2}), numbers({2, 4, 7}), nullptr, {});
-  ASSERT_EQ(gathered.series.size(), 1U);
-  EXPECT_THAT(gathered.series[0].y, ElementsAre(3, 7));
+  ASSERT_EQ(gathered.curves.size(), 1U);
+  EXPECT_THAT(gathered.curves[0].y, ElementsAre(3, 7));
   EXPECT_EQ(gathered.most_at_a_place, 2U);
 }
 

@@ -84,78 +84,46 @@ def test_python_ends_well_when_the_call_of_a_daemon_thread_ends_behind_it():
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done", "")
 
 
-def test_a_child_after_fork_solves_and_asks(database):
+SENTENCE = r'multiprocessing\.set_start_method\("spawn"\)'
+
+
+def test_every_call_in_the_child_of_a_fork_says_how_to_start_processes_instead(database):
     asked = oblique.Database(database)
-    expected = oblique.solve(1, 0.4, 1).fn_peak_N
+    calls = [
+        lambda: oblique.solve(1, 0.4, 1),
+        lambda: oblique.trace(1, 0.4, 1),
+        lambda: oblique.solve_many(1, [0.4], 1),
+        lambda: oblique.Database(database),
+        lambda: asked.query("sweep"),
+        lambda: asked.studies(),
+    ]
     child = os.fork()
     if child == 0:
-        same = oblique.solve(1, 0.4, 1).fn_peak_N == expected
-        os._exit(0 if same and len(asked.query("sweep")) == 36 else 1)
+        try:
+            for call in calls:
+                with pytest.raises(RuntimeError, match=SENTENCE):
+                    call()
+            os._exit(0)
+        finally:
+            os._exit(1)
     assert os.waitpid(child, 0)[1] == 0
     assert len(asked.query("sweep")) == 36
 
 
-def test_a_child_after_fork_has_the_falls_of_its_parent_where_no_thread_is_at_any():
-    oblique.solve(1, 0.4, 1)
-    kept = oblique._solving._falls
-    child = os.fork()
-    if child == 0:
-        os._exit(0 if oblique._solving._falls is kept else 1)
-    assert os.waitpid(child, 0)[1] == 0
+def test_a_forked_pool_sends_the_error_back():
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        with pytest.raises(RuntimeError, match=SENTENCE):
+            pool.apply(oblique.solve, (1, 0.4, 1))
 
 
-@pytest.mark.parametrize("way", ["fork", "spawn"])
-def test_processes_of_a_pool_solve_and_send_results_back(way):
+def test_processes_of_a_spawned_pool_solve_and_send_results_back():
     here = oblique.solve_many(1, [0.4, 1.2], 1)
-    with multiprocessing.get_context(way).Pool(2) as pool:
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
         ones = pool.starmap(oblique.solve, [(1, 0.4, 1), (1, 1.2, 1)])
         many = pool.apply(oblique.solve_many, (1, [0.4, 1.2], 1))
         with pytest.raises(oblique.SolveError):
             pool.apply(oblique.solve, (1, 0.4, 1), {"dt": 1e-25})
     assert [one.fn_peak_N for one in ones] == here.fn_peak_N.tolist() == many.fn_peak_N.tolist()
-
-
-def test_a_child_of_a_fork_behind_a_ctrl_c_solves_the_fall_that_its_parent_was_at():
-    ended = ended_script(
-        "import oblique\n"
-        "def interrupt(*_): raise KeyboardInterrupt\n"
-        "signal.signal(signal.SIGVTALRM, interrupt)\n"
-        # It takes a second or some, in which the signal finds it at work.
-        "def solve(): return oblique.solve(1, 0.4, 1, integrator='generalized-alpha', dt_fall=2e-6).mode\n"
-        "try:\n"
-        "    signal.setitimer(signal.ITIMER_VIRTUAL, 0.05)\n"
-        "    solve()\n"
-        "    print('it ended before')\n"
-        "except KeyboardInterrupt:\n"
-        "    pass\n"
-        "child = os.fork()\n"
-        "mode = solve()\n"
-        "if child == 0: os._exit(0 if mode else 1)\n"
-        "print(os.waitpid(child, 0)[1])\n"
-    )
-    assert (ended.stdout, ended.stderr) == ("0\n", "")
-
-
-def test_a_question_that_ctrl_c_ended_before_its_turn_is_not_asked(database):
-    ended = ended_script(
-        "import oblique\n"
-        "asked = oblique.Database(sys.argv[1])\n"
-        "def ask(rows): return asked.sql('WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL"
-        " SELECT i + 1 FROM n LIMIT %s) SELECT count(*) AS n FROM n' % rows)\n"
-        "before = threads()\n"
-        "first = threading.Thread(target=ask, args=(10**7,))\n"
-        "first.start()\n"
-        "def interrupt():\n"
-        "    wait_for_threads(before + 2, first)\n"  # both threads, and that of the question which waits
-        "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "try:\n"
-        "    threading.Thread(target=interrupt, daemon=True).start()\n"
-        "    ask(-1)\n"
-        "except KeyboardInterrupt:\n"
-        "    print(ask(5).n[0])\n",
-        database,
-    )
-    assert (ended.stdout, ended.stderr) == ("5\n", "")
 
 
 def test_the_memory_of_falls_is_given_back_when_asked():

@@ -3,7 +3,6 @@
 import csv
 import doctest
 import importlib
-import json
 import os
 import pickle
 import subprocess
@@ -75,7 +74,7 @@ def test_results_show_what_they_are():
         ({"mu": None}, "mu = None is not allowed: mu must be a number"),
         ({"mu": [0.1, 0.2]}, "mu has 2 values: solve takes one; oblique.solve_many takes arrays"),
         ({"I": "A^2 / (4 * p)"}, 'I = "A^2 / (4 * p)": unknown key `p`'),
-        ({"k": "2 * k"}, 'k = "2 * k" follows from itself'),
+        ({"k": "2 * k"}, "k: the expressions go round in a circle"),
         ({"length4": 0.4}, "length4 is the length of a link that there is not: there are 3"),
         ({"mu": 10**400}, "is not allowed: mu must be a number"),
         ({"mu": True}, "mu = True is not allowed: mu must be a number"),
@@ -127,17 +126,6 @@ def test_the_version_is_that_of_the_program():
     assert oblique.__version__ in run_oblique("--version")
 
 
-def test_what_a_report_of_a_defect_should_tell_is_what_the_doctor_tells():
-    said = subprocess.run([sys.executable, "-m", "oblique"], capture_output=True, text=True, check=True)
-    assert said.stdout == oblique.about() + "\n"
-    lines = dict(line.split(maxsplit=1) for line in said.stdout.splitlines())
-    doctor = json.loads(run_oblique("doctor", "--json", "--no-timing", "--timeout", "600"))
-    assert "oblique " + lines["oblique"] == run_oblique("--version").strip()
-    assert lines["built"] == "{compiler}, {type}".format(**doctor["programs"]["built"])
-    assert lines["instructions"] == oblique._core.instruction_set()
-    assert lines["NumPy"] == np.__version__
-
-
 def test_threads_get_the_same_bits_as_one():
     expected = [oblique.solve(1, 0.1 * i, 1).fn_peak_N for i in range(8)]
     got = [0.0] * 8
@@ -153,7 +141,7 @@ def test_threads_get_the_same_bits_as_one():
     assert got == expected
 
 
-@pytest.mark.parametrize("name", ["oblique", "oblique._solving", "oblique._results", "oblique._database", "oblique._about"])
+@pytest.mark.parametrize("name", ["oblique", "oblique._solving", "oblique._results", "oblique._database"])
 def test_examples_in_doc_strings_hold(name):
     module = importlib.import_module(name)
     assert doctest.testmod(module, optionflags=doctest.ELLIPSIS).failed == 0
@@ -172,8 +160,5 @@ def test_types_name_the_fields_that_there_are():
         fields[group].append(name)
     groups = ["energy", "errors", "solver"]
     assert list(oblique.Result.__annotations__) == fields[""] + groups
-    assert list(oblique.ManyResults.__annotations__) == fields[""] + groups + ["error", "failed"]
     for kind in (oblique.Energy, oblique.Errors, oblique.Solver):
         assert list(kind.__annotations__) == fields[kind.__name__.lower()]
-    trace = oblique.trace(1, 0.4, 1)._asdict()
-    assert [name for name in trace if not name.startswith("R")] == list(oblique.Trace.__annotations__)

@@ -87,7 +87,7 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
         ({"lengths": [0.4, 0.5], "links": [2]}, "lengths stands beside links or length"),
         ({"lengths": [0.4, 0.5], "length": [0.5, 0.6]}, "lengths stands beside links or length"),
         ({"lengths": [0.4, 0.5], "length": "H / 2"}, "lengths stands beside links or length"),
-        ({"integrator": ["euler"]}, "integrator = 'euler' is not allowed"),
+        ({"integrator": ["euler"]}, 'integrator = "euler" is not allowed'),
     ],
 )
 def test_what_is_wrong_with_all_points_is_a_value_error(keys, sentence):

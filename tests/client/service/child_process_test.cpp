@@ -98,5 +98,22 @@ TEST(ChildProcess, ThatIsNotThereIsAnErrorWithItsName) {
   }
 }
 
+TEST(OutputOf, IsStandardOutputAloneAndTheEndOfTheErrorsWhenTheProgramFails) {
+  EXPECT_EQ(output_of(shell("echo words; echo noise >&2; echo more")), "words\nmore\n");
+  const auto error_of = [](const std::string& script, int calls) {
+    try {
+      return output_of(shell(script), [&calls] { return --calls > 0; });
+    } catch (const ProcessError& error) {
+      return std::string(error.what());
+    }
+  };
+  constexpr int kManyCalls = 1'000'000;
+  EXPECT_EQ(error_of("echo out; echo one >&2; echo two >&2; exit 3", kManyCalls),
+            "/bin/sh ended with exit code 3: one two");
+  EXPECT_EQ(error_of("exec sleep 600", 3), "stopped waiting for /bin/sh");
+  EXPECT_NE(error_of("head -c 20000000 /dev/zero", kManyCalls).find("more than"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace oblique::client

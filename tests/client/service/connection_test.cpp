@@ -242,7 +242,6 @@ TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
     another.set_request_id(request.request_id() + 1);
     auto reply = reply_to(request);
     reply.mutable_query()->add_columns("a");
-    reply.mutable_query()->add_parts();
     reply.mutable_query()->set_chunk(1);
     reply.mutable_query()->set_ends(true);
     return std::vector{still_working(another, true), still_working(request, false),

@@ -56,7 +56,7 @@ class SourceTest : public ::testing::Test {
     return open_source(flags)->status({}).at(0).name();
   }
 
-  test::TemporaryFolder folder_;
+  oblique::test::TemporaryFolder folder_;
   std::filesystem::path before_ = std::filesystem::current_path();
   ScriptedServer named_{answer("named")};
   ScriptedServer from_environment_{answer("environment")};

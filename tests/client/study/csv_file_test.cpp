@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/keys.h"
+#include "proto/recipe/blocks.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::client {

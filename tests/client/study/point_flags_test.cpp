@@ -9,7 +9,6 @@
 
 #include "client/study/flag_axis.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/keys.h"
 #include "proto/recipe/point_table.h"
 #include "tests/client/study/flags_of.h"
 #include "tests/client/study/pretended_fall.h"

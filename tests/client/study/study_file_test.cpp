@@ -9,7 +9,6 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/study_size.h"
 #include "tests/client/study/study_text.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/number.h"

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "client/study/study_file.h"
-#include "proto/recipe/keys.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written.h"

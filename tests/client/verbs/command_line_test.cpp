@@ -64,7 +64,6 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"solve", "--H", "4*mu", "--mu", "0.4", "--e", "1"}, "--H 4*mu: point 0: H = 1.6 m"},
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
        "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
-      {{"converge", "--mesh-study", "--k", "mu-1"}, "k = -0.9 N/m is not allowed"},
       {{"converge", "--H", "1", "--mu", "0.4,0.6", "--e", "1", "--where", "mu > 1"},
        "leaves no point in"},
       {{"run", "--H", "1", "--mu", "0.4", "--e", "1", "--k", "0-mu"},
@@ -100,9 +99,6 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {{"converge", "--H", "1", "--mu", "0.4,0.6", "--e", "1"}, "2 points, and converge takes one"},
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--finest", "24"}, "--finest 24"},
       {{"converge", "--H", "1", "--mu", "0.4", "--e", "1", "--halvings", "1"}, "--halvings 1"},
-      {{"converge", "--within", "1"}, "--mesh-study"},
-      {{"converge", "--step-study", "--elements-per-link", "4,8"}, "2 models, and a step study"},
-      {{"converge", "--step-study", "--mu", "0.4"}, "--mu is not allowed with --step-study"},
       {{"solve", "--H", "1", "--mu", "0.4", "--e", "1", "--tolerance", "0.1"}, "tolerance = 0.1"},
       {{"fit", "--from", "papre"}, "papre"},
       {{"fit", "--elements-per-link", "0"}, "elements_per_link = 0"},
@@ -115,27 +111,6 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
     EXPECT_NE(outcome.err.find(says), std::string::npos) << words << outcome.err;
     EXPECT_TRUE(outcome.err.starts_with("oblique")) << words << outcome.err;
   }
-}
-
-TEST(CommandLine, AutoscaleWantsTheVariablesThatItsScriptNeeds) {
-  const test::TemporaryFolder folder;
-  std::ofstream(folder.path() / "jobs") << "server=${OBLIQUE_WORKER_SERVER:?\"needed\"}\n"
-                                        << "keys=${OBLIQUE_WORKER_KEYS:-}\n";
-  ASSERT_EQ(test::run_oblique(folder, {"keygen", "keys"}).exit_code, 0);
-  const auto look = [&folder](const test::Environment& environment) {
-    return test::Process(
-               folder, test::client_program(),
-               {"autoscale", "slurm", "--max", "1", "--dry-run", "--script", "jobs", "--keys",
-                "keys/reader.key", "--server", "tcp://127.0.0.1:1", "--timeout", "0.1"},
-               environment)
-        .outcome();
-  };
-  const auto refused = look({});
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_NE(refused.err.find("OBLIQUE_WORKER_SERVER is not set"), std::string::npos) << refused.err;
-  const auto warned = look({{"OBLIQUE_WORKER_SERVER", "tcp://127.0.0.1:2"}});
-  EXPECT_NE(warned.exit_code, 2) << warned.err;
-  EXPECT_NE(warned.err.find("OBLIQUE_WORKER_KEYS is not set"), std::string::npos) << warned.err;
 }
 
 TEST(CommandLine, ShowsEveryVerbWithExamplesOnStandardOutput) {
@@ -322,8 +297,7 @@ TEST(CommandLine, RefusesFilesThatAreNotRegularAndSaysWhatTheyAre) {
     EXPECT_NE(outcome.exit_code, 0) << testing::PrintToString(arguments);
     EXPECT_NE(outcome.err.find(says), std::string::npos) << outcome.err;
   }
-  const auto doctor =
-      test::run_oblique(folder, {"doctor", "--no-timing", "--timeout", "600", "--db", "./pipe"});
+  const auto doctor = test::run_oblique(folder, {"doctor", "--db", "./pipe"});
   EXPECT_NE(doctor.out.find("/pipe is a pipe"), std::string::npos) << doctor.out;
 }
 

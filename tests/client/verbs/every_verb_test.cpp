@@ -85,7 +85,7 @@ Words needed_words(const Verb& verb) {
   std::size_t skipped = 0;
   while (usage >> word) {
     if (skipped++ >= verb.words.size() && word.front() != '[' && word != "SUBCOMMAND") {
-      words.push_back(word == "ENGINE" ? "slurm" : "1");
+      words.push_back(word == "SYSTEM" ? "slurm" : "1");
     }
   }
   const std::regex line("\n  (--[a-z0-9-]+) ([A-Z]+) REQUIRED");

@@ -124,9 +124,6 @@ TEST(Flags, ThatTakeNumbersRefuseThoseThatTheyCannotMean) {
       expect_refused(words, flag);
     }
   }
-  for (const char* value : {"nan", "0", "-1", "101", "inf"}) {
-    expect_refused({"converge", "--mesh-study", "--within", value}, "--within");
-  }
   for (const char* value : {"nan", "0", "-1", "257", "1.5", "99999999999"}) {
     expect_refused({"fit", "--elements-per-link", value}, "elements");
   }

@@ -1,4 +1,4 @@
-#include "proto/recipe/study_size.h"
+#include "proto/recipe/point_table.h"
 
 #include <algorithm>
 
@@ -73,7 +73,7 @@ TEST(StudySize, OfMorePointsFindsTheFallsThatManyPointsShareWithoutAnEstimate) {
   EXPECT_EQ(size.examples.size(), 64U);
 }
 
-// 400 is four standard deviations of what Chao's estimate has for so many.
+// 400 is more than four standard deviations of the estimate.
 TEST(StudySize, EstimatesTheFallsOfMorePointsFromTenThousand) {
   const auto shared = size_of_blocks(
       {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});

@@ -72,17 +72,6 @@ TEST(Chunk, ARowHasAValueForEachColumn) {
   EXPECT_THROW(writer.integer(3), std::logic_error);
 }
 
-TEST(Chunk, OfOneKindNamesItOnce) {
-  ChunkWriter writer({"a"});
-  for (int i = 0; i < 1000; ++i) {
-    writer.real(i);
-    writer.end_row();
-  }
-  const QueryReply chunk = writer.take();
-  EXPECT_EQ(chunk.parts(0).kinds().size(), 1U);
-  EXPECT_TRUE(is_sound(chunk));
-}
-
 TEST(Chunk, OfATableHasItsRows) {
   Table whole;
   append_rows(two_rows(), whole);
@@ -103,12 +92,14 @@ TEST(Chunk, ThatDoesNotFitTogetherIsNotSound) {
   EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.set_chunk_rows(3); }));
   EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.set_chunk_rows(UINT64_MAX); }));
   EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.add_columns("more"); }));
-  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(0)->clear_integers(); }));
-  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(1)->add_reals(1.0); }));
-  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(1)->set_kinds("\x02\x07"); }));
-  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_parts(2)->set_texts("S"); }));
-  EXPECT_FALSE(
-      broken([](QueryReply& chunk) { chunk.mutable_parts(2)->set_text_bytes(0, UINT32_MAX); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.clear_columns(); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.clear_cells(); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_cells()->pop_back(); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_cells()->push_back('\0'); }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_cells()->front() = '\x7'; }));
+  EXPECT_FALSE(broken([](QueryReply& chunk) {  // the length of the last text
+    chunk.mutable_cells()->replace(chunk.cells().size() - 4, 4, 4, '\xff');
+  }));
   QueryReply endless;
   endless.set_chunk_rows(UINT64_MAX);
   EXPECT_FALSE(is_sound(endless));

@@ -11,15 +11,6 @@
 namespace oblique::protocol {
 namespace {
 
-std::string heartbeat_of(std::size_t leases) {
-  WorkerMessage message;
-  message.mutable_heartbeat();
-  for (std::size_t i = 0; i < leases; ++i) {
-    message.mutable_heartbeat()->add_lease_ids((std::uint64_t{1} << 40U) + i);
-  }
-  return encode(message);
-}
-
 std::string results_of(std::size_t results) {
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
@@ -40,37 +31,12 @@ ClientRequest submission() {
 }
 
 TEST(FrameScanTest, WhatASoundWorkerSendsPasses) {
-  EXPECT_TRUE(is_of_a_workers_size(heartbeat_of(50'000 + 1024)));
   EXPECT_TRUE(is_of_a_workers_size(results_of(1000)));
   EXPECT_TRUE(is_of_a_workers_size(""));
   WorkerMessage long_text;
   auto& result = *long_text.mutable_results()->add_results();
   result.add_texts(std::string(1 << 20, 'S'));
   EXPECT_TRUE(is_of_a_workers_size(encode(long_text)));
-}
-
-TEST(FrameScanTest, MoreLeasesThanAWorkerCanHoldAreTooMany) {
-  EXPECT_TRUE(is_of_a_workers_size(heartbeat_of(kMostLeasesAHeartbeat)));
-  EXPECT_FALSE(is_of_a_workers_size(heartbeat_of(kMostLeasesAHeartbeat + 1)));
-  EXPECT_FALSE(is_of_a_workers_size(heartbeat_of(2'500'000)));
-}
-
-TEST(FrameScanTest, LeasesThatAreNotPackedCountTheSame) {
-  std::string ids;
-  for (std::size_t i = 0; i <= kMostLeasesAHeartbeat; ++i) {
-    ids += std::string("\x08\x01", 2);
-  }
-  // Field 4 of the message, in two parts, which a reader puts together.
-  const auto part = [](const std::string& bytes) {
-    std::string size;
-    for (std::size_t left = bytes.size(); size.empty() || left > 0; left >>= 7U) {
-      size += static_cast<char>((left & 0x7fU) | (left > 0x7fU ? 0x80U : 0U));
-    }
-    return "\x22" + size + bytes;
-  };
-  const std::string half = ids.substr(0, ids.size() / 4 * 2);
-  EXPECT_TRUE(is_of_a_workers_size(part(half)));
-  EXPECT_FALSE(is_of_a_workers_size(part(half) + part(ids.substr(half.size()))));
 }
 
 TEST(FrameScanTest, MoreResultsThanAMessageHoldsAreTooMany) {

@@ -1,4 +1,4 @@
-#include "server/database/open_for_reading.h"
+#include "server/database/database_file.h"
 
 #include <cstdlib>
 #include <filesystem>
@@ -95,12 +95,6 @@ TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
   }
 }
 
-TEST_F(ReadOnlyFolderTest, ItIsSaidThatTheDatabaseIsReadAsItStands) {
-  EXPECT_EXIT(as_stranger([&] { return !Reader(file_in("alone")).remark().empty(); }),
-              testing::ExitedWithCode(0), "");
-  EXPECT_EQ(Reader(folder_.file("source.db")).remark(), "");
-}
-
 TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
   const std::string file = file_in("with_log");
   const std::string copy = folder_.file("out/copy.db");
@@ -112,13 +106,6 @@ TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
                        salvage(file, saved).results == 3;
               }),
               testing::ExitedWithCode(0), "");
-}
-
-TEST_F(ReadOnlyFolderTest, NothingIsLeftBesideADatabaseThatCanBeReadOnly) {
-  EXPECT_EXIT(as_stranger([&] { return rows_of(file_in("with_log")) == 3; }),
-              testing::ExitedWithCode(0), "");
-  const fs::directory_iterator files(folder_.file("with_log"));
-  EXPECT_EQ(std::distance(fs::begin(files), fs::end(files)), 2);
 }
 
 TEST_F(ReadOnlyFolderTest, ADatabaseThatMayNotBeReadIsSaidToBeItsOwnersAlone) {

@@ -22,7 +22,7 @@
 #include "proto/result_message.h"
 #include "proto/wire/chunk.h"
 #include "server/event_loop/event_loop.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "tests/support/hang_limit.h"
 #include "tests/support/points.h"
 
@@ -38,7 +38,8 @@ class RunningServer {
  public:
   explicit RunningServer(const std::string& database, QueueSettings queue = {},
                          NetworkLimits network = {}, ClientHandlerSettings clients = {},
-                         const AccessSettings& access = {}, const std::optional<WebSettings>& web = {})
+                         const AccessSettings& access = {},
+                         const std::optional<WebSettings>& web = {})
       : loop_(settings(database, queue, network, clients, access, web)) {
     thread_ = std::thread([this] { end_ = loop_.run(stop_fd_); });
   }
@@ -62,7 +63,8 @@ class RunningServer {
  private:
   static LoopSettings settings(const std::string& database, QueueSettings queue,
                                NetworkLimits network, const ClientHandlerSettings& clients,
-                               const AccessSettings& access, const std::optional<WebSettings>& web) {
+                               const AccessSettings& access,
+                               const std::optional<WebSettings>& web) {
     LoopSettings settings;
     settings.web = web;
     settings.access = access;

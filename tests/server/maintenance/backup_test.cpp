@@ -1,8 +1,9 @@
 #include "server/maintenance/backup.h"
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,6 @@
 namespace oblique::server {
 namespace {
 
-using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
@@ -33,19 +33,18 @@ TEST_F(MaintenanceTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
       << "a copy is its owner's alone";
 }
 
-TEST_F(MaintenanceTest, ACopyNeverReplacesAFile) {
-  std::ofstream(copy_) << "mine";
-  EXPECT_THROW(back_up(path_, copy_), StorageError);
-  std::ifstream file(copy_);
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "mine");
-}
-
-TEST_F(MaintenanceTest, OnlyADatabaseOfOursIsCopied) {
-  const std::string other = folder_.file("notes.txt");
-  std::ofstream(other) << "not a database, and long enough to be sure of it";
-  EXPECT_THROW(back_up(other, copy_), StorageError);
-  EXPECT_THROW(back_up(folder_.file("nowhere.db"), copy_), StorageError);
-  EXPECT_FALSE(std::filesystem::exists(copy_));
+TEST_F(MaintenanceTest, OnlyADatabaseOfOursIsCopiedOrSalvagedAndNoFileIsReplaced) {
+  const std::string notes = folder_.file("notes.txt");
+  std::ofstream(notes) << "not a database, and long enough to be sure of it";
+  std::ofstream(folder_.file("empty.db"));
+  for (const std::string& other : {notes, folder_.file("nowhere.db"), folder_.file("empty.db")}) {
+    EXPECT_THROW(back_up(other, copy_), StorageError) << other;
+    EXPECT_THROW(salvage(other, copy_), StorageError) << other;
+    EXPECT_FALSE(std::filesystem::exists(copy_)) << other;
+  }
+  EXPECT_THROW(back_up(path_, notes), StorageError);
+  EXPECT_THROW(salvage(path_, notes), StorageError);
+  EXPECT_GT(std::filesystem::file_size(notes), 0U);
 }
 
 class SalvageTest : public MaintenanceTest {
@@ -62,131 +61,9 @@ class SalvageTest : public MaintenanceTest {
     }
     return found;
   }
-
-  /// Follows the first child of each page, whose number is where the first of the pointers behind
-  /// the header of twelve bytes says.
-  static std::int64_t first_leaf(const std::string& path, std::int64_t page) {
-    constexpr unsigned char kLeaf = 0x0a;
-    std::ifstream file(path, std::ios::binary);
-    for (std::vector<unsigned char> bytes(kPageBytes);;) {
-      file.seekg((page - 1) * kPageBytes);
-      file.read(reinterpret_cast<char*>(bytes.data()), kPageBytes);
-      if (bytes[0] == kLeaf) {
-        return page;
-      }
-      const std::size_t cell = bytes[12] * 256U + bytes[13];
-      page = bytes[cell] * 16777216 + bytes[cell + 1] * 65536 + bytes[cell + 2] * 256 +
-             bytes[cell + 3];
-    }
-  }
 };
 
-TEST_F(SalvageTest, WhatCanBeReadOfADamagedDatabaseIsSavedAndTheRestIsPendingAgain) {
-  constexpr std::uint64_t kPoints = 400;
-  const std::string damaged = folder_.file("damaged.db");
-  table_ = table_of(kPoints);
-  {
-    Store store(damaged);
-    add_results(store, 0, kPoints, true);
-    store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
-  }
-  const auto stored = rows_of(damaged);
-  // One page in the middle, where nearly all pages are rows of results.
-  overwrite_page(
-      damaged, static_cast<std::int64_t>(std::filesystem::file_size(damaged)) / 2 / kPageBytes + 1);
-  EXPECT_FALSE(find_faults(damaged).empty());
-  const auto saved = salvage(damaged, copy_);
-  EXPECT_EQ(saved.studies, 1U);
-  EXPECT_GE(saved.unreadable_places, 1U);
-  EXPECT_LT(saved.results, kPoints);
-  EXPECT_GT(saved.results, kPoints - 40);
-  EXPECT_THAT(find_faults(copy_), IsEmpty());
-  EXPECT_THAT(rows_of(copy_), SizeIs(saved.results));
-  EXPECT_TRUE(std::ranges::includes(stored, rows_of(copy_)));
-  Store copy(copy_);
-  const auto studies = copy.studies();
-  EXPECT_EQ(studies.at(0).completed.size(), saved.results);
-  EXPECT_EQ(studies.at(0).state, StudyState::kRunning);
-}
-
-TEST_F(SalvageTest, SalvagingEndsAlsoWhenTheFirstPagesOfATableAreGone) {
-  constexpr std::uint64_t kPoints = 400;
-  for (const std::string damage : {"root of results", "first rows", "root of models"}) {
-    const std::string damaged = folder_.file(damage + ".db");
-    table_ = table_of(kPoints);
-    {
-      Store store(damaged);
-      add_results(store, 0, kPoints, true);
-    }
-    const auto stored = rows_of(damaged);
-    std::int64_t page = page_of(damaged, damage == "root of models" ? "models" : "results");
-    if (damage == "first rows") {
-      page = first_leaf(damaged, page);
-    }
-    overwrite_page(damaged, page);
-    const std::string saved_file = folder_.file(damage + " saved.db");
-    const auto saved = salvage(damaged, saved_file);
-    EXPECT_GE(saved.unreadable_places, 1U) << damage;
-    EXPECT_EQ(saved.results > kPoints - 40, damage == "first rows") << damage << saved.results;
-    EXPECT_TRUE(std::ranges::includes(stored, rows_of(saved_file))) << damage;
-    EXPECT_THAT(find_faults(saved_file), IsEmpty()) << damage;
-  }
-}
-
-TEST_F(SalvageTest, AFlippedByteInAListOfARowIsFoundAndTheRowIsNotSalvaged) {
-  store_.reset();
-  std::ifstream file(path_, std::ios::binary);
-  const std::string bytes(std::istreambuf_iterator<char>(file), {});
-  auto others = rows_of(path_);
-  others.erase(others.begin() + 3);
-  for (const std::string column : {"peaks", "ft_peaks", "phases", "reaction_peaks"}) {
-    std::string text;
-    {
-      const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-      Statement row(database.get(), "SELECT " + column + " FROM results WHERE point = 3");
-      ASSERT_TRUE(row.step());
-      text = row.text(0);
-    }
-    const auto at = bytes.find(text);
-    ASSERT_NE(at, std::string::npos) << column;
-    std::string damaged = bytes;
-    auto& digit = damaged[at + text.find_first_of("123456789")];
-    digit = digit == '1' ? '2' : '1';
-    const std::string damaged_file = folder_.file(column + ".db");
-    std::ofstream(damaged_file, std::ios::binary) << damaged;
-    EXPECT_THAT(find_faults(damaged_file), testing::Contains(HasSubstr("point 3"))) << column;
-    const std::string saved_file = folder_.file(column + " saved.db");
-    EXPECT_EQ(salvage(damaged_file, saved_file).unreadable_places, 1U) << column;
-    EXPECT_EQ(rows_of(saved_file), others) << column;
-  }
-}
-
-TEST_F(SalvageTest, AStudyOrModelWithAFlippedByteIsSavedWithItsRows) {
-  store_.reset();
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "UPDATE studies SET created_at = 'x'; UPDATE models SET E = E + 1");
-  EXPECT_EQ(salvage(path_, copy_).results, 5U);
-  EXPECT_THAT(find_faults(copy_), IsEmpty());
-  EXPECT_EQ(Store(copy_).studies().at(0).completed, IntervalSet(0, 5));
-}
-
-TEST_F(SalvageTest, ADatabaseWithoutStudiesOrTablesIsNotSalvaged) {
-  std::ofstream(folder_.file("empty.db"));
-  EXPECT_THROW(salvage(folder_.file("empty.db"), copy_), StorageError);
-  EXPECT_THROW(salvage(folder_.file("nowhere.db"), copy_), StorageError);
-  EXPECT_FALSE(std::filesystem::exists(copy_));
-}
-
-TEST_F(SalvageTest, ASoundDatabaseIsSalvagedWholeAndNothingIsReplaced) {
-  store_.reset();
-  const auto saved = salvage(path_, copy_);
-  EXPECT_EQ(saved.results, 5U);
-  EXPECT_EQ(saved.unreadable_places, 0U);
-  EXPECT_EQ(rows_of(copy_), rows_of(path_));
-  EXPECT_THROW(salvage(path_, copy_), StorageError) << "it exists";
-}
-
-TEST_F(SalvageTest, OfATruncatedFileEveryRowThatIsLeftIsSavedAndTheFileStaysAsItIs) {
+TEST_F(SalvageTest, WhatCanBeReadOfADamagedFileIsSavedAndTheRestIsPendingAgain) {
   constexpr std::uint64_t kPoints = 1500;  // with some more the root of their tree splits
   const std::string whole = folder_.file("whole.db");
   table_ = table_of(kPoints);
@@ -195,28 +72,68 @@ TEST_F(SalvageTest, OfATruncatedFileEveryRowThatIsLeftIsSavedAndTheFileStaysAsIt
     for (std::uint64_t first = 0; first < kPoints; first += 100) {
       add_results(store, first, first + 100, first == 0);
     }
+    store.commit(std::vector<Change>{SetStudyState{1, StudyState::kDone, "now"}});
   }
   const auto stored = rows_of(whole);
   const auto size = std::filesystem::file_size(whole);
-  // In the middle of a page, at its end, and so that little more than the tables' heads is left.
-  for (const std::uintmax_t cut :
-       {size / 100 * 99 + 7, size / kPageBytes * 3 / 4 * kPageBytes, size / 6}) {
-    const std::string name = std::to_string(cut);
-    const std::string truncated = folder_.file(name + ".db");
-    const std::string saved_file = folder_.file(name + " saved.db");
-    std::filesystem::copy_file(whole, truncated);
-    std::filesystem::resize_file(truncated, cut);
-    const auto saved = salvage(truncated, saved_file);
-    const double share = static_cast<double>(cut) / static_cast<double>(size);
-    // Upper pages of the rows' tree lie behind lower ones, which cannot be found without them.
-    EXPECT_GE(static_cast<double>(saved.results), (share - 0.2) * kPoints) << cut;
-    EXPECT_LT(saved.results, kPoints) << cut;
-    EXPECT_GE(saved.unreadable_places, 1U) << cut;
-    EXPECT_THAT(rows_of(saved_file), SizeIs(saved.results)) << cut;
-    EXPECT_TRUE(std::ranges::includes(stored, rows_of(saved_file))) << cut;
-    EXPECT_THAT(find_faults(saved_file), IsEmpty()) << cut;
-    EXPECT_EQ(std::filesystem::file_size(truncated), cut);
+  const auto cut_to = [](std::uintmax_t bytes) {
+    return [bytes](const std::string& file) { std::filesystem::resize_file(file, bytes); };
+  };
+  const struct {
+    const char* what;
+    std::function<void(const std::string&)> damage;
+    double least_share;  ///< of the rows. Upper pages of a tree are behind lower ones.
+  } cases[] = {{"one page of rows",
+                [&](const auto& file) {
+                  overwrite_page(file, static_cast<std::int64_t>(size) / 2 / kPageBytes + 1);
+                },
+                0.95},
+               {"root of results",
+                [](const auto& file) { overwrite_page(file, page_of(file, "results")); }, 0.0},
+               {"root of models",
+                [](const auto& file) { overwrite_page(file, page_of(file, "models")); }, 0.0},
+               {"cut in a page", cut_to(size / 100 * 99 + 7), 0.79},
+               {"cut at a page", cut_to(size / kPageBytes * 3 / 4 * kPageBytes), 0.55},
+               {"cut to a sixth", cut_to(size / 6), 0.0}};
+  for (const auto& [what, damage, least_share] : cases) {
+    const std::string damaged = folder_.file(std::string(what) + ".db");
+    const std::string saved_file = folder_.file(std::string(what) + " saved.db");
+    std::filesystem::copy_file(whole, damaged);
+    damage(damaged);
+    const auto damaged_size = std::filesystem::file_size(damaged);
+    const auto saved = salvage(damaged, saved_file);
+    EXPECT_EQ(saved.studies, 1U) << what;
+    EXPECT_GE(saved.unreadable_places, 1U) << what;
+    EXPECT_GE(static_cast<double>(saved.results), least_share * kPoints) << what;
+    EXPECT_LT(saved.results, kPoints) << what;
+    EXPECT_THAT(rows_of(saved_file), SizeIs(saved.results)) << what;
+    EXPECT_TRUE(std::ranges::includes(stored, rows_of(saved_file))) << what;
+    EXPECT_THAT(find_faults(saved_file), IsEmpty()) << what;
+    EXPECT_EQ(std::filesystem::file_size(damaged), damaged_size) << what;
+    const auto study = Store(saved_file).studies().at(0);
+    EXPECT_EQ(study.completed.size(), saved.results) << what;
+    EXPECT_EQ(study.state, StudyState::kRunning) << what;
   }
+}
+
+TEST_F(SalvageTest, ADamagedRowIsNotSavedButAStudyOrModelWithADamagedValueIsWithItsRows) {
+  store_.reset();
+  auto others = rows_of(path_);
+  others.erase(others.begin() + 3);
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE studies SET created_at = 'x'; UPDATE models SET E = E + 1;"
+          "UPDATE results SET peaks = replace(peaks, '1', '2') WHERE point = 3");
+  EXPECT_EQ(salvage(path_, copy_).unreadable_places, 1U);
+  EXPECT_EQ(rows_of(copy_), others);
+  EXPECT_THAT(find_faults(copy_), IsEmpty());
+}
+
+TEST_F(SalvageTest, ASoundDatabaseIsSalvagedWhole) {
+  store_.reset();
+  const auto saved = salvage(path_, copy_);
+  EXPECT_EQ(saved.results, 5U);
+  EXPECT_EQ(saved.unreadable_places, 0U);
+  EXPECT_EQ(rows_of(copy_), rows_of(path_));
 }
 
 TEST_F(SalvageTest, RowsThatAreOnlyInTheLogAreSavedTooAndTheLogStaysAsItIs) {

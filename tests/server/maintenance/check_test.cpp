@@ -25,10 +25,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST_F(MaintenanceTest, ASoundDatabaseHasNoFaults) {
-  EXPECT_THAT(find_faults(path_), IsEmpty());
-}
-
 TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
   protocol::PointResult result = solved_point(5, *table_);
   result.set_mu(std::nextafter(result.mu(), 1.0));
@@ -76,12 +72,15 @@ TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
   }
 }
 
-TEST_F(MaintenanceTest, AStudyOrModelThatWasChangedIsFound) {
+TEST_F(MaintenanceTest, AStudyOrModelThatWasChangedAndAReferenceToNoStudyAreFound) {
   store_.reset();
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  execute(database.get(), "UPDATE studies SET created_at = 'b'; UPDATE models SET E = E + 1");
+  execute(database.get(),
+          "UPDATE studies SET created_at = 'b'; UPDATE models SET E = E + 1;"
+          "INSERT INTO reused_points VALUES (7, 'b', 1)");
   EXPECT_THAT(find_faults(path_),
-              ElementsAre("model 1: it is not the one that was stored", HasSubstr("study 1, a")));
+              ElementsAre("table reused_points: refers to study number 7, which does not exist",
+                          "model 1: it is not the one that was stored", HasSubstr("study 1, a")));
 }
 
 TEST_F(MaintenanceTest, ADamagedDatabaseIsRefusedWithTheWayOut) {
@@ -107,7 +106,7 @@ TEST_F(MaintenanceTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) 
 TEST_F(MaintenanceTest, EveryTableThatIsMissingOrHasOtherColumnsIsNamed) {
   store_.reset();
   for (const std::string table : {"about", "studies", "models", "workers", "results",
-                                  "completed_ranges", "reused_points", "deletions", "retries"}) {
+                                  "completed_ranges", "reused_points", "deletions"}) {
     for (const std::string change : {"DROP TABLE ", "ALTER TABLE "}) {
       const std::string copy = folder_.file("changed_" + table + ".db");
       std::filesystem::copy_file(path_, copy, std::filesystem::copy_options::overwrite_existing);
@@ -119,16 +118,6 @@ TEST_F(MaintenanceTest, EveryTableThatIsMissingOrHasOtherColumnsIsNamed) {
       EXPECT_THROW(Store{copy}, StorageError);
     }
   }
-}
-
-TEST_F(MaintenanceTest, ARowOfAWorkerOrStudyThatDoesNotExistIsNamed) {
-  store_.reset();
-  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  execute(database.get(), "UPDATE results SET worker_id = 99, checksum = NULL WHERE point = 2");
-  EXPECT_THAT(find_faults(path_), ElementsAre("study a, point 2: its worker does not exist"));
-  execute(database.get(), "INSERT INTO reused_points VALUES (7, 'b', 1)");
-  EXPECT_THAT(find_faults(path_),
-              Contains("table reused_points: refers to study number 7, which does not exist"));
 }
 
 TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemedy) {
@@ -143,12 +132,6 @@ TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemed
   }
   execute(database.get(), "UPDATE studies SET counted = 0, state = 'done'");
   EXPECT_THAT(find_faults(path_), ElementsAre("study a is done: 5 of 10 points have a result"));
-}
-
-TEST_F(MaintenanceTest, RowsWithoutChecksumsAreCounted) {
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "UPDATE results SET checksum = NULL WHERE point < 2");
-  EXPECT_THAT(diagnose(path_).remarks, Contains(HasSubstr("2 of 5 results have no checksum")));
 }
 
 /// Three points, the last of them failed; their rows have no checksums.
@@ -187,9 +170,12 @@ TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResult
       {"peaks = replace(peaks, ']', '')", "one of its lists cannot be read"},
       {"phases = '[inf]'", "one of its lists cannot be read"},
       {"impulse_n_Ns = NULL", "outputs are missing"},
-      {"error = 'none'", "point 1: it is failed, and has outputs"}};
+      {"error = 'none'", "point 1: it is failed, and has outputs"},
+      {"model_id = 7", "point 1: its model does not exist"},
+      {"worker_id = 7", "point 1: its worker does not exist"}};
   const std::string columns = fmt::format("{}", fmt::join(result_columns(), ", "));
   EXPECT_THAT(find_faults(path_), IsEmpty());
+  EXPECT_THAT(diagnose(path_).remarks, Contains(HasSubstr("3 of 3 results have no checksum")));
   for (const auto& [change, said] : damages) {
     const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
     execute(database.get(),
@@ -216,6 +202,17 @@ TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("it has 5 points, and the study 6")));
   run("UPDATE studies SET points = 5, recipe = x'ff'");
   EXPECT_THAT(find_faults(path_), Contains(HasSubstr("its recipe cannot be read")));
+}
+
+TEST_F(RowFaultsTest, AStudyThatWouldKeepAServerFromStartingIsNamed) {
+  run("CREATE TABLE before AS SELECT * FROM studies");
+  for (const char* change : {"points = 1000000000000000000", "points = -1",
+                             "priority = 9223372036854775807", "name = ''", "name = char(27)",
+                             "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
+    run(std::string("PRAGMA ignore_check_constraints = ON; UPDATE studies SET ") + change);
+    EXPECT_THAT(find_faults(path_), Contains(HasSubstr("study 1, "))) << change;
+    run("DELETE FROM studies; INSERT INTO studies SELECT * FROM before");
+  }
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ TEST_F(MaintenanceTest, AFileOfAnotherSchemaIsRefusedWithBothNumbersAndTheRemedy
       {"backup", [&] { back_up(path_, copy_); }},
       {"salvage", [&] { salvage(path_, copy_); }},
       {"check", [&] { diagnose(path_); }},
-      {"merge from it", [&] { Merger(copy_).merge(path_, {}, [](auto, auto) {}); }},
+      {"merge from it", [&] { Merger(copy_).merge(path_); }},
       {"merge into it", [&] { const Merger merger(path_); }},
       {"describe", [&] { stored_recipe(path_, 1); }},
       {"rename", [&] { rename_study(path_, 1, "b"); }}};

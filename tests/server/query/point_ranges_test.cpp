@@ -53,19 +53,6 @@ TEST(PointRanges, OtherConditionsRestrictNothing) {
   }
 }
 
-TEST(PointRanges, SamplesZipsAndExpressionsRestrictNothing) {
-  auto recipe = cube();
-  recipe.mutable_blocks(0)->set_zip(true);
-  EXPECT_EQ(point_ranges(recipe, "H = 0.5"), (Ranges{{0, 9}}));
-  recipe = cube();
-  recipe.mutable_blocks(0)->mutable_axes(1)->Clear();
-  recipe.mutable_blocks(0)->mutable_axes(1)->set_key("mu");
-  recipe.mutable_blocks(0)->mutable_axes(1)->set_expression("H / 2");
-  EXPECT_EQ(point_ranges(recipe, "mu = 0.1 AND H = 0.5"), (Ranges{{30, 59}}));
-  recipe.mutable_blocks(0)->mutable_sample()->set_count(500);
-  EXPECT_EQ(point_ranges(recipe, "H = 0.5"), (Ranges{{0, 499}}));
-}
-
 TEST(PointRanges, OfHugeStudiesAreFew) {
   const auto recipe = protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});

@@ -26,8 +26,7 @@
 #include "proto/system/descriptor.h"
 #include "proto/system/spawn_plan.h"
 #include "proto/wire/chunk.h"
-#include "server/query/query_rules.h"
-#include "server/query/reader_program.h"
+#include "server/query/reader.h"
 #include "server/store/store.h"
 #include "tests/support/hang_limit.h"
 #include "tests/support/temporary_folder.h"
@@ -254,17 +253,15 @@ TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
 }
 
 TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
+  use_script("printf '\\377\\377\\377\\377\\0\\0\\0\\0'\nexec sleep 1000");
+  EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process that ran the query has ended"))
+      << "its frame is too long";
   const std::string program = use_script("exit 3");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process that ran the query has ended"));
   std::filesystem::remove(program);
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("no process can be started"));
   std::filesystem::create_symlink(OBLIQUE_TEST_READER, program);
   EXPECT_EQ(number_of("SELECT 1"), 1);
-}
-
-TEST_F(QueryPoolTest, AnAnswerThatIsTooLongForAFrameEndsTheReader) {
-  use_script("printf '\\377\\377\\377\\377\\0\\0\\0\\0'\nexec sleep 1000");
-  EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process that ran the query has ended"));
 }
 
 TEST_F(QueryPoolTest, ALongAnswerComesWholeInBoundedChunks) {
@@ -277,41 +274,20 @@ TEST_F(QueryPoolTest, ALongAnswerComesWholeInBoundedChunks) {
   EXPECT_LT(answer.largest, (std::uint64_t{256} << 10U) + 4096);
 }
 
-TEST_F(QueryPoolTest, FirstRowsDoNotWaitForManyMore) {
-  const auto ticket =
-      ask("WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
-          "SELECT i FROM n WHERE i % 1000000 = 1");
-  EXPECT_GT(wait_for_chunks(ticket, 1).rows, 0U);
-}
-
-TEST_F(QueryPoolTest, AClientThatTakesNothingIsSentFourChunks) {
+TEST_F(QueryPoolTest, AClientThatTakesNothingIsSentFourChunksAndLosesItsAnswerAfterTenSeconds) {
   const auto ticket = ask(kLong);
   wait_for_chunks(ticket, kChunksAhead);
   take_all(ask("SELECT 1"));
   EXPECT_EQ(answer(ticket).chunks, kChunksAhead);
+  advance_ms(settings_.patience_ms - 1);
   pool().more(ticket, 1);
   wait_for_chunks(ticket, kChunksAhead + 1);
+  advance_ms(settings_.patience_ms - 1);
   take_all(ask("SELECT 1"));
   EXPECT_EQ(answer(ticket).chunks, kChunksAhead + 1);
-}
-
-TEST_F(QueryPoolTest, AClientThatTakesNothingForTenSecondsLosesItsAnswer) {
-  const auto ticket = ask(kLong);
-  wait_for_chunks(ticket, kChunksAhead);
-  advance_ms(settings_.patience_ms - 1);
-  pool().more(ticket, 1);
-  wait_for_chunks(ticket, kChunksAhead + 1);
-  advance_ms(settings_.patience_ms - 1);
-  take_all(ask("SELECT 1"));
   EXPECT_FALSE(answer(ticket).ended);
   advance_ms(1);
   EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("took no rows for 10 s"));
-}
-
-TEST_F(QueryPoolTest, AnErrorInTheMiddleEndsTheAnswer) {
-  const Answer answer = take_all(ask(std::string(kLong) + " WHERE i < 59000 OR json('{')"));
-  EXPECT_THAT(answer.error, HasSubstr("malformed JSON"));
-  EXPECT_GT(answer.chunks, 5U);
 }
 
 TEST_F(QueryPoolTest, AnAnswerMayNotTakeForever) {
@@ -343,15 +319,6 @@ class QueryQueueTest : public testing::Test {
   QueryQueue queue_{QueueSettings{}};
   std::uint64_t last_ticket_ = 0;
 };
-
-TEST_F(QueryQueueTest, OneClientNeverHasAllReaders) {
-  for (int i = 0; i < 5; ++i) {
-    add("a");
-  }
-  EXPECT_EQ(start(), (Names{"a:1", "a:2"}));
-  add("b");
-  EXPECT_EQ(start(), Names{"b:6"});
-}
 
 TEST_F(QueryQueueTest, ClientsTakeTurnsAndEachIsServedInOrderOfArrival) {
   for (int i = 0; i < 6; ++i) {
@@ -392,16 +359,6 @@ TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
   EXPECT_FALSE(add("d", half));
   start();
   EXPECT_TRUE(add("d", half)) << "running queries do not count";
-}
-
-TEST_F(QueryQueueTest, ARemovedQueryIsNeverStarted) {
-  add("a");
-  add("a");
-  add("b");
-  queue_.remove(1);
-  queue_.remove(3);
-  queue_.remove(99);
-  EXPECT_EQ(start(), Names{"a:2"});
 }
 
 }  // namespace

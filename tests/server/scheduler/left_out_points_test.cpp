@@ -187,7 +187,7 @@ TEST_F(LeftOutPointsTest, OfALeaseThatHasEndedResultsCountAndRangesDoNot) {
 TEST_F(LeftOutPointsTest, AfterARestartTheyAreKnownAndNotHandedOut) {
   IntervalSet settled(0, 90);
   SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_, settled, 3, false, false, {}, "", {}, false, 45});
+  bench.feed(StudyAdded{1, table_, settled, 3, false, false, {}, "", false, 45});
   EXPECT_EQ(bench.scheduler.study(1).solved, 42U);
   EXPECT_EQ(bench.scheduler.study(1).left_out, 45U);
   EXPECT_EQ(bench.join(1, 1).at(0).first_point(), 90U);
@@ -250,11 +250,11 @@ TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutHasNoSolverVersion) {
 
 TEST_F(LeftOutPointsTest, MoreLeftOutPointsThanAreSettledMakeNoHugeNumbers) {
   SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", {}, false, 7});
+  bench.feed(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 7});
   EXPECT_EQ(bench.scheduler.study(1).solved, 0U);
   Scheduler scheduler{trusting()};
-  scheduler.handle(
-      StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", {}, false, 45}, 0);
+  scheduler.handle(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 45},
+                   0);
   EXPECT_EQ(scheduler.study(1).solved, 0U);
   EXPECT_EQ(scheduler.points(1).solved(), 0U);
 }

@@ -1,4 +1,4 @@
-// What many workers cost, counted in looks at workers and not in time.
+// What many workers cost, counted in examined workers and not in time.
 #include <cstdint>
 
 #include <gtest/gtest.h>
@@ -29,11 +29,11 @@ class IdleCrowd : public testing::Test {
 };
 
 TEST_F(IdleCrowd, AMessageOfOneWorkerMakesTheServerLookAtNoOther) {
-  const std::uint64_t before = scheduler_.looks();
+  const std::uint64_t before = scheduler_.examined_workers();
   for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
     scheduler_.handle(HeartbeatReceived{worker, {}}, now_ms_);
   }
-  EXPECT_LE(scheduler_.looks() - before, kWorkers);
+  EXPECT_LE(scheduler_.examined_workers() - before, kWorkers);
   scheduler_.check_invariants();
 }
 
@@ -62,7 +62,7 @@ TEST_F(IdleCrowd, APausedStudyThatGoesOnIsHandedOutAtOnce) {
 }
 
 TEST(ManyStudies, ThatRestCostDispatchNothing) {
-  const auto looks_with = [](StudyId resting) {
+  const auto cost_with = [](StudyId resting) {
     Scheduler scheduler(trusting());
     for (StudyId study = 1; study <= resting; ++study) {
       StudyAdded event{study, table_of(3), study % 2 == 0 ? IntervalSet(0, 3) : IntervalSet()};
@@ -71,16 +71,16 @@ TEST(ManyStudies, ThatRestCostDispatchNothing) {
     }
     scheduler.handle(WorkerJoined{1, 1}, 0);
     scheduler.handle(StudyAdded{resting + 1, table_of(1000), {}}, 0);
-    const std::uint64_t before = scheduler.looks();
+    const std::uint64_t before = scheduler.examined_workers();
     std::size_t batches = 0;
     for (int i = 0; i < 100; ++i) {
       batches += only<SendBatch>(scheduler.handle(CreditGiven{1, 1}, 0)).size();
       scheduler.handle(Tick{}, i);
     }
     EXPECT_EQ(batches, 100U);
-    return scheduler.looks() - before;
+    return scheduler.examined_workers() - before;
   };
-  EXPECT_EQ(looks_with(10'000), looks_with(10));
+  EXPECT_EQ(cost_with(10'000), cost_with(10));
 }
 
 }  // namespace

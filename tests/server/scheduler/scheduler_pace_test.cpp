@@ -22,18 +22,6 @@ TEST(SchedulerPace, ABatchTakesTheTimeAimedAt) {
   EXPECT_EQ(next.count(), 100U) << "0.1 s at 1 ms a point";
 }
 
-TEST(SchedulerPace, WithMoreWorkersThanTheServerServesAtThatPaceBatchesTakeLonger) {
-  SchedulerSettings settings = by_pace_alone();
-  settings.most_batches_per_s = 20.0;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  const SendBatch first = bench.join(1, 1).at(0);
-  for (WorkerId worker = 2; worker <= 8; ++worker) {
-    bench.join(worker, 0);
-  }
-  EXPECT_EQ(bench.next_after(first, 1e-3).count(), 400U) << "8 workers, each a batch in 0.4 s";
-}
-
 TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;

@@ -56,35 +56,6 @@ TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
   EXPECT_EQ(last_reply().change().study().state(), "done");
 }
 
-TEST_F(ServiceTest, TheAttemptGoesOnCountingAfterARetryAlsoWhenTheServerStartedAgainBetween) {
-  submit("a", 1);
-  hello();
-  credit(3);
-  for (std::uint32_t attempt = 1; attempt <= 3; ++attempt) {
-    ASSERT_TRUE(last_message().has_batch());
-    EXPECT_EQ(last_message().batch().attempt(), attempt);
-    answer_batch(0);
-    request(change_request("a", protocol::STUDY_CHANGE_RETRY));
-    write_all();
-  }
-  StoredStudy stored{};
-  stored.study_id = 1;
-  stored.name = "a";
-  stored.table = table_of(2);
-  stored.attempts.set({1, 2}, 4);
-  start({}, {stored});
-  hello();
-  ports_.worker_messages.clear();
-  credit(2);
-  std::map<std::uint64_t, std::uint32_t> attempts;
-  for (const auto& message : ports_.worker_messages) {
-    if (message.has_batch()) {
-      attempts[points_of(message.batch()).front()] = message.batch().attempt();
-    }
-  }
-  EXPECT_EQ(attempts, (std::map<std::uint64_t, std::uint32_t>{{0, 1}, {1, 5}}));
-}
-
 TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingMoreIsAcknowledgedAndEverybodyIsTold) {
   submit("a");
   hello_and_credit();

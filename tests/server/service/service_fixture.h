@@ -10,7 +10,7 @@
 
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "server/query/reader_program.h"
+#include "server/query/query_pool.h"
 #include "server/service/service.h"
 #include "tests/support/points.h"
 

@@ -66,9 +66,7 @@ TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
   EXPECT_THAT(last_reply().error().message(), HasSubstr("disk is full"));
 }
 
-TEST_F(ServiceTest, AWorkerWithoutASolverVersionOrWithOtherOutputsIsRefused) {
-  hello("worker", "");
-  EXPECT_THAT(last_message().refused().reason(), HasSubstr("its solver has version"));
+TEST_F(ServiceTest, AWorkerWithOtherOutputsIsRefused) {
   for (const std::string& outputs : {std::string(), protocol::sent_outputs() + " new_N"}) {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
     message.mutable_hello()->set_outputs(outputs);

@@ -15,7 +15,7 @@ constexpr auto kCancelled = StudyState::kCancelled;
 constexpr auto kDone = StudyState::kDone;
 
 StudyRecord record_of(const std::string& name) {
-  return {name, table_of(10), "2026-01-01T00:00:00.000Z", {}, {}, {}, 0};
+  return {name, table_of(10), "2026-01-01T00:00:00.000Z", {}, {}, 0};
 }
 
 StoredStudy stored(StudyState state, std::uint64_t completed) {
@@ -99,17 +99,13 @@ TEST_F(StudyStatesTest, OpenStudiesAreCountedWithTheirPoints) {
   EXPECT_EQ(states_.counts(), (std::array<std::uint64_t, kStudyStates>{0, 0, 1, 0}));
 }
 
-TEST_F(StudyStatesTest, FailuresAreKnownWithTheirAttemptsAndAttemptsOutliveForgetting) {
-  states_.point_failed(1, 3, 2);
-  states_.point_failed(1, 5, 1);
+TEST_F(StudyStatesTest, FailuresAreKnownUntilTheyAreForgotten) {
+  states_.point_failed(1, 3);
+  states_.point_failed(1, 5);
   EXPECT_EQ(states_.record(1).failures.size(), 2U);
   states_.forget_failures(1, IntervalSet(3, 4), 99);
   EXPECT_EQ(states_.record(1).failures, IntervalSet(5, 6));
   EXPECT_EQ(states_.record(1).since_ms, 99);
-  std::vector<std::uint32_t> attempts;
-  states_.record(1).attempts.for_each(
-      [&](const Interval&, std::uint32_t attempt) { attempts.push_back(attempt); });
-  EXPECT_EQ(attempts, (std::vector<std::uint32_t>{2, 1}));
 }
 
 TEST(RestoredStudy, HasTheStateOfTheDatabaseUnlessRowsOfADoneStudyAreLost) {

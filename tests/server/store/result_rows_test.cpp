@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -15,7 +14,6 @@
 namespace oblique::server {
 namespace {
 
-using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::UnorderedElementsAreArray;
@@ -51,34 +49,6 @@ TEST_F(ResultRowsTest, ColumnsAreThoseOfTheTable) {
   std::erase(columns, "checksum");
   std::erase(columns, "model_id");
   EXPECT_THAT(columns, UnorderedElementsAreArray(model_columns()));
-}
-
-TEST_F(ResultRowsTest, EveryOutputIsAColumnOfItsTypeAndTheViewForPeopleShowsIt) {
-  const auto shown = columns_of("runs");
-  const auto typed = rows("SELECT name || ' ' || type FROM pragma_table_info('results')");
-  const auto expect = [&](std::string_view column, const std::string& type) {
-    EXPECT_THAT(typed, Contains(fmt::format("{} {}", column, type)));
-    EXPECT_THAT(shown, Contains(std::string(column)));
-  };
-  solver::for_each_stored<double>(
-      [&](const auto& field, const auto&) { expect(field.column, "REAL"); });
-  solver::for_each_stored<std::int64_t>(
-      [&](const auto& field, const auto&) { expect(field.column, "INTEGER"); });
-  solver::for_each_stored<std::string>(
-      [&](const auto& field, const auto&) { expect(field.column, "TEXT"); });
-  for (const auto& field : solver::result_fields()) {
-    if (field.sent_with != solver::SentWith::kResult) {
-      EXPECT_THAT(shown, Contains(std::string(field.column)));
-    }
-  }
-  for (const solver::ResultList* list : solver::result_lists()) {
-    expect(list->column, "TEXT");
-    std::vector<std::string> members{"study_id", "point", "seq"};
-    members.insert(members.end(), list->members.begin(), list->members.end());
-    if (list->column != "ft_peaks") {
-      EXPECT_THAT(columns_of(std::string(list->column)), UnorderedElementsAreArray(members));
-    }
-  }
 }
 
 TEST_F(ResultRowsTest, ScalarsKeepEveryBit) {
@@ -186,19 +156,6 @@ TEST_F(ResultRowsTest, AFailedPointHasAReasonAndNoOutputs) {
   EXPECT_THAT(
       rows(fmt::format("SELECT coalesce({}) IS NULL FROM runs", fmt::join(output_columns(), ", "))),
       ElementsAre("1"));
-}
-
-TEST_F(ResultRowsTest, ARowThatBreaksARuleOfTheTableIsAnError) {
-  store();
-  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-  ResultInsert insert(database.get());
-  const AddResults change = results_of(study_of(1), {});
-  protocol::Point inputs{0, std::numeric_limits<double>::quiet_NaN(), 0.5, 1.0};
-  EXPECT_THROW(insert.run(change, solved_point(0), inputs, 1), StorageError)
-      << "SQLite stores a NaN as NULL";
-  inputs.H_m = 1.0;
-  insert.run(change, solved_point(0), inputs, 1);
-  EXPECT_THAT(rows("SELECT status, count(*) FROM results"), ElementsAre("solved|1"));
 }
 
 TEST_F(ResultRowsTest, AGridTakesLessThan850BytesAPointWithAllIndices) {

@@ -110,13 +110,6 @@ class GroupCommitTest : public testing::Test {
   std::deque<WriteJob> jobs_;
 };
 
-TEST_F(GroupCommitTest, AFailureIsAnsweredToAClientThatWaits) {
-  storage_.is_full = true;
-  jobs_ = {answered(1)};
-  EXPECT_THAT(write(), ElementsAre(report(Kind::kRefused, 1)));
-  EXPECT_THAT(jobs_, IsEmpty());
-}
-
 TEST_F(GroupCommitTest, OneBadChangeDoesNotBlockTheOthers) {
   storage_.on_change = [](const Change& change) {
     if (std::holds_alternative<SetStudyState>(change)) {
@@ -199,16 +192,6 @@ TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone
   EXPECT_EQ(jobs_.size(), 2U) << "they count as lost";
   EXPECT_THAT(write(), IsEmpty()) << "reported once, never tried again";
   EXPECT_THAT(storage_.sizes, ElementsAre(2));
-}
-
-TEST_F(GroupCommitTest, JobsThatAreTriedAloneAreKeptWhenTheFileGoes) {
-  storage_.on_change = [this](const Change&) {
-    storage_.is_gone = true;  // before the next commit
-    throw StorageError("the disk is full");
-  };
-  jobs_ = {kept(1), kept(2)};
-  EXPECT_THAT(write(), ElementsAre(report(Kind::kGone)));
-  EXPECT_EQ(jobs_.size(), 2U) << "they count as lost";
 }
 
 TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
@@ -320,24 +303,9 @@ TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
   EXPECT_EQ(writer_.finish(), 1U) << "it is not durable";
 }
 
-TEST_F(WriterTest, FinishingReturnsHowManyChangesWereNotMadeDurable) {
-  storage_.is_full = true;
-  writer_.submit(kept(1));
-  writer_.submit(kept(2));
-  EXPECT_EQ(writer_.finish(), 2U);
-  EXPECT_EQ(storage_.merges, 0);
-}
-
-TEST_F(WriterTest, TheEndMergesTheLogAfterSomeAttempts) {
-  storage_.merged_at = 3;
-  writer_.submit(kept(1));
-  EXPECT_EQ(writer_.finish(), 0U);
-  EXPECT_EQ(storage_.merges, 3);
-  EXPECT_EQ(count(Kind::kUnmerged), 0U);
-}
-
-TEST_F(WriterTest, ALogThatReadersKeepIsReportedAtTheEnd) {
+TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsOneThatReadersKeep) {
   storage_.merged_at = 1'000'000;
+  writer_.submit(kept(1));
   EXPECT_EQ(writer_.finish(), 0U);
   EXPECT_GE(storage_.merges, 3);
   EXPECT_EQ(count(Kind::kUnmerged), 1U);
@@ -354,17 +322,6 @@ TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWithoutAny) {
     EXPECT_EQ(wait_for_ticket(ticket), Kind::kStored) << "written meanwhile";
   }
   EXPECT_EQ(writer_.finish(), 0U);
-}
-
-TEST_F(WriterTest, RowsThatAnEarlierProcessLeftAreDeletedWhenItIsTold) {
-  storage_.parts_left = 3;
-  writer_.submit(kept(1));
-  ASSERT_EQ(wait_for_ticket(1), Kind::kStored);
-  EXPECT_EQ(storage_.parts_left, 3) << "others may still use the storage";
-  writer_.resume_deletions();
-  while (storage_.parts_left > 0) {
-    std::this_thread::yield();
-  }
 }
 
 }  // namespace

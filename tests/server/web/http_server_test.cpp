@@ -1,14 +1,18 @@
 // Over real sockets of the loopback device, with what sound and hostile peers send.
 #include "server/web/http/http_server.h"
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <random>
 #include <stdexcept>
 #include <vector>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "tests/server/web/raw_http.h"
 
@@ -20,22 +24,28 @@ using testing::Not;
 
 const std::string kEnd = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
-/// Repeats the path of a request. /wait is answered after `open`, /wrong and /broken throw, /loud
-/// and /quiet are streams that always, or never, have more.
+/// Repeats the path of a request; /large does so at length. /wait is answered after `open`, /wrong
+/// and /broken throw, /loud and /quiet are streams that always, or never, have more.
 class EchoServer {
  public:
   explicit EchoServer(const HttpLimits& limits = {})
       : server_({"127.0.0.1", "*"}, {}, limits,
                 {[this](const HttpRequest& request) { return answer(request); },
-                 [](const HttpRequest&) { return text_answer(405, "no changes"); }}) {}
+                 [](const HttpRequest&) { return text_answer(405, "no changes"); },
+                 [this] { return std::chrono::steady_clock::time_point() + passed_.load(); }}) {}
 
   const std::string& url() const { return server_.url(); }
   void open() {
     is_open_ = true;
     server_.wake();
   }
+  void let_pass(std::chrono::seconds time) {
+    passed_ = passed_.load() + time;
+    server_.wake();
+  }
   /// Number of pending answers and streams.
   long in_progress() const { return token_.use_count() - 1; }
+  static constexpr std::size_t kLargeBytes = 50'000'000;  // more than sockets buffer
   /// Wakes the server, as its owner does regularly, until that many are in progress.
   void wake_until_in_progress(long count) {
     while (in_progress() != count) {
@@ -53,6 +63,9 @@ class EchoServer {
       throw std::runtime_error("a broken disk");
     }
     HttpAnswer answer = text_answer(200, path);
+    if (path == "/large") {
+      answer.body.resize(kLargeBytes, 'x');
+    }
     if (path == "/wait") {
       return [this, answer, token = token_] {
         return is_open_ ? std::optional(answer) : std::nullopt;
@@ -67,6 +80,7 @@ class EchoServer {
   }
 
   std::atomic<bool> is_open_ = false;
+  std::atomic<std::chrono::seconds> passed_ = std::chrono::seconds(0);
   std::shared_ptr<int> token_ = std::make_shared<int>();
   HttpServer server_;  // last: its thread uses the others
 };
@@ -209,6 +223,43 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   EXPECT_FALSE(quiet.has_news()) << "it takes all that there is";
 }
 
+TEST(HttpServer, APeerWithoutEndIsEnded) {
+  HttpLimits limits;
+  limits.idle = test::kHangLimit;
+  EchoServer server(limits);
+  RawHttp waiting(server.url());
+  waiting.send("GET /wait" + kEnd);
+  RawHttp quiet(server.url());
+  quiet.send("GET /quiet" + kEnd);
+  quiet.read_until("\r\n\r\n");
+  server.wake_until_in_progress(2);
+  std::vector<std::unique_ptr<RawHttp>> uploading;
+  for (int i = 0; i < 2; ++i) {
+    uploading.push_back(std::make_unique<RawHttp>(server.url()));
+    uploading.back()->send(
+        "GET /a HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\nContent-Length: 8192\r\n"
+        "\r\n");
+    uploading.back()->read_until("\r\n\r\n");
+  }
+  RawHttp large(server.url());
+  large.send("GET /large" + kEnd);
+  large.read_until("\r\n\r\n");
+  RawHttp halting(server.url());
+  halting.send("GET / HTTP/1.1\r\n");
+  get(server.url(), "/a");  // all before it were accepted
+  server.let_pass(limits.idle);
+  EXPECT_EQ(halting.read_to_the_end(), "");
+  EXPECT_EQ(body_of(uploading.front()->ask(std::string(8192, 'x'))), "/a\n");
+  uploading.back()->send("x");
+  server.let_pass(std::chrono::seconds(2));
+  EXPECT_EQ(uploading.back()->read_to_the_end(), "");
+  server.let_pass(std::chrono::seconds(EchoServer::kLargeBytes / limits.least_bytes_a_second));
+  EXPECT_LT(large.read_to_the_end().size(), EchoServer::kLargeBytes);
+  EXPECT_EQ(server.in_progress(), 2);
+  EXPECT_FALSE(waiting.has_news());
+  EXPECT_FALSE(quiet.has_news());
+}
+
 TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
   EchoServer server;
   RawHttp staying(server.url());
@@ -277,6 +328,25 @@ TEST(HttpServer, StopsWhileRequestsWait) {
   EXPECT_EQ(waiting.read_to_the_end(), "");
   EXPECT_EQ(silent.read_to_the_end(), "");
   EXPECT_EQ(body_of(streaming.read_to_the_end()), "");
+}
+
+TEST(HttpServer, DoesNotListenElsewhereWithoutDescriptors) {
+  rlimit usual{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
+  rlimit one = usual;
+  {
+    const protocol::Descriptor next(::fcntl(0, F_DUPFD_CLOEXEC, 0));
+    one.rlim_cur = static_cast<rlim_t>(next.number()) + 1;
+  }
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &one), 0);
+  std::string fault;
+  try {
+    const EchoServer server;
+  } catch (const std::runtime_error& error) {
+    fault = error.what();
+  }
+  ::setrlimit(RLIMIT_NOFILE, &usual);
+  EXPECT_THAT(fault, HasSubstr("cannot listen at http://127.0.0.1:"));
 }
 
 TEST(HttpServer, NamesAnAddressThatIsTaken) {

@@ -46,66 +46,37 @@ class SlurmAutoscaleTest : public SlurmTest {
       return listed_jobs() == count;
     });
   }
-
-  static void wait_until_said(const Process& client, const std::string& words) {
-    wait_until("autoscale says: " + words + "; it said: " + client.err(),
-               [&] { return client.err().find(words) != std::string::npos; });
-  }
-
-  static std::vector<std::string> quickly() {
-    return {"--poll", "0.2", "--cool-down", "1", "--target", "1", "--forget", "2"};
-  }
-
-  static std::vector<std::string> quickly(const std::vector<std::string>& more) {
-    auto all = quickly();
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  }
 };
 
-TEST_F(SlurmAutoscaleTest, WorkersComeUpFromNoneAndAreRetiredToTheMinimumWhenTheQueueIsEmpty) {
-  Process scaling(folder_, client_program(), autoscale(quickly({"--max", "2"})), environment());
+TEST_F(SlurmAutoscaleTest, JobsComeUpForAStudyAndEndByThemselvesWhenItIsDone) {
+  auto variables = environment();
+  variables["OBLIQUE_WORKER_IDLE_EXIT"] = "3";
+  const auto half = std::to_string(static_cast<int>(kPoints / 2) + 1);
+  Process scaling(folder_, client_program(),
+                  autoscale({"--max", "4", "--points-per-job", half, "--interval", "0.2"}),
+                  variables);
   submit_study();
   wait_until_done();
   wait_for_jobs(0);
   expect_each_point_once();
   scaling.send(SIGINT);
   EXPECT_EQ(scaling.wait(), 130);
-  EXPECT_NE(scaling.err().find("submitted: job"), std::string::npos) << scaling.err();
-  EXPECT_NE(scaling.err().find("asked to leave:"), std::string::npos) << scaling.err();
+  EXPECT_NE(scaling.err().find("submitting 2 jobs"), std::string::npos) << scaling.err();
 }
 
-TEST_F(SlurmAutoscaleTest, OneThatIsStoppedLeavesItsJobsAndTheNextOneFindsThem) {
+TEST_F(SlurmAutoscaleTest, OneThatIsStoppedLeavesItsJobsAndTheNextOneCountsThem) {
   {
-    Process scaling(folder_, client_program(), autoscale(quickly({"--min", "2", "--max", "2"})),
+    Process scaling(folder_, client_program(), autoscale({"--min", "2", "--max", "2"}),
                     environment());
     wait_for_jobs(2);
     scaling.send(SIGINT);
     EXPECT_EQ(scaling.wait(), 130);
-    EXPECT_NE(scaling.err().find("2 jobs go on"), std::string::npos) << scaling.err();
   }
   const auto again = once({"--min", "2", "--max", "2", "--once"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   const auto dry = once({"--min", "3", "--max", "3", "--dry-run"});
-  EXPECT_NE(dry.err.find("would submit a job with: sbatch"), std::string::npos) << dry.err;
+  EXPECT_NE(dry.err.find("would submit 1 job with: sbatch"), std::string::npos) << dry.err;
   EXPECT_EQ(listed_jobs(), 2U);
-  const auto retired = once({"--retire"});
-  EXPECT_EQ(retired.exit_code, 0) << retired.err;
-  EXPECT_EQ(listed_jobs(), 0U);
-}
-
-TEST_F(SlurmAutoscaleTest, JobsThatTheControllerForgotAreForgottenToo) {
-  Process scaling(folder_, client_program(), autoscale(quickly({"--min", "1", "--max", "1"})),
-                  environment());
-  wait_for_jobs(1);
-  cluster_->kill_controller();
-  wait_until_said(scaling, "nothing changes until that is over");
-  cluster_->start_controller(true);
-  wait_until_said(scaling, "the list of jobs is there again");
-  wait_until_said(scaling, "vanished");
-  submit_study();
-  wait_until_done();
-  expect_each_point_once();
 }
 
 }  // namespace

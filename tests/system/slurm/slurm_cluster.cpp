@@ -79,7 +79,7 @@ std::string SlurmCluster::objection() {
 SlurmCluster::SlurmCluster(const TemporaryFolder& folder) : folder_(folder) {
   write_configuration();
   start_authentication();
-  start_controller(false);
+  controller_ = started("slurmctld", {"-D"});
   for (const char* node : {"n1", "n2"}) {
     nodes_.push_back(started("slurmd", {"-D", "-N", node}));
   }
@@ -158,15 +158,6 @@ std::unique_ptr<Process> SlurmCluster::started(const std::string& program,
   std::vector<std::string> words{"--pdeathsig", "KILL", installed(program)};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return std::make_unique<Process>(folder_, installed("setpriv"), words, environment());
-}
-
-void SlurmCluster::kill_controller() {
-  controller_.reset();
-}
-
-void SlurmCluster::start_controller(bool loses_jobs) {
-  controller_ = started("slurmctld", loses_jobs ? std::vector<std::string>{"-D", "-c"}
-                                                : std::vector<std::string>{"-D"});
 }
 
 void SlurmCluster::wait_for_nodes() const {

@@ -41,9 +41,6 @@ class SlurmCluster {
   /// A job that waits until a time begins now.
   void begin_now(const std::string& job) const;
 
-  /// The controller is killed; with `loses_jobs` it starts again without what it knew of them.
-  void kill_controller();
-  void start_controller(bool loses_jobs);
   /// The end of the controller's log, for failures.
   std::string log() const;
 

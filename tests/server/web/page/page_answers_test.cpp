@@ -99,11 +99,18 @@ TEST_F(PageAnswersTest, AStudyIsItsRecipeAndColumns) {
 
 TEST_F(PageAnswersTest, AStudyThatDoesNotExistIsNotFound) {
   submit_grid();
-  for (const std::string path : {"0", "2", "2/slice?z=mode&x=mu", "2/bins?x=mu", "2/points/0"}) {
+  for (const std::string path : {"0", "2", "2/slice?z=mode&x=mu", "2/bins?x=mu", "2/points/0",
+                                 "2/rows", "2/points/0/trace"}) {
     const std::string answer = page_.get("/api/studies/" + path);
     EXPECT_EQ(status_of_answer(answer), 404) << path;
   }
-  EXPECT_THAT(page_.get("/api/studies/2"), HasSubstr("there is no such study"));
+  const std::string sentence = "there is no such study";
+  for (const std::string path : {"2", "2/rows", "2/points/0/trace"}) {
+    EXPECT_THAT(page_.get("/api/studies/" + path), HasSubstr(sentence)) << path;
+  }
+  const std::string unchanged = page_.post("/api/studies/2/pause");
+  EXPECT_EQ(status_of_answer(unchanged), 404);
+  EXPECT_THAT(unchanged, HasSubstr(sentence));
 }
 
 TEST_F(PageAnswersTest, ASliceIsIndexArithmeticOnTheRecipe) {

@@ -10,7 +10,7 @@
 
 #include "proto/frames.h"
 #include "server/query/plan.h"
-#include "server/query/query_rules.h"
+#include "server/query/reader.h"
 #include "server/web/answers/study_answers.h"
 #include "tests/server/web/page/page_study.h"
 

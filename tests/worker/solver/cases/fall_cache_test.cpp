@@ -179,18 +179,6 @@ TEST(FallCacheTest, WhileAnotherThreadSolvesAFallTheNextOnesAreSolved) {
   EXPECT_TRUE(cache.kept_fall(models[2]));
 }
 
-TEST(FallCacheTest, ItIsAtRestUnlessAThreadIsInACall) {
-  bool was_at_rest = true;
-  FallCache cache({}, [&](std::span<const ModelParameters> models) {
-    was_at_rest = cache.is_at_rest();
-    return solve_falls(models);
-  });
-  EXPECT_TRUE(cache.is_at_rest());
-  cache.fall(coarse_model());
-  EXPECT_FALSE(was_at_rest);
-  EXPECT_TRUE(cache.is_at_rest());
-}
-
 TEST(FallCacheTest, TheFallNotUsedForLongestMakesRoomForANewOne) {
   CountedFalls falls({.falls = 2});
   const auto models = models_with_E(3);

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include <pybind11/pybind11.h>
+
+namespace oblique::python {
+
+/// Adds the functions and classes of the extension.
+void add_solving(pybind11::module_& module);
+void add_database(pybind11::module_& module);
+
+/// Releases the interpreter's lock while it exists. If Python ends meanwhile, as it does under a
+/// daemon thread, the thread blocks for good when it would take the lock again: Python ends such a
+/// thread by unwinding its stack, which destructors do not survive.
+class WithoutLock {
+ public:
+  WithoutLock() : state_(PyEval_SaveThread()) {}
+  ~WithoutLock() { take(); }
+  WithoutLock(const WithoutLock&) = delete;
+  WithoutLock& operator=(const WithoutLock&) = delete;
+
+  /// Returns what `call` returns, which runs with the lock.
+  template <class Call>
+  auto with_lock(const Call& call) {
+    take();
+    const struct Release {
+      WithoutLock& without;
+      ~Release() { without.state_ = PyEval_SaveThread(); }
+    } release{*this};
+    return call();
+  }
+
+ private:
+  void take() noexcept;
+
+  PyThreadState* state_;
+};
+
+/// Whether this thread, which has the lock, is the one in which handlers of signals run.
+bool is_main_thread();
+
+/// Throws an error that becomes RuntimeError in the child of a fork: threads and locks of the
+/// parent are not usable there. The module calls it first when it is imported.
+void refuse_forked_child();
+
+/// Thrown by work whose result is no longer wanted.
+class Stopped {};
+
+/// Runs `work` without the interpreter's lock and returns its result. From the main thread, which
+/// signals reach, `work` runs on a thread of its own. If the handler of a signal throws, as that of
+/// Ctrl-C does, `stop` is set, `when_stopped` is called, and the exception is thrown soon after,
+/// even while `work` still runs: it must own all that it uses.
+template <class Result>
+Result interruptibly(const std::function<Result(const std::atomic<bool>& stop)>& work,
+                     const std::function<void()>& when_stopped = {}) {
+  constexpr std::chrono::milliseconds kBetweenSignalChecks{50};
+  constexpr std::chrono::milliseconds kLongestWait{150};
+  refuse_forked_child();
+  const auto stop = std::make_shared<std::atomic<bool>>(false);
+  const bool has_signals = is_main_thread();
+  WithoutLock others_run;
+  if (!has_signals) {
+    return work(*stop);
+  }
+  std::packaged_task<Result()> task([stop, work] { return work(*stop); });
+  auto result = task.get_future();
+  std::thread thread(std::move(task));
+  while (result.wait_for(kBetweenSignalChecks) != std::future_status::ready) {
+    if (others_run.with_lock([] { return PyErr_CheckSignals() == 0; })) {
+      continue;
+    }
+    *stop = true;
+    if (when_stopped) {
+      when_stopped();
+    }
+    const bool has_ended = result.wait_for(kLongestWait) == std::future_status::ready;
+    has_ended ? thread.join() : thread.detach();
+    others_run.with_lock([] { throw pybind11::error_already_set(); });
+  }
+  thread.join();
+  return result.get();
+}
+
+}  // namespace oblique::python

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/model/result_fields.h"
+
+namespace oblique::python {
+
+/// An array that takes over the values.
+template <class T>
+pybind11::array_t<T> array_of(std::vector<T>&& values) {
+  auto* const owned = new std::vector<T>(std::move(values));  // the capsule deletes it
+  const pybind11::capsule owner(owned,
+                                [](void* kept) { delete static_cast<std::vector<T>*>(kept); });
+  return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(owned->size()), owned->data(), owner);
+}
+
+/// Texts of many points; equal ones are stored once.
+class Texts {
+ public:
+  explicit Texts(std::size_t points) : codes_(points, -1) {}
+
+  void set(std::size_t point, std::string_view text);
+  /// The texts, and for each point the index of its text, or -1.
+  pybind11::tuple tuple() const;
+
+ private:
+  std::vector<std::int32_t> codes_;
+  std::map<std::string, std::int32_t, std::less<>> known_;
+  std::vector<std::string> texts_;
+};
+
+/// The outputs of many points, an array each: NaN and no text where there is none.
+class ResultArrays {
+ public:
+  explicit ResultArrays(std::size_t points);
+
+  /// Not from two threads at once; without the interpreter's lock.
+  void set(std::size_t point, const solver::CaseResult& result);
+  void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
+
+  /// The names of `oblique solve --json` with an array for each number, a tuple of Texts for each
+  /// text, and `error`. `lists` has an array for each member of a list, and the `offsets` of
+  /// the points. Moves the numbers out.
+  pybind11::dict dict();
+
+ private:
+  /// One list of many points, in the order in which the points came.
+  struct Elements {
+    const solver::ResultList* list;
+    std::vector<std::uint64_t> begin;  ///< of each point
+    std::vector<std::uint32_t> count;
+    /// One a member; a text is the place of its first element with the same text in `texts`.
+    std::vector<std::vector<double>> members;
+    std::vector<std::string> texts;
+  };
+  static double number_of(Elements& elements, const solver::Cell& cell);
+  static pybind11::dict dict_of(const Elements& elements);
+
+  std::vector<std::vector<double>> numbers_;  ///< by field; empty for fields of other kinds
+  std::map<std::size_t, Texts> texts_;        ///< by field
+  std::vector<Elements> lists_;
+  Texts errors_;
+};
+
+}  // namespace oblique::python

@@ -1,0 +1,279 @@
+// From the rows of a source to a figure.
+#include "client/plot/figure_builder.h"
+
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/plot/study_shape.h"
+#include "client/study/study_file.h"
+#include "proto/wire/chunk.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client::plot {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+using Value = std::variant<std::monostate, double, std::string>;
+using Rows = std::vector<std::vector<Value>>;
+
+/// Answers each query with rows that were made before.
+class MadeRows : public Source {
+ public:
+  explicit MadeRows(std::vector<std::string> columns, Rows rows) {
+    protocol::ChunkWriter writer(columns);
+    for (const auto& row : rows) {
+      for (const auto& value : row) {
+        if (const auto* number = std::get_if<double>(&value)) {
+          writer.real(*number);
+        } else if (const auto* text = std::get_if<std::string>(&value)) {
+          writer.text(*text);
+        } else {
+          writer.null();
+        }
+      }
+      writer.end_row();
+    }
+    answer_ = writer.take();
+    answer_.set_ends(true);
+  }
+  std::unique_ptr<RowStream> rows(protocol::QueryRequest) override {
+    class One : public RowStream {
+     public:
+      explicit One(protocol::QueryReply reply) : reply_(std::move(reply)) {}
+      protocol::QueryReply next() override { return reply_; }
+
+     private:
+      protocol::QueryReply reply_;
+    };
+    return std::make_unique<One>(answer_);
+  }
+  std::vector<protocol::StudyStatus> status(const std::string&, const Tell&) override { return {}; }
+  std::vector<protocol::StudyStatus> status_of(const std::string&, std::uint64_t,
+                                               const Tell&) override {
+    return {};
+  }
+  std::string place() const override { return "made"; }
+
+ private:
+  protocol::QueryReply answer_;
+};
+
+/// The figure that rows make, of a study of H in {0.5, 1} and mu in {1, 2, 3}.
+Figure figure_from(PlotRequest request, const std::vector<std::string>& columns, const Rows& rows) {
+  const auto study = parse_study("name = \"s\"\n[[block]]\nH = [0.5, 1]\nmu = [1, 2, 3]\ne = 1\n",
+                                 "s.toml", [](const auto&...) {});
+  request.study = "s";
+  MadeRows source(columns, rows);
+  return figure_of(source, shape_for(study.recipe, request), request, [](const std::string&) {});
+}
+
+Rows rows_of_numbers(std::size_t count) {
+  Rows rows;
+  for (std::size_t i = 0; i < count; ++i) {
+    rows.push_back({static_cast<double>(i % 7), static_cast<double>(i % 5)});
+  }
+  return rows;
+}
+
+const std::vector<std::string> kMapColumns{"mu", "H", "fn_peak_N", "status"};
+
+TEST(Map, OfNumbersHasACellAPointAndTheScaleOfItsValues) {
+  const Figure figure = figure_from(
+      {.map = "fn_peak_N"}, kMapColumns,
+      {{1.0, 0.5, 10.0, "solved"}, {2.0, 0.5, {}, "failed"}, {3.0, 1.0, 30.0, "solved"}});
+  const Cells& cells = *figure.panels[0].cells;
+  EXPECT_EQ(cells.columns(), 3U);
+  EXPECT_EQ(cells.rows(), 2U);
+  EXPECT_EQ(cells.count(CellState::kSolved), 2U);
+  EXPECT_EQ(cells.count(CellState::kFailed), 1U);
+  EXPECT_EQ(cells.count(CellState::kNoResult), 3U);
+  EXPECT_EQ(figure.colours->range, (Range{10.0, 30.0}));
+  EXPECT_EQ(figure.title, "s: fn_peak_N");
+  EXPECT_EQ(figure.subtitle, "e = 1, 3 points");
+}
+
+TEST(Map, ByLogarithmsLeavesOutWhatHasNone) {
+  const Figure figure = figure_from(
+      {.map = "fn_peak_N", .is_colour_logarithmic = true}, kMapColumns,
+      {{1.0, 0.5, 0.0, "solved"}, {2.0, 0.5, 1.0, "solved"}, {3.0, 1.0, 8.0, "solved"}});
+  EXPECT_EQ(figure.panels[0].cells->count(CellState::kNoValue), 1U);
+  EXPECT_EQ(figure.colours->range, (Range{1.0, 8.0}));
+  EXPECT_THAT(figure.notes, Contains(HasSubstr("1 cell is blank")));
+}
+
+TEST(Map, WithARangeSaysThatThereIsMoreBeyond) {
+  const Figure figure = figure_from({.map = "fn_peak_N", .range = "2:20"}, kMapColumns,
+                                    {{1.0, 0.5, 1.0, "solved"}, {2.0, 0.5, 30.0, "solved"}});
+  EXPECT_EQ(figure.colours->range, (Range{2.0, 20.0}));
+  EXPECT_THAT(figure.notes, Contains(HasSubstr("Values from 1 to 30; those outside the scale")));
+}
+
+TEST(Map, OfNothingAndOfOneValueSaysSo) {
+  const Figure empty = figure_from({.map = "fn_peak_N"}, kMapColumns, {});
+  EXPECT_TRUE(empty.is_empty);
+  EXPECT_THAT(empty.notes, Contains("Nothing to draw: no cell has a value."));
+  const Figure one = figure_from({.map = "fn_peak_N"}, kMapColumns,
+                                 {{1.0, 0.5, 4.0, "solved"}, {2.0, 0.5, 4.0, "solved"}});
+  EXPECT_THAT(one.notes, Contains("All cells have one value: fn_peak_N = 4."));
+}
+
+TEST(Map, OfModesNamesThemByTheirPoints) {
+  const Figure figure = figure_from(
+      {.map = "mode"}, {"mu", "H", "mode", "status"},
+      {{1.0, 0.5, "sC", "solved"}, {2.0, 0.5, "SC", "solved"}, {3.0, 1.0, "SC", "solved"}});
+  const Cells& cells = *figure.panels[0].cells;
+  ASSERT_EQ(cells.categories.size(), 2U);
+  EXPECT_EQ(cells.categories[0].name, "SC");
+  EXPECT_EQ(cells.categories[0].points, 2U);
+  EXPECT_EQ(cells.values[0], 1.0);
+  EXPECT_FALSE(figure.colours);
+  EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("S stick, s slip")));
+}
+
+TEST(Categories, ThoseWithNextToNoPointsAreGathered) {
+  Cells cells{.name = "mode"};
+  std::map<std::string, std::uint64_t> points;
+  for (int i = 0; i < 20; ++i) {
+    const std::string name = "mode " + std::to_string(10 + i);
+    points[name] = i < 15 ? 1000 - static_cast<std::uint64_t>(i) : 1;
+    cells.names.push_back(name);
+    cells.values.push_back(0.0);
+    cells.states.push_back(CellState::kSolved);
+  }
+  Figure figure;
+  add_categories(figure, cells, points, "modes");
+  ASSERT_EQ(cells.categories.size(), kMostCategories + 1);
+  EXPECT_TRUE(cells.categories.back().is_other);
+  EXPECT_EQ(cells.categories.back().name, "8 other modes");
+  EXPECT_EQ(cells.categories.back().points, 988U + 987U + 986U + 5U);
+  EXPECT_EQ(cells.values[19], static_cast<double>(kMostCategories));
+  EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv has all 20")));
+}
+
+TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
+  Rows rows;
+  for (int i = 0; i < 9; ++i) {
+    rows.push_back({1.0, 5.0 + i, 0.1 * i});
+    rows.push_back({2.0, 6.0 + i, 0.1 * i});
+  }
+  const std::vector<std::string> columns{"mu", "fn_peak_N", "e"};
+  const Figure many = figure_from({.lines = "fn_peak_N", .x = "mu", .by = "e"}, columns, rows);
+  EXPECT_TRUE(many.panels[0].curves[0].is_coloured_by);
+  ASSERT_TRUE(many.colours);
+  EXPECT_EQ(many.colours->name, "e");
+  rows.resize(10);
+  const Figure few = figure_from({.lines = "fn_peak_N", .x = "mu", .by = "e"}, columns, rows);
+  EXPECT_FALSE(few.colours);
+  ASSERT_EQ(few.panels[0].curves.size(), 5U);
+  EXPECT_EQ(few.panels[0].curves[2].name, "e = 0.2");
+}
+
+TEST(Lines, CountTheirGaps) {
+  const Figure figure = figure_from({.lines = "fn_peak_N", .x = "mu", .by = "H"},
+                                    {"mu", "fn_peak_N", "H"}, {{1.0, 4.0, 1.0}, {3.0, 5.0, 1.0}});
+  EXPECT_TRUE(std::isnan(figure.panels[0].curves[0].y[1]));
+  EXPECT_THAT(figure.notes, Contains("Gaps in the lines: 1 point is without a value."));
+}
+
+TEST(Scatter, DrawsFewPointsEachAndSaysHowManyLackAValue) {
+  const Figure figure = figure_from({.scatter = "mu,slide_m"}, {"mu", "slide_m"},
+                                    {{1.0, 1.0}, {2.0, {}}, {3.0, 2.0}});
+  EXPECT_EQ(figure.panels[0].dots->x.size(), 3U);
+  EXPECT_THAT(figure.notes, ElementsAre("1 of 3 points lack a value that can be drawn."));
+}
+
+TEST(Scatter, CountsManyPointsInCells) {
+  const Figure figure =
+      figure_from({.scatter = "mu,slide_m"}, {"mu", "slide_m"}, rows_of_numbers(10'000));
+  ASSERT_TRUE(figure.panels[0].cells);
+  double points = 0.0;
+  for (const double value : figure.panels[0].cells->values) {
+    points += std::isnan(value) ? 0.0 : value;
+  }
+  EXPECT_EQ(points, 10'000.0);
+  EXPECT_EQ(figure.panels[0].cells->count(CellState::kNoResult), 0U);
+  EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("10,000 points, gathered in ")));
+}
+
+TEST(Histogram, HoldsEachValueOnceInBinsOfRoundWidth) {
+  for (const std::size_t count : {1U, 2U, 10U, 1000U, 100'000U}) {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < count; ++i) {
+      values.push_back(std::fmod(static_cast<double>(i) * 0.618, 1.0) * 2e-4 + 3e-4);
+    }
+    const Bars bars = binned(values, range_of(values), false);
+    EXPECT_EQ(std::accumulate(bars.heights.begin(), bars.heights.end(), 0.0),
+              static_cast<double>(count));
+    EXPECT_LE(bars.heights.size(), 110U);
+    EXPECT_EQ(bars.edges.size(), bars.heights.size() + 1);
+  }
+}
+
+TEST(Histogram, PutsAValueOnAnEdgeIntoTheBinThatBeginsThere) {
+  std::vector<double> values(30, 0.5);
+  values.insert(values.end(), 30, 0.8);
+  values.insert(values.end(), 30, 1.0);
+  const Bars bars = binned(values, range_of(values), false);
+  for (std::size_t i = 0; i < bars.heights.size(); ++i) {
+    if (bars.heights[i] > 0.0) {
+      EXPECT_TRUE(bars.edges[i] == 0.5 || bars.edges[i] == 0.8 || bars.edges[i] == 1.0)
+          << bars.edges[i];
+    }
+  }
+}
+
+TEST(Histogram, OfLogarithmsAndOfNothingSaysWhatIsLeftOut) {
+  const Figure figure = figure_from({.histogram = "margin", .is_x_logarithmic = true}, {"margin"},
+                                    {{0.0}, {0.1}, {1.0}, {10.0}});
+  EXPECT_THAT(figure.notes, ElementsAre("1 of 4 points have no value, or one outside the axis."));
+  EXPECT_TRUE(figure_from({.histogram = "margin"}, {"margin"}, {}).is_empty);
+}
+
+TEST(Histogram, OfTextsIsLargestFirstAndGathersTheRare) {
+  Rows rows;
+  for (int i = 0; i < 40; ++i) {
+    rows.insert(rows.end(), static_cast<std::size_t>(i + 1), {"mode " + std::to_string(i)});
+  }
+  const Figure figure = figure_from({.histogram = "mode"}, {"mode"}, rows);
+  const Bars& bars = *figure.panels[0].bars;
+  EXPECT_EQ(bars.names.front(), "mode 39");
+  EXPECT_EQ(bars.names.back(), "other: 25");
+  EXPECT_EQ(std::accumulate(bars.heights.begin(), bars.heights.end(), 0.0), 820.0);
+}
+
+TEST(Axes, AreLabelledForPeopleWithTheirUnits) {
+  EXPECT_EQ(axis_of("duration_s", "s").label, "duration of contact [\u00b5s]");
+  EXPECT_EQ(axis_of("duration_s", "s").per_unit, 1e6);
+  EXPECT_EQ(axis_of("mu", "").label, "coefficient of friction \u03bc");
+  EXPECT_EQ(axis_of("ft_peak_N/fn_peak_N", "").label, "ft_peak_N/fn_peak_N");
+  EXPECT_EQ(shown_value(axis_of("H", "m"), 0.96), "H = 0.96 m");
+}
+
+TEST(Edges, LieHalfwayBetweenValues) {
+  EXPECT_THAT(edges_between({1.0, 2.0, 4.0}, false), ElementsAre(0.5, 1.5, 3.0, 5.0));
+  EXPECT_THAT(edges_between({1.0, 4.0}, true),
+              ElementsAre(testing::DoubleEq(0.5), testing::DoubleEq(2.0), testing::DoubleEq(8.0)));
+  EXPECT_THAT(edges_between({0.0}, false), ElementsAre(-0.5, 0.5));
+  EXPECT_THAT(edges_between({}, false), testing::IsEmpty());
+}
+
+TEST(Ranges, LeaveOutWhatHasNoPlaceAndDoNotCrossZeroWhenWidened) {
+  EXPECT_EQ(range_of({2.0, std::nan(""), -1.0, INFINITY}), (Range{-1.0, 2.0}));
+  EXPECT_EQ(range_of({-1.0, 0.0, 3.0, 5.0}, true), (Range{3.0, 5.0}));
+  EXPECT_EQ(widened({1.0, 101.0}, 0.05), (Range{0.0, 106.0}));
+  EXPECT_EQ(Scale({3.0, 3.0}).share_of(3.0), 0.5);
+}
+
+}  // namespace
+}  // namespace oblique::client::plot

@@ -1,0 +1,266 @@
+// Figures as scripts for gnuplot, and what gnuplot makes of them.
+#include "client/plot/gnuplot_script.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/plot/cell_areas.h"
+#include "client/plot/picture_file.h"
+#include "tests/client/plot/figures_of_tests.h"
+#include "tests/support/programs.h"
+
+namespace oblique::client::plot {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+std::string script(const Figure& figure) {
+  return script_of(figure, Terminal::kSvg, {});
+}
+
+std::vector<std::pair<std::string, Figure>> all_figures() {
+  Figure log_lines = test::lines_of(3, 5);
+  log_lines.panels[0].x.is_logarithmic = true;
+  Figure coloured_lines = test::lines_of(9, 5);
+  coloured_lines.colours = axis_of("e", "");
+  for (Curve& curve : coloured_lines.panels[0].curves) {
+    curve.is_coloured_by = true;
+  }
+  return {{"map of numbers", test::gappy_map()},
+          {"map of many numbers", test::map_of(test::counted_cells(150, 150))},
+          {"map of categories", test::category_map()},
+          {"lines", test::lines_of(3, 5)},
+          {"logarithmic lines", log_lines},
+          {"coloured lines", coloured_lines},
+          {"points", test::some_dots()},
+          {"histogram", test::some_bars()},
+          {"histogram of texts", test::named_bars()},
+          {"panels", test::panels()},
+          {"nothing", test::figure_with({})}};
+}
+
+TEST(GnuplotScript, OfALineIsShortAndReadable) {
+  EXPECT_EQ(script_of(test::lines_of(1, 2), Terminal::kSvg, {400, 300}, "picture.svg"),
+            R"(# A picture by `oblique plot`, for gnuplot 5.4 or later.
+# Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.
+set terminal svg size 400,300 font 'DejaVu Sans,12' background '#ffffff'
+set output 'picture.svg'
+set encoding utf8
+set border 15 lc rgb '#556070' lw 1
+set tics out nomirror textcolor rgb '#1b1f24'
+set key noenhanced Left reverse samplen 3.2 spacing 1.15
+set style textbox opaque fillcolor rgb '#ffffff' noborder margins 0.3,0.3
+set xlabel offset 0,0.4
+set cblabel offset 1.2,0
+set grid back lt 1 lc rgb '#d9dfe6' lw 0.8
+unset colorbox
+
+# Title and notes
+set label '{/:Bold*1.25 friction: a picture}' at screen 0.0300, 0.9233 left
+set label 'e = 0.9, 100 points' at screen 0.0300, 0.8583 left noenhanced tc rgb '#555f6b'
+
+# Axes
+set origin 0.0000, 0.0200
+set size noratio 1.0000, 0.8100
+set tmargin at screen 0.7900
+set xlabel 'coefficient of friction μ' noenhanced
+unset logscale x
+set xtics autofreq
+set format x '% h'
+set xrange [0.01:0.02]
+set ylabel 'duration of contact [µs]' noenhanced
+unset logscale y
+set ytics autofreq
+set format y '% h'
+set yrange [0:200]
+set key rmargin top vertical
+$data1 << EOD
+0.01 100 0
+0.02 200 0
+EOD
+plot $data1 using 1:2 with linespoints lc rgb '#0067a5' dt solid pt 6 lw 1.7 ps 0.7 notitle
+)");
+}
+
+TEST(GnuplotScript, LeavesTextsFromOutsideAsTheyAre) {
+  EXPECT_EQ(gnuplot_text("it's\n`rm` \"x\" $y"), "'it\u2019s\\n`rm` \"x\" $y'");
+  Figure figure = test::lines_of(1, 2);
+  figure.title = "a_b^c {x} `rm` it's";
+  EXPECT_THAT(script(figure), HasSubstr("'{/:Bold*1.25 a\\_b\\^c \\{x\\} `rm` it\u2019s}'"));
+  EXPECT_THAT(script(test::named_bars("100 % a_b")), HasSubstr("('100 %% a_b' 0, "));
+}
+
+TEST(GnuplotScript, TellsCellsWithoutAValueApart) {
+  const auto text = script(test::gappy_map());
+  EXPECT_THAT(text, AllOf(HasSubstr("'no result (1)'"), HasSubstr("'left out by --where (1)'"),
+                          HasSubstr("'failed (1)'")));
+  for (const char* number : {"-1", "-2", "-3"}) {
+    EXPECT_THAT(text, HasSubstr("using ($7==" + std::string(number) +
+                                "?$1:NaN):2:3:4:5:6 with boxxyerror fs transparent pattern"));
+  }
+}
+
+TEST(GnuplotScript, OfCategoriesHasPatternsLettersBordersAndPercentages) {
+  const auto text = script(test::category_map());
+  EXPECT_THAT(text, AllOf(HasSubstr("'SC sR (50\u00a0%)'"), HasSubstr("'sC (42\u00a0%)'"),
+                          HasSubstr("'2 other modes (8.3\u00a0%)'"), HasSubstr("'no result (1)'")));
+  EXPECT_THAT(text, AllOf(HasSubstr("set label '{/:Bold A}' at "), HasSubstr("{/:Bold B}' at ")));
+  EXPECT_THAT(text, HasSubstr("using ($7==1?$1:NaN)"));
+  EXPECT_THAT(text, HasSubstr("# Lines between areas\n"));
+}
+
+TEST(GnuplotScript, OfCategoriesLikeNoiseHasColoursAlone) {
+  Figure figure = test::category_map();
+  for (std::size_t i = 0; i < figure.panels[0].cells->values.size(); ++i) {
+    figure.panels[0].cells->values[i] = static_cast<double>((i % 30 * 7 + i / 30 * 11) % 3);
+  }
+  EXPECT_THAT(script(figure), AllOf(Not(HasSubstr("# Lines between areas")),
+                                    Not(HasSubstr("using ($7==1?$1:NaN)"))));
+}
+
+TEST(GnuplotScript, MergesNeighboursOfOneCategory) {
+  const auto text = script(test::category_map());
+  EXPECT_THAT(text, HasSubstr("\n0 0.55 0 1.5 0.55 0.6 0 "));
+}
+
+TEST(GnuplotScript, OfManyCellsIsAnImageAlsoWhereTheyAreUneven) {
+  EXPECT_THAT(script(test::gappy_map()), Not(HasSubstr("with image")));
+  EXPECT_THAT(script(test::map_of(test::counted_cells(150, 150))), HasSubstr("with image"));
+  Cells uneven = test::counted_cells(150, 150);
+  for (double& edge : uneven.x_edges) {
+    edge = 0.1 * edge * edge;
+  }
+  EXPECT_THAT(script(test::map_of(uneven)), HasSubstr("axes x2y2 with image"));
+}
+
+TEST(GnuplotScript, DrawsLinesThatDifferInColourDashesAndMarks) {
+  const auto text = script(test::lines_of(8, 3));
+  std::vector<std::string> styles;
+  for (auto at = text.find("linespoints "); at != std::string::npos;
+       at = text.find("linespoints ", at + 1)) {
+    styles.push_back(text.substr(at, text.find(" lw ", at) - at));
+  }
+  EXPECT_EQ(styles.size(), 8U);
+  std::sort(styles.begin(), styles.end());
+  EXPECT_EQ(std::unique(styles.begin(), styles.end()), styles.end());
+}
+
+TEST(GnuplotScript, HasUnitsAndLogarithmicAxesWithSeveralTicks) {
+  Figure figure = test::lines_of(1, 5);
+  figure.panels[0].x.is_logarithmic = true;
+  figure.panels[0].x.range = {0.01, 2.0};
+  const auto text = script(figure);
+  EXPECT_THAT(text, HasSubstr("set ylabel 'duration of contact [\u00b5s]' noenhanced"));
+  EXPECT_THAT(text, HasSubstr("set logscale x\nset xtics (0.01, 0.02, 0.05, 0.1"));
+  EXPECT_THAT(text, HasSubstr("set yrange [0:500]"));
+}
+
+TEST(GnuplotScript, ShadesPhasesAndStickAndNamesThemOnce) {
+  Figure figure = test::panels();
+  figure.panels[1] = figure.panels[0];
+  const auto text = script(figure);
+  EXPECT_THAT(text, HasSubstr("from 0, graph 0 to 70, graph 1 behind fs solid"));
+  EXPECT_THAT(text, HasSubstr("from 0, graph 0 to 50, graph 1 behind fs transparent pattern"));
+  EXPECT_EQ(text.find("title 'stick'"), text.rfind("title 'stick'"));
+  EXPECT_THAT(text, HasSubstr("title 'published'"));
+}
+
+TEST(GnuplotScript, IsDrawnByGnuplotInEveryFormat) {
+  if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
+  }
+  for (const auto& [name, figure] : all_figures()) {
+    SCOPED_TRACE(name);
+    const auto svg = picture_of(figure, PictureFormat::kSvg);
+    EXPECT_THAT(svg, AllOf(StartsWith("<?xml"), HasSubstr("</svg>")));
+    EXPECT_THAT(picture_of(figure, PictureFormat::kPdf), StartsWith("%PDF"));
+    EXPECT_THAT(picture_of(figure, PictureFormat::kPng), StartsWith("\x89PNG"));
+    EXPECT_THAT(output_of_gnuplot(script_for_terminal(figure, 80, 40, true)), HasSubstr("\x1b["));
+    EXPECT_THAT(output_of_gnuplot(script_for_terminal(figure, 80, 40, false)),
+                AllOf(Not(HasSubstr("\x1b[")), testing::ContainsRegex("[^ \n\f]")));
+  }
+}
+
+TEST(GnuplotScript, RunsNothingThatTextsSay) {
+  if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
+  }
+  const oblique::test::TemporaryFolder folder;
+  const auto made = (folder.path() / "made").string();
+  for (const std::string& text : std::vector<std::string>{
+           "`touch " + made + "`", "'; system('touch " + made + "'); print '", "\"; !touch " + made,
+           "x\n!touch " + made + "\n", "@made $(touch " + made + ")", "%s%n\\", "{/Bold", "EOD"}) {
+    SCOPED_TRACE(text);
+    std::vector<Figure> figures{test::category_map(text), test::named_bars(text),
+                                test::lines_of(2, 3), test::panels()};
+    for (Figure& figure : figures) {
+      figure.title = figure.subtitle = text;
+      figure.notes = {text};
+      for (Panel& panel : figure.panels) {
+        panel.title = panel.x.label = panel.y.label = text;
+        for (Curve& curve : panel.curves) {
+          curve.name = text;
+        }
+      }
+      EXPECT_THAT(picture_of(figure, PictureFormat::kSvg), HasSubstr("</svg>"));
+      EXPECT_FALSE(output_of_gnuplot(script_for_terminal(figure, 80, 40, false)).empty());
+      EXPECT_FALSE(std::filesystem::exists(made));
+    }
+  }
+}
+
+TEST(Gnuplot, ThatFailsSaysWhy) {
+  if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
+  }
+  try {
+    (void)output_of_gnuplot("set terminal svg\nplot nonsense(x)\n");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), AllOf(StartsWith("gnuplot "), HasSubstr("undefined function")));
+  }
+}
+
+TEST(CellAreas, AreConnectedAlongSidesAndHaveTheirLargestSquare) {
+  const auto found = areas_of({0, 0, 1,   //
+                               0, 0, -1,  //
+                               1, 0, 0},
+                              3);
+  ASSERT_EQ(found.areas.size(), 3U);
+  EXPECT_THAT(found.of_cells, ElementsAre(0, 0, 1, 0, 0, CellAreas::kNone, 2, 0, 0));
+  EXPECT_EQ(found.areas[0].side, 2U);
+  EXPECT_EQ(found.areas[0].x, 1.0);
+  EXPECT_EQ(found.areas[0].y, 1.0);
+  EXPECT_EQ(found.areas[1].category, 1);
+}
+
+TEST(PictureFormat, IsThatOfTheFileUnlessItIsNamed) {
+  EXPECT_EQ(picture_format("", "a.svg"), PictureFormat::kSvg);
+  EXPECT_EQ(picture_format("", "a.b/c.PNG"), PictureFormat::kPng);
+  EXPECT_EQ(picture_format("", "a.gp"), PictureFormat::kScript);
+  EXPECT_EQ(picture_format("csv", "a.txt"), PictureFormat::kCsv);
+  EXPECT_EQ(picture_format("", ""), PictureFormat::kSvg);
+}
+
+TEST(PictureSize, IsTwoWholeNumbersThatCanBeRead) {
+  EXPECT_EQ(size_of("480x360").width, 480.0);
+  EXPECT_EQ(size_of("480x360").height, 360.0);
+  for (const char* text : {"", "480", "x", "480x", "0x0", "480.5x360", "1e9x300", "nanx300"}) {
+    EXPECT_ANY_THROW(size_of(text)) << text;
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client::plot

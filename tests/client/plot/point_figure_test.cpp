@@ -1,0 +1,129 @@
+// What pictures of one point show.
+#include <cmath>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/plot/figure_table.h"
+#include "client/plot/gnuplot_script.h"
+#include "client/plot/point_figure.h"
+#include "tests/client/plot/history_of_tests.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client::plot {
+namespace {
+
+using testing::ElementsAre;
+using testing::Field;
+using testing::HasSubstr;
+
+TEST(PointSpans, ArePhasesAndOverThemStick) {
+  const auto spans = spans_of(test::small_history());
+  ASSERT_EQ(spans.size(), 3U);
+  EXPECT_EQ(spans[0].kind, Span::Kind::kCompression);
+  EXPECT_DOUBLE_EQ(spans[0].from, 0.0);
+  EXPECT_DOUBLE_EQ(spans[0].to, 1e-4);
+  EXPECT_EQ(spans[1].kind, Span::Kind::kRestitution);
+  EXPECT_DOUBLE_EQ(spans[1].from, 1e-4);
+  EXPECT_DOUBLE_EQ(spans[1].to, 2e-4);
+  EXPECT_EQ(spans[2].kind, Span::Kind::kStick);
+  EXPECT_DOUBLE_EQ(spans[2].to, 5e-5);
+}
+
+TEST(PointSpans, ThatComeAgainAreSpansOfTheirOwn) {
+  auto history = test::small_history();
+  history.rows[15].state = "SR";
+  const auto spans = spans_of(history);
+  ASSERT_EQ(spans.size(), 4U);
+  EXPECT_DOUBLE_EQ(spans[3].from, 1.5e-4);
+  EXPECT_DOUBLE_EQ(spans[3].to, 1.6e-4);
+}
+
+TEST(PointPanels, OverTimeReachFromTouchToSeparation) {
+  for (const auto panel : {PointPanel::kForces, PointPanel::kDeformation, PointPanel::kVelocities,
+                           PointPanel::kEnergies}) {
+    const Panel drawn = panel_of(test::small_history(), panel);
+    EXPECT_EQ(drawn.x.range, (Range{0.0, 2e-4}));
+    EXPECT_EQ(drawn.x.label, "time since touch [\u00b5s]");
+  }
+}
+
+TEST(PointPanels, HysteresisPartsBranchesAndJoinsThemAtTheTurn) {
+  const auto curves = panel_of(test::small_history(), PointPanel::kLoop).curves;
+  ASSERT_EQ(curves.size(), 2U);
+  EXPECT_EQ(curves[0].name, "compression");
+  ASSERT_EQ(curves[0].x.size(), 12U);  // eleven instants and the gap
+  EXPECT_DOUBLE_EQ(curves[0].y[10], 1000.0);
+  EXPECT_TRUE(std::isnan(curves[0].x[11]));
+  EXPECT_DOUBLE_EQ(curves[1].x[0], curves[0].x[10]);
+  EXPECT_GT(curves[1].x[10], 0.0) << "an indentation is left";
+}
+
+TEST(PointEnergies, WhatTheTipGivesIsLostByPOrIsInTheElement) {
+  const auto history = test::small_history();
+  const auto energies = energies_of(history);
+  EXPECT_DOUBLE_EQ(energies.friction[5], 0.0) << "P sticks";
+  // While it sticks both elements are springs: a half of force times deformation each.
+  const auto& stuck = history.rows[5];
+  EXPECT_NEAR(energies.element[5], 0.5 * stuck.fn_N * (-stuck.uy_m - stuck.ux_m), 1e-12);
+  // In the end the tangential spring is empty, and the normal one has lost 1 - e*^2 of its work.
+  EXPECT_NEAR(energies.element.back(), 0.5 * 1000.0 * 1e-4 * (1.0 - 0.25), 1e-12);
+  EXPECT_GT(energies.friction.back(), 0.0);
+  EXPECT_DOUBLE_EQ(energies.kinetic.back(), -1.0);
+}
+
+TEST(PointShape, HasOneScaleUpwardsAndSideways) {
+  const Figure figure = point_figure(test::small_history(), PointPanel::kShape);
+  EXPECT_TRUE(figure.panels[0].has_equal_aspect);
+  EXPECT_THAT(figure.panels[0].curves,
+              ElementsAre(Field(&Curve::name, "at rest"), Field(&Curve::name, "drop 0.5 m"),
+                          Field(&Curve::name, "at touch"), Field(&Curve::name, "at separation"),
+                          Field(&Curve::name, "ground")));
+  EXPECT_THAT(figure.notes,
+              ElementsAre("From touch to separation no node moves farther than 1 mm."));
+}
+
+TEST(PointFigure, HasSixPanelsOrTheOneThatIsAskedFor) {
+  const Figure all = point_figure(test::small_history(), {});
+  EXPECT_EQ(all.panels.size(), 6U);
+  EXPECT_EQ(all.columns, 2U);
+  EXPECT_EQ(all.title, "Point 3 of a study");
+  const Figure one = point_figure(test::small_history(), PointPanel::kVelocities);
+  ASSERT_EQ(one.panels.size(), 1U);
+  EXPECT_EQ(one.title, "Point 3 of a study: Velocities");
+  EXPECT_FALSE(one.panels[0].spans.empty());
+}
+
+TEST(PointFigure, IsDrawnOfAContactThatIsNone) {
+  auto history = test::small_history();
+  history.rows.resize(1);
+  EXPECT_THAT(script_of(point_figure(history, {}), Terminal::kSvg, {}), HasSubstr("plot "));
+  history.rows.clear();
+  history.falls.clear();
+  EXPECT_THAT(script_of(point_figure(history, {}), Terminal::kSvg, {}), HasSubstr("plot "));
+}
+
+TEST(PointFigure, AsATableHasAllPanels) {
+  const auto csv = csv_of(point_figure(test::small_history(), {}));
+  for (const char* heading :
+       {"line,t_s,force_N\n", "line,minus_uy_m,fn_N\n", "line,t_s,energy_J\n", "line,x_m,y_m\n"}) {
+    EXPECT_THAT(csv, HasSubstr(heading));
+  }
+  EXPECT_THAT(csv, HasSubstr("normal force F_n,0.0001,1000\n"));
+}
+
+TEST(PointPanels, AreFoundByNameAndSuggested) {
+  EXPECT_EQ(point_panel_named(""), std::nullopt);
+  EXPECT_EQ(point_panel_named("shape"), PointPanel::kShape);
+  try {
+    (void)point_panel_named("loops");
+    FAIL();
+  } catch (const solver::InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("--panel loops is not known"));
+    EXPECT_THAT(error.what(), HasSubstr("forces, loop"));
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client::plot
