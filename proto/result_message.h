@@ -24,7 +24,7 @@ inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
 // What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
 // order and without their names, which the worker says once, when it joins.
 
-/// What solving a point gave, without its inputs (proto/recipe/point_inputs.h).
+/// What solving a point gave, without its inputs.
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
 
 /// The result that was made a message; what it does not hold is 0 or empty.

@@ -27,8 +27,8 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags, bool with_single_lengths
 /// either says wrong, `check_reach` included. What only its points tell is left to `judge_points`.
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach);
 
-/// "sweep-" and the first eight digits of the recipe's digest (proto/recipe/canonical.h), so that
-/// the same points name the same study again.
+/// "sweep-" and the first eight digits of the recipe's digest (proto/recipe/model_message.h), so
+/// that the same points name the same study again.
 std::string name_of_recipe(const protocol::Recipe& recipe);
 
 }  // namespace oblique::client

@@ -257,6 +257,9 @@ void write_new_file(const std::string& path, std::string_view text, const std::s
 /// Locks the folder of a list against other processes that change the list.
 Descriptor locked_folder_of(const std::string& path) {
   Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!folder.is_open()) {
+    fail_to("cannot open the folder", folder_of(path));
+  }
   while (::flock(folder.number(), LOCK_EX) != 0) {
     if (errno != EINTR) {
       fail_to("cannot lock the folder of", path);
@@ -560,12 +563,22 @@ AuthorizedKey add_key(const std::string& folder, const std::string& name, Role r
   }
   const KeyPair pair = public_key ? KeyPair{*public_key, {}} : made_key_pair();
   const AuthorizedKey added{name, role, pair.public_key, utc_now()};
-  change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
-    keys.add(added);
-    if (!public_key) {
-      write_key_file(key_file_in(folder, name), {role, name, pair, server.pair.public_key});
+  const std::string file = key_file_in(folder, name);
+  bool has_file = false;
+  try {
+    change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
+      keys.add(added);
+      if (!public_key) {
+        write_key_file(file, {role, name, pair, server.pair.public_key});
+        has_file = true;
+      }
+    });
+  } catch (...) {
+    if (has_file) {
+      ::unlink(file.c_str());
     }
-  });
+    throw;
+  }
   return added;
 }
 

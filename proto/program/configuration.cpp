@@ -242,6 +242,9 @@ void Configuration::read_file(const std::string& path, Given& given) const {
       file.fail(key,
                 fmt::format("there is no setting {}{}", excerpt(name), did_you_mean(name, known)));
     }
+    if (given.contains(name)) {
+      file.fail(key, fmt::format("{} is given twice", name));
+    }
     given[name] = {typed_values(file, name, node), file.before(key.source())};
   };
   for (const auto& [key, node] : top) {

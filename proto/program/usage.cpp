@@ -17,7 +17,7 @@ namespace oblique::protocol {
 namespace {
 
 std::string objection_to_empty(const std::string& value) {
-  return value.empty() ? "the value is empty: give one, or leave the option out" : "";
+  return value.empty() ? "the value is empty" : "";
 }
 
 /// Names of the verbs of a verb or the program, and of its flags.

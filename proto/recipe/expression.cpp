@@ -154,7 +154,7 @@ class Expression::Parser {
 
   /// Reads a value and all following operations that bind at least as strongly as `weakest`.
   void read_operations(int weakest) {
-    read_value();
+    read_value(weakest);
     bool is_compared = false;
     for (const Operator* op = next_operator(); op != nullptr && op->priority >= weakest;
          op = next_operator()) {
@@ -168,7 +168,7 @@ class Expression::Parser {
     }
   }
 
-  void read_value() {
+  void read_value(int weakest) {
     const char c = next();
     const std::string_view word = name_at(rest_);
     if (is_digit(c) || c == '.') {
@@ -182,6 +182,9 @@ class Expression::Parser {
     } else if (take('+')) {
       read_operations(kSign);
     } else if ((c == '!' && !rest_.starts_with("!=")) || word == "not") {
+      if (weakest > kNot) {
+        throw InputError("`not` needs brackets where an operator stands before it");
+      }
       rest_.remove_prefix(std::max<std::size_t>(word.size(), 1));
       read_operations(kNot);
       to_.steps_.push_back({[](const double* x) { return std::isnan(*x) ? *x : *x == 0.0; }, 1});

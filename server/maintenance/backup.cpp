@@ -28,9 +28,11 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
   }
   // All pages in one step, so that the copy has one state of the source even if a server writes.
-  sqlite3_backup_step(backup, -1);
-  if (sqlite3_backup_finish(backup) != SQLITE_OK) {
-    throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
+  const int step = sqlite3_backup_step(backup, -1);
+  const int end = sqlite3_backup_finish(backup);
+  if (step != SQLITE_DONE || end != SQLITE_OK) {
+    throw StorageError("cannot write the copy " + path + ": " +
+                       sqlite3_errstr(end == SQLITE_OK ? step : end));
   }
 }
 

@@ -188,6 +188,12 @@ bool is_list_column(std::string_view name) {
          (field != nullptr && std::holds_alternative<solver::ListPart>(field->value));
 }
 
+bool is_list_of_numbers(std::string_view name) {
+  const auto* field = solver::find_result_column(name);
+  const auto* part = field == nullptr ? nullptr : std::get_if<solver::ListPart>(&field->value);
+  return name == "lengths_m" || (part != nullptr && !part->member.empty());
+}
+
 std::string unit_of_column(std::string_view name) {
   const Column* const column = find_column(name);
   return column == nullptr || column->unit.find(',') != std::string::npos ? "" : column->unit;

@@ -35,6 +35,9 @@ std::vector<Column> columns_and_functions();
 /// Whether the values of a column are lists, as JSON arrays.
 bool is_list_column(std::string_view name);
 
+/// Whether they are lists of numbers.
+bool is_list_of_numbers(std::string_view name);
+
 /// The unit of a column; empty for pure numbers, texts, lists of several quantities and other
 /// names.
 std::string unit_of_column(std::string_view name);

@@ -14,6 +14,8 @@
 #include <system_error>
 #include <utility>
 
+#include <strings.h>
+
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
@@ -79,6 +81,11 @@ std::string phase_sql(int index, std::size_t member) {
   return fmt::format("CASE WHEN {0} BETWEEN 0 AND {1} - 1 THEN {2} END", i, count, value);
 }
 
+/// `sql` as a real number: a whole number in JSON would divide as an integer.
+std::string as_real(const std::string& sql) {
+  return fmt::format("CAST({} AS REAL)", sql);
+}
+
 /// The element of list `tokens[0]` at the index `tokens[1]`.
 Element indexed(SqlTokens tokens) {
   const std::string name(tokens[0].text);
@@ -91,7 +98,8 @@ Element indexed(SqlTokens tokens) {
   const std::string path = fmt::format("$[{}{}]", index < 0 ? "#" : "", index);
   const auto* list = solver::find_result_list(name);
   if (list == nullptr || tokens.size() < 4 || !tokens[2].is_sign(".")) {
-    return {2, name, fmt::format("({} ->> '{}')", name, path), unit_of_column(name)};
+    const std::string sql = fmt::format("({} ->> '{}')", name, path);
+    return {2, name, is_list_of_numbers(name) ? as_real(sql) : sql, unit_of_column(name)};
   }
   const std::string member = name_of(tokens[3]);
   const auto found = std::ranges::find(list->members, member);
@@ -101,10 +109,11 @@ Element indexed(SqlTokens tokens) {
                                  protocol::did_you_mean(member, list->members)));
   }
   const auto number = static_cast<std::size_t>(found - list->members.begin());
-  if (name == "phases") {
-    return {4, kStoredPhases, phase_sql(index, number), unit_of_member(member)};
-  }
-  return {4, name, fmt::format("({} ->> '{}[{}]')", name, path, number), unit_of_member(member)};
+  const bool is_phase = name == "phases";
+  const std::string sql =
+      is_phase ? phase_sql(index, number) : fmt::format("({} ->> '{}[{}]')", name, path, number);
+  const std::string unit = unit_of_member(member);
+  return {4, is_phase ? kStoredPhases : name, unit.empty() ? sql : as_real(sql), unit};
 }
 
 /// The element at the beginning of `tokens`.
@@ -112,8 +121,9 @@ Element element_at(SqlTokens tokens) {
   if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
     return {};
   }
-  // After a space SQL reads brackets as an alias.
-  if (tokens[1].text.front() == '[' && tokens[0].text.end() == tokens[1].text.begin()) {
+  // After a space SQL reads brackets as an alias, which would silently be the whole list.
+  const bool touches = tokens[0].text.end() == tokens[1].text.begin();
+  if (tokens[1].text.front() == '[' && (touches || is_list_column(tokens[0].text))) {
     return indexed(tokens);
   }
   if (tokens.size() > 2 && tokens[1].is_sign(".") && tokens[2].text == "count" &&
@@ -185,20 +195,61 @@ bool is_aggregate(SqlTokens tokens, std::size_t i) {
          (!compares || sql_items(arguments_of(tokens, i)).size() == 1);
 }
 
-bool has_aggregate(SqlTokens tokens) {
+/// The first token outside subqueries for whose number `is_it` is true; the number of all tokens if
+/// there is none.
+template <class Predicate>
+std::size_t find_outside_subqueries(SqlTokens tokens, const Predicate& is_it) {
   for (std::size_t i = 0; i < tokens.size(); ++i) {
-    if (is_aggregate(tokens, i)) {
-      return true;
+    if (is_it(i)) {
+      return i;
     }
     const bool is_subquery =
         tokens[i].is_sign("(") && i + 1 < tokens.size() && is_word(tokens[i + 1], "select");
     i = is_subquery ? closing_bracket(tokens, i) : i;
   }
-  return false;
+  return tokens.size();
+}
+
+bool has_aggregate(SqlTokens tokens) {
+  return find_outside_subqueries(tokens, [&](std::size_t i) { return is_aggregate(tokens, i); }) <
+         tokens.size();
 }
 
 bool has_window(SqlTokens tokens) {
   return std::ranges::any_of(tokens, [](const SqlToken& token) { return is_word(token, "over"); });
+}
+
+/// The names that AS gives.
+Names aliases_of(SqlTokens tokens) {
+  Names aliases;
+  for (std::size_t i = 1; i < tokens.size(); ++i) {
+    if (is_word(tokens[i - 1], "as") && tokens[i].is_name()) {
+      aliases.insert(name_of(tokens[i]));
+    }
+  }
+  return aliases;
+}
+
+/// Throws InputError for a name that is no column, but that SQL, which does not distinguish case,
+/// would take for one. Names of functions, after AS and in `free` may be any.
+void check_letter_case(const Part& part, const Names& free) {
+  const auto tokens = sql_tokens(part.written);
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    const bool is_call = i + 1 < tokens.size() && tokens[i + 1].is_sign("(");
+    if (!tokens[i].is_name() || is_call || (i > 0 && is_word(tokens[i - 1], "as"))) {
+      continue;
+    }
+    const std::string name = name_of(tokens[i]);
+    const auto column = std::ranges::find_if(all_columns(), [&](const Column& each) {
+      return strcasecmp(each.name.c_str(), name.c_str()) == 0;
+    });
+    if (column != all_columns().end() && find_column(name) == nullptr && !free.contains(name)) {
+      throw InputError(
+          not_allowed(part.flag, part.written,
+                      fmt::format("{0} is no column, and SQL would take it for {1}: write {1}{2}",
+                                  name, column->name, name == "E" ? ", or E_Pa" : "")));
+    }
+  }
 }
 
 /// Throws InputError for an item of a grouped row (or of the one row of all points) that has no
@@ -215,17 +266,17 @@ void check_grouped(const Part& select, const Part& group) {
     const bool is_all = item.size() == 1 && item[0].is_sign("*");
     const bool has_key_as_alias =
         !item.empty() && item.back().is_name() && keys.contains(name_of(item.back()));
-    const auto column = std::ranges::find_if(item, [&](const SqlToken& token) {
-      return token.is_name() && find_column(name_of(token)) != nullptr &&
-             !keys.contains(name_of(token));
+    const std::size_t column = find_outside_subqueries(item, [&](std::size_t i) {
+      return item[i].is_name() && find_column(name_of(item[i])) != nullptr &&
+             !keys.contains(name_of(item[i]));
     });
-    if (is_all || (column != item.end() && !has_key_as_alias && !has_aggregate(item))) {
+    if (is_all || (column < item.size() && !has_key_as_alias && !has_aggregate(item))) {
       throw InputError(not_allowed(
           select.flag, select.written,
           fmt::format(
               "{0} has many values in {1}; use an aggregate, as avg({0}), or add it to "
               "--group",
-              is_all ? "*" : column->text,
+              is_all ? "*" : item[column].text,
               keys.empty() ? "the one row that an aggregate makes of all points" : "a group")));
     }
   }
@@ -250,8 +301,27 @@ std::string unit_of(SqlTokens tokens) {
                                                : std::string();
 }
 
+/// The names of all columns: those of the view `runs` in its order, then those that it lacks.
+std::vector<std::string> names_of_star(sqlite3* database) {
+  std::vector<std::string> names;
+  const StatementHandle view = prepare_query(database, "SELECT * FROM runs");
+  for (int i = 0; i < sqlite3_column_count(view.get()); ++i) {
+    const char* const name = sqlite3_column_name(view.get(), i);
+    if (name != nullptr && find_column(name) != nullptr) {
+      names.emplace_back(name);
+    }
+  }
+  for (const Column& column : all_columns()) {
+    if (std::ranges::find(names, column.name) == names.end()) {
+      names.push_back(column.name);
+    }
+  }
+  return names;
+}
+
 /// The selected columns, and the SQL expression of each. `*` becomes all columns.
-std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns(SqlTokens tokens,
+std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns(sqlite3* database,
+                                                                                 SqlTokens tokens,
                                                                                  Names& names) {
   std::vector<PlannedColumn> columns;
   std::vector<std::string> sql;
@@ -261,14 +331,10 @@ std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns
       sql.push_back(in_sqlite(item, names));
       continue;
     }
-    for (const bool is_row : {true, false}) {
-      for (const Column& column : all_columns()) {
-        if ((column.kind == "row") == is_row) {
-          columns.push_back({column.name, unit_of_column(column.name)});
-          sql.push_back(column.name);
-          names.insert(column.name);
-        }
-      }
+    for (const std::string& name : names_of_star(database)) {
+      columns.push_back({name, unit_of_column(name)});
+      sql.push_back(name);
+      names.insert(name);
     }
   }
   return {std::move(columns), std::move(sql)};
@@ -647,20 +713,21 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   const QueriedStudy study = find_study(database, question.study());
   Parts parts = parts_of(question, study.recipe);
   auto& [select, where, group, order] = parts;
+  const auto tokens = sql_tokens(select.written);
+  for (const Part& part : parts) {
+    // SQL looks for a name of the order among the aliases first.
+    check_letter_case(part, &part == &order ? aliases_of(tokens) : Names());
+  }
   check_grouped(select, group);
   Names names;
   for (Part* part : {&where, &group, &order}) {
-    const auto tokens = sql_tokens(part->written);
-    part->sql = in_sqlite(tokens, names);
+    const auto part_tokens = sql_tokens(part->written);
+    part->sql = in_sqlite(part_tokens, names);
   }
-  const auto tokens = sql_tokens(select.written);
   const bool is_distinct = tokens.size() > 1 && is_word(tokens[0], "distinct");
   auto [columns, columns_sql] =
-      selected_columns(SqlTokens(tokens).subspan(is_distinct ? 1 : 0), names);
+      selected_columns(database, SqlTokens(tokens).subspan(is_distinct ? 1 : 0), names);
   select.sql = fmt::format("{}{}", is_distinct ? "DISTINCT " : "", fmt::join(columns_sql, ", "));
-  if (names.contains("E")) {
-    throw InputError("E is no column, and SQL would take it for e: write e, or E_Pa");
-  }
   const Rows rows = rows_of(study, where.written, names);
   if (order.sql.empty() && (!group.sql.empty() || !rows.are_sorted || has_window(tokens))) {
     order.sql = group.sql.empty() ? "picked.point" : group.sql;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <new>
 #include <system_error>
+#include <utility>
 
 #include <strings.h>
 
@@ -35,10 +36,19 @@ bool continues_name(char c) {
 
 /// Refuses comments, parameters and what else would end or change the statement around a text.
 void check_beginning(std::string_view rest) {
-  // SQLite would read the last one, a byte-order mark, as a space.
-  for (const char* wrong : {"--", "/*", "?", ":", "@", "$", "#", ";", "\xEF\xBB\xBF"}) {
+  constexpr std::array<std::pair<const char*, const char*>, 9> kWrong{
+      {{"--", "a comment (--)"},
+       {"/*", "a comment (/*)"},
+       {"?", "a parameter (?)"},
+       {":", "a parameter (:)"},
+       {"@", "a parameter (@)"},
+       {"$", "a parameter ($)"},
+       {"#", "a parameter (#)"},
+       {";", "a semicolon"},
+       {"\xEF\xBB\xBF", "a byte-order mark"}}};  // which SQLite would read as a space
+  for (const auto& [wrong, meaning] : kWrong) {
     if (rest.starts_with(wrong)) {
-      throw InputError(fmt::format("it has {}", wrong));
+      throw InputError(fmt::format("it has {}", meaning));
     }
   }
   if (rest.front() == '\0') {

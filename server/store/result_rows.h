@@ -56,7 +56,7 @@ class ResultInsert {
   std::array<std::string, 5> lists_;  // texts of the lists; kept to reuse their memory
 };
 
-/// The rows of `models`, found by the model's canonical text (proto/recipe/canonical.h).
+/// The rows of `models`, found by the model's canonical text (proto/recipe/model_message.h).
 class ModelRows {
  public:
   /// The connection must outlive this.

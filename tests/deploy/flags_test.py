@@ -28,7 +28,7 @@ def output_of(*words):
 
 
 def help_of(words):
-    return output_of(*words, "--help-all") or output_of(*words, "--help")
+    return output_of(*words, "--help")
 
 
 def offered(words):

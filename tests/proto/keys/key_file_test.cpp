@@ -407,5 +407,28 @@ TEST_F(KeyFolderTest, ListsNoKeyWhoseFileCannotBeWrittenAndWritesNoneThatCannotB
   EXPECT_EQ(files(), 6);
 }
 
+TEST_F(KeyFolderTest, KeepsNoFileOfAKeyThatWasNotListed) {
+  make_key_folder(keys_);
+  const std::string draft = authorized_keys_in(keys_) + ".new";
+  std::filesystem::create_directory(draft);  // so that the list cannot be written
+  EXPECT_THROW(add_key(keys_, "alice", Role::kClient, std::nullopt), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(key_file_in(keys_, "alice")));
+  std::filesystem::remove(draft);
+  add_key(keys_, "alice", Role::kClient, std::nullopt);
+  std::filesystem::remove_all(keys_);
+  std::filesystem::create_directories(draft);
+  EXPECT_THROW(make_key_folder(keys_), std::runtime_error);
+  EXPECT_EQ(files(), 1) << "the folder that is in the way";
+}
+
+TEST_F(KeyFolderTest, ThatIsNotThereIsNamedWhenItsListIsToBeChanged) {
+  try {
+    change_authorized_keys(authorized_keys_in(keys_), [](AuthorizedKeys&) {});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cannot open the folder " + keys_));
+  }
+}
+
 }  // namespace
 }  // namespace oblique::protocol

@@ -196,6 +196,8 @@ TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
   refuse("[log]\nlevel = \"shrill\"\n", "a.toml:2:1: --log-level: shrill not in {debug,");
   refuse("[no]\nkey = 1\n", "a.toml:2:1: there is no setting no_key");
   refuse("[limits.deep]\nkey = 1\n", "there is no setting limits_deep");
+  refuse("log_level = \"info\"\n[log]\nlevel = \"debug\"\n",
+         "a.toml:1:1: log_level is given twice");
   refuse("limits = 5\n", "a.toml:1:1: there is no setting limits");
 }
 

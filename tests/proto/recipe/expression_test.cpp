@@ -61,6 +61,10 @@ TEST(ExpressionTest, ComparisonsAreOneOrZeroAndBindWeakerThanSums) {
   EXPECT_EQ(value_of("not 1 == 2 and 1 == 2"), 0.0);
   EXPECT_EQ(value_of("!1 == 2"), 1.0);
   EXPECT_EQ(value_of("not (1 >= 1)"), 0.0);
+  EXPECT_EQ(value_of("2 * (not 1 == 2)"), 2.0);
+  for (const char* text : {"2 * not mu == 0.2", "1 < not mu < 0.2", "-not mu", "2 ^ !mu"}) {
+    EXPECT_THAT(objection_to(text), HasSubstr("`not` needs brackets")) << text;
+  }
   EXPECT_EQ(value_of("if(2 <= 1, 10, 20)"), 20.0);
 }
 

@@ -130,8 +130,18 @@ TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemed
     EXPECT_THAT(find_faults(path_), Contains(HasSubstr("UPDATE studies SET counted = 0")))
         << change;
   }
-  execute(database.get(), "UPDATE studies SET counted = 0, state = 'done'");
+  execute(database.get(), "UPDATE completed_ranges SET first_point = 0, points = 5");
+  execute(database.get(), "UPDATE studies SET state = 'done'");
   EXPECT_THAT(find_faults(path_), ElementsAre("study a is done: 5 of 10 points have a result"));
+}
+
+TEST_F(MaintenanceTest, ADoneStudyOfWhichRowsWereDeletedByHandIsSound) {
+  add_results(*store_, 5, 10, false);
+  store_.reset();
+  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+          "UPDATE studies SET state = 'done'; DELETE FROM results WHERE point > 6");
+  EXPECT_THAT(find_faults(path_), IsEmpty());
+  EXPECT_THAT(diagnose(path_).remarks, Contains("study a is done: 7 of 10 points have a result"));
 }
 
 /// Three points, the last of them failed; their rows have no checksums.

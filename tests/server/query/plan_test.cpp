@@ -152,10 +152,13 @@ TEST_F(PlanTest, AConditionCannotReachOtherStudies) {
 
 TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
   const auto columns = plan(database_.get(), question("*, phases[0].t1_s")).columns;
-  constexpr int kListsOfSolve = 4;
-  const Statement runs(database_.get(), "SELECT * FROM runs");
-  ASSERT_EQ(static_cast<int>(columns.size()), runs.columns() + kListsOfSolve + 1);
-  EXPECT_EQ(columns[0].name, "study");
+  constexpr std::size_t kListsOfSolve = 4;
+  const StatementHandle runs = prepare_query(database_.get(), "SELECT * FROM runs");
+  const int in_view = sqlite3_column_count(runs.get());
+  ASSERT_EQ(columns.size(), static_cast<std::size_t>(in_view) + kListsOfSolve + 1);
+  for (int i = 0; i < in_view; ++i) {
+    EXPECT_EQ(columns[static_cast<std::size_t>(i)].name, sqlite3_column_name(runs.get(), i));
+  }
   EXPECT_EQ(columns.back().name, "phases[0].t1_s");
 }
 
@@ -233,8 +236,10 @@ TEST_F(PlanTest, ElementsAreThoseOfTheListsInTheView) {
     for (int i = -4; i <= 4; ++i) {
       const std::string path = i < 0 ? fmt::format("$[#{}]", i) : fmt::format("$[{}]", i);
       for (std::size_t member = 0; member < members.size(); ++member) {
+        const bool is_number = !unit_of_member(members[member]).empty();
+        const std::string value = fmt::format("{} ->> '{}[{}]'", list, path, member);
         expect_same(fmt::format("{}[{}].{}", list, i, members[member]),
-                    fmt::format("{} ->> '{}[{}]'", list, path, member));
+                    is_number ? "CAST(" + value + " AS REAL)" : value);
       }
       expect_same(fmt::format("{}[{}]", list, i), fmt::format("{} -> '{}'", list, path));
     }
@@ -269,12 +274,22 @@ TEST_F(PlanTest, ElementsMayBeInEveryPartOfAQuery) {
   EXPECT_EQ(number(question("point", "", "", "phases[0].t1_s DESC")), 9.0);
   EXPECT_THAT(texts(question("peaks.count * count(*)", "", "peaks.count")), ElementsAre("20"));
   EXPECT_EQ(number("max(peaks[0].fn_N) - max(fn_peaks_N[0])"), 0.0);
+  EXPECT_EQ(texts(question("peaks [0]")), texts(question("peaks[0]")));
+  EXPECT_THAT(error("peaks [x]"), HasSubstr("whole number"));
   EXPECT_EQ(column("peaks[1].fn_N").name, "peaks[1].fn_N");
   EXPECT_EQ(column("peaks[1].fn_N").unit, "N");
   EXPECT_EQ(column("peaks[1].fn_N AS second").name, "second");
   EXPECT_THAT(error("peaks[0].fn"), AllOf(HasSubstr("peaks[0].fn"), HasSubstr("fn_N")));
   EXPECT_THAT(error("peaks[x].fn_N"), HasSubstr("whole number"));
   EXPECT_THAT(error("peaks[0.5].fn_N"), HasSubstr("whole number"));
+}
+
+TEST_F(PlanTest, WholeNumbersInListsDivideAsOthersDo) {
+  edit("UPDATE results SET peaks = '[[0,3,1,1],[1,2,1,1]]', phases = '[3,2]' WHERE point = 1");
+  for (const char* ratio : {"peaks[0].fn_N / peaks[1].fn_N", "fn_peaks_N[0] / fn_peaks_N[1]",
+                            "phases[0].t1_s / phases[1].t1_s"}) {
+    EXPECT_EQ(number(ratio, "point = 1"), 1.5) << ratio;
+  }
 }
 
 TEST_F(PlanTest, OnlyQueriesThatNameAModelOrWorkerReadTheirTables) {
@@ -322,7 +337,8 @@ TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
       {"median(mu), max(mu) - min(mu), 1", ""},
       {"mu, max(mu, e)", ""},
       {"mu, avg(mu) OVER ()", ""},
-      {"mu, (SELECT max(mu) FROM runs) AS most", ""}};
+      {"mu, (SELECT max(mu) FROM runs) AS most", ""},
+      {"(SELECT max(mu) FROM runs), max(mu)", ""}};
   for (const auto& [select, group] : right) {
     EXPECT_EQ(error(select, "", group), "") << select;
   }
@@ -336,7 +352,8 @@ TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
                {"peaks[0].fn_N", "e", "peaks has many"},
                {"median(mu), mode", "", "mode has many values"},
                {"mu, count(*) FILTER (WHERE e = 1)", "", "mu has many"},
-               {"*, count(*)", "", "* has many"}};
+               {"*, count(*)", "", "* has many"},
+               {"H, MU, count(*)", "H", "MU is no column, and SQL would take it for mu: write mu"}};
   for (const auto& [select, group, message] : wrong) {
     EXPECT_THAT(error(select, "", group), AllOf(HasSubstr("--select"), HasSubstr(message)));
   }
@@ -368,8 +385,12 @@ TEST_F(PlanTest, AWrongPartIsNamedByItsFlagAndAWrongNameWithTheNearest) {
     EXPECT_THAT(error(asked), AllOf(HasSubstr(flag), HasSubstr(message))) << asked.DebugString();
   }
   for (const char* text : {"E > 1", "\"E\" > 1", "abs([E]) > 1", "e = 1 AND -E > 1"}) {
-    EXPECT_THAT(error("mu", text), HasSubstr("write e, or E_Pa")) << text;
+    EXPECT_THAT(error("mu", text), AllOf(HasSubstr("--where"), HasSubstr("write e, or E_Pa")))
+        << text;
   }
+  EXPECT_THAT(error("mu", "", "", "\"Fn_Peak_N\""),
+              AllOf(HasSubstr("--order"), HasSubstr("write fn_peak_N")));
+  EXPECT_EQ(error("H AS h, LENGTH(mode)", "", "", "h DESC"), "");
   EXPECT_THAT(error("peak[0].fn_N"), HasSubstr("peak is no list"));
   EXPECT_THAT(error("peaks[0].fn_M"), HasSubstr("did you mean `fn_N`"));
   EXPECT_THAT(error("xyzzy"), Not(HasSubstr("did you mean")));
@@ -418,14 +439,14 @@ TEST(SqlPart, ExpressionsAreAllowed) {
 
 TEST(SqlPart, NothingReachesBeyondIt) {
   const std::pair<std::string, const char*> wrong[] = {
-      {"mu > 0.5 --", "it has --"},
-      {"mu /* x */ > 0.5", "it has /*"},
-      {"mu > ?1", "it has ?"},
-      {"mu > :x", "it has :"},
-      {"mu > @x", "it has @"},
-      {"mu > $x", "it has $"},
-      {"mu > #1", "it has #"},
-      {"mu > 0.5; SELECT 1", "it has ;"},
+      {"mu > 0.5 --", "it has a comment (--)"},
+      {"mu /* x */ > 0.5", "it has a comment (/*)"},
+      {"mu > ?1", "it has a parameter (?)"},
+      {"mu > :x", "it has a parameter (:)"},
+      {"mu > @x", "it has a parameter (@)"},
+      {"mu > $x", "it has a parameter ($)"},
+      {"mu > #1", "it has a parameter (#)"},
+      {"mu > 0.5; SELECT 1", "it has a semicolon"},
       {"mu > 0.5) OR (1", "closed that was not opened"},
       {"(mu > 0.5", "bracket is not closed"},
       {"mode = 'x'' --", "the quote ' is not closed"},
@@ -438,7 +459,7 @@ TEST(SqlPart, NothingReachesBeyondIt) {
       {"1 union select 1", "union outside brackets"},
       {" ", "it is empty"},
       {std::string("mu\0> 1", 6), "zero byte"},
-      {"mu > 1 AND \xEF\xBB\xBFmu", "it has"},
+      {"mu > 1 AND \xEF\xBB\xBFmu", "it has a byte-order mark"},
       {"mu > 1 AND (" + std::string(100'000, '1'), "--where \"mu > 1 AND (111"}};
   for (const auto& [text, message] : wrong) {
     EXPECT_THAT(objection(text), HasSubstr(message)) << text;
