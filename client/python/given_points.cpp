@@ -10,9 +10,9 @@
 #include <pybind11/stl.h>
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::python {
