@@ -11,7 +11,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/parameters.h"
 
@@ -62,7 +61,7 @@ void add_key(GivenKeys& given, const std::string& name, const py::handle& value)
 }
 
 /// Adds the model with these values of `keys`, or its fault.
-void add_model(GivenPoints& all, const std::vector<double>& values,
+void add_model(GivenPoints& all, std::span<const double> values,
                const std::vector<std::size_t>& keys, const ModelParameters& base) {
   std::string fault;
   ModelParameters model = base;
@@ -125,14 +124,9 @@ GivenPoints points_of(const GivenKeys& given) {
   }
   protocol::Block block = protocol::block_of(std::move(axes));
   block.set_zip(true);
-  protocol::Recipe recipe;
-  *recipe.mutable_model() = protocol::to_message(base);
-  *recipe.add_blocks() = std::move(block);
-  const protocol::PointTable table(std::move(recipe));
   std::map<std::vector<std::uint64_t>, std::size_t> known;  // models, by the bits of their values
   all.points.reserve(given.points);
-  for (std::size_t i = 0; i < given.points; ++i) {
-    const std::vector<double> values = table.values(i);
+  const auto add = [&](std::span<const double> values) {
     std::vector<std::uint64_t> bits;  // of NaN too
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
       bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
@@ -141,9 +135,10 @@ GivenPoints points_of(const GivenKeys& given) {
     if (is_new) {
       add_model(all, values, model_keys, base);
     }
-    const auto point = std::span(values).last(protocol::kPointKeyOrder.size());
+    const auto point = values.subspan(given.axes.size() - protocol::kPointKeyOrder.size());
     all.points.push_back({point[0], point[1], point[2], model->second});
-  }
+  };
+  protocol::visit_values(base, block, given.points, add);
   return all;
 }
 

@@ -301,6 +301,14 @@ void PointTable::in_block(std::size_t number, Act act) const {
   }
 }
 
+void visit_values(const solver::ModelParameters& base, const Block& block, std::uint64_t points,
+                  const std::function<void(std::span<const double>)>& visit) {
+  const PointTable::BlockPoints compiled(base, block);
+  for (std::uint64_t i = 0; i < points; ++i) {
+    visit(compiled.values_at(i));
+  }
+}
+
 PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::move(recipe))) {
   if (!recipe_->has_model()) {
     throw InputError(

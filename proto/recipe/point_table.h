@@ -2,8 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -98,6 +100,9 @@ class PointTable {
 
  private:
   class BlockPoints;
+  friend void visit_values(const solver::ModelParameters& base, const Block& block,
+                           std::uint64_t points,
+                           const std::function<void(std::span<const double>)>& visit);
 
   void add_block(const Block& block);
   template <typename Act>
@@ -116,6 +121,11 @@ class PointTable {
   std::size_t expressions_ = 0;
   bool has_filter_ = false;
 };
+
+/// Calls `visit` with the values of each of the first `points` points of a block, in the order of
+/// its axes. They need not be allowed. Throws solver::InputError for a wrong expression.
+void visit_values(const solver::ModelParameters& base, const Block& block, std::uint64_t points,
+                  const std::function<void(std::span<const double>)>& visit);
 
 // H, mu, e and the model of a point, as a worker sends them with a result. Two machines may compute
 // them with different last bits.
