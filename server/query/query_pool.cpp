@@ -175,8 +175,8 @@ std::optional<QueryJob> QueryQueue::start_next() {
   waiting_.erase(next);
   running_.emplace(job.ticket, job.client);
   // The other clients come before the next query of this one.
-  std::ranges::stable_partition(waiting_,
-                                [&](const QueryJob& each) { return each.client != job.client; });
+  std::stable_partition(waiting_.begin(), waiting_.end(),
+                        [&](const QueryJob& each) { return each.client != job.client; });
   return job;
 }
 
