@@ -75,9 +75,8 @@ EventLoop::EventLoop(LoopSettings settings)
                    service_->query_report(std::move(report));
                  });
                }),
-      checks_([this](Completion done) {
-        completions_.put([this, done = std::move(done)] { done(now()); });
-      }),
+      checks_(
+          [this](Completion done) { completions_.put([done = std::move(done)] { done(now()); }); }),
       network_(settings.network),
       workers_(network_.listen(access_.address(), settings.worker_port,
                                access_.security(AccessControl::PortRole::kWorkers))),
