@@ -52,9 +52,10 @@ void find_squares(std::size_t columns, CellAreas& found) {
     sides[x] = goes_on ? 1 + std::min({sides[x - 1], below[x], below[x - 1]}) : 1;
     if (area != CellAreas::kNone && sides[x] > found.areas[area].side) {
       const double half = static_cast<double>(sides[x]) / 2.0;
+      const std::size_t row = cell / columns;
       found.areas[area].side = sides[x];
       found.areas[area].x = static_cast<double>(x + 1) - half;
-      found.areas[area].y = static_cast<double>(cell / columns + 1) - half;
+      found.areas[area].y = static_cast<double>(row + 1) - half;
     }
   }
 }

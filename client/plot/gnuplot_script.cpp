@@ -348,7 +348,8 @@ class ScriptWriter {
     const double bottom = below() / size_.height;
     const double height = (1.0 - bottom - above() / size_.height) /
                           static_cast<double>(std::max<std::size_t>(1, rows));
-    const double from_below = static_cast<double>(rows - 1 - index / columns);
+    const std::size_t row = index / columns;
+    const double from_below = static_cast<double>(rows - 1 - row);
     const double top = bottom + height * (from_below + 1.0);
     out_ += fmt::format("set origin {:.4f}, {:.4f}\nset size {} {:.4f}, {:.4f}\n",
                         width * static_cast<double>(index % columns), bottom + height * from_below,
@@ -529,8 +530,9 @@ class ScriptWriter {
     out_ += "set x2range [0:1]\nset y2range [0:1]\n";
     const auto data = begin_data();
     for (std::size_t i = 0; i < width * height; ++i) {
+      const std::size_t row_of_image = i / width;
       const double x = (static_cast<double>(i % width) + 0.5) / static_cast<double>(width);
-      const double y = (static_cast<double>(i / width) + 0.5) / static_cast<double>(height);
+      const double y = (static_cast<double>(row_of_image) + 0.5) / static_cast<double>(height);
       const std::size_t cell = cell_at(cells.y_edges, y_scale.value_at(y)) * cells.columns() +
                                cell_at(cells.x_edges, x_scale.value_at(x));
       const bool is_solved = cells.states[cell] == CellState::kSolved;

@@ -19,6 +19,50 @@ constexpr std::size_t kMostDots = 4000;     // more are gathered in cells
 constexpr std::size_t kMostNames = 16;      // of a histogram of texts
 constexpr double kMostBins = 100.0;
 
+/// The range of the values, widened by a share of it.
+Range range_for(const std::vector<double>& values, const FigureAxis& axis, double share) {
+  const Scale scale(range_of(values, axis.is_logarithmic), axis.is_logarithmic);
+  return widened(scale.range(), share, axis.is_logarithmic);
+}
+
+void add_notes(Figure& figure, const GatheredLines& gathered) {
+  if (gathered.gaps > 0) {
+    figure.notes.push_back(fmt::format(
+        "Gaps in the lines: {} without a value.",
+        gathered.gaps == 1 ? "1 point is" : shown_count(gathered.gaps) + " points are"));
+  }
+  if (gathered.most_at_a_place > 1) {
+    figure.notes.push_back(fmt::format("Where up to {} points share a place, their mean is drawn.",
+                                       shown_count(gathered.most_at_a_place)));
+  }
+}
+
+/// Throws solver::InputError for a column with texts, which an axis cannot show.
+void refuse_texts(const std::vector<AnswerColumn>& answer) {
+  for (const auto& column : answer) {
+    if (column.has_texts()) {
+      throw solver::InputError(fmt::format(
+          "{} has texts, which have no place on an axis; --map and --histogram take them",
+          column.name));
+    }
+  }
+}
+
+/// The number of points of a scatter that lack a place, or a colour if the answer has one.
+std::uint64_t count_missing(const std::vector<AnswerColumn>& answer, const Scale& x_scale,
+                            const Scale& y_scale, bool is_colour_logarithmic) {
+  std::uint64_t missing = 0;
+  for (std::size_t i = 0; i < answer[0].numbers.size(); ++i) {
+    const bool is_drawn =
+        std::isfinite(x_scale.share_of(answer[0].numbers[i])) &&
+        std::isfinite(y_scale.share_of(answer[1].numbers[i])) &&
+        (answer.size() < 3 || (std::isfinite(answer[2].numbers[i]) &&
+                               (!is_colour_logarithmic || answer[2].numbers[i] > 0.0)));
+    missing += is_drawn ? 0 : 1;
+  }
+  return missing;
+}
+
 /// Cells for values along an axis. Of few different values, as of a grid, there are fewer cells
 /// than values: otherwise empty cells were stripes.
 std::size_t cells_for(const std::vector<double>& values, std::size_t most) {
@@ -158,11 +202,6 @@ Figure FigureBuilder::lines() {
     curve.has_marks = has_marks;
     curve.is_coloured_by = are_coloured;
   }
-  const auto range_for = [](const std::vector<double>& values, const FigureAxis& axis,
-                            double more) {
-    const Scale scale(range_of(values, axis.is_logarithmic), axis.is_logarithmic);
-    return widened(scale.range(), more, axis.is_logarithmic);
-  };
   panel.x.range = range_for(xs, panel.x, has_marks ? 0.02 : 0.0);
   panel.y.range = range_given(request_.range).value_or(range_for(ys, panel.y, 0.05));
   panel.curves = std::move(gathered.curves);
@@ -170,15 +209,7 @@ Figure FigureBuilder::lines() {
   if (std::all_of(ys.begin(), ys.end(), [](double v) { return std::isnan(v); })) {
     note_empty(figure, "no point has a value");
   }
-  if (gathered.gaps > 0) {
-    figure.notes.push_back(fmt::format(
-        "Gaps in the lines: {} without a value.",
-        gathered.gaps == 1 ? "1 point is" : shown_count(gathered.gaps) + " points are"));
-  }
-  if (gathered.most_at_a_place > 1) {
-    figure.notes.push_back(fmt::format("Where up to {} points share a place, their mean is drawn.",
-                                       shown_count(gathered.most_at_a_place)));
-  }
+  add_notes(figure, gathered);
   add_titles(figure, answer[1].name, answer[0].numbers.size());
   return figure;
 }
@@ -199,37 +230,20 @@ Figure FigureBuilder::scatter() {
                     "--map {}, or --where for the points of one of them",
                     request_.colour, request_.colour));
   }
-  for (const auto& column : answer) {
-    if (column.has_texts()) {
-      throw solver::InputError(fmt::format(
-          "{} has texts, which have no place on an axis; --map and --histogram take them",
-          column.name));
-    }
-  }
+  refuse_texts(answer);
   Figure figure;
   Panel panel;
   panel.x = axis_for("--log-x", x, answer[0], request_.is_x_logarithmic);
   panel.y = axis_for("--log-y", y, answer[1], request_.is_y_logarithmic);
   const bool has_colour = answer.size() > 2;
-  const auto scale_for = [](const AnswerColumn& column, const FigureAxis& axis) {
-    const Scale scale(range_of(column.numbers, axis.is_logarithmic), axis.is_logarithmic);
-    return Scale(widened(scale.range(), 0.03, axis.is_logarithmic), axis.is_logarithmic);
-  };
-  const Scale x_scale = scale_for(answer[0], panel.x);
-  const Scale y_scale = scale_for(answer[1], panel.y);
+  const Scale x_scale(range_for(answer[0].numbers, panel.x, 0.03), panel.x.is_logarithmic);
+  const Scale y_scale(range_for(answer[1].numbers, panel.y, 0.03), panel.y.is_logarithmic);
   panel.x.range = x_scale.range();
   panel.y.range = y_scale.range();
   FigureAxis colour = has_colour ? axis_of(answer[2].name, answer[2].unit) : FigureAxis();
   const std::uint64_t points = answer[0].numbers.size();
-  std::uint64_t missing = 0;
-  for (std::size_t i = 0; i < points; ++i) {
-    const bool is_drawn =
-        std::isfinite(x_scale.share_of(answer[0].numbers[i])) &&
-        std::isfinite(y_scale.share_of(answer[1].numbers[i])) &&
-        (!has_colour || (std::isfinite(answer[2].numbers[i]) &&
-                         (!request_.is_colour_logarithmic || answer[2].numbers[i] > 0.0)));
-    missing += is_drawn ? 0 : 1;
-  }
+  const std::uint64_t missing =
+      count_missing(answer, x_scale, y_scale, request_.is_colour_logarithmic);
   if (missing > 0) {
     figure.notes.push_back(fmt::format("{} of {} points lack a value that can be drawn.",
                                        shown_count(missing), shown_count(points)));

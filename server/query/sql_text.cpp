@@ -157,7 +157,8 @@ struct Moments {
 /// The object that SQLite keeps for the group, at first with zeros; nullptr ends the statement,
 /// because there is no memory. With `bytes` 0 it is not created, and nullptr: the group has no row.
 template <class T>
-T* state_of(sqlite3_context* context, int bytes = sizeof(T)) {
+T* state_of(sqlite3_context* context,
+            int bytes = sizeof(T)) {  // NOLINT(bugprone-sizeof-expression): T may be a pointer
   auto* const state = static_cast<T*>(sqlite3_aggregate_context(context, bytes));
   if (state == nullptr && bytes > 0) {
     sqlite3_result_error_nomem(context);
