@@ -35,7 +35,7 @@ TEST(CostlyTest, WhileALongRecipeIsSubmittedOthersAreAnsweredAndTheirPointsGoOn)
   wait_until("points are solved", [&] { return database.rows() > 0; });
 
   Process large(folder, client_program(),
-                {"submit", large_study(folder, 50'000), "--server", server.client_url()});
+                {"submit", large_study(folder, 10'000), "--server", server.client_url()});
   int answers = 0;
   while (!large.exit_code()) {
     const Outcome status =
