@@ -22,7 +22,7 @@
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
-#include "proto/system/limits_of_group.h"
+#include "proto/system/available_memory.h"
 #include "worker/point_solver.h"
 #include "worker/session.h"
 #include "worker/solver/model/fall_model.h"

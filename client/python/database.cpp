@@ -25,8 +25,7 @@ namespace {
 
 namespace py = pybind11;
 using protocol::CellKind;
-
-using Value = std::variant<std::monostate, std::int64_t, double, std::string>;
+using protocol::Value;
 
 /// One column of an answer.
 struct Column {
@@ -40,19 +39,6 @@ struct Column {
                        [](const Value& value) { return std::holds_alternative<Kind>(value); });
   }
 };
-
-Value value_of(const protocol::Cell& cell) {
-  switch (cell.kind) {
-    case CellKind::kInteger:
-      return cell.integer;
-    case CellKind::kReal:
-      return cell.real;
-    case CellKind::kText:
-      return std::string(cell.text);
-    default:
-      return {};
-  }
-}
 
 /// Throws InputError for a study that does not exist, with the nearest name.
 server::Answer begun(server::Reader& reader, const protocol::QueryRequest& request) {
@@ -79,7 +65,7 @@ std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryReque
     protocol::ChunkRows rows(chunk);
     while (rows.next()) {
       for (std::size_t i = 0; i < columns.size(); ++i) {
-        columns[i].values.push_back(value_of(rows.cell(i)));
+        columns[i].values.push_back(protocol::value_of(rows.cell(i)));
       }
     }
     ends = chunk.ends();

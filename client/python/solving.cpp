@@ -15,7 +15,7 @@
 #include "client/python/given_points.h"
 #include "client/python/results.h"
 #include "proto/recipe/blocks.h"
-#include "proto/system/limits_of_group.h"
+#include "proto/system/available_memory.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"

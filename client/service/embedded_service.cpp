@@ -16,7 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/service/connection.h"
-#include "proto/system/limits_of_group.h"
+#include "proto/system/available_memory.h"
 #include "worker/solver/model/fall_model.h"
 
 namespace oblique::client {

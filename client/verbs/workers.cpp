@@ -29,17 +29,12 @@ struct WorkersFlags {
   SourceFlags source;
 };
 
-/// "1 study", "2 studies".
+/// "1 frame", "2 frames".
 std::string counted(std::uint64_t count, const char* one, const char* several) {
   return fmt::format("{} {}", shown_count(count), count == 1 ? one : several);
 }
 
-std::string shown_key(const protocol::KeyStatus& key) {
-  return fmt::format("key {} ({}): {}", key.name(), key.role(),
-                     counted(key.connections(), "connection", "connections"));
-}
-
-/// A cause of the server's as people know it: who has no key comes with another mechanism.
+/// The cause of a refusal. A peer without a key uses another mechanism.
 std::string shown_cause(const protocol::WorkersReply& reply, const std::string& reason) {
   const bool is_mechanism = reason == "other mechanism";
   return !is_mechanism              ? reason
@@ -47,11 +42,8 @@ std::string shown_cause(const protocol::WorkersReply& reply, const std::string& 
                                     : "with a key, where there are none";
 }
 
-/// The keys that are connected, who was turned away, and what no sound peer sends.
+/// Prints how many peers were refused, and how many frames were malformed.
 void tell_access(const protocol::WorkersReply& reply) {
-  for (const auto& key : reply.keys()) {
-    tell_line(shown_key(key));
-  }
   std::string refusals;
   for (const auto& of_cause : reply.refusals()) {
     if (of_cause.peers() > 0) {

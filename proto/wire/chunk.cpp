@@ -50,6 +50,19 @@ bool take_cell(std::string_view& bytes, Cell& cell) {
   return false;
 }
 
+Cell cell_of(const Value& value) {
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) {
+    return {.kind = CellKind::kInteger, .integer = *integer};
+  }
+  if (const auto* real = std::get_if<double>(&value)) {
+    return {.kind = CellKind::kReal, .real = *real};
+  }
+  const auto* text = std::get_if<std::string>(&value);
+  return text == nullptr ? Cell{} : Cell{.kind = CellKind::kText, .text = *text};
+}
+
+}  // namespace
+
 Value value_of(const Cell& cell) {
   switch (cell.kind) {
     case CellKind::kInteger:
@@ -63,19 +76,6 @@ Value value_of(const Cell& cell) {
   }
   return {};
 }
-
-Cell cell_of(const Value& value) {
-  if (const auto* integer = std::get_if<std::int64_t>(&value)) {
-    return {.kind = CellKind::kInteger, .integer = *integer};
-  }
-  if (const auto* real = std::get_if<double>(&value)) {
-    return {.kind = CellKind::kReal, .real = *real};
-  }
-  const auto* text = std::get_if<std::string>(&value);
-  return text == nullptr ? Cell{} : Cell{.kind = CellKind::kText, .text = *text};
-}
-
-}  // namespace
 
 bool is_sound(const QueryReply& chunk) {
   const auto columns = static_cast<std::uint64_t>(chunk.columns_size());

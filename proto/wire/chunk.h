@@ -33,6 +33,9 @@ struct Table {
   std::vector<Row> rows = {};
 };
 
+/// The value of a cell, with a text of its own.
+Value value_of(const Cell& cell);
+
 /// Whether a chunk has the cells of as many rows as it says. Chunks from outside must pass this
 /// before anything else is done with them.
 bool is_sound(const QueryReply& chunk);

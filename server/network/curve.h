@@ -98,9 +98,9 @@ class CurveSession {
   std::uint64_t sent_counter_ = 0;
 };
 
-/// The server's part of one handshake: HELLO, then INITIATE, each once. Between the two it keeps
-/// only the key of the cookie, which carries the rest, so that no command of one connection is of
-/// use on another.
+/// The server's side of one handshake, which takes one HELLO and then one INITIATE. Between them it
+/// stores only the key of its cookie; the cookie carries all other state. So a command that was
+/// recorded on one connection is refused on another.
 class CurveHandshake {
  public:
   /// `security` must outlive this.

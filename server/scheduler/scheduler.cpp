@@ -571,17 +571,11 @@ void Scheduler::on(const ResultsStored& event) {
 
 StudyCounts Scheduler::study(StudyId id) const {
   const Study& study = studies_.at(id);
-  const PointCounts counts = points(id);
-  return {counts.points,        counts.solved(),
-          counts.failed,        counts.left_out,
-          counts.leased,        study.cancelled,
-          study.solver_version, !is_current(study) && counts.open() > 0};
-}
-
-PointCounts Scheduler::points(StudyId id) const {
-  const Study& study = studies_.at(id);
-  return {study.points.size(), study.points.settled(), study.failed, study.points.left_out(),
-          study.points.leased()};
+  const StudyPoints& points = study.points;
+  return {points.size(),        points.settled(),
+          study.failed,         points.left_out(),
+          points.leased(),      study.cancelled,
+          study.solver_version, !is_current(study) && !points.is_complete()};
 }
 
 QuietWorkers Scheduler::quiet_workers(StudyId id, std::int64_t now_ms) const {

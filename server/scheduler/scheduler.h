@@ -23,22 +23,13 @@ namespace oblique::server {
 /// A study as others see it.
 struct StudyCounts {
   std::uint64_t points;
-  std::uint64_t solved;
-  std::uint64_t failed;
-  std::uint64_t left_out;  ///< by a filter, as far as it is known
-  std::uint64_t leased;
-  bool cancelled;
-  std::string solver_version;  ///< that its results have; empty while there are none
-  bool is_of_other_solver;     ///< points are open, and the server has another version
-};
-
-/// The points of a study by where they are; costs nothing to ask for.
-struct PointCounts {
-  std::uint64_t points;
   std::uint64_t settled;  ///< also those that failed or are left out
   std::uint64_t failed;
-  std::uint64_t left_out;  ///< by a filter
+  std::uint64_t left_out;  ///< by a filter, as far as workers have reported it
   std::uint64_t leased;
+  bool cancelled;
+  std::string solver_version;  ///< of its results; empty without results
+  bool is_of_other_solver;     ///< points are open, and the server has another version
 
   std::uint64_t open() const { return points - settled; }
   std::uint64_t solved() const { return settled - std::min(settled, failed + left_out); }
@@ -97,8 +88,6 @@ class Scheduler {
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
-  /// The same.
-  PointCounts points(StudyId study) const;
   /// Those that hold points of the study. Throws std::out_of_range for an unknown study.
   QuietWorkers quiet_workers(StudyId study, std::int64_t now_ms) const;
   /// No worker gets points before it has solved a probe; true without workers.

@@ -103,7 +103,7 @@ struct PointsTaken {
 struct StudyCancelled {
   StudyId study;
 };
-/// No further batches; those at workers are still solved.
+/// The study gets no further batches. Batches that workers hold are still solved.
 struct StudyPaused {
   StudyId study;
 };

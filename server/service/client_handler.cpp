@@ -287,7 +287,6 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
   fields.set_workers(static_cast<std::uint32_t>(core_.scheduler.workers()));
   fields.set_access(settings_.access);
   fields.set_version(settings_.version);
-  fields.set_utc_ms(now.utc_ms);
   if (!request.study().empty() || request.study_id() != 0) {
     const auto known = states.find_durable(request.study(), request.study_id());
     if (!known) {

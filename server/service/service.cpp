@@ -170,7 +170,7 @@ void Service::handle_worker_events(Instant now) {
 void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
   // Of a study without open points nothing is stored, and its table need not be made.
   if (!states_.contains(event.study) || !scheduler_.knows_study(event.study) ||
-      scheduler_.points(event.study).open() == 0) {
+      scheduler_.study(event.study).open() == 0) {
     return;
   }
   const StudyTable& table = states_.record(event.study).table;

@@ -56,13 +56,12 @@ protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
   const StudyRecord& record = core.states.record(id);
   const StudyState state = core.states.state(id);
   const StudyCounts counts = core.scheduler.study(id);
-  const std::uint64_t completed = counts.solved + counts.failed + counts.left_out;
   protocol::StudyStatus status;
   status.set_study_id(id);
   status.set_name(record.name);
-  status.set_state(state_name(completed == counts.points ? StudyState::kDone : state));
+  status.set_state(state_name(counts.open() == 0 ? StudyState::kDone : state));
   status.set_points(counts.points);
-  status.set_solved(counts.solved);
+  status.set_solved(counts.solved());
   status.set_failed(counts.failed);
   status.set_left_out(counts.left_out);
   status.set_leased(counts.leased);
@@ -73,7 +72,7 @@ protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
   const protocol::TakenOver reused = core.reuse.status(id);
   if (state == StudyState::kRunning) {
     status.set_points_per_s(core.rates.points_per_s(id, now.steady_ms));
-    if (completed < counts.points) {
+    if (counts.open() > 0) {
       status.set_waits_for(reason_to_wait(id, core, counts, reused, now));
     }
   }

@@ -416,7 +416,7 @@ void StudyChanges::reply_submitted(const Client& client, StudyId id, bool create
   fields = more;
   fields.set_study_id(id);
   fields.set_points(counts.points);
-  fields.set_settled(counts.solved + counts.failed + counts.left_out);
+  fields.set_settled(counts.settled);
   fields.set_created(created);
   if (core_.reuse.is_under_way(id)) {
     held_.push_back({id, client, std::move(reply), now.steady_ms + kLongestWait_ms});

@@ -80,9 +80,9 @@ class GroupCommit {
   /// `storage` must outlive this.
   explicit GroupCommit(Storage& storage) : storage_(storage) {}
 
-  /// Writes a group from the front of `jobs`, in order, and removes the jobs that are durable or
-  /// refused. When the group fails, every job is tried alone, so that one bad change does not block
-  /// the others; changes of one study keep their order.
+  /// Writes the first jobs as one transaction and removes those that are durable or refused. If the
+  /// transaction fails, each job gets its own, so that one bad change does not block the others.
+  /// Changes of one study keep their order.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
   /// Number of results that this object has made durable.

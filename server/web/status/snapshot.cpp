@@ -23,7 +23,7 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
     if (!service.scheduler().knows_study(id)) {
       continue;  // it is not durable yet
     }
-    const PointCounts points = service.scheduler().points(id);
+    const StudyCounts points = service.scheduler().study(id);
     snapshot.points_open += states.state(id) == StudyState::kRunning ? points.open() : 0;
     snapshot.points_leased += points.leased;
     ranked.emplace_back(-std::int64_t{states.record(id).priority}, id);

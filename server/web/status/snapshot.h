@@ -33,8 +33,7 @@ struct Snapshot {
   double points_per_s = 0.0;
   double thread_s_per_point = 0.0;  ///< of the last batches; 0: unknown
   std::array<std::uint64_t, kStudyStates> studies_by_state{};
-  /// Studies that run or are paused, the highest priority first, then the oldest; at most
-  /// kShownStudies.
+  /// Studies that run or are paused: the first kShownStudies, by falling priority and then by age.
   std::vector<protocol::StudyStatus> studies;
   std::uint64_t unlisted = 0;                   ///< further ones
   std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers

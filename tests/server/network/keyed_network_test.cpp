@@ -194,7 +194,7 @@ TEST_F(CrowdOfOneAddressTest, NewcomersOfOtherAddressesAreAdmittedAtOnce) {
   expect_message(*admitted());
 }
 
-TEST_F(CrowdOfOneAddressTest, OneOfTheNewestMakesRoomSoonForANewcomerOfThatAddress) {
+TEST_F(CrowdOfOneAddressTest, AnotherConnectionOfThatAddressReplacesOneOfItsNewestHandshakes) {
   now_ms_ += NetworkLimits().handshake_ms / 100;
   const auto newcomer = admitted(kElsewhere);
   EXPECT_EQ(network_.connections(), kMost);
@@ -202,7 +202,7 @@ TEST_F(CrowdOfOneAddressTest, OneOfTheNewestMakesRoomSoonForANewcomerOfThatAddre
   take_welcome(*crowd_.front());  // the oldest keeps its place
 }
 
-TEST_F(CrowdOfOneAddressTest, TheOldestMakesRoomOnceItHasHadItsTime) {
+TEST_F(CrowdOfOneAddressTest, AfterATenthOfTheHandshakeTimeItReplacesTheOldest) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
   const auto newcomer = admitted(kElsewhere);
   EXPECT_EQ(crowd_.front()->tcp.receive(), greeting_of("CURVE"));

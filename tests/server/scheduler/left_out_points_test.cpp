@@ -90,9 +90,9 @@ TEST_F(LeftOutPointsTest, AStudyIsDoneWhenEveryPointIsSolvedOrLeftOut) {
     }
     const StudyCounts counts = bench.scheduler.study(1);
     EXPECT_EQ(finished, 1U) << where;
-    EXPECT_EQ(counts.solved, left_in) << where;
+    EXPECT_EQ(counts.solved(), left_in) << where;
     EXPECT_EQ(counts.left_out, 100U - left_in) << where;
-    EXPECT_EQ(bench.scheduler.points(1).open(), 0U) << where;
+    EXPECT_EQ(bench.scheduler.study(1).open(), 0U) << where;
   }
 }
 
@@ -145,7 +145,7 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingO
     ASSERT_EQ(only<DropWorker>(effects).size(), 1U) << point;
     EXPECT_TRUE(only<StoreResults>(effects).empty());
     EXPECT_FALSE(bench.scheduler.knows_worker(1));
-    EXPECT_EQ(bench.scheduler.points(1).settled, 0U);
+    EXPECT_EQ(bench.scheduler.study(1).settled, 0U);
   }
 }
 
@@ -156,7 +156,7 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfAStudyWithoutAFilterIsLost) {
   const auto effects = bench.feed(ResultsReceived{
       1, 1, batch.lease, ++bench.sequence, true, 1e-3, {}, IntervalSet(batch.first_point(), 1)});
   EXPECT_EQ(only<DropWorker>(effects).size(), 1U);
-  EXPECT_EQ(bench.scheduler.points(1).settled, 0U);
+  EXPECT_EQ(bench.scheduler.study(1).settled, 0U);
 }
 
 TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfABlockWithoutAFilterIsLost) {
@@ -188,7 +188,7 @@ TEST_F(LeftOutPointsTest, AfterARestartTheyAreKnownAndNotHandedOut) {
   IntervalSet settled(0, 90);
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_, settled, 3, false, false, {}, "", false, 45});
-  EXPECT_EQ(bench.scheduler.study(1).solved, 42U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 42U);
   EXPECT_EQ(bench.scheduler.study(1).left_out, 45U);
   EXPECT_EQ(bench.join(1, 1).at(0).first_point(), 90U);
 }
@@ -206,32 +206,28 @@ TEST_F(LeftOutPointsTest, PointsThatAStudyGrowsByAreNamedToo) {
   const auto grown = std::make_shared<const protocol::PointTable>(recipe);
   held = only<SendBatch>(bench_.feed(StudyGrown{1, StudyTable(grown)}));
   solve_all(*grown);
-  EXPECT_EQ(bench_.scheduler.study(1).solved, 52U);
+  EXPECT_EQ(bench_.scheduler.study(1).solved(), 52U);
   EXPECT_EQ(bench_.scheduler.study(1).left_out, 58U);
 }
 
-TEST_F(LeftOutPointsTest, ABatchIsNotSoLongThatItTakesTooLongWhereTheFilterLeavesInAll) {
-  const auto table = filtered_table(1'000'000, "mu > 900000");
-  SchedulerSettings settings = trusting();
-  SchedulerBench bench(settings);
+/// The number of points in the batch that a worker gets after `batches` others, which took no time.
+std::uint64_t batch_size_after(int batches, const std::string& where) {
+  const auto table = filtered_table(1'000'000, where);
+  SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table, {}});
   SendBatch batch = bench.join(1, 1).at(0);
-  for (int turn = 0; turn < 20; ++turn) {
+  for (int i = 0; i < batches; ++i) {
     batch = only<SendBatch>(solve(bench, *table, batch)).at(0);
   }
-  EXPECT_EQ(batch.count(), settings.unsolved_batch_points) << "nobody knows what a point takes";
+  return batch.count();
 }
 
-TEST_F(LeftOutPointsTest, ALongStretchWithoutASolvedPointDoesNotMakeBatchesShort) {
-  const auto table = filtered_table(1'000'000, "mu < 100");
-  SchedulerSettings settings = trusting();
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table, {}});
-  SendBatch batch = bench.join(1, 1).at(0);
-  for (int turn = 0; turn < 50; ++turn) {
-    batch = only<SendBatch>(solve(bench, *table, batch)).at(0);
-  }
-  EXPECT_EQ(batch.count(), settings.largest_batch_points);
+TEST(LeftOutPoints, BatchesStayShortUntilAPointWasSolved) {
+  EXPECT_EQ(batch_size_after(20, "mu > 900000"), SchedulerSettings().unsolved_batch_points);
+}
+
+TEST(LeftOutPoints, BatchesStayLongWhileTheFilterKeepsNothing) {
+  EXPECT_EQ(batch_size_after(50, "mu < 100"), SchedulerSettings().largest_batch_points);
 }
 
 TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutHasNoSolverVersion) {
@@ -251,12 +247,12 @@ TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutHasNoSolverVersion) {
 TEST_F(LeftOutPointsTest, MoreLeftOutPointsThanAreSettledMakeNoHugeNumbers) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 7});
-  EXPECT_EQ(bench.scheduler.study(1).solved, 0U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 0U);
   Scheduler scheduler{trusting()};
   scheduler.handle(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 45},
                    0);
-  EXPECT_EQ(scheduler.study(1).solved, 0U);
-  EXPECT_EQ(scheduler.points(1).solved(), 0U);
+  EXPECT_EQ(scheduler.study(1).solved(), 0U);
+  EXPECT_EQ(scheduler.study(1).solved(), 0U);
 }
 
 TEST_F(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
@@ -276,7 +272,7 @@ TEST_F(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
     effects = bench.join_as("process " + std::to_string(worker), worker, 1);
   };
   join();
-  for (int turn = 0; turn < 3000 && !bench.scheduler.points(1).failed; ++turn) {
+  for (int turn = 0; turn < 3000 && !bench.scheduler.study(1).failed; ++turn) {
     if (const auto failures = only<StoreFailure>(effects); !failures.empty()) {
       EXPECT_EQ(failures[0].point, kKiller);
       bench.feed(ResultsStored{0, 1, 0, {{failures[0].point, true}}});
@@ -302,7 +298,7 @@ TEST_F(LeftOutPointsTest, APointThatKillsAmongOthersIsFoundByFewWorkers) {
       effects = solve(bench, *table, batch);
     }
   }
-  EXPECT_EQ(bench.scheduler.points(1).failed, 1U);
+  EXPECT_EQ(bench.scheduler.study(1).failed, 1U);
   EXPECT_LE(deaths, 9U);
 }
 

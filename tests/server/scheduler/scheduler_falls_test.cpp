@@ -73,7 +73,7 @@ TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerButForAFewThatAreShared) {
   EXPECT_EQ(given.points.size(), 20'000U);
   EXPECT_EQ(given.workers_of_fall.size(), 500U);
   EXPECT_LE(given.falls_solved(), 530U);
-  EXPECT_EQ(bench.scheduler.study(1).solved, 20'000U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 20'000U);
 }
 
 TEST(SchedulerFalls, AServerThatStartsAgainHandsOutTheRestByFalls) {
@@ -91,7 +91,7 @@ TEST(SchedulerFalls, AServerThatStartsAgainHandsOutTheRestByFalls) {
     EXPECT_EQ(given.points.count(point), 1U);
     EXPECT_FALSE(settled.contains(point));
   }
-  EXPECT_EQ(bench.scheduler.study(1).solved, 2'000U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 2'000U);
 }
 
 TEST(SchedulerFalls, PointsOfALostWorkerComeBackAndAFailedPointIsNamedByItsNumber) {

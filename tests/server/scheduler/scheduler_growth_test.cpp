@@ -23,14 +23,14 @@ TEST(SchedulerGrowthTest, OfAStudyThatIsDoneOnlyTheFurtherPointsAreHandedOut) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(10), {}});
   solve_all(bench, bench.join(1, 3));
-  ASSERT_EQ(bench.scheduler.points(1).open(), 0U);
+  ASSERT_EQ(bench.scheduler.study(1).open(), 0U);
   const auto effects = bench.feed(StudyGrown{1, table_of(25)});
   const auto batches = only<SendBatch>(effects);
   ASSERT_FALSE(batches.empty());
   EXPECT_EQ(batches.front().first_point(), 10U);
-  EXPECT_EQ(bench.scheduler.points(1).open(), 15U);
+  EXPECT_EQ(bench.scheduler.study(1).open(), 15U);
   solve_all(bench, batches);
-  EXPECT_EQ(bench.scheduler.points(1).settled, 25U);
+  EXPECT_EQ(bench.scheduler.study(1).settled, 25U);
 }
 
 TEST(SchedulerGrowthTest, AWorkerIsToldOfTheFurtherPointsOnceBeforeItsNextBatch) {
@@ -57,7 +57,7 @@ TEST(SchedulerGrowthTest, ABatchOfBeforeCountsAlsoWhenItComesAfterTheGrowth) {
   const auto batch = bench.join(1, 1).at(0);
   bench.feed(StudyGrown{1, table_of(8)});
   bench.solve_and_store(batch);
-  EXPECT_EQ(bench.scheduler.points(1).settled, batch.count());
+  EXPECT_EQ(bench.scheduler.study(1).settled, batch.count());
 }
 
 TEST(SchedulerGrowthTest, PausedAndCancelledStudiesGoOn) {
@@ -140,7 +140,7 @@ TEST(SchedulerRemovalTest, WhatLossesSaidOfItsPointsIsForgotten) {
     bench.join_as("process " + std::to_string(worker), 10 + worker, 1);
   }
   bench.feed(StudyAdded{3, table_of(10), {}});
-  EXPECT_EQ(bench.scheduler.points(3).settled, 0U);
+  EXPECT_EQ(bench.scheduler.study(3).settled, 0U);
 }
 
 }  // namespace

@@ -12,6 +12,14 @@
 namespace oblique::server {
 namespace {
 
+/// Workers 1, 2 and 3 are lost with points and have solved none.
+void lose_newcomers(SchedulerBench& bench) {
+  for (const WorkerId newcomer : {1U, 2U, 3U}) {
+    bench.join(newcomer, 1);
+    bench.feed(WorkerUnreachable{newcomer});
+  }
+}
+
 TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(2000), {}});
@@ -44,7 +52,7 @@ TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
   }
   EXPECT_EQ(failures, 0U);
   EXPECT_TRUE(finished);
-  EXPECT_EQ(bench.scheduler.study(1).solved, 2000U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 2000U);
 }
 
 TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints) {
@@ -69,10 +77,7 @@ TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints)
 TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  for (const WorkerId fake : {1U, 2U, 3U}) {
-    bench.join(fake, 1);
-    bench.feed(WorkerUnreachable{fake});
-  }
+  lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("faulty", 4, 10)).at(0);
   const auto failed =
       bench.feed(ResultsReceived{4, kProbeStudy, probe.lease, 1, true, 0.1, {{0, true}}});
@@ -84,10 +89,7 @@ TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
 TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  for (const WorkerId fake : {1U, 2U, 3U}) {
-    bench.join(fake, 1);
-    bench.feed(WorkerUnreachable{fake});
-  }
+  lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("sound", 4, 2)).at(0);
   bench.pass(2750, {4});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {}}).empty()) << "it may be on its way";

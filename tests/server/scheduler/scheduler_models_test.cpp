@@ -177,7 +177,7 @@ TEST(SchedulerModels, APointOfManyModelsThatKillsIsFoundAndNoOtherFails) {
   };
   join();
   join();
-  for (int step = 0; step < 2000 && bench.scheduler.points(1).open() > 0; ++step) {
+  for (int step = 0; step < 2000 && bench.scheduler.study(1).open() > 0; ++step) {
     if (held.empty()) {
       take(bench.pass(250, {worker, worker - 1}));
       continue;
@@ -194,7 +194,7 @@ TEST(SchedulerModels, APointOfManyModelsThatKillsIsFoundAndNoOtherFails) {
       take(bench.feed(CreditGiven{batch.worker, 1}));
     }
   }
-  EXPECT_EQ(bench.scheduler.study(1).solved, 399U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 399U);
   EXPECT_EQ(failed, std::vector<std::uint64_t>{kKiller});
 }
 

@@ -74,7 +74,7 @@ TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStaySettled) {
   ASSERT_EQ(batches.size(), 1U);
   EXPECT_EQ(batches[0].first_point(), 2U);
   EXPECT_EQ(bench.scheduler.study(1).failed, 0U);
-  EXPECT_EQ(bench.scheduler.study(1).solved, 7U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 7U);
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ TEST_F(StallTest, WhatItSendsLateIsStoredOnce) {
   EXPECT_EQ(only<StoreResults>(bench_.solve_and_store(batch_)).at(0).accepted.size(), 4U);
   EXPECT_FALSE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside) << "it was slow";
   EXPECT_TRUE(only<StoreResults>(bench_.solve_and_store(again[0])).at(0).accepted.empty());
-  EXPECT_EQ(bench_.scheduler.study(1).solved, 4U);
+  EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
 
 TEST_F(StallTest, AWorkerThatStoresSomethingInTimeKeepsItsBatch) {

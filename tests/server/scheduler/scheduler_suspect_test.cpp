@@ -93,7 +93,7 @@ TEST(SchedulerTest, APointThatKillsItsWorkersIsFoundAndFailedAndTheStudyGoesOn) 
   ASSERT_EQ(supervised.failed.size(), 2U);
   EXPECT_TRUE(supervised.failed.contains(137) && supervised.failed.contains(777));
   EXPECT_NE(supervised.failed[137].find("worker was lost"), std::string::npos);
-  EXPECT_EQ(bench.scheduler.study(1).solved, 998U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 998U);
 }
 
 TEST(SchedulerTest, AStudyOfNothingButAPointThatKillsEndsToo) {
@@ -174,7 +174,7 @@ TEST_F(SuspectTest, APointDoesNotFailWhenOneOfItsThreeWorkersComesBack) {
   ASSERT_EQ(again.size(), 1U) << "it is still proven";
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(20'000, {12})).empty());
   bench_.solve_and_store(again[0]);
-  EXPECT_EQ(bench_.scheduler.study(1).solved, 4U);
+  EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
 
 TEST_F(SuspectTest, OneProcessThatIsLostAgainAndAgainWithAPointDoesNotFailIt) {

@@ -27,7 +27,7 @@ TEST(SchedulerTaken, WhatIsTakenIsNotHandedOut) {
   SchedulerBench bench;
   bench.feed(held_study(10));
   bench.feed(PointsTaken{1, IntervalSet(2, 10)});
-  EXPECT_EQ(bench.scheduler.study(1).solved, 8U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 8U);
   bench.feed(StudyHeld{1, false});
   const auto batches = bench.join(1, 4);
   ASSERT_THAT(batches, Not(IsEmpty()));
@@ -55,7 +55,7 @@ TEST(SchedulerTaken, PointsThatAreOutAreTakenAllTheSameAndTheirBatchIsWithdrawn)
   ASSERT_THAT(released, SizeIs(1));
   EXPECT_EQ(released[0].lease, second.lease);
   bench.feed(WorkerLeft{1});
-  EXPECT_EQ(bench.scheduler.study(1).solved, second.count() + 5);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), second.count() + 5);
 }
 
 TEST(SchedulerTaken, AHeldStudyCanBePausedCancelledAndGoOn) {

@@ -155,7 +155,7 @@ TEST(SchedulerTest, ADuplicateResultIsNotKeptButStillAcknowledged) {
   ASSERT_EQ(again.size(), 1U);
   EXPECT_TRUE(again[0].accepted.empty());
   EXPECT_EQ(only<AcknowledgeResults>(bench.feed(ResultsStored{7, 1, 2, {}})).size(), 1U);
-  EXPECT_EQ(bench.scheduler.study(1).solved, batch.count());
+  EXPECT_EQ(bench.scheduler.study(1).solved(), batch.count());
 }
 
 TEST(SchedulerTest, ADuplicateInsideOneMessageIsKeptOnce) {
@@ -295,7 +295,7 @@ TEST(SchedulerTest, ResultsOfACancelledStudyAreKept) {
   const auto batch = bench.join(1, 1).at(0);
   bench.feed(StudyCancelled{1});
   bench.solve_and_store(batch);
-  EXPECT_EQ(bench.scheduler.study(1).solved, batch.count());
+  EXPECT_EQ(bench.scheduler.study(1).solved(), batch.count());
 }
 
 TEST(SchedulerTest, ARestoredStudyHandsOutOnlyWhatIsOpen) {
@@ -310,7 +310,7 @@ TEST(SchedulerTest, ARestoredStudyHandsOutOnlyWhatIsOpen) {
     }
   }
   EXPECT_EQ(leased, (std::set<std::uint64_t>{5, 6, 8, 9}));
-  EXPECT_EQ(bench.scheduler.study(1).solved, 4U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 4U);
   EXPECT_EQ(bench.scheduler.study(1).failed, 2U);
 }
 

@@ -51,7 +51,7 @@ TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
   ASSERT_TRUE(last_message().has_batch());
   answer_batch(1);
   write_all();
-  EXPECT_EQ(service_->scheduler().study(1).solved, 1U);
+  EXPECT_EQ(service_->scheduler().study(1).solved(), 1U);
   request(change_request("a", protocol::STUDY_CHANGE_RETRY));
   EXPECT_EQ(last_reply().change().study().state(), "done");
 }

@@ -36,7 +36,7 @@ class ServiceGrowthTest : public ServiceTest {
   /// One worker solves all points of study 1.
   void solve_everything() {
     hello();
-    for (int batch = 0; batch < 100 && service_->scheduler().points(1).open() > 0; ++batch) {
+    for (int batch = 0; batch < 100 && service_->scheduler().study(1).open() > 0; ++batch) {
       credit(1);
       answer_batch(UINT64_MAX);
     }
@@ -48,7 +48,7 @@ TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedOnceTheyAreDurable) {
   submit("a", 10);
   grow("a", 10, 5);
   grow("a", 10, 5);  // another client
-  EXPECT_EQ(service_->scheduler().points(1).points, 10U) << "not durable yet";
+  EXPECT_EQ(service_->scheduler().study(1).points, 10U) << "not durable yet";
   ASSERT_EQ(ports_.jobs.size(), 1U);
   ports_.replies.clear();
   write_all();
@@ -61,7 +61,7 @@ TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedOnceTheyAreDurable) {
     EXPECT_EQ(reply.submit().study_id(), 1U);
     EXPECT_FALSE(reply.submit().created());
   }
-  EXPECT_EQ(service_->scheduler().points(1).points, 15U);
+  EXPECT_EQ(service_->scheduler().study(1).points, 15U);
 }
 
 TEST_F(ServiceGrowthTest, ADoneStudyRunsAgainAndItsWorkersGetTheFurtherPoints) {
@@ -206,7 +206,7 @@ TEST_F(ServiceGrowthTest, ADeletedStudyIsGoneAndItsNameIsFree) {
   EXPECT_TRUE(std::get<AddResults>(ports_.jobs[0].change).results.empty());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), 1U);
-  EXPECT_EQ(service_->scheduler().points(2).settled, 0U);
+  EXPECT_EQ(service_->scheduler().study(2).settled, 0U);
   remove("a", 1);
   EXPECT_EQ(last_reply().change().study().state(), "deleted") << "it is deleted already";
   EXPECT_TRUE(ports_.jobs.empty()) << "the new study of that name stays";

@@ -103,7 +103,7 @@ TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskHearsSignsOfLifeThoughI
   EXPECT_LE(ports_.worker_messages.size(), 6U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatchAndNoPointCountsAsLost) {
+TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatchAndNoStudyCountsAsLost) {
   begin({});
   ports_.busy = "worker";
   credit(1);

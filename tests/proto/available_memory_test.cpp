@@ -1,4 +1,4 @@
-#include "proto/system/limits_of_group.h"
+#include "proto/system/available_memory.h"
 
 #include <filesystem>
 #include <fstream>
@@ -10,14 +10,14 @@
 namespace oblique::protocol {
 namespace {
 
-TEST(LimitsOfAGroup, AreTheTightestFromTheProcessUpwards) {
+TEST(MemoryLimit, IsTheTightestOfTheGroupsFromTheProcessUpwards) {
   const test::TemporaryFolder folder;
   std::filesystem::create_directories(folder.path() / "a" / "b");
   std::ofstream(folder.file("a/memory.max")) << "500000000\n";
   std::ofstream(folder.file("a/b/memory.max")) << "max\n";
   const std::string root = folder.path().string();
-  EXPECT_EQ(limits_of_group(root, "0::/a/b\n").memory_bytes, 500'000'000U);
-  EXPECT_FALSE(limits_of_group(root, "0::/\n").memory_bytes);
+  EXPECT_EQ(memory_limit_bytes(root, "0::/a/b\n"), 500'000'000U);
+  EXPECT_FALSE(memory_limit_bytes(root, "0::/\n"));
 }
 
 }  // namespace
