@@ -27,47 +27,72 @@ constexpr const char* kWayOut =
   throw StorageError("the database failed: " + reason);
 }
 
-uLong crc_of(uLong sum, const void* bytes, std::size_t size) {
-  return crc32_z(sum, static_cast<const Bytef*>(bytes), size);
-}
-
-/// The checksum of the bytes of `sum`, of a type and of a word, least significant byte first.
-uLong crc_of_word(uLong sum, char type, std::uint64_t word) {
-  std::array<char, 9> bytes{type};
-  for (std::size_t i = 1; i < bytes.size(); ++i) {
-    bytes[i] = static_cast<char>(word & 0xffU);
-    word >>= 8U;
-  }
-  return crc_of(sum, bytes.data(), bytes.size());
-}
-
-uLong crc_of_value(uLong sum, sqlite3_value* value) {
-  switch (const int type = sqlite3_value_type(value); type) {
-    case SQLITE_INTEGER:
-      return crc_of_word(sum, 'i', static_cast<std::uint64_t>(sqlite3_value_int64(value)));
-    case SQLITE_FLOAT: {
-      const double real = sqlite3_value_double(value);
-      // SQLite may store a zero without its sign.
-      return crc_of_word(sum, 'r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
+/// The CRC-32 of bytes that are added in small pieces. zlib gets them together, because a call of
+/// it costs as much as some hundred bytes.
+class Crc {
+ public:
+  void add(const void* bytes, std::size_t size) {
+    if (size > buffer_.size() - used_) {
+      flush();
     }
-    case SQLITE_TEXT:
-    case SQLITE_BLOB: {
-      const void* data = sqlite3_value_blob(value);
-      const auto size = static_cast<std::size_t>(sqlite3_value_bytes(value));
-      sum = crc_of_word(sum, type == SQLITE_TEXT ? 't' : 'b', size);
-      return size == 0 ? sum : crc_of(sum, data, size);
+    if (size > buffer_.size()) {
+      sum_ = crc32_z(sum_, static_cast<const Bytef*>(bytes), size);
+    } else if (size > 0) {
+      std::memcpy(buffer_.data() + used_, bytes, size);
+      used_ += size;
     }
-    default:
-      return crc_of(sum, "n", 1);
   }
-}
+  /// A type and a word, least significant byte first.
+  void add_word(char type, std::uint64_t word) {
+    std::array<char, 9> bytes{type};
+    for (std::size_t i = 1; i < bytes.size(); ++i) {
+      bytes[i] = static_cast<char>(word & 0xffU);
+      word >>= 8U;
+    }
+    add(bytes.data(), bytes.size());
+  }
+  void add_value(sqlite3_value* value) {
+    switch (const int type = sqlite3_value_type(value); type) {
+      case SQLITE_INTEGER:
+        add_word('i', static_cast<std::uint64_t>(sqlite3_value_int64(value)));
+        break;
+      case SQLITE_FLOAT: {
+        const double real = sqlite3_value_double(value);
+        // SQLite may store a zero without its sign.
+        add_word('r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
+        break;
+      }
+      case SQLITE_TEXT:
+      case SQLITE_BLOB: {
+        const void* data = sqlite3_value_blob(value);
+        const auto size = static_cast<std::size_t>(sqlite3_value_bytes(value));
+        add_word(type == SQLITE_TEXT ? 't' : 'b', size);
+        add(data, size);
+        break;
+      }
+      default:
+        add("n", 1);
+    }
+  }
+  uLong sum() {
+    flush();
+    return sum_;
+  }
+
+ private:
+  void flush() { sum_ = crc32_z(sum_, buffer_.data(), std::exchange(used_, 0)); }
+
+  uLong sum_ = 0;
+  std::size_t used_ = 0;
+  std::array<Bytef, 2048> buffer_;
+};
 
 void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
-  uLong sum = 0;
+  Crc crc;
   for (int i = 0; i < count; ++i) {
-    sum = crc_of_value(sum, values[i]);
+    crc.add_value(values[i]);
   }
-  sqlite3_result_int64(context, static_cast<sqlite3_int64>(sum));
+  sqlite3_result_int64(context, static_cast<sqlite3_int64>(crc.sum()));
 }
 
 }  // namespace
