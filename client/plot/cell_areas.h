@@ -6,11 +6,12 @@
 
 namespace oblique::client::plot {
 
-/// Cells of one category that touch along a side, and the largest square among them.
+/// Cells of one category that touch along a side, and the rectangle in them that has most room for
+/// a letter.
 struct CellArea {
   int category = 0;
-  std::size_t side = 0;  ///< of the square, in cells
-  double x = 0.0;        ///< its middle, in cells from the first
+  double room = 0.0;  ///< the shorter side of the rectangle, in the unit of the cells' sides
+  double x = 0.0;     ///< its middle, in cells from the first
   double y = 0.0;
 };
 
@@ -23,7 +24,9 @@ struct CellAreas {
 /// More areas than these cannot be told apart by outlines and hatching.
 inline constexpr std::size_t kMostOutlinedAreas = 300;
 
-/// The areas of cells, row by row; a category below 0 is none.
-CellAreas areas_of(const std::vector<int>& categories, std::size_t columns);
+/// The areas of cells, row by row; a category below 0 is none. All cells are drawn with this width
+/// and height.
+CellAreas areas_of(const std::vector<int>& categories, std::size_t columns, double cell_width,
+                   double cell_height);
 
 }  // namespace oblique::client::plot

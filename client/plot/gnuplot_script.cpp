@@ -292,7 +292,7 @@ class ScriptWriter {
     if (!is_text_) {
       // Nearer to the ticks where the key of a panel follows.
       out_ += fmt::format("set xlabel offset 0,{}\nset cblabel offset 1.2,0\n",
-                          figure_.panels.size() > 1 ? "0.8" : "0.4");
+                          figure_.panels.size() > 1 ? "0.35" : "0.4");
     }
     if (!is_map_ && !is_text_) {
       out_ += "set grid back lt 1 lc rgb '#d9dfe6' lw 0.8\n";
@@ -577,7 +577,10 @@ class ScriptWriter {
       end_data();
       elements_.push_back(
           data + " using 1:2:3:4:5:6:8 with boxxyerror fs solid 1 lc rgb variable lw 0.3 notitle");
-      const CellAreas areas = areas_of(numbers, cells.columns());
+      // A picture has room beside the map, so a cell is smaller than its share of the whole.
+      const CellAreas areas = areas_of(numbers, cells.columns(),
+                                       0.65 * size_.width / static_cast<double>(cells.columns()),
+                                       0.65 * size_.height / static_cast<double>(cells.rows()));
       const bool is_outlined = areas.areas.size() <= kMostOutlinedAreas;
       write_patterns(cells, data, is_outlined);
       if (is_outlined) {
@@ -633,12 +636,9 @@ class ScriptWriter {
       const Scale scale({edges[below], edges[below + 1]}, is_logarithmic);
       return scale.value_at(at - static_cast<double>(below));
     };
-    const double room_x = 0.65 * size_.width / static_cast<double>(cells.columns());
-    const double room_y = 0.65 * size_.height / static_cast<double>(cells.rows());
     for (const CellArea& area : areas.areas) {
-      const bool has_room =
-          static_cast<double>(area.side) * std::min(room_x, room_y) > 2.3 * metrics_.letter;
-      if (!has_room || cells.categories[static_cast<std::size_t>(area.category)].is_other) {
+      if (area.room <= 2.3 * metrics_.letter ||
+          cells.categories[static_cast<std::size_t>(area.category)].is_other) {
         continue;
       }
       const std::string letter = letter_of(static_cast<std::size_t>(area.category));

@@ -185,7 +185,7 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
         client,
         fmt::format("there is a study called \"{}\" with {}. A study may grow by blocks "
                     "behind those that it has, and never change:\n{}\n"
-                    "Give this one another name, or use another database",
+                    "Give this one another name (--name), or use another database (--db)",
                     study.name,
                     growth.kind == Growth::Kind::kShorter ? "more points" : "another recipe",
                     growth.difference));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -233,17 +234,58 @@ TEST(Gnuplot, ThatFailsSaysWhy) {
   }
 }
 
-TEST(CellAreas, AreConnectedAlongSidesAndHaveTheirLargestSquare) {
+TEST(CellAreas, AreConnectedAlongSidesAndHaveTheRectangleWithMostRoom) {
   const auto found = areas_of({0, 0, 1,   //
                                0, 0, -1,  //
                                1, 0, 0},
-                              3);
+                              3, 1.0, 1.0);
   ASSERT_EQ(found.areas.size(), 3U);
   EXPECT_THAT(found.of_cells, ElementsAre(0, 0, 1, 0, 0, CellAreas::kNone, 2, 0, 0));
-  EXPECT_EQ(found.areas[0].side, 2U);
+  EXPECT_EQ(found.areas[0].room, 2.0);
   EXPECT_EQ(found.areas[0].x, 1.0);
   EXPECT_EQ(found.areas[0].y, 1.0);
   EXPECT_EQ(found.areas[1].category, 1);
+}
+
+TEST(CellAreas, WithFewRowsHaveTheirLetterInTheMiddleOfTheirWidth) {
+  const auto found = areas_of({0, 0, 0, 0, 0, 0, 1,  //
+                               0, 0, 0, 0, 0, 0, 0},
+                              7, 10.0, 100.0);
+  EXPECT_EQ(found.areas[0].room, 70.0) << "the whole lower row";
+  EXPECT_EQ(found.areas[0].x, 3.5);
+  EXPECT_EQ(found.areas[0].y, 1.5);
+  EXPECT_EQ(found.areas[1].room, 10.0);
+}
+
+TEST(CellAreas, HaveTheRoomThatTryingAllRectanglesFinds) {
+  constexpr std::size_t kColumns = 9;
+  constexpr std::size_t kRows = 7;
+  std::mt19937 random(1);
+  for (int round = 0; round < 100; ++round) {
+    std::vector<int> categories(kColumns * kRows);
+    std::ranges::generate(categories, [&] { return static_cast<int>(random() % 4) / 3; });
+    const auto found = areas_of(categories, kColumns, 3.0, 2.0);
+    std::vector<double> room(found.areas.size(), 0.0);
+    for (std::size_t cell = 0; cell < categories.size(); ++cell) {
+      const std::size_t column = cell % kColumns;
+      for (std::size_t width = 1; column + width <= kColumns; ++width) {
+        for (std::size_t height = 1; cell / kColumns + height <= kRows; ++height) {
+          bool is_inside = true;
+          for (std::size_t i = 0; i < width * height; ++i) {
+            is_inside = is_inside && found.of_cells[cell + i / width * kColumns + i % width] ==
+                                         found.of_cells[cell];
+          }
+          double& most = room[found.of_cells[cell]];
+          most = std::max(most, is_inside ? std::min(3.0 * static_cast<double>(width),
+                                                     2.0 * static_cast<double>(height))
+                                          : 0.0);
+        }
+      }
+    }
+    for (std::size_t area = 0; area < room.size(); ++area) {
+      ASSERT_EQ(found.areas[area].room, room[area]) << "round " << round;
+    }
+  }
 }
 
 TEST(PictureFormat, IsThatOfTheFileUnlessItIsNamed) {
