@@ -3,6 +3,8 @@
 #include <array>
 #include <bit>
 #include <cerrno>
+#include <cstring>
+#include <utility>
 
 #include <zlib.h>
 
