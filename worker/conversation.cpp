@@ -1,7 +1,13 @@
 #include "worker/conversation.h"
 
 #include <algorithm>
+#include <cmath>
+#include <set>
 #include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/result_message.h"
 
 namespace oblique::worker {
 namespace {
@@ -10,14 +16,21 @@ namespace {
 constexpr std::int64_t kShortestInterval_ms = 10;
 constexpr std::int64_t kLongestInterval_ms = 600'000;
 
+/// To a tenth of a second.
+std::string seconds_of(std::int64_t duration_ms) {
+  constexpr double kTenth_ms = 100.0;
+  constexpr double kTenths = 10.0;
+  return fmt::format("{:.12g} s",
+                     std::round(static_cast<double>(duration_ms) / kTenth_ms) / kTenths);
+}
+
 }  // namespace
 
 Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings)
     : hello_(std::move(hello)),
       settings_(std::move(settings)),
       hello_timeout_ms_(settings_.hello_timeout_ms),
-      outbox_(settings_.outbox),
-      leaving_(settings_.leaving, hello_.threads()) {}
+      outbox_(settings_.outbox) {}
 
 Effects Conversation::take_effects() {
   return std::exchange(effects_, {});
@@ -28,7 +41,7 @@ Effects Conversation::take_effects() {
 Effects Conversation::start(std::int64_t now_ms) {
   now_ms_ = now_ms;
   start_ms_ = now_ms;
-  leaving_.note_work(now_ms);
+  last_work_ms_ = now_ms;
   connect("");
   return take_effects();
 }
@@ -88,13 +101,13 @@ Effects Conversation::on_time(std::int64_t now_ms) {
     finish(stop_exit_code_, stop_reason_);
   }
   finish_if_delivered();
-  leave_if_due();
+  exit_if_due();
   switch (state_) {
     case State::kGreeting:
       if (now_ms_ >= deadline_ms_) {
         // Handshake and hello may take longer than that on a long line.
         hello_timeout_ms_ = std::min(2 * hello_timeout_ms_, settings_.longest_hello_timeout_ms);
-        effects_.emplace_back(TellSilence{});
+        effects_.emplace_back(ReportUnreachable{});
         connect_after_backoff("");
       }
       break;
@@ -123,7 +136,7 @@ std::int64_t Conversation::next_deadline_ms() const {
   const std::int64_t last_points_ms =
       outbox_.is_empty() ? std::max(last_points_until_ms_, now_ms_ + 1) : kNever_ms;
   const std::int64_t stop_ms =
-      stopping_ ? std::min(stop_deadline_ms_, last_points_ms) : leaving_.next_deadline_ms();
+      stopping_ ? std::min(stop_deadline_ms_, last_points_ms) : std::min(exit_ms(), idle_exit_ms());
   const std::int64_t heartbeat_ms = state_ == State::kWelcomed ? heartbeat_due_ms_ : kNever_ms;
   return std::min({deadline_ms_, stop_ms, heartbeat_ms});
 }
@@ -278,17 +291,14 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   backoff_ms_ = 0;
-  const Batch taken(next_batch_++, batch.study_id(), *ranges, study->second);
-  held_[taken.number()] = {batch.study_id(), batch.lease_id(), batch.attempt(), taken.size()};
-  leaving_.note_work(now_ms_);
-  leaving_.note_batch({batch.study_id(), taken.size()});
-  effects_.emplace_back(Solve{taken});
-  give_back_what_takes_too_long();
+  held_[next_batch_] = {batch.study_id(), batch.lease_id(), batch.attempt()};
+  last_work_ms_ = now_ms_;
+  effects_.emplace_back(Solve{Batch(next_batch_++, batch.study_id(), *ranges, study->second)});
 }
 
 void Conversation::on(const protocol::ResultsStored& stored) {
   backoff_ms_ = 0;
-  leaving_.note_work(now_ms_);
+  last_work_ms_ = now_ms_;
   outbox_.acknowledged(stored.sequence());
   deliver();
   give_credit();
@@ -331,6 +341,128 @@ void Conversation::on(const protocol::ServerStopping&) {
   effects_.emplace_back(Note{"the server stops"});
 }
 
+// ---- Solved points ------------------------------------------------------------------------------
+
+Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  if (state_ == State::kFinished) {
+    return take_effects();
+  }
+  for (Progress& part : progress) {
+    last_work_ms_ = now_ms;
+    report(part);
+  }
+  give_credit();
+  return take_effects();
+}
+
+void Conversation::report(Progress& progress) {
+  if (progress.batch < first_batch_of_database_) {
+    return;  // the study of that number is another one now
+  }
+  const auto found = held_.find(progress.batch);
+  // A batch of before the last welcome: what is solved is solved, but there is no lease to end.
+  const Held held = found != held_.end() ? found->second : Held{progress.study_id, 0, 0};
+  const auto new_message = [&] {
+    protocol::Results results;
+    results.set_study_id(progress.study_id);
+    results.set_lease_id(held.lease_id);
+    results.set_attempt(held.attempt);
+    return results;
+  };
+  const double s_per_point = progress.results.empty()
+                                 ? 0.0
+                                 : progress.busy_s / static_cast<double>(progress.results.size());
+  protocol::Results results = new_message();
+  results.set_busy_s(progress.results.empty() ? progress.busy_s : 0.0);
+  // Without the lease of its batch the server takes no range: it hands these points out again.
+  for (std::size_t i = 0; found != held_.end() && i < progress.left_out.size(); ++i) {
+    if (results.left_out_size() >= 2 * protocol::kMostLeftOutRanges) {
+      outbox_.add(std::exchange(results, new_message()));
+      deliver();
+    }
+    const Batch::Range& range = progress.left_out[i];
+    results.add_left_out(range.begin);
+    results.add_left_out(range.end - range.begin);
+  }
+  std::size_t bytes = results.ByteSizeLong();
+  for (protocol::PointResult& result : progress.results) {
+    if (result.ByteSizeLong() > settings_.most_bytes_a_result) {
+      result = protocol::failed_point(result.point(), "its result is too large to send");
+    }
+    const std::size_t result_bytes = result.ByteSizeLong();
+    const auto count = static_cast<std::size_t>(results.results_size());
+    if (count == settings_.results_a_message ||
+        (count > 0 && bytes + result_bytes > settings_.bytes_a_message)) {
+      outbox_.add(std::exchange(results, new_message()));
+      deliver();
+      bytes = 0;
+    }
+    bytes += result_bytes;
+    results.set_busy_s(results.busy_s() + s_per_point);
+    *results.add_results() = std::move(result);
+  }
+  const bool ends_lease = progress.batch_done && found != held_.end();
+  results.set_batch_done(ends_lease);
+  if (ends_lease) {
+    held_.erase(found);
+  }
+  if (ends_lease || results.results_size() > 0 || results.left_out_size() > 0) {
+    outbox_.add(std::move(results));
+    deliver();
+  }
+}
+
+void Conversation::deliver() {
+  while (state_ == State::kWelcomed) {
+    const protocol::Results* next = outbox_.next_to_send();
+    if (next == nullptr) {
+      return;
+    }
+    protocol::WorkerMessage message;
+    *message.mutable_results() = *next;
+    send(std::move(message));
+  }
+}
+
+void Conversation::give_credit() {
+  const auto occupied = static_cast<std::uint32_t>(held_.size()) + open_credit_;
+  // Points of results that still wait here must not be handed out again.
+  if (state_ != State::kWelcomed || stopping_ || server_stopping_ || outbox_.has_waiting() ||
+      !may_solve() || occupied >= settings_.batches_held) {
+    return;
+  }
+  protocol::WorkerMessage message;
+  message.mutable_credit()->set_batches(settings_.batches_held - occupied);
+  send(std::move(message));
+  open_credit_ = settings_.batches_held - static_cast<std::uint32_t>(held_.size());
+}
+
+// ---- Traces -----------------------------------------------------------------------------------
+
+void Conversation::on(const protocol::TraceOrder& order) {
+  last_work_ms_ = now_ms_;
+  if (!stopping_) {
+    effects_.emplace_back(SolveTrace{order});
+    return;
+  }
+  protocol::WorkerMessage message;
+  message.mutable_trace()->set_trace_id(order.trace_id());
+  message.mutable_trace()->set_not_taken(true);
+  send(std::move(message));
+}
+
+Effects Conversation::on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms) {
+  now_ms_ = now_ms;
+  for (protocol::Trace& trace : traces) {
+    last_work_ms_ = now_ms;
+    protocol::WorkerMessage message;
+    *message.mutable_trace() = std::move(trace);
+    send(std::move(message));
+  }
+  return take_effects();
+}
+
 // ---- The end ----------------------------------------------------------------------------------
 
 Effects Conversation::stop(std::int64_t now_ms, bool points_are_solved) {
@@ -359,7 +491,7 @@ void Conversation::begin_stop(const std::string& reason, bool points_are_solved,
   last_points_until_ms_ = now_ms_ + (points_are_solved ? settings_.last_points_ms : 0);
   // Points of results that still wait here must not be handed out again.
   if (!outbox_.has_waiting()) {
-    give_back(0);
+    give_back_batches();
   }
   effects_.emplace_back(DropAll{});
   effects_.emplace_back(DropTraces{});
@@ -389,6 +521,65 @@ void Conversation::finish(int exit_code, const std::string& reason) {
                                : "; " + std::to_string(outbox_.results()) +
                                      " results could not be delivered and will be solved again";
   effects_.emplace_back(Finish{exit_code, reason + lost});
+}
+
+void Conversation::give_back_batches() {
+  protocol::WorkerMessage message;
+  for (const auto& [number, held] : held_) {
+    message.mutable_give_back()->add_lease_ids(held.lease_id);
+  }
+  if (message.has_give_back()) {
+    send(std::move(message));
+  }
+}
+
+// ---- Ending by itself ---------------------------------------------------------------------------
+
+std::int64_t Conversation::exit_ms() const {
+  return settings_.exit.until_ms == kNever_ms
+             ? kNever_ms
+             : settings_.exit.until_ms - settings_.exit.shutdown_grace_ms;
+}
+
+std::int64_t Conversation::idle_exit_ms() const {
+  return settings_.exit.idle_exit_ms == kNever_ms ? kNever_ms
+                                                  : last_work_ms_ + settings_.exit.idle_exit_ms;
+}
+
+void Conversation::exit_if_due() {
+  if (stopping_ || state_ == State::kFinished) {
+    return;
+  }
+  if (!held_.empty() || !outbox_.is_empty()) {
+    last_work_ms_ = now_ms_;
+  }
+  if (now_ms_ >= exit_ms()) {
+    exit_by_itself("leaving: --until " + settings_.exit.until);
+  } else if (now_ms_ >= idle_exit_ms()) {
+    exit_by_itself(fmt::format("no work for {}: leaving (--idle-exit)",
+                               seconds_of(settings_.exit.idle_exit_ms)));
+  }
+}
+
+/// The exit code is 1 for a worker that no server ever welcomed, so that whoever started it
+/// notices.
+void Conversation::exit_by_itself(const std::string& reason) {
+  if (was_welcomed_) {
+    begin_stop(reason, !held_.empty());
+    return;
+  }
+  begin_stop(fmt::format("leaving: {} {} in {}", settings_.server,
+                         rejection_.empty() ? "was never reached" : "never let this worker in",
+                         seconds_of(now_ms_ - start_ms_)),
+             false, 1);
+}
+
+std::string Conversation::status() const {
+  if (stopping_) {
+    return "stopping: " + std::to_string(outbox_.results()) + " results are to be delivered";
+  }
+  return state_ == State::kWelcomed ? std::to_string(held_.size()) + " batches from the server"
+                                    : "looks for the server";
 }
 
 }  // namespace oblique::worker

@@ -2,23 +2,83 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
 #include "worker/batch.h"
-#include "worker/effects.h"
-#include "worker/leaving.h"
 #include "worker/outbox.h"
 
 namespace oblique::worker {
 
-/// What the conversation with the server keeps to.
+// ---- Effects: what the conversation decides and the session carries out -------------------------
+
+/// Drop the socket, if there is one, with all that waits in it, and open a new one.
+struct Connect {
+  std::string reason;  ///< empty for the first one
+};
+struct Send {
+  protocol::WorkerMessage message;
+};
+struct Solve {
+  Batch batch;
+};
+/// Drop the batches of the study.
+struct DropStudy {
+  std::uint64_t study_id;
+};
+/// Drop that batch.
+struct DropBatch {
+  std::uint64_t number;
+};
+/// Drop all batches; the server leases their points anew.
+struct DropAll {};
+/// Solve that point for a trace, beside the batches.
+struct SolveTrace {
+  protocol::TraceOrder order;
+};
+/// No client waits for that trace any more.
+struct CancelTrace {
+  std::uint64_t trace_id;
+};
+/// The server has forgotten all traces.
+struct DropTraces {};
+/// The hello had no answer: log why, as far as the socket shows the cause.
+struct ReportUnreachable {};
+/// A line for the log.
+struct Note {
+  std::string text;
+  bool is_warning = false;
+};
+/// The conversation is over.
+struct Finish {
+  int exit_code;
+  std::string reason;
+};
+
+using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, SolveTrace,
+                            CancelTrace, DropTraces, ReportUnreachable, Note, Finish>;
+using Effects = std::vector<Effect>;
+
+// ---- The conversation ---------------------------------------------------------------------------
+
+inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max();
+
+/// When a worker ends by itself.
+struct ExitSettings {
+  std::int64_t until_ms = kNever_ms;      ///< the process has ended by then; same clock as `now_ms`
+  std::string until = {};                 ///< the same as the user wrote it
+  std::int64_t idle_exit_ms = kNever_ms;  ///< longest time without work
+  std::int64_t shutdown_grace_ms = 3000;  ///< it stops this long before `until_ms`
+};
+
 struct ConversationSettings {
-  std::string server = "the server";  ///< what it is called in sentences: its address
+  std::string server = "the server";  ///< its address, for messages
   std::uint32_t batches_held = 2;     ///< one is solved, the next waits ready
   OutboxLimits outbox;
   std::size_t results_a_message = 1000;
@@ -35,7 +95,7 @@ struct ConversationSettings {
   /// A request to stop that follows so soon is part of the one before: Slurm sends SIGTERM twice
   /// within milliseconds to jobs that it preempts.
   std::int64_t stop_repeats_ms = 1000;
-  LeavingSettings leaving;
+  ExitSettings exit;
 };
 
 /// The worker's side of the conversation with the server (proto/protocol.md): decides what follows
@@ -54,7 +114,7 @@ class Conversation {
   Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
   /// A message could not be sent; what follows it of the same effects must not be sent either.
   Effects on_send_failed(std::int64_t now_ms);
-  /// The server has turned the socket away, for this reason, and people must mend that.
+  /// The server has rejected the socket, for a reason that a person must mend.
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
   /// To be called at `next_deadline_ms` or a little later.
   Effects on_time(std::int64_t now_ms);
@@ -65,7 +125,7 @@ class Conversation {
   /// After a stop: no point is being solved any more, and all that was is reported.
   Effects on_solver_idle(std::int64_t now_ms);
   bool is_stopping() const { return stopping_; }
-  /// Where it is, as a sentence part for people.
+  /// The state in words, for a service manager.
   std::string status() const;
 
   std::int64_t next_deadline_ms() const;
@@ -84,7 +144,6 @@ class Conversation {
     std::uint64_t study_id;
     std::uint64_t lease_id;
     std::uint32_t attempt;
-    std::uint64_t points_left;
   };
 
   void connect(const std::string& reason);
@@ -106,12 +165,12 @@ class Conversation {
   void send(protocol::WorkerMessage message);
   void send_heartbeat();
   void give_credit();
-  std::vector<HeldPoints> held_points() const;
-  void give_back(std::uint64_t first_batch);
-  void give_back_what_takes_too_long();
-  void leave_if_due();
+  void give_back_batches();
+  std::int64_t exit_ms() const;
+  std::int64_t idle_exit_ms() const;
+  void exit_if_due();
   void begin_stop(const std::string& reason, bool points_are_solved, int exit_code = 0);
-  void leave(const std::string& reason, bool points_are_solved);
+  void exit_by_itself(const std::string& reason);
   void finish_if_delivered();
   void finish(int exit_code, const std::string& reason);
   Effects take_effects();
@@ -130,7 +189,8 @@ class Conversation {
   std::int64_t rejected_ms_ = 0;  ///< pause after the last rejection; 0: welcomed since
   std::string rejection_;         ///< what the last one was for; empty: welcomed since
   std::int64_t start_ms_ = 0;
-  bool was_welcomed_ = false;  ///< ever
+  std::int64_t last_work_ms_ = 0;  ///< when it last had a batch, a trace or results to deliver
+  bool was_welcomed_ = false;      ///< ever
   bool stopping_ = false;
   std::string stop_reason_;
   int stop_exit_code_ = 0;
@@ -146,7 +206,6 @@ class Conversation {
   std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches were of another database
   std::uint32_t open_credit_ = 0;              ///< batches asked for and not yet come
   Outbox outbox_;
-  Leaving leaving_;
   Effects effects_;  // of the call being made
 };
 

@@ -67,39 +67,28 @@ std::string objection_to_until(const std::string& text) {
                    "\" is neither a time, as 2026-11-22T05:00:00Z, nor a duration, as 90m";
 }
 
-/// What people say of when the worker ends by itself.
-struct Ending {
-  std::string until;
-  double idle_exit_s = 0.0;  ///< 0: never
-};
-
-oblique::worker::LeavingSettings leaving_settings(const Ending& ending) {
+/// Fills in the settings that follow from `--until` and `--idle-exit`. Returns what is wrong where
+/// the worker would have to leave before it works; else an empty text.
+std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
   using std::chrono::duration_cast;
   using std::chrono::milliseconds;
-  oblique::worker::LeavingSettings settings;
-  if (const auto left =
-          oblique::protocol::time_until(ending.until, std::chrono::system_clock::now())) {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    settings.until = ending.until;
-    settings.until_ms = (duration_cast<milliseconds>(now) + *left).count();
+  if (idle_exit_s > 0.0) {
+    exit.idle_exit_ms = std::max<std::int64_t>(std::llround(idle_exit_s * 1000.0), 1);
   }
-  if (ending.idle_exit_s > 0.0) {
-    settings.idle_exit_ms = std::max<std::int64_t>(std::llround(ending.idle_exit_s * 1000.0), 1);
-  }
-  return settings;
-}
-
-/// Empty unless the worker would have to leave before it works, and then what is wrong.
-std::string objection_to_end(const std::string& until, std::int64_t farewell_ms) {
-  const auto left = oblique::protocol::time_until(until, std::chrono::system_clock::now());
-  if (!left || left->count() > farewell_ms) {
+  const auto left = oblique::protocol::time_until(exit.until, std::chrono::system_clock::now());
+  if (!left) {
     return {};
   }
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  exit.until_ms = (duration_cast<milliseconds>(now) + *left).count();
+  if (left->count() < 0) {
+    return fmt::format("--until {} is in the past", exit.until);
+  }
   constexpr std::int64_t kSecond_ms = 1000;
-  return left->count() < 0
-             ? fmt::format("--until {} is in the past", until)
+  return left->count() > exit.shutdown_grace_ms
+             ? ""
              : fmt::format("--until {} leaves no time to work: leaving begins {} s before it",
-                           until, farewell_ms / kSecond_ms);
+                           exit.until, exit.shutdown_grace_ms / kSecond_ms);
 }
 
 int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes,
@@ -146,7 +135,7 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes,
 }
 
 void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
-                 SessionSettings& settings, std::uint64_t& fall_memory_bytes, Ending& ending,
+                 SessionSettings& settings, std::uint64_t& fall_memory_bytes, double& idle_exit_s,
                  std::string& keys, LogSettings& log) {
   app.set_version_flag("--version", "oblique-worker " + oblique::protocol::version_and_commit());
   app.add_option("--server", settings.server, "Where the server awaits workers")
@@ -168,14 +157,13 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
          "the default is an eighth of the free memory, or of the container's limit")
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false).description(""));
-  app.add_option("--until", ending.until,
+  app.add_option("--until", settings.conversation.exit.until,
                  "Be gone by then: a time in UTC, as 2026-11-22T05:00:00Z, "
                  "or a duration from now, as 90m")
       ->type_name("TIME")
       ->check(objection_to_until);
   constexpr double kLongestIdle_s = 1e9;
-  app.add_option("--idle-exit", ending.idle_exit_s,
-                 "Leave after so many seconds without work; 0: stay")
+  app.add_option("--idle-exit", idle_exit_s, "Leave after so many seconds without work; 0: stay")
       ->type_name("SECONDS")
       ->capture_default_str()
       ->check(oblique::protocol::number_between(0.0, kLongestIdle_s));
@@ -197,9 +185,9 @@ int run_program(int argc, char** argv, LogSettings& log) {
   Configuration configuration(
       app, {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml")});
   StopWithParent parent;
-  Ending ending;
+  double idle_exit_s = 0.0;
   std::uint64_t fall_memory_bytes = 0;
-  add_options(app, configuration, parent, settings, fall_memory_bytes, ending, keys, log);
+  add_options(app, configuration, parent, settings, fall_memory_bytes, idle_exit_s, keys, log);
   if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {
     return *exit_code;
   }
@@ -210,8 +198,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
     std::cout << configuration.printed();
     return oblique::protocol::kDone;
   }
-  if (const std::string objection =
-          objection_to_end(ending.until, settings.conversation.leaving.farewell_ms);
+  if (const std::string objection = set_exit(settings.conversation.exit, idle_exit_s);
       !objection.empty()) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), objection);
   }
@@ -219,7 +206,6 @@ int run_program(int argc, char** argv, LogSettings& log) {
   if (settings.name.empty()) {
     settings.name = settings.host + ":" + std::to_string(getpid());
   }
-  settings.conversation.leaving = leaving_settings(ending);
   oblique::protocol::set_up_log(kProgram, log);
   try {
     if (!keys.empty()) {

@@ -121,9 +121,9 @@ std::string Session::cause_of_silence() {
              : "attempts to connect get no answer: does a firewall drop them?";
 }
 
-void Session::tell_silence() {
+void Session::report_unreachable() {
   const std::string cause = cause_of_silence();
-  if (told_causes_.insert(cause).second) {
+  if (reported_causes_.insert(cause).second) {
     spdlog::warn("no server answers at {} ({}); trying again", settings_.server, cause);
   }
 }
@@ -201,7 +201,7 @@ void Session::receive_all() {
     }
     was_heard_ = true;
     if (message.has_welcome()) {
-      told_causes_.clear();
+      reported_causes_.clear();
     }
     apply(conversation_.on_message(message, now_ms()));
   }
@@ -238,7 +238,7 @@ void Session::apply(Effects effects) {
       [&](SolveTrace& effect) { tracer_.take(std::move(effect.order)); },
       [&](const CancelTrace& effect) { tracer_.cancel(effect.trace_id); },
       [&](const DropTraces&) { tracer_.drop_all(); },
-      [&](const TellSilence&) { tell_silence(); },
+      [&](const ReportUnreachable&) { report_unreachable(); },
       [&](const Note& note) {
         spdlog::log(note.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", note.text);
       },

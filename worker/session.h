@@ -65,7 +65,7 @@ class Session {
   protocol::DealerSettings dealer_settings() const;
   void open_socket();
   void note_rejection();
-  void tell_silence();
+  void report_unreachable();
   std::string cause_of_silence();
   void apply(Effects effects);
   /// False when the message could not be handed to the socket.
@@ -79,8 +79,8 @@ class Session {
   std::optional<Link> link_;
   unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
   bool was_heard_ = true;  ///< something came over this socket
-  std::set<std::string> told_causes_;  ///< of the server's silence, since it last welcomed us
-  protocol::WakeUp news_;              ///< a batch ended, or there is more of a trace
+  std::set<std::string> reported_causes_;  ///< of the server's silence, since it last welcomed us
+  protocol::WakeUp news_;                  ///< a batch ended, or there is more of a trace
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

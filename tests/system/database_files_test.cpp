@@ -90,6 +90,20 @@ TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsAndSaysSo) {
   EXPECT_EQ(database_.rows(), 1) << "the other database is as it was";
 }
 
+TEST_F(DatabaseFilesTest, AServerStoppedInTheMiddleOfAStudyCompletesItWhenItIsStartedAgain) {
+  Server server(folder_, file_);
+  Worker worker(folder_, server.worker_url());
+  submit_to(server);
+  wait_until("rows in the database", [&] { return database_.rows() > 0; });
+  server.process().send(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+  ASSERT_LT(database_.rows(), kManyPoints) << "stopped too late to be a test";
+  const Server next(folder_, file_, server);
+  wait_until("all rows", [&] { return database_.rows() == kManyPoints; });
+  EXPECT_EQ(database_.number("SELECT count(DISTINCT point) FROM results WHERE status = 'solved'"),
+            kManyPoints);
+}
+
 TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsAfterARunAlsoWhenAnotherProgramHasItOpen) {
   ASSERT_EQ(run_oblique(folder_, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                                   "--db", file_})

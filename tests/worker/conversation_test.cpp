@@ -1,5 +1,11 @@
 #include "worker/conversation.h"
 
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <variant>
+#include <vector>
+
 #include "tests/worker/conversation_fixture.h"
 
 namespace oblique::worker {
@@ -138,7 +144,7 @@ TEST_F(ConversationTest, ARejectionThatRepeatsIsToldInFullOnceUntilTheWorkerWasW
 TEST_F(ConversationTest, OfAHelloWithoutAnswerTheCauseIsTold) {
   start();
   pass(3000);
-  EXPECT_TRUE(has<TellSilence>());
+  EXPECT_TRUE(has<ReportUnreachable>());
   EXPECT_FALSE(has<Note>());
 }
 
@@ -391,6 +397,132 @@ TEST_F(ConversationTest, AWorkerWithoutServerLeavesAtOnceWhenItHasNothingToDeliv
   take(conversation_->stop(now_ms_));
   ASSERT_TRUE(finish());
   EXPECT_EQ(finish()->exit_code, 0);
+}
+
+// ---- Ending by itself ---------------------------------------------------------------------------
+
+/// A worker that ends by itself, 3 s before its time or when idle.
+class ExitTest : public ConversationTest {
+ protected:
+  void leave_within(std::int64_t until_ms, std::int64_t idle_exit_ms = kNever_ms) {
+    ConversationSettings settings;
+    settings.exit = {.until_ms = until_ms == kNever_ms ? kNever_ms : now_ms_ + until_ms,
+                     .idle_exit_ms = idle_exit_ms};
+    use(settings);
+    start();
+    auto welcome = welcome_message();
+    welcome.mutable_welcome()->set_lost_after_ms(1'000'000);
+    receive(welcome);
+    receive(study_message(7));
+  }
+
+  std::vector<std::uint64_t> given_back() const {
+    std::vector<std::uint64_t> leases;
+    for (const auto& message : sent(WorkerMessage::kGiveBack)) {
+      const auto& ids = message.give_back().lease_ids();
+      leases.insert(leases.end(), ids.begin(), ids.end());
+    }
+    return leases;
+  }
+};
+
+TEST_F(ExitTest, AWorkerWhoseTimeIsOverGivesBackWhatIsLeftAndLeaves) {
+  leave_within(60'000);
+  receive(batch_message(7, 31));
+  receive(batch_message(7, 32, 10));
+  solve(1, 0, 5, false);
+  pass(56'999);
+  EXPECT_FALSE(has<DropAll>());
+  pass(1);
+  EXPECT_TRUE(has<DropAll>());
+  EXPECT_EQ(given_back(), (std::vector<std::uint64_t>{31, 32}));
+  EXPECT_FALSE(finish());
+  receive(stored_message(1));
+  take(conversation_->on_solver_idle(now_ms_));
+  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 0);
+}
+
+TEST_F(ExitTest, AWorkerWhoseTimeIsOverFromTheStartLeavesAtOnce) {
+  leave_within(-1000);
+  pass(0);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 0);
+}
+
+TEST_F(ExitTest, ABatchThatTakesLongIsNoIdleness) {
+  leave_within(kNever_ms, 5000);
+  receive(batch_message(7, 31));
+  for (int i = 0; i < 100; ++i) {
+    pass(1000);
+    EXPECT_FALSE(finish());
+  }
+  solve(1, 0, 10, true);
+  pass(100'000);
+  EXPECT_FALSE(finish()) << "its results are not stored";
+  receive(stored_message(1));
+  pass(4999);
+  EXPECT_FALSE(finish());
+  pass(1);
+  EXPECT_TRUE(finish());
+}
+
+TEST_F(ExitTest, AWorkerThatNoServerAnswersIsIdleToo) {
+  ConversationSettings settings;
+  settings.exit.idle_exit_ms = 5000;
+  use(settings);
+  start();
+  for (int i = 0; i < 49; ++i) {
+    pass(100);
+    ASSERT_FALSE(finish());
+  }
+  pass(100);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_EQ(finish()->reason, "leaving: the server was never reached in 5 s");
+}
+
+TEST_F(ExitTest, AWorkerThatWasWelcomedOnceLeavesWithZeroThoughItsServerIsGone) {
+  leave_within(kNever_ms, 5000);
+  pass(5000);
+  ASSERT_TRUE(finish());
+  EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_EQ(finish()->reason, "no work for 5 s: leaving (--idle-exit)");
+}
+
+TEST_F(ExitTest, TheNextDeadlineIsNeverLaterThanTheTimeToLeave) {
+  leave_within(3100, 50);
+  EXPECT_LE(conversation_->next_deadline_ms(), now_ms_ + 50);
+  receive(batch_message(7, 31));
+  EXPECT_LE(conversation_->next_deadline_ms(), now_ms_ + 100);
+}
+
+TEST_F(ExitTest, AStoppedWorkerGivesBackAtOnceAndDeliversWhatEndsAMomentLater) {
+  leave_within(kNever_ms);
+  receive(batch_message(7, 31));
+  solve(1, 0, 5, false);
+  receive(stored_message(1));
+  take(conversation_->stop(now_ms_, true));
+  EXPECT_EQ(given_back(), std::vector<std::uint64_t>{31});
+  EXPECT_FALSE(finish());
+  solve(1, 5, 2, false);
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].lease_id(), 0U);
+  take(conversation_->on_solver_idle(now_ms_));
+  EXPECT_FALSE(finish());
+  receive(stored_message(2));
+  EXPECT_TRUE(finish());
+}
+
+TEST_F(ExitTest, PointsThatTakeLongAreNotWaitedFor) {
+  leave_within(kNever_ms);
+  receive(batch_message(7, 31));
+  take(conversation_->stop(now_ms_, true));
+  pass(249);
+  EXPECT_FALSE(finish());
+  pass(1);
+  EXPECT_TRUE(finish());
 }
 
 }  // namespace

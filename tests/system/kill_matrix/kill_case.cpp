@@ -58,9 +58,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kNobody, kKilledWorkers, kNoSignal, 1},
     Entry{kApart, kNobody, kCutConnections, kNoSignal, 1},
     Entry{kApart, kNobody, kVanishingPeers, kNoSignal, 1},
-    // Those of the server. A companion is there to whom it sends what workers seldom get.
-    Entry{kApart, kServer, "before-send:release", SIGKILL, 1},
-    Entry{kApart, kServer, "after-send:release", SIGSTOP, 1},
+    // Those of the server.
     Entry{kApart, kServer, "before-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "time", SIGSTOP, 1500},
     Entry{kApart, kServer, "after-receive:submit", SIGKILL, 1},

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <mutex>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -14,8 +18,6 @@
 
 #include "tests/support/database.h"
 #include "tests/system/kill_matrix/blow.h"
-#include "tests/system/kill_matrix/companion.h"
-#include "tests/system/kill_matrix/same_rows.h"
 
 namespace oblique::test {
 namespace {
@@ -75,7 +77,6 @@ class ApartCycle {
     if (case_.storm) {
       storm_.emplace(*case_.storm, folder_, server_->worker_url(), blow_.bystander());
     }
-    companion_.emplace(case_.point, server_->worker_url());
     for (auto& worker : workers_) {
       start_worker(worker, &worker == workers_.data());
     }
@@ -88,7 +89,6 @@ class ApartCycle {
       look_after();
       return Database(database_).texts("SELECT state FROM studies").at(0) == "done";
     });
-    companion_.reset();
     if (storm_) {
       storm_->end();
     }
@@ -192,7 +192,6 @@ class ApartCycle {
   std::string database_;
   std::unique_ptr<Server> server_;
   std::array<std::unique_ptr<Worker>, 2> workers_;
-  std::optional<Companion> companion_;
   std::optional<Storm> storm_;
 };
 
@@ -249,6 +248,57 @@ std::string last_words(const TemporaryFolder& folder) {
   return words.str();
 }
 
+// ---- Many cycles -------------------------------------------------------------------------------
+
+constexpr unsigned kAtOncePerCore = 4;
+
+std::string blow_of(const KillCase& kill_case) {
+  if (kill_case.storm) {
+    return kill_case.point;
+  }
+  const std::string after = kill_case.then == SIGKILL ? "SIGSTOP and SIGKILL" : "SIGSTOP";
+  return std::string(kill_case.all_in_one ? "oblique run: " : "apart: ") + kill_case.program +
+         ", " + (kill_case.signal == SIGKILL ? "SIGKILL" : after);
+}
+
+// ---- Rows that must be the same ----------------------------------------------------------------
+
+struct Table {
+  std::string name;
+  std::set<std::string> by_chance;  ///< columns
+  std::string joined;
+  std::string order;
+};
+
+std::vector<Table> tables() {
+  return {
+      {"studies",
+       {"created_at", "changed_at", "checksum", "submitted_by", "counted"},
+       "",
+       "study_id"},
+      {"models", {"model_id"}, "", "definition"},
+      // The model's number is one by order of arrival, so its definition stands in for it.
+      {"results",
+       {"model_id", "wall_s", "worker_id", "attempt", "solved_at", "checksum"},
+       " JOIN models USING (model_id)",
+       "study_id, point"},
+  };
+}
+
+/// Every row as one text. The columns are asked for, so that new ones are compared too.
+std::vector<std::string> rows_of(const Database& database, const Table& table) {
+  // quote() writes numbers so that they are read again as the same ones.
+  std::string row = table.joined.empty() ? "''" : "quote(models.definition)";
+  for (const std::string& column :
+       database.texts("SELECT name FROM pragma_table_info('" + table.name + "')")) {
+    if (!table.by_chance.contains(column)) {
+      row += " || ' " + column + "=' || quote(" + table.name + "." + column + ")";
+    }
+  }
+  return database.texts("SELECT " + row + " FROM " + table.name + table.joined + " ORDER BY " +
+                        table.order);
+}
+
 }  // namespace
 
 KillStudy::KillStudy() {
@@ -285,6 +335,53 @@ CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
   }
   outcome.struck = outcome.struck || blow.has_struck();
   return outcome;
+}
+
+MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count) {
+  const KillStudy study;
+  MatrixReport report;
+  std::mutex mutex;
+  std::atomic<std::uint64_t> next = first_seed;
+  const auto work = [&] {
+    for (std::uint64_t seed = next++; seed < first_seed + count; seed = next++) {
+      const KillCase kill_case = draw_case(seed);
+      const CycleOutcome outcome = run_cycle(study, kill_case);
+      const std::lock_guard lock(mutex);
+      ++report.cycles;
+      report.not_struck += outcome.struck ? 0 : 1;
+      if (outcome.struck) {
+        ++report.blows[blow_of(kill_case)];
+      }
+      if (outcome.failure) {
+        report.failures.push_back(describe(kill_case) + ": " + *outcome.failure);
+      }
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (unsigned i = 0; i < kAtOncePerCore * std::max(1U, std::thread::hardware_concurrency());
+       ++i) {
+    threads.emplace_back(work);
+  }
+  threads.clear();
+  return report;
+}
+
+std::string first_difference(const std::string& database, const std::string& other) {
+  for (const Table& table : tables()) {
+    const auto rows = rows_of(Database(database), table);
+    const auto others = rows_of(Database(other), table);
+    const std::size_t both = std::min(rows.size(), others.size());
+    for (std::size_t i = 0; i < both; ++i) {
+      if (rows[i] != others[i]) {
+        return table.name + ", row " + std::to_string(i) + ":\n" + rows[i] + "\n" + others[i];
+      }
+    }
+    if (rows.size() != others.size()) {
+      return table.name + ": " + std::to_string(rows.size()) + " rows and " +
+             std::to_string(others.size());
+    }
+  }
+  return {};
 }
 
 }  // namespace oblique::test

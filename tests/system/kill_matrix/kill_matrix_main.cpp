@@ -5,7 +5,7 @@
 #include <iostream>
 #include <string>
 
-#include "tests/system/kill_matrix/kill_matrix.h"
+#include "tests/system/kill_matrix/kill_cycle.h"
 
 int main(int argc, char** argv) {
   using namespace oblique::test;

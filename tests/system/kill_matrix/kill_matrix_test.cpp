@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/system/kill_matrix/kill_matrix.h"
-#include "tests/system/kill_matrix/same_rows.h"
+#include "tests/system/kill_matrix/kill_cycle.h"
 
 namespace oblique::test {
 namespace {

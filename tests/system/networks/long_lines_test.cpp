@@ -11,8 +11,8 @@
 
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
-#include "tests/system/networks/slow_proxy.h"
 #include "tests/system/networks/small_study.h"
+#include "tests/system/tcp_proxy.h"
 
 namespace oblique::test {
 namespace {
@@ -28,8 +28,8 @@ class LongLines : public ::testing::Test {
     ASSERT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 0);
     server_ = std::make_unique<Server>(folder_, folder_.file("study.db"),
                                        Environment{{"OBLIQUE_KEYS", keys_ + "/server.key"}});
-    to_workers_port_ = std::make_unique<SlowProxy>(server_->worker_url(), delay);
-    to_clients_port_ = std::make_unique<SlowProxy>(server_->client_url(), delay);
+    to_workers_port_ = std::make_unique<TcpProxy>(server_->worker_url(), delay);
+    to_clients_port_ = std::make_unique<TcpProxy>(server_->client_url(), delay);
     for (auto* worker : {&worker_, &other_worker_}) {
       worker->emplace(folder_, to_workers_port_->url(),
                       std::vector<std::string>{"--threads", "1", "--keys", keys_ + "/worker.key"});
@@ -56,8 +56,8 @@ class LongLines : public ::testing::Test {
   std::string client_key_{keys_ + "/client.key"};
   Database database_{folder_.file("study.db")};
   std::unique_ptr<Server> server_;
-  std::unique_ptr<SlowProxy> to_workers_port_;
-  std::unique_ptr<SlowProxy> to_clients_port_;
+  std::unique_ptr<TcpProxy> to_workers_port_;
+  std::unique_ptr<TcpProxy> to_clients_port_;
   std::optional<Worker> worker_;
   std::optional<Worker> other_worker_;
   std::optional<Process> client_;

@@ -10,9 +10,10 @@
 namespace oblique::test {
 
 std::vector<std::string> submit_and_watch() {
-  const std::string count = std::to_string(kPointsOfAnAxis);
-  return {"submit", "--watch", "--name",           "many", "--preset",        "paper", "--H",
-          "1",      "--mu",    "0.1:2.0:" + count, "--e",  "0.5:1.0:" + count};
+  std::vector<std::string> words{"submit", "--watch"};
+  const auto points = many_points("many");
+  words.insert(words.end(), points.begin(), points.end());
+  return words;
 }
 
 void wait_for_rows(const Database& database, double at_least) {
@@ -24,13 +25,13 @@ void wait_for_rows(const Database& database, double at_least) {
 
 void expect_completed(Process& client, const Database& database,
                       const std::function<std::string()>& workers) {
-  wait_for_rows(database, kPoints);
+  wait_for_rows(database, kManyPoints);
   const auto completed = std::chrono::steady_clock::now();
   EXPECT_EQ(client.wait(), 0) << client.err();
   print_measured("the client knows of the end after", seconds_since(completed));
   EXPECT_EQ(database.number("SELECT count(DISTINCT point) FROM results WHERE status = 'solved'"),
-            kPoints);
-  EXPECT_EQ(database.rows(), kPoints);
+            kManyPoints);
+  EXPECT_EQ(database.rows(), kManyPoints);
   for (const auto& worker : nlohmann::json::parse(workers())) {
     EXPECT_NE(worker.at("standing"), "set aside") << worker;
   }

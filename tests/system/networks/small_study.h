@@ -7,17 +7,9 @@
 
 #include "tests/support/database.h"
 #include "tests/support/process.h"
+#include "tests/system/many_points.h"
 
 namespace oblique::test {
-
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr int kPointsOfAnAxis = 30;  ///< sanitized programs are some twenty times slower
-#else
-constexpr int kPointsOfAnAxis = 120;
-#endif
-
-/// A worker solves them in about two seconds, so that a fault falls into the middle of the study.
-constexpr double kPoints = kPointsOfAnAxis * kPointsOfAnAxis;
 
 /// The words after `oblique` by which a client submits the study and watches it to its end, but for
 /// the server.

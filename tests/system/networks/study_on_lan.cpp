@@ -74,7 +74,7 @@ void StudyOnLan::goes_on_after(const std::function<void()>& fault, std::size_t w
   fault();
   const auto mended = std::chrono::steady_clock::now();
   const double rows = database_.rows();
-  ASSERT_LT(rows, kPoints) << "the study was too short for this fault";
+  ASSERT_LT(rows, kManyPoints) << "the study was too short for this fault";
   wait_for_rows(database_, rows + 1);
   print_measured("work goes on after", seconds_since(mended));
   expect_completed(*client_, database_, [this] {

@@ -42,7 +42,7 @@ Storm::Storm(StormKind kind, const TemporaryFolder& folder, const std::string& s
              const Environment& environment)
     : folder_(folder), server_url_(server_url), environment_(environment) {
   if (kind == StormKind::kCutConnections) {
-    proxy_ = std::make_unique<CuttingProxy>(server_url, kBetweenCuts);
+    proxy_ = std::make_unique<TcpProxy>(server_url, milliseconds(0), kBetweenCuts);
     behind_proxy_ = std::make_unique<Worker>(folder, proxy_->url(), kOneThread, environment);
   } else {
     thread_ = std::jthread([this, kind](const std::stop_token& stop) {

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "tests/support/programs.h"
-#include "tests/system/storms/cutting_proxy.h"
+#include "tests/system/tcp_proxy.h"
 
 namespace oblique::test {
 
@@ -41,7 +41,7 @@ class Storm {
   std::string server_url_;
   Environment environment_;
   std::atomic<int> blows_ = 0;
-  std::unique_ptr<CuttingProxy> proxy_;
+  std::unique_ptr<TcpProxy> proxy_;
   std::unique_ptr<Worker> behind_proxy_;
   std::jthread thread_;  ///< last, as it uses the others
 };

@@ -1,9 +1,10 @@
-#include "tests/system/networks/slow_proxy.h"
+#include "tests/system/tcp_proxy.h"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -13,6 +14,8 @@
 #include <list>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "proto/system/descriptor.h"
@@ -132,10 +135,12 @@ std::optional<Line> accepted(int listener, std::uint16_t server_port) {
 
 }  // namespace
 
-SlowProxy::SlowProxy(const std::string& server_url, std::chrono::milliseconds delay)
+TcpProxy::TcpProxy(const std::string& server_url, std::chrono::milliseconds delay,
+                   std::chrono::milliseconds cut_interval)
     : server_port_(
           static_cast<std::uint16_t>(std::stoul(server_url.substr(server_url.rfind(':') + 1)))),
       delay_(delay),
+      cut_interval_(cut_interval),
       listener_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in address = on_loopback(0);
   socklen_t size = sizeof address;
@@ -147,19 +152,20 @@ SlowProxy::SlowProxy(const std::string& server_url, std::chrono::milliseconds de
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
-SlowProxy::~SlowProxy() {
+TcpProxy::~TcpProxy() {
   thread_.request_stop();
   thread_.join();
   close(listener_);
 }
 
-std::string SlowProxy::url() const {
+std::string TcpProxy::url() const {
   return "tcp://127.0.0.1:" + std::to_string(port_);
 }
 
-void SlowProxy::run(const std::stop_token& stop) {
+void TcpProxy::run(const std::stop_token& stop) {
   std::list<Line> lines;
   int swallowed = 0;
+  auto next_cut = Clock::now() + cut_interval_;
   while (!stop.stop_requested()) {
     std::vector<pollfd> polled{{listener_, POLLIN, 0}};
     for (const Line& line : lines) {
@@ -184,6 +190,11 @@ void SlowProxy::run(const std::stop_token& stop) {
       }
     }
     const auto now = Clock::now();
+    if (cut_interval_.count() > 0 && now >= next_cut) {
+      cuts_ += static_cast<int>(lines.size());
+      lines.clear();
+      next_cut = now + cut_interval_;
+    }
     lines.remove_if([&](Line& line) { return !line.move(now, delay_, stalls_); });
   }
 }

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <thread>
+
+namespace oblique::test {
+
+/// Forwards TCP connections on loopback to a server: slowly, with stalls, with silent losses, or
+/// cut again and again.
+class TcpProxy {
+ public:
+  /// Forwards to the server at that ZeroMQ address. Every byte and every end arrives `delay` later,
+  /// in either direction. All connections are cut after each `cut_interval`, unless it is 0.
+  explicit TcpProxy(const std::string& server_url, std::chrono::milliseconds delay = {},
+                    std::chrono::milliseconds cut_interval = {});
+  ~TcpProxy();
+  TcpProxy(const TcpProxy&) = delete;
+  TcpProxy& operator=(const TcpProxy&) = delete;
+
+  /// Its ZeroMQ address.
+  std::string url() const;
+  /// While true, nothing is forwarded; what arrived meanwhile is forwarded afterwards.
+  void stall(bool holds) { stalls_ = holds; }
+  /// From now on everything on the present connections is lost, their ends too, so that each side
+  /// believes the other silent. Later connections are forwarded.
+  void swallow() { ++swallowed_; }
+  /// Connections made so far.
+  int connections() const { return connections_; }
+  /// Connections cut so far.
+  int cuts() const { return cuts_; }
+
+ private:
+  void run(const std::stop_token& stop);
+
+  std::uint16_t server_port_;
+  std::chrono::milliseconds delay_;
+  std::chrono::milliseconds cut_interval_;
+  int listener_ = -1;
+  std::uint16_t port_ = 0;
+  std::atomic<bool> stalls_ = false;
+  std::atomic<int> swallowed_ = 0;
+  std::atomic<int> connections_ = 0;
+  std::atomic<int> cuts_ = 0;
+  std::jthread thread_;  ///< last, as it uses the others
+};
+
+}  // namespace oblique::test
