@@ -92,13 +92,15 @@ TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheHalvedMeshDoesNotC
   CaseResult far = some_result();
   far.duration_s *= 1.02;
   far.major_mode = "sC sR";
-  const auto error = [](int elements_per_link, const CaseResult& companion) {
-    return *estimated_errors(coarse_model(elements_per_link), some_result(), companion).duration;
+  const double tolerance = coarse_model().tolerance;
+  const auto error = [&](int elements_per_link, const CaseResult& companion) {
+    return *estimated_errors(coarse_model(elements_per_link), some_result(), companion).duration -
+           tolerance;
   };
   EXPECT_NEAR(error(16, far) / error(16, near), 2.0, 1e-9);
   EXPECT_GT(error(4, near), 5.0 * error(16, near));
-  // Once the waves are carried, that of order 3 and a factor of 2: d/7.
-  EXPECT_NEAR(error(64, near), 0.01 / 7.0, 1e-5);
+  // Once the waves are carried, that of order 2 and a factor of 2: d/3.
+  EXPECT_NEAR(error(64, near), 0.01 / 3.0, 1e-5);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), near).mode_same, 1);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), far).mode_same, 0);
 }
@@ -109,7 +111,8 @@ TEST(EstimatedErrors, OfOneComponentOfTheExitVelocityCountForBoth) {
   const double one = *estimated_errors(coarse_model(8), some_result(), companion).v_out;
   companion.vn_out_m_s += 0.1;
   const double both = *estimated_errors(coarse_model(8), some_result(), companion).v_out;
-  EXPECT_NEAR(both / one, std::sqrt(2.0), 1e-9);
+  const double tolerance = coarse_model().tolerance;
+  EXPECT_NEAR((both - tolerance) / (one - tolerance), std::sqrt(2.0), 1e-9);
 }
 
 TEST(EstimatedErrors, AreAbsentWhereTheScaleIsZero) {
@@ -121,13 +124,13 @@ TEST(EstimatedErrors, AreAbsentWhereTheScaleIsZero) {
   EXPECT_TRUE(errors.duration);
 }
 
-TEST(EstimatedErrors, OfGeneralizedAlphaCountOnNoHigherOrderThanItHas) {
+TEST(EstimatedErrors, HaveTheErrorOfStepsThatAreChosenByATolerance) {
   CaseResult companion = some_result();
-  companion.duration_s *= 1.01;
+  companion.duration_s *= 1.0 + 1e-12;
   ModelParameters model = coarse_model(64);
-  const double explicitly = *estimated_errors(model, some_result(), companion).duration;
-  model.integrator = Integrator::kGeneralizedAlpha;
-  EXPECT_GT(*estimated_errors(model, some_result(), companion).duration, 2.0 * explicitly);
+  EXPECT_NEAR(*estimated_errors(model, some_result(), companion).duration, model.tolerance, 1e-11);
+  model.dt_s = 1e-7;
+  EXPECT_LT(*estimated_errors(model, some_result(), companion).duration, 1e-11);
 }
 
 TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
