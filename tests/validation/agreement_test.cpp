@@ -11,6 +11,7 @@
 #include "tests/validation/both_ways.h"
 #include "tests/validation/outputs.h"
 #include "tests/validation/validation_table.h"
+#include "worker/solver/estimate.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::validation {
@@ -186,6 +187,35 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
                             {{"exit velocity, of exit speed", {1e-3, kSlowExit}},
                              {"reaction peaks, of each itself",
                               {4e-4, "vibration from the release, which 5 us do not resolve"}}});
+}
+
+TEST(Agreement, EstimatedErrorsCoverWhatTheStepsLeaveInAllOutputsAndInstantsOfSixtyContacts) {
+  const solver::ModelParameters model = solver::preset("standard");
+  solver::ModelParameters fine = model;
+  fine.step_factor = 0.25;  // an error 256 times smaller
+  const solver::Finger finger(model);
+  const solver::Finger companion(solver::companion_model(model));
+  const solver::Finger reference(fine);
+  for (const Point& point : grid()) {
+    SCOPED_TRACE(testing::Message() << point.H_m << ' ' << point.mu << ' ' << point.e_star);
+    const CaseResult result = finger.solve(point.H_m, point.mu, point.e_star);
+    const CaseResult right = reference.solve(point.H_m, point.mu, point.e_star);
+    ASSERT_TRUE(have_same_turns(result, right));
+    const auto errors =
+        solver::estimated_errors(model, result, companion.solve(point.H_m, point.mu, point.e_star));
+    const double fn_N = right.fn_peak_N;
+    const double slide_m = std::hypot(right.vt_in_m_s, right.vn_in_m_s) * right.duration_s;
+    EXPECT_LE(std::abs(result.fn_peak_N - right.fn_peak_N) / fn_N, *errors.fn_peak);
+    EXPECT_LE(std::abs(result.ft_peak_N - right.ft_peak_N) / fn_N, *errors.ft_peak);
+    EXPECT_LE(std::abs(result.slide_m - right.slide_m) / slide_m, *errors.slide);
+    EXPECT_LE(std::abs(result.stick_total_s - right.stick_total_s) / right.duration_s,
+              *errors.stick_total);
+    for (std::size_t i = 0; i < right.phases.size(); ++i) {
+      EXPECT_LE(std::abs(result.phases[i].t1_s - right.phases[i].t1_s) / right.duration_s,
+                *errors.duration)
+          << "phase " << i;
+    }
+  }
 }
 
 }  // namespace
