@@ -1,9 +1,10 @@
 #include "client/service/run_service.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <stdexcept>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -11,7 +12,6 @@
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
 #include "client/service/connection.h"
-#include "client/service/result_query.h"
 #include "client/service/watching.h"
 #include "proto/study_counts.h"
 #include "proto/text.h"
@@ -21,26 +21,7 @@
 namespace oblique::client {
 namespace {
 
-void tell_how_to_continue(const Study& study, const RunSettings& settings) {
-  std::cerr << fmt::format(
-      "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
-      study.name, settings.service.database.string());
-}
-
-/// Rows that were not merged into the file are missing in a copy of it.
-void tell_of_log(const std::filesystem::path& database) {
-  std::error_code ignored;
-  const std::string log = database.string() + "-wal";
-  const auto size = std::filesystem::file_size(log, ignored);
-  if (!ignored && size > 0) {
-    std::cerr << fmt::format(
-        "Another program reads {0}, so {1} holds some of its rows: a copy needs both files. "
-        "`oblique backup COPY.db --db {0}` makes one that is whole.\n",
-        database.string(), log);
-  }
-}
-
-/// Why the rest of a study is not solved by the workers of this run, and what to do; empty: it is.
+/// Why the workers of this run do not solve the rest of a study, and what to do; or empty.
 std::string objection_to_waiting(const protocol::StudyStatus& status) {
   const std::string own = solver::solver_version();
   if (status.state() == "paused" && status.leased() == 0) {
@@ -61,32 +42,28 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
 /// Names the other studies of the database that are not finished. They wait during this run.
 void tell_of_other_studies(Connection& connection, const Study& study,
                            const std::filesystem::path& database) {
-  constexpr std::size_t kMostNamed = 3;
   std::vector<std::string> others;
-  const auto all = connection.status({});
-  for (const auto& other : all.studies()) {
+  for (const auto& other : connection.status({}, {})) {
     if (other.name() != study.name && other.state() == "running") {
       others.push_back(fmt::format("{} ({} points open)", other.name(),
                                    shown_count(protocol::open_points(other))));
     }
   }
-  if (others.empty()) {
-    return;
+  if (!others.empty()) {
+    constexpr std::size_t kMostNamed = 3;
+    const std::size_t more = others.size() - std::min(others.size(), kMostNamed);
+    others.resize(others.size() - more);
+    tell_line(fmt::format(
+        "Also unfinished in {0}: {1}{2}. To go on with one, repeat the `oblique run` that "
+        "began it; `oblique view {0}` goes on with all.",
+        database.string(), fmt::join(others, ", "),
+        more > 0 ? fmt::format(" and {} more", shown_count(more)) : ""));
   }
-  std::string more;
-  if (others.size() > kMostNamed) {
-    more = fmt::format(" and {} more", shown_count(others.size() - kMostNamed));
-    others.resize(kMostNamed);
-  }
-  tell_line(fmt::format(
-      "Also unfinished in {0}: {1}{2}. To go on with one, repeat the `oblique run` that "
-      "began it; `oblique view {0}` goes on with all.",
-      database.string(), fmt::join(others, ", "), more));
 }
 
 RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
                        protocol::StopSignals& stop) {
-  const auto look_after = [&] {
+  const auto keep_waiting = [&] {
     service.check();
     if (const auto news = service.news(); !news.empty()) {
       std::cerr << protocol::visible_lines(news) << '\n';
@@ -97,7 +74,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   where.server_url = service.client_url();
   where.key = service.client_key();
   where.if_silent = why_silent(settings.service.database);
-  Connection connection(where, look_after);
+  Connection connection(where, keep_waiting);
   const auto submitted = connection.submit(study, {.no_reuse = settings.no_reuse});
   if (submitted.created()) {
     tell_mesh(std::cerr, study.recipe);
@@ -110,15 +87,12 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   }
   tell_of_other_studies(connection, study, settings.service.database);
   const auto ask = [&](const Tell& tell) {
-    look_after();
-    const auto reply = connection.status(study.name, tell);
-    if (reply.studies_size() != 1) {
-      throw ServerError(fmt::format("the server no longer knows the study \"{}\"", study.name));
-    }
-    if (const auto reason = objection_to_waiting(reply.studies(0)); !reason.empty()) {
+    keep_waiting();
+    auto status = study_named(connection, study.name, tell);
+    if (const auto reason = objection_to_waiting(status); !reason.empty()) {
       throw std::runtime_error(reason);
     }
-    return reply.studies(0);
+    return status;
   };
   RunEnd end;
   end.status = watch_study(ask, stop);
@@ -168,10 +142,11 @@ std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
     EmbeddedService service(how, stop);
     auto end = submit_and_wait(study, settings, service, stop);
     service.stop();
-    tell_of_log(settings.service.database);
     return end;
   } catch (const Interrupted&) {
-    tell_how_to_continue(study, settings);
+    std::cerr << fmt::format(
+        "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
+        study.name, settings.service.database.string());
     return std::nullopt;
   }
 }

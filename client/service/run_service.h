@@ -6,7 +6,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/source.h"
 #include "client/study/study.h"
@@ -19,10 +18,10 @@ namespace oblique::client {
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};
   bool no_reuse = false;   ///< as in SubmitSettings
-  std::int64_t rows = 30;  ///< most rows of results asked for at the end
+  std::int64_t rows = 30;  ///< most rows of results fetched at the end
 };
 
-/// Adds --workers and --verbose. `settings` must live as long as `verb`.
+/// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `verb`.
 void add_worker_flags(CLI::App& verb, RunSettings& settings);
 
 /// Throws solver::InputError, naming the flag and what is allowed, for a number of workers or rows
@@ -37,8 +36,8 @@ struct RunEnd {
 };
 
 /// Starts server and workers here, submits the study, shows its progress and waits for its end;
-/// nothing is left running. Nothing when `stop` is requested; what to do next is told then. Throws
-/// ProcessError when server or workers end too soon, ServerError when the study is refused.
+/// nothing is left running. When `stop` is requested, prints how to continue and returns nothing.
+/// Throws ProcessError when server or workers end too soon, ServerError when the study is refused.
 std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop);
 

@@ -16,8 +16,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/io/child_process.h"
 #include "client/output/human_units.h"
-#include "client/service/child_process.h"
 #include "client/service/source.h"
 #include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"

@@ -10,7 +10,7 @@
 #include "client/output/mesh_note.h"
 #include "client/output/value_notes.h"
 #include "client/service/connection.h"
-#include "client/service/result_query.h"
+#include "client/service/source.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/study/study_flags.h"
@@ -74,11 +74,11 @@ std::string query_for_more(const Study& study, const ConnectionSettings& server)
 int watch(const Study& study, std::uint64_t study_id, std::int64_t rows,
           const std::string& for_more, Connection& connection, protocol::StopSignals& stop) {
   const auto ask = [&](const Tell& tell) {
-    const auto status = connection.status_of(study.name, study_id, tell);
-    if (status.studies_size() != 1) {
-      throw ServerError("the server no longer knows the study \"" + study.name + "\"");
+    const auto found = connection.status_of(study.name, study_id, tell);
+    if (found.size() != 1) {
+      throw ServerError("the server no longer has the study \"" + study.name + "\"");
     }
-    return status.studies(0);
+    return found.front();
   };
   const auto status = watch_study(ask, stop);
   if (stop.requested()) {

@@ -28,7 +28,7 @@ TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
   const auto url = nobody.url();
   Connection connection(at(url, 100));
   try {
-    connection.status("");
+    connection.full_status();
     FAIL();
   } catch (const ConnectionError& error) {
     const std::string message = error.what();
@@ -102,7 +102,7 @@ TEST(Connection, PassesOverAnswersToEarlierQuestions) {
     return std::vector{protocol::encode(stale), protocol::encode(reply)};
   });
   Connection connection(at(server.url(), kLong_ms));
-  EXPECT_EQ(connection.status("").workers(), 2U);
+  EXPECT_EQ(connection.full_status().workers(), 2U);
 }
 
 /// Frames with one reply to a status question, which says that there are so many workers.
@@ -140,7 +140,7 @@ TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
   Connection connection(
       {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
       replace_when_taken);
-  EXPECT_EQ(connection.status("").workers(), 3U);
+  EXPECT_EQ(connection.full_status().workers(), 3U);
 }
 
 TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) {
@@ -152,7 +152,7 @@ TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) 
     return ids.size() < 3 ? std::vector<std::string>() : workers_reply(request, 4);
   });
   Connection connection({.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = 1});
-  EXPECT_EQ(connection.status("").workers(), 4U);
+  EXPECT_EQ(connection.full_status().workers(), 4U);
   const std::lock_guard lock(mutex);
   EXPECT_GE(ids.size(), 3U);
   EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
@@ -167,7 +167,7 @@ TEST(Connection, AsksAServerThatAnswersOnce) {
   Connection connection(
       {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
   for (int i = 1; i <= 20; ++i) {
-    connection.status("");
+    connection.full_status();
     EXPECT_EQ(asked, i);
   }
 }
@@ -180,7 +180,7 @@ TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
   });
   Connection connection(at(server.url(), kLong_ms));
   for (std::uint32_t i = 1; i <= 20; ++i) {
-    EXPECT_EQ(connection.status("").workers(), i);
+    EXPECT_EQ(connection.full_status().workers(), i);
   }
 }
 
@@ -192,13 +192,17 @@ TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
     sentences.push_back(sentence);
     if (server == nullptr) {
       server = std::make_unique<ScriptedServer>(
-          [](const protocol::ClientRequest& request) { return workers_reply(request, 5); },
+          [](const protocol::ClientRequest& request) {
+            auto reply = reply_to(request);
+            reply.mutable_status()->add_studies()->set_points(5);
+            return std::vector{protocol::encode(reply)};
+          },
           port.url());
     }
   };
   // Far longer than the time-out of an answer that is not waited for.
   Connection connection(at(port.url(), 10));
-  EXPECT_EQ(connection.status("", tell).workers(), 5U);
+  EXPECT_EQ(connection.status("", tell).at(0).points(), 5U);
   ASSERT_EQ(sentences.size(), 2U);
   EXPECT_NE(sentences[0].find("no answer from " + port.url()), std::string::npos) << sentences[0];
   EXPECT_NE(sentences[1].find("answers again"), std::string::npos) << sentences[1];
@@ -261,7 +265,7 @@ TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {
     return std::vector{protocol::encode(reply)};
   });
   Connection connection(at(server.url(), kLong_ms));
-  const auto all = connection.status("");
+  const auto all = connection.full_status();
   ASSERT_EQ(all.studies_size(), 4);
   EXPECT_EQ(all.studies(3).study_id(), 40U);
   EXPECT_EQ(all.workers(), 3U);

@@ -1,4 +1,4 @@
-#include "client/service/result_query.h"
+#include "client/service/source.h"
 
 #include <functional>
 
