@@ -1,6 +1,7 @@
 #include "client/python/results.h"
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <variant>
 
@@ -18,30 +19,19 @@ py::str text_of(std::string_view text) {
   return {text.data(), text.size()};
 }
 
-py::dict group_of(py::dict& all, std::string_view group) {
-  if (group.empty()) {
-    return all;
-  }
-  const py::str name = text_of(group);
-  if (!all.contains(name)) {
-    all[name] = py::dict();
-  }
-  return all[name];
-}
-
 }  // namespace
 
-void Texts::set(std::size_t point, std::string_view text) {
-  auto known = known_.find(text);
-  if (known == known_.end()) {
-    known = known_.emplace(text, static_cast<std::int32_t>(texts_.size())).first;
-    texts_.emplace_back(text);
+void ResultArrays::Texts::set(std::size_t point, std::string_view text) {
+  auto place = known.find(text);
+  if (place == known.end()) {
+    place = known.emplace(text, static_cast<std::int32_t>(texts.size())).first;
+    texts.emplace_back(text);
   }
-  codes_[point] = known->second;
+  codes[point] = place->second;
 }
 
-py::tuple Texts::tuple() const {
-  return py::make_tuple(texts_, array_of(std::vector(codes_)));
+py::tuple ResultArrays::Texts::tuple() const {
+  return py::make_tuple(texts, array_of(std::vector(codes)));
 }
 
 ResultArrays::ResultArrays(std::size_t points) : errors_(points) {
@@ -68,18 +58,14 @@ void ResultArrays::set(std::size_t point, const CaseResult& result) {
   const auto fields = solver::result_fields();
   for (std::size_t i = 0; i < fields.size(); ++i) {
     const auto& value = fields[i].value;
-    if (const auto* real = std::get_if<Member<double>>(&value)) {
-      if (const double* number = real->of(result)) {
-        numbers_[i][point] = *number;
-      }
-    } else if (const auto* whole = std::get_if<Member<std::int64_t>>(&value)) {
-      if (const std::int64_t* number = whole->of(result)) {
-        numbers_[i][point] = static_cast<double>(*number);
-      }
-    } else if (const auto* text = std::get_if<Member<std::string>>(&value)) {
-      if (const std::string* here = text->of(result)) {
-        texts_.at(i).set(point, *here);
-      }
+    if (const auto* real = std::get_if<Member<double>>(&value); real && real->of(result)) {
+      numbers_[i][point] = *real->of(result);
+    }
+    if (const auto* whole = std::get_if<Member<std::int64_t>>(&value); whole && whole->of(result)) {
+      numbers_[i][point] = static_cast<double>(*whole->of(result));
+    }
+    if (const auto* text = std::get_if<Member<std::string>>(&value); text && text->of(result)) {
+      texts_.at(i).set(point, *text->of(result));
     }
   }
   for (Elements& elements : lists_) {
@@ -140,13 +126,16 @@ py::dict ResultArrays::dict() {
     if (std::holds_alternative<solver::ListPart>(value)) {
       continue;
     }
-    py::object column;
-    if (std::holds_alternative<Member<std::string>>(value)) {
-      column = texts_.at(i).tuple();
-    } else {
-      column = array_of(std::move(numbers_[i]));
+    const py::str group = text_of(fields[i].group);
+    if (!fields[i].group.empty() && !all.contains(group)) {
+      all[group] = py::dict();
     }
-    group_of(all, fields[i].group)[text_of(fields[i].name)] = column;
+    py::dict named = fields[i].group.empty() ? all : py::dict(all[group]);
+    if (std::holds_alternative<Member<std::string>>(value)) {
+      named[text_of(fields[i].name)] = texts_.at(i).tuple();
+    } else {
+      named[text_of(fields[i].name)] = array_of(std::move(numbers_[i]));
+    }
   }
   py::dict lists;
   for (const Elements& list : lists_) {

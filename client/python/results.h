@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
@@ -26,21 +25,6 @@ pybind11::array_t<T> array_of(std::vector<T>&& values) {
   return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(owned->size()), owned->data(), owner);
 }
 
-/// Texts of many points; equal ones are stored once.
-class Texts {
- public:
-  explicit Texts(std::size_t points) : codes_(points, -1) {}
-
-  void set(std::size_t point, std::string_view text);
-  /// The texts, and for each point the index of its text, or -1.
-  pybind11::tuple tuple() const;
-
- private:
-  std::vector<std::int32_t> codes_;
-  std::map<std::string, std::int32_t, std::less<>> known_;
-  std::vector<std::string> texts_;
-};
-
 /// The outputs of many points, an array each: NaN and no text where there is none.
 class ResultArrays {
  public:
@@ -50,18 +34,28 @@ class ResultArrays {
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// The names of `oblique solve --json` with an array for each number, a tuple of Texts for each
-  /// text, and `error`. `lists` has an array for each member of a list, and the `offsets` of
-  /// the points. Moves the numbers out.
+  /// The names of `oblique solve --json` with an array for each number, (texts, index of each
+  /// point's text or -1) for each text, and `error`. `lists` has an array for each member of a
+  /// list, and the `offsets` of the points. Moves the numbers out.
   pybind11::dict dict();
 
  private:
+  /// Texts of many points; equal ones are stored once.
+  struct Texts {
+    explicit Texts(std::size_t points) : codes(points, -1) {}
+    void set(std::size_t point, std::string_view text);
+    pybind11::tuple tuple() const;
+
+    std::vector<std::int32_t> codes;
+    std::map<std::string, std::int32_t, std::less<>> known;
+    std::vector<std::string> texts;
+  };
   /// One list of many points, in the order in which the points came.
   struct Elements {
     const solver::ResultList* list;
     std::vector<std::uint64_t> begin;  ///< of each point
     std::vector<std::uint32_t> count;
-    /// One a member; a text is the place of its first element with the same text in `texts`.
+    /// One a member; a text is the index of its first occurrence in `texts`.
     std::vector<std::vector<double>> members;
     std::vector<std::string> texts;
   };

@@ -57,7 +57,6 @@ def test_results_show_what_they_are():
     assert list(impact)[:4] == ["H", "mu", "e", "fall_time_s"]
     assert impact.energy.closure < 1e-6
     assert impact.phases[0]["kind"] == "compression"
-    assert impact == oblique.solve(1, 0.4, 1) and impact != oblique.solve(1, 0.5, 1)
     assert pickle.loads(pickle.dumps(impact)) == impact
 
 
@@ -120,10 +119,6 @@ def test_a_trace_may_begin_with_the_fall():
     assert list(trace.to_pandas().columns)[:2] == ["t_s", "fn_N"]
     with pytest.raises(AttributeError, match="node0x_m"):
         trace.node0x_m
-
-
-def test_the_version_is_that_of_the_program():
-    assert oblique.__version__ in run_oblique("--version")
 
 
 def test_threads_get_the_same_bits_as_one():

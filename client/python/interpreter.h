@@ -26,15 +26,14 @@ class WithoutLock {
   WithoutLock(const WithoutLock&) = delete;
   WithoutLock& operator=(const WithoutLock&) = delete;
 
-  /// Returns what `call` returns, which runs with the lock.
-  template <class Call>
-  auto with_lock(const Call& call) {
+  /// Calls `call` with the lock.
+  void with_lock(const std::function<void()>& call) {
     take();
     const struct Release {
       WithoutLock& without;
       ~Release() { without.state_ = PyEval_SaveThread(); }
     } release{*this};
-    return call();
+    call();
   }
 
  private:
@@ -43,9 +42,6 @@ class WithoutLock {
   PyThreadState* state_;
 };
 
-/// Whether this thread, which has the lock, is the one in which handlers of signals run.
-bool is_main_thread();
-
 /// Throws an error that becomes RuntimeError in the child of a fork: threads and locks of the
 /// parent are not usable there. The module calls it first when it is imported.
 void refuse_forked_child();
@@ -53,36 +49,41 @@ void refuse_forked_child();
 /// Thrown by work whose result is no longer wanted.
 class Stopped {};
 
-/// Runs `work` without the interpreter's lock and returns its result. From the main thread, which
-/// signals reach, `work` runs on a thread of its own. If the handler of a signal throws, as that of
+/// Runs `work` on a thread of its own, without the interpreter's lock, and returns its result.
+/// Meanwhile signals are handled and `meanwhile` is called every 50 ms. Where either raises, as
 /// Ctrl-C does, `stop` is set, `when_stopped` is called, and the exception is thrown soon after,
 /// even while `work` still runs: it must own all that it uses.
 template <class Result>
 Result interruptibly(const std::function<Result(const std::atomic<bool>& stop)>& work,
-                     const std::function<void()>& when_stopped = {}) {
+                     const std::function<void()>& when_stopped = {},
+                     const std::function<void()>& meanwhile = {}) {
   constexpr std::chrono::milliseconds kBetweenSignalChecks{50};
   constexpr std::chrono::milliseconds kLongestWait{150};
   refuse_forked_child();
   const auto stop = std::make_shared<std::atomic<bool>>(false);
-  const bool has_signals = is_main_thread();
   WithoutLock others_run;
-  if (!has_signals) {
-    return work(*stop);
-  }
   std::packaged_task<Result()> task([stop, work] { return work(*stop); });
   auto result = task.get_future();
   std::thread thread(std::move(task));
   while (result.wait_for(kBetweenSignalChecks) != std::future_status::ready) {
-    if (others_run.with_lock([] { return PyErr_CheckSignals() == 0; })) {
-      continue;
+    try {
+      others_run.with_lock([&meanwhile] {
+        if (PyErr_CheckSignals() != 0) {
+          throw pybind11::error_already_set();
+        }
+        if (meanwhile) {
+          meanwhile();
+        }
+      });
+    } catch (...) {
+      *stop = true;
+      if (when_stopped) {
+        when_stopped();
+      }
+      const bool has_ended = result.wait_for(kLongestWait) == std::future_status::ready;
+      has_ended ? thread.join() : thread.detach();
+      throw;
     }
-    *stop = true;
-    if (when_stopped) {
-      when_stopped();
-    }
-    const bool has_ended = result.wait_for(kLongestWait) == std::future_status::ready;
-    has_ended ? thread.join() : thread.detach();
-    others_run.with_lock([] { throw pybind11::error_already_set(); });
   }
   thread.join();
   return result.get();
