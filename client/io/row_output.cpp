@@ -7,7 +7,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/atomic_file.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 

@@ -85,9 +85,9 @@ std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   return lines;
 }
 
-/// Widths of columns are those of the first rows; a later value that is wider shifts the rest of its
-/// line. Where lines would be too long, texts are shortened, then columns left out from the right,
-/// which a line below the table says. Another one says what the letters of a mode mean.
+/// Widths of columns are those of the first rows; a later value that is wider shifts the rest of
+/// its line. Where lines would be too long, texts are shortened, then columns left out from the
+/// right, which a line below the table says. Another one says what the letters of a mode mean.
 class TablePrinter : public RowPrinter {
  public:
   explicit TablePrinter(OutputSettings settings) : settings_(std::move(settings)) {}

@@ -12,7 +12,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/atomic_file.h"
 #include "client/io/child_process.h"
 #include "client/io/sink.h"
 #include "client/plot/figure_table.h"

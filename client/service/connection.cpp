@@ -357,21 +357,6 @@ std::vector<protocol::StudyStatus> Connection::status(const std::string& study, 
   return {reply.studies().begin(), reply.studies().end()};
 }
 
-std::vector<protocol::StudyStatus> Connection::status_of(const std::string& study,
-                                                         std::uint64_t study_id, const Tell& tell) {
-  protocol::ClientRequest request;
-  request.mutable_status()->set_study(study);
-  request.mutable_status()->set_study_id(study_id);
-  const auto reply = call(std::move(request), tell).status();
-  return {reply.studies().begin(), reply.studies().end()};
-}
-
-protocol::StatusReply Connection::greeting() {
-  protocol::ClientRequest request;
-  request.mutable_status()->set_limit(1);
-  return call(std::move(request)).status();
-}
-
 protocol::WorkersReply Connection::workers() {
   protocol::WorkersReply all;
   std::uint64_t after = 0;
@@ -403,35 +388,14 @@ protocol::TraceReply Connection::trace(protocol::TraceRequest trace) {
   return call(std::move(request)).trace();
 }
 
-protocol::ChangeReply Connection::change(protocol::ChangeRequest change) {
+protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change,
+                                         std::uint64_t study_id, const std::string& new_name) {
   protocol::ClientRequest request;
-  *request.mutable_change() = std::move(change);
+  request.mutable_change()->set_study(study);
+  request.mutable_change()->set_study_id(study_id);
+  request.mutable_change()->set_change(change);
+  request.mutable_change()->set_new_name(new_name);
   return call(std::move(request)).change();
-}
-
-protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change) {
-  protocol::ChangeRequest request;
-  request.set_study(study);
-  request.set_change(change);
-  return this->change(std::move(request));
-}
-
-protocol::ChangeReply Connection::rename(const protocol::StudyStatus& study,
-                                         const std::string& name) {
-  protocol::ChangeRequest request;
-  request.set_study(study.name());
-  request.set_study_id(study.study_id());
-  request.set_change(protocol::STUDY_CHANGE_RENAME);
-  request.set_new_name(name);
-  return change(std::move(request));
-}
-
-protocol::ChangeReply Connection::remove(const protocol::StudyStatus& study) {
-  protocol::ChangeRequest request;
-  request.set_study(study.name());
-  request.set_study_id(study.study_id());
-  request.set_change(protocol::STUDY_CHANGE_DELETE);
-  return change(std::move(request));
 }
 
 protocol::Recipe Connection::describe(const std::string& study) {

@@ -87,22 +87,16 @@ class Connection : public Source {
 
   using Source::status;
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override;
-  std::vector<protocol::StudyStatus> status_of(const std::string& study, std::uint64_t study_id,
-                                               const Tell& tell) override;
   /// The status of all studies, with what the server says of itself.
   protocol::StatusReply full_status() { return status_pages({}, {}); }
-  /// The same with one study at most.
-  protocol::StatusReply greeting();
   protocol::WorkersReply workers();  ///< all of them
 
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
   /// Waits as long as the server says that it has the request, whose time limit it keeps.
   protocol::TraceReply trace(protocol::TraceRequest trace);
-  protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
-  /// Gives the study of that number, as `status` has it, another name.
-  protocol::ChangeReply rename(const protocol::StudyStatus& study, const std::string& name);
-  /// Deletes it with its results.
-  protocol::ChangeReply remove(const protocol::StudyStatus& study);
+  /// Changes the study of that name; renaming and deleting also need its number.
+  protocol::ChangeReply change(const std::string& study, protocol::StudyChange change,
+                               std::uint64_t study_id = 0, const std::string& new_name = {});
   protocol::Recipe describe(const std::string& study);
 
  private:
@@ -132,7 +126,6 @@ class Connection : public Source {
   };
 
   protocol::StatusReply status_pages(const std::string& study, const Tell& tell);
-  protocol::ChangeReply change(protocol::ChangeRequest change);
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
   /// Throws what the server's error says, or what is wrong with its reply to a request of `kind`.
   void check(const protocol::ClientReply& reply, int kind) const;

@@ -60,12 +60,6 @@ class Database : public Source {
       throw server::QueryError(fmt::format("{} in {}", error.what(), file_));
     }
   }
-  std::vector<protocol::StudyStatus> status_of(const std::string& study, std::uint64_t study_id,
-                                               const Tell& tell) override {
-    const auto name = reader_.query(
-        fmt::format("SELECT name FROM studies WHERE study_id = {}", study_id), limits_);
-    return status(name.rows.size() == 1 ? std::get<std::string>(name.rows[0][0]) : study, tell);
-  }
   std::string place() const override { return file_; }
 
  private:
@@ -107,10 +101,7 @@ protocol::QueryRequest request_for(const ResultQuery& query) {
 }
 
 protocol::QueryRequest first_results(const std::string& study, std::int64_t rows) {
-  ResultQuery query;
-  query.study = study;
-  query.limit = rows;
-  return request_for(query);
+  return request_for({.study = study, .limit = rows});
 }
 
 protocol::Table Source::query(const std::string& sql) {

@@ -20,12 +20,13 @@ struct DatabaseSettings {
 
 /// What to show of the results of a study. Texts are SQL over the columns of the view `runs`.
 struct ResultQuery {
-  std::string study;
-  std::string where;   ///< empty: all points
-  std::string select;  ///< empty: the axes that vary and the main outputs, of a group its columns
-  std::string group;   ///< columns of which each row has other values; empty: none
-  std::string order;   ///< empty: by point, of a group by its columns
-  std::optional<std::int64_t> limit;  ///< none: all rows
+  std::string study = {};
+  std::string where = {};  ///< empty: all points
+  /// Empty: the axes that vary and the main outputs, of a group its columns.
+  std::string select = {};
+  std::string group = {};  ///< columns of which each row has other values; empty: none
+  std::string order = {};  ///< empty: by point, of a group by its columns
+  std::optional<std::int64_t> limit = {};  ///< none: all rows
 };
 
 /// Throws solver::InputError, naming the flag, for a limit below 0 and for texts that are no part
@@ -65,10 +66,6 @@ class Source {
   /// `tell`, waits for a server that is away; see Connection.
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;
   std::vector<protocol::StudyStatus> status(const std::string& study) { return status(study, {}); }
-  /// The study of that number, also after it was renamed; `study` was its name.
-  virtual std::vector<protocol::StudyStatus> status_of(const std::string& study,
-                                                       std::uint64_t study_id,
-                                                       const Tell& tell) = 0;
   /// Who may use it, as StatusReply.access of the last status; empty for a file.
   virtual std::string access() const { return {}; }
   /// "oblique.db" or "tcp://127.0.0.1:7600", for messages.

@@ -1,6 +1,7 @@
 #include "client/service/source_flags.h"
 
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>

@@ -104,24 +104,6 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
   return found.front();
 }
 
-protocol::StudyStatus WatchedStudy::ask(const Tell& tell) {
-  if (study_id_ == 0) {
-    const auto first = study_named(source_, name_, tell);
-    study_id_ = first.study_id();
-    return first;
-  }
-  const auto found = source_.status_of(name_, study_id_, tell);
-  if (found.size() != 1) {
-    throw std::runtime_error(
-        fmt::format("the study \"{}\" is no longer in {}", name_, source_.place()));
-  }
-  if (found.front().name() != name_ && tell) {
-    tell(fmt::format("{} is called {} now", name_, found.front().name()));
-    name_ = found.front().name();
-  }
-  return found.front();
-}
-
 int tell_end(const protocol::StudyStatus& status,
              const std::function<protocol::Table(const std::string&)>& query) {
   const ErrorOn error(std::cerr);

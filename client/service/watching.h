@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "client/service/source.h"
@@ -45,19 +44,6 @@ void tell_line(const std::string& sentence);
 /// The study of that name. Throws std::runtime_error where there is none. Given a `tell`, waits for
 /// a server that is away.
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
-
-/// Finds one study again and again: by name first, then by its number, also after it was renamed.
-/// Throws as `study_named`.
-class WatchedStudy {
- public:
-  WatchedStudy(Source& source, std::string name) : source_(source), name_(std::move(name)) {}
-  protocol::StudyStatus ask(const Tell& tell);
-
- private:
-  Source& source_;
-  std::string name_;
-  std::uint64_t study_id_ = 0;  // 0: it was not found yet
-};
 
 /// Prints failed points with their reasons, or that the study was cancelled, to standard error.
 /// Returns the exit code: kDone when every point is solved.

@@ -67,10 +67,9 @@ void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
 
 std::optional<Value> StoredRow::value(const std::string& column) const {
   const auto found = std::find(row_.columns.begin(), row_.columns.end(), column);
-  return found == row_.columns.end()
-             ? std::nullopt
-             : std::optional(
-                   row_.rows.at(0).at(static_cast<std::size_t>(found - row_.columns.begin())));
+  return found == row_.columns.end() ? std::nullopt
+                                     : std::optional(row_.rows.at(0).at(
+                                           static_cast<std::size_t>(found - row_.columns.begin())));
 }
 
 std::string StoredRow::text(const std::string& column) const {

@@ -6,7 +6,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/io/atomic_file.h"
 #include "client/output/case_report.h"
 #include "client/output/trace_table.h"
 

@@ -16,44 +16,17 @@
 namespace oblique::client {
 namespace {
 
-protocol::TraceRequest request_for(const std::string& study, std::uint64_t point) {
-  protocol::TraceRequest request;
-  request.set_study(study);
-  request.set_point(point);
-  return request;
-}
-
 PointSpec point_of(const std::string& study, std::uint64_t point,
-                     const protocol::TraceReply& reply) {
+                   const protocol::TraceReply& reply) {
   return {study,         point,      protocol::from_message(reply.model()),
           reply.h_m(),   reply.mu(), reply.e_star(),
           reply.errors()};
 }
 
-SolvedByWorker solved_by_worker(const std::string& study, std::uint64_t point,
-                                const protocol::TraceReply& reply) {
-  SolvedByWorker solved{point_of(study, point, reply),
-                        reply.trace().result().error(),
-                        std::nullopt,
-                        reply.worker(),
-                        reply.solver_version(),
-                        reply.instruction_set(),
-                        reply.trace().every()};
-  if (solved.error.empty() && reply.outputs() == protocol::sent_outputs()) {
-    auto& result = solved.result.emplace(protocol::from_message(reply.trace().result()));
-    result.H_m = solved.point.H_m;
-    result.mu = solved.point.mu;
-    result.e_star = solved.point.e_star;
-    result.solver.integrator = solver::integrator_name(solved.point.model.integrator);
-    result.solver.version = reply.solver_version();
-  }
-  return solved;
-}
-
 }  // namespace
 
 PointSpec point_in(const std::string& database, const protocol::StudyStatus& study,
-                     std::uint64_t point) {
+                   std::uint64_t point) {
   const protocol::PointTable table(server::stored_recipe(database, study.study_id()));
   if (point >= table.size()) {
     throw std::runtime_error(fmt::format("the study \"{}\" has no point {}: its points are 0 to {}",
@@ -72,28 +45,46 @@ PointSpec point_in(const std::string& database, const protocol::StudyStatus& stu
 }
 
 PointSpec point_at(Connection& connection, const std::string& study, std::uint64_t point) {
-  protocol::TraceRequest request = request_for(study, point);
+  protocol::TraceRequest request;
+  request.set_study(study);
+  request.set_point(point);
   request.set_only_point(true);
   return point_of(study, point, connection.trace(std::move(request)));
 }
 
 SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
                                std::uint64_t point, const TraceOptions& options,
-                               const BeginTrace& begin, const solver::Tracing::Sink& row) {
-  protocol::TraceRequest request = request_for(study, point);
+                               const std::function<void(const solver::TraceShape&)>& begin,
+                               const solver::Tracing::Sink& row) {
+  protocol::TraceRequest request;
+  request.set_study(study);
+  request.set_point(point);
   request.set_shape(options.with_shape);
   request.set_fall(options.with_fall);
   request.set_every(options.every);
   request.set_time_limit_ms(static_cast<std::uint64_t>(options.time_limit_ms));
   const protocol::TraceReply reply = connection.trace(request);
   const protocol::Trace& trace = reply.trace();
-  SolvedByWorker solved = solved_by_worker(study, point, reply);
+  SolvedByWorker solved{.point = point_of(study, point, reply),
+                        .error = trace.result().error(),
+                        .worker = reply.worker(),
+                        .instruction_set = reply.instruction_set(),
+                        .every = trace.every()};
   if (!solved.error.empty()) {
     return solved;
   }
-  const auto shape = solver::trace_shape(
-      solved.point.model.lengths_m.size(),
-      static_cast<std::size_t>(solved.point.model.elements_per_link), options.with_shape);
+  const PointSpec& spec = solved.point;
+  if (reply.outputs() == protocol::sent_outputs()) {
+    auto& result = solved.result.emplace(protocol::from_message(trace.result()));
+    result.H_m = spec.H_m;
+    result.mu = spec.mu;
+    result.e_star = spec.e_star;
+    result.solver.integrator = solver::integrator_name(spec.model.integrator);
+    result.solver.version = reply.solver_version();
+  }
+  const auto shape = solver::trace_shape(spec.model.lengths_m.size(),
+                                         static_cast<std::size_t>(spec.model.elements_per_link),
+                                         options.with_shape);
   if (const std::string fault = protocol::fault_of_trace(trace, shape, options.with_fall);
       !fault.empty()) {
     throw ConnectionError(
@@ -113,8 +104,7 @@ SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
   }
   begin(shape);
   const std::size_t numbers = solver::trace_numbers(shape);
-  const std::size_t rows = trace.states().size();
-  for (std::size_t i = 0; i < rows; ++i) {
+  for (std::size_t i = 0; i < trace.states().size(); ++i) {
     row(solver::trace_row(shape, {trace.values().data() + i * numbers, numbers},
                           solver::kTraceStates.at(static_cast<unsigned char>(trace.states()[i]))));
   }

@@ -36,10 +36,9 @@ PointSpec point_at(Connection& connection, const std::string& study, std::uint64
 /// The answer of a worker.
 struct SolvedByWorker {
   PointSpec point;
-  std::string error;                         ///< why there is no result; empty: there is one
-  std::optional<solver::CaseResult> result;  ///< none: it has outputs that are unknown here
-  std::string worker;                        ///< its name
-  std::string solver_version;
+  std::string error;                              ///< why there is no result; empty: there is one
+  std::optional<solver::CaseResult> result = {};  ///< none: it has outputs that are unknown here
+  std::string worker;                             ///< its name
   std::string instruction_set;
   std::uint64_t every = 1;  ///< the rows have each such instant of the contact
 };
@@ -51,15 +50,13 @@ struct TraceOptions {
   std::int64_t time_limit_ms = 0;  ///< 0: the server's own
 };
 
-/// Receives the shape of a trace, before its first row.
-using BeginTrace = std::function<void(const solver::TraceShape&)>;
-
-/// Has a worker solve the point and passes its instants to `row`. Throws what the connection
-/// throws, ServerError for a trace that is too long, and ConnectionError for a reply that is no
-/// trace.
+/// Has a worker solve the point and passes the shape of its trace to `begin` and its instants to
+/// `row`. Throws what the connection throws, ServerError for a trace that is too long, and
+/// ConnectionError for a reply that is no trace.
 SolvedByWorker trace_by_worker(Connection& connection, const std::string& study,
                                std::uint64_t point, const TraceOptions& options,
-                               const BeginTrace& begin, const solver::Tracing::Sink& row);
+                               const std::function<void(const solver::TraceShape&)>& begin,
+                               const solver::Tracing::Sink& row);
 
 /// Moves the rows of the fall out of a trace: from release (its time is minus the time of the fall)
 /// to touch. The contact is left.

@@ -267,7 +267,7 @@ void check_server(Diagnosis& diagnosis, const DoctorFlags& flags) {
   }
   try {
     Connection connection(connection_settings(flags.source));
-    const auto status = connection.greeting();
+    const auto status = connection.full_status();
     diagnosis.ok(kCheck,
                  fmt::format("{} answers{}: oblique-server {}, {} workers", connection.url(),
                              status.access() == "keys" ? " and admits the key" : "",

@@ -37,20 +37,12 @@ TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
     EXPECT_NE(message.find("oblique-server"), std::string::npos) << message;
     EXPECT_NE(message.find("--server"), std::string::npos) << message;
   }
-}
-
-TEST(Connection, SaysOfASilentServerThatItStartedWhatThatWaitsFor) {
-  const ScriptedServer server(
-      [](const protocol::ClientRequest&) { return std::vector<std::string>(); });
-  ConnectionSettings settings = at(server.url(), 100);
-  settings.if_silent = "its database is slow";
-  Connection connection(settings);
+  Connection own({.server_url = url, .timeout_ms = 100, .if_silent = "its database is slow"});
   try {
-    connection.submit({.name = "sweep", .recipe = {}});
+    own.full_status();
     FAIL();
   } catch (const ConnectionError& error) {
-    EXPECT_EQ(error.what(),
-              "no answer from " + server.url() + " within 0.1 s: its database is slow");
+    EXPECT_EQ(error.what(), "no answer from " + url + " within 0.1 s: its database is slow");
   }
 }
 
@@ -90,19 +82,6 @@ TEST(Connection, HandsOnTheServersOwnErrors) {
   } catch (const ServerError& error) {
     EXPECT_STREQ(error.what(), "no study called \"x\"");
   }
-}
-
-TEST(Connection, PassesOverAnswersToEarlierQuestions) {
-  const ScriptedServer server([](const protocol::ClientRequest& request) {
-    protocol::ClientReply stale;
-    stale.set_request_id(request.request_id() + 1000);
-    stale.mutable_status()->set_workers(1);
-    auto reply = reply_to(request);
-    reply.mutable_status()->set_workers(2);
-    return std::vector{protocol::encode(stale), protocol::encode(reply)};
-  });
-  Connection connection(at(server.url(), kLong_ms));
-  EXPECT_EQ(connection.full_status().workers(), 2U);
 }
 
 /// Frames with one reply to a status question, which says that there are so many workers.
@@ -158,29 +137,18 @@ TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) 
   EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
 }
 
-TEST(Connection, AsksAServerThatAnswersOnce) {
-  std::atomic<int> asked{0};
+TEST(Connection, SendsARequestOnceToAServerThatAnswersAndPassesOverASecondAnswer) {
+  std::atomic<unsigned> requests{0};
   const ScriptedServer server([&](const protocol::ClientRequest& request) {
-    ++asked;
-    return workers_reply(request, 1);
-  });
-  Connection connection(
-      {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
-  for (int i = 1; i <= 20; ++i) {
-    connection.full_status();
-    EXPECT_EQ(asked, i);
-  }
-}
-
-TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
-  const ScriptedServer server([](const protocol::ClientRequest& request) {
-    auto replies = workers_reply(request, static_cast<std::uint32_t>(request.request_id()));
+    auto replies = workers_reply(request, ++requests);
     replies.push_back(replies.front());
     return replies;
   });
-  Connection connection(at(server.url(), kLong_ms));
-  for (std::uint32_t i = 1; i <= 20; ++i) {
+  Connection connection(
+      {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
+  for (unsigned i = 1; i <= 20; ++i) {
     EXPECT_EQ(connection.full_status().workers(), i);
+    EXPECT_EQ(requests, i);
   }
 }
 
