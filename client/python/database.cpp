@@ -16,7 +16,6 @@
 #include <pybind11/stl.h>
 
 #include "client/python/interpreter.h"
-#include "client/python/results.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"
 #include "server/query/columns.h"
@@ -144,7 +143,6 @@ class Database {
  private:
   template <class Result>
   Result with_reader(const std::function<Result(server::Reader&)>& read) {
-    refuse_forked_child();
     const auto reader = std::make_shared<server::Reader>(file_);
     return interruptibly<Result>([reader, read](const std::atomic<bool>&) { return read(*reader); },
                                  [reader] { reader->interrupt(); });

@@ -7,7 +7,9 @@
 #include <memory>
 #include <thread>
 #include <utility>
+#include <vector>
 
+#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
 namespace oblique::python {
@@ -15,6 +17,15 @@ namespace oblique::python {
 /// Adds the functions and classes of the extension.
 void add_solving(pybind11::module_& module);
 void add_database(pybind11::module_& module);
+
+/// An array that takes over the values.
+template <class T>
+pybind11::array_t<T> array_of(std::vector<T>&& values) {
+  auto* const owned = new std::vector<T>(std::move(values));  // the capsule deletes it
+  const pybind11::capsule owner(owned,
+                                [](void* kept) { delete static_cast<std::vector<T>*>(kept); });
+  return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(owned->size()), owned->data(), owner);
+}
 
 /// Releases the interpreter's lock while it exists. If Python ends meanwhile, as it does under a
 /// daemon thread, the thread blocks for good when it would take the lock again: Python ends such a

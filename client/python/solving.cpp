@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <span>
@@ -17,7 +19,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/python/interpreter.h"
-#include "client/python/results.h"
 #include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/point_table.h"
@@ -34,6 +35,181 @@ namespace oblique::python {
 namespace {
 
 namespace py = pybind11;
+
+using solver::Cell;
+using solver::Member;
+
+py::str text_of(std::string_view text) {
+  return {text.data(), text.size()};
+}
+
+/// The outputs of many points, an array each: NaN and no text where there is none.
+class ResultArrays {
+ public:
+  explicit ResultArrays(std::size_t points);
+
+  /// Not from two threads at once; without the interpreter's lock.
+  void set(std::size_t point, const solver::CaseResult& result);
+  void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
+
+  /// The names of `oblique solve --json` with an array for each number, (texts, index of each
+  /// point's text or -1) for each text, and `error`. `lists` has an array for each member of a
+  /// list, and the `offsets` of the points. Moves the numbers out.
+  py::dict dict();
+
+ private:
+  /// Texts of many points; equal ones are stored once.
+  struct Texts {
+    explicit Texts(std::size_t points) : codes(points, -1) {}
+    void set(std::size_t point, std::string_view text);
+    py::tuple tuple() const;
+
+    std::vector<std::int32_t> codes;
+    std::map<std::string, std::int32_t, std::less<>> known;
+    std::vector<std::string> texts;
+  };
+  /// One list of many points, in the order in which the points came.
+  struct Elements {
+    const solver::ResultList* list;
+    std::vector<std::uint64_t> begin;  ///< of each point
+    std::vector<std::uint32_t> count;
+    /// One a member; a text is the index of its first occurrence in `texts`.
+    std::vector<std::vector<double>> members;
+    std::vector<std::string> texts;
+  };
+  static double number_of(Elements& elements, const solver::Cell& cell);
+  static py::dict dict_of(const Elements& elements);
+
+  std::vector<std::vector<double>> numbers_;  ///< by field; empty for fields of other kinds
+  std::map<std::size_t, Texts> texts_;        ///< by field
+  std::vector<Elements> lists_;
+  Texts errors_;
+};
+
+void ResultArrays::Texts::set(std::size_t point, std::string_view text) {
+  auto place = known.find(text);
+  if (place == known.end()) {
+    place = known.emplace(text, static_cast<std::int32_t>(texts.size())).first;
+    texts.emplace_back(text);
+  }
+  codes[point] = place->second;
+}
+
+py::tuple ResultArrays::Texts::tuple() const {
+  return py::make_tuple(texts, array_of(std::vector(codes)));
+}
+
+ResultArrays::ResultArrays(std::size_t points) : errors_(points) {
+  const auto fields = solver::result_fields();
+  numbers_.resize(fields.size());
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& value = fields[i].value;
+    if (std::holds_alternative<Member<std::string>>(value)) {
+      texts_.emplace(i, Texts(points));
+    } else if (!std::holds_alternative<solver::ListPart>(value)) {
+      numbers_[i].assign(points, std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  for (const solver::ResultList* list : solver::result_lists()) {
+    lists_.push_back({list,
+                      std::vector<std::uint64_t>(points),
+                      std::vector<std::uint32_t>(points),
+                      std::vector<std::vector<double>>(list->members.size()),
+                      {}});
+  }
+}
+
+void ResultArrays::set(std::size_t point, const CaseResult& result) {
+  const auto fields = solver::result_fields();
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& value = fields[i].value;
+    if (const auto* real = std::get_if<Member<double>>(&value); real && real->of(result)) {
+      numbers_[i][point] = *real->of(result);
+    }
+    if (const auto* whole = std::get_if<Member<std::int64_t>>(&value); whole && whole->of(result)) {
+      numbers_[i][point] = static_cast<double>(*whole->of(result));
+    }
+    if (const auto* text = std::get_if<Member<std::string>>(&value); text && text->of(result)) {
+      texts_.at(i).set(point, *text->of(result));
+    }
+  }
+  for (Elements& elements : lists_) {
+    elements.begin[point] = elements.members.front().size();
+    elements.list->each(result, [&](std::span<const Cell> element) {
+      for (std::size_t i = 0; i < element.size(); ++i) {
+        elements.members[i].push_back(number_of(elements, element[i]));
+      }
+      ++elements.count[point];
+    });
+  }
+}
+
+double ResultArrays::number_of(Elements& elements, const Cell& cell) {
+  if (const auto* number = std::get_if<double>(&cell)) {
+    return *number;
+  }
+  if (const auto* flag = std::get_if<bool>(&cell)) {
+    return *flag ? 1.0 : 0.0;
+  }
+  const auto text = std::get<std::string_view>(cell);
+  const auto found = std::find(elements.texts.begin(), elements.texts.end(), text);
+  const auto place = found - elements.texts.begin();
+  if (found == elements.texts.end()) {
+    elements.texts.emplace_back(text);
+  }
+  return static_cast<double>(place);
+}
+
+// The elements are brought into the order of the points.
+py::dict ResultArrays::dict_of(const Elements& elements) {
+  const std::size_t points = elements.begin.size();
+  std::vector<std::int64_t> offsets{0};
+  for (const std::uint32_t count : elements.count) {
+    offsets.push_back(offsets.back() + count);
+  }
+  py::dict named;
+  for (std::size_t member = 0; member < elements.members.size(); ++member) {
+    std::vector<double> values;
+    values.reserve(static_cast<std::size_t>(offsets.back()));
+    for (std::size_t i = 0; i < points; ++i) {
+      const auto begin =
+          elements.members[member].begin() + static_cast<std::ptrdiff_t>(elements.begin[i]);
+      values.insert(values.end(), begin, begin + elements.count[i]);
+    }
+    named[text_of(elements.list->members[member])] = array_of(std::move(values));
+  }
+  named["offsets"] = array_of(std::move(offsets));
+  named["texts"] = py::cast(elements.texts);
+  return named;
+}
+
+py::dict ResultArrays::dict() {
+  py::dict all;
+  const auto fields = solver::result_fields();
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& value = fields[i].value;
+    if (std::holds_alternative<solver::ListPart>(value)) {
+      continue;
+    }
+    const py::str group = text_of(fields[i].group);
+    if (!fields[i].group.empty() && !all.contains(group)) {
+      all[group] = py::dict();
+    }
+    py::dict named = fields[i].group.empty() ? all : py::dict(all[group]);
+    if (std::holds_alternative<Member<std::string>>(value)) {
+      named[text_of(fields[i].name)] = texts_.at(i).tuple();
+    } else {
+      named[text_of(fields[i].name)] = array_of(std::move(numbers_[i]));
+    }
+  }
+  py::dict lists;
+  for (const Elements& list : lists_) {
+    lists[text_of(list.list->column)] = dict_of(list);
+  }
+  all["lists"] = lists;
+  all["error"] = errors_.tuple();
+  return all;
+}
 
 /// The points with their models.
 struct GivenPoints {
@@ -294,7 +470,6 @@ struct ManyPoints {
 
 py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
                     std::size_t threads, bool errors, const py::object& progress) {
-  refuse_forked_child();
   const auto many = std::make_shared<ManyPoints>(count, points_of(keys, count));
   const auto work = [many, threads, errors, falls](const std::atomic<bool>& stop) {
     many->solve({.threads = threads, .errors = errors, .falls = falls}, stop);

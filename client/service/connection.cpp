@@ -337,7 +337,7 @@ void Connection::broke_off(const std::string& why) const {
       fmt::format("the answer broke off after {} rows: {}. Ask again", rows_->rows, why));
 }
 
-protocol::StatusReply Connection::status_pages(const std::string& study, const Tell& tell) {
+protocol::StatusReply Connection::full_status(const std::string& study, const Tell& tell) {
   protocol::StatusReply all;
   std::uint64_t after = 0;
   do {
@@ -352,7 +352,7 @@ protocol::StatusReply Connection::status_pages(const std::string& study, const T
 }
 
 std::vector<protocol::StudyStatus> Connection::status(const std::string& study, const Tell& tell) {
-  const auto reply = status_pages(study, tell);
+  const auto reply = full_status(study, tell);
   access_ = reply.access();
   return {reply.studies().begin(), reply.studies().end()};
 }

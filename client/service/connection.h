@@ -87,8 +87,8 @@ class Connection : public Source {
 
   using Source::status;
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override;
-  /// The status of all studies, with what the server says of itself.
-  protocol::StatusReply full_status() { return status_pages({}, {}); }
+  /// The same, with what the server says of itself.
+  protocol::StatusReply full_status(const std::string& study = {}, const Tell& tell = {});
   protocol::WorkersReply workers();  ///< all of them
 
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
@@ -125,7 +125,6 @@ class Connection : public Source {
     std::optional<bool> runs = {};           ///< in that: the query runs, or waits
   };
 
-  protocol::StatusReply status_pages(const std::string& study, const Tell& tell);
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
   /// Throws what the server's error says, or what is wrong with its reply to a request of `kind`.
   void check(const protocol::ClientReply& reply, int kind) const;

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
-#include <utility>
 #include <variant>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
@@ -55,9 +55,10 @@ template <class T>
 void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
                      std::vector<std::string>& differing) {
   solver::for_each_sent<T>([&](const solver::ResultField& field, const solver::Member<T>& member) {
-    const auto value = stored.value(std::string(field.column));
+    const auto before = stored.values.find(std::string(field.column));
     const T* now = member.of(result);
-    if (field.name != "wall_s" && value && *value != (now == nullptr ? Value() : Value(*now))) {
+    if (field.name != "wall_s" && before != stored.values.end() &&
+        before->second != (now == nullptr ? Value() : Value(*now))) {
       differing.emplace_back(field.column);
     }
   });
@@ -65,23 +66,23 @@ void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
 
 }  // namespace
 
-std::optional<Value> StoredRow::value(const std::string& column) const {
-  const auto found = std::find(row_.columns.begin(), row_.columns.end(), column);
-  return found == row_.columns.end() ? std::nullopt
-                                     : std::optional(row_.rows.at(0).at(
-                                           static_cast<std::size_t>(found - row_.columns.begin())));
-}
-
 std::string StoredRow::text(const std::string& column) const {
-  const auto found = value(column);
-  const auto* text = found ? std::get_if<std::string>(&*found) : nullptr;
+  const auto found = values.find(column);
+  const auto* text = found == values.end() ? nullptr : std::get_if<std::string>(&found->second);
   return text == nullptr ? std::string() : *text;
 }
 
 std::optional<StoredRow> stored_row(Source& source, const std::string& study, std::uint64_t point) {
-  auto rows = source.query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
-                                       server::sql_text(study), point));
-  return rows.rows.empty() ? std::nullopt : std::optional(StoredRow(std::move(rows)));
+  const auto table = source.query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
+                                              server::sql_text(study), point));
+  if (table.rows.empty()) {
+    return std::nullopt;
+  }
+  StoredRow row;
+  for (std::size_t i = 0; i < table.columns.size(); ++i) {
+    row.values.emplace(table.columns[i], table.rows[0].at(i));
+  }
+  return row;
 }
 
 std::string differences_in_words(const StoredRow& stored, const solver::CaseResult& result) {
@@ -90,8 +91,8 @@ std::string differences_in_words(const StoredRow& stored, const solver::CaseResu
   compare_scalars<std::int64_t>(stored, result, columns);
   compare_scalars<std::string>(stored, result, columns);
   for (const solver::ResultList* list : solver::result_lists()) {
-    const auto value = stored.value(std::string(list->column));
-    if (value && !is_same_list(*value, *list, result)) {
+    const auto before = stored.values.find(std::string(list->column));
+    if (before != stored.values.end() && !is_same_list(before->second, *list, result)) {
       columns.emplace_back(list->column);
     }
   }

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "client/service/source.h"
 #include "proto/wire/chunk.h"
@@ -13,18 +12,12 @@
 namespace oblique::client {
 
 /// The row of one point in the view `runs`.
-class StoredRow {
- public:
-  explicit StoredRow(protocol::Table row) : row_(std::move(row)) {}
+struct StoredRow {
+  std::map<std::string, protocol::Value> values;  ///< by column
 
-  /// The value of that column; nothing: the view has no such column.
-  std::optional<protocol::Value> value(const std::string& column) const;
   /// The text of a column; empty where it is NULL or missing.
   std::string text(const std::string& column) const;
   bool has_failed() const { return text("status") == "failed"; }
-
- private:
-  protocol::Table row_;
 };
 
 /// The row of that point; nothing: it is not solved yet.
