@@ -79,15 +79,6 @@ std::string mode_to_peak(const std::string& mode, std::size_t peak, bool whole_r
   return mode;
 }
 
-std::vector<double> tail_of(const std::vector<std::optional<double>>& values) {
-  std::vector<double> tail;
-  for (auto value = values.rbegin(); value != values.rend() && *value; ++value) {
-    tail.push_back(**value);
-  }
-  std::reverse(tail.begin(), tail.end());
-  return tail;
-}
-
 OutputConvergence output_convergence(const Output& finest,
                                      const std::vector<std::vector<Output>>& levels,
                                      double highest_order) {
@@ -99,8 +90,12 @@ OutputConvergence output_convergence(const Output& finest,
     });
     output.values.push_back(same == level.end() ? std::nullopt : std::optional(same->value));
   }
-  output.extrapolation =
-      extrapolate(tail_of(output.values), highest_order, kRoundingFraction * finest.scale);
+  // The finest levels that have the value, without a gap.
+  std::vector<double> tail;
+  for (auto value = output.values.rbegin(); value != output.values.rend() && *value; ++value) {
+    tail.insert(tail.begin(), **value);
+  }
+  output.extrapolation = extrapolate(tail, highest_order, kRoundingFraction * finest.scale);
   return output;
 }
 
@@ -137,15 +132,16 @@ std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter) {
   const std::size_t columns = shorter.size() + 1;
   // cost[i * columns + j]: the first i of `longer` against the first j of `shorter`.
-  std::vector<double> cost((longer.size() + 1) * columns, std::numeric_limits<double>::infinity());
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  std::vector<double> cost((longer.size() + 1) * columns, kNever);
   cost[0] = 0.0;
   const auto matched = [&](std::size_t i, std::size_t j) {
-    return i > 0 && j > 0
-               ? cost[(i - 1) * columns + j - 1] + std::abs(longer[i - 1] - shorter[j - 1])
-               : std::numeric_limits<double>::infinity();
+    return i == 0 || j == 0
+               ? kNever
+               : cost[(i - 1) * columns + j - 1] + std::abs(longer[i - 1] - shorter[j - 1]);
   };
   const auto skipped = [&](std::size_t i, std::size_t j) {
-    return i > 1 ? cost[(i - 2) * columns + j] : std::numeric_limits<double>::infinity();
+    return i < 2 ? kNever : cost[(i - 2) * columns + j];
   };
   for (std::size_t i = 1; i <= longer.size(); ++i) {
     for (std::size_t j = 0; j < columns; ++j) {
@@ -241,7 +237,6 @@ std::vector<Output> outputs_of(const CaseResult& result) {
 
 PointConvergence convergence_of(std::span<const CaseResult> results, double highest_order) {
   std::vector<std::vector<Output>> levels;
-  levels.reserve(results.size());
   for (const auto& result : results) {
     levels.push_back(outputs_of(result));
   }
@@ -255,19 +250,15 @@ PointConvergence convergence_of(std::span<const CaseResult> results, double high
       point.changes.push_back(change);
     }
   }
-  const auto same_mode = [&](std::size_t back) {
-    return results.size() > back &&
-           results[results.size() - 1 - back].major_mode == results.back().major_mode;
-  };
-  point.has_one_mode = same_mode(1) && same_mode(2);
+  const std::size_t n = results.size();
+  point.has_one_mode = n > 2 && results[n - 2].major_mode == results[n - 1].major_mode &&
+                       results[n - 3].major_mode == results[n - 1].major_mode;
   return point;
 }
 
 std::optional<double> relative_error(const std::optional<double>& value, double limit) {
-  if (!value || limit == 0.0) {
-    return std::nullopt;
-  }
-  return std::abs(*value - limit) / std::abs(limit);
+  return value && limit != 0.0 ? std::optional(std::abs(*value - limit) / std::abs(limit))
+                               : std::nullopt;
 }
 
 }  // namespace oblique::client

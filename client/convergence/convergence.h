@@ -1,14 +1,60 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
+#include <ostream>
 #include <span>
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
+#include "client/output/work_line.h"
 #include "worker/solver/model/case_result.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
+
+/// One refinement: a model and its name, as "n = 8".
+struct Level {
+  std::string name;
+  solver::ModelParameters model;
+};
+
+/// Meshes from `coarsest` to `finest` elements a link, doubled each time. The explicit integrator
+/// chooses its steps on each mesh; those of generalized-alpha do not depend on the mesh and stay.
+/// Throws InputError unless finest is coarsest times 4, 8, 16, ...
+std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarsest, int finest);
+
+/// Steps of contact and fall, both halved each time, from those that the model takes at e_star;
+/// where restitution takes shorter steps, the shorter step throughout. Where the fall chooses its
+/// steps by the tolerance, all levels share it; see exact_fall_level().
+std::vector<Level> step_levels(const solver::ModelParameters& model, double e_star, int halvings);
+
+/// `level` with the same contact on a fall solved for a tenth of the tolerance, which shows the
+/// error of the fall. Nothing where the fall has a step to halve.
+std::optional<Level> exact_fall_level(const Level& level);
+
+struct ContactPoint {
+  double H_m;
+  double mu;
+  double e_star;
+};
+
+/// A level with the result of the point on it.
+struct SolvedLevel {
+  Level level;
+  solver::CaseResult result;
+  double wall_s = 0.0;  ///< fall and contact
+};
+
+/// Solves `point` on every level, all levels side by side. Levels whose falls are the same share
+/// one. `line` shows what is under way; `after_each` is called as each level ends, from its thread,
+/// one call at a time. Throws InputError and SolveError as the solver does.
+std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels, const ContactPoint& point,
+                                      WorkLine& line,
+                                      const std::function<void(const SolvedLevel&)>& after_each);
 
 /// How values behave whose mesh or step is halved from one to the next.
 enum class Trend {
@@ -120,5 +166,33 @@ PointConvergence convergence_of(std::span<const solver::CaseResult> results, dou
 
 /// |value - limit| / |limit|, where both are there; of a limit of 0, nothing.
 std::optional<double> relative_error(const std::optional<double>& value, double limit);
+
+/// One point refined in one way, judged.
+struct Refinement {
+  std::string what;  ///< "mesh" or "step"
+  std::vector<SolvedLevel> levels;
+  PointConvergence convergence;
+};
+
+/// Judges `levels`, coarsest first.
+Refinement refinement_of(std::string what, std::vector<SolvedLevel> levels);
+
+/// Whether every output is seen to approach a limit: one mode on the finest three levels, and
+/// differences that fall or are below a thousandth of the output's scale.
+bool converges(const Refinement& refinement);
+
+/// The outputs over the levels for people: values, limit, order, error; what comes and goes; the
+/// verdict.
+void print_refinement(std::ostream& out, const Refinement& refinement);
+
+/// Levels, outputs, changes and verdict as one JSON object.
+nlohmann::ordered_json json_of(const Refinement& refinement);
+
+/// "The fall, solved for 1e-05, changes outputs by ... % at most": between the first level of
+/// `step` and the same contact on the fall of exact_fall_level().
+std::string fall_sentence(const Refinement& step, const SolvedLevel& exact_fall);
+
+/// The same as a JSON object.
+nlohmann::ordered_json json_of_fall(const Refinement& step, const SolvedLevel& exact_fall);
 
 }  // namespace oblique::client

@@ -1,6 +1,7 @@
-#include "client/convergence/convergence_report.h"
+#include "client/convergence/convergence.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -38,26 +39,19 @@ struct TrendNames {
 };
 
 TrendNames names_of(const OutputConvergence& output) {
-  switch (output.extrapolation.trend) {
-    case Trend::kTooFew:
-      return {"too few values", "other mode before"};
-    case Trend::kRounding:
-      return {"rounding", "rounding only"};
-    case Trend::kMonotone:
-      return {"monotone", ""};
-    case Trend::kOscillating:
-      return {"oscillating", "oscillates"};
-    default:
-      return {"unsettled", is_settled(output) ? "wavers" : "does not settle"};
-  }
+  constexpr std::array<TrendNames, 5> kNames{{{"too few values", "other mode before"},
+                                              {"rounding", "rounding only"},
+                                              {"monotone", ""},
+                                              {"oscillating", "oscillates"},
+                                              {"unsettled", "does not settle"}}};
+  const auto trend = output.extrapolation.trend;
+  const TrendNames names = kNames.at(static_cast<std::size_t>(trend));
+  return trend == Trend::kUnsettled && is_settled(output) ? TrendNames{names.name, "wavers"}
+                                                          : names;
 }
 
 std::optional<double> times(const std::optional<double>& value, double factor) {
   return value ? std::optional(*value * factor) : std::nullopt;
-}
-
-void add_optional(protocol::Row& row, const std::optional<double>& value) {
-  row.push_back(value ? protocol::Value(*value) : protocol::Value());
 }
 
 // Two digits are all that an estimate has.
@@ -66,16 +60,13 @@ void add_rough(protocol::Row& row, const std::optional<double>& value) {
 }
 
 std::optional<double> relative(const OutputConvergence& output) {
-  const auto& extrapolation = output.extrapolation;
-  if (!extrapolation.error || output.finest() == 0.0) {
-    return std::nullopt;
-  }
-  return *extrapolation.error / std::abs(output.finest());
+  return output.finest() == 0.0
+             ? std::nullopt
+             : times(output.extrapolation.error, 1.0 / std::abs(output.finest()));
 }
 
 void print_outputs(std::ostream& out, const Refinement& refinement) {
-  protocol::Table table;
-  table.columns.emplace_back("output");
+  protocol::Table table{.columns = {"output"}};
   for (const auto& level : refinement.levels) {
     table.columns.emplace_back(level.level.name);
   }
@@ -87,14 +78,13 @@ void print_outputs(std::ostream& out, const Refinement& refinement) {
     const auto shown = shown_column(output.name);
     add_value(row, shown.heading);
     for (const auto& value : output.values) {
-      add_optional(row, times(value, shown.per_unit));
+      row.push_back(value ? protocol::Value(*value * shown.per_unit) : protocol::Value());
     }
     const auto& extrapolation = output.extrapolation;
     add_value(row, extrapolation.limit * shown.per_unit);
     add_rough(row, extrapolation.order);
     add_rough(row, times(extrapolation.error, shown.per_unit));
-    const auto error = relative(output);
-    add_rough(row, error ? std::optional(kPercent * *error) : std::nullopt);
+    add_rough(row, times(relative(output), kPercent));
     add_value(row, std::string(names_of(output).remark));
   }
   print(out, table, Format::kTable);
@@ -107,42 +97,18 @@ std::string change_sentence(const Refinement& refinement, const ContactChange& c
                      change.in_finer ? coarser : finer);
 }
 
-std::string names_of_unsettled(const PointConvergence& convergence) {
-  std::string names;
-  for (const auto& output : convergence.outputs) {
-    if (!is_settled(output)) {
-      names += (names.empty() ? "" : ", ") + output.name;
-    }
-  }
-  return names;
-}
-
-// "0.95 % (vt_out_m_s)": the largest of relative errors.
-class Worst {
- public:
+// The largest of relative errors.
+struct Worst {
   void add(const std::string& name, const std::optional<double>& error) {
-    if (error && (!error_ || *error > *error_)) {
-      error_ = error;
-      name_ = name;
+    if (error && *error > largest) {
+      largest = *error;
+      shown = readable_number(kPercent * largest, 2) + " % (" + name + ")";
     }
   }
-  std::string shown() const {
-    return error_ ? readable_number(kPercent * *error_, 2) + " % (" + name_ + ")"
-                  : std::string("-");
-  }
 
- private:
-  std::string name_;
-  std::optional<double> error_;
+  double largest = -1.0;
+  std::string shown = "-";  // "0.95 % (vt_out_m_s)"
 };
-
-void print_modes(std::ostream& out, const Refinement& refinement) {
-  out << "\nmode, ripples merged\n";
-  for (const auto& [level, result, wall_s] : refinement.levels) {
-    out << fmt::format("  {:<8} {}  ({} us steps)\n", level.name, result.major_mode,
-                       readable_number(result.solver.dt_s * kMicroseconds, 3));
-  }
-}
 
 void print_verdict(std::ostream& out, const Refinement& refinement) {
   const auto& convergence = refinement.convergence;
@@ -158,16 +124,20 @@ void print_verdict(std::ostream& out, const Refinement& refinement) {
       coarse.add(output.name, relative_error(output.values.front(), output.extrapolation.limit));
     }
     out << fmt::format("The {} converges; largest estimated error on {}: {}, on {}: {}.\n",
-                       refinement.what, finest, fine.shown(), refinement.levels.front().level.name,
-                       coarse.shown());
+                       refinement.what, finest, fine.shown, refinement.levels.front().level.name,
+                       coarse.shown);
     return;
   }
   out << fmt::format("The {} does not converge by {}: ", refinement.what, finest);
-  if (convergence.has_one_mode) {
-    out << "the mode settles, but not " << names_of_unsettled(convergence);
-  } else {
-    out << "the mode is not one on the finest three levels";
+  std::vector<std::string> unsettled;
+  for (const auto& output : convergence.outputs) {
+    if (!is_settled(output)) {
+      unsettled.push_back(output.name);
+    }
   }
+  out << (convergence.has_one_mode
+              ? fmt::format("the mode settles, but not {}", fmt::join(unsettled, ", "))
+              : "the mode is not one on the finest three levels");
   if (!convergence.changes.empty()) {
     out << "; to blame: " << change_sentence(refinement, convergence.changes.back());
   }
@@ -237,7 +207,11 @@ bool converges(const Refinement& refinement) {
 
 void print_refinement(std::ostream& out, const Refinement& refinement) {
   print_outputs(out, refinement);
-  print_modes(out, refinement);
+  out << "\nmode, ripples merged\n";
+  for (const auto& [level, result, wall_s] : refinement.levels) {
+    out << fmt::format("  {:<8} {}  ({} us steps)\n", level.name, result.major_mode,
+                       readable_number(result.solver.dt_s * kMicroseconds, 3));
+  }
   print_verdict(out, refinement);
 }
 
@@ -256,7 +230,7 @@ std::string fall_sentence(const Refinement& step, const SolvedLevel& exact_fall)
   }
   return fmt::format(
       "The fall, solved for {}, changes outputs by {} at most beside one solved for {}.\n",
-      solved_for, worst.shown(), exact);
+      solved_for, worst.shown, exact);
 }
 
 ordered_json json_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {

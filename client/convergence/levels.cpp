@@ -1,4 +1,4 @@
-#include "client/convergence/levels.h"
+#include "client/convergence/convergence.h"
 
 #include <algorithm>
 #include <chrono>

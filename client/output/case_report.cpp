@@ -9,7 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/formats/table_printer.h"
+#include "client/io/row_output.h"
 #include "client/output/printer.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "client/formats/row_printer.h"
+#include "client/io/row_output.h"
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {

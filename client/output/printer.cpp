@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "client/formats/cell_text.h"
-#include "client/formats/row_output.h"
-#include "client/formats/sink.h"
+#include "client/io/row_output.h"
+#include "client/io/sink.h"
 #include "proto/wire/chunk.h"
 
 namespace oblique::client {
@@ -17,12 +16,7 @@ std::string csv_field(std::string_view text) {
 }
 
 void print(std::ostream& out, const protocol::Table& rows, Format format) {
-  TextSink text;
-  const auto printer = made_printer(format, text);
-  printer->print(protocol::chunk_of(rows));
-  printer->end();
-  text.finish();
-  out << text.text();
+  out << text_of({protocol::chunk_of(rows)}, {.format = format});
 }
 
 void print_out(const protocol::Table& rows, Format format) {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/formats/row_printer.h"
+#include "client/io/row_output.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"
 

@@ -3,7 +3,7 @@
 #include <string_view>
 #include <variant>
 
-#include "client/formats/cell_text.h"
+#include "client/io/row_output.h"
 
 namespace oblique::client {
 

@@ -11,7 +11,6 @@
 #include "client/plot/gathered.h"
 #include "client/plot/plot_request.h"
 #include "client/plot/study_shape.h"
-#include "client/service/result_query.h"
 #include "client/service/source.h"
 
 namespace oblique::client::plot {

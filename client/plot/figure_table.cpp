@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "client/formats/cell_text.h"
+#include "client/io/row_output.h"
 
 namespace oblique::client::plot {
 namespace {

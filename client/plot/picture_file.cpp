@@ -12,12 +12,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/formats/new_file.h"
-#include "client/formats/pager.h"
-#include "client/formats/sink.h"
+#include "client/io/child_process.h"
+#include "client/io/sink.h"
 #include "client/plot/figure_table.h"
 #include "client/plot/gnuplot_script.h"
-#include "client/service/child_process.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -161,7 +159,7 @@ std::string text_of(const Figure& figure) {
 
 void write_picture(const std::string& picture, PictureFormat format, const std::string& file) {
   if (!file.empty()) {
-    NewFile out(file);
+    AtomicFile out(file);
     out.append(picture);
     out.finish();
     return;

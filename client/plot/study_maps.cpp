@@ -4,7 +4,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/formats/table_printer.h"
+#include "client/io/row_output.h"
 #include "client/output/human_units.h"
 #include "client/plot/figure_builder.h"
 #include "worker/solver/model/errors.h"

@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -12,8 +15,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include "client/python/calls.h"
-#include "client/python/results.h"
+#include "client/python/interpreter.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"
 #include "server/query/columns.h"
@@ -40,23 +42,9 @@ struct Column {
   }
 };
 
-/// Throws InputError for a study that does not exist, with the nearest name.
-server::Answer begun(server::Reader& reader, const protocol::QueryRequest& request) {
-  try {
-    return reader.answer(request, server::kNoLimits);
-  } catch (const solver::InputError&) {
-    try {
-      static_cast<void>(reader.study_status(request.question().study()));
-    } catch (const server::QueryError& error) {
-      throw solver::InputError(error.what());
-    }
-    throw;
-  }
-}
-
 std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryRequest& request) {
   std::vector<Column> columns;
-  server::Answer answer = begun(reader, request);
+  server::Answer answer = reader.answer(request, server::kNoLimits);
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();
     for (int i = static_cast<int>(columns.size()); i < chunk.columns_size(); ++i) {
@@ -155,7 +143,6 @@ class Database {
  private:
   template <class Result>
   Result with_reader(const std::function<Result(server::Reader&)>& read) {
-    refuse_forked_child();
     const auto reader = std::make_shared<server::Reader>(file_);
     return interruptibly<Result>([reader, read](const std::atomic<bool>&) { return read(*reader); },
                                  [reader] { reader->interrupt(); });

@@ -3,47 +3,33 @@
 #include <exception>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include <pybind11/pybind11.h>
 
-#include "client/python/calls.h"
+#include "client/python/interpreter.h"
 #include "server/database/sqlite.h"
 #include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::python {
-namespace {
 
-bool python_ends() {
+void WithoutLock::take() noexcept {
 #if PY_VERSION_HEX >= 0x030D0000
-  return Py_IsFinalizing() != 0;
+  const bool python_ends = Py_IsFinalizing() != 0;
 #else
-  return _Py_IsFinalizing() != 0;
+  const bool python_ends = _Py_IsFinalizing() != 0;
 #endif
-}
-
-[[noreturn]] void block_for_good() {
+  try {
+    if (!python_ends) {
+      PyEval_RestoreThread(state_);
+      return;
+    }
+  } catch (...) {  // pthread_exit of a Python that began to end just then
+  }
   while (true) {
     pause();
   }
-}
-
-}  // namespace
-
-void WithoutLock::take() noexcept {
-  if (python_ends()) {
-    block_for_good();
-  }
-  try {
-    PyEval_RestoreThread(state_);
-  } catch (...) {  // pthread_exit of a Python that began to end just then
-    block_for_good();
-  }
-}
-
-bool is_main_thread() {
-  const auto main = pybind11::module_::import("threading").attr("main_thread")();
-  return main.attr("ident").cast<unsigned long>() == PyThread_get_thread_ident();
 }
 
 void refuse_forked_child() {

@@ -1,23 +1,32 @@
-#include <malloc.h>
-
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
+#include <spdlog/fmt/fmt.h>
 
-#include "client/python/calls.h"
-#include "client/python/given_points.h"
-#include "client/python/results.h"
+#include "client/python/interpreter.h"
+#include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/point_table.h"
+#include "proto/recipe/written.h"
 #include "proto/system/available_memory.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/model/trace_columns.h"
 #include "worker/solver/model/usual_ranges.h"
@@ -27,48 +36,360 @@ namespace {
 
 namespace py = pybind11;
 
-/// A single point with its model.
-struct OnePoint {
-  ModelParameters model;
-  Point point;
+using solver::Cell;
+using solver::Member;
+
+py::str text_of(std::string_view text) {
+  return {text.data(), text.size()};
+}
+
+/// The outputs of many points, an array each: NaN and no text where there is none.
+class ResultArrays {
+ public:
+  explicit ResultArrays(std::size_t points);
+
+  /// Not from two threads at once; without the interpreter's lock.
+  void set(std::size_t point, const solver::CaseResult& result);
+  void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
+
+  /// The names of `oblique solve --json` with an array for each number, (texts, index of each
+  /// point's text or -1) for each text, and `error`. `lists` has an array for each member of a
+  /// list, and the `offsets` of the points. Moves the numbers out.
+  py::dict dict();
+
+ private:
+  /// Texts of many points; equal ones are stored once.
+  struct Texts {
+    explicit Texts(std::size_t points) : codes(points, -1) {}
+    void set(std::size_t point, std::string_view text);
+    py::tuple tuple() const;
+
+    std::vector<std::int32_t> codes;
+    std::map<std::string, std::int32_t, std::less<>> known;
+    std::vector<std::string> texts;
+  };
+  /// One list of many points, in the order in which the points came.
+  struct Elements {
+    const solver::ResultList* list;
+    std::vector<std::uint64_t> begin;  ///< of each point
+    std::vector<std::uint32_t> count;
+    /// One a member; a text is the index of its first occurrence in `texts`.
+    std::vector<std::vector<double>> members;
+    std::vector<std::string> texts;
+  };
+  static double number_of(Elements& elements, const solver::Cell& cell);
+  static py::dict dict_of(const Elements& elements);
+
+  std::vector<std::vector<double>> numbers_;  ///< by field; empty for fields of other kinds
+  std::map<std::size_t, Texts> texts_;        ///< by field
+  std::vector<Elements> lists_;
+  Texts errors_;
 };
 
-OnePoint one_point(const py::dict& keys) {
-  GivenPoints given = points_of(keys_of(keys, 1));
+void ResultArrays::Texts::set(std::size_t point, std::string_view text) {
+  auto place = known.find(text);
+  if (place == known.end()) {
+    place = known.emplace(text, static_cast<std::int32_t>(texts.size())).first;
+    texts.emplace_back(text);
+  }
+  codes[point] = place->second;
+}
+
+py::tuple ResultArrays::Texts::tuple() const {
+  return py::make_tuple(texts, array_of(std::vector(codes)));
+}
+
+ResultArrays::ResultArrays(std::size_t points) : errors_(points) {
+  const auto fields = solver::result_fields();
+  numbers_.resize(fields.size());
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& value = fields[i].value;
+    if (std::holds_alternative<Member<std::string>>(value)) {
+      texts_.emplace(i, Texts(points));
+    } else if (!std::holds_alternative<solver::ListPart>(value)) {
+      numbers_[i].assign(points, std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  for (const solver::ResultList* list : solver::result_lists()) {
+    lists_.push_back({list,
+                      std::vector<std::uint64_t>(points),
+                      std::vector<std::uint32_t>(points),
+                      std::vector<std::vector<double>>(list->members.size()),
+                      {}});
+  }
+}
+
+void ResultArrays::set(std::size_t point, const CaseResult& result) {
+  const auto fields = solver::result_fields();
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& value = fields[i].value;
+    if (const auto* real = std::get_if<Member<double>>(&value); real && real->of(result)) {
+      numbers_[i][point] = *real->of(result);
+    }
+    if (const auto* whole = std::get_if<Member<std::int64_t>>(&value); whole && whole->of(result)) {
+      numbers_[i][point] = static_cast<double>(*whole->of(result));
+    }
+    if (const auto* text = std::get_if<Member<std::string>>(&value); text && text->of(result)) {
+      texts_.at(i).set(point, *text->of(result));
+    }
+  }
+  for (Elements& elements : lists_) {
+    elements.begin[point] = elements.members.front().size();
+    elements.list->each(result, [&](std::span<const Cell> element) {
+      for (std::size_t i = 0; i < element.size(); ++i) {
+        elements.members[i].push_back(number_of(elements, element[i]));
+      }
+      ++elements.count[point];
+    });
+  }
+}
+
+double ResultArrays::number_of(Elements& elements, const Cell& cell) {
+  if (const auto* number = std::get_if<double>(&cell)) {
+    return *number;
+  }
+  if (const auto* flag = std::get_if<bool>(&cell)) {
+    return *flag ? 1.0 : 0.0;
+  }
+  const auto text = std::get<std::string_view>(cell);
+  const auto found = std::find(elements.texts.begin(), elements.texts.end(), text);
+  const auto place = found - elements.texts.begin();
+  if (found == elements.texts.end()) {
+    elements.texts.emplace_back(text);
+  }
+  return static_cast<double>(place);
+}
+
+// The elements are brought into the order of the points.
+py::dict ResultArrays::dict_of(const Elements& elements) {
+  const std::size_t points = elements.begin.size();
+  std::vector<std::int64_t> offsets{0};
+  for (const std::uint32_t count : elements.count) {
+    offsets.push_back(offsets.back() + count);
+  }
+  py::dict named;
+  for (std::size_t member = 0; member < elements.members.size(); ++member) {
+    std::vector<double> values;
+    values.reserve(static_cast<std::size_t>(offsets.back()));
+    for (std::size_t i = 0; i < points; ++i) {
+      const auto begin =
+          elements.members[member].begin() + static_cast<std::ptrdiff_t>(elements.begin[i]);
+      values.insert(values.end(), begin, begin + elements.count[i]);
+    }
+    named[text_of(elements.list->members[member])] = array_of(std::move(values));
+  }
+  named["offsets"] = array_of(std::move(offsets));
+  named["texts"] = py::cast(elements.texts);
+  return named;
+}
+
+py::dict ResultArrays::dict() {
+  py::dict all;
+  const auto fields = solver::result_fields();
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const auto& value = fields[i].value;
+    if (std::holds_alternative<solver::ListPart>(value)) {
+      continue;
+    }
+    const py::str group = text_of(fields[i].group);
+    if (!fields[i].group.empty() && !all.contains(group)) {
+      all[group] = py::dict();
+    }
+    py::dict named = fields[i].group.empty() ? all : py::dict(all[group]);
+    if (std::holds_alternative<Member<std::string>>(value)) {
+      named[text_of(fields[i].name)] = texts_.at(i).tuple();
+    } else {
+      named[text_of(fields[i].name)] = array_of(std::move(numbers_[i]));
+    }
+  }
+  py::dict lists;
+  for (const Elements& list : lists_) {
+    lists[text_of(list.list->column)] = dict_of(list);
+  }
+  all["lists"] = lists;
+  all["error"] = errors_.tuple();
+  return all;
+}
+
+/// The points with their models.
+struct GivenPoints {
+  std::vector<ModelParameters> models;
+  std::vector<std::string> faults;  // of each model; empty: the model can be solved
+  std::vector<Point> points;
+};
+
+constexpr std::string_view kIntegrator = "integrator";
+
+double number_of_integrator(const std::string& name) {
+  return static_cast<double>(solver::integrator_named(name));
+}
+
+std::vector<double> values_of(std::string_view key, const py::handle& array) {
+  if (key != kIntegrator || array.attr("dtype").attr("kind").cast<std::string>() != "U") {
+    return array.cast<std::vector<double>>();
+  }
+  std::vector<double> numbers;
+  for (const auto& name : array.cast<std::vector<std::string>>()) {
+    numbers.push_back(number_of_integrator(name));
+  }
+  return numbers;
+}
+
+/// Adds a key: one number of the model to `model`; a number of a point, a text (expression) and an
+/// array with a value for each point to `axes`, which are by key_number.
+void add_key(protocol::WrittenModel& model, std::map<std::size_t, protocol::Axis>& axes,
+             const std::string& name, const py::handle& value) {
+  const std::size_t number = protocol::key_number(name);
+  protocol::Axis axis;
+  axis.set_key(name);
+  if (py::isinstance<py::array>(value)) {
+    const auto values = values_of(name, value);
+    axis.mutable_values()->Add(values.begin(), values.end());
+  } else if (py::isinstance<py::str>(value) && name != kIntegrator) {
+    axis.set_expression(value.cast<std::string>());
+  } else {
+    const bool is_text = py::isinstance<py::str>(value);
+    const double one =
+        is_text ? number_of_integrator(value.cast<std::string>()) : value.cast<double>();
+    if (!protocol::is_point_key(number) && !protocol::link_of_key(number)) {
+      model.set(name, one);
+      return;
+    }
+    solver::check_value(protocol::key_numbered(number), one);
+    axis.add_values(one);
+  }
+  axes[number] = std::move(axis);
+}
+
+/// Adds the model with these values of `keys`, or its fault.
+void add_model(GivenPoints& all, std::span<const double> values,
+               const std::vector<std::size_t>& keys, const ModelParameters& base) {
+  std::string fault;
+  ModelParameters model = base;
+  try {
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const auto& key = protocol::key_numbered(keys[i]);
+      solver::check_value(key, values[i]);
+      const auto link = protocol::link_of_key(keys[i]);
+      if (!link) {
+        key.set(model, values[i]);
+      } else if (*link < model.lengths_m.size()) {
+        model.lengths_m[*link] = values[i];
+      } else {
+        throw InputError(fmt::format("{} is the length of a link that there is not: there are {}",
+                                     key.name, model.lengths_m.size()));
+      }
+    }
+    solver::validate(model);
+  } catch (const InputError& error) {
+    model = base;
+    fault = error.what();
+  }
+  all.models.push_back(std::move(model));
+  all.faults.push_back(std::move(fault));
+}
+
+std::vector<double> lengths_of(const py::handle& value) {
+  const auto array = py::cast<py::array_t<double>>(value);
+  if (array.ndim() != 1 || array.size() == 0) {
+    throw InputError("lengths must be the length of each link, as [0.4, 0.4, 0.3]");
+  }
+  return array.cast<std::vector<double>>();
+}
+
+/// Reads a dict of numbers, texts (expressions), arrays of `points` values, and a list `lengths`.
+/// Throws InputError, which names key, value and what is allowed, for a value that is wrong for all
+/// points, for an unknown key, with the nearest one, and for wrong combinations. A wrong value in
+/// an array makes a fault of its model, or fails when the point is solved.
+GivenPoints points_of(const py::dict& keys, std::size_t points) {
+  protocol::WrittenModel model;
+  std::map<std::size_t, protocol::Axis> keyed_axes;
+  if (!py::isinstance<py::str>(keys["preset"])) {
+    throw InputError(fmt::format("preset = {} is not allowed: preset must be a name, as \"paper\"",
+                                 py::repr(keys["preset"]).cast<std::string>()));
+  }
+  model.set_preset(keys["preset"].cast<std::string>());
+  const bool has_lengths = keys.contains("lengths");
+  for (const auto& [key, value] : keys) {
+    const auto name = key.cast<std::string>();
+    if (name == "lengths") {
+      model.set_lengths(lengths_of(value));
+    } else if (name != "preset") {
+      add_key(model, keyed_axes, name, value);
+    }
+    if (has_lengths && (name == "links" || name == "length")) {
+      throw InputError(std::string(protocol::WrittenModel::kLengthsStandAlone));
+    }
+  }
+  const ModelParameters base = model.model();
+  GivenPoints all;
+  if (points == 0) {
+    return all;
+  }
+  std::vector<protocol::Axis> axes;
+  std::vector<std::size_t> model_keys;
+  for (auto& [number, axis] : keyed_axes) {
+    axes.push_back(std::move(axis));
+    if (!protocol::is_point_key(number)) {
+      model_keys.push_back(number);
+    }
+  }
+  protocol::Block block = protocol::block_of(std::move(axes));
+  block.set_zip(true);
+  std::map<std::vector<std::uint64_t>, std::size_t> known;  // models, by the bits of their values
+  all.points.reserve(points);
+  const auto add = [&](std::span<const double> values) {
+    std::vector<std::uint64_t> bits;  // of NaN too
+    for (std::size_t j = 0; j < model_keys.size(); ++j) {
+      bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
+    }
+    const auto [place, is_new] = known.try_emplace(std::move(bits), all.models.size());
+    if (is_new) {
+      add_model(all, values, model_keys, base);
+    }
+    const auto point = values.subspan(keyed_axes.size() - protocol::kPointKeyOrder.size());
+    all.points.push_back({point[0], point[1], point[2], place->second});
+  };
+  protocol::visit_values(base, block, points, add);
+  return all;
+}
+
+/// A single point with its model, which can be solved.
+GivenPoints one_point(const py::dict& keys) {
+  GivenPoints given = points_of(keys, 1);
   if (!given.faults.front().empty()) {
     throw InputError(given.faults.front());
   }
-  return {std::move(given.models.front()), given.points.front()};
+  return given;
 }
 
 /// The outputs with H, mu and e of the points.
 py::dict with_points(ResultArrays& arrays, const std::vector<Point>& points) {
   py::dict all = arrays.dict();
-  std::vector<double> H_m;
-  std::vector<double> mu;
-  std::vector<double> e;
-  for (const Point& point : points) {
-    H_m.push_back(point.H_m);
-    mu.push_back(point.mu);
-    e.push_back(point.e);
-  }
-  all["H"] = array_of(std::move(H_m));
-  all["mu"] = array_of(std::move(mu));
-  all["e"] = array_of(std::move(e));
+  const auto column = [&points](double Point::*member) {
+    std::vector<double> values;
+    for (const Point& point : points) {
+      values.push_back(point.*member);
+    }
+    return array_of(std::move(values));
+  };
+  all["H"] = column(&Point::H_m);
+  all["mu"] = column(&Point::mu);
+  all["e"] = column(&Point::e);
   return all;
 }
 
-py::dict dict_of(const OnePoint& one, const CaseResult& result) {
+py::dict dict_of(const GivenPoints& one, const CaseResult& result) {
   ResultArrays arrays(1);
   arrays.set(0, result);
-  return with_points(arrays, {one.point});
+  return with_points(arrays, one.points);
 }
 
 py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
-  const OnePoint one = one_point(keys);
+  const GivenPoints one = one_point(keys);
   const auto result = interruptibly<CaseResult>([one, falls, errors](const std::atomic<bool>&) {
-    const Finger finger(one.model, falls);
-    const Point& point = one.point;
+    const Finger finger(one.models.front(), falls);
+    const Point& point = one.points.front();
     CaseResult solved = finger.solve(point.H_m, point.mu, point.e);
     if (errors) {
       solved.errors = finger.estimated_errors(solved);
@@ -86,7 +407,7 @@ struct Instants {
 };
 
 py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape) {
-  const OnePoint one = one_point(keys);
+  const GivenPoints one = one_point(keys);
   auto instants = interruptibly<Instants>([one, falls, fall, shape](const std::atomic<bool>& stop) {
     Instants rows;
     Tracing tracing;
@@ -99,49 +420,31 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
       solver::append_numbers(row, rows.numbers);
       rows.states.push_back(solver::code_of_state(row.state));
     };
-    const Point& point = one.point;
-    rows.result = Finger(one.model, falls).trace(point.H_m, point.mu, point.e, tracing);
+    const Point& point = one.points.front();
+    rows.result = Finger(one.models.front(), falls).trace(point.H_m, point.mu, point.e, tracing);
     return rows;
   });
+  const ModelParameters& model = one.models.front();
   const auto headings = solver::trace_headings(solver::trace_shape(
-      one.model.lengths_m.size(), static_cast<std::size_t>(one.model.elements_per_link), shape));
+      model.lengths_m.size(), static_cast<std::size_t>(model.elements_per_link), shape));
   return py::make_tuple(dict_of(one, instants.result), headings,
                         array_of(std::move(instants.numbers)),
                         array_of(std::move(instants.states)));
 }
 
-/// Reports to `progress` (or None) and lets signals and what it raises end the work.
-std::function<bool(std::size_t)> goes_on(WithoutLock& others_run, std::size_t points,
-                                         bool has_signals, const py::object& progress) {
-  if (!has_signals && progress.is_none()) {
-    return {};
-  }
-  return [=, &others_run, &progress](std::size_t outcomes) {
-    return others_run.with_lock([&] {
-      if (has_signals && PyErr_CheckSignals() != 0) {
-        throw py::error_already_set();
-      }
-      if (!progress.is_none()) {
-        progress(outcomes, points);
-      }
-      return true;
-    });
-  };
-}
+/// What a call of solve_many works on; kept by its threads where it is ended early.
+struct ManyPoints {
+  ManyPoints(std::size_t points, GivenPoints with_models)
+      : given(std::move(with_models)), arrays(points) {}
 
-py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
-                    std::size_t threads, bool errors, const py::object& progress) {
-  refuse_forked_child();
-  const GivenKeys given_keys = keys_of(keys, count);
-  const bool has_signals = is_main_thread();
-  ResultArrays arrays(count);
   GivenPoints given;
-  {
-    WithoutLock others_run;
-    given = points_of(given_keys);
+  ResultArrays arrays;
+  std::atomic<std::size_t> outcomes = 0;
+
+  void solve(ManyOptions options, const std::atomic<bool>& stop) {
     std::vector<Point> points;
     std::vector<std::size_t> places;
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < given.points.size(); ++i) {
       if (const std::string& fault = given.faults[given.points[i].model]; !fault.empty()) {
         arrays.set_error(i, fault);
       } else {
@@ -149,24 +452,38 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
         places.push_back(i);
       }
     }
-    oblique::solve_many(given.models, points,
-                        [&](Outcome&& outcome) {
-                          const std::size_t place = places[outcome.point];
-                          if (outcome.result) {
-                            arrays.set(place, *outcome.result);
-                          } else {
-                            arrays.set_error(place, outcome.error);
-                          }
-                        },
-                        {.threads = threads,
-                         .errors = errors,
-                         .goes_on = goes_on(others_run, count, has_signals, progress),
-                         .falls = falls});
+    options.goes_on = [this, &stop](std::size_t so_far) {
+      outcomes = so_far;
+      return !stop;
+    };
+    const auto take = [this, &places](Outcome&& outcome) {
+      const std::size_t place = places[outcome.point];
+      if (outcome.result) {
+        arrays.set(place, *outcome.result);
+      } else {
+        arrays.set_error(place, outcome.error);
+      }
+    };
+    oblique::solve_many(given.models, points, take, options);
   }
+};
+
+py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
+                    std::size_t threads, bool errors, const py::object& progress) {
+  const auto many = std::make_shared<ManyPoints>(count, points_of(keys, count));
+  const auto work = [many, threads, errors, falls](const std::atomic<bool>& stop) {
+    many->solve({.threads = threads, .errors = errors, .falls = falls}, stop);
+    return true;
+  };
+  interruptibly<bool>(work, {}, [&] {
+    if (!progress.is_none()) {
+      progress(many->outcomes.load(), count);
+    }
+  });
   if (!progress.is_none()) {
     progress(count, count);
   }
-  return with_points(arrays, given.points);
+  return with_points(many->arrays, many->given.points);
 }
 
 /// (name, group, column, is_whole, list, member, where) of each output.
@@ -194,8 +511,6 @@ void add_solving(py::module_& module) {
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));
   module.def("solve_many", &solve_many, py::arg("falls"), py::arg("keys"), py::arg("points"),
              py::arg("threads"), py::arg("errors"), py::arg("progress"));
-  // What threads have freed is kept for them otherwise.
-  module.def("give_memory_back", [] { malloc_trim(0); });
   module.def("version", &version);
   module.def("fields", &fields);
   module.def("trace_states", [] {

@@ -8,23 +8,22 @@
 
 #include "proto/address.h"
 #include "proto/frames.h"
-#include "proto/socket/socket.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
 
-/// A server that says nothing for so long is away.
+/// A server that is silent for this time counts as away.
 constexpr std::chrono::milliseconds kSilence{3'000};
 
 std::string seconds_of(std::chrono::milliseconds time) {
   return fmt::format("{} s", solver::exact_number(static_cast<double>(time.count()) / 1000.0));
 }
 
-/// A request that was not sent yet must not hold up the end of the program. Nothing is queued for a
-/// server that is not there, which would get every copy when it is back. The embedded service may
-/// be connected to before it listens: attempts follow each other closely.
+/// An unsent request must not delay the end of the program. Nothing is queued for a server that is
+/// away, which would get every copy when it is back. The embedded service may be connected to
+/// before it listens: attempts follow each other closely.
 protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
   return {.url = settings.server_url,
           .example_url = ConnectionSettings().server_url,
@@ -35,22 +34,29 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .key = settings.key};
 }
 
-/// Why nobody may have answered, and what to do about it.
-std::string guess_at_silence(const std::string& url) {
-  const std::string host = protocol::host_of(url);
-  const auto [has_v4, has_v6] = protocol::families_of(host);
-  return host.empty() || has_v4 || has_v6
-             ? "is a server running there? Start one with `oblique-server`"
-             : fmt::format("no address is known here for the name {}. Check it", host);
-}
-
-/// Where the page begins that follows the one after `asked`; 0: there is none. A page that does not
-/// come later than the one before would never end.
-std::uint64_t next_page(std::uint64_t asked, std::uint64_t answered) {
-  return answered > asked ? answered : 0;
+/// Where the page after `requested` begins; 0: there is none. A page that does not come later than
+/// the one before would never end.
+std::uint64_t next_page(std::uint64_t requested, std::uint64_t answered) {
+  return answered > requested ? answered : 0;
 }
 
 }  // namespace
+
+/// The stream that a connection has under way.
+class ServerRows : public RowStream {
+ public:
+  ServerRows(Connection& connection, protocol::QueryRequest request) : connection_(connection) {
+    connection_.start_rows(std::move(request), {});
+  }
+  ~ServerRows() override { connection_.end_rows(); }
+  ServerRows(const ServerRows&) = delete;
+  ServerRows& operator=(const ServerRows&) = delete;
+
+  protocol::QueryReply next() override { return connection_.next_rows(); }
+
+ private:
+  Connection& connection_;
+};
 
 Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
     : settings_(std::move(settings)),
@@ -74,19 +80,21 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
     outstanding.sent = now;
     return;
   }
-  // A connection over which nothing comes may be dead, and only its ends do not know.
+  // A connection over which nothing comes may be dead without either end noticing.
   const bool has_connected = monitor_.connections() > connections_before_;
-  // Where nobody answers, the next attempt gets longer: on a long line a handshake takes seconds.
+  // Without an answer the next attempt gets more time: over a slow network a handshake takes
+  // seconds.
   const auto patience =
-      has_connected ? outstanding.resend_after : kSilence * (1U << std::min(attempts_in_vain_, 2U));
+      has_connected ? outstanding.resend_after : kSilence * (1U << std::min(failed_attempts_, 2U));
   if (now - std::max(outstanding.sent, connecting_since_) <= patience) {
     return;
   }
-  attempts_in_vain_ = has_connected ? 0 : attempts_in_vain_ + 1;
   if (has_connected) {
     constexpr std::chrono::milliseconds kLongestPause{60'000};
     outstanding.resend_after = std::min(2 * outstanding.resend_after, kLongestPause);
+    failed_attempts_ = 0;
   } else {
+    ++failed_attempts_;
     ++attempt_;
   }
   connections_before_ = monitor_.connections();
@@ -102,7 +110,7 @@ void Connection::wait_a_slice(bool to_send) {
     throw Interrupted("stopped while waiting for the server");
   }
   const int events = ZMQ_POLLIN | (to_send ? ZMQ_POLLOUT : 0);
-  // The monitor first: the socket, looked at after it, then knows of the same connection.
+  // The monitor first: the socket, polled after it, then has the same connection.
   std::array<zmq::pollitem_t, 2> items{{{monitor_.handle(), 0, ZMQ_POLLIN, 0},
                                         {socket_.handle(), 0, static_cast<short>(events), 0}}};
   try {
@@ -125,24 +133,13 @@ std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_
         "what answers at {} does not speak as oblique-server does: check the address and port",
         settings_.server_url));
   }
-  // An answer that came after its time was given up, or a second one, belongs to nobody.
+  // A late answer to an earlier request, or a second one, is passed over.
   const bool is_word_of_it =
       reply.has_still_working() && reply.still_working().request_id() == request_id;
   if (reply.request_id() != request_id && reply.request_id() != 0 && !is_word_of_it) {
     return std::nullopt;
   }
   return reply;
-}
-
-void Connection::note_word(Outstanding& outstanding, const protocol::StillWorking& word,
-                           bool counts_as_answer) {
-  const auto now = Clock::now();
-  outstanding.word = now;
-  outstanding.runs = word.runs();
-  outstanding.sent = now;  // it has arrived
-  if (counts_as_answer) {
-    outstanding.heard = now;
-  }
 }
 
 protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& request,
@@ -162,9 +159,12 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
       if (!reply->has_still_working()) {
         return *std::move(reply);
       }
-      // A trace may take long, and so may the points of a study, each of which is looked at.
-      const bool may_take_long = tell || request.has_trace() || request.has_submit();
-      note_word(outstanding, reply->still_working(), may_take_long);
+      outstanding.runs = reply->still_working().runs();
+      outstanding.word = outstanding.sent = Clock::now();
+      // A trace may take long, and so may the check of all points of a study.
+      if (tell || request.has_trace() || request.has_submit()) {
+        outstanding.heard = outstanding.word;
+      }
     }
     if (tell && !said_silent && Clock::now() - outstanding.heard > kSilence) {
       tell(fmt::format("no answer from {} for {}: waiting until it is back", settings_.server_url,
@@ -172,29 +172,33 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
       said_silent = true;
     }
   }
+  throw_no_answer(outstanding);
+}
+
+void Connection::throw_no_answer(const Outstanding& outstanding) const {
+  const std::string timeout = seconds_of(std::chrono::milliseconds(settings_.timeout_ms));
   if (outstanding.runs && Clock::now() - outstanding.word < kSilence) {
     throw ConnectionError(fmt::format(
         "the query took too long: after {} {} {} still. Narrow it, as with WHERE or LIMIT, or give "
         "it more time with --timeout SECONDS",
-        seconds_of(timeout), settings_.server_url,
+        timeout, settings_.server_url,
         *outstanding.runs ? "works on it" : "is busy with the queries of others"));
   }
-  if (!settings_.if_silent.empty()) {
-    throw ConnectionError(fmt::format("no answer from {} within {}: {}", settings_.server_url,
-                                      seconds_of(timeout), settings_.if_silent));
+  std::string guess = settings_.if_silent;
+  if (guess.empty()) {
+    const std::string host = protocol::host_of(settings_.server_url);
+    const auto [has_v4, has_v6] = protocol::families_of(host);
+    guess =
+        fmt::format("{}, or say where it is with --server URL or OBLIQUE_SERVER",
+                    host.empty() || has_v4 || has_v6
+                        ? "is a server running there? Start one with `oblique-server`"
+                        : fmt::format("no address is known here for the name {}. Check it", host));
   }
-  throw ConnectionError(fmt::format(
-      "no answer from {} within {}: {}, or say where it is with --server URL or "
-      "OBLIQUE_SERVER",
-      settings_.server_url, seconds_of(timeout), guess_at_silence(settings_.server_url)));
+  throw ConnectionError(
+      fmt::format("no answer from {} within {}: {}", settings_.server_url, timeout, guess));
 }
 
 protocol::ClientReply Connection::call(protocol::ClientRequest request, const Tell& tell) {
-  return call_numbered(request, tell);
-}
-
-protocol::ClientReply Connection::call_numbered(protocol::ClientRequest& request,
-                                                const Tell& tell) {
   end_rows();
   request.set_protocol_version(protocol::kProtocolVersion);
   request.set_request_id(++last_request_id_);
@@ -205,29 +209,23 @@ protocol::ClientReply Connection::call_numbered(protocol::ClientRequest& request
                     "lists of values as ranges",
                     frame.size(), protocol::kMaxFrameBytes));
   }
-  auto reply =
-      answer_to(request,
-                {.frame = std::move(frame),
-                 .heard = Clock::now(),
-                 // A trace may take long to arrive; a new connection would begin anew.
-                 .resend_after = std::chrono::milliseconds(
-                     request.has_trace() ? settings_.timeout_ms : settings_.resend_after_ms),
-                 .sent = Clock::now()},
-                tell);
-  check(reply, request);
+  // A trace may take long to arrive; a new connection would begin anew.
+  const std::chrono::milliseconds resend_after(request.has_trace() ? settings_.timeout_ms
+                                                                   : settings_.resend_after_ms);
+  auto reply = answer_to(request, {.frame = std::move(frame), .resend_after = resend_after}, tell);
+  check(reply, request.kind_case());
   return reply;
 }
 
-void Connection::check(const protocol::ClientReply& reply,
-                       const protocol::ClientRequest& request) const {
+void Connection::check(const protocol::ClientReply& reply, int kind) const {
   if (reply.has_error() && reply.error().wrong_request()) {
     throw solver::InputError(reply.error().message());
   }
   if (reply.has_error()) {
     throw ServerError(reply.error().message());
   }
-  // A reply has the number of its request's kind. Other programs' frames may be read as anything.
-  if (static_cast<int>(reply.kind_case()) != static_cast<int>(request.kind_case())) {
+  // A reply has the number of its request's kind. Frames of other programs may decode as anything.
+  if (static_cast<int>(reply.kind_case()) != kind) {
     throw ConnectionError(
         fmt::format("what answers at {} does not speak as oblique-server does to clients: check "
                     "the address and port ({} is for clients; the port for workers is another one)",
@@ -235,24 +233,111 @@ void Connection::check(const protocol::ClientReply& reply,
   }
 }
 
-protocol::SubmitReply Connection::submit(const Study& study, const SubmitSettings& settings) {
-  protocol::ClientRequest request;
-  request.mutable_submit()->set_name(study.name);
-  *request.mutable_submit()->mutable_recipe() = study.recipe;
-  if (settings.priority) {
-    request.mutable_submit()->set_priority(*settings.priority);
+std::unique_ptr<RowStream> Connection::rows(protocol::QueryRequest request) {
+  return std::make_unique<ServerRows>(*this, std::move(request));
+}
+
+std::vector<protocol::QueryReply> Connection::chunks(protocol::QueryRequest request,
+                                                     const Tell& tell) {
+  start_rows(std::move(request), tell);
+  std::vector<protocol::QueryReply> all;
+  while (rows_) {
+    all.push_back(next_rows());
   }
-  request.mutable_submit()->set_no_reuse(settings.no_reuse);
-  return call(std::move(request)).submit();
+  return all;
 }
 
-protocol::StatusReply Connection::greeting() {
+protocol::Table Connection::query(const std::string& sql, const Tell& tell) {
+  protocol::QueryRequest request;
+  request.set_sql(sql);
+  protocol::Table whole;
+  for (const protocol::QueryReply& chunk : chunks(std::move(request), tell)) {
+    protocol::append_rows(chunk, whole);
+  }
+  return whole;
+}
+
+void Connection::start_rows(protocol::QueryRequest request, const Tell& tell) {
+  end_rows();
+  request.set_time_limit_ms(static_cast<std::uint64_t>(settings_.timeout_ms));
+  rows_ = Rows{.request = std::move(request), .tell = tell};
+}
+
+protocol::QueryReply Connection::next_rows() {
+  protocol::QueryReply chunk;
+  if (rows_->chunks > 0) {
+    chunk = more_rows();
+  } else {
+    // A call ends the stream under way.
+    Rows rows = *std::exchange(rows_, std::nullopt);
+    protocol::ClientRequest request;
+    *request.mutable_query() = rows.request;
+    chunk = std::move(*call(std::move(request), rows.tell).mutable_query());
+    rows.request_id = last_request_id_;
+    rows.connection = monitor_.connections();
+    rows.columns.assign(chunk.columns().begin(), chunk.columns().end());
+    rows_ = std::move(rows);
+  }
+  if (chunk.chunk() != rows_->chunks + 1 || !protocol::is_sound(chunk) ||
+      !std::equal(chunk.columns().begin(), chunk.columns().end(), rows_->columns.begin(),
+                  rows_->columns.end())) {
+    broke_off(fmt::format("what came from {} is not its next part", settings_.server_url));
+  }
+  ++rows_->chunks;
+  rows_->rows += chunk.chunk_rows();
+  if (chunk.ends()) {
+    rows_.reset();
+  }
+  return chunk;
+}
+
+protocol::QueryReply Connection::more_rows() {
   protocol::ClientRequest request;
-  request.mutable_status()->set_limit(1);
-  return call(std::move(request)).status();
+  request.mutable_more_rows()->set_request_id(rows_->request_id);
+  request.mutable_more_rows()->set_taken(rows_->chunks);
+  send_about_rows(std::move(request));
+  // Time in which this process was stopped, or its machine slept, does not count.
+  constexpr std::chrono::milliseconds kLongestSlice{500};
+  const std::chrono::milliseconds timeout(settings_.timeout_ms);
+  Clock::duration waited{0};
+  while (waited < timeout) {
+    const auto before = Clock::now();
+    if (auto reply = received(rows_->request_id); reply && !reply->has_still_working()) {
+      check(*reply, protocol::ClientRequest::kQuery);
+      return std::move(*reply->mutable_query());
+    }
+    if (monitor_.connections() != rows_->connection) {
+      broke_off(fmt::format("the connection to {} was lost", settings_.server_url));
+    }
+    wait_a_slice(false);
+    waited += std::min<Clock::duration>(Clock::now() - before, kLongestSlice);
+  }
+  broke_off(fmt::format("nothing came from {} for {}", settings_.server_url, seconds_of(timeout)));
 }
 
-protocol::StatusReply Connection::status(const std::string& study, const Tell& tell) {
+void Connection::send_about_rows(protocol::ClientRequest request) {
+  request.set_protocol_version(protocol::kProtocolVersion);
+  // It has no reply of its own; errors come under the number of the query.
+  request.set_request_id(rows_->request_id);
+  // If it cannot be sent, nothing more comes, which is noticed.
+  (void)socket_.send(zmq::buffer(protocol::encode(request)), zmq::send_flags::dontwait);
+}
+
+void Connection::end_rows() {
+  if (rows_ && rows_->chunks > 0) {
+    protocol::ClientRequest request;
+    request.mutable_end_query()->set_request_id(rows_->request_id);
+    send_about_rows(std::move(request));
+  }
+  rows_.reset();
+}
+
+void Connection::broke_off(const std::string& why) const {
+  throw ConnectionError(
+      fmt::format("the answer broke off after {} rows: {}. Ask again", rows_->rows, why));
+}
+
+protocol::StatusReply Connection::full_status(const std::string& study, const Tell& tell) {
   protocol::StatusReply all;
   std::uint64_t after = 0;
   do {
@@ -266,12 +351,10 @@ protocol::StatusReply Connection::status(const std::string& study, const Tell& t
   return all;
 }
 
-protocol::StatusReply Connection::status_of(const std::string& study, std::uint64_t study_id,
-                                            const Tell& tell) {
-  protocol::ClientRequest request;
-  request.mutable_status()->set_study(study);
-  request.mutable_status()->set_study_id(study_id);
-  return call(std::move(request), tell).status();
+std::vector<protocol::StudyStatus> Connection::status(const std::string& study, const Tell& tell) {
+  const auto reply = full_status(study, tell);
+  access_ = reply.access();
+  return {reply.studies().begin(), reply.studies().end()};
 }
 
 protocol::WorkersReply Connection::workers() {
@@ -287,34 +370,31 @@ protocol::WorkersReply Connection::workers() {
   return all;
 }
 
+protocol::SubmitReply Connection::submit(const Study& study, const SubmitSettings& settings) {
+  protocol::ClientRequest request;
+  auto& submit = *request.mutable_submit();
+  submit.set_name(study.name);
+  *submit.mutable_recipe() = study.recipe;
+  if (settings.priority) {
+    submit.set_priority(*settings.priority);
+  }
+  submit.set_no_reuse(settings.no_reuse);
+  return call(std::move(request)).submit();
+}
+
 protocol::TraceReply Connection::trace(protocol::TraceRequest trace) {
   protocol::ClientRequest request;
   *request.mutable_trace() = std::move(trace);
   return call(std::move(request)).trace();
 }
 
-protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change) {
+protocol::ChangeReply Connection::change(const std::string& study, protocol::StudyChange change,
+                                         std::uint64_t study_id, const std::string& new_name) {
   protocol::ClientRequest request;
   request.mutable_change()->set_study(study);
+  request.mutable_change()->set_study_id(study_id);
   request.mutable_change()->set_change(change);
-  return call(std::move(request)).change();
-}
-
-protocol::ChangeReply Connection::rename(const protocol::StudyStatus& study,
-                                         const std::string& name) {
-  protocol::ClientRequest request;
-  request.mutable_change()->set_study(study.name());
-  request.mutable_change()->set_study_id(study.study_id());
-  request.mutable_change()->set_change(protocol::STUDY_CHANGE_RENAME);
-  request.mutable_change()->set_new_name(name);
-  return call(std::move(request)).change();
-}
-
-protocol::ChangeReply Connection::remove(const protocol::StudyStatus& study) {
-  protocol::ClientRequest request;
-  request.mutable_change()->set_study(study.name());
-  request.mutable_change()->set_study_id(study.study_id());
-  request.mutable_change()->set_change(protocol::STUDY_CHANGE_DELETE);
+  request.mutable_change()->set_new_name(new_name);
   return call(std::move(request)).change();
 }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include <zmq.hpp>
 
+#include "client/service/source.h"
 #include "client/study/study.h"
 #include "proto/keys/key_file.h"
 #include "proto/oblique.pb.h"
@@ -22,8 +24,8 @@ namespace oblique::client {
 struct ConnectionSettings {
   std::string server_url{"tcp://127.0.0.1:7600"};
   std::int64_t timeout_ms = 10'000;  ///< for one answer
-  /// A request of which nothing was heard for so long is sent again over a new connection, and
-  /// again after twice as long.
+  /// A request without an answer for this time is sent again over a new connection, and again after
+  /// twice the time.
   std::int64_t resend_after_ms = 3'000;
   std::optional<protocol::KeyFile> key = {};  ///< ours; none: plain text
   /// What to say of a server that does not answer; empty: that there may be none.
@@ -54,111 +56,98 @@ struct SubmitSettings {
   bool no_reuse = false;  ///< solves also the points of which other studies have results
 };
 
-/// Takes in a sentence for people.
-using Tell = std::function<void(const std::string& sentence)>;
-
-/// Asks one server, one question at a time. Every call sends one ClientRequest and waits for the
-/// reply with its number; each throws ServerError, ConnectionError or Interrupted, and
-/// solver::InputError where the server says that the fault is in what was asked.
+/// Sends requests to one server, one at a time. Every call sends one ClientRequest and waits for
+/// the reply with its number; each throws ServerError, ConnectionError or Interrupted, and
+/// solver::InputError where the server says that the request is wrong.
 ///
-/// Requests are idempotent. One that a server may have taken with it when it died is sent again, as
-/// soon as a server is there again; so is one of which nothing is heard. Of several answers the
-/// first counts.
+/// Requests are idempotent. One that may be lost with a server that died is sent again to the next
+/// one, and so is one without an answer. The first answer counts.
 ///
-/// A call that is given a `tell` does not end for want of an answer: it says once that the server
-/// is silent, and once that it answers again. It ends, as any other, when the server turns this
-/// program away, as for its key.
-class Connection {
+/// A call that is given a `tell` never times out: it says once that the server is silent, and once
+/// that it answers again. It ends when the server rejects this program, as for its key.
+class Connection : public Source {
  public:
-  /// Asked many times a second while waiting; false ends the wait. It may throw.
+  /// Called many times a second while waiting; false ends the wait. It may throw.
   using KeepWaiting = std::function<bool()>;
 
   /// Connects in the background. Throws solver::InputError for an address that is none.
   explicit Connection(ConnectionSettings settings, KeepWaiting keep_waiting = {});
 
   const std::string& url() const { return settings_.server_url; }
+  std::string place() const override { return url(); }
+  std::string access() const override { return access_; }
 
-  /// What the server says of itself, with one study at most.
-  protocol::StatusReply greeting();
-  protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
-  /// The study of that name, or all of them when it is empty, however many pages they fill.
-  protocol::StatusReply status(const std::string& study, const Tell& tell = {});
-  /// The same of one study by its number, whatever it is called by now; errors call it `study`.
-  protocol::StatusReply status_of(const std::string& study, std::uint64_t study_id,
-                                  const Tell& tell = {});
-  /// All workers, likewise.
-  protocol::WorkersReply workers();
-  /// Waits for as long as the server says that it has the request, whose time limit it keeps.
-  protocol::TraceReply trace(protocol::TraceRequest trace);
-  protocol::ChangeReply change(const std::string& study, protocol::StudyChange change);
-  /// Gives the study of that number, as `status` has it, another name.
-  protocol::ChangeReply rename(const protocol::StudyStatus& study, const std::string& name);
-  /// Deletes it with its results.
-  protocol::ChangeReply remove(const protocol::StudyStatus& study);
-  protocol::Recipe describe(const std::string& study);
-  /// The whole answer to one statement that only reads. For answers that fit into memory.
-  protocol::Table query(const std::string& sql, const Tell& tell = {});
-
-  /// The chunks of the answer to a question, all of them. For answers that fit into memory.
+  /// A connection lost after the first chunk is a ConnectionError, and so is a missing chunk. Any
+  /// other call ends the stream.
+  std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override;
+  /// All chunks of an answer. For answers that fit into memory.
   std::vector<protocol::QueryReply> chunks(protocol::QueryRequest request, const Tell& tell = {});
+  using Source::query;
+  protocol::Table query(const std::string& sql, const Tell& tell);
 
-  /// Asks for an answer in chunks. It is given by `next_rows` and ended by `end_rows`, or by any
-  /// other request.
-  void ask_for_rows(protocol::QueryRequest request);
-  /// The next chunk of it, the first being asked for again over a new connection as any answer. A
-  /// connection that is lost after that is a ConnectionError, and so is a chunk that is missing.
-  protocol::QueryReply next_rows();
-  /// Nothing more of it is wanted.
-  void end_rows();
+  using Source::status;
+  std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override;
+  /// The same, with what the server says of itself.
+  protocol::StatusReply full_status(const std::string& study = {}, const Tell& tell = {});
+  protocol::WorkersReply workers();  ///< all of them
+
+  protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
+  /// Waits as long as the server says that it has the request, whose time limit it keeps.
+  protocol::TraceReply trace(protocol::TraceRequest trace);
+  /// Changes the study of that name; renaming and deleting also need its number.
+  protocol::ChangeReply change(const std::string& study, protocol::StudyChange change,
+                               std::uint64_t study_id = 0, const std::string& new_name = {});
+  protocol::Recipe describe(const std::string& study);
 
  private:
+  friend class ServerRows;
   using Clock = std::chrono::steady_clock;
 
-  /// An answer in chunks.
+  /// An answer in chunks that is not complete.
   struct Rows {
-    protocol::ClientRequest request;
-    std::uint64_t connection = 0;  ///< over which it comes
-    std::uint64_t chunks = 0;      ///< that were given
-    std::uint64_t rows = 0;
+    protocol::QueryRequest request;
+    Tell tell = {};                ///< of the first chunk
+    std::uint64_t request_id = 0;  ///< after the first chunk
+    std::uint64_t connection = 0;  ///< over which the answer comes
+    std::uint64_t chunks = 0;      ///< received
+    std::uint64_t rows = 0;        ///< received
     std::vector<std::string> columns = {};
-    Tell tell = {};  ///< of the first chunk
   };
 
-  /// A request that is not answered yet.
+  /// A request without an answer so far.
   struct Outstanding {
     std::string frame;
-    Clock::time_point heard;                 ///< when the server last gave a sign, or the start
     std::chrono::milliseconds resend_after;  ///< since `sent`
-    Clock::time_point sent;                  ///< when it was last sent, or the start
+    Clock::time_point heard = Clock::now();  ///< last sign of the server, at first the start
+    Clock::time_point sent = Clock::now();   ///< last time, at first the start
     std::uint64_t sent_over = 0;             ///< connection that took it; 0: none has
-    Clock::time_point word = {};             ///< when the server last said that it has it
-    std::optional<bool> runs = {};           ///< what it said: the query runs, or waits
+    Clock::time_point word = {};             ///< last StillWorking
+    std::optional<bool> runs = {};           ///< in that: the query runs, or waits
   };
 
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
-  /// The same, and numbers the request.
-  protocol::ClientReply call_numbered(protocol::ClientRequest& request, const Tell& tell);
-  /// Throws what the server's error says, or what is wrong with its reply.
-  void check(const protocol::ClientReply& reply, const protocol::ClientRequest& request) const;
+  /// Throws what the server's error says, or what is wrong with its reply to a request of `kind`.
+  void check(const protocol::ClientReply& reply, int kind) const;
   protocol::ClientReply answer_to(const protocol::ClientRequest& request, Outstanding outstanding,
                                   const Tell& tell);
-  /// Waits for a chunk after the first.
-  protocol::QueryReply more_rows();
-  void tell_of_rows(const protocol::ClientRequest& wish);
+  [[noreturn]] void throw_no_answer(const Outstanding& outstanding) const;
+
+  void start_rows(protocol::QueryRequest request, const Tell& tell);
+  protocol::QueryReply next_rows();
+  protocol::QueryReply more_rows();  ///< waits for a chunk after the first
+  void end_rows();
+  void send_about_rows(protocol::ClientRequest request);
   /// Throws ConnectionError for an answer that broke off, for this reason.
   [[noreturn]] void broke_off(const std::string& why) const;
-  /// Whether no connection has taken it, or only one that there was before the present one.
+
+  /// Whether the present connection has not taken it.
   bool is_unsent(const Outstanding& outstanding);
-  /// Sends it if a connection takes it that has not yet; connects again when nothing was heard for
-  /// long.
+  /// Sends it over a new connection; connects again after a long silence.
   void send_or_connect_again(Outstanding& outstanding);
   /// Waits for the next frame, a connection, or the end of a slice of time.
   void wait_a_slice(bool to_send);
-  /// The server has the query and works on it. For a call that waits for ever that is sign enough.
-  static void note_word(Outstanding& outstanding, const protocol::StillWorking& word,
-                        bool counts_as_answer);
   /// The next frame from the server, if it is an answer to request `request_id` or says that the
-  /// server works on it still.
+  /// server still works on it.
   std::optional<protocol::ClientReply> received(std::uint64_t request_id);
 
   ConnectionSettings settings_;
@@ -166,12 +155,13 @@ class Connection {
   zmq::context_t context_;
   zmq::socket_t socket_;
   protocol::SocketMonitor monitor_;
-  unsigned attempt_ = 0;           ///< to connect: which family of addresses is tried
-  unsigned attempts_in_vain_ = 0;  ///< since the last that led to a connection
+  unsigned attempt_ = 0;          ///< to connect: which family of addresses is tried
+  unsigned failed_attempts_ = 0;  ///< since the last that led to a connection
   Clock::time_point connecting_since_ = Clock::now();
   std::uint64_t connections_before_ = 0;  ///< the present attempt to connect began
   std::uint64_t last_request_id_ = 0;
-  std::optional<Rows> rows_;  ///< under way
+  std::string access_;
+  std::optional<Rows> rows_;
 };
 
 }  // namespace oblique::client

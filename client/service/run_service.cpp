@@ -1,46 +1,97 @@
 #include "client/service/run_service.h"
 
-#include <filesystem>
+#include <poll.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
 #include <iostream>
-#include <string>
+#include <stdexcept>
 #include <system_error>
-#include <vector>
+#include <thread>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
 
 #include "client/output/human_units.h"
 #include "client/output/mesh_note.h"
 #include "client/service/connection.h"
-#include "client/service/result_query.h"
 #include "client/service/watching.h"
 #include "proto/study_counts.h"
+#include "proto/system/available_memory.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/version.h"
 
 namespace oblique::client {
 namespace {
 
-void tell_how_to_continue(const Study& study, const RunSettings& settings) {
-  std::cerr << fmt::format(
-      "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
-      study.name, settings.service.database.string());
+using Clock = std::chrono::steady_clock;
+
+// A server with a large database reads what is done first.
+constexpr std::chrono::seconds kReadyWithin{60};
+// A worker ends its point first, which on fine meshes takes long; the server commits.
+constexpr std::chrono::seconds kStopWithin{5};
+constexpr std::chrono::milliseconds kPause{1};
+
+std::string with_last_words(const std::string& what, const ChildProcess& child) {
+  const auto words = child.last_words();
+  return words.empty() ? what : fmt::format("{}; its last words:\n{}", what, words);
 }
 
-/// Rows that were not merged into the file are missing in a copy of it.
-void tell_of_log(const std::filesystem::path& database) {
-  std::error_code ignored;
-  const std::string log = database.string() + "-wal";
-  const auto size = std::filesystem::file_size(log, ignored);
-  if (!ignored && size > 0) {
-    std::cerr << fmt::format(
-        "Another program reads {0}, so {1} holds some of its rows: a copy needs both files. "
-        "`oblique backup COPY.db --db {0}` makes one that is whole.\n",
-        database.string(), log);
+/// Waits until none of `children` runs, and kills those that still do at the end of the time.
+void end_all(const std::vector<std::unique_ptr<ChildProcess>>& children) {
+  for (const auto& child : children) {
+    child->send(SIGTERM);
+  }
+  const auto deadline = Clock::now() + kStopWithin;
+  for (const auto& child : children) {
+    while (child->is_running() && Clock::now() < deadline) {
+      std::this_thread::sleep_for(kPause);
+    }
+    child->send(SIGKILL);
+    child->wait();
   }
 }
 
-/// Why the rest of a study is not solved by the workers of this run, and what to do; empty: it is.
+/// The first line that the server writes to `ready`; empty when it closes the pipe without one.
+/// Throws ProcessError when none comes in time, and Interrupted when `stop` is requested.
+std::string first_line(const Descriptor& ready, const ChildProcess& server,
+                       const std::filesystem::path& database, protocol::StopSignals& stop) {
+  const auto deadline = Clock::now() + kReadyWithin;
+  std::string text;
+  while (text.find('\n') == std::string::npos) {
+    if (stop.requested()) {
+      throw Interrupted("stopped before the server was ready");
+    }
+    if (Clock::now() > deadline) {
+      throw ProcessError(with_last_words(
+          fmt::format("no answer within {} s: {}", kReadyWithin.count(), why_silent(database)),
+          server));
+    }
+    constexpr int kSlice_ms = 50;
+    pollfd waited{ready.number(), POLLIN, 0};
+    if (poll(&waited, 1, kSlice_ms) <= 0) {
+      continue;
+    }
+    std::array<char, 512> bytes{};
+    const auto got = ::read(ready.number(), bytes.data(), bytes.size());
+    if (got == 0 || (got < 0 && errno != EINTR)) {
+      return {};
+    }
+    text.append(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+  }
+  return text.substr(0, text.find('\n'));
+}
+
+/// Why the workers of this run do not solve the rest of a study, and what to do; or empty.
 std::string objection_to_waiting(const protocol::StudyStatus& status) {
   const std::string own = solver::solver_version();
   if (status.state() == "paused" && status.leased() == 0) {
@@ -58,35 +109,9 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
       status.name(), status.solver_version(), own, shown_count(protocol::open_points(status)));
 }
 
-/// Names the other studies of the database that are not finished. They wait during this run.
-void tell_of_other_studies(Connection& connection, const Study& study,
-                           const std::filesystem::path& database) {
-  constexpr std::size_t kMostNamed = 3;
-  std::vector<std::string> others;
-  const auto all = connection.status({});
-  for (const auto& other : all.studies()) {
-    if (other.name() != study.name && other.state() == "running") {
-      others.push_back(fmt::format("{} ({} points open)", other.name(),
-                                   shown_count(protocol::open_points(other))));
-    }
-  }
-  if (others.empty()) {
-    return;
-  }
-  std::string more;
-  if (others.size() > kMostNamed) {
-    more = fmt::format(" and {} more", shown_count(others.size() - kMostNamed));
-    others.resize(kMostNamed);
-  }
-  tell_line(fmt::format(
-      "Also unfinished in {0}: {1}{2}. To go on with one, repeat the `oblique run` that "
-      "began it; `oblique view {0}` goes on with all.",
-      database.string(), fmt::join(others, ", "), more));
-}
-
 RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
                        protocol::StopSignals& stop) {
-  const auto look_after = [&] {
+  const auto keep_waiting = [&] {
     service.check();
     if (const auto news = service.news(); !news.empty()) {
       std::cerr << protocol::visible_lines(news) << '\n';
@@ -97,7 +122,7 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   where.server_url = service.client_url();
   where.key = service.client_key();
   where.if_silent = why_silent(settings.service.database);
-  Connection connection(where, look_after);
+  Connection connection(where, keep_waiting);
   const auto submitted = connection.submit(study, {.no_reuse = settings.no_reuse});
   if (submitted.created()) {
     tell_mesh(std::cerr, study.recipe);
@@ -108,17 +133,13 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
     std::cerr << fmt::format("\"{}\": {}\n", study.name, taken);
   }
-  tell_of_other_studies(connection, study, settings.service.database);
   const auto ask = [&](const Tell& tell) {
-    look_after();
-    const auto reply = connection.status(study.name, tell);
-    if (reply.studies_size() != 1) {
-      throw ServerError(fmt::format("the server no longer knows the study \"{}\"", study.name));
-    }
-    if (const auto reason = objection_to_waiting(reply.studies(0)); !reason.empty()) {
+    keep_waiting();
+    auto status = study_named(connection, study.name, tell);
+    if (const auto reason = objection_to_waiting(status); !reason.empty()) {
       throw std::runtime_error(reason);
     }
-    return reply.studies(0);
+    return status;
   };
   RunEnd end;
   end.status = watch_study(ask, stop);
@@ -132,6 +153,129 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
 }
 
 }  // namespace
+
+std::string why_silent(const std::filesystem::path& database) {
+  return fmt::format(
+      "the server that was started here runs, and waits for its database {0}, which is slow or "
+      "damaged. `oblique check --db {0}` examines it",
+      database.string());
+}
+
+EphemeralKeys::EphemeralKeys()
+    : folder_((std::filesystem::temp_directory_path() / "oblique-run-XXXXXX").string()) {
+  if (::mkdtemp(folder_.data()) == nullptr) {
+    throw std::runtime_error(
+        fmt::format("cannot make a folder for keys, {}: {}", folder_, std::strerror(errno)));
+  }
+  try {
+    protocol::make_key_folder(folder_);
+  } catch (const std::runtime_error&) {
+    ::rmdir(folder_.c_str());
+    throw;
+  }
+}
+
+EphemeralKeys::~EphemeralKeys() {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+std::string EphemeralKeys::file_of(protocol::Role role) const {
+  return protocol::key_file_in(folder_, std::string(name_of(role)));
+}
+
+EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
+  static_cast<void>(sibling_program("oblique-worker"));  // missing before a server starts
+  start_server(settings, stop);
+  for (int i = 0; i < settings.workers; ++i) {
+    start_worker(settings);
+  }
+}
+
+void EmbeddedService::start_server(const ServiceSettings& settings, protocol::StopSignals& stop) {
+  Pipe ready;
+  ChildSettings child{
+      .program = sibling_program("oblique-server"),
+      .arguments = {"--no-config", "--db", settings.database.string(), "--drain", "0",
+                    "--worker-port", "0", "--client-port", "0", "--http", settings.http,
+                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
+                    std::to_string(getpid()), "--keys", keys_.file_of(protocol::Role::kServer)},
+      .show_errors = settings.verbose,
+      .handed_over = ready.write.number()};
+  if (!settings.only_study.empty()) {
+    child.arguments.push_back("--only-study=" + settings.only_study);
+  }
+  if (settings.allow_network_disk) {
+    child.arguments.emplace_back("--allow-network-disk");
+  }
+  server_ = std::make_unique<ChildProcess>(child);
+  ready.write.close();  // the server holds the only other end: its end shows on ours
+  const auto urls = nlohmann::json::parse(first_line(ready.read, *server_, settings.database, stop),
+                                          nullptr, false);
+  if (urls.is_object() && urls.contains("client") && urls.contains("worker")) {
+    client_url_ = urls.value("client", std::string());
+    worker_url_ = urls.value("worker", std::string());
+    page_url_ = urls.value("page", std::string());
+    return;
+  }
+  // It closed the pipe because it ends: then its last words are complete.
+  const auto deadline = Clock::now() + kStopWithin;
+  while (server_->is_running() && Clock::now() < deadline) {
+    std::this_thread::sleep_for(kPause);
+  }
+  throw ProcessError(
+      with_last_words(fmt::format("the server did not start: it {}", server_->ending()), *server_));
+}
+
+void EmbeddedService::start_worker(const ServiceSettings& settings) {
+  // Together the workers use the cores and the memory for falls.
+  const auto workers = static_cast<unsigned>(settings.workers);
+  const unsigned threads = std::max(1U, std::thread::hardware_concurrency() / workers);
+  const std::uint64_t all_bytes =
+      settings.fall_memory_bytes != 0
+          ? settings.fall_memory_bytes
+          : protocol::available_memory_bytes() / solver::kFallsPartOfMemory;
+  workers_.push_back(std::make_unique<ChildProcess>(ChildSettings{
+      .program = sibling_program("oblique-worker"),
+      .arguments = {"--no-config", "--server", worker_url_, "--keys",
+                    keys_.file_of(protocol::Role::kWorker), "--stop-with-parent",
+                    std::to_string(getpid()), "--threads", std::to_string(threads), "--fall-memory",
+                    std::to_string(std::max<std::uint64_t>(all_bytes / workers, 1))},
+      .show_errors = settings.verbose}));
+}
+
+void EmbeddedService::check() {
+  if (!server_->is_running()) {
+    throw ProcessError(with_last_words(fmt::format("the server {}", server_->ending()), *server_));
+  }
+  if (std::none_of(workers_.begin(), workers_.end(),
+                   [](const auto& worker) { return worker->is_running(); })) {
+    throw ProcessError(with_last_words(
+        fmt::format("no worker is left: the last one {}", workers_.back()->ending()),
+        *workers_.back()));
+  }
+}
+
+std::string EmbeddedService::news() {
+  std::string text;
+  for (const auto& worker : workers_) {
+    if (!worker->is_running() && reported_.insert(worker->pid()).second) {
+      text += text.empty() ? "" : "\n";
+      text += with_last_words(
+          fmt::format("a worker (process {}) {}", worker->pid(), worker->ending()), *worker);
+    }
+  }
+  return text;
+}
+
+void EmbeddedService::stop() {
+  end_all(std::exchange(workers_, {}));
+  std::vector<std::unique_ptr<ChildProcess>> server;
+  if (server_) {
+    server.push_back(std::move(server_));
+  }
+  end_all(server);
+}
 
 void check_settings(const RunSettings& settings) {
   constexpr int kMostWorkers = 1024;
@@ -168,10 +312,11 @@ std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
     EmbeddedService service(how, stop);
     auto end = submit_and_wait(study, settings, service, stop);
     service.stop();
-    tell_of_log(settings.service.database);
     return end;
   } catch (const Interrupted&) {
-    tell_how_to_continue(study, settings);
+    std::cerr << fmt::format(
+        "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
+        study.name, settings.service.database.string());
     return std::nullopt;
   }
 }

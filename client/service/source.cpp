@@ -1,108 +1,108 @@
 #include "client/service/source.h"
 
 #include <utility>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/service/database_rows.h"
-#include "proto/wire/chunk.h"
 #include "server/database/database_file.h"
 #include "server/query/reader.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
 
-class DatabaseSource : public Source {
+/// Returns what `call` returns; a wrong statement is wrong usage.
+template <class Call>
+auto answered(const Call& call) {
+  try {
+    return call();
+  } catch (const server::StatementError& error) {
+    throw solver::InputError(error.what());
+  }
+}
+
+class DatabaseRows : public RowStream {
  public:
-  DatabaseSource(std::string file, std::int64_t timeout_ms)
-      : file_(std::move(file)), reader_(file_) {
+  explicit DatabaseRows(server::Answer answer) : answer_(std::move(answer)) {}
+  protocol::QueryReply next() override {
+    return answered([this] { return answer_.next(); });
+  }
+
+ private:
+  server::Answer answer_;
+};
+
+class Database : public Source {
+ public:
+  Database(std::string file, std::int64_t timeout_ms) : file_(std::move(file)), reader_(file_) {
+    constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
     limits_.time_limit_ms = timeout_ms;
-    // One for the whole process, which has nothing else in SQLite.
-    sqlite3_hard_heap_limit64(kHeapBytes);
+    sqlite3_hard_heap_limit64(kHeapBytes);  // of this process, which uses SQLite for nothing else
   }
 
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
-    return std::make_unique<DatabaseRows>(reader_, request, limits_);
+    return answered(
+        [&] { return std::make_unique<DatabaseRows>(reader_.answer(request, limits_)); });
   }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
       auto found = reader_.study_status(study);
-      if (!server::is_in_use(file_)) {
-        say_that_nobody_works(found);
+      const bool has_server = server::is_in_use(file_);
+      for (auto& each : found) {
+        if (!has_server && each.state() == "running") {
+          each.set_waits_for(fmt::format("a server: nobody is at work on {}", file_));
+        }
       }
       return found;
     } catch (const server::QueryError& error) {
       throw server::QueryError(fmt::format("{} in {}", error.what(), file_));
     }
   }
-  std::vector<protocol::StudyStatus> status_of(const std::string& study, std::uint64_t study_id,
-                                               const Tell& tell) override {
-    const auto name = reader_.query(
-        fmt::format("SELECT name FROM studies WHERE study_id = {}", study_id), limits_);
-    return status(name.rows.size() == 1 ? std::get<std::string>(name.rows[0][0]) : study, tell);
-  }
   std::string place() const override { return file_; }
 
  private:
-  void say_that_nobody_works(std::vector<protocol::StudyStatus>& studies) const {
-    for (auto& study : studies) {
-      if (study.state() == "running") {
-        study.set_waits_for(fmt::format("a server: nobody is at work on {}", file_));
-      }
-    }
-  }
-
-  static constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
-
   std::string file_;
   server::Reader reader_;
-  // Nobody else is kept waiting.
   server::QueryLimits limits_{UINT64_MAX, 0, std::int64_t{64} << 20U};
 };
 
-class ServerRows : public RowStream {
- public:
-  ServerRows(Connection& connection, protocol::QueryRequest request) : connection_(connection) {
-    connection_.ask_for_rows(std::move(request));
-  }
-  ~ServerRows() override { connection_.end_rows(); }
-  ServerRows(const ServerRows&) = delete;
-  ServerRows& operator=(const ServerRows&) = delete;
-
-  protocol::QueryReply next() override { return connection_.next_rows(); }
-
- private:
-  Connection& connection_;
-};
-
-class ServerSource : public Source {
- public:
-  ServerSource(ConnectionSettings settings, Connection::KeepWaiting keep_waiting)
-      : connection_(std::move(settings), std::move(keep_waiting)) {}
-
-  std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
-    return std::make_unique<ServerRows>(connection_, std::move(request));
-  }
-  std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override {
-    const auto reply = connection_.status(study, tell);
-    access_ = reply.access();
-    return {reply.studies().begin(), reply.studies().end()};
-  }
-  std::vector<protocol::StudyStatus> status_of(const std::string& study, std::uint64_t study_id,
-                                               const Tell& tell) override {
-    const auto reply = connection_.status_of(study, study_id, tell);
-    return {reply.studies().begin(), reply.studies().end()};
-  }
-  std::string access() const override { return access_; }
-  std::string place() const override { return connection_.url(); }
-
- private:
-  Connection connection_;
-  std::string access_;
-};
-
 }  // namespace
+
+void check(const ResultQuery& query) {
+  if (query.limit && *query.limit < 0) {
+    throw solver::InputError(
+        fmt::format("--limit {} is not allowed: it must be >= 0", *query.limit));
+  }
+  for (const auto& [flag, text] :
+       {std::pair("--select", query.select), std::pair("--where", query.where),
+        std::pair("--group", query.group), std::pair("--order", query.order)}) {
+    if (!text.empty()) {
+      server::check_sql_part(flag, text);
+    }
+  }
+}
+
+protocol::QueryRequest request_for(const ResultQuery& query) {
+  protocol::QueryRequest request;
+  auto& question = *request.mutable_question();
+  question.set_study(query.study);
+  if (!query.select.empty()) {
+    question.add_select(query.select);
+  }
+  question.set_where(query.where);
+  question.set_group(query.group);
+  question.set_order(query.order);
+  if (query.limit) {
+    question.set_limit(static_cast<std::uint64_t>(*query.limit));
+  }
+  return request;
+}
+
+protocol::QueryRequest first_results(const std::string& study, std::int64_t rows) {
+  return request_for({.study = study, .limit = rows});
+}
 
 protocol::Table Source::query(const std::string& sql) {
   protocol::QueryRequest request;
@@ -117,13 +117,8 @@ protocol::Table Source::query(const std::string& sql) {
   return whole;
 }
 
-std::unique_ptr<Source> open_server(ConnectionSettings settings,
-                                    Connection::KeepWaiting keep_waiting) {
-  return std::make_unique<ServerSource>(std::move(settings), std::move(keep_waiting));
-}
-
 std::unique_ptr<Source> open_database(const std::string& file, std::int64_t timeout_ms) {
-  return std::make_unique<DatabaseSource>(file, timeout_ms);
+  return std::make_unique<Database>(file, timeout_ms);
 }
 
 }  // namespace oblique::client

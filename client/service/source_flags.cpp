@@ -1,6 +1,7 @@
 #include "client/service/source_flags.h"
 
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -18,13 +19,14 @@ namespace {
 constexpr const char* kServerVariable = "OBLIQUE_SERVER";
 constexpr const char* kKeysVariable = "OBLIQUE_KEYS";
 
-std::string of_environment(const char* variable) {
+std::string from_environment(const char* variable) {
   const char* value = std::getenv(variable);
   return value == nullptr ? std::string() : std::string(value);
 }
 
-std::string server_of_environment() {
-  return of_environment(kServerVariable);
+/// The server that a flag or the environment names; empty: none.
+std::string server_named(const SourceFlags& flags) {
+  return flags.server.empty() ? from_environment(kServerVariable) : flags.server;
 }
 
 std::string seconds(std::int64_t milliseconds) {
@@ -85,12 +87,10 @@ void add_database_argument(CLI::App& verb, std::filesystem::path& file) {
 ConnectionSettings connection_settings(const SourceFlags& flags) {
   ConnectionSettings settings;
   settings.timeout_ms = timeout_of(flags, settings.timeout_ms);
-  if (!flags.server.empty()) {
-    settings.server_url = flags.server;
-  } else if (const auto from_environment = server_of_environment(); !from_environment.empty()) {
-    settings.server_url = from_environment;
+  if (const std::string server = server_named(flags); !server.empty()) {
+    settings.server_url = server;
   }
-  const std::string keys = flags.keys.empty() ? of_environment(kKeysVariable) : flags.keys;
+  const std::string keys = flags.keys.empty() ? from_environment(kKeysVariable) : flags.keys;
   tell_detail(std::cerr,
               fmt::format("asks the server at {}{}", settings.server_url,
                           keys.empty() ? std::string() : fmt::format(" with the key {}", keys)));
@@ -101,12 +101,9 @@ ConnectionSettings connection_settings(const SourceFlags& flags) {
 }
 
 std::string database_meant(const SourceFlags& flags) {
-  if (!flags.database.empty()) {
-    return flags.database;
-  }
-  const bool server_named = !flags.server.empty() || !server_of_environment().empty();
-  return !server_named && std::filesystem::exists(DatabaseSettings().file) ? DatabaseSettings().file
-                                                                           : std::string();
+  const std::string file = DatabaseSettings().file;
+  const bool is_default = server_named(flags).empty() && std::filesystem::exists(file);
+  return flags.database.empty() && is_default ? file : flags.database;
 }
 
 std::unique_ptr<Source> open_source(const SourceFlags& flags,
@@ -116,7 +113,7 @@ std::unique_ptr<Source> open_source(const SourceFlags& flags,
     tell_detail(std::cerr, fmt::format("reads the database {} itself", database));
     return open_database(database, database_timeout_ms);
   }
-  return open_server(connection_settings(flags), std::move(keep_waiting));
+  return std::make_unique<Connection>(connection_settings(flags), std::move(keep_waiting));
 }
 
 }  // namespace oblique::client

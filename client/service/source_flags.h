@@ -37,9 +37,8 @@ ConnectionSettings connection_settings(const SourceFlags& flags);
 /// named; empty: a server is meant.
 std::string database_meant(const SourceFlags& flags);
 
-/// Opens what the flags name: --db, else --server or OBLIQUE_SERVER, else oblique.db when it is in
-/// this folder, else the server at its default address.
-/// `keep_waiting` may end the wait for a server's answer; see Connection.
+/// Opens the database of `database_meant`, else the server of `connection_settings`, whose answers
+/// `keep_waiting` may end the wait for; see Connection.
 std::unique_ptr<Source> open_source(const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting = {});
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <iostream>
+#include <stdexcept>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -11,7 +13,6 @@
 #include "client/output/progress.h"
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
-#include "client/service/watch_teller.h"
 #include "proto/program/usage.h"
 #include "proto/study_counts.h"
 #include "proto/text.h"
@@ -23,7 +24,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-// A short study is seen to end at once; a long one is not asked after needlessly.
+// The end of a short study shows at once; a long one needs few requests.
 Seconds pause_after(Seconds elapsed) {
   constexpr Seconds kShortest{0.004};
   constexpr Seconds kLongest{0.5};
@@ -45,17 +46,19 @@ void tell_failures(const protocol::StudyStatus& status,
   }
 }
 
-/// The study of that name, the only one that was found at `place`.
-template <class Studies>
-protocol::StudyStatus only_one(const Studies& found, const std::string& name,
-                               const std::string& place) {
-  if (found.size() != 1) {
-    throw std::runtime_error(fmt::format("there is no study called \"{}\" in {}", name, place));
-  }
-  return *found.begin();
-}
-
 }  // namespace
+
+std::string WaitMessages::update(const protocol::StudyStatus& status, Seconds elapsed) {
+  if (status.waits_for() != reason_) {
+    reason_ = status.waits_for();
+    since_ = elapsed;
+  }
+  if (reason_ == said_ || (!reason_.empty() && elapsed - since_ < kShortestWait)) {
+    return {};
+  }
+  said_ = reason_;
+  return reason_.empty() ? "The study goes on." : fmt::format("The study waits for {}.", reason_);
+}
 
 void tell_line(const std::string& sentence) {
   std::cerr << protocol::visible(sentence) << '\n';
@@ -68,22 +71,22 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
     tell_line(sentence);
   };
   const auto start = Clock::now();
-  WatchTeller teller;
+  WaitMessages messages;
   for (;;) {
     auto status = ask(tell);
     const Seconds elapsed = Clock::now() - start;
-    const std::uint64_t settled = protocol::completed_points(status);
+    const std::uint64_t completed = protocol::completed_points(status);
     progress.update({.study = status.name(),
                      .points = status.points(),
-                     .settled = settled,
+                     .settled = completed,
                      .failed = status.failed(),
                      .left_out = status.left_out(),
                      .elapsed_s = elapsed.count()});
-    if (const auto sentence = teller.update(status, elapsed); !sentence.empty()) {
+    if (const auto sentence = messages.update(status, elapsed); !sentence.empty()) {
       tell(sentence);
     }
     const bool over =
-        (status.state() != "running" && status.state() != "paused") || settled == status.points();
+        (status.state() != "running" && status.state() != "paused") || completed == status.points();
     if (over ||
         stop.wait(std::chrono::duration_cast<std::chrono::nanoseconds>(pause_after(elapsed)))) {
       progress.finish();
@@ -93,27 +96,10 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
 }
 
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell) {
-  return only_one(source.status(name, tell), name, source.place());
-}
-
-protocol::StudyStatus study_named(Connection& connection, const std::string& name) {
-  return only_one(connection.status(name).studies(), name, connection.url());
-}
-
-protocol::StudyStatus WatchedStudy::ask(const Tell& tell) {
-  if (study_id_ == 0) {
-    const auto first = study_named(source_, name_, tell);
-    study_id_ = first.study_id();
-    return first;
-  }
-  const auto found = source_.status_of(name_, study_id_, tell);
+  const auto found = source.status(name, tell);
   if (found.size() != 1) {
     throw std::runtime_error(
-        fmt::format("the study \"{}\" is no longer in {}", name_, source_.place()));
-  }
-  if (found.front().name() != name_ && tell) {
-    tell(fmt::format("{} is called {} now", name_, found.front().name()));
-    name_ = found.front().name();
+        fmt::format("there is no study called \"{}\" in {}", name, source.place()));
   }
   return found.front();
 }

@@ -1,9 +1,9 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "client/service/source.h"
@@ -13,45 +13,47 @@
 
 namespace oblique::client {
 
-/// Where a watched study is. Given a `tell`, it may take for as long as the server is away.
-using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
-
-/// Asks where one study is, over and over, and shows it on standard error, with what it waits for,
-/// until it no longer runs or `stop` is requested. Asks often at first, then ever less. Throws what
-/// `ask` throws. Returns the last status.
-protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop);
-
-/// Writes one line to standard error, whatever is in it.
-void tell_line(const std::string& sentence);
-
-/// The one study of that name in an answer to a status question; std::runtime_error where there is
-/// none. Given a `tell`, waits for a server that is away.
-protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
-protocol::StudyStatus study_named(Connection& connection, const std::string& name);
-
-/// Asks for one study again and again: by name first, then by its number, so that it is found under
-/// another name too. Throws as `study_named`.
-class WatchedStudy {
+/// Finds the sentences that a watched study needs beside its progress: what it waits for, and that
+/// it goes on. The clock is the caller's.
+class WaitMessages {
  public:
-  WatchedStudy(Source& source, std::string name) : source_(source), name_(std::move(name)) {}
-  protocol::StudyStatus ask(const Tell& tell);
+  using Seconds = std::chrono::duration<double>;
+
+  /// A shorter wait is not worth a sentence: workers come and go.
+  static constexpr Seconds kShortestWait{2};
+
+  /// The sentence that is due at `elapsed`, which must not fall; or an empty text.
+  std::string update(const protocol::StudyStatus& status, Seconds elapsed);
 
  private:
-  Source& source_;
-  std::string name_;
-  std::uint64_t study_id_ = 0;  // 0: it was not found yet
+  std::string reason_;  ///< what the study waits for; empty: for nothing
+  Seconds since_{0};
+  std::string said_;  ///< the reason that the last sentence named
 };
 
-/// Tells on standard error how a watched study stands: failed points with their reasons, or that
-/// it was cancelled. Gives the exit code: kDone when every point is solved.
+/// The status of a watched study. Given a `tell`, it may take as long as the server is away.
+using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
+
+/// Shows the status of a study on standard error, with what it waits for, until it no longer runs
+/// or `stop` is requested. Throws what `ask` throws. Returns the last status.
+protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop);
+
+/// Writes one line to standard error, with control characters made visible.
+void tell_line(const std::string& sentence);
+
+/// The study of that name. Throws std::runtime_error where there is none. Given a `tell`, waits for
+/// a server that is away.
+protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
+
+/// Prints failed points with their reasons, or that the study was cancelled, to standard error.
+/// Returns the exit code: kDone when every point is solved.
 int tell_end(const protocol::StudyStatus& status,
              const std::function<protocol::Table(const std::string&)>& query);
 
-/// Tells on standard error when anybody may come to the server at `place`, as StatusReply.access
-/// says.
+/// Warns on standard error when the server at `place` is insecure, as StatusReply.access says.
 void tell_if_insecure(const std::string& access, const std::string& place);
 
-/// "12 points are taken over: 7 of a, 5 of b", or an empty text when none are.
+/// "12 points are taken over: 7 of a, 5 of b", or an empty text.
 std::string taken_over(const protocol::TakenOver& taken);
 
 /// Columns and rows of studies for `status` and `studies`.

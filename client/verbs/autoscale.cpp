@@ -16,8 +16,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/io/child_process.h"
 #include "client/output/human_units.h"
-#include "client/service/child_process.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
@@ -181,7 +181,7 @@ std::string checked_script(const AutoscaleFlags& flags) {
 
 /// One round: submits the jobs that are missing; with `dry_run`, prints the command instead.
 void submit_missing(Connection& connection, const SlurmJobs& slurm, const AutoscaleFlags& flags) {
-  const auto open = open_points(connection.status(""));
+  const auto open = open_points(connection.full_status());
   const auto jobs = slurm.count();
   const auto missing = jobs_to_submit(open, jobs, flags.limits);
   const auto found = fmt::format("{} points are open and {} pending or running", shown_count(open),

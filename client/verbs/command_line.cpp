@@ -17,8 +17,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/formats/pager.h"
-#include "client/formats/sink.h"
+#include "client/io/sink.h"
 #include "client/output/help_text.h"
 #include "client/output/human_units.h"
 #include "client/output/speech.h"

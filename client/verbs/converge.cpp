@@ -7,8 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/convergence/convergence_report.h"
-#include "client/convergence/levels.h"
+#include "client/convergence/convergence.h"
 #include "client/output/human_units.h"
 #include "client/output/printer.h"
 #include "client/output/work_line.h"

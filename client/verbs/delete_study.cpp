@@ -67,7 +67,8 @@ int delete_study(const DeleteFlags& flags) {
       std::cerr << "Nothing is deleted.\n";
       return kFailed;
     }
-    study = connection.remove(study).study();
+    study =
+        connection.change(study.name(), protocol::STUDY_CHANGE_DELETE, study.study_id()).study();
   } else {
     study = study_named(*open_source(flags.source), flags.study);
     if (asks && !is_confirmed(study, database)) {

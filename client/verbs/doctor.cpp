@@ -16,8 +16,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/io/child_process.h"
 #include "client/output/human_units.h"
-#include "client/service/child_process.h"
 #include "client/service/source.h"
 #include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
@@ -267,7 +267,7 @@ void check_server(Diagnosis& diagnosis, const DoctorFlags& flags) {
   }
   try {
     Connection connection(connection_settings(flags.source));
-    const auto status = connection.greeting();
+    const auto status = connection.full_status();
     diagnosis.ok(kCheck,
                  fmt::format("{} answers{}: oblique-server {}, {} workers", connection.url(),
                              status.access() == "keys" ? " and admits the key" : "",

@@ -4,8 +4,7 @@
 
 #include <iostream>
 
-#include "client/formats/pager.h"
-#include "client/formats/sink.h"
+#include "client/io/sink.h"
 #include "proto/program/usage.h"
 #include "worker/solver/model/errors.h"
 

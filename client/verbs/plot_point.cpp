@@ -13,9 +13,8 @@
 #include "client/output/work_line.h"
 #include "client/plot/point_figure.h"
 #include "client/service/watching.h"
-#include "client/trace/stored_row.h"
-#include "client/trace/trace_of_worker.h"
-#include "client/trace/traced_fall.h"
+#include "client/trace/stored_comparison.h"
+#include "client/trace/worker_trace.h"
 #include "client/verbs/solve_here.h"
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
@@ -59,7 +58,7 @@ void solve_history(PointHistory& history, bool with_errors) {
   take_falls(history);
 }
 
-PointHistory history_of(const PointAtHand& point) {
+PointHistory history_of(const PointSpec& point) {
   return {.name = fmt::format("Point {} of {}", point.point, point.study),
           .model = point.model,
           .H_m = point.H_m,
@@ -74,7 +73,7 @@ PointHistory history_of(const PointAtHand& point) {
 
 /// A point of a study with its histories.
 struct SolvedAgain {
-  PointAtHand point;
+  PointSpec point;
   PointHistory history;
 };
 
@@ -106,7 +105,7 @@ SolvedAgain solved_by_worker(const PointPictureFlags& flags, const SourceFlags& 
   return {solved.point, std::move(history)};
 }
 
-SolvedAgain solved_here(const PointPictureFlags& flags, const PointAtHand& point) {
+SolvedAgain solved_here(const PointPictureFlags& flags, const PointSpec& point) {
   PointHistory history = history_of(point);
   try {
     solve_history(history, point.errors);

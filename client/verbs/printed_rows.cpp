@@ -7,7 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/formats/row_output.h"
+#include "client/io/row_output.h"
 #include "client/output/columns.h"
 #include "client/output/human_units.h"
 #include "client/output/terminal.h"

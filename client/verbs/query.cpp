@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/service/result_query.h"
+#include "client/service/source.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"

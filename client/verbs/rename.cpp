@@ -36,7 +36,8 @@ int rename(const RenameFlags& flags) {
   const std::string database = database_meant(flags.source);
   if (database.empty()) {
     Connection connection(connection_settings(flags.source));
-    connection.rename(study_named(connection, flags.study), flags.name);
+    const auto study = study_named(connection, flags.study);
+    connection.change(study.name(), protocol::STUDY_CHANGE_RENAME, study.study_id(), flags.name);
   } else {
     const auto study = study_named(*open_source(flags.source), flags.study);
     server::rename_study(database, study.study_id(), flags.name);

@@ -5,7 +5,6 @@
 
 #include "client/output/value_notes.h"
 #include "client/service/connection.h"
-#include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
 #include "client/study/study_flags.h"
 #include "client/verbs/printed_rows.h"

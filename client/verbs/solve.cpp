@@ -56,7 +56,7 @@ TraceOutput trace_output(const std::string& where, bool json) {
     throw solver::InputError(
         "--trace - and --json both write to standard output: give the trace a file");
   }
-  return {where == kStandardOutput ? "" : where, TraceFormat::kCsv, "--trace"};
+  return {where == kStandardOutput ? "" : where, Format::kCsv, "--trace"};
 }
 
 /// Said before values are judged, which would speak of the largest of them.

@@ -10,7 +10,7 @@
 #include "client/output/mesh_note.h"
 #include "client/output/value_notes.h"
 #include "client/service/connection.h"
-#include "client/service/result_query.h"
+#include "client/service/source.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/study/study_flags.h"
@@ -71,15 +71,9 @@ std::string query_for_more(const Study& study, const ConnectionSettings& server)
                      key.empty() ? "" : " --keys " + shell_word(key));
 }
 
-int watch(const Study& study, std::uint64_t study_id, std::int64_t rows,
-          const std::string& for_more, Connection& connection, protocol::StopSignals& stop) {
-  const auto ask = [&](const Tell& tell) {
-    const auto status = connection.status_of(study.name, study_id, tell);
-    if (status.studies_size() != 1) {
-      throw ServerError("the server no longer knows the study \"" + study.name + "\"");
-    }
-    return status.studies(0);
-  };
+int watch(const Study& study, std::int64_t rows, const std::string& for_more,
+          Connection& connection, protocol::StopSignals& stop) {
+  const auto ask = [&](const Tell& tell) { return study_named(connection, study.name, tell); };
   const auto status = watch_study(ask, stop);
   if (stop.requested()) {
     throw Interrupted("no longer watching");
@@ -112,7 +106,7 @@ int submit(const SubmitFlags& flags) {
     }
     tell_values(std::cerr, study.recipe);
     submitted = true;
-    return flags.watch || flags.rows ? watch(study, reply.study_id(), flags.rows.value_or(0),
+    return flags.watch || flags.rows ? watch(study, flags.rows.value_or(0),
                                              query_for_more(study, server), connection, stop)
                                      : kDone;
   } catch (const Interrupted&) {

@@ -11,9 +11,9 @@
 #include "client/output/work_line.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
-#include "client/trace/stored_row.h"
-#include "client/trace/trace_of_worker.h"
+#include "client/trace/stored_comparison.h"
 #include "client/trace/trace_output.h"
+#include "client/trace/worker_trace.h"
 #include "client/verbs/solve_here.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
@@ -47,12 +47,12 @@ struct TraceFlags {
 
 /// The point solved again.
 struct Solved {
-  PointAtHand point;
+  PointSpec point;
   std::optional<solver::CaseResult> result;  // none: it has outputs that are unknown here
   std::string where;                         // as a sentence part
 };
 
-std::string named(const PointAtHand& point) {
+std::string named(const PointSpec& point) {
   return fmt::format("Point {} of {}: H = {} m, mu = {}, e* = {}", point.point, point.study,
                      solver::readable_number(point.H_m), solver::readable_number(point.mu),
                      solver::readable_number(point.e_star));
@@ -63,8 +63,7 @@ std::string named(const PointAtHand& point) {
       fmt::format("point {} of {} has no answer: {}", flags.point, flags.study, reason));
 }
 
-Solved solve_in_this_process(const TraceFlags& flags, const PointAtHand& point,
-                             TraceOutput& output) {
+Solved solve_in_this_process(const TraceFlags& flags, const PointSpec& point, TraceOutput& output) {
   const solver::Finger finger(point.model);
   output.begin(solver::trace_shape(point.model.lengths_m.size(),
                                    static_cast<std::size_t>(point.model.elements_per_link),
@@ -145,7 +144,7 @@ void refuse_failed(const TraceFlags& flags, const std::optional<StoredRow>& stor
 }
 
 int trace(const TraceFlags& flags) {
-  const TraceFormat format = trace_format(flags.format, flags.out);
+  const Format format = format_of_output(flags.format, flags.out, kTraceFormats, Format::kCsv);
   const std::string database = database_meant(flags.source);
   const bool is_file = !database.empty();
   if (is_file && flags.on_worker) {
@@ -159,7 +158,7 @@ int trace(const TraceFlags& flags) {
     connection.emplace(connection_settings(flags.source));
   }
   const bool is_here = is_file || flags.local;
-  std::optional<PointAtHand> point;
+  std::optional<PointSpec> point;
   if (is_here) {
     point = is_file ? point_in(database, study_named(*source, flags.study), number)
                     : point_at(*connection, flags.study, number);
@@ -191,7 +190,7 @@ void add_trace(CLI::App& app, Command& command) {
                                   "csv or json; as the file's name ends when left out, else "
                                   "csv; the Python module returns NumPy arrays")
                      ->type_name("FORMAT");
-  protocol::note_choices(format, trace_format_names());
+  protocol::note_choices(format, kTraceFormats);
   verb->add_flag("--shape", flags->shape, "add the positions of the chain's nodes");
   verb->add_flag(
       "--fall", flags->fall,

@@ -13,7 +13,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/service/connection.h"
-#include "client/service/embedded_service.h"
 #include "client/service/run_service.h"
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"

@@ -26,11 +26,10 @@ struct WatchFlags {
 int watch(const WatchFlags& flags) {
   protocol::StopSignals stop;
   const auto source = open_source(flags.source, [&stop] { return !stop.requested(); });
-  WatchedStudy watched(*source, flags.study);
   bool answered = false;
   const auto ask = [&](const Tell& tell) {
     // Where nobody ever answered, the address may be wrong.
-    auto status = watched.ask(answered ? tell : Tell());
+    auto status = study_named(*source, flags.study, answered ? tell : Tell());
     if (!std::exchange(answered, true)) {
       tell_if_insecure(source->access(), source->place());
     }

@@ -18,7 +18,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/convergence/convergence.h"
-#include "client/convergence/levels.h"
 #include "client/output/columns.h"
 #include "client/output/printer.h"
 #include "worker/solver/falls.h"

@@ -11,9 +11,8 @@ Units are SI and stand at the end of names: ``fn_peak_N``, ``duration_s``.
   and out, and :func:`trace` gives the time histories of one.
 * :class:`Database` asks the results that studies have left, also while a server writes them.
 
-All of it may be called from several threads at once and lets other threads run meanwhile. Nothing
-stays behind a call but falls that later ones use again (:func:`forget_falls` gives their memory
-back), and, where Ctrl-C ended it in the middle of a long fall, the thread that solves that.
+All of it may be called from several threads at once and lets other threads run meanwhile. Falls
+are kept for later calls, in an eighth of the free memory at most.
 
 The child of a fork cannot use it: calls raise RuntimeError there. Start processes with
 ``multiprocessing.set_start_method("spawn")``; ``subprocess`` is not affected.
@@ -21,11 +20,11 @@ The child of a fork cannot use it: calls raise RuntimeError there. Start process
 
 from __future__ import annotations
 
-from . import _core
-from ._core import DatabaseError, SolveError
 from ._database import Answer, Database, Study
-from ._solving import forget_falls, solve, solve_many, trace
-from ._results import Energy, Errors, ManyResults, Result, Solver, Trace
+from ._solving import solve, solve_many, trace
+from ._results import Energy, Errors, ManyResults, Result, Solver, Trace, _core
+
+DatabaseError, SolveError = _core.DatabaseError, _core.SolveError
 
 for _error, _meaning in (
     (SolveError, "A point that has no answer; the message says why."),
@@ -47,7 +46,6 @@ __all__ = [
     "Solver",
     "Study",
     "Trace",
-    "forget_falls",
     "solve",
     "solve_many",
     "trace",

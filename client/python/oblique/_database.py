@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from typing import TYPE_CHECKING, Any, Iterator, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Optional, Sequence, Union
 
 import numpy as np
-import numpy.typing as npt
 
-from . import _core
-from ._results import Named
+from ._results import Arrays, Named, _core
 
 if TYPE_CHECKING:
     import pandas
@@ -29,59 +27,41 @@ class Study(Named):
     solver_version: str
 
 
-class Answer:
+class Answer(Arrays):
     """Columns by name, as ``answer["fn_peak_N"]`` or ``answer.fn_peak_N``: NumPy arrays, whole
     numbers as int64, others as float64 with NaN for NULL, texts as objects with None. ``units`` has
     their units (SI) as far as they are known, ``len()`` counts rows."""
 
-    units: dict[str, str]
-
     def __init__(self, columns: list[tuple[str, str, Any]]) -> None:
-        self._columns: dict[str, npt.NDArray[Any]] = {}
-        self.units = {}
+        named: dict[str, Any] = {"_units": {}}
         for name, unit, values in columns:
             unique, number = name, 2
-            while unique in self._columns:
+            while unique in named:
                 unique, number = f"{name}_{number}", number + 1
-            is_text = isinstance(values, list)
-            self._columns[unique] = np.array(values, dtype=object) if is_text else values
-            self.units[unique] = unit
+            named[unique] = np.array(values, dtype=object) if isinstance(values, list) else values
+            named["_units"][unique] = unit
+        super().__init__(**named)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units (SI) by column; empty where there is none."""
+        return dict(self.__dict__["_units"])
 
     def keys(self) -> list[str]:
         """Names of the columns, in order."""
-        return list(self._columns)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        try:
-            return self._columns[name]
-        except KeyError:
-            raise KeyError(f"no column {name!r}: there are {', '.join(self._columns)}") from None
-
-    def __getattr__(self, name: str) -> npt.NDArray[Any]:
-        if name.startswith("_") or name not in self._columns:
-            raise AttributeError(f"no column {name!r}")
-        return self._columns[name]
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._columns]
+        return list(self)
 
     def __len__(self) -> int:
-        return len(next(iter(self._columns.values()))) if self._columns else 0
+        return len(self[next(iter(self))]) if self.units else 0
 
     def __repr__(self) -> str:
-        return f"<{len(self)} rows: {', '.join(self._columns)}>"
-
-    def _asdict(self) -> dict[str, npt.NDArray[Any]]:
-        return dict(self._columns)
+        return f"<{len(self)} rows: {', '.join(self)}>"
 
     def to_pandas(self) -> "pandas.DataFrame":
         """The same as a DataFrame; pandas is needed for this alone."""
         import pandas
 
-        return pandas.DataFrame(self._columns)
+        return pandas.DataFrame(self._asdict())
 
 
 class Database:

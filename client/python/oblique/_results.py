@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Iterator, Optional
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-
 if TYPE_CHECKING:
     import pandas
+
+_core: Any = import_module("._core", __package__)  # the extension, which has no types
 
 
 class Named(SimpleNamespace):
@@ -29,12 +30,7 @@ class Named(SimpleNamespace):
         }
 
     def __getitem__(self, name: str) -> Any:
-        if not isinstance(name, str):
-            raise TypeError(
-                f"a {type(self).__name__} has fields, not places: take one by its name, "
-                "as [\"fn_peak_N\"], and then its elements"
-            )
-        if name.startswith("_") or name not in self.__dict__:
+        if str(name).startswith("_") or name not in self.__dict__:
             raise KeyError(f"no field {name!r}: there are {', '.join(self)}")
         return getattr(self, name)
 
@@ -75,21 +71,13 @@ class Errors(Named):
 
 
 class Solver(Named):
-    """How a result was got. Two are equal whatever time they took."""
+    """How a result was computed."""
 
     integrator: str
     dt_s: float
     steps: int
     wall_s: float
     version: str
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is Solver and {**self.__dict__, "wall_s": 0} == {
-            **other.__dict__,
-            "wall_s": 0,
-        }
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 class Result(Named):
@@ -296,9 +284,6 @@ class Trace(Arrays):
 
     def __len__(self) -> int:
         return len(self.t_s)
-
-    def __repr__(self) -> str:
-        return f"<Trace of {len(self)} instants: {', '.join(self.__dict__)}>"
 
     def to_pandas(self) -> "pandas.DataFrame":
         """A row an instant."""

@@ -10,8 +10,7 @@ from typing import Any, Callable, Optional, Sequence, SupportsIndex, Union
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-from ._results import ManyResults, Result, Trace
+from ._results import ManyResults, Result, Trace, _core
 
 Number = Union[float, int, "np.floating[Any]", "np.integer[Any]"]
 #: One value, or an expression of other keys, as "A^2 / (4 * pi)".
@@ -20,15 +19,6 @@ Value = Union[Number, str]
 _falls = _core.Falls()  # of all calls: a model's fall is solved once
 #: Threads that one call may have.
 MOST_THREADS = 1024
-
-
-def forget_falls() -> None:
-    """Gives back the memory of the falls that are kept for later calls: 256 MB at most, or 96 MB a
-    core where that is more. Calls of other threads go on; what comes next solves its falls anew,
-    to the same bits."""
-    global _falls
-    _falls = _core.Falls()
-    _core.give_memory_back()
 
 
 def solve(
@@ -50,8 +40,8 @@ def solve(
     ``dt_fall``, ``tolerance``, ...; ``lengths`` has one length a link. A value may be an expression
     of other keys. ``errors`` asks for estimated errors too.
 
-    The first point of a model takes half a second or so, for its fall, which is kept for others (see
-    :func:`forget_falls`); these take some 10 ms. Many points are ten times as fast in one call of
+    The first point of a model takes half a second or so, for its fall, which is kept for others;
+    these take some 10 ms. Many points are ten times as fast in one call of
     :func:`solve_many`.
 
     Raises ValueError, naming key, value and range, for what is not allowed, and SolveError for a
@@ -66,9 +56,7 @@ def solve(
       ...
     ValueError: unknown key `tip_mas` (did you mean `tip_mass`?): ...
     """
-    values = {"H": H, "mu": mu, "e": e, **model}
-    _require_one_value_each("solve", values)
-    keys, _ = _keys(values, preset, lengths)
+    keys, _ = _keys({"H": H, "mu": mu, "e": e, **model}, preset, lengths, one_for="solve")
     return Result(ManyResults(_core.solve(_falls, keys, errors), ()))
 
 
@@ -92,9 +80,7 @@ def trace(
     >>> round(float(contact.fn_N.max()), 1), contact.state[0]
     (4909.4, 'sC')
     """
-    values = {"H": H, "mu": mu, "e": e, **model}
-    _require_one_value_each("trace", values)
-    keys, _ = _keys(values, preset, lengths)
+    keys, _ = _keys({"H": H, "mu": mu, "e": e, **model}, preset, lengths, one_for="trace")
     result, headings, numbers, states = _core.trace(_falls, keys, fall, shape)
     rows = iter(np.ascontiguousarray(numbers.reshape(len(states), -1).T))
     names = np.array(_core.trace_states())
@@ -134,35 +120,32 @@ def solve_many(
     array([3545., 4450., 5581.])
     """
     keys, shape = _keys({"H": H, "mu": mu, "e": e, **model}, preset, lengths)
-    points = math.prod(shape)
-    many = _core.solve_many(_falls, keys, points, _threads(threads), errors, progress)
+    count = 0 if threads is None else operator.index(threads)
+    if threads is not None and not 1 <= count <= MOST_THREADS:
+        raise ValueError(
+            f"threads = {threads} is not allowed: threads must be from 1 to {MOST_THREADS}"
+        )
+    many = _core.solve_many(_falls, keys, math.prod(shape), count, errors, progress)
     return ManyResults(many, shape)
 
 
-def _threads(threads: Optional[SupportsIndex]) -> int:
-    if threads is None:
-        return 0
-    try:
-        count = 0 if isinstance(threads, (bool, np.bool_)) else operator.index(threads)
-    except TypeError:
-        count = 0
-    if not 1 <= count <= MOST_THREADS:
-        raise ValueError(
-            f"threads = {threads} is not allowed: "
-            f"threads must be a whole number from 1 to {MOST_THREADS}"
-        )
-    return count
-
-
 def _keys(
-    values: dict[str, Any], preset: str, lengths: Optional[Sequence[Number]]
+    values: dict[str, Any],
+    preset: str,
+    lengths: Optional[Sequence[Number]],
+    one_for: Optional[str] = None,
 ) -> tuple[dict[str, Any], tuple[int, ...]]:
     """What the extension takes, which checks it: floats, texts and flat arrays, and their common
-    shape. Warns of values that are likely to be in another unit."""
-    if not isinstance(preset, str):
-        raise ValueError(f"preset = {preset!r} is not allowed: preset must be a name, as \"paper\"")
-    keys = dict(values)
+    shape. Warns of values that are likely to be in another unit. ``one_for`` names a function that
+    takes one value a key."""
+    keys: dict[str, Any] = {**values, "preset": preset}
     arrays = {key: _array(key, v) for key, v in values.items() if not isinstance(v, str)}
+    for key, array in arrays.items():
+        if one_for and array.ndim:
+            raise ValueError(
+                f"{key} has {array.size} values: {one_for} takes one; "
+                "oblique.solve_many takes arrays"
+            )
     try:
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
     except ValueError:
@@ -171,31 +154,20 @@ def _keys(
     for key, array in arrays.items():
         _warn_of_units(key, array)
         keys[key] = np.broadcast_to(array, shape).ravel() if array.ndim else array.item()
-    keys["preset"] = preset
     if lengths is not None:
         array = _array("lengths", lengths)
-        if array.ndim != 1 or not array.size:
-            raise ValueError("lengths must be the length of each link, as [0.4, 0.4, 0.3]")
         _warn_of_units("length", array)
-        keys["lengths"] = array.tolist()
+        keys["lengths"] = array
     return keys, shape
-
-
-def _require_one_value_each(name: str, values: dict[str, Any]) -> None:
-    for key, value in values.items():
-        if np.ndim(value):
-            raise ValueError(
-                f"{key} has {np.size(value)} values: {name} takes one; "
-                "oblique.solve_many takes arrays"
-            )
 
 
 def _warn_of_units(key: str, array: npt.NDArray[Any]) -> None:
     numbers = array[np.isfinite(array)] if array.dtype.kind == "f" else array[:0]
-    ends = [numbers.min(), numbers.max()] if numbers.size else []
-    for note in filter(None, (_core.note_on_value(key, end) for end in ends)):
-        warnings.warn(note, stacklevel=4)
-        break
+    for end in (numbers.min(), numbers.max()) if numbers.size else ():
+        note: str = _core.note_on_value(key, end)
+        if note:
+            warnings.warn(note, stacklevel=4)
+            break
 
 
 def _without_masks(value: Any) -> Any:

@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "client/convergence/convergence_report.h"
-#include "client/convergence/levels.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/solve.h"
@@ -32,19 +32,14 @@ std::vector<double> sequence(double limit, double c, double p, int values) {
 
 TEST(Richardson, FindsOrderLimitAndErrorOfAPureErrorTermExactly) {
   for (const double order : {0.5, 1.0, 2.0, 3.7}) {
-    const auto values = sequence(7.0, -3.0, order, 4);
+    auto values = sequence(7.0, -3.0, order, 4);
+    values.insert(values.begin(), 1000.0);  // only the finest three count
     const auto found = extrapolate(values, 4.0, kNoRounding);
     EXPECT_EQ(found.trend, Trend::kMonotone);
     EXPECT_NEAR(found.order.value(), order, 1e-12);
     EXPECT_NEAR(found.limit, 7.0, 1e-12);
     EXPECT_NEAR(found.error.value(), 7.0 - values.back(), 1e-12);
   }
-}
-
-TEST(Richardson, UsesTheFinestThreeValuesOnly) {
-  auto values = sequence(1.0, 1.0, 2.0, 3);
-  values.insert(values.begin(), 1000.0);
-  EXPECT_NEAR(extrapolate(values, 4.0, kNoRounding).limit, 1.0, 1e-12);
 }
 
 TEST(Richardson, ErrorEstimateIsRightToLeadingOrderWhenAHigherTermIsPresent) {
@@ -67,38 +62,25 @@ TEST(Richardson, DoesNotBelieveALastDifferenceThatIsSmallByLuck) {
   EXPECT_DOUBLE_EQ(found.error.value(), 16.0 / 4.0 / 3.0);
 }
 
-TEST(Richardson, DoesNotExtrapolateValuesThatOscillate) {
-  const std::vector<double> values{0.0, 8.0, 6.0};
-  const auto found = extrapolate(values, 4.0, kNoRounding);
-  EXPECT_EQ(found.trend, Trend::kOscillating);
-  EXPECT_FALSE(found.order);
-  EXPECT_EQ(found.limit, 6.0);
-  EXPECT_EQ(found.error, 2.0);
-}
-
-TEST(Richardson, SaysSoWhenDifferencesDoNotFall) {
-  const std::vector<double> values{0.0, 1.0, 2.0};
-  const auto found = extrapolate(values, 4.0, kNoRounding);
-  EXPECT_EQ(found.trend, Trend::kUnsettled);
-  EXPECT_EQ(found.error, 1.0);
-  EXPECT_FALSE(found.order);
-}
-
-TEST(Richardson, TakesDifferencesBelowTheResolutionForRounding) {
-  const std::vector<double> values{1.0, 1.0 + 1e-12, 1.0 - 1e-12};
-  const auto found = extrapolate(values, 4.0, 1e-11);
-  EXPECT_EQ(found.trend, Trend::kRounding);
-  EXPECT_EQ(found.error, 1e-11);
-  const std::vector<double> zeros{0.0, 0.0, 0.0};
-  EXPECT_EQ(extrapolate(zeros, 4.0, kNoRounding).trend, Trend::kRounding);
-}
-
-TEST(Richardson, SaysNothingOfALimitFromFewerThanThreeValues) {
-  const std::vector<double> two{1.0, 3.0};
-  EXPECT_EQ(extrapolate(two, 4.0, kNoRounding).trend, Trend::kTooFew);
-  EXPECT_EQ(extrapolate(two, 4.0, kNoRounding).error, 2.0);
-  const std::vector<double> one{1.0};
-  EXPECT_FALSE(extrapolate(one, 4.0, kNoRounding).error);
+TEST(Richardson, ExtrapolatesNoValuesThatDoNotSettleMonotonically) {
+  struct {
+    std::vector<double> values;
+    double resolution;
+    Trend trend;
+    std::optional<double> error;
+  } const cases[]{{{0.0, 8.0, 6.0}, 0.0, Trend::kOscillating, 2.0},
+                  {{0.0, 1.0, 2.0}, 0.0, Trend::kUnsettled, 1.0},
+                  {{1.0, 1.0 + 1e-12, 1.0 - 1e-12}, 1e-11, Trend::kRounding, 1e-11},
+                  {{0.0, 0.0, 0.0}, 0.0, Trend::kRounding, 0.0},
+                  {{1.0, 3.0}, 0.0, Trend::kTooFew, 2.0},
+                  {{1.0}, 0.0, Trend::kTooFew, std::nullopt}};
+  for (const auto& [values, resolution, trend, error] : cases) {
+    const auto found = extrapolate(values, 4.0, resolution);
+    EXPECT_EQ(found.trend, trend) << testing::PrintToString(values);
+    EXPECT_EQ(found.error, error) << testing::PrintToString(values);
+    EXPECT_EQ(found.limit, values.back()) << testing::PrintToString(values);
+    EXPECT_FALSE(found.order) << testing::PrintToString(values);
+  }
 }
 
 using Kind = ContactChange::Kind;
@@ -146,47 +128,35 @@ TEST(ContactChanges, AreNoneWhereOnlyTimesDiffer) {
       changes_between(with_sticks({{1e-5, 2e-5}}), with_sticks({{1.2e-5, 2.2e-5}})).empty());
 }
 
-TEST(ContactChanges, FindACompressionThatComesWithTheFinerLevel) {
-  const auto changes = changes_between(with_turns({20}), with_turns({20, 60, 62}));
-  ASSERT_EQ(changes.size(), 1U);
-  EXPECT_EQ(changes[0].kind, Kind::kCompression);
-  EXPECT_DOUBLE_EQ(changes[0].t0_s, 60e-6);
-  EXPECT_DOUBLE_EQ(changes[0].t1_s, 62e-6);
-  EXPECT_TRUE(changes[0].in_finer);
-  EXPECT_EQ(described(changes[0]), "a compression of 2 us, from 60.00 to 62.00 us (V_n grazes 0)");
-}
-
-TEST(ContactChanges, FindARestitutionThatGoesWithTheFinerLevel) {
-  const auto changes = changes_between(with_turns({20, 21, 30, 50, 80}), with_turns({31, 51, 80}));
-  ASSERT_EQ(changes.size(), 1U);
-  EXPECT_EQ(changes[0].kind, Kind::kRestitution);
-  EXPECT_DOUBLE_EQ(changes[0].t0_s, 20e-6);
-  EXPECT_FALSE(changes[0].in_finer);
-}
-
-TEST(ContactChanges, FindSticksAndSlipsWhereverTheyAre) {
-  const auto last_stick =
-      changes_between(with_sticks({{0.0, 3e-5}}), with_sticks({{0.0, 3.1e-5}, {9e-5, 1e-4}}));
-  ASSERT_EQ(last_stick.size(), 1U);
-  EXPECT_EQ(last_stick[0].kind, Kind::kStick);
-  EXPECT_DOUBLE_EQ(last_stick[0].t0_s, 9e-5);
-
-  const auto slip =
-      changes_between(with_sticks({{0.0, 5e-5}}), with_sticks({{0.0, 2e-5}, {2.1e-5, 5e-5}}));
-  ASSERT_EQ(slip.size(), 1U);
-  EXPECT_EQ(slip[0].kind, Kind::kSlip);
-  EXPECT_DOUBLE_EQ(slip[0].t0_s, 2e-5);
-  EXPECT_DOUBLE_EQ(slip[0].t1_s, 2.1e-5);
-}
-
-TEST(ContactChanges, FindAPeakThatIsARippleOnOneLevelOnly) {
+TEST(ContactChanges, FindWhatOneLevelHasAndTheOtherHasNot) {
   auto ripple = with_turns({20, 50, 60});
   ripple.peaks[1].major = false;
-  const auto changes = changes_between(with_turns({20, 50, 60}), ripple);
-  ASSERT_EQ(changes.size(), 1U);
-  EXPECT_EQ(changes[0].kind, Kind::kRipple);
-  EXPECT_DOUBLE_EQ(changes[0].t0_s, 60e-6);
-  EXPECT_FALSE(changes[0].in_finer);
+  struct {
+    CaseResult coarser;
+    CaseResult finer;
+    ContactChange change;
+  } const cases[]{
+      {with_turns({20}), with_turns({20, 60, 62}), {Kind::kCompression, 60e-6, 62e-6, true}},
+      {with_turns({20, 21, 30, 50, 80}),
+       with_turns({31, 51, 80}),
+       {Kind::kRestitution, 20e-6, 21e-6, false}},
+      {with_sticks({{0.0, 3e-5}}),
+       with_sticks({{0.0, 3.1e-5}, {9e-5, 1e-4}}),
+       {Kind::kStick, 9e-5, 1e-4, true}},
+      {with_sticks({{0.0, 5e-5}}),
+       with_sticks({{0.0, 2e-5}, {2.1e-5, 5e-5}}),
+       {Kind::kSlip, 2e-5, 2.1e-5, true}},
+      {with_turns({20, 50, 60}), ripple, {Kind::kRipple, 60e-6, 60e-6, false}}};
+  for (const auto& [coarser, finer, change] : cases) {
+    const auto changes = changes_between(coarser, finer);
+    ASSERT_EQ(changes.size(), 1U) << name_of(change.kind);
+    EXPECT_EQ(changes[0].kind, change.kind);
+    EXPECT_DOUBLE_EQ(changes[0].t0_s, change.t0_s);
+    EXPECT_DOUBLE_EQ(changes[0].t1_s, change.t1_s);
+    EXPECT_EQ(changes[0].in_finer, change.in_finer) << name_of(change.kind);
+  }
+  EXPECT_EQ(described(cases[0].change),
+            "a compression of 2 us, from 60.00 to 62.00 us (V_n grazes 0)");
 }
 
 constexpr double kHighestOrder = 4.0;
@@ -297,19 +267,11 @@ TEST(MeshLevels, DoubleTheMeshAndChooseStepsForEach) {
   EXPECT_EQ(levels[1].model.elements_per_link, 4);
   EXPECT_EQ(levels[1].model.dt_s, 0.0);
   EXPECT_EQ(levels[2].model.dt_fall_s, 0.0);
-  EXPECT_THROW(mesh_levels(model, 4, 24), solver::InputError);
-  EXPECT_THROW(mesh_levels(model, 4, 8), solver::InputError);
-  EXPECT_THROW(mesh_levels(model, 0, 8), solver::InputError);
-}
-
-TEST(MeshLevels, KeepTheStepsOfGeneralizedAlpha) {
-  solver::ModelParameters model = solver::preset("paper");
-  model.integrator = solver::Integrator::kGeneralizedAlpha;
-  model.dt_s = 1e-6;
-  for (const auto& level : mesh_levels(model, 2, 8)) {
-    EXPECT_EQ(level.model.dt_s, 1e-6);
-    EXPECT_EQ(level.model.dt_fall_s, 0.0);
+  for (const auto& [coarsest, finest] : {std::pair{4, 24}, {4, 8}, {0, 8}}) {
+    EXPECT_THROW(mesh_levels(model, coarsest, finest), solver::InputError);
   }
+  model.integrator = solver::Integrator::kGeneralizedAlpha;
+  EXPECT_EQ(mesh_levels(model, 2, 8)[2].model.dt_s, 1e-6) << "its steps do not depend on the mesh";
 }
 
 TEST(StepLevels, HalveBothStepsFromTheShortestTheModelTakes) {
@@ -358,45 +320,6 @@ TEST(FallSentence, NamesTheOutputThatTheFallMovesMost) {
   exact.result.major_mode = "sC sR";
   EXPECT_NE(fall_sentence(step, exact).find("gives another"), std::string::npos);
   EXPECT_EQ(json_of_fall(step, exact)["same_mode"], false);
-}
-
-// On two elements a link the second compression appears between mu = 0.5 and 0.6.
-constexpr double kWithout = 0.5;
-constexpr double kWith = 0.6;
-
-// A mu at which one step sees the grazing turn and the other does not; the turn comes and goes with
-// the step's error.
-double grazing_mu(const solver::Finger& a, const solver::Finger& b) {
-  const auto turns = [](const solver::Finger& finger, double mu) {
-    return finger.solve(1.0, mu, 1.0).phases.size();
-  };
-  double without = kWithout;
-  double with = kWith;
-  for (;;) {
-    const double mu = 0.5 * (without + with);
-    if (mu == without || mu == with || turns(a, mu) != turns(b, mu)) {
-      return mu;
-    }
-    (turns(a, mu) == turns(a, kWithout) ? without : with) = mu;
-  }
-}
-
-TEST(Convergence, NamesTheGrazingTurnThatComesAndGoesWithTheStep) {
-  solver::ModelParameters model = solver::preset("paper");
-  model.elements_per_link = 2;
-  model.dt_fall_s = 5e-6;
-  model.dt_s = 4e-6;
-  const solver::Finger coarse(model);
-  model.dt_s = 2e-6;
-  const solver::Finger fine(model);
-  const double mu = grazing_mu(coarse, fine);
-  const auto changes = changes_between(coarse.solve(1.0, mu, 1.0), fine.solve(1.0, mu, 1.0));
-  ASSERT_EQ(changes.size(), 1U) << "mu = " << mu;
-  EXPECT_EQ(changes[0].kind, ContactChange::Kind::kCompression);
-  EXPECT_LT(changes[0].t1_s - changes[0].t0_s, 2e-6);
-  // Between the peak and the end of the contact at mu = 0.5 and 0.6.
-  EXPECT_GT(changes[0].t0_s, 1e-4);
-  EXPECT_LT(changes[0].t0_s, 2.8e-4);
 }
 
 TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
@@ -468,22 +391,18 @@ TEST(Verdict, BlamesTheEventThatComesAndGoes) {
   EXPECT_EQ(json["changes"][0]["finer"], "dt/4");
 }
 
-TEST(Verdict, NamesOutputsThatGoOnChanging) {
+TEST(Verdict, NamesOutputsThatGoOnChangingByMoreThanAThousandthOfTheirScale) {
   auto finest = second_order(0.025);
   finest.vt_out_m_s = -3.0;
   const auto refinement = refinement_with({second_order(0.1), second_order(0.05), finest});
   EXPECT_FALSE(converges(refinement));
   EXPECT_NE(shown(refinement).find("the mode settles, but not vt_out_m_s"), std::string::npos)
       << shown(refinement);
-}
-
-TEST(Verdict, TakesChangesBelowAThousandthOfTheScaleForSettled) {
-  auto finest = second_order(0.025);
+  auto coarsest = second_order(0.1);
   auto middle = second_order(0.05);
+  coarsest.vt_out_m_s = -1.001;
   middle.vt_out_m_s = -1.0;
   finest.vt_out_m_s = -1.005;  // of a speed of 7 m/s at touch
-  auto coarsest = second_order(0.1);
-  coarsest.vt_out_m_s = -1.001;
   EXPECT_TRUE(converges(refinement_with({coarsest, middle, finest})));
 }
 

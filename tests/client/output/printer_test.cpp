@@ -189,7 +189,6 @@ TEST(Json, EscapesControlCharactersAndReadsBackTheSame) {
   EXPECT_EQ(text.find_first_of("\x1b\x7f"), std::string::npos) << text;
   EXPECT_EQ(text.find("\u009b"), std::string::npos) << text;
   EXPECT_EQ(text.find("\u202e"), std::string::npos) << text;
-  EXPECT_NE(text.find("µ🙂"), std::string::npos) << text;
   const auto back = nlohmann::json::parse(text);
   EXPECT_EQ(back[0]["a\u009b"], kSteering);
   EXPECT_EQ(back[1]["a\u009b"], "\u2066µ🙂");

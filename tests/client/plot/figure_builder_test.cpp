@@ -59,10 +59,6 @@ class MadeRows : public Source {
     return std::make_unique<One>(answer_);
   }
   std::vector<protocol::StudyStatus> status(const std::string&, const Tell&) override { return {}; }
-  std::vector<protocol::StudyStatus> status_of(const std::string&, std::uint64_t,
-                                               const Tell&) override {
-    return {};
-  }
   std::string place() const override { return "made"; }
 
  private:

@@ -1,7 +1,5 @@
 """Many points: arrays in, arrays out."""
 
-import pickle
-
 import numpy as np
 import pytest
 
@@ -74,18 +72,10 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
         ({"mu": [0.1, 0.2], "e": [1, 1, 1]}, "these shapes do not fit each other: mu (2,), e (3,)"),
         ({"mu": ["a", "b"]}, "mu = ['a', 'b'] is not allowed: mu must be a number or numbers"),
         ({"e": 2}, "e = 2 is not allowed: e must be in [0.001, 1]"),
-        ({"tipmass": [1, 2]}, "did you mean `tip_mass`?"),
         ({"threads": 0}, "threads = 0 is not allowed"),
-        ({"threads": 1.5}, "threads = 1.5 is not allowed"),
-        ({"threads": True}, "threads = True is not allowed: threads must be a whole number from 1 to"),
-        ({"threads": np.bool_(True)}, "threads = True is not allowed"),
-        ({"threads": 10**20}, "threads = 100000000000000000000 is not allowed"),
-        ({"mu": np.array([1j])}, "is not allowed: mu must be a number or numbers"),
         ({"mu": ["a"] * 1000}, "'a', '... is not allowed: mu must be a number or numbers"),
         ({"lengths": [[0.4, 0.4]]}, "lengths must be the length of each link"),
         ({"lengths": [0.4, 0.5], "links": 2}, "lengths stands beside links or length"),
-        ({"lengths": [0.4, 0.5], "links": [2]}, "lengths stands beside links or length"),
-        ({"lengths": [0.4, 0.5], "length": [0.5, 0.6]}, "lengths stands beside links or length"),
         ({"lengths": [0.4, 0.5], "length": "H / 2"}, "lengths stands beside links or length"),
         ({"integrator": ["euler"]}, 'integrator = "euler" is not allowed'),
     ],
@@ -115,19 +105,12 @@ def test_what_pandas_has_no_value_for_fails_alone():
     assert oblique.solve_many(**rows).shape == (2,)
 
 
-def test_the_number_of_threads_changes_no_bit():
-    mu = np.linspace(0, 2, 50)[::-1]
-    one = oblique.solve_many(0.8, mu, 0.9, threads=np.int64(1))
-    three = oblique.solve_many(0.8, mu, 0.9, threads=3)
-    assert np.array_equal(one.fn_peak_N, three.fn_peak_N)
-    assert np.array_equal(one.mode, three.mode)
-
-
-def test_progress_is_told_up_to_the_end_and_may_end_the_work():
+def test_progress_is_told_up_to_the_end_on_any_number_of_threads_and_may_end_the_work():
     told = []
-    oblique.solve_many(1, np.linspace(0, 1, 500), 1, progress=lambda done, of: told.append((done, of)))
-    assert told[-1] == (500, 500)
-    assert told == sorted(told)
+    mu = np.linspace(0, 1, 500)
+    one = oblique.solve_many(1, mu, 1, progress=lambda *counts: told.append(counts), threads=np.int64(1))
+    assert told == sorted(told) and told[-1] == (500, 500)
+    assert np.array_equal(one.fn_peak_N, oblique.solve_many(1, mu, 1, threads=3).fn_peak_N)
 
     def enough(done, of):
         raise RuntimeError("enough")
@@ -152,15 +135,6 @@ def test_fields_are_taken_by_name_as_columns_of_an_answer_are():
     assert oblique.trace(1, 0.4, 1)["state"][0] == "sC"
     with pytest.raises(KeyError, match="no field 'fn': there are H, mu"):
         many["fn"]
-    with pytest.raises(TypeError, match="has fields, not places"):
-        many[0]
-
-
-def test_results_can_be_pickled_and_copied():
-    many = oblique.solve_many(1, [0.4, 1.2], 1)
-    copy = pickle.loads(pickle.dumps(many))
-    assert np.array_equal(copy.fn_peak_N, many.fn_peak_N)
-    assert copy.fn_peaks_N[1].tolist() == many.fn_peaks_N[1].tolist()
 
 
 def test_errors_are_estimated_where_they_are_asked_for():

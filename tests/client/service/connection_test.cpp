@@ -28,7 +28,7 @@ TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
   const auto url = nobody.url();
   Connection connection(at(url, 100));
   try {
-    connection.status("");
+    connection.full_status();
     FAIL();
   } catch (const ConnectionError& error) {
     const std::string message = error.what();
@@ -37,20 +37,12 @@ TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
     EXPECT_NE(message.find("oblique-server"), std::string::npos) << message;
     EXPECT_NE(message.find("--server"), std::string::npos) << message;
   }
-}
-
-TEST(Connection, SaysOfASilentServerThatItStartedWhatThatWaitsFor) {
-  const ScriptedServer server(
-      [](const protocol::ClientRequest&) { return std::vector<std::string>(); });
-  ConnectionSettings settings = at(server.url(), 100);
-  settings.if_silent = "its database is slow";
-  Connection connection(settings);
+  Connection own({.server_url = url, .timeout_ms = 100, .if_silent = "its database is slow"});
   try {
-    connection.submit({.name = "sweep", .recipe = {}});
+    own.full_status();
     FAIL();
   } catch (const ConnectionError& error) {
-    EXPECT_EQ(error.what(),
-              "no answer from " + server.url() + " within 0.1 s: its database is slow");
+    EXPECT_EQ(error.what(), "no answer from " + url + " within 0.1 s: its database is slow");
   }
 }
 
@@ -92,19 +84,6 @@ TEST(Connection, HandsOnTheServersOwnErrors) {
   }
 }
 
-TEST(Connection, PassesOverAnswersToEarlierQuestions) {
-  const ScriptedServer server([](const protocol::ClientRequest& request) {
-    protocol::ClientReply stale;
-    stale.set_request_id(request.request_id() + 1000);
-    stale.mutable_status()->set_workers(1);
-    auto reply = reply_to(request);
-    reply.mutable_status()->set_workers(2);
-    return std::vector{protocol::encode(stale), protocol::encode(reply)};
-  });
-  Connection connection(at(server.url(), kLong_ms));
-  EXPECT_EQ(connection.status("").workers(), 2U);
-}
-
 /// Frames with one reply to a status question, which says that there are so many workers.
 std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
                                        std::uint32_t workers) {
@@ -140,7 +119,7 @@ TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
   Connection connection(
       {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
       replace_when_taken);
-  EXPECT_EQ(connection.status("").workers(), 3U);
+  EXPECT_EQ(connection.full_status().workers(), 3U);
 }
 
 TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) {
@@ -152,35 +131,24 @@ TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) 
     return ids.size() < 3 ? std::vector<std::string>() : workers_reply(request, 4);
   });
   Connection connection({.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = 1});
-  EXPECT_EQ(connection.status("").workers(), 4U);
+  EXPECT_EQ(connection.full_status().workers(), 4U);
   const std::lock_guard lock(mutex);
   EXPECT_GE(ids.size(), 3U);
   EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
 }
 
-TEST(Connection, AsksAServerThatAnswersOnce) {
-  std::atomic<int> asked{0};
+TEST(Connection, SendsARequestOnceToAServerThatAnswersAndPassesOverASecondAnswer) {
+  std::atomic<unsigned> requests{0};
   const ScriptedServer server([&](const protocol::ClientRequest& request) {
-    ++asked;
-    return workers_reply(request, 1);
-  });
-  Connection connection(
-      {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
-  for (int i = 1; i <= 20; ++i) {
-    connection.status("");
-    EXPECT_EQ(asked, i);
-  }
-}
-
-TEST(Connection, PassesOverASecondAnswerToAnEarlierQuestion) {
-  const ScriptedServer server([](const protocol::ClientRequest& request) {
-    auto replies = workers_reply(request, static_cast<std::uint32_t>(request.request_id()));
+    auto replies = workers_reply(request, ++requests);
     replies.push_back(replies.front());
     return replies;
   });
-  Connection connection(at(server.url(), kLong_ms));
-  for (std::uint32_t i = 1; i <= 20; ++i) {
-    EXPECT_EQ(connection.status("").workers(), i);
+  Connection connection(
+      {.server_url = server.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms});
+  for (unsigned i = 1; i <= 20; ++i) {
+    EXPECT_EQ(connection.full_status().workers(), i);
+    EXPECT_EQ(requests, i);
   }
 }
 
@@ -192,13 +160,17 @@ TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
     sentences.push_back(sentence);
     if (server == nullptr) {
       server = std::make_unique<ScriptedServer>(
-          [](const protocol::ClientRequest& request) { return workers_reply(request, 5); },
+          [](const protocol::ClientRequest& request) {
+            auto reply = reply_to(request);
+            reply.mutable_status()->add_studies()->set_points(5);
+            return std::vector{protocol::encode(reply)};
+          },
           port.url());
     }
   };
   // Far longer than the time-out of an answer that is not waited for.
   Connection connection(at(port.url(), 10));
-  EXPECT_EQ(connection.status("", tell).workers(), 5U);
+  EXPECT_EQ(connection.status("", tell).at(0).points(), 5U);
   ASSERT_EQ(sentences.size(), 2U);
   EXPECT_NE(sentences[0].find("no answer from " + port.url()), std::string::npos) << sentences[0];
   EXPECT_NE(sentences[1].find("answers again"), std::string::npos) << sentences[1];
@@ -261,7 +233,7 @@ TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {
     return std::vector{protocol::encode(reply)};
   });
   Connection connection(at(server.url(), kLong_ms));
-  const auto all = connection.status("");
+  const auto all = connection.full_status();
   ASSERT_EQ(all.studies_size(), 4);
   EXPECT_EQ(all.studies(3).study_id(), 40U);
   EXPECT_EQ(all.workers(), 3U);

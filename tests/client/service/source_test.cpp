@@ -71,44 +71,26 @@ class SourceTest : public ::testing::Test {
   }
 };
 
-TEST_F(SourceTest, IsTheDatabaseThatIsNamedWhateverElseThereIs) {
+TEST_F(SourceTest, IsWhatIsNamedThenTheServerOfTheEnvironmentThenTheFileInThisFolder) {
   make_database("oblique.db", "default");
   make_database("other.db", "other");
-  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
-  EXPECT_EQ(study_of({.database = "other.db", .server = {}, .timeout_s = {}}), "other");
-}
-
-TEST_F(SourceTest, IsTheServerThatIsNamedBeforeThatOfTheEnvironmentAndTheFile) {
-  make_database("oblique.db", "default");
-  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
-  EXPECT_EQ(study_of({.database = {}, .server = named_.url(), .timeout_s = {}}), "named");
-}
-
-TEST_F(SourceTest, IsTheServerOfTheEnvironmentBeforeTheFileInThisFolder) {
-  make_database("oblique.db", "default");
-  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
-  EXPECT_EQ(study_of({}), "environment");
-}
-
-TEST_F(SourceTest, IsTheFileInThisFolderWhenNothingIsNamed) {
-  make_database("oblique.db", "default");
   EXPECT_EQ(study_of({}), "default");
   setenv("OBLIQUE_SERVER", "", 1);
   EXPECT_EQ(study_of({}), "default") << "an empty variable names no server";
+  setenv("OBLIQUE_SERVER", from_environment_.url().c_str(), 1);
+  EXPECT_EQ(study_of({}), "environment");
+  EXPECT_EQ(study_of({.database = "other.db", .server = {}, .timeout_s = {}}), "other");
+  EXPECT_EQ(study_of({.database = {}, .server = named_.url(), .timeout_s = {}}), "named");
 }
 
 TEST_F(SourceTest, IsTheServerAtItsDefaultAddressWhenThereIsNoFileEither) {
   EXPECT_EQ(open_source({})->place(), ConnectionSettings().server_url);
 }
 
-TEST_F(SourceTest, SaysOfAFileThatNobodyWorksOnIt) {
+TEST_F(SourceTest, SaysOfAFileThatNobodyWorksOnItUnlessAServerHasIt) {
   make_database("oblique.db", "default");
   EXPECT_EQ(open_source({})->status("default").at(0).waits_for(),
             "a server: nobody is at work on oblique.db");
-}
-
-TEST_F(SourceTest, SaysNothingOfTheKindWhileAServerHasTheFile) {
-  make_database("oblique.db", "default");
   const server::Store at_work("oblique.db");
   EXPECT_EQ(open_source({})->status("default").at(0).waits_for(), "");
 }

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "client/trace/traced_fall.h"
+#include "client/trace/worker_trace.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -55,7 +55,7 @@ TEST(TraceOutput, ThatIsNotFinishedLeavesWhatWasThere) {
   const oblique::test::TemporaryFolder folder;
   for (const char* name : {"t.csv", "t.json"}) {
     const std::string file = folder.file(name);
-    TraceOutput output(file, trace_format("", file));
+    TraceOutput output(file, format_of_output("", file));
     output.begin(kTwoLinksOfOneElement);
     output.add(made_up_rows(1, kTwoLinksOfOneElement).front());
   }
@@ -64,7 +64,7 @@ TEST(TraceOutput, ThatIsNotFinishedLeavesWhatWasThere) {
 
 TEST(TraceOutput, NamesTheFlagOfAFileThatCannotBeWritten) {
   try {
-    const TraceOutput output("/nowhere/t.csv", TraceFormat::kCsv, "--trace");
+    const TraceOutput output("/nowhere/t.csv", Format::kCsv, "--trace");
     ADD_FAILURE() << "it is taken";
   } catch (const solver::InputError& error) {
     EXPECT_EQ(std::string(error.what()),

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "client/formats/row_printer.h"
+#include "client/io/row_output.h"
 #include "client/output/columns.h"
 #include "client/output/printer.h"
 #include "proto/wire/chunk.h"
@@ -141,13 +141,8 @@ TEST(Columns, OfShortTimesAreShownInTheUnitsOfTheReport) {
   for (const double value : {0.000543704, 0.00114159, 0.001, 1.0, 0.000543704}) {
     add_value(row, value);
   }
-  TextSink out;
   const auto chunk = protocol::chunk_of(rows);
-  const auto printer = made_printer(Format::kTable, out, {.shown = shown_columns(chunk)});
-  printer->print(chunk);
-  printer->end();
-  out.finish();
-  EXPECT_EQ(out.text(),
+  EXPECT_EQ(text_of({chunk}, {.shown = shown_columns(chunk)}),
             "duration_s [us]  slide_m [mm]  wall_s [ms]  H  max(duration_s)\n"
             "---------------  ------------  -----------  -  ---------------\n"
             "        543.704       1.14159            1  1      0.000543704\n");

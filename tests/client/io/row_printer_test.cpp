@@ -1,0 +1,178 @@
+// Rows as tables, CSV and JSON.
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/io/row_output.h"
+#include "proto/wire/chunk.h"
+
+namespace oblique::client {
+namespace {
+
+protocol::QueryReply chunk_of(const std::vector<std::string>& columns,
+                              const std::vector<protocol::Row>& rows) {
+  return protocol::chunk_of({.columns = columns, .rows = rows});
+}
+
+std::string printed(Format format, const std::vector<protocol::QueryReply>& chunks,
+                    OutputSettings settings = {}) {
+  settings.format = format;
+  return text_of(chunks, settings);
+}
+
+protocol::QueryReply points(std::int64_t from, std::int64_t to) {
+  std::vector<protocol::Row> rows;
+  for (std::int64_t i = from; i < to; ++i) {
+    rows.push_back({i, 0.5 * static_cast<double>(i)});
+  }
+  return chunk_of({"point", "H"}, rows);
+}
+
+TEST(Formats, PrintTheSameWhateverTheChunks) {
+  const auto whole = points(0, 100);
+  const std::vector parts{points(0, 1), points(1, 1), points(1, 60), points(60, 100)};
+  for (const Format format : {Format::kTable, Format::kCsv, Format::kJson, Format::kJsonLines}) {
+    EXPECT_EQ(printed(format, {whole}), printed(format, parts)) << static_cast<int>(format);
+  }
+}
+
+TEST(Formats, OfNoRowsHaveWhatTheyMustHave) {
+  const std::vector none{chunk_of({"a", "b"}, {})};
+  EXPECT_EQ(printed(Format::kTable, none), "a  b\n-  -\n");
+  EXPECT_EQ(printed(Format::kCsv, none), "a,b\n");
+  EXPECT_EQ(printed(Format::kJson, none), "[]\n");
+  EXPECT_EQ(printed(Format::kJsonLines, none), "");
+}
+
+TEST(JsonLines, HaveAnObjectALine) {
+  EXPECT_EQ(
+      printed(Format::kJsonLines, {chunk_of({"n", "x", "s"}, {{std::int64_t{1}, 2.0, "a\nb"}}),
+                                   chunk_of({"n", "x", "s"}, {{protocol::Value(), 1e-300, "\""}})}),
+      "{\"n\":1,\"x\":2.0,\"s\":\"a\\nb\"}\n"
+      "{\"n\":null,\"x\":1e-300,\"s\":\"\\\"\"}\n");
+}
+
+/// The value of a column with that text in JSON.
+std::string json_value(const std::string& column, const std::string& text) {
+  const std::string line = printed(Format::kJsonLines, {chunk_of({column}, {{text}})});
+  const std::size_t begin = column.size() + 4;
+  return line.substr(begin, line.size() - begin - 2);
+}
+
+TEST(Json, HasListsOfColumnsAsSolveJsonHasThem) {
+  for (const auto& [column, text, json] : std::vector<std::array<std::string, 3>>{
+           {"phases", R"([["compression",0.0,1e-05]])",
+            R"([{"kind":"compression","t0_s":0.0,"t1_s":1e-05}])"},
+           {"peaks", "[[1e-05,4000.5,2000.0,1]]",
+            R"([{"t_s":1e-05,"fn_N":4000.5,"ft_N":2000.0,"major":1}])"},
+           {"reaction_peaks", "[[1e-05,7.5]]", R"([{"t_s":1e-05,"force_N":7.5}])"},
+           {"stick_intervals", "[[0.0,1e-05]]", "[[0.0,1e-05]]"},
+           {"fn_peaks_N", "[5057.6299999999992,0.1,5e-324]", "[5057.629999999999,0.1,5e-324]"},
+           {"fn_peaks_N", "[]", "[]"},
+           {"name", "[1,2]", "\"[1,2]\""}}) {
+    EXPECT_EQ(json_value(column, text), json);
+  }
+}
+
+TEST(Json, LeavesATextAloneThatIsNoSuchList) {
+  const std::string deep(1000000, '[');
+  for (const std::string& text :
+       {std::string(), std::string("[1,2"), std::string("17"), std::string("{}"),
+        std::string("[[1e-05,4000.5]]"), std::string("[1,2,3,4]"), std::string("[[[1]]]"),
+        std::string("[{}]"), deep, deep + std::string(1000000, ']')}) {
+    EXPECT_EQ(json_value("peaks", text), "\"" + text + "\"") << text.substr(0, 20);
+  }
+}
+
+TEST(Json, LeavesCharactersThatTerminalsShowAsTheyAre) {
+  EXPECT_EQ(json_value("name", "µ \"\\"), R"("µ \"\\")");
+  EXPECT_EQ(json_value("name", "\xff"), R"("\ufffd")");
+}
+
+TEST(Table, AlignsNumbersAtThePoint) {
+  EXPECT_EQ(
+      printed(
+          Format::kTable,
+          {chunk_of({"fn_N", "kind"},
+                    {{5057.63, "SC"}, {812.345, "sC"}, {-2.0, "SR"}, {protocol::Value(), "-"}})}),
+      "    fn_N  kind\n"
+      "--------  ----\n"
+      "5057.63   SC\n"
+      " 812.345  sC\n"
+      "  -2      SR\n"
+      "       -  -\n");
+}
+
+TEST(Table, WithModesSaysWhatTheirLettersMean) {
+  for (const char* column : {"mode", "major_mode"}) {
+    EXPECT_TRUE(printed(Format::kTable, {chunk_of({column}, {{"SC"}})})
+                    .ends_with("\n(S stick, s slip; C compression, R restitution)\n"));
+  }
+}
+
+TEST(Table, KeepsTheWidthsOfItsFirstRows) {
+  OutputSettings settings;
+  settings.first_rows = 2;
+  const auto rows = chunk_of({"s", "n"}, {{"ab", std::int64_t{1}},
+                                          {"abc", std::int64_t{2}},
+                                          {"abcdefgh", std::int64_t{3}},
+                                          {"a", std::int64_t{4}}});
+  EXPECT_EQ(printed(Format::kTable, {rows}, settings),
+            "s    n\n"
+            "---  -\n"
+            "ab   1\n"
+            "abc  2\n"
+            "abcdefgh  3\n"
+            "a    4\n");
+}
+
+TEST(Table, FitsATerminalAndSaysWhatItLeavesOut) {
+  OutputSettings settings;
+  settings.width = 40;
+  const std::string long_text = "µµµµµµµµµµµµµµµµµµµµµµµµµµµµµµ";
+  const auto rows = chunk_of({"point", "error", "a_long_heading", "last"},
+                             {{std::int64_t{1}, long_text, 0.5, std::int64_t{7}}});
+  EXPECT_EQ(printed(Format::kTable, {rows}, settings),
+            "point  error         a_long_heading  …\n"
+            "-----  ------------  --------------\n"
+            "    1  µµµµµµµµµµµ…             0.5\n"
+            "Left out, for a width of 40 (csv and\njson have all): last\n");
+  settings.width = 3;
+  EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr("    1\n"))
+      << "a column stays, however narrow the terminal";
+  settings.width = 0;
+  EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr(long_text));
+}
+
+TEST(Table, ThatKeepsAllColumnsWrapsSentencesInTheLast) {
+  OutputSettings settings;
+  settings.width = 40;
+  settings.may_leave_out = false;
+  const auto rows = chunk_of({"column", "n", "meaning"},
+                             {{"a", std::int64_t{1}, "what stands here is longer than the line"},
+                              {std::string(20, 'x'), std::int64_t{2}, "short"}});
+  EXPECT_EQ(printed(Format::kTable, {rows}, settings),
+            "column               n  meaning\n"
+            "-------------------  -  ----------------\n"
+            "a                    1  what stands here\n"
+            "                        is longer than\n"
+            "                        the line\n"
+            "xxxxxxxxxxxxxxxxxx…  2  short\n");
+}
+
+TEST(Table, ShowsColumnsInTheirUnits) {
+  OutputSettings settings;
+  settings.shown = {{"duration_s [us]", 1e6}, {"status"}};
+  const auto rows = chunk_of({"duration_s", "status"}, {{0.000125, "solved"}});
+  EXPECT_EQ(printed(Format::kTable, {rows}, settings),
+            "duration_s [us]  status\n"
+            "---------------  ------\n"
+            "            125  solved\n");
+}
+
+}  // namespace
+}  // namespace oblique::client
