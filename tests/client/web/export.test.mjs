@@ -35,8 +35,7 @@ test("each kind of view has a command that draws it, a CSV of its numbers, and a
     await web.press(page, "CSV");
     const saved = (await web.until(page, () => window.saved)).trim().split("\r\n");
     assert.deepEqual([saved[0], saved.length], [head, lines], view);
-    const canvas =
-      view.includes("pic=lines") || view.includes("histogram") ? ".uplot canvas" : ".map canvas";
+    const canvas = web.pictureIn(view) === web.mapCanvas ? ".map canvas" : ".uplot canvas";
     await page.waitForSelector(canvas);
     await web.press(page, "PNG");
     await web.until(page, () => window.image);

@@ -61,7 +61,7 @@ test("the slider moves the finger and the cursors of the plots, and keys in a pl
   await page.close();
 });
 
-test("a point shows all its numbers with their meaning, each in one piece in a window of 400 pixels", async () => {
+test("a point shows all its numbers with their meaning", async () => {
   const page = await web.point({ width: 400 });
   const texts = await page.$$eval("dl.values div", (all) =>
     all.map((one) => [one.firstChild.textContent, one.lastChild.textContent, one.title]),
@@ -71,9 +71,6 @@ test("a point shows all its numbers with their meaning, each in one piece in a w
     assert.ok(numbers.has(name), name);
   assert.match(numbers.get("duration_s")[0], /^\d+\.\d+ µs$/);
   assert.match(numbers.get("slide_m")[1], /length of the path/);
-  await web.shows(page, ".figures", /µsduration_s|duration_s[\d.]+ µs/);
-  const wide = await page.evaluate(() => document.documentElement.scrollWidth);
-  assert.ok(wide <= 400, `${wide}`);
   await page.close();
 });
 

@@ -8,15 +8,11 @@ test("a running study keeps the button that has the focus, its plot and the curs
   const id = await web.submit(page, "looked at", web.longAxes);
   await web.goTo(page, `#/study/${id}?pic=histogram&x=mu`);
   const isRefreshed = async () => {
-    for (let i = 0; i < 2; ++i)
-      await page.waitForResponse((answer) => answer.url().includes("/bins?"));
+    const isBins = (answer) => answer.url().includes("/bins?");
+    for (let i = 0; i < 2; ++i) await page.waitForResponse(isBins);
   };
   await page.waitForSelector(".u-over");
-  for (const selector of [
-    '[data-change="pause"]',
-    ".plot[role=application]",
-    ".commands .copied button",
-  ]) {
+  for (const selector of ["[data-change=pause]", ".plot[role]", ".copied button"]) {
     const one = await page.waitForSelector(selector);
     await one.focus();
     if (selector.startsWith(".plot")) await page.keyboard.press("Home");

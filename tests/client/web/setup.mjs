@@ -12,6 +12,8 @@ export { until };
 export const server = new Server(join(process.env.OBLIQUE_BIN, "oblique"));
 export const browser = new Browser();
 export const mapCanvas = ".map canvas[tabindex]";
+/** What a view drags over. */
+export const pictureIn = (view) => (/pic=(lines|histogram)/.test(view) ? ".u-over" : mapCanvas);
 export const whereField = ".conditions > div:first-child input";
 export const markField = ".marks input";
 
