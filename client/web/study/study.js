@@ -195,13 +195,14 @@ export class StudyView {
     root.append(
       h("h2.name", study.name),
       this.status.element,
-      modelLine(study, place.signal),
       this.said,
       this.conditions.element,
       h("div.beside", picture, this.table.element),
       h("section", h("h2", "Export"), this.exports),
     );
     this.#showAddress();
+    // After picture and table, as queries are answered in their order.
+    this.status.element.after(modelLine(study, place.signal));
   }
 
   /** A field of the address. */
