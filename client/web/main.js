@@ -1,179 +1,176 @@
-// @ts-check
-// Which view an address means. Views are functions: they fill an element and give what ends them.
-import { h } from "/parts/dom.js";
-import { session, follow, in_words, Silence } from "/server.js";
-import { overview } from "/overview.js";
+// The view that an address means. A view is a function that fills an element and returns its handlers: `take` an overview
+// of the server, `goTo` another address of the same path, `reconnected`, `close`.
+import { follow, retryMs, session } from "./api.js";
+import { h } from "./lib/dom.js";
+import { newStudyView } from "./newStudy.js";
+import { overview } from "./overview.js";
+import { pointView } from "./point/point.js";
+import { studyView } from "./study/study.js";
 
-/**
- * @typedef {object} Place what an address says
- * @property {URLSearchParams} fields
- * @property {(fields: URLSearchParams, is_step?: boolean) => void} keep writes them into the address, soon; a step is one that people go back over
- * @property {(address: string) => void} go to another view, so that this one can be come back to
- * @property {boolean} may_change
- * @property {string} file that commands are to read; empty: they ask the server
- * @property {AbortSignal} signal this view is left, or did not come about
- * @property {() => any} now the last overview, or null
- * @property {(links: (string | Node)[]) => void} trail what stands beside the name
- * @property {(path: string) => string} last how that view was left
- * @typedef {{close?: () => void, take?: (now: any) => void, go_to?: (fields: URLSearchParams) => void, focus?: () => void, again?: () => void}} View
- *   `go_to` another address of the same path; `focus` for who came back; `again` after the server did not answer
- */
+const routes = [
+  [/^\/study\/(\d+)\/point\/(\d+)$/, pointView],
+  [/^\/study\/(\d+)$/, studyView],
+  [/^\/new$/, newStudyView],
+  [/^/, overview],
+];
 
-const view = /** @type {HTMLElement} */ (document.getElementById("view"));
-const pace = /** @type {HTMLElement} */ (document.getElementById("pace"));
-const trail = /** @type {HTMLElement} */ (document.getElementById("trail"));
+const main = document.getElementById("view");
+const pace = document.getElementById("pace");
+const trail = document.getElementById("trail");
 
-/** @type {View} */
+let path = "";
 let shown = {};
-/** @type {any} */
 let now = null;
+let rights = {};
 let turn = 0;
-/** Ends what the view that is shown, or comes, still asks for. */
 let leaving = new AbortController();
-/** Of the view that is shown. */
-let here = "";
-let may_change = false;
-let file = "";
-/** How views were left. @type {Map<string, string>} */
-const left = new Map();
+/** The last address of each view. */
+const addresses = new Map();
 
-/** Browsers refuse addresses that change more than some hundred times in ten seconds. */
-const kWriteAgain_ms = 150;
-/** After the server did not answer. */
-const kAskAgain_ms = 3000;
-/** The address that this view is to have; empty: it has it. */
-let wanted = "";
-let later = 0;
-const path_of = (/** @type {string} */ address) => address.replace(/^#/, "").split("?", 1)[0] || "/";
-const address_of = (/** @type {string} */ path, /** @type {URLSearchParams} */ fields) => `#${path}${String(fields) && `?${fields}`}`;
+/** Browsers refuse more than some hundred changes of the address in ten seconds. */
+const writeEveryMs = 150;
+let unwritten = "";
+let timer = 0;
+const pathOf = (address) => address.replace(/^#/, "").split("?", 1)[0] || "/";
 
-function write() {
-  if (wanted === "" || path_of(wanted) !== path_of(location.hash)) return;
-  try {
-    history.replaceState(null, "", wanted);
-    wanted = "";
-  } catch { /* too often for this browser: a little later */ }
-}
-function write_soon() {
-  if (later) return;
-  write();
-  later = setTimeout(() => {
-    later = 0;
-    if (wanted !== "") write_soon();
-  }, kWriteAgain_ms);
+function writeAddress() {
+  const isShown = pathOf(unwritten) === pathOf(location.hash);
+  if (unwritten && isShown) history.replaceState(null, "", unwritten);
+  unwritten = "";
 }
 
-/** The address that is left stays behind. @param {string} address */
-function step_to(address) {
-  write();
-  if (address === location.hash) return;
-  try {
-    history.pushState(null, "", address);
-  } catch { /* too often for this browser: it is written as others are */ }
+function writeSoon() {
+  if (timer) return;
+  writeAddress();
+  timer = setTimeout(() => {
+    timer = 0;
+    if (unwritten) writeSoon();
+  }, writeEveryMs);
 }
 
-function links(/** @type {(string | Node)[]} */ parts) {
-  trail.replaceChildren(...parts.flatMap((part) => [h("span", { "aria-hidden": "true" }, "/"), part]));
+/** Writes what a view shows into its address. A step is undone by the browser's Back. */
+function keep(of, fields, isStep) {
+  const address = `#${of}${String(fields) && `?${fields}`}`;
+  addresses.set(of, address);
+  if (isStep) {
+    writeAddress();
+    if (address !== location.hash) history.pushState(null, "", address);
+  } else {
+    unwritten = address;
+    writeSoon();
+  }
+}
+
+function showTrail(parts) {
+  const separated = parts.flatMap((part) => [h("span", { "aria-hidden": "true" }, "/"), part]);
+  trail.replaceChildren(...separated);
   const last = parts.at(-1);
-  document.title = last ? `${typeof last === "string" ? last : last.textContent} – oblique` : "oblique";
+  document.title = last ? `${last.textContent ?? last} – oblique` : "oblique";
+}
+
+/** What a view may do with the frame around it, as long as it is shown. */
+function placeOf(mine, own, fields, signal) {
+  const whileShown =
+    (act) =>
+    (...given) =>
+      mine === turn && act(...given);
+  return {
+    fields,
+    signal,
+    mayChange: rights.may_change,
+    file: rights.file,
+    now: () => now,
+    trail: whileShown(showTrail),
+    keep: whileShown((all, isStep = false) => keep(own, all, isStep)),
+    last: (of) => addresses.get(of) ?? `#${of}`,
+    go: (address) => {
+      writeAddress();
+      location.hash = address;
+    },
+  };
 }
 
 async function show() {
-  const path = path_of(location.hash);
-  const query = location.hash.split("?", 2)[1];
-  if (path === here && shown.go_to) {
-    wanted = "";
-    left.set(path, location.hash);
-    shown.go_to(new URLSearchParams(query ?? ""));
+  unwritten = "";
+  const fields = new URLSearchParams(location.hash.split("?", 2)[1] ?? "");
+  const isSame = pathOf(location.hash) === path;
+  path = pathOf(location.hash);
+  addresses.set(path, location.hash);
+  if (isSame && shown.goTo) {
+    shown.goTo(fields);
     return;
   }
-  const is_first = turn === 0;
-  here = path;
   const mine = ++turn;
   leaving.abort();
   leaving = new AbortController();
-  const { signal } = leaving;
   shown.close?.();
   shown = {};
-  wanted = "";
-  const root = h("div", {});
-  /** @type {Place} */
-  const place = { fields: new URLSearchParams(query ?? ""), may_change, file, signal, now: () => now,
-    // Answers may come when another view is shown.
-    trail: (parts) => { if (mine === turn) links(parts); },
-    last: (of) => left.get(of) ?? `#${of}`,
-    keep: (fields, is_step = false) => {
-      if (mine !== turn) return;
-      if (is_step) step_to(address_of(path, fields));
-      left.set(path, wanted = address_of(path, fields));
-      write_soon();
-    },
-    go: (address) => {
-      write();
-      location.hash = address;
-    } };
-  left.set(path, location.hash);
-  links([]);
-  view.replaceChildren(root);
+  const root = h("div");
+  showTrail([]);
+  main.replaceChildren(root);
+  const [pattern, view] = routes.find(([one]) => one.test(path));
+  const ids = pattern.exec(path).slice(1).map(Number);
   try {
-    const point = /^\/study\/(\d+)\/point\/(\d+)$/.exec(path);
-    const study = /^\/study\/(\d+)$/.exec(path);
-    /** @type {View} */
-    let made;
-    if (point) made = await (await import("/point/point.js")).point_view(root, place, Number(point[1]), Number(point[2]));
-    else if (study) made = await (await import("/study/study.js")).study_view(root, place, Number(study[1]));
-    else if (path === "/new") made = await (await import("/start.js")).start_view(root, place);
-    else made = overview(root, place);
+    const made = await view(root, placeOf(mine, path, fields, leaving.signal), ...ids);
     if (mine !== turn) {
       made.close?.();
       return;
     }
     shown = made;
-    if (!is_first && [document.body, view, null].includes(/** @type {any} */ (document.activeElement))) {
-      view.focus({ preventScroll: true });
-      made.focus?.();
+    if (mine > 1 && [document.body, null].includes(document.activeElement)) {
+      main.focus({ preventScroll: true });
     }
     if (now) shown.take?.(now);
   } catch (error) {
     if (mine !== turn) return;
-    leaving.abort();
-    const said = in_words(error);
-    if (said instanceof Silence) setTimeout(() => { if (mine === turn) show(); }, kAskAgain_ms);
-    root.replaceChildren(h("p", { role: "alert", class: "bad" }, String(said.message ?? said)),
-      h("p", {}, h("a", { href: "#/" }, "All studies")));
+    const retry = () => mine === turn && show();
+    if (error.isSilence) setTimeout(retry, retryMs);
+    root.replaceChildren(
+      h("p", { role: "alert", class: "bad" }, error.message),
+      h("p", h("a", { href: "#/" }, "All studies")),
+    );
   }
 }
 
-try {
-  const told = await session();
-  ({ may_change, file } = told);
-  if (told.may_look) {
-    const take = (/** @type {any} */ told) => {
-      now = told;
-      pace.textContent = told.database_fault || `${Math.round(told.points_per_s)} points/s`;
-      pace.className = told.database_fault ? "bad" : "";
-      shown.take?.(told);
-    };
-    follow(take, (text) => {
-      pace.textContent = text;
-      pace.className = "bad";
-    }, () => {
-      if (now) take(now);
-      shown.again?.();
-    });
-    // At once: what the view that is left still writes would otherwise replace the address that people come back to.
-    addEventListener("popstate", show);
-    // Links, and what copies the address, find it written.
-    document.addEventListener("click", write, { capture: true });
-    // Drawings have the colours of when they were drawn; forms are left as people filled them.
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      write();
-      if (location.hash.startsWith("#/study/")) show();
-    });
-    await show();
-  } else {
-    view.replaceChildren(h("p", {}, told.how_to_enter));
-  }
-} catch (error) {
-  view.replaceChildren(h("p", { role: "alert", class: "bad" }, String(error)));
+function say(text, isBad) {
+  pace.textContent = text;
+  pace.className = isBad ? "bad" : "";
 }
+
+function take(told) {
+  now = told;
+  say(told.database_fault || `${Math.round(told.points_per_s)} points/s`, told.database_fault);
+  shown.take?.(told);
+}
+
+async function begin() {
+  rights = await session();
+  if (!rights.may_look) {
+    main.replaceChildren(h("p", rights.how_to_enter));
+    return;
+  }
+  follow({
+    take,
+    say: (text) => say(text, true),
+    reconnected: () => {
+      if (now) take(now);
+      shown.reconnected?.();
+    },
+  });
+  addEventListener("popstate", show);
+  // Links, and what copies the address, find it written.
+  document.addEventListener("click", writeAddress, { capture: true });
+  // Canvases keep the colours that they were drawn with.
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    writeAddress();
+    if (!path.startsWith("/study/")) return;
+    shown.close?.();
+    shown = {};
+    show();
+  });
+  await show();
+}
+
+begin().catch((error) => {
+  main.replaceChildren(h("p", { role: "alert", class: "bad" }, error.message));
+});

@@ -1,313 +1,262 @@
-// @ts-check
-// The finger moving: the whole of it from the side, its motion since touch enlarged; and its tip at the ground, with the
-// contact particle P and the forces.
-import { h, named, picker } from "/parts/dom.js";
-import { ink } from "/parts/colours.js";
-import { shown } from "/parts/format.js";
-import { ends_of } from "/parts/scale.js";
+// The finger during the contact: the whole of it from the side, its motion enlarged; and its tip at the ground, with the contact
+// particle P and the forces. A player moves both through time.
+import { ink } from "../lib/colours.js";
+import { button, h } from "../lib/dom.js";
+import { shown } from "../lib/format.js";
+import { endsOf } from "../lib/scale.js";
+import { rowAt } from "./trace.js";
 
-const kHeight = 330;
+const height = 250;
+const playedSeconds = 8;
+const sliderSteps = 1000;
+const stateNames = { S: "stick", s: "slip", C: "compression", R: "restitution" };
 
-/** @param {number} size @returns {number} a round length at most that long */
-function round_length(size) {
-  const power = 10 ** Math.floor(Math.log10(size));
-  return [5, 2, 1].map((digit) => digit * power).find((length) => length <= size) ?? power;
-}
-
-/** A length in the unit that suits it. @param {number} metres */
-function length_text(metres) {
+function lengthText(metres) {
   if (metres >= 0.1) return `${shown(metres, 3)} m`;
   return metres >= 1e-3 ? `${shown(metres * 1e3, 3)} mm` : `${shown(metres * 1e6, 3)} µm`;
 }
 
-/** An empty drawing; null where there is no room. @param {any} canvas @param {HTMLElement} place */
-export const begin = (canvas, place, height = kHeight) => {
+/** An empty canvas as wide as its place; null: there is no room. */
+function begin(canvas, place) {
   const width = place.clientWidth;
   if (width < 60) return null;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = width * ratio;
   canvas.height = height * ratio;
   canvas.style.height = `${height}px`;
-  const c = canvas.getContext("2d");
-  c.scale(ratio, ratio);
-  c.font = "12px system-ui, sans-serif";
-  c.lineJoin = c.lineCap = "round";
-  return { c, width };
-};
+  const context = canvas.getContext("2d");
+  context.scale(ratio, ratio);
+  context.font = "12px system-ui, sans-serif";
+  context.lineJoin = context.lineCap = "round";
+  context.textBaseline = "top";
+  return { context, width };
+}
 
-/** @param {any} c @param {number} width @param {number} level */
-const draw_ground = (c, width, level) => {
-  c.strokeStyle = ink("ground");
-  c.lineWidth = 1.5;
-  c.beginPath();
-  c.moveTo(0, level);
-  c.lineTo(width, level);
-  c.stroke();
-  c.lineWidth = 0.7;
-  c.beginPath();
-  for (let gx = -12; gx < width; gx += 11) {
-    c.moveTo(gx + 10, level);
-    c.lineTo(gx, level + 9);
-  }
-  c.stroke();
-};
+function drawPath(context, points, colour, lineWidth, dash = []) {
+  context.strokeStyle = ink(colour);
+  context.lineWidth = lineWidth;
+  context.setLineDash(dash);
+  context.beginPath();
+  for (const [x, y] of points) context.lineTo(x, y);
+  context.stroke();
+  context.setLineDash([]);
+}
 
-/** A text that is read where lines run below it: they end around it. @param {any} c @param {string} text @param {number} x @param {number} y */
-const label = (c, text, x, y) => {
-  c.save();
-  c.strokeStyle = ink("page");
-  c.lineWidth = 5;
-  c.strokeText(text, x, y);
-  c.restore();
-  c.fillText(text, x, y);
-};
+function drawDisc(context, [x, y], radius) {
+  context.fillStyle = ink("text");
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fill();
+}
 
-/** @param {any} c @param {number} width @param {number} metres_per_px */
-const draw_length = (c, width, metres_per_px) => {
-  const metres = round_length(width * 0.3 * metres_per_px);
-  const w = metres / metres_per_px;
-  c.strokeStyle = c.fillStyle = ink("text");
-  c.lineWidth = 2;
-  c.beginPath();
-  c.moveTo(width - 12 - w, 14);
-  c.lineTo(width - 12, 14);
-  c.stroke();
-  c.textAlign = "right";
-  c.textBaseline = "top";
-  label(c, length_text(metres), width - 12, 19);
-};
+function drawGround(context, width, level) {
+  context.fillStyle = ink("ground");
+  context.fillRect(0, level, width, 5);
+}
 
-/** @param {any} c @param {number[]} from @param {number[]} by pixels @param {string} colour */
-const arrow = (c, [x0, y0], [dx, dy], colour) => {
+/** A text with a border in the colour of the page, so that lines end around it. */
+function write(context, text, x, y, colour = "text", align = "left") {
+  context.textAlign = align;
+  context.strokeStyle = ink("page");
+  context.lineWidth = 5;
+  context.strokeText(text, x, y);
+  context.fillStyle = ink(colour);
+  context.fillText(text, x, y);
+}
+
+/** A bar of a round length. */
+function drawLength(context, width, metresPerPixel) {
+  const most = width * 0.3 * metresPerPixel;
+  const power = 10 ** Math.floor(Math.log10(most));
+  const metres = [5, 2, 1].map((digit) => digit * power).find((length) => length <= most) ?? power;
+  const start = [width - 12 - metres / metresPerPixel, 14];
+  drawPath(context, [start, [width - 12, 14]], "text", 2);
+  write(context, lengthText(metres), width - 12, 19, "text", "right");
+}
+
+function drawArrow(context, [x, y], [dx, dy], colour) {
   const length = Math.hypot(dx, dy);
   if (length < 3) return;
-  const [ux, uy] = [dx / length, dy / length];
-  c.strokeStyle = c.fillStyle = colour;
-  c.lineWidth = 2.2;
-  c.beginPath();
-  c.moveTo(x0, y0);
-  c.lineTo(x0 + dx - 6 * ux, y0 + dy - 6 * uy);
-  c.stroke();
-  c.beginPath();
-  c.moveTo(x0 + dx, y0 + dy);
-  c.lineTo(x0 + dx - 9 * ux - 4 * uy, y0 + dy - 9 * uy + 4 * ux);
-  c.lineTo(x0 + dx - 9 * ux + 4 * uy, y0 + dy - 9 * uy - 4 * ux);
-  c.fill();
-};
+  const [ux, uy] = [(dx / length) * 9, (dy / length) * 9];
+  const head = [x + dx, y + dy];
+  const neck = [x + dx - ux / 2, y + dy - uy / 2];
+  drawPath(context, [[x, y], neck], colour, 2.2);
+  context.fillStyle = ink(colour);
+  context.beginPath();
+  context.moveTo(...head);
+  context.lineTo(head[0] - ux - uy / 2, head[1] - uy + ux / 2);
+  context.lineTo(head[0] - ux + uy / 2, head[1] - uy - ux / 2);
+  context.fill();
+}
 
-/** What the finger reaches from release to touch. @param {import("./trace.js").Trace} trace @param {number} ground */
-function reach_of(trace, ground) {
-  const box = { left: 0, right: 0, top: 0, bottom: ground };
-  const all = [trace.nodes(0), ...Array.from({ length: trace.fall.rows }, (_, row) => trace.fall.nodes(row))];
-  for (const nodes of all) {
-    for (let i = 0; i < nodes.length; i += 2) {
-      box.left = Math.min(box.left, nodes[i]);
-      box.right = Math.max(box.right, nodes[i]);
-      box.top = Math.max(box.top, nodes[i + 1]);
-      box.bottom = Math.min(box.bottom, nodes[i + 1]);
-    }
+/** x and y by turns as pairs of pixels. */
+const pixelsOf = (nodes, px, py) =>
+  Array.from({ length: nodes.length / 2 }, (_, i) => [px(nodes[2 * i]), py(nodes[2 * i + 1])]);
+
+function figureOf(caption, label) {
+  const canvas = h("canvas", { role: "img", "aria-label": label });
+  const place = h("div.plot", canvas);
+  return {
+    canvas,
+    place,
+    element: h("figure.lines", h("figcaption", caption), place),
+  };
+}
+
+/** The largest power of ten that shows motion as at most a quarter of the finger. */
+function enlargementOf(trace, size) {
+  const rest = trace.nodes(0);
+  let moved = 1e-12;
+  for (let row = 0; row < trace.rows; row += Math.ceil(trace.rows / 100)) {
+    trace.nodes(row).forEach((value, i) => {
+      moved = Math.max(moved, Math.abs(value - rest[i]));
+    });
   }
-  return box;
+  return 10 ** Math.max(Math.floor(Math.log10(size / 4 / moved)), 0);
 }
 
-/** A path through places that come as x and y by turns. @param {any} c @param {ArrayLike<number>} nodes @param {(x: number) => number} px @param {(y: number) => number} py */
-function draw_path(c, nodes, px, py) {
-  c.beginPath();
-  for (let i = 0; i < nodes.length; i += 2) c.lineTo(px(nodes[i]), py(nodes[i + 1]));
-  c.stroke();
-}
-
-/** @param {import("./trace.js").Trace} trace @param {Fall} fall */
-function whole_of(trace, fall) {
-  const canvas = h("canvas", { role: "img", "aria-label": "The finger, seen from the side" });
-  const place = h("div", { class: "plot" }, canvas);
+function wholeFinger(trace) {
   const rest = trace.nodes(0);
   const ground = -trace.head.H;
-  const box = reach_of(trace, ground);
-
-  /** Where the tip falls, and the finger as it is at touch. @param {any} c @param {number} last row of the fall @param {(x: number) => number} px @param {(y: number) => number} py */
-  function draw_before(c, last, px, py) {
-    c.strokeStyle = ink("weak");
-    c.lineWidth = 1;
-    c.beginPath();
-    for (let i = 0; i <= last; ++i) c.lineTo(px(fall.x[i]), py(fall.y[i]));
-    c.stroke();
-    c.setLineDash([3, 4]);
-    draw_path(c, rest, px, py);
-    c.setLineDash([]);
+  const [left, right] = endsOf(rest.filter((_, i) => i % 2 === 0));
+  const [bottom, top] = endsOf([ground, ...rest.filter((_, i) => i % 2 === 1)]);
+  const enlargement = enlargementOf(trace, Math.max(right - left, top - bottom));
+  const caption = `Finger, motion since touch enlarged ${enlargement} times; dashed: at touch`;
+  const figure = figureOf(caption, "The finger, seen from the side");
+  function draw(row) {
+    const made = begin(figure.canvas, figure.place);
+    if (!made) return;
+    const { context, width } = made;
+    const scale = Math.max((right - left) / (width - 80), (top - bottom) / (height - 70));
+    const margin = (width - (right - left) / scale) / 2;
+    const px = (x) => margin + (x - left) / scale;
+    const py = (y) => height - 26 + (bottom - y) / scale;
+    drawGround(context, width, py(ground));
+    drawPath(context, pixelsOf(rest, px, py), "weak", 1, [3, 4]);
+    const moved = trace.nodes(row).map((value, i) => rest[i] + enlargement * (value - rest[i]));
+    const nodes = pixelsOf(moved, px, py);
+    drawPath(context, nodes, "finger", 4);
+    const joints = nodes.filter((_, i) => i % trace.head.elements_per_link === 0);
+    joints.forEach((joint, i) => drawDisc(context, joint, i === 0 ? 6 : 4));
+    write(context, "O", px(0) + 10, py(0) - 6);
+    drawLength(context, width, scale);
   }
-  /** Its links and joints. @param {any} c @param {ArrayLike<number>} nodes @param {(x: number) => number} px @param {(y: number) => number} py */
-  function draw_links(c, nodes, px, py) {
-    c.strokeStyle = ink("finger");
-    c.lineWidth = 4;
-    draw_path(c, nodes, px, py);
-    c.fillStyle = ink("text");
-    for (let i = 0; i < nodes.length; i += 2 * trace.head.elements_per_link) {
-      c.beginPath();
-      c.arc(px(nodes[i]), py(nodes[i + 1]), i === 0 ? 6 : 4, 0, 2 * Math.PI);
-      c.fill();
-    }
-  }
-  return { place,
-    /** @param {import("./player.js").Instant} instant @param {number} enlargement of the motion since touch */
-    draw({ row, is_falling }, enlargement) {
-      const made = begin(canvas, place);
-      if (!made) return;
-      const { c, width } = made;
-      const metres_per_px = Math.max((box.right - box.left) / (width - 40), (box.top - box.bottom) / (kHeight - 70));
-      const left = (width - (box.right - box.left) / metres_per_px) / 2;
-      const px = (/** @type {number} */ v) => left + (v - box.left) / metres_per_px;
-      const py = (/** @type {number} */ v) => kHeight - 26 + (box.bottom - v) / metres_per_px;
-      draw_ground(c, width, py(ground));
-      draw_before(c, is_falling ? row : fall.x.length - 1, px, py);
-      draw_links(c, is_falling ? trace.fall.nodes(row) : trace.nodes(row).map((v, i) => rest[i] + enlargement * (v - rest[i])), px, py);
-      c.textAlign = "left";
-      c.textBaseline = "bottom";
-      label(c, "O", px(0) + 8, py(0) - 6);
-      c.textBaseline = "top";
-      label(c, is_falling ? `falls, ${shown(-fall.v[row], 3)} m/s downwards` : `touches, motion enlarged ${enlargement} times`, 10, 10);
-      draw_length(c, width, metres_per_px);
-    } };
+  return { ...figure, draw };
 }
 
-const kLevel = kHeight * 0.6;
-const kStates = { S: "stick", s: "slip", C: "compression", R: "restitution" };
-
-/** From where to where some columns reach. @param {...ArrayLike<number>} columns */
-function span(...columns) {
-  const ends = columns.flatMap((column) => ends_of(column).map((end) => end ?? 0));
-  return [Math.min(...ends), Math.max(...ends)];
-}
-
-/** @param {any} c @param {number} width @param {number} metres above the ground */
-function draw_falling(c, width, metres) {
-  draw_ground(c, width, kLevel);
-  c.fillStyle = ink("text");
-  c.textAlign = "left";
-  c.textBaseline = "top";
-  label(c, `falls: the tip is ${length_text(Math.max(metres, 0))} above the ground`, 10, 10);
-}
-
-/** P on the ground, and the springs between it and the tip. @param {any} c @param {number[]} tip in pixels @param {number} px_of_P */
-function draw_particle(c, [x, y], px_of_P) {
-  c.strokeStyle = ink("text");
-  c.setLineDash([2, 3]);
-  c.lineWidth = 1.2;
-  c.beginPath();
-  c.moveTo(x, y);
-  c.lineTo(px_of_P, kLevel);
-  c.stroke();
-  c.setLineDash([]);
-  c.fillStyle = ink("text");
-  c.beginPath();
-  c.arc(px_of_P, kLevel, 4, 0, 2 * Math.PI);
-  c.fill();
-}
-
-/** @param {import("./trace.js").Trace} trace @param {Fall} fall */
-function near_of(trace, fall) {
-  const canvas = h("canvas", { role: "img", "aria-label": "The tip and the ground, enlarged" });
-  const place = h("div", { class: "plot" }, canvas);
+function tipAtGround(trace) {
+  const figure = figureOf(
+    "Tip at the ground, with the forces on it",
+    "The tip and the ground, enlarged",
+  );
   const [x, y, xP, fn, ft] = ["x_m", "y_m", "xP_m", "fn_N", "ft_N"].map(trace.column);
   const ground = -trace.head.H;
-  const largest = Math.max(1e-9, ...span(fn, ft).map(Math.abs));
-  // All places of tip and P during the contact.
-  const [x0, x1] = span(x, xP);
-  const [y0, y1] = span(y, [ground]);
-
-  /** Where the tip was, and the last element's direction, not its length. @param {any} c @param {number} at @param {number} length @param {(x: number) => number} px @param {(y: number) => number} py */
-  function draw_tip(c, at, length, px, py) {
-    c.strokeStyle = ink("weak");
-    c.lineWidth = 1;
-    c.beginPath();
-    for (let i = 0; i <= at; ++i) c.lineTo(px(x[i]), py(y[i]));
-    c.stroke();
-    const nodes = trace.nodes(at);
-    const [nx, ny] = [nodes[nodes.length - 4] - x[at], nodes[nodes.length - 3] - y[at]];
-    const n = Math.hypot(nx, ny) || 1;
-    c.strokeStyle = ink("finger");
-    c.lineWidth = 9;
-    c.beginPath();
-    c.moveTo(px(x[at]) + (nx / n) * length, py(y[at]) - (ny / n) * length);
-    c.lineTo(px(x[at]), py(y[at]));
-    c.stroke();
+  const level = height * 0.62;
+  const largest = Math.max(1e-9, ...[fn, ft].flatMap(endsOf).map(Math.abs));
+  const span = (columns) => endsOf(columns.flatMap(endsOf));
+  const [left, right] = span([x, xP]);
+  const [bottom, top] = span([y, [ground]]);
+  function draw(row) {
+    const made = begin(figure.canvas, figure.place);
+    if (!made) return;
+    const { context, width } = made;
+    const scale = Math.max((right - left) / (width * 0.5), (top - bottom) / (height * 0.4), 1e-9);
+    const px = (value) => width / 2 + (value - (left + right) / 2) / scale;
+    const py = (value) => level - (value - ground) / scale;
+    const tip = [px(x[row]), py(y[row])];
+    const particle = [px(xP[row]), level];
+    drawGround(context, width, level);
+    const past = Array.from({ length: row + 1 }, (_, i) => [px(x[i]), py(y[i])]);
+    drawPath(context, past, "weak", 1);
+    // The direction of the last element, not its length.
+    const [nx, ny] = trace.nodes(row).slice(-4);
+    const [dx, dy] = [nx - x[row], ny - y[row]];
+    const far = width / (Math.hypot(dx, dy) || 1);
+    drawPath(context, [[tip[0] + dx * far, tip[1] - dy * far], tip], "finger", 9);
+    drawPath(context, [tip, particle], "text", 1.2, [2, 3]);
+    drawDisc(context, particle, 4);
+    const pixelsPerNewton = (height * 0.3) / largest;
+    drawArrow(context, tip, [0, -fn[row] * pixelsPerNewton], "line0");
+    drawArrow(context, tip, [ft[row] * pixelsPerNewton, 0], "line1");
+    write(context, "P", particle[0], level + 16, "text", "center");
+    write(context, [...trace.state(row)].map((one) => stateNames[one]).join(", "), 10, 10);
+    write(context, `F_n ${shown(fn[row], 4)} N`, 10, 28, "line0");
+    write(context, `F_t ${shown(ft[row], 4)} N`, 10, 46, "line1");
+    drawLength(context, width, scale);
   }
-  /** @param {any} c @param {number} at @param {number[]} tip in pixels */
-  function draw_forces(c, at, tip) {
-    const per_N = (kHeight * 0.3) / largest;
-    arrow(c, tip, [0, -fn[at] * per_N], ink("line0"));
-    arrow(c, tip, [ft[at] * per_N, 0], ink("line1"));
-  }
-  /** @param {any} c @param {number} at @param {number} px_of_P */
-  function write(c, at, px_of_P) {
-    c.fillStyle = ink("text");
-    c.textAlign = "center";
-    c.textBaseline = "top";
-    label(c, "P", px_of_P, kLevel + 20);
-    c.textAlign = "left";
-    label(c, [...trace.state(at)].map((one) => kStates[/** @type {keyof typeof kStates} */ (one)]).join(", "), 10, 10);
-    c.fillStyle = ink("line0");
-    label(c, `Fn ${shown(fn[at], 4)} N`, 10, 28);
-    c.fillStyle = ink("line1");
-    label(c, `Ft ${shown(ft[at], 4)} N`, 10, 46);
-  }
-  return { place,
-    /** @param {import("./player.js").Instant} instant */
-    draw({ row, is_falling }) {
-      const made = begin(canvas, place);
-      if (!made) return;
-      const { c, width } = made;
-      if (is_falling) {
-        draw_falling(c, width, fall.y[row] - ground);
-        return;
-      }
-      const metres_per_px = Math.max((x1 - x0) / (width * 0.55), (y1 - y0) / (kHeight * 0.4), 1e-9);
-      const px = (/** @type {number} */ v) => width / 2 + (v - (x0 + x1) / 2) / metres_per_px;
-      const py = (/** @type {number} */ v) => kLevel - (v - ground) / metres_per_px;
-      draw_ground(c, width, kLevel);
-      draw_tip(c, row, width, px, py);
-      const tip = [px(x[row]), py(y[row])];
-      draw_particle(c, tip, px(xP[row]));
-      draw_forces(c, row, tip);
-      write(c, row, px(xP[row]));
-      draw_length(c, width, metres_per_px);
-    } };
+  return { ...figure, draw };
 }
 
-const kEnlargements = ["1", "10", "30", "100"];
-
-/** @typedef {{x: ArrayLike<number>, y: ArrayLike<number>, v: ArrayLike<number>}} Fall the tip's places [m] and its velocity upwards [m/s], row by row; none: it begins at touch */
-
-/** @param {import("./trace.js").Trace} trace */
-export function finger(trace) {
-  const fall = trace.fall.rows > 0 ? { x: trace.fall.column("x_m"), y: trace.fall.column("y_m"), v: trace.fall.column("vn_m_s") } : { x: [], y: [], v: [] };
-  const whole = whole_of(trace, fall);
-  const near = near_of(trace, fall);
-  let enlargement = 30;
-  /** @type {import("./player.js").Instant} */
-  let at = { row: 0, is_falling: false };
-
-  const draw_whole = () => whole.draw(at, enlargement);
-  const draw = () => {
-    draw_whole();
-    near.draw(at);
-  };
-  const watch = new ResizeObserver(draw);
-  watch.observe(whole.place);
-  watch.observe(near.place);
-  const element = h("div", { class: "two" },
-    h("figure", { class: "lines" }, h("figcaption", {}, "The finger; dashed: at touch"), whole.place,
-      named("motion since touch, enlarged", picker(kEnlargements.map((n) => [n, `${n} times`]), String(enlargement), (n) => {
-        enlargement = Number(n);
-        draw_whole();
-      }))),
-    h("figure", { class: "lines" }, h("figcaption", {}, "The tip at the ground, with the forces on it"), near.place));
-  return { element,
-    /** @param {import("./player.js").Instant} instant */
-    stand_at(instant) {
-      if (instant.row === at.row && instant.is_falling === at.is_falling) return;
-      at = instant;
-      draw();
+/** The finger and a player, whose `moved` gets the row that is shown. */
+export function fingerOf(trace, moved) {
+  const times = trace.column("t_s");
+  const last = times.at(-1) || 1e-9;
+  const [tip, whole] = [tipAtGround(trace), wholeFinger(trace)];
+  let row = 0;
+  let time = 0;
+  let frame = 0;
+  let before = 0;
+  const play = button("Play", () => (frame ? pause() : start()), { class: "play" });
+  const slider = h("input", {
+    type: "range",
+    min: 0,
+    max: sliderSteps,
+    value: 0,
+    "aria-label": "time since touch",
+    oninput: () => {
+      pause();
+      set((last * Number(slider.value)) / sliderSteps);
     },
-    close: () => watch.disconnect() };
+  });
+  const output = h("output");
+  const draw = () => [tip, whole].forEach((one) => one.draw(row));
+  const watch = new ResizeObserver(draw);
+  [tip, whole].forEach((one) => watch.observe(one.place));
+
+  function set(to) {
+    time = Math.min(Math.max(to, 0), last);
+    row = rowAt(times, time);
+    slider.value = String(Math.round((sliderSteps * time) / last));
+    output.textContent = `${(time * 1e6).toFixed(1)} µs`;
+    slider.setAttribute("aria-valuetext", output.textContent);
+    draw();
+    moved(row);
+  }
+  function step(now) {
+    const passed = Math.min((now - before) / 1000, 0.1);
+    before = now;
+    set(time + (passed * last) / playedSeconds);
+    if (time >= last) pause();
+    else if (frame) frame = requestAnimationFrame(step);
+  }
+  function start() {
+    if (time >= last) time = 0;
+    before = performance.now();
+    play.textContent = "Pause";
+    frame = requestAnimationFrame(step);
+  }
+  function pause() {
+    cancelAnimationFrame(frame);
+    frame = 0;
+    play.textContent = "Play";
+  }
+  return {
+    tip: tip.element,
+    whole: whole.element,
+    player: h("div.row.player", play, h("span.scrub", slider, output)),
+    /** Plays from touch on, unless the reader prefers little motion. */
+    begin() {
+      set(0);
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) start();
+    },
+    /** Stops at a row. */
+    show(at) {
+      pause();
+      set(times[at]);
+    },
+    close() {
+      pause();
+      watch.disconnect();
+    },
+  };
 }

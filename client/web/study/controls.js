@@ -1,102 +1,184 @@
-// @ts-check
-// What a picture is of: pickers, sliders, scales. A choice goes into the address, and from there into the picture.
-import { h, keep_focus, named, picker, tick } from "/parts/dom.js";
-import { count, heading, shown } from "/parts/format.js";
-import { axis_value, fill_in, varying } from "./axes.js";
-import { colour_controls } from "./drawn/legend.js";
-import { show_takeaways } from "./take.js";
+// What a picture is of: pickers, sliders, scales. A choice is written into the address, and shown from there.
+import { button, checkbox, h, labelled, picker, setChildren } from "../lib/dom.js";
+import { heading, shown, shownUnit, withUnit } from "../lib/format.js";
+import { axisValue, fillIn, varyingAxes } from "./fields.js";
 
-/** @typedef {import("./study.js").StudyView} View */
+const zoomedOut = { x0: "", x1: "", y0: "", y1: "", page: "" };
 
-/** The pickers above a picture, and what follows from a choice. @param {View} view */
-export function show_controls(view) {
-  const kind = view.is("pic");
-  const again = (/** @type {Record<string, string>} */ changes) => {
-    // Another output is one of the same part.
-    view.set({ ...changes, ...("z" in changes ? {} : { x0: "", x1: "", y0: "", y1: "", cell: "" }) }, true);
-    fill_in(view.fields, view.study);
+export function controlsOf(view) {
+  const { study } = view;
+  const grids = [...study.blocks.entries()].filter(([, block]) => varyingAxes(block).length > 0);
+  const pickers = h("div.controls");
+  const sliders = h("div.sliders");
+
+  /** Shows the picture of another choice. */
+  function choose(changes) {
+    view.set(changes, true);
+    fillIn(view.fields, study);
     view.place.keep(view.fields);
-    view.choice.none();
-    show_controls(view);
+    show();
     view.load();
-    view.table.load();
-  };
-  const may_map = view.grids.some((/** @type {any} */ g) => varying(g.b).length > 1);
-  const kinds = [...(may_map ? [["map", "map"]] : []),
-    ...(view.grids.length > 0 ? [["lines", "lines"]] : []), ["gathered", "scatter"], ["histogram", "histogram"]];
-  const on_grid = kind === "map" || kind === "lines";
-  const axes = on_grid ? varying(view.block).map((a) => [a.key, heading(a.key, a.unit)])
-    : view.numbers.map((c) => [c.name, heading(c.name, c.unit)]);
-  const outputs = view.columns.filter((c) => c.picture === "numbers" || (kind === "map" && c.picture === "categories"))
-    .map((c) => [c.name, heading(c.name, c.unit)]);
-  const parts = [named("picture", picker(kinds, kind, (pic) => again({ pic, ...(on_grid && pic === "histogram" ? { x: "" } : {}), y: "", from: "", to: "" })))];
-  if (kind !== "histogram") {
-    parts.push(named(kind === "gathered" ? "colour" : "output", picker(kind === "gathered" ? [["", "none"], ...outputs] : outputs, view.is("z"), (z) => {
-      if (z === "") view.fields.set("z", "");
-      again({ ...(z === "" ? {} : { z }), from: "", to: "" });
-    })));
   }
-  if (on_grid && view.grids.length > 1) {
-    parts.push(named("block", picker(view.grids.map((/** @type {any} */ g) => [String(g.i), `${g.i + 1}: ${varying(g.b).map((a) => `${a.values} ${a.key}`).join(" × ")}`]),
-      view.is("block"), (block) => again({ block, at: "" }))));
-  }
-  parts.push(named(kind === "histogram" ? "of" : "across", picker(axes, view.is("x"), (x) => again({ x, ...(x === view.is("y") ? { y: on_grid ? view.is("x") : "" } : {}) }))));
-  if (kind !== "histogram" && axes.length > 1) {
-    parts.push(named(kind === "lines" ? "a line for each" : "upwards", picker(kind === "lines" ? [["", "none"], ...axes.filter(([k]) => k !== view.is("x"))] : axes, view.is("y"),
-      (y) => again({ y, ...(y === view.is("x") ? { x: view.is("y") } : {}) }))));
-  }
-  const redraw = (/** @type {Record<string, string>} */ changes) => {
+
+  /** Draws the same data in another way, or loads it again where it depends on the scale. */
+  function redraw(changes) {
     view.set(changes);
-    if (kind === "map") view.drawing.draw();
+    if (view.is("pic") === "map") view.draw();
     else view.load();
-    show_takeaways(view);
-  };
-  parts.push(h("div", { class: "ticks" }, tick(`log ${view.is("x")}`, view.is("xlog") !== "", (is) => redraw({ xlog: is ? "1" : "" })),
-    kind === "histogram" ? null : tick(kind === "lines" ? "log output" : `log ${view.is("y")}`, view.is("ylog") !== "", (is) => redraw({ ylog: is ? "1" : "" }))));
-  const drags = picker([["zoom", "zooms in"], ["mark", "marks points"]], view.is("drag") === "mark" ? "mark" : "zoom", (drag) => {
-    view.set({ drag: drag === "mark" ? "mark" : "" });
-    view.map.let_drag(drag === "mark" ? "mark" : "zoom");
-    view.drawing.draw();
-  });
-  drags.title = "with Shift it is the other one";
-  parts.push(named("dragging", drags));
-  keep_focus(view.controls, () => view.controls.replaceChildren(...parts));
-  show_sliders(view, on_grid);
-  const has_bar = (kind === "map" || kind === "gathered") && view.columns.find((c) => c.name === view.is("z"))?.picture !== "categories";
-  const colours = has_bar ? [colour_controls({ from: view.is("from"), to: view.is("to"), is_log: view.is("zlog") !== "" },
-    (changed) => {
-      view.set(/** @type {any} */ (changed));
-      if ("from" in changed && "to" in changed) show_controls(view);
-      view.drawing.draw();
-      show_takeaways(view);
-    })] : [];
-  keep_focus(view.colour_row, () => view.colour_row.replaceChildren(...colours));
-}
+  }
 
-/** At which values the other axes are held. @param {View} view @param {boolean} on_grid */
-function show_sliders(view, on_grid) {
-  const others = on_grid ? varying(view.block).filter((a) => a.key !== view.is("x") && a.key !== view.is("y")) : [];
-  const places = view.places();
-  view.sliders.replaceChildren(...others.map((axis) => {
-    const number = Math.min(places.get(axis.key) ?? 0, axis.values - 1);
-    const out = h("output", { "data-axis": axis.key }, held(axis, number));
-    const slider = h("input", { type: "range", min: 0, max: axis.values - 1, step: 1, value: number, "aria-label": `${axis.key}, held at`,
-      "aria-valuetext": held(axis, number), oninput: () => {
-        const now = view.places();
-        now.set(axis.key, Number(slider.value));
-        out.textContent = held(axis, Number(slider.value));
-        slider.setAttribute("aria-valuetext", out.textContent);
-        view.set({ at: [...now].map(([key, n]) => `${key}@${n}`).join(",") });
-        view.load(true);  // what comes while it is dragged is shown
-      }, onchange: () => {
-        if (view.wants_more) view.load();
-      } });
-    return h("div", { class: "slider" }, h("span", {}, axis.key), slider, out);
-  }));
-}
+  function kindPicker() {
+    const mayMap = grids.some(([, block]) => varyingAxes(block).length > 1);
+    const kinds = ["map", "lines", "scatter", "histogram"].filter(
+      (kind) => kind !== "map" || mayMap,
+    );
+    const isOfGrid = (kind) => grids.length > 0 && ["map", "lines"].includes(kind);
+    return picker(kinds, view.is("pic"), (pic) => {
+      const keepsX = isOfGrid(pic) && isOfGrid(view.is("pic"));
+      const z = view.is("z") === "" ? {} : { z: view.is("z") };
+      choose({ pic, ...zoomedOut, ...z, ...(keepsX ? {} : { x: "" }), y: "", from: "", to: "" });
+    });
+  }
 
-/** @param {any} axis @param {number} number */
-function held(axis, number) {
-  const value = axis_value(axis, number);
-  return value === undefined ? `value ${number + 1} of ${count(axis.values)}` : `${shown(value)} ${axis.unit === "1" ? "" : axis.unit}`;
+  /** Columns that a picture can show, with the one that it shows. */
+  function columnChoices(shownColumn, mayBeCategory) {
+    const found = view.columns.filter(
+      ([name]) => mayBeCategory || view.columnOf(name).picture === "numbers",
+    );
+    const isMissing = shownColumn && !found.some(([name]) => name === shownColumn);
+    const all = isMissing ? [...found, [shownColumn, "other"]] : found;
+    return all.map(([name, group]) => [name, heading(name, view.unitOf(name)), group]);
+  }
+
+  function outputPicker() {
+    const kind = view.is("pic");
+    const outputs = columnChoices(view.is("z"), kind === "map" || kind === "scatter");
+    const none = kind === "scatter" ? [["", "none"]] : [];
+    const z = picker([...none, ...outputs], view.is("z"), (name) => {
+      view.fields.set("z", name); // "" is a choice too
+      choose({ ...(name ? { z: name } : {}), from: "", to: "" });
+    });
+    return labelled(kind === "scatter" ? "colour" : "output", z);
+  }
+
+  function axisPickers() {
+    const axes = view.block
+      ? varyingAxes(view.block).map((axis) => [axis.key, heading(axis.key, axis.unit)])
+      : null;
+    const axisPicker = (name, none = []) =>
+      picker([...none, ...(axes ?? columnChoices(view.is(name), false))], view.is(name), (key) =>
+        choose({
+          [name]: key,
+          ...(name === "x" && view.is("y") === key ? { y: "" } : {}),
+          ...zoomedOut,
+        }),
+      );
+    const found = [labelled("x axis", axisPicker("x"))];
+    if (view.hasMap) found.push(labelled("y axis", axisPicker("y")));
+    else if (axes?.length > 1)
+      found.push(labelled("lines of", axisPicker("y", [["", "one line"]])));
+    return found;
+  }
+
+  function blockPicker() {
+    const choices = grids.map(([i, block]) => {
+      const size = varyingAxes(block).map((axis) => `${axis.values} ${axis.key}`);
+      return [String(i), `${i + 1}: ${size.join(" × ")}`];
+    });
+    return labelled(
+      "block",
+      picker(choices, view.is("block"), (block) => choose({ block, ...zoomedOut })),
+    );
+  }
+
+  function scaleBoxes() {
+    const kind = view.is("pic");
+    const isOn = (name) => view.is(name) !== "";
+    const box = (name, text) =>
+      checkbox(text, isOn(name), (is) => redraw({ [name]: is ? "1" : "" }));
+    return h(
+      "div.ticks",
+      box("xlog", "log x"),
+      kind !== "histogram" && !(kind === "lines" && !view.block) && box("ylog", "log y"),
+      hasColourBar() && box("zlog", "log colours"),
+    );
+  }
+
+  function mousePicker() {
+    const drags = picker(["zoom", "select"], view.is("drag") || "zoom", (drag) => {
+      view.set({ drag: drag === "select" ? drag : "" });
+      view.map.dragSelects = drag === "select";
+      view.draw();
+    });
+    return labelled("mouse", drags, "Dragging over the picture; with Shift the other one");
+  }
+
+  const hasColourBar = () => view.hasMap && view.columnOf(view.is("z"))?.picture === "numbers";
+
+  /** The range of colours, in shown units. */
+  function rangeFields() {
+    const [, factor] = shownUnit(view.is("z"), view.unitOf(view.is("z")));
+    const end = (name) => {
+      const value = view.is(name) === "" ? "" : shown(Number(view.is(name)) * factor);
+      const settings = { type: "text", inputMode: "decimal", value, placeholder: "auto", size: 7 };
+      const field = h("input", settings);
+      field.addEventListener("change", () => {
+        const text = field.value.trim();
+        const isNumber = Number.isFinite(Number(text));
+        field.setAttribute("aria-invalid", String(!isNumber));
+        if (isNumber) redraw({ [name]: text === "" ? "" : String(Number(text) / factor) });
+      });
+      return field;
+    };
+    const fit = () => {
+      redraw({ from: "", to: "" });
+      show();
+    };
+    return [labelled("colours from", end("from")), labelled("to", end("to")), button("Fit", fit)];
+  }
+
+  function sliderOf(axis) {
+    const number = Math.min(view.places().get(axis.key) ?? 0, axis.values - 1);
+    const output = h("output", { "data-axis": axis.key });
+    const slider = h("input", {
+      type: "range",
+      min: 0,
+      max: axis.values - 1,
+      value: number,
+      "aria-label": `value of ${axis.key}`,
+    });
+    const tell = () => {
+      const i = Number(slider.value);
+      const value = axisValue(axis, i);
+      const place = `value ${i + 1} of ${axis.values}`;
+      output.textContent = value === undefined ? place : withUnit(value, axis.key, axis.unit);
+      slider.setAttribute("aria-valuetext", output.textContent);
+    };
+    slider.addEventListener("input", () => {
+      tell();
+      const places = view.places().set(axis.key, Number(slider.value));
+      view.set({ at: [...places].map(([key, at]) => `${key}@${at}`).join(",") });
+      view.load({ waits: true });
+    });
+    tell();
+    return h("div.slider", h("span", axis.key), slider, output);
+  }
+
+  function show() {
+    const isHistogram = view.is("pic") === "histogram";
+    setChildren(
+      pickers,
+      labelled("picture", kindPicker()),
+      !isHistogram && outputPicker(),
+      ...axisPickers(),
+      view.block && grids.length > 1 && blockPicker(),
+      mousePicker(),
+      ...(hasColourBar() ? rangeFields() : []),
+      scaleBoxes(),
+    );
+    const isShown = ({ key }) => key === view.is("x") || key === view.is("y");
+    const held = view.block ? varyingAxes(view.block).filter((axis) => !isShown(axis)) : [];
+    sliders.replaceChildren(...held.map(sliderOf));
+  }
+  return { element: h("div", pickers, sliders), show };
 }

@@ -1,321 +1,494 @@
-// @ts-check
-// A study: what its address says, the picture, and what belongs to it.
-import { h } from "/parts/dom.js";
-import { in_words, json, Silence } from "/server.js";
-import { ask, steps_to } from "./pictures.js";
-import { fill_in, varying } from "./axes.js";
-import { choice_of } from "./choice.js";
-import { condition_fields, rounded } from "./conditions.js";
-import { show_controls } from "./controls.js";
-import { drawing_of } from "./drawing.js";
-import { MapCanvas } from "./drawn/map.js";
-import { marking_of } from "./marking.js";
-import { refine_row } from "./refine.js";
-import { standing_row } from "./standing.js";
-import { row_table } from "./table.js";
-import { show_takeaways } from "./take.js";
+// A study: its picture, its points, and what they have in common: the address, a filter, a selection, a chosen point.
+import { json, retryMs } from "../api.js";
+import { CategoryLooks } from "../lib/colours.js";
+import { Chart } from "../lib/chart.js";
+import { button, h, labelled, setChildren, statusLine } from "../lib/dom.js";
+import { count, heading, shownUnit, withUnit } from "../lib/format.js";
+import { addressOf, conditionOf, joined, rounded, shownPart } from "./conditions.js";
+import { controlsOf } from "./controls.js";
+import { factsOf, sentenceOf } from "./describe.js";
+import { showExports } from "./exports.js";
+import { fillIn, pickedColumns } from "./fields.js";
+import { legendOf, spanOf } from "./legend.js";
+import { MapCanvas } from "./map.js";
+import { askPicture, askSelected, stepsTo } from "./picture.js";
+import { refineRow } from "./refine.js";
+import { modelLine, statusRow } from "./status.js";
+import { PointTable } from "./table.js";
 
-const kLookAgain_ms = 1500;
-/** After the server did not answer. */
-const kAskAgain_ms = 3000;
+const refreshEveryMs = 1500;
 
-/** @typedef {import("./pictures.js").Picture} Picture */
+/** Looks of the categories of a study's columns: they stay while the page is open. */
+const looksOfColumns = new Map();
 
-/**
- * @param {HTMLElement} root @param {import("/main.js").Place} place @param {number} id
- * @returns {Promise<import("/main.js").View>}
- */
-export async function study_view(root, place, id) {
-  const study = await json(`/api/studies/${id}`);
-  place.trail([study.name]);
-  return new StudyView(root, place, study).begin();
+function looksOf(study, column) {
+  const key = `${study.id} ${column}`;
+  if (!looksOfColumns.has(key)) looksOfColumns.set(key, new CategoryLooks());
+  return looksOfColumns.get(key);
 }
 
+export async function studyView(root, place, id) {
+  const study = await json(`/api/studies/${id}`, place.signal);
+  place.trail([study.name]);
+  return new StudyView(root, place, study);
+}
+
+/** Fields for the filter and the selection, with what the server finds wrong with them. */
+function conditionFields(view) {
+  const field = (name, text, placeholder, help) => {
+    const said = h("p", { role: "status", class: "bad said", id: `said-${name}` });
+    const take = ({ target }) => view.change({ [name]: target.value.trim() });
+    const settings = { placeholder, spellcheck: false, autocomplete: "off", onchange: take };
+    const input = h("input", { type: "search", "aria-describedby": said.id, ...settings });
+    return { said, input, label: labelled(text, input, help) };
+  };
+  const language = "A condition of the query language, as of oblique query --where";
+  const where = field(
+    "where",
+    "Filter",
+    "mu > 0.5 AND fn_peak_N > 20",
+    `${language}: others are not shown`,
+  );
+  const mark = field(
+    "mark",
+    "Select",
+    "drag with Shift, or a condition",
+    `${language}: these are marked`,
+  );
+  const keep = () => view.change({ where: joined(view.is("where"), view.is("mark")), mark: "" });
+  const buttons = h(
+    "span.buttons",
+    button("Filter to selection", keep),
+    button("Clear", () => view.change({ mark: "" })),
+  );
+  const fields = { where, mark };
+  return {
+    element: h(
+      "div.conditions",
+      h("div", where.label, where.said),
+      h("div.marks", h("div.row", mark.label, buttons), mark.said),
+    ),
+    /** Shows the conditions of the address. */
+    show() {
+      for (const [name, { input }] of Object.entries(fields)) input.value = view.is(name);
+      buttons.hidden = !view.is("mark");
+      this.say("where", "");
+      this.say("mark", "");
+    },
+    say(name, fault) {
+      fields[name].said.textContent = fault;
+      fields[name].input.setAttribute("aria-invalid", String(fault !== ""));
+    },
+  };
+}
+
+/** Lines or bars of a picture, in shown units. */
+function linesOf(view, picture) {
+  const { x, y, z, head, labels } = picture;
+  const isBars = view.is("pic") === "histogram";
+  const isLog = view.is("ylog") !== "" && !isBars;
+  const [[xUnit, xFactor], [zUnit, zFactor]] = [x, z].map((one) => shownUnit(one.name, one.unit));
+  const order = orderOf(x);
+  const valuesOf = (row) =>
+    order.map((i) => {
+      const value = isBars ? head.counts[i] : picture.values[row * x.values.length + i] * zFactor;
+      return Number.isFinite(value) && !(isLog && value <= 0) ? value : null;
+    });
+  const labelOf = (value) => (y.name ? `${y.name} = ${withUnit(value, y.name, y.unit)}` : z.name);
+  const series = Array.from(y.values, (value, row) => ({
+    label: isBars ? "all" : (labels?.[row] ?? labelOf(value)),
+    values: valuesOf(row),
+  }));
+  const { counts, cells } = view.selected ?? {};
+  if (isBars && counts) series.push({ label: "selected", values: order.map((i) => counts[i]) });
+  else if (cells) {
+    const isIn = (row, k) => cells[row * order.length + order[k]] > 0;
+    const thick = ({ label, values }, row) => ({
+      label: `${label} (selected)`,
+      values: values.map((value, k) => (isIn(row, k) ? value : null)),
+      look: row,
+      isThick: true,
+    });
+    series.push(...series.map(thick));
+  }
+  const values = order.map((i) => x.values[i] * xFactor);
+  const ends = x.edges ? [x.edges[0], x.edges.at(-1)].map((end) => end * xFactor) : undefined;
+  const inUnits = (part) =>
+    part && {
+      x: part.x.map((value) => value / xFactor),
+      y: isBars ? null : (part.y?.map((value) => value / zFactor) ?? null),
+    };
+  return {
+    title: isBars ? `Distribution of ${x.name}` : `${z.name} over ${x.name}`,
+    x: {
+      label: heading(x.name, x.unit),
+      name: x.name,
+      unit: xUnit,
+      values,
+      ends,
+      isLog: view.is("xlog") !== "" && values[0] > 0,
+    },
+    y: {
+      label: isBars ? "points" : heading(z.name, z.unit),
+      unit: isBars ? "" : zUnit,
+      isLog,
+      ends: view.hasSpan && !isBars ? spanOf(view, picture).map((end) => end * zFactor) : undefined,
+    },
+    series,
+    isBars,
+    dragSelects: view.is("drag") === "select",
+    height: 380,
+    zoom: (part) => view.zoom(inUnits(part)),
+    select: (part) => view.selectPart(inUnits(part)),
+  };
+}
+
+const orderOf = ({ values }) => [...values.keys()].sort((a, b) => values[a] - values[b]);
+
 export class StudyView {
-  /** @param {HTMLElement} root @param {import("/main.js").Place} place @param {any} study */
+  picture = null;
+  /** Which cells or points of the picture are selected, as askSelected returns it. */
+  selected = null;
+  #asked = null;
+  #askedSelected = null;
+  #wantsMore = false;
+  #isStale = false;
+  #isOld = false;
+  #isRefreshing = false;
+  #chart = null;
+
   constructor(root, place, study) {
-    this.root = root;
-    this.place = place;
-    this.study = study;
-    this.fields = place.fields;
-    /** @type {any[]} */
-    this.columns = study.columns;
-    this.numbers = this.columns.filter((c) => c.picture === "numbers");
-    this.grids = study.blocks.map((/** @type {any} */ b, /** @type {number} */ i) => ({ b, i })).filter((/** @type {any} */ one) => varying(one.b).length > 0);
-    /** @type {AbortController | null} */
-    this.asked = null;
-    /** @type {Picture | null} */
-    this.picture = null;
-    this.wants_more = false;
-    /** Something that was asked for did not come. */
-    this.is_stale = false;
-    /** Who came back goes on at the map. */
-    this.wants_focus = false;
-    /** When the last refresh came to its end. */
-    this.loaded_ms = 0;
-    /** The timer of the next refresh; 0: none. */
-    this.later = 0;
-    this.is_refreshing = false;
-    this.has_moved = false;
-    this.is_closed = false;
-    fill_in(this.fields, this.study);
+    Object.assign(this, { root, place, study, fields: place.fields });
+    this.columns = pickedColumns(study);
+    fillIn(this.fields, study);
+    ({ element: this.said, say: this.say } = statusLine());
+    this.status = statusRow(this, () => this.#refresh());
+    this.conditions = conditionFields(this);
+    this.controls = controlsOf(this);
+    this.legend = h("div.colours");
+    this.map = new MapCanvas({
+      hover: (cell) => this.#speak(cell ?? this.map.chosen),
+      choose: (cell, point) => this.choose(point ?? this.picture.point(...cell), cell),
+      open: () => this.is("cell") && place.go(this.pointAddress(this.is("cell"))),
+      zoom: (part) => this.zoom(part),
+      select: (part) => this.selectPart(part),
+    });
+    this.lines = h("div");
+    this.reading = h("p.reading", { "aria-live": "polite" });
+    this.choice = h("p.choice");
+    this.facts = h("p.weak.facts");
+    this.refine = refineRow(this);
+    this.table = new PointTable(this);
+    this.exports = h("div.commands");
+    const picture = h(
+      "section.picture",
+      { "aria-label": "Picture" },
+      this.controls.element,
+      this.legend,
+      this.map.element,
+      this.lines,
+      this.reading,
+      this.choice,
+      this.facts,
+      this.refine.element,
+    );
+    root.append(
+      h("h2.name", study.name),
+      this.status.element,
+      this.said,
+      this.conditions.element,
+      h("div.beside", picture, this.table.element),
+      h("section", h("h2", "Export"), this.exports),
+    );
+    this.#showAddress();
+    // After picture and table, as queries are answered in their order.
+    this.status.element.after(modelLine(study, place.signal));
   }
 
-  is(/** @type {string} */ name) {
+  /** A field of the address. */
+  is(name) {
     return this.fields.get(name) ?? "";
   }
-  /** @param {Record<string, string>} changes @param {boolean} [is_step] that people go back over */
-  set(changes, is_step = false) {
+
+  /** Changes fields of the address; a step is undone by the browser's Back. */
+  set(changes, isStep = false) {
     for (const [name, value] of Object.entries(changes)) {
       if (value === "") this.fields.delete(name);
       else this.fields.set(name, value);
     }
-    this.place.keep(this.fields, is_step);
+    this.place.keep(this.fields, isStep);
   }
+
+  /** The block of a grid that the picture is of; undefined: it is of columns. */
   get block() {
-    return this.study.blocks[Number(this.is("block"))];
+    const isOfGrid = ["map", "lines"].includes(this.is("pic")) && this.is("block") !== "";
+    return isOfGrid ? this.study.blocks[Number(this.is("block"))] : undefined;
   }
-  get has_map() {
-    return this.is("pic") === "map" || this.is("pic") === "gathered";
+  get hasMap() {
+    return ["map", "scatter"].includes(this.is("pic"));
   }
-  /** @param {number} point */
-  address_of(point) {
+  /** Whether the address says what colours span, or the axis of lines. */
+  get hasSpan() {
+    return ["from", "to"].some(
+      (end) => this.is(end) !== "" && Number.isFinite(Number(this.is(end))),
+    );
+  }
+  /** Numbers of the values at which other axes are held. */
+  places() {
+    const held = this.is("at")
+      .split(",")
+      .filter((one) => one.includes("@"));
+    return new Map(held.map((one) => one.split("@")).map(([key, number]) => [key, Number(number)]));
+  }
+  columnOf(name) {
+    return this.study.columns.find((one) => one.name === name);
+  }
+  unitOf(name) {
+    const keys = [...this.study.blocks.flatMap((block) => block.axes), ...this.study.model];
+    return (this.columnOf(name) ?? keys.find(({ key }) => key === name))?.unit ?? "";
+  }
+  pointAddress(point) {
     return `#/study/${this.study.id}/point/${point}`;
   }
-  /** Numbers of the values at which the other axes are held. @returns {Map<string, number>} */
-  places() {
-    const held = this.is("at").split(",").filter((text) => text.includes("@")).map((one) => one.split("@"));
-    return new Map(held.map(([key, number]) => [key, Number(number)]));
-  }
-  unit_of = (/** @type {string} */ key) => this.columns.find((c) => c.name === key)?.unit
-    ?? [...this.study.blocks.flatMap((/** @type {any} */ b) => b.axes), ...this.study.model].find((/** @type {any} */ a) => a.key === key)?.unit ?? "";
-
-  begin() {
-    this.said = h("p", { role: "status", class: "said" });
-    this.standing = standing_row(this, () => this.#look_again());
-    this.conditions = condition_fields(this);
-    this.controls = h("div", { class: "controls" });
-    this.sliders = h("div", { class: "sliders" });
-    this.colour_row = h("div", {});
-    this.commands = h("div", { class: "commands" });
-    this.map = new MapCanvas({
-      hover: (cell) => this.choice.speak(cell ?? this.map.chosen),
-      choose: (cell, point) => this.choice.choose(cell, point),
-      open: (cell) => this.choice.open(cell),
-      zoom: (part) => this.zoom(part),
-      mark: (part, is_further) => this.marking.mark_part(part, is_further),
-    });
-    this.map.let_drag(this.is("drag") === "mark" ? "mark" : "zoom");
-    this.drawing = drawing_of(this);
-    this.marking = marking_of(this);
-    this.choice = choice_of(this);
-    this.refine = refine_row(this);
-    this.table = row_table({ study: this.study.id, points: this.study.points, columns: () => this.row_columns(),
-      where: () => this.is("where"), marked: () => this.is("mark"),
-      all: () => this.is("all") !== "", keep_all: (all) => {
-        this.set({ all: all ? "1" : "" });
-        show_takeaways(this);
-      },
-      // People count pages from 1.
-      page: () => Math.max(Math.floor(Number(this.is("page"))) || 1, 1) - 1, keep_page: (page) => this.set({ page: page > 0 ? String(page + 1) : "" }),
-      order: () => this.is("order"), keep_order: (order) => { this.set({ order }); show_takeaways(this); },
-      wrong: (error) => this.complain(error), chosen: (point) => this.choice.choose_point(point) });
-    this.choice.speak(null);
-    this.root.append(h("h2", { class: "name" }, this.study.name), this.standing.element, this.said, this.conditions.element,
-      h("div", { class: "beside" },
-        h("section", { class: "picture", "aria-label": "Picture" }, this.controls, this.sliders, this.map.element, this.drawing.lines_place,
-          this.choice.spoken, this.choice.line, this.refine.element, this.drawing.legend, this.colour_row, this.drawing.told),
-        this.table.element),
-      h("section", {}, h("h2", {}, "Take it with you"), this.commands));
-    show_controls(this);
-    this.load();
-    this.table.load();
-    this.conditions.tell();
-    return this;
+  /** The part that the picture is zoomed into, as conditions on x and y. */
+  shownParts() {
+    if (!this.picture) return [];
+    return ["x", "y"].map((name) => shownPart(this.picture[name], this.is(`${name}0`) !== ""));
   }
 
-  /** Another view of the same study, as by the browser's Back. @param {URLSearchParams} fields */
-  go_to(fields) {
+  /** Another address of the same study. */
+  goTo(fields) {
     this.fields = fields;
-    fill_in(this.fields, this.study);
+    fillIn(this.fields, this.study);
     this.say("");
-    this.map.let_drag(this.is("drag") === "mark" ? "mark" : "zoom");
-    this.choice.none();
-    show_controls(this);
+    this.#showAddress();
+  }
+  #showAddress() {
+    this.map.dragSelects = this.is("drag") === "select";
+    this.conditions.show();
+    this.controls.show();
     this.load();
     this.table.load();
-    this.conditions.tell();
   }
-
-  close() {
-    this.is_closed = true;
-    this.standing.close();
-    this.stop_asking();
-    this.table.close();
-    this.conditions.close();
-    this.map.close();
-    this.drawing.end();
-  }
-
-  /** The server did not answer, and does again. */
-  again() {
-    if (!this.is_stale || this.is_closed) return;
-    this.is_stale = false;
-    this.say("");
-    this.load();
-    this.table.load();
-    this.conditions.tell(true);
-  }
-
-  focus() {
-    this.wants_focus = true;
-  }
-
-  /** @param {any} now */
   take(now) {
-    this.standing.take(now);
+    this.status.take(now);
+  }
+  reconnected() {
+    if (!this.#isStale || this.place.signal.aborted) return;
+    this.#isStale = false;
+    this.say("");
+    this.load();
+    this.table.load();
+  }
+  close() {
+    this.#asked?.abort();
+    this.#askedSelected?.abort();
+    this.table.close();
+    this.map.close();
+    this.#chart?.close();
   }
 
-  /** Points were solved since. Where answers take longer than points one refresh ends before the next begins, or none would end. */
-  #look_again() {
-    if (this.is_closed) return;
-    this.has_moved = true;
-    if (this.later || this.is_refreshing) return;
-    this.later = setTimeout(async () => {
-      this.later = 0;
-      this.has_moved = false;
-      this.is_refreshing = true;
-      await Promise.allSettled([this.load(true), this.conditions.tell(true), this.table.again()]);
-      await this.marked;
-      this.is_refreshing = false;
-      this.loaded_ms = performance.now();
-      if (this.has_moved) this.#look_again();
-    }, Math.max(kLookAgain_ms - (performance.now() - this.loaded_ms), 0));
+  /** Shows an error: beside the condition that the server refuses, if it is one. */
+  complain(error, condition = "") {
+    if (error.isSilence) {
+      if (!this.#isStale) setTimeout(() => this.reconnected(), retryMs);
+      this.#isStale = true;
+      this.say("The server does not answer: the last answer is shown.", true);
+    } else if (error.status === 400 && condition && this.is(condition)) {
+      this.conditions.say(condition, error.message);
+    } else {
+      this.say(error.message, true);
+    }
   }
 
-  /** @param {string | (string | Node)[]} what */
-  say(what, is_bad = false) {
-    this.said.replaceChildren(...(typeof what === "string" ? [what] : what));
-    this.said.className = is_bad ? "said bad" : "said";
+  /** New results have come: picture and table are loaded again, one refresh after the other. */
+  async #refresh() {
+    this.#isOld = true;
+    if (this.#isRefreshing) return;
+    this.#isRefreshing = true;
+    while (this.#isOld && !this.place.signal.aborted) {
+      await new Promise((resolve) => setTimeout(resolve, refreshEveryMs));
+      this.#isOld = false;
+      await Promise.allSettled([
+        this.load({ waits: true, isRefresh: true }),
+        this.table.load(true),
+      ]);
+    }
+    this.#isRefreshing = false;
   }
-  /** What a condition is refused for stands beside its field, and is not said again. @param {any} error */
-  async complain(error) {
-    if (in_words(error) instanceof Silence) {
-      if (!this.is_stale) setTimeout(() => this.again(), kAskAgain_ms);
-      this.is_stale = true;
-      this.say("The server does not answer: what is shown is what came last.", true);
+
+  /** Loads the picture. What is under way is given up, or waited for, so that a slider that moves shows pictures. */
+  async load({ waits = false, isRefresh = false } = {}) {
+    if (this.#asked && waits) {
+      this.#wantsMore = true;
       return;
     }
-    if (error.status === 400 && await this.conditions.is_wrong()) return;
-    this.say(String(error.message), true);
-  }
-
-  row_columns() {
-    /** @type {string[]} */
-    const usual = this.study.usual_columns;
-    const outputs = usual.indexOf("status");
-    const keys = new Set(usual.slice(0, outputs));
-    if (/\b(error|status)\b/.test(`${this.is("where")} ${this.is("mark")}`)) keys.add("error");
-    for (const key of [this.is("x"), this.is("y"), this.is("z")]) {
-      if (this.columns.some((c) => c.name === key)) keys.add(key);
-    }
-    return [...new Set([...keys, ...usual.slice(outputs)])];
-  }
-
-  stop_asking() {
-    clearTimeout(this.later);
-    this.later = 0;
-    this.has_moved = this.wants_more = false;
-    this.asked?.abort();
-    this.marking.stop();
-  }
-
-  /**
-   * Asks for the picture. What is under way ends, because it would not be seen; what repeats itself waits for it, or it
-   * would never end. Only the last of what is asked for meanwhile comes.
-   */
-  async load(waits = false) {
-    if (this.asked) {
-      this.wants_more = true;
-      if (!waits) this.asked.abort();
-      return;
-    }
-    this.asked = new AbortController();
-    const { signal } = this.asked;
-    const kind = this.is("pic");
+    this.#asked?.abort();
+    const asked = (this.#asked = new AbortController());
+    this.#wantsMore = false;
+    const begun = performance.now();
     try {
-      const begun = performance.now();
-      for (const cells of steps_to(this)) {
-        if (this.wants_more) break;  // the finer one would not be seen
-        const picture = await ask(this, cells, signal);
-        if (signal.aborted) break;
-        this.loaded_ms = performance.now();
-        this.show(picture, kind);
-        this.root.dataset.pictureMs = String(Math.round(performance.now() - begun));
+      for (const cells of stepsTo(this, isRefresh)) {
+        const picture = await askPicture(this, cells, asked.signal);
+        if (asked.signal.aborted || this.place.signal.aborted) return;
+        this.#show(picture);
+        this.root.dataset.pictureMs = Math.round(performance.now() - begun);
+        if (this.#wantsMore) break;
       }
+      this.conditions.say("where", "");
       if (this.said.className.includes("bad")) this.say("");
     } catch (error) {
-      if (!signal.aborted) this.complain(error);
-    } finally {
-      this.asked = null;
+      if (asked.signal.aborted) return;
+      this.complain(error, "where");
     }
-    if (this.wants_more) {
-      this.wants_more = false;
-      this.load();
-    }
+    this.#asked = null;
+    if (this.#wantsMore) await this.load();
+    else await this.#loadSelected();
   }
 
-  /** @param {Picture} picture @param {string} kind what it was asked for as */
-  show(picture, kind) {
-    if (kind !== this.is("pic")) return;
+  #show(picture) {
     this.picture = picture;
-    this.marking.forget();
-    this.map.element.hidden = this.choice.spoken.hidden = this.choice.line.hidden = !this.has_map;
-    this.drawing.draw();
-    this.choice.again();
-    if (this.wants_focus && this.has_map) this.map.top.focus({ preventScroll: true });
-    this.wants_focus = false;
+    this.selected = null;
+    looksOf(this.study, picture.z.name).assign(picture.dictionary);
+    this.map.element.hidden = this.reading.hidden = this.choice.hidden = !this.hasMap;
+    this.draw();
+    this.#showChoice();
     this.refine.offer();
-    this.marked = this.marking.load();
-    show_takeaways(this);
+    this.table.load(); // if the part that is shown is another
   }
 
-  /** @param {import("./drawn/map.js").Rectangle | null} part */
+  /** Draws the picture with the colours and scales of the address. */
+  draw() {
+    const { picture } = this;
+    if (!picture) return;
+    if (this.hasMap) {
+      this.#chart?.close();
+      this.#chart = null;
+      this.lines.replaceChildren();
+      this.map.show(picture, this.#look(), this.selected);
+    } else {
+      this.#drawLines();
+    }
+    setChildren(this.legend, ...(this.hasMap ? legendOf(this, this.#look()) : []));
+    const isPart = this.is("x0") || this.is("y0") || (this.is("pic") === "lines" && this.hasSpan);
+    const showAll = isPart && button("Show all", () => this.zoom(null));
+    setChildren(this.facts, factsOf(this), showAll && " Zoomed. ", showAll);
+    showExports(this);
+  }
+  #look() {
+    const [from, to] = spanOf(this, this.picture);
+    const looks = looksOf(this.study, this.picture.z.name);
+    return {
+      from,
+      to,
+      zLog: this.is("zlog") !== "" && from > 0,
+      xLog: this.is("xlog") !== "",
+      yLog: this.is("ylog") !== "",
+      categories: this.picture.dictionary.map(({ text }) => looks.of(text)),
+    };
+  }
+  #drawLines() {
+    const lines = linesOf(this, this.picture);
+    if (!this.#chart?.update(lines)) {
+      const hadFocus = this.lines.contains(document.activeElement);
+      this.#chart?.close();
+      this.#chart = new Chart(lines);
+      this.lines.replaceChildren(this.#chart.element);
+      if (hadFocus) this.#chart.place.focus({ preventScroll: true });
+    }
+  }
+  /** The picture as pngOf draws it. */
+  figure() {
+    const title = this.study.name;
+    if (this.hasMap) return { title, canvas: this.map.base, legend: this.legend };
+    return { ...this.#chart.figure(), title: `${title}: ${this.#chart.lines.title}` };
+  }
+
+  /** Changes the filter or the selection. */
+  change(conditions) {
+    this.set({ ...conditions, page: "" }, true);
+    this.say("");
+    this.conditions.show();
+    this.table.load();
+    if ("where" in conditions) this.load();
+    else this.#loadSelected();
+  }
+  /** Selects the points that meet a condition; null: none. */
+  select(condition) {
+    if ((condition ?? "") !== this.is("mark")) this.change({ mark: condition ?? "" });
+  }
+  /** Selects the points in a part of the picture; null: none. */
+  selectPart(part) {
+    const { picture, study, hasMap } = this;
+    this.select(part && picture ? conditionOf(study.blocks, picture, part, hasMap) : null);
+  }
+  async #loadSelected() {
+    this.#askedSelected?.abort();
+    const { picture } = this;
+    const condition = this.is("mark");
+    if (!picture || (!condition && !this.selected)) return;
+    const { signal } = (this.#askedSelected = new AbortController());
+    try {
+      const selected = condition ? await askSelected(this, picture, condition, signal) : null;
+      if (signal.aborted || picture !== this.picture) return;
+      this.selected = selected;
+      this.conditions.say("mark", "");
+      this.draw();
+      this.root.dataset.selected = condition;
+    } catch (error) {
+      if (!signal.aborted) this.complain(error, "mark");
+    }
+  }
+
+  /** Shows a part of the picture; null: all of it. */
   zoom(part) {
     const { picture } = this;
     if (!picture) return;
-    if (!part) {
-      this.set({ x0: "", x1: "", y0: "", y1: "", ...(this.is("pic") === "lines" ? { from: "", to: "" } : {}) }, true);
-    } else {
-      const ends = (/** @type {import("./pictures.js").Side} */ side, /** @type {number[]} */ cells, /** @type {number[]} */ values) => (side.edges
-        ? values : cells.map((i) => side.numbers?.[i] ?? 0)).sort((a, b) => a - b).map(String);
-      const [x0, x1] = ends(picture.x, [part.from[0], part.to[0]], part.x);
-      const [y0, y1] = ends(picture.y, [part.from[1], part.to[1]], part.y);
-      this.set({ x0, x1, y0, y1 }, true);
+    const zoomed = { x0: "", x1: "", y0: "", y1: "", page: "" };
+    const isLines = this.is("pic") === "lines";
+    if (!part && isLines) Object.assign(zoomed, { from: "", to: "" });
+    if (part) {
+      [zoomed.x0, zoomed.x1] = addressOf(picture.x, part.x);
+      if (!this.hasMap && zoomed.x0 === zoomed.x1) return; // one value is no line
+      if (this.hasMap) [zoomed.y0, zoomed.y1] = addressOf(picture.y, part.y);
+      const width = part.y ? part.y[1] - part.y[0] : 0;
+      if (isLines && part.y)
+        [zoomed.from, zoomed.to] = part.y.map((end) => String(rounded(end, width)));
     }
-    this.map.choose(null);
+    this.set(zoomed, true);
     this.load();
+    this.table.load();
   }
 
-  /** @param {import("/parts/lines.js").Part | null} part of lines or of a histogram */
-  zoom_lines(part) {
+  #speak(cell) {
+    const isThere =
+      cell && this.picture && !this.picture.dots && cell[0] < this.picture.x.values.length;
+    this.reading.textContent = isThere ? sentenceOf(this.picture, cell) : "";
+  }
+  /** Chooses a point: it is marked in picture and table, and can be opened. */
+  choose(point, cell = this.#cellOf(point)) {
+    this.map.choose(cell, this.picture?.dots ? point : null);
+    this.#speak(cell);
+    this.set({ cell: point === null ? "" : String(point) });
+    this.table.choose(point);
+    const link = (text) => h("a.button", { href: this.pointAddress(point) }, text);
+    setChildren(this.choice, point !== null && link(`Open point ${count(point)}`));
+  }
+  #showChoice() {
+    if (this.is("cell")) this.choose(Number(this.is("cell")));
+    else if (!this.map.chosen || this.picture.x.edges) this.choose(null, null);
+  }
+  /** The cell of a point in the picture; null: it has none. */
+  #cellOf(point) {
     const { picture } = this;
-    if (!picture) return;
-    if (!part) {
-      this.zoom(null);
-      return;
+    if (!picture || point === null) return null;
+    const { x, y, head } = picture;
+    if (!head.x?.stride) return null;
+    for (let row = 0; row < y.values.length; ++row) {
+      const column = (point - picture.point(0, row)) / head.x.stride + x.numbers[0];
+      const found = x.numbers.indexOf(column);
+      if (found >= 0) return [found, row];
     }
-    const { values, numbers, edges } = picture.x;
-    if (edges) {
-      const [from, to] = part.x.map((one) => rounded(one, edges[edges.length - 1] - edges[0]));
-      if (to > from) this.set({ x0: String(from), x1: String(to) }, true);
-    } else {
-      const inside = [...values.keys()].filter((i) => values[i] >= part.x[0] && values[i] <= part.x[1]).map((i) => numbers?.[i] ?? 0);
-      if (inside.length < 2) return;  // one value is no line
-      const wide = part.y ? part.y[1] - part.y[0] : 0;
-      this.set({ x0: String(Math.min(...inside)), x1: String(Math.max(...inside)),
-        ...(part.y ? { from: String(rounded(part.y[0], wide)), to: String(rounded(part.y[1], wide)) } : {}) }, true);
-    }
-    this.load();
+    return null;
   }
 }

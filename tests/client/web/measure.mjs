@@ -1,52 +1,63 @@
-// How long people wait: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]. Of a database a copy is worked on; PAGE is the
-// address of a server, with its token. The largest grid of which a tenth is solved is looked at. PARTs are opening, modes, scatter, slider,
-// solving and large; all when none is named. OBLIQUE_FIGURES=FILE gets the times as JSON as well. All is seen from the
-// browser: from the click to what is painted.
+// Times that readers wait, from the click to what is painted: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]. Of a
+// database a copy is worked on; PAGE is the address of a server, with its token. The largest grid of which a tenth is solved
+// is looked at. PARTs are opening, modes, scatter, slider and large; all when none is named. OBLIQUE_FIGURES=FILE gets the
+// times as JSON as well.
 import { constants, copyFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Browser, Server, until } from "./browser.mjs";
 
-const kOpened = 20;
-const kSlides = 60;
-const kSolved = 5;
-
 const [given, ...parts] = process.argv.slice(2);
 if (!given) {
-  console.error("measure.mjs: name a database, as one of a study of 10^6 points on a grid of three axes, or the address of a page");
+  console.error("measure.mjs: name a database with a grid of three axes, or the address of a page");
   process.exit(2);
 }
-const is_page = given.startsWith("http://");
-const server = is_page ? { address: given, origin: new URL(given).origin } : new Server(join(process.env.OBLIQUE_BIN, "oblique"));
+const isPage = given.startsWith("http://");
+const server = isPage
+  ? { address: given, origin: new URL(given).origin }
+  : new Server(join(process.env.OBLIQUE_BIN, "oblique"));
 const browser = new Browser();
 const figures = {};
-const at = (sorted, share) => sorted[Math.min(Math.ceil(share * sorted.length) - 1, sorted.length - 1)];
+
 function say(part, what, times, wanted) {
   figures[part] = times;
   const sorted = [...times].sort((a, b) => a - b);
-  console.log(`${what.padEnd(44)} median ${at(sorted, 0.5).toFixed(0).padStart(5)} ms, 95 % ${at(sorted, 0.95).toFixed(0).padStart(5)} ms, `
-    + `first ${times[0].toFixed(0).padStart(5)} ms, of ${times.length}; wanted ${wanted} ms`);
+  const at = (share) => sorted[Math.min(Math.ceil(share * sorted.length) - 1, sorted.length - 1)];
+  const [median, most, first] = [at(0.5), at(0.95), times[0]].map((ms) => ms.toFixed(0));
+  console.log(
+    `${what}: median ${median} ms, 95 % ${most} ms, first ${first} ms, wanted ${wanted} ms`,
+  );
 }
 
-/** From the start of a navigation to the first picture that is painted. */
-async function opened(view) {
-  const page = await browser.open(view, { early: () => {
-    const watch = new MutationObserver(() => {
-      if (window.painted_ms || !document.querySelector("[data-picture-ms]")) return;
-      window.painted_ms = -1;
-      requestAnimationFrame(() => setTimeout(() => { window.painted_ms = performance.now(); }));
+/** Run in a tab before its scripts: painted_ms is when the first picture was painted, `next` when the next one is. */
+function watchPictures() {
+  const painted = () =>
+    new Promise((resolve) =>
+      requestAnimationFrame(() => setTimeout(() => resolve(performance.now()))),
+    );
+  window.next = () =>
+    new Promise((resolve) => {
+      const watch = new MutationObserver(() => {
+        if (!document.querySelector("[data-picture-ms]")) return;
+        watch.disconnect();
+        painted().then(resolve);
+      });
+      const attributeFilter = ["data-picture-ms"];
+      watch.observe(document, {
+        subtree: true,
+        childList: true,
+        attributes: true,
+        attributeFilter,
+      });
     });
-    watch.observe(document, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-picture-ms"] });
-  } });
-  const painted = await until(page, () => (window.painted_ms > 0 ? window.painted_ms : 0));
-  return { page, painted };
+  window.next().then((ms) => (window.paintedMs = ms));
 }
 
 async function opening(part, what, view) {
-  const { page, painted } = await opened(view);
-  const times = [painted];
-  while (times.length < kOpened) {
+  const page = await browser.open(view, { early: watchPictures });
+  const times = [await until(page, () => window.paintedMs)];
+  while (times.length < 20) {
     await page.reload();
-    times.push(await until(page, () => (window.painted_ms > 0 ? window.painted_ms : 0)));
+    times.push(await until(page, () => window.paintedMs));
   }
   say(part, what, times, 500);
   await page.close();
@@ -54,79 +65,72 @@ async function opening(part, what, view) {
 
 /** Each step of a slider, from its event to the picture that is painted. */
 async function sliding(view) {
-  const { page } = await opened(view);
-  const times = await page.evaluate(async (slides) => {
+  const page = await browser.open(view, { early: watchPictures });
+  await until(page, () => window.paintedMs);
+  const times = await page.evaluate(async () => {
     const slider = document.querySelector(".sliders input");
-    const root = document.querySelector("[data-picture-ms]");
     const found = [];
-    for (let i = 0; i < slides; ++i) {
-      slider.value = String(Math.round((Number(slider.max) * ((i * 37) % slides)) / slides));
+    for (let i = 0; i < 60; ++i) {
+      slider.value = String(Math.round((Number(slider.max) * ((i * 37) % 60)) / 60));
+      delete document.querySelector("[data-picture-ms]").dataset.pictureMs;
       const begun = performance.now();
-      const painted = new Promise((take) => {
-        const watch = new MutationObserver(() => {
-          watch.disconnect();
-          requestAnimationFrame(() => setTimeout(() => take(performance.now())));
-        });
-        watch.observe(root, { attributes: true, attributeFilter: ["data-picture-ms"] });
-      });
+      const painted = window.next();
       slider.dispatchEvent(new Event("input"));
-      root.dataset.slid = String(i);
-      found.push(await painted - begun);
-    }
-    return found;
-  }, kSlides);
-  say("slider", "slider to repaint", times, 100);
-  const slices = await page.evaluate(async () => {
-    const asked = performance.getEntriesByType("resource").map((one) => one.name).filter((name) => name.includes("/slice?")).at(-1);
-    const found = [];
-    for (let i = 0; i < 30; ++i) {
-      const begun = performance.now();
-      await (await fetch(asked.replace(/n([xy])=\d+/g, "n$1=256"))).arrayBuffer();
-      found.push(performance.now() - begun);
+      found.push((await painted) - begun);
     }
     return found;
   });
-  say("slice", "a slice of 256 × 256 at most", slices, 60);
+  say("slider", "slider to repaint", times, 100);
   await page.close();
 }
 
 /** A study of 10^9 points, of which some are solved. */
-async function begin_large(page) {
-  return page.evaluate(async () => {
+const beginLarge = (page) =>
+  page.evaluate(async () => {
     const axis = (key, from, to) => ({ key, from, to, count: 1000 });
-    const body = { name: `measured-${Date.now()}`, model: { preset: "paper" }, recipe: { blocks: [{ axes: [axis("H", 0.2, 1.1), axis("mu", 0.1, 2), axis("e", 0.5, 1)] }] } };
-    const { id } = await (await fetch("/api/studies", { method: "POST", body: JSON.stringify(body) })).json();
-    await new Promise((go_on) => setTimeout(go_on, 3000));
-    await fetch(`/api/studies/${id}/pause`, { method: "POST", body: "{}" });
+    const axes = [axis("H", 0.2, 1.1), axis("mu", 0.1, 2), axis("e", 0.5, 1)];
+    const body = {
+      name: `measured-${Date.now()}`,
+      model: { preset: "paper" },
+      recipe: { blocks: [{ axes }] },
+    };
+    const post = (path, text) => fetch(path, { method: "POST", body: text });
+    const { id } = await (await post("/api/studies", JSON.stringify(body))).json();
+    await new Promise((resolve) => setTimeout(resolve, 3000));
+    await post(`/api/studies/${id}/pause`, "{}");
     return id;
   });
-}
 
 async function measure() {
   const page = await browser.open("#/");
-  const studies = await page.evaluate(async () => (await (await fetch("/api/studies?limit=1000")).json()).studies);
-  const study = studies.filter((one) => one.solved * 10 >= one.points).sort((a, b) => b.points - a.points)[0];
+  const list = () => fetch("/api/studies?limit=1000").then((answer) => answer.json());
+  const { studies } = await page.evaluate(list);
+  const solved = studies.filter((one) => one.solved * 10 >= one.points);
+  const study = solved.sort((a, b) => b.points - a.points)[0];
   console.log(`${study.name}: ${study.points} points, ${study.solved} solved`);
   const view = `#/study/${study.id}`;
   const all = {
-    opening: () => opening("opening", "from opening the study to its first picture", view),
+    opening: () => opening("opening", "opening a study", view),
     modes: () => opening("modes", "the same of modes", `${view}?pic=map&z=mode`),
-    scatter: () => opening("scatter", "the same of a scatter", `${view}?pic=gathered&x=mu&y=fn_peak_N`),
+    scatter: () =>
+      opening("scatter", "the same of a scatter", `${view}?pic=scatter&x=mu&y=fn_peak_N`),
     slider: () => sliding(view),
-    large: async () => opening("large", "the same of 10^9 points, some solved", `#/study/${await begin_large(page)}`),
+    large: async () =>
+      opening("large", "the same of 10^9 points", `#/study/${await beginLarge(page)}`),
   };
   for (const part of parts.length > 0 ? parts : Object.keys(all)) await all[part]();
 }
 
 try {
-  if (!is_page) {
+  if (!isPage) {
     copyFileSync(given, server.database, constants.COPYFILE_FICLONE);
     await server.start();
   }
   await browser.start(server);
   await measure();
-  if (process.env.OBLIQUE_FIGURES) writeFileSync(process.env.OBLIQUE_FIGURES, JSON.stringify(figures));
+  if (process.env.OBLIQUE_FIGURES)
+    writeFileSync(process.env.OBLIQUE_FIGURES, JSON.stringify(figures));
 } finally {
   await browser.stop();
-  if (!is_page) await server.stop();
+  if (!isPage) await server.stop();
 }

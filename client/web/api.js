@@ -1,0 +1,82 @@
+// Requests to the server; server/web/page/README.md describes every path and field.
+
+export const retryMs = 3000;
+
+/** Errors have the status of a refusal, or isSilence if there was no answer. */
+const failure = (text, fields) => Object.assign(new Error(text), fields);
+
+async function request(path, options) {
+  let answer;
+  try {
+    answer = await fetch(path, options);
+  } catch (error) {
+    if (options.signal?.aborted) throw error;
+    throw failure("The server does not answer.", { isSilence: true });
+  }
+  if (answer.ok) return answer;
+  const { error } = await answer.json().catch(() => ({}));
+  throw failure(error ?? `${answer.status} ${answer.statusText}`, { status: answer.status });
+}
+
+export const json = async (path, signal) => (await request(path, { signal })).json();
+
+export const rowsPath = (study, query) =>
+  `/api/studies/${study}/rows?${new URLSearchParams(query)}`;
+
+/** Rows of a study: columns, units, rows. */
+export const rows = (study, query, signal) => json(rowsPath(study, query), signal);
+
+/** Posts a change. */
+export async function post(path, body = {}, signal = undefined) {
+  const headers = { "Content-Type": "application/json" };
+  return (
+    await request(path, { method: "POST", signal, body: JSON.stringify(body), headers })
+  ).json();
+}
+
+/** Numbers behind a head: the head, all bytes, and where the numbers begin. */
+export async function numbers(path, signal) {
+  const bytes = await (await request(path, { signal })).arrayBuffer();
+  const length = new DataView(bytes).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
+  return { head, bytes, begin: 4 + length };
+}
+
+export const session = () => json("/api/session");
+
+/** Follows the server's overview while the page is visible. */
+export function follow({ take, say, reconnected }) {
+  let source = null;
+  let timer = 0;
+  let isSilent = false;
+  const close = () => {
+    clearTimeout(timer);
+    source?.close();
+    source = null;
+  };
+  const open = () => {
+    if (document.hidden) close();
+    if (document.hidden || source) return;
+    source = new EventSource("/api/events");
+    source.addEventListener("overview", (event) => take(JSON.parse(event.data)));
+    source.addEventListener("open", () => {
+      if (isSilent) reconnected();
+      isSilent = false;
+    });
+    source.addEventListener("error", () => {
+      isSilent = true;
+      say("The server does not answer; trying again.");
+      if (source?.readyState !== EventSource.CLOSED) return;
+      close(); // browsers do not try again after a refusal
+      session().then(
+        (told) => told.may_look || say(`The server was restarted: ${told.how_to_enter}.`),
+        () => {},
+      );
+      timer = setTimeout(open, retryMs);
+    });
+  };
+  document.addEventListener("visibilitychange", open);
+  addEventListener("pagehide", close);
+  addEventListener("pageshow", open);
+  open();
+}

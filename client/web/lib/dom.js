@@ -1,0 +1,128 @@
+// Elements in one expression. Texts become text nodes, so nothing that a server sends is read as HTML.
+
+const attributes = ["role", "for", "list", "scope"];
+
+/**
+ * Makes an element of "TAG.CLASS...". Settings, which may be left out, are properties; those that start with "on" are
+ * listeners, those with a dash and `attributes` are attributes. Children that are null, undefined or false are left out.
+ */
+export function h(selector, ...given) {
+  const [tag, ...classes] = selector.split(".");
+  const hasSettings = given[0]?.constructor === Object;
+  const [settings, ...children] = hasSettings ? given : [{}, ...given];
+  const element = document.createElement(tag);
+  if (classes.length > 0) element.className = classes.join(" ");
+  for (const [name, value] of Object.entries(settings)) {
+    if (value === undefined || value === null) continue;
+    if (name === "class") element.className = value;
+    else if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name.includes("-") || attributes.includes(name)) element.setAttribute(name, value);
+    else element[name] = value;
+  }
+  element.append(...children.filter(isShown));
+  return element;
+}
+
+const isShown = (child) => child !== null && child !== undefined && child !== false;
+
+/** A line that says what happened: {element, say}. */
+export function statusLine() {
+  const element = h("p.said", { role: "status" });
+  const say = (text, isBad = false) => {
+    element.textContent = text;
+    element.classList.toggle("bad", isBad);
+  };
+  return { element, say };
+}
+
+/** A field with its label above it; `help` is shown as a tooltip. */
+export const labelled = (name, field, help) =>
+  h("label.field", { title: help }, h("span", name), field);
+
+export const button = (text, onclick, settings = {}) =>
+  h("button", { type: "button", onclick, ...settings }, text);
+
+/** Choices are [value, text, group] or values that are their text; an empty or missing group is none. */
+export function picker(choices, chosen, pick) {
+  const select = h("select", { onchange: () => pick(select.value) });
+  let parent = select;
+  for (const choice of choices) {
+    const [value, text = value, group = ""] = [choice].flat();
+    if (group !== (parent.label ?? "")) {
+      parent = group ? h("optgroup", { label: group }) : select;
+      if (group) select.append(parent);
+    }
+    parent.append(h("option", { value }, text));
+  }
+  select.value = chosen;
+  return select;
+}
+
+export function checkbox(name, checked, toggle) {
+  const box = h("input", { type: "checkbox", checked, onchange: () => toggle(box.checked) });
+  return h("label.tick", box, name);
+}
+
+/** A button that copies a text. */
+export function copyButton(label, text, settings = {}) {
+  const copy = async (event) => {
+    const done = navigator.clipboard?.writeText(text());
+    event.target.textContent = await Promise.resolve(done ?? Promise.reject()).then(
+      () => "Copied",
+      () => "Copy it by hand",
+    );
+  };
+  return button(label, copy, settings);
+}
+
+/** A command line with a button that copies it; `name` says of what it is. */
+export const command = (name, text) =>
+  h(
+    "div.copied",
+    h("code", { tabIndex: 0 }, text),
+    copyButton("Copy", () => text, { "aria-label": `Copy the command of ${name}` }),
+  );
+
+const focusable = "a[href], button, input, select, [tabindex]";
+const containers = ["THEAD", "TBODY", "TR"];
+// Their state is no attribute, so that equal ones may show something else.
+const withState = "input, select, canvas";
+
+/**
+ * Changes the children of an element to these. Children that are equal stay, so that a button is not replaced while it is
+ * pressed; the focus stays at its place among the controls of the element.
+ */
+export function setChildren(element, ...children) {
+  const place = [...element.querySelectorAll(focusable)].indexOf(document.activeElement);
+  replaceChanged(
+    element,
+    children.filter(isShown).map((one) => (typeof one === "string" ? new Text(one) : one)),
+  );
+  if (place < 0 || element.contains(document.activeElement)) return;
+  const controls = element.querySelectorAll(focusable);
+  controls[Math.min(place, controls.length - 1)]?.focus({ preventScroll: true });
+}
+
+function replaceChanged(element, children) {
+  children.forEach((child, i) => {
+    const old = element.childNodes[i];
+    if (!old) {
+      element.append(child);
+    } else if (old.nodeName === child.nodeName && containers.includes(child.nodeName)) {
+      for (const { name, value } of child.attributes) old.setAttribute(name, value);
+      replaceChanged(old, [...child.childNodes]);
+    } else if (!old.isEqualNode(child) || child.querySelector?.(withState)) {
+      old.replaceWith(child);
+    }
+  });
+  while (element.childNodes.length > children.length) element.lastChild.remove();
+}
+
+/** Saves text or a Blob as a file. */
+export function saveFile(name, content, type = "text/csv;charset=utf-8") {
+  const address = URL.createObjectURL(
+    content instanceof Blob ? content : new Blob([content], { type }),
+  );
+  h("a", { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10_000);
+}

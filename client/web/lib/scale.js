@@ -1,0 +1,71 @@
+// From values to places and back, linear or logarithmic, and round values for ticks.
+
+const identity = (value) => value;
+
+/** Places run from 0 at `from` to 1 at `to`. */
+export function scale(from, to, isLog) {
+  const [inner, outer] = isLog ? [Math.log, Math.exp] : [identity, identity];
+  const start = inner(from);
+  const width = inner(to) - start || 1;
+  return {
+    from,
+    to,
+    isLog,
+    place: (value) => (inner(value) - start) / width,
+    value: (place) => outer(start + place * width),
+  };
+}
+
+/** The smallest and largest number; null: there is none. */
+export function endsOf(values) {
+  let [least, most] = [Infinity, -Infinity];
+  for (const value of values) {
+    if (typeof value !== "number" || Number.isNaN(value)) continue;
+    if (value < least) least = value;
+    if (value > most) most = value;
+  }
+  return least <= most ? [least, most] : [null, null];
+}
+
+/** About `wanted` round values. */
+export function ticks({ from, to, isLog }, wanted) {
+  const [least, most] = [Math.min(from, to), Math.max(from, to)];
+  const width = most - least;
+  // Steps of a range of a few ulps would not move on.
+  if (!(width < Infinity && width > 1e-12 * Math.max(Math.abs(least), Math.abs(most))))
+    return [least];
+  if (isLog && most / least >= 8) return logTicks(least, most, wanted);
+  const rough = width / Math.max(wanted, 1);
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].find((digit) => digit * power >= rough * 0.67) * power;
+  const first = Math.ceil(least / step - 1e-9);
+  const number = Math.floor(most / step + 1e-9) - first + 1;
+  return Array.from({ length: number }, (_, i) => Number(((first + i) * step).toPrecision(12)));
+}
+
+function logTicks(least, most, wanted) {
+  const decades = Math.log10(most / least);
+  const digits = decades > wanted ? [1] : decades > wanted / 3 ? [1, 3] : [1, 2, 5];
+  const step = Math.max(1, Math.round(decades / wanted));
+  const found = [];
+  for (let power = Math.floor(Math.log10(least)); power <= Math.log10(most); power += step) {
+    found.push(...digits.map((digit) => Number((digit * 10 ** power).toPrecision(12))));
+  }
+  return found.filter((value) => value >= least * (1 - 1e-9) && value <= most * (1 + 1e-9));
+}
+
+export function tickText(value) {
+  const size = Math.abs(value);
+  const isLong = value !== 0 && (size >= 1e5 || size < 1e-3);
+  const text = isLong
+    ? value.toExponential().replace("e+", "e")
+    : String(Number(value.toPrecision(12)));
+  return text.replaceAll("-", "\u2212");
+}
+
+/** The value below which a share of rising numbers lies. */
+export function quantile(sorted, share) {
+  const at = (sorted.length - 1) * share;
+  const low = Math.floor(at);
+  return sorted[low] + (at - low) * ((sorted[low + 1] ?? sorted[low]) - sorted[low]);
+}
