@@ -102,26 +102,20 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
   if (found.empty()) {
     return 0;  // the table is lost
   }
-  std::vector<std::string> columns = texts(to, columns_sql);
+  std::vector<std::string> columns;
   std::vector<std::string> lost;  // columns, and with them the checksum over them
-  std::erase_if(columns, [&](const std::string& column) {
-    const bool is_lost = std::ranges::find(found, column) == found.end();
-    if (is_lost) {
-      lost.push_back(column);
-    }
-    return is_lost;
-  });
+  for (const std::string& column : texts(to, columns_sql)) {
+    (std::ranges::count(found, column) > 0 ? columns : lost).push_back(column);
+  }
   if (!lost.empty() && std::erase(columns, "checksum") > 0) {
     lost.emplace_back("checksum");
   }
-  std::string source = rows.table;
-  if (!lost.empty()) {
-    source = fmt::format("(SELECT {}, NULL AS {} FROM {})", fmt::join(columns, ", "),
-                         fmt::join(lost, ", NULL AS "), rows.table);
-  }
+  const std::string source =
+      lost.empty() ? rows.table
+                   : fmt::format("(SELECT {}, NULL AS {} FROM {})", fmt::join(columns, ", "),
+                                 fmt::join(lost, ", NULL AS "), rows.table);
   Statement read(
-      from, fmt::format("SELECT {0}, {1}, {2} FROM {3} WHERE {4} AND {0} > ?"
-                        " ORDER BY {0}",
+      from, fmt::format("SELECT {0}, {1}, {2} FROM {3} WHERE {4} AND {0} > ? ORDER BY {0}",
                         rows.key, rows.is_sound, fmt::join(columns, ", "), source, rows.condition));
   Statement insert(
       to, fmt::format("INSERT INTO {} ({}) VALUES ({})", rows.table, fmt::join(columns, ", "),

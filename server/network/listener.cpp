@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <arpa/inet.h>
 #include <netdb.h>
 #include <sys/socket.h>
 
@@ -46,6 +47,18 @@ PeerAddress::PeerAddress(sockaddr_in6 address) {
   const bool is_v6 = address.sin6_family == AF_INET6;
   text = fmt::format(fmt::runtime(is_v6 ? "[{}]:{}" : "{}:{}"), host.data(), port.data());
   source = is_v6 ? std::string(v6, kNetworkBytes) : std::string(host.data());
+}
+
+std::optional<bool> is_loopback(const std::string& address) {
+  in_addr v4{};
+  in6_addr v6{};
+  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) {
+    return (ntohl(v4.s_addr) >> 24U) == 127;
+  }
+  if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &v6) == 1) {
+    return IN6_IS_ADDR_LOOPBACK(&v6);
+  }
+  return std::nullopt;
 }
 
 Listener::Listener(const std::string& address, const std::string& port) {

@@ -50,7 +50,7 @@ class TurnedNetwork {
  public:
   using Take = std::function<void(Network&, const Incoming&)>;
   explicit TurnedNetwork(Take take) : take_(std::move(take)) {
-    authenticator_->add(own_.public_key, "bench");
+    authenticator_.add(own_.public_key, "bench");
     network_.listen("127.0.0.1", "*", PortSecurity{server_, authenticator_});
     network_.listen("127.0.0.1", "*");
     thread_ = std::thread([this] { turn(); });
@@ -94,7 +94,7 @@ class TurnedNetwork {
 
   protocol::KeyPair server_ = protocol::made_key_pair();
   protocol::KeyPair own_ = protocol::made_key_pair();
-  std::shared_ptr<ListAuthenticator> authenticator_ = std::make_shared<ListAuthenticator>();
+  ListAuthenticator authenticator_;
   Network network_{{}};
   Take take_;
   std::atomic<bool> is_stopped_ = false;

@@ -79,10 +79,6 @@ std::string FieldReader::condition() const {
   return condition;
 }
 
-double real_of(const protocol::Cell& cell) {
-  return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
-}
-
 std::optional<PictureColumn> find_picture_column(std::string_view name) {
   constexpr std::array<std::string_view, 3> kCategories{"mode", "major_mode", "margin_event"};
   if (std::ranges::find(kCategories, name) != kCategories.end()) {
@@ -94,18 +90,6 @@ std::optional<PictureColumn> find_picture_column(std::string_view name) {
                            kind_of_values(name) != protocol::CellKind::kText;
   return is_quantity ? std::optional(PictureColumn{column->name, column->unit, false})
                      : std::nullopt;
-}
-
-PictureColumn picture_column(const FieldReader& fields, const std::string& name,
-                             bool may_be_category) {
-  const std::string text = fields.text(name).value_or("");
-  auto column = find_picture_column(text);
-  if (!column || (column->is_category && !may_be_category)) {
-    throw std::invalid_argument(fmt::format("{} must be a column of numbers{}; \"{}\" is none",
-                                            name, may_be_category ? " or categories" : "",
-                                            protocol::excerpt(text)));
-  }
-  return *std::move(column);
 }
 
 }  // namespace oblique::server

@@ -9,12 +9,10 @@
 #include <system_error>
 #include <vector>
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
+#include "server/network/listener.h"
 
 namespace oblique::server {
 namespace {
@@ -27,15 +25,9 @@ std::optional<Number> whole_number(const std::string& text) {
   return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
 }
 
-bool is_numeric(const std::string& host) {
-  in6_addr address{};
-  return inet_pton(AF_INET, host.c_str(), &address) == 1 ||
-         inet_pton(AF_INET6, host.c_str(), &address) == 1;
-}
-
 bool is_own(const std::string& host, const OwnNames& own) {
   return host == "localhost" || own.names.contains(host) ||
-         (own.is_loopback ? is_loopback(host) : is_numeric(host));
+         (own.is_loopback ? is_loopback(host).value_or(false) : is_loopback(host).has_value());
 }
 
 /// Whether a header is present once, with this value.
@@ -61,13 +53,6 @@ bool is_followed_link(const HttpRequest& request) {
 
 }  // namespace
 
-bool is_loopback(const std::string& address) {
-  in_addr v4{};
-  in6_addr v6{};
-  return (inet_pton(AF_INET, address.c_str(), &v4) == 1 && (ntohl(v4.s_addr) >> 24U) == 127) ||
-         (inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6));
-}
-
 std::string host_without_port(const std::string& header) {
   constexpr std::size_t kLongest = 300;  // a name has 253 characters at most
   static const std::regex kHost(
@@ -90,7 +75,7 @@ std::optional<HttpAddress> parse_http_address(const std::string& text) {
   const std::string host = host_without_port(text);
   const std::string address = host == "localhost" ? "127.0.0.1" : host;
   const auto port = whole_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
-  if (!port || !is_numeric(address)) {
+  if (!port || !is_loopback(address)) {
     throw std::runtime_error(fmt::format(
         "--http {} is no ADDRESS:PORT, as 127.0.0.1:7602 or [::1]:7602 with a port from 0 to 65535 "
         "(0: the system picks one), and not \"off\"",

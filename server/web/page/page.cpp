@@ -10,7 +10,6 @@
 
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/page/request_flow.h"
 
 namespace oblique::server {
 namespace {

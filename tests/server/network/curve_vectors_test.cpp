@@ -100,8 +100,8 @@ TEST(CurveVectorsTest, WithTheSameRandomNumbersTheServerSendsTheSameBytesAsLibzm
   server.public_key = protocol::public_half_of(server.secret_key);
   protocol::CurveKey client{};
   std::ranges::copy(bytes_of(recorded::kClientPublic), client.begin());
-  const auto authenticator = std::make_shared<ListAuthenticator>();
-  authenticator->add(client, "anna");
+  ListAuthenticator authenticator;
+  authenticator.add(client, "anna");
   const PortSecurity security{server, authenticator};
   CurveHandshake handshake(security);
   const RecordedRandomness randomness;

@@ -85,6 +85,27 @@ class EchoServer {
   HttpServer server_;  // last: its thread uses the others
 };
 
+/// A peer that has requested a path, and read the head of the answer if it is a stream.
+std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
+  auto peer = std::make_unique<RawHttp>(server.url());
+  peer->send("GET " + path + kEnd);
+  if (path == "/quiet" || path == "/loud" || path == "/large") {
+    peer->read_until("\r\n\r\n");
+  }
+  return peer;
+}
+
+/// Peers that have sent the beginning of a request.
+std::vector<std::unique_ptr<RawHttp>> silent_peers(const EchoServer& server, int count,
+                                                   const std::string& from = "127.0.0.1") {
+  std::vector<std::unique_ptr<RawHttp>> peers;
+  for (int i = 0; i < count; ++i) {
+    peers.push_back(std::make_unique<RawHttp>(server.url(), from));
+    peers.back()->send("GET ");
+  }
+  return peers;
+}
+
 TEST(HttpServer, AnswersBothVersionsAndEndsTheConnection) {
   const EchoServer server;
   const std::string answer = RawHttp(server.url()).ask("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
@@ -179,11 +200,7 @@ TEST(HttpServer, AnAddressWithItsShareOfConnectionsTakesNoneFromOthers) {
   HttpLimits limits;
   limits.connections_of_one_address = 4;
   const EchoServer server(limits);
-  std::vector<std::unique_ptr<RawHttp>> silent;
-  for (int i = 0; i < 4; ++i) {
-    silent.push_back(std::make_unique<RawHttp>(server.url(), "127.0.0.2"));
-    silent.back()->send("GET ");
-  }
+  const auto silent = silent_peers(server, 4, "127.0.0.2");
   EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").ask("GET /a" + kEnd), "");
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
 }
@@ -194,12 +211,7 @@ TEST(HttpServer, AnswersAgainWhenTooManyConnectionsHaveEnded) {
   limits.idle = test::kHangLimit;
   const EchoServer server(limits);
   for (int round = 0; round < 3; ++round) {
-    std::vector<std::unique_ptr<RawHttp>> silent;
-    for (int i = 0; i < 10; ++i) {
-      silent.push_back(std::make_unique<RawHttp>(server.url()));
-      silent.back()->send("GET ");
-    }
-    silent.clear();
+    silent_peers(server, 10).clear();
     EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
   }
 }
@@ -211,27 +223,20 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   RawHttp silent(server.url());
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
-  RawHttp quiet(server.url());
-  quiet.send("GET /quiet" + kEnd);
-  quiet.read_until("\r\n\r\n");
-  RawHttp taking_nothing(server.url());
-  taking_nothing.send("GET /loud" + kEnd);
-  taking_nothing.read_until("\r\n\r\n");
+  const auto quiet = begin(server, "/quiet");
+  const auto taking_nothing = begin(server, "/loud");
   silent.read_to_the_end();
   halting.read_to_the_end();
   server.wake_until_in_progress(1);
-  EXPECT_FALSE(quiet.has_news()) << "it takes all that there is";
+  EXPECT_FALSE(quiet->has_news()) << "it takes all that there is";
 }
 
 TEST(HttpServer, APeerWithoutEndIsEnded) {
   HttpLimits limits;
   limits.idle = test::kHangLimit;
   EchoServer server(limits);
-  RawHttp waiting(server.url());
-  waiting.send("GET /wait" + kEnd);
-  RawHttp quiet(server.url());
-  quiet.send("GET /quiet" + kEnd);
-  quiet.read_until("\r\n\r\n");
+  const auto waiting = begin(server, "/wait");
+  const auto quiet = begin(server, "/quiet");
   server.wake_until_in_progress(2);
   std::vector<std::unique_ptr<RawHttp>> uploading;
   for (int i = 0; i < 2; ++i) {
@@ -241,9 +246,7 @@ TEST(HttpServer, APeerWithoutEndIsEnded) {
         "\r\n");
     uploading.back()->read_until("\r\n\r\n");
   }
-  RawHttp large(server.url());
-  large.send("GET /large" + kEnd);
-  large.read_until("\r\n\r\n");
+  const auto large = begin(server, "/large");
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
   get(server.url(), "/a");  // all before it were accepted
@@ -254,40 +257,36 @@ TEST(HttpServer, APeerWithoutEndIsEnded) {
   server.let_pass(std::chrono::seconds(2));
   EXPECT_EQ(uploading.back()->read_to_the_end(), "");
   server.let_pass(std::chrono::seconds(EchoServer::kLargeBytes / limits.least_bytes_a_second));
-  EXPECT_LT(large.read_to_the_end().size(), EchoServer::kLargeBytes);
+  EXPECT_LT(large->read_to_the_end().size(), EchoServer::kLargeBytes);
   EXPECT_EQ(server.in_progress(), 2);
-  EXPECT_FALSE(waiting.has_news());
-  EXPECT_FALSE(quiet.has_news());
+  EXPECT_FALSE(waiting->has_news());
+  EXPECT_FALSE(quiet->has_news());
 }
 
 TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
   EchoServer server;
-  RawHttp staying(server.url());
-  staying.send("GET /wait" + kEnd);
+  const auto staying = begin(server, "/wait");
   server.wake_until_in_progress(1);
   for (const std::string path : {"/wait", "/quiet", "/loud"}) {
-    auto closing = std::make_unique<RawHttp>(server.url());
-    closing->send("GET " + path + kEnd);
+    auto closing = begin(server, path);
     server.wake_until_in_progress(2);
     closing.reset();
     server.wake_until_in_progress(1);
   }
   for (const std::string path : {"/wait", "/quiet"}) {  // browsers may close their half first
-    RawHttp halving(server.url());
-    halving.send("GET " + path + kEnd);
+    const auto halving = begin(server, path);
     server.wake_until_in_progress(2);
-    ::shutdown(halving.number(), SHUT_WR);
+    ::shutdown(halving->number(), SHUT_WR);
     server.wake_until_in_progress(1);
   }
-  EXPECT_FALSE(staying.has_news());
+  EXPECT_FALSE(staying->has_news());
 }
 
 TEST(HttpServer, APendingAnswerDelaysNoOther) {
   EchoServer server;
   std::vector<std::unique_ptr<RawHttp>> waiting;
   for (int i = 0; i < 20; ++i) {
-    waiting.push_back(std::make_unique<RawHttp>(server.url()));
-    waiting.back()->send("GET /wait" + kEnd);
+    waiting.push_back(begin(server, "/wait"));
   }
   server.wake_until_in_progress(20);
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
@@ -302,14 +301,10 @@ TEST(HttpServer, StreamsAreBounded) {
   HttpLimits limits;
   limits.streams = 2;
   EchoServer server(limits);
-  std::vector<std::unique_ptr<RawHttp>> tabs;
-  for (int i = 0; i < 2; ++i) {
-    tabs.push_back(std::make_unique<RawHttp>(server.url()));
-    tabs.back()->send("GET /quiet" + kEnd);
-    tabs.back()->read_until("\r\n\r\n");
-  }
+  const auto staying = begin(server, "/quiet");
+  auto leaving = begin(server, "/quiet");
   EXPECT_EQ(status_of_answer(get(server.url(), "/quiet")), 503);
-  tabs.pop_back();
+  leaving.reset();
   server.wake_until_in_progress(1);
   RawHttp next(server.url());
   next.send("GET /quiet" + kEnd);
@@ -318,16 +313,14 @@ TEST(HttpServer, StreamsAreBounded) {
 
 TEST(HttpServer, StopsWhileRequestsWait) {
   auto server = std::make_unique<EchoServer>();
-  RawHttp waiting(server->url());
-  waiting.send("GET /wait" + kEnd);
-  RawHttp streaming(server->url());
-  streaming.send("GET /quiet" + kEnd);
+  const auto waiting = begin(*server, "/wait");
+  const auto streaming = begin(*server, "/quiet");
   RawHttp silent(server->url());
   server->wake_until_in_progress(2);
   server.reset();
-  EXPECT_EQ(waiting.read_to_the_end(), "");
+  EXPECT_EQ(waiting->read_to_the_end(), "");
   EXPECT_EQ(silent.read_to_the_end(), "");
-  EXPECT_EQ(body_of(streaming.read_to_the_end()), "");
+  EXPECT_EQ(streaming->read_to_the_end(), "");
 }
 
 TEST(HttpServer, DoesNotListenElsewhereWithoutDescriptors) {

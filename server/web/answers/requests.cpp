@@ -1,21 +1,24 @@
-#include "server/web/page/request_flow.h"
+#include "server/web/answers/study_answers.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "proto/recipe/model_message.h"
 #include "proto/wire/chunk.h"
 #include "server/study/limits.h"
-#include "server/web/answers/study_answers.h"
 #include "server/web/status/snapshot.h"
 #include "worker/solver/model/trace_columns.h"
 
@@ -176,8 +179,11 @@ HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::Tr
                         numbers + states);
 }
 
-}  // namespace
+/// What follows from a reply: the answer or the next request.
+using NextStep = std::variant<HttpAnswer, ClientRequest>;
+using OnReply = std::function<NextStep(const ClientReply&)>;
 
+/// Sends requests one after the other until there is an answer. An error of the service is one.
 PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const ClientRequest& first,
                            OnReply on_reply) {
   exchange->send(first);
@@ -194,31 +200,22 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
+/// The same for a study that HTTP identifies by its number and the service by its name, which
+/// `request` gets.
 PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
                                std::function<ClientRequest(const std::string&)> request,
                                OnReply on_reply) {
   ClientRequest first;
   first.mutable_status()->set_study_id(study);
-  exchange->send(first);
-  return
-      [exchange = std::move(exchange), request = std::move(request), on_reply = std::move(on_reply),
-       named = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
-        if (!named) {
-          const auto reply = exchange->reply();
-          if (!reply) {
-            return std::nullopt;
-          }
-          if (reply->has_error()) {
-            HttpAnswer answer = failure(reply->error());
-            return answer.status == MHD_HTTP_NOT_FOUND
-                       ? error_answer(MHD_HTTP_NOT_FOUND, "there is no such study")
-                       : answer;
-          }
-          named = request_flow(exchange, request(reply->status().studies(0).name()), on_reply);
-        }
-        return named();
-      };
+  return request_flow(std::move(exchange), first,
+                      [request = std::move(request),
+                       on_reply = std::move(on_reply)](const ClientReply& reply) -> NextStep {
+                        return reply.has_status() ? request(reply.status().studies(0).name())
+                                                  : on_reply(reply);
+                      });
 }
+
+}  // namespace
 
 PendingAnswer list_studies(ServiceClient& service, const Fields& fields) {
   ClientRequest request;
@@ -227,11 +224,8 @@ PendingAnswer list_studies(ServiceClient& service, const Fields& fields) {
   return request_flow(
       std::make_shared<ServiceExchange>(service), request,
       [](const ClientReply& reply) -> NextStep {
-        ordered_json studies = ordered_json::array();
-        for (const auto& study : reply.status().studies()) {
-          studies.push_back(study_json(study));
-        }
-        return json_answer({{"studies", studies}, {"next_after", reply.status().next_after()}});
+        return json_answer({{"studies", json_list(reply.status().studies(), study_json)},
+                            {"next_after", reply.status().next_after()}});
       });
 }
 
@@ -242,11 +236,8 @@ PendingAnswer list_workers(ServiceClient& service, const Fields& fields) {
   return request_flow(
       std::make_shared<ServiceExchange>(service), request,
       [](const ClientReply& reply) -> NextStep {
-        ordered_json workers = ordered_json::array();
-        for (const auto& worker : reply.workers().workers()) {
-          workers.push_back(worker_json(worker));
-        }
-        return json_answer({{"workers", workers}, {"next_after", reply.workers().next_after()}});
+        return json_answer({{"workers", json_list(reply.workers().workers(), worker_json)},
+                            {"next_after", reply.workers().next_after()}});
       });
 }
 
