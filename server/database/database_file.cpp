@@ -126,9 +126,9 @@ std::string file_system_of(const std::string& path) {
 
 std::string objection_to_shared_disk(const std::string& path) {
   // In FUSE, which has local file systems too, the name of the program follows.
-  constexpr std::array<std::string_view, 11> kShared{"nfs",     "cifs",  "smb",   "ceph",
-                                                     "lustre",  "afs",   "gpfs",  "beegfs",
-                                                     "gluster", "sshfs", "rclone"};
+  constexpr std::array<std::string_view, 12> kShared{"nfs",     "cifs",  "smb",    "ceph",
+                                                     "lustre",  "afs",   "gpfs",   "beegfs",
+                                                     "gluster", "sshfs", "rclone", "s3fs"};
   const std::string type = file_system_of(path);
   const std::string_view name =
       std::string_view(type).substr(type.starts_with("fuse.") ? sizeof "fuse." - 1 : 0);

@@ -39,21 +39,6 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
 
 // ---- Salvage ------------------------------------------------------------------------------------
 
-/// Throws StorageError unless the list of tables can be read.
-void check_tables(sqlite3* database, const std::string& path) {
-  try {
-    if (identify(database, path) != DatabaseKind::kEmpty) {
-      return;
-    }
-  } catch (const StorageError&) {
-    if ((static_cast<unsigned>(sqlite3_errcode(database)) & 0xffU) != SQLITE_CORRUPT) {
-      throw;
-    }
-    throw StorageError(path + " has a damaged list of tables: nothing can be salvaged");
-  }
-  throw StorageError(path + " is empty: no study was ever stored in it");
-}
-
 std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   Statement rows(database, sql);
   std::vector<std::string> found;
@@ -210,7 +195,9 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   const DatabaseHandle source = open_for_reading(from);
   // So that SQLite reads a file that is shorter than its first page says.
   execute(source.get(), "PRAGMA writable_schema = ON");
-  check_tables(source.get(), from);
+  if (identify(source.get(), from) == DatabaseKind::kEmpty) {
+    throw StorageError(from + " is empty: no study was ever stored in it");
+  }
   const DraftFile draft(to + ".part");
   Salvaged saved;
   {

@@ -18,11 +18,6 @@
 namespace oblique::server {
 namespace {
 
-bool accepts_both_families(int socket) {
-  const int no = 0;
-  return setsockopt(socket, IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no) == 0;
-}
-
 sockaddr* generic(sockaddr_in6& address) {
   return reinterpret_cast<sockaddr*>(&address);
 }
@@ -76,10 +71,12 @@ Listener::Listener(const std::string& address, const std::string& port) {
   socket_ = protocol::Descriptor(
       ::socket(found->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, IPPROTO_TCP));
   const int yes = 1;
+  const int no = 0;
   socklen_t bytes = sizeof own;
   const bool listens =
       socket_.is_open() &&
-      (found->ai_family == AF_INET || accepts_both_families(socket_.number())) &&
+      (found->ai_family == AF_INET ||
+       setsockopt(socket_.number(), IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no) == 0) &&
       setsockopt(socket_.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) == 0 &&
       bind(socket_.number(), found->ai_addr, found->ai_addrlen) == 0 &&
       listen(socket_.number(), protocol::kWaitingConnections) == 0 &&

@@ -50,14 +50,6 @@ bool would_block() {
   return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
 }
 
-/// How many connections the system's limit on descriptors allows.
-std::size_t most_connections() {
-  rlimit limit{};
-  static_cast<void>(getrlimit(RLIMIT_NOFILE, &limit));
-  return std::max<std::size_t>(limit.rlim_cur, kOtherDescriptors + kFewestConnections) -
-         kOtherDescriptors;
-}
-
 }  // namespace
 
 // ---- One connection ---------------------------------------------------------------------------
@@ -206,7 +198,11 @@ Network::Network(NetworkLimits limits)
   if (!epoll_.is_open()) {
     throw std::system_error(errno, std::generic_category(), "epoll_create1");
   }
-  limits_.connections = std::min(limits_.connections, most_connections());
+  rlimit limit{};
+  static_cast<void>(getrlimit(RLIMIT_NOFILE, &limit));
+  limits_.connections = std::min<std::size_t>(
+      limits_.connections,
+      std::max<rlim_t>(limit.rlim_cur, kOtherDescriptors + kFewestConnections) - kOtherDescriptors);
 }
 
 Network::~Network() = default;

@@ -27,13 +27,6 @@ std::int64_t steady_ms() {
       .count();
 }
 
-PageSettings page_settings_of(const WebSettings& settings) {
-  PageSettings page = settings.page;
-  page.database = settings.database;
-  page.version = OBLIQUE_VERSION;
-  return page;
-}
-
 }  // namespace
 
 void HttpOptions::add_to(CLI::App& app) {
@@ -110,7 +103,7 @@ HttpAnswer readiness(const Snapshot& snapshot, double free_bytes) {
 Web::Web(WebSettings settings)
     : settings_(std::move(settings)),
       started_ms_(steady_ms()),
-      page_(page_settings_of(settings_), service_, events_),
+      page_(settings_.page, settings_.database, service_, snapshots_),
       http_(settings_.address,
             {is_loopback(settings_.address.address).value_or(false), settings_.names},
             settings_.limits,

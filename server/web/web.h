@@ -80,7 +80,6 @@ class Web {
   std::int64_t published_ms_ = 0;  // used by the event loop only
   SnapshotCache snapshots_;
   ServiceClient service_;
-  EventFeed events_{snapshots_};
   Page page_;
   HttpServer http_;  // last: its thread uses the other members
 };

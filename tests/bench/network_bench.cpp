@@ -116,20 +116,20 @@ void be_unknown(const TurnedNetwork& server) {
   }
   client.take_welcome(std::string_view(heard).substr(kGreetingBytes + 10));
   peer.send(command_frame("INITIATE", client.initiate()));
-  peer.await_end();
+  peer.read_to_the_end();
 }
 
 void be_astray(const TurnedNetwork& server) {
   RawPeer peer(server.endpoint(0));
   CurveClient client(server.own(), server.own().public_key);
   peer.send(curve_greeting() + command_frame("HELLO", client.hello()));
-  peer.await_end();
+  peer.read_to_the_end();
 }
 
 void be_without_key(const TurnedNetwork& server) {
   RawPeer peer(server.endpoint(0));
   peer.send(zmtp_greeting());
-  peer.await_end();
+  peer.read_to_the_end();
 }
 
 void measure_refusals(const char* what, int count, void (*be_refused)(const TurnedNetwork&)) {

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,20 +11,9 @@
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
+#include "server/web/http/http_message.h"
 
 namespace oblique::server {
-namespace {
-
-template <typename Number>
-std::optional<Number> read_as(const std::string& text) {
-  Number number{};
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
-}
-
-}  // namespace
-
 bool is_text(const Fields& fields) {
   return std::all_of(fields.begin(), fields.end(), [](const auto& field) {
     return protocol::is_utf8(field.first) && protocol::is_utf8(field.second);
@@ -44,7 +31,7 @@ std::optional<std::uint64_t> FieldReader::whole(const std::string& name) const {
   if (!field) {
     return std::nullopt;
   }
-  const auto number = read_as<std::uint64_t>(*field);
+  const auto number = read_number<std::uint64_t>(*field);
   if (!number) {
     throw std::invalid_argument(fmt::format("{} must be a whole number from 0", name));
   }
@@ -56,7 +43,7 @@ std::optional<double> FieldReader::number(const std::string& name) const {
   if (!field) {
     return std::nullopt;
   }
-  const auto number = read_as<double>(*field);
+  const auto number = read_number<double>(*field);
   if (!number || !std::isfinite(*number)) {
     throw std::invalid_argument(fmt::format("{} must be a number", name));
   }

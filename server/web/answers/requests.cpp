@@ -320,43 +320,38 @@ PendingAnswer change_study(ServiceClient& service, std::uint64_t study,
 PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint64_t point,
                           const Fields& fields) {
   const auto is_set = [&fields](const char* name) {
-    const auto field = fields.find(name);
-    return field != fields.end() && field->second == "1";
+    return FieldReader(fields).text(name).value_or("") == "1";
   };
   const bool with_shape = is_set("shape");
-  protocol::ClientRequest request;  // `every` stays 0: as many instants as fit
+  ClientRequest request;  // `every` stays 0: as many instants as fit
   request.mutable_trace()->set_point(point);
   request.mutable_trace()->set_shape(with_shape);
   request.mutable_trace()->set_fall(is_set("fall"));
-  const auto begin = [&service, study, point, with_shape,
-                      request](const std::shared_ptr<const void>& slot) {
-    return named_study_flow(
-        std::make_shared<ServiceExchange>(service), study,
-        [request](const std::string& name) {
-          protocol::ClientRequest named = request;
-          named.mutable_trace()->set_study(name);
-          return named;
-        },
-        [point, with_shape, slot](const protocol::ClientReply& reply) -> NextStep {
-          const std::string& error = reply.trace().trace().result().error();
-          HttpAnswer answer = error.empty() ? trace_answer(point, with_shape, reply.trace())
-                                            : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
-          answer.until_sent = slot;
-          return answer;
-        });
-  };
-  using Clock = std::chrono::steady_clock;
-  const auto until = Clock::now() + std::chrono::milliseconds(limits::kTraceTime_ms);
-  return [&service, begin, until, flow = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
-    if (!flow) {
-      const auto slot = service.trace_slots().take();
-      if (!slot) {
-        return Clock::now() < until ? std::nullopt
-                                    : std::optional(error_answer(
-                                          MHD_HTTP_SERVICE_UNAVAILABLE,
-                                          "too many traces are on their way to browsers already"));
-      }
-      flow = begin(slot);
+  const auto until = FlowClock::now() + std::chrono::milliseconds(limits::kTraceTime_ms);
+  return [&service, study, point, with_shape, request, until,
+          flow = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
+    const auto slot = flow ? nullptr : service.trace_slots().take();
+    if (!flow && !slot) {
+      return FlowClock::now() < until
+                 ? std::nullopt
+                 : std::optional(
+                       error_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
+                                    "too many traces are on their way to browsers already"));
+    }
+    if (slot) {
+      flow = named_study_flow(
+          std::make_shared<ServiceExchange>(service), study,
+          [request](const std::string& name) mutable {
+            request.mutable_trace()->set_study(name);
+            return request;
+          },
+          [point, with_shape, slot](const ClientReply& reply) -> NextStep {
+            const std::string& error = reply.trace().trace().result().error();
+            HttpAnswer answer = error.empty() ? trace_answer(point, with_shape, reply.trace())
+                                              : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
+            answer.until_sent = slot;
+            return answer;
+          });
     }
     return flow();
   };

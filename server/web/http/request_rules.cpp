@@ -1,12 +1,10 @@
 #include "server/web/http/request_rules.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstddef>
 #include <regex>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -16,14 +14,6 @@
 
 namespace oblique::server {
 namespace {
-
-template <typename Number>
-std::optional<Number> whole_number(const std::string& text) {
-  Number number = 0;
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
-}
 
 bool is_own(const std::string& host, const OwnNames& own) {
   return host == "localhost" || own.names.contains(host) ||
@@ -74,7 +64,7 @@ std::optional<HttpAddress> parse_http_address(const std::string& text) {
   }
   const std::string host = host_without_port(text);
   const std::string address = host == "localhost" ? "127.0.0.1" : host;
-  const auto port = whole_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
+  const auto port = read_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
   if (!port || !is_loopback(address)) {
     throw std::runtime_error(fmt::format(
         "--http {} is no ADDRESS:PORT, as 127.0.0.1:7602 or [::1]:7602 with a port from 0 to 65535 "
@@ -118,7 +108,7 @@ std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own
   const std::string length = request.header("content-length");
   if (request.headers.contains("transfer-encoding") ||
       (!length.empty() &&
-       whole_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
+       read_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
     return text_answer(
         MHD_HTTP_CONTENT_TOO_LARGE,
         fmt::format("a body states its length, which is at most {} bytes", kMostBodyBytes));

@@ -55,8 +55,6 @@ struct PageSettings {
   bool shows_without_token = false;  ///< reading needs no token
   /// The server belongs to a program that shows a file and ends with it: commands read the file.
   bool is_of_file = false;
-  std::string database;
-  std::string version;
 };
 
 /// Sends the overview to all tabs as server-sent events called `overview`. The text is made once
@@ -83,7 +81,8 @@ class EventFeed {
 class Page {
  public:
   /// The references must outlive the page.
-  Page(PageSettings settings, ServiceClient& service, EventFeed& events);
+  Page(PageSettings settings, std::string database, ServiceClient& service,
+       const SnapshotCache& snapshots);
 
   const PageToken& token() const { return settings_.token; }
 
@@ -100,8 +99,9 @@ class Page {
   std::optional<HttpOutcome> change(const HttpRequest& request);
 
   PageSettings settings_;
+  std::string database_;
   ServiceClient& service_;
-  EventFeed& events_;
+  EventFeed events_;
 };
 
 }  // namespace oblique::server

@@ -1,16 +1,27 @@
+// Who may connect from where, and the addresses of ports and peers.
 #include "server/network/access.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <variant>
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <sys/socket.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
 #include "proto/keys/key_file.h"
+#include "server/network/listener.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -23,6 +34,7 @@ using testing::AllOf;
 using testing::AnyOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::StartsWith;
 
 std::string address_or_error(const AccessSettings& settings) {
   try {
@@ -187,6 +199,96 @@ TEST_F(AccessControlTest, WithoutProtectionAWarningIsLoggedEveryTenMinutes) {
   EXPECT_FALSE(loopback.refresh(5));
   EXPECT_THAT(take_log(), IsEmpty());
   EXPECT_FALSE(loopback.security(PortRole::kWorkers));
+}
+
+// ---- Addresses of both families -----------------------------------------------------------------
+
+/// An IPv6 address, or an IPv4 one mapped into IPv6.
+sockaddr_in6 system_address(const std::string& address, int port) {
+  sockaddr_in6 v6{};
+  EXPECT_EQ(inet_pton(AF_INET6, address.c_str(), &v6.sin6_addr), 1) << address;
+  v6.sin6_family = AF_INET6;
+  v6.sin6_port = htons(static_cast<std::uint16_t>(port));
+  return v6;
+}
+
+PeerAddress peer_address(const std::string& address, int port = 1) {
+  return PeerAddress(system_address(address, port));
+}
+
+/// Nothing where the machine has no IPv6.
+std::optional<Listener> listening(const std::string& address) {
+  try {
+    return Listener(address, "*");
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
+  }
+}
+
+std::string address_of_peer(const Listener& listener, const std::string& from) {
+  const std::string& endpoint = listener.endpoint();
+  const auto port = static_cast<std::uint16_t>(std::stoi(endpoint.substr(endpoint.rfind(':') + 1)));
+  const sockaddr_in6 to = system_address(from, port);
+  const protocol::Descriptor peer(::socket(AF_INET6, SOCK_STREAM, 0));
+  if (::connect(peer.number(), reinterpret_cast<const sockaddr*>(&to), sizeof to) != 0) {
+    return "cannot connect";
+  }
+  pollfd item{listener.descriptor(), POLLIN, 0};
+  ::poll(&item, 1, -1);
+  return listener.accept().address.text;
+}
+
+TEST(PeerAddressTest, IsWrittenAsInEndpoints) {
+  EXPECT_EQ(peer_address("::1", 7600).text, "[::1]:7600");
+  EXPECT_EQ(peer_address("2001:0DB8::0:1", 65535).text, "[2001:db8::1]:65535");
+  EXPECT_EQ(peer_address("::ffff:10.0.0.3", 4711).text, "10.0.0.3:4711");
+}
+
+TEST(PeerAddressTest, AllPortsOfAnIpv4AddressAndAllAddressesOfAnIpv6NetworkAreOneSource) {
+  EXPECT_EQ(peer_address("::ffff:10.0.0.3").source, peer_address("::ffff:10.0.0.3", 2).source);
+  EXPECT_NE(peer_address("::ffff:10.0.0.3").source, peer_address("::ffff:10.0.0.4").source);
+  EXPECT_EQ(peer_address("2001:db8::1").source, peer_address("2001:db8::ffff:1:2:3").source);
+  EXPECT_NE(peer_address("2001:db8::1").source, peer_address("2001:db8:0:1::1").source);
+}
+
+TEST(ListenerTest, APeerOfTheSameFamilyHasItsAddress) {
+  const Listener v4("127.0.0.1", "*");
+  EXPECT_THAT(v4.endpoint(), StartsWith("tcp://127.0.0.1:"));
+  EXPECT_THAT(address_of_peer(v4, "::ffff:127.0.0.1"), StartsWith("127.0.0.1:"));
+  const auto v6 = listening("::1");
+  if (!v6) {
+    GTEST_SKIP() << "this machine has no IPv6";
+  }
+  EXPECT_THAT(v6->endpoint(), StartsWith("tcp://[::1]:"));
+  EXPECT_THAT(address_of_peer(*v6, "::1"), StartsWith("[::1]:"));
+}
+
+TEST(ListenerTest, AtTwoColonsPeersOfBothFamiliesAreAccepted) {
+  const auto both = listening("::");
+  if (!both) {
+    GTEST_SKIP() << "this machine has no IPv6";
+  }
+  EXPECT_THAT(both->endpoint(), StartsWith("tcp://[::]:"));
+  EXPECT_THAT(address_of_peer(*both, "::1"), StartsWith("[::1]:"));
+  EXPECT_THAT(address_of_peer(*both, "::ffff:127.0.0.1"), StartsWith("127.0.0.1:"));
+}
+
+TEST(ListenerTest, APortThatIsTakenAndAddressesThatAreNotNumericAreNamed) {
+  const auto error_of = [](const std::string& address, const std::string& port) -> std::string {
+    try {
+      const Listener listener(address, port);
+      return "";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  };
+  const Listener first("127.0.0.1", "*");
+  const std::string port = first.endpoint().substr(first.endpoint().rfind(':') + 1);
+  EXPECT_THAT(error_of("127.0.0.1", port),
+              AllOf(HasSubstr("tcp://127.0.0.1:" + port), HasSubstr("does a server run already?")));
+  for (const char* const address : {"localhost", "::1::", "[::1", "::g"}) {
+    EXPECT_THAT(error_of(address, port), HasSubstr(address));
+  }
 }
 
 }  // namespace

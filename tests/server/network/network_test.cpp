@@ -84,6 +84,11 @@ class NetworkTest : public testing::Test {
     peer->shake_hands();
     return peer;
   }
+  std::vector<std::unique_ptr<RawPeer>> open_peers(std::size_t count) {
+    std::vector<std::unique_ptr<RawPeer>> peers(count);
+    std::ranges::generate(peers, [this] { return open_peer(); });
+    return peers;
+  }
   std::unique_ptr<KeyedPeer> keyed_peer(const protocol::KeyPair& own,
                                         const protocol::CurveKey& server,
                                         const char* source = kHere) {
@@ -92,9 +97,7 @@ class NetworkTest : public testing::Test {
   std::vector<std::unique_ptr<KeyedPeer>> keyed_peers(std::size_t count,
                                                       const char* source = kHere) {
     std::vector<std::unique_ptr<KeyedPeer>> peers(count);
-    for (auto& peer : peers) {
-      peer = keyed_peer(worker_, server_.public_key, source);
-    }
+    std::ranges::generate(peers, [&] { return keyed_peer(worker_, server_.public_key, source); });
     return peers;
   }
   /// Runs the network until the peer has received so many bytes, and returns them.
@@ -224,8 +227,8 @@ TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected
   std::size_t ended = 0;
   run_until([&] { return (ended += network_.take_disconnects().size()) == 2; });
   EXPECT_EQ(refused(RefusalCause::kFaulty), 1U) << "the other one was admitted before";
-  stranger.await_end();
-  in_parts.await_end();
+  stranger.read_to_the_end();
+  in_parts.read_to_the_end();
 }
 
 class PausingNetworkTest : public NetworkTest {
@@ -237,20 +240,18 @@ class PausingNetworkTest : public NetworkTest {
 
 TEST_F(PausingNetworkTest, PeersThatSendMoreThanIsTakenAreNotReadAndLoseNothing) {
   constexpr std::size_t kMessage = 60'000;
-  constexpr int kPeers = 40;
-  std::vector<std::unique_ptr<RawPeer>> peers;
-  for (int i = 0; i < kPeers; ++i) {
-    peers.push_back(open_peer());
-    peers.back()->send(zmtp_frame(std::string(kMessage, 'x')));
+  const auto peers = open_peers(40);
+  for (const auto& peer : peers) {
+    peer->send(zmtp_frame(std::string(kMessage, 'x')));
   }
   std::size_t most = 0;
   const auto update_most = [&] { return most = std::max(most, network_.held_in_bytes()); };
   run_until([&] { return update_most() >= kPause; });
-  int taken = 0;
+  std::size_t taken = 0;
   run_until([&] {
     update_most();
-    taken += network_.next(open_, anybody) ? 1 : 0;
-    return taken == kPeers;
+    taken += network_.next(open_, anybody) ? 1U : 0U;
+    return taken == peers.size();
   });
   EXPECT_TRUE(network_.take_disconnects().empty());
   EXPECT_LT(most, kPause + 4 * kMessage);
@@ -300,11 +301,10 @@ TEST_F(TightNetworkTest, APeerThatReadsAgainIsNoLongerBusy) {
 }
 
 TEST_F(TightNetworkTest, TheSumOfUnreadOutputIsBounded) {
-  std::vector<std::unique_ptr<RawPeer>> peers;
+  const auto peers = open_peers(3);
   std::vector<std::string> identities;
-  for (int i = 0; i < 3; ++i) {
-    peers.push_back(open_peer());
-    identities.push_back(identity_of(*peers.back()));
+  for (const auto& peer : peers) {
+    identities.push_back(identity_of(*peer));
   }
   for (int i = 0; i < 13; ++i) {
     for (const std::string& identity : identities) {
@@ -335,7 +335,7 @@ TEST_F(TightNetworkTest, TheQuietestConnectionMakesRoomUnlessAllWereActiveJustNo
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> at_work;
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i) {  // one after the other: handshakes make room first
     at_work.push_back(open_peer());
     identity_of(*at_work.back());
   }
@@ -534,42 +534,37 @@ TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedWhateverItsStep) {
 
 // ---- Sockets of libzmq --------------------------------------------------------------------------
 
-/// A DEALER of libzmq with a monitor of its handshakes.
-class Dealer {
- public:
-  explicit Dealer(zmq::context_t& context) : socket_(context, zmq::socket_type::dealer) {
-    const std::string where = "inproc://monitor" + std::to_string(++monitors_);
-    zmq_socket_monitor(socket_.handle(), where.c_str(), ZMQ_EVENT_ALL);
-    monitor_ = zmq::socket_t(context, zmq::socket_type::pair);
-    monitor_.connect(where);
-    monitor_.set(zmq::sockopt::linger, 0);
-    socket_.set(zmq::sockopt::linger, 0);
-    socket_.set(zmq::sockopt::maxmsgsize,
-                static_cast<std::int64_t>(protocol::kMaxFrameBytes) + protocol::kSealBytes);
-  }
-  void use_keys(const protocol::KeyPair& own, const protocol::CurveKey& server) {
-    socket_.set(zmq::sockopt::curve_publickey, zmq::buffer(own.public_key));
-    socket_.set(zmq::sockopt::curve_secretkey, zmq::const_buffer(own.secret_key.data(), kKeyBytes));
-    socket_.set(zmq::sockopt::curve_serverkey, zmq::buffer(server));
-  }
-  zmq::socket_t& socket() { return socket_; }
-  void send(const std::string& body) { socket_.send(zmq::buffer(body), zmq::send_flags::dontwait); }
-  std::optional<std::string> receive() {
-    zmq::message_t message;
-    if (!socket_.recv(message, zmq::recv_flags::dontwait)) {
-      return std::nullopt;
+/// A DEALER of libzmq, with keys if they are given, and a monitor of its handshakes.
+struct Dealer {
+  Dealer(zmq::context_t& context, const std::string& endpoint,
+         const protocol::KeyPair* own = nullptr, const protocol::CurveKey* server = nullptr)
+      : socket(context, zmq::socket_type::dealer), monitor(context, zmq::socket_type::pair) {
+    const std::string where =
+        "inproc://" + std::to_string(reinterpret_cast<std::uintptr_t>(socket.handle()));
+    zmq_socket_monitor(socket.handle(), where.c_str(), ZMQ_EVENT_ALL);
+    monitor.connect(where);
+    monitor.set(zmq::sockopt::linger, 0);
+    socket.set(zmq::sockopt::linger, 0);
+    socket.set(zmq::sockopt::maxmsgsize,
+               static_cast<std::int64_t>(protocol::kMaxFrameBytes) + protocol::kSealBytes);
+    if (own != nullptr) {
+      socket.set(zmq::sockopt::curve_publickey, zmq::buffer(own->public_key));
+      socket.set(zmq::sockopt::curve_secretkey,
+                 zmq::const_buffer(own->secret_key.data(), kKeyBytes));
+      socket.set(zmq::sockopt::curve_serverkey, zmq::buffer(*server));
     }
-    return message.to_string();
+    socket.connect(endpoint);
   }
+  void send(const std::string& body) { socket.send(zmq::buffer(body), zmq::send_flags::dontwait); }
   /// The kind and the value of the next failure of a handshake.
   std::optional<std::pair<int, int>> failure() {
     zmq::message_t event;
-    while (monitor_.recv(event, zmq::recv_flags::dontwait)) {
+    while (monitor.recv(event, zmq::recv_flags::dontwait)) {
       std::uint16_t kind = 0;
       std::uint32_t value = 0;
       std::memcpy(&kind, event.data(), sizeof kind);
       std::memcpy(&value, event.data<char>() + sizeof kind, sizeof value);
-      static_cast<void>(monitor_.recv(event));  // the address
+      static_cast<void>(monitor.recv(event));  // the address
       if (kind == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH || kind == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) {
         return std::pair(int{kind}, static_cast<int>(value));
       }
@@ -577,25 +572,14 @@ class Dealer {
     return std::nullopt;
   }
 
- private:
-  static inline int monitors_ = 0;
-  zmq::socket_t socket_;
-  zmq::socket_t monitor_;
+  zmq::socket_t socket;
+  zmq::socket_t monitor;
 };
 
 class LibzmqPeersTest : public NetworkTest {
  protected:
   std::unique_ptr<Dealer> dealer(const protocol::KeyPair& own, const protocol::CurveKey& server) {
-    auto dealer = std::make_unique<Dealer>(context_);
-    dealer->use_keys(own, server);
-    dealer->socket().connect(network_.endpoint(keyed_));
-    return dealer;
-  }
-  std::unique_ptr<Dealer> worker_dealer() { return dealer(worker_, server_.public_key); }
-  std::string reply_to(Dealer& dealer) {
-    std::optional<std::string> reply;
-    run_until([&] { return (reply = dealer.receive()).has_value(); });
-    return reply.value_or("");
+    return std::make_unique<Dealer>(context_, network_.endpoint(keyed_), &own, &server);
   }
   /// Runs the network until the socket reports that its handshake has failed, and how.
   std::pair<int, int> failure_of(Dealer& dealer) {
@@ -608,7 +592,7 @@ class LibzmqPeersTest : public NetworkTest {
 };
 
 TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
-  const auto worker = worker_dealer();
+  const auto worker = dealer(worker_, server_.public_key);
   worker->send("hello");
   const Incoming incoming = next(keyed_);
   EXPECT_EQ(incoming.body, "hello");
@@ -619,7 +603,9 @@ TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
            0, 1, 222, 223, 255, 256, 100'000, protocol::kMaxFrameBytes}) {
     const std::string reply(bytes, 'r');
     EXPECT_NE(network_.send(incoming.identity, reply), Delivery::kGone);
-    EXPECT_EQ(reply_to(*worker), reply);
+    zmq::message_t received;
+    run_until([&] { return worker->socket.recv(received, zmq::recv_flags::dontwait).has_value(); });
+    EXPECT_EQ(received.to_string(), reply);
     worker->send(reply);
     EXPECT_EQ(next(keyed_).body, reply);
   }
@@ -636,12 +622,9 @@ TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
 
   const std::pair other_mechanism(ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL,
                                   ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH);
-  Dealer plain(context_);
-  plain.socket().connect(network_.endpoint(keyed_));
+  Dealer plain(context_, network_.endpoint(keyed_));
   EXPECT_EQ(failure_of(plain), other_mechanism);
-  Dealer keyed(context_);
-  keyed.use_keys(worker_, server_.public_key);
-  keyed.socket().connect(network_.endpoint(open_));
+  Dealer keyed(context_, network_.endpoint(open_), &worker_, &server_.public_key);
   EXPECT_EQ(failure_of(keyed), other_mechanism);
   run_until([&] { return refused(RefusalCause::kOtherMechanism) == 2; });
 }
@@ -649,7 +632,7 @@ TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
 TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAtOnceWithAllThatItSent) {
   const protocol::KeyPair other = protocol::made_key_pair();
   authenticator_.add(other.public_key, "berta");
-  const auto revoked = worker_dealer();
+  const auto revoked = dealer(worker_, server_.public_key);
   const auto staying = dealer(other, server_.public_key);
   revoked->send("first");
   staying->send("first");

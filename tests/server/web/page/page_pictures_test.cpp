@@ -25,8 +25,7 @@ using testing::HasSubstr;
 
 TEST_F(PageStudyTest, ASliceIsIndexArithmeticOnTheRecipe) {
   solve_grid();
-  const std::string url = "/api/studies/1/slice?";
-  const Numbers slice = page_.numbers(url + "z=fn_peak_N&x=mu&y=H&at=e@1");
+  const Numbers slice = slice_of("z=fn_peak_N&x=mu&y=H&at=e@1");
   EXPECT_EQ(slice.head["nx"], 4);
   EXPECT_EQ(slice.head["ny"], 3);
   EXPECT_EQ(slice.head["at"][0]["value"], 0.5);
@@ -40,32 +39,32 @@ TEST_F(PageStudyTest, ASliceIsIndexArithmeticOnTheRecipe) {
     }
   }
   // The other way round it is the same, transposed.
-  const Numbers turned = page_.numbers(url + "z=fn_peak_N&x=H&y=mu&at=e@1");
+  const Numbers turned = slice_of("z=fn_peak_N&x=H&y=mu&at=e@1");
   EXPECT_EQ(turned.read<float>(56, 12)[1], values[4]);
   // A line has one row.
-  const Numbers line = page_.numbers(url + "z=fn_peak_N&x=mu&at=H@2,e@0");
+  const Numbers line = slice_of("z=fn_peak_N&x=mu&at=H@2,e@0");
   EXPECT_EQ(line.head["ny"], 1);
   EXPECT_EQ(line.head["y"], nullptr);
   EXPECT_EQ(line.read<float>(32, 4)[3], force_of(16 + 6));
   // More cells than were requested are never sent.
-  const Numbers few = page_.numbers(url + "z=fn_peak_N&x=mu&y=H&nx=2&ny=2&x0=1&at=e@0");
+  const Numbers few = slice_of("z=fn_peak_N&x=mu&y=H&nx=2&ny=2&x0=1&at=e@0");
   EXPECT_EQ(few.head["x"]["all_lines"], false);
   EXPECT_EQ(few.head["x"]["first"], 1);
   EXPECT_EQ(few.read<float>(32, 4),
             (std::vector<float>{force_of(2), force_of(6), force_of(18), force_of(22)}));
-  const Numbers modes = page_.numbers(url + "z=mode&x=mu&y=H");
+  const Numbers modes = slice_of("z=mode&x=mu&y=H");
   EXPECT_EQ(modes.head["dictionary"], json::parse(R"([{"text":"SC SR sR","cells":12}])"));
   EXPECT_EQ(modes.read<std::uint16_t>(56, 12), std::vector<std::uint16_t>(12, 0));
 }
 
 TEST_F(PageStudyTest, WhatIsNotSolvedAndWhatIsLeftOutIsMarked) {
   submit("filtered", filtered_grid("mu < 0.5"));
-  const Numbers slice = page_.numbers("/api/studies/1/slice?z=mode&x=mu");
+  const Numbers slice = slice_of("z=mode&x=mu");
   EXPECT_EQ(slice.head["missing"], 3);
   EXPECT_EQ(slice.head["left_out"], 1);
   EXPECT_EQ(slice.read<std::uint16_t>(32, 4)[0], 0xffff);
   EXPECT_EQ(slice.read<std::uint16_t>(32, 4)[3], 0xfffd);
-  const Numbers numbers = page_.numbers("/api/studies/1/slice?z=slide_m&x=mu");
+  const Numbers numbers = slice_of("z=slide_m&x=mu");
   EXPECT_EQ(numbers.read<std::uint32_t>(32, 4)[0], 0x7fc00000U);
   EXPECT_EQ(numbers.read<std::uint32_t>(32, 4)[3], 0x7fc00002U);
 }
@@ -87,11 +86,14 @@ TEST_F(PageStudyTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
   submit("huge", protocol::recipe_of(
                      {{protocol::range("H", 0.1, 1.0, 1000), protocol::range("mu", 0.0, 2.0, 1000),
                        protocol::range("e", 0.5, 1.0, 1000)}}));
-  const Numbers slice =
-      page_.numbers("/api/studies/1/slice?z=mode&x=mu&y=H&nx=256&ny=256&at=e@999");
+  const Numbers slice = slice_of("z=mode&x=mu&y=H&nx=256&ny=256&at=e@999");
   EXPECT_EQ(slice.head["nx"], 256);
   EXPECT_EQ(slice.head["missing"], 256 * 256);
-  EXPECT_EQ(page_.numbers("/api/studies/1/bins?x=fn_peak_N").head["points"], 0);
+  EXPECT_EQ(bins_of("x=fn_peak_N").head["points"], 0);
+  solve(3);
+  const Numbers bins = bins_of("x=fn_peak_N&y=mu&z=H&nx=2&ny=2");
+  EXPECT_GE(bins.head["points"], 3);
+  EXPECT_FLOAT_EQ(bins.head["x"]["least"], force_of(0));
 }
 
 TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyThatAreNot) {
@@ -108,7 +110,7 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyThatAreNot) {
   EXPECT_LT(solved.size(), 60'000U);
   for (const std::string view : {"x=e&y=mu&at=H@0", "x=mu&y=e&at=H@0", "x=e&y=mu&at=H@1",
                                  "x=mu&y=H&at=e@7", "x=e&at=mu@4,H@0", "x=e&at=mu@5,H@0"}) {
-    const Numbers slice = page_.numbers("/api/studies/1/slice?z=fn_peak_N&" + view);
+    const Numbers slice = slice_of("z=fn_peak_N&" + view);
     const auto nx = slice.head["nx"].get<std::size_t>();
     const auto ny = slice.head["ny"].get<std::size_t>();
     const bool is_line = slice.head["y"].is_null();
@@ -141,17 +143,17 @@ TEST_F(PageStudyTest, WrongQuestionsAreToldWhatIsAllowed) {
 
 TEST_F(PageStudyTest, BinsCountEveryPointOnce) {
   solve_grid();
-  const Numbers bins = page_.numbers("/api/studies/1/bins?x=mu&y=H&z=fn_peak_N&nx=4&ny=3");
+  const Numbers bins = bins_of("x=mu&y=H&z=fn_peak_N&nx=4&ny=3");
   EXPECT_EQ(bins.head["points"], 24);
   EXPECT_EQ(bins.read<std::uint32_t>(0, 12), std::vector<std::uint32_t>(12, 2));
-  const Numbers some = page_.numbers("/api/studies/1/bins?x=mu&x0=0.1&x1=0.5&nx=2");
+  const Numbers some = bins_of("x=mu&x0=0.1&x1=0.5&nx=2");
   EXPECT_EQ(some.head["points"], 12);
   EXPECT_EQ(some.head["outside"], 12);
-  const Numbers met = page_.numbers("/api/studies/1/bins?x=mu&nx=2&where=mu%20%3C%200.3");
+  const Numbers met = bins_of("x=mu&nx=2&where=mu%20%3C%200.3");
   EXPECT_EQ(met.head["points"], 12);
   EXPECT_EQ(met.head["x"]["most"], 0.2) << "of those that are counted";
   EXPECT_EQ(met.read<std::uint32_t>(0, 2), (std::vector<std::uint32_t>{6, 6}));
-  EXPECT_EQ(page_.numbers("/api/studies/1/bins?x=mu&nx=2&where=0").head["points"], 0);
+  EXPECT_EQ(bins_of("x=mu&nx=2&where=0").head["points"], 0);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mode"), 400);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mu&xlog=1&x0=0"), 400);
 }
@@ -177,18 +179,6 @@ TEST_F(PageStudyTest, BinsOfNothingHaveTheEndsThatWereTyped) {
   EXPECT_EQ(page_.numbers(bins + "&x1=-2").head["x"]["least"], -2);
   EXPECT_EQ(page_.status(bins + "&xlog=1"), 200);
   EXPECT_EQ(page_.status(bins + "&xlog=1&x0=-1&x1=1"), 400);
-}
-
-TEST_F(PageStudyTest, BinsOfAHugeStudyHaveWhatWasSolved) {
-  submit("large", protocol::recipe_of(
-                      {{protocol::range("H", 0.8, 1.0, 10'000),
-                        protocol::range("mu", 0.0, 2.0, 100'000), protocol::listed("e", {1.0})}}));
-  solve(3);
-  const Numbers bins = page_.numbers("/api/studies/1/bins?x=fn_peak_N&y=mu&z=H&nx=2&ny=2");
-  EXPECT_GE(bins.head["points"], 3);
-  EXPECT_FLOAT_EQ(bins.head["x"]["least"], force_of(0));
-  const Numbers some = page_.numbers("/api/studies/1/bins?x=mu&where=point%20%3C%202");
-  EXPECT_EQ(some.head["points"], 2);
 }
 
 // ---- Conditions ---------------------------------------------------------------------------------

@@ -141,6 +141,12 @@ class PageStudyTest : public testing::Test {
     recipe.mutable_blocks(0)->set_where(where);
     return recipe;
   }
+  Numbers slice_of(const std::string& query) const {
+    return page_.numbers("/api/studies/1/slice?" + query);
+  }
+  Numbers bins_of(const std::string& query) const {
+    return page_.numbers("/api/studies/1/bins?" + query);
+  }
   void submit_grid() { submit("grid", grid_recipe()); }
   void solve_grid() {
     submit_grid();

@@ -221,12 +221,6 @@ TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
   }
 }
 
-TEST_F(StudyFlowTest, AnErrorOfTheServiceIsTheAnswer) {
-  const PendingAnswer pending = study_answer(client_, 1);
-  reply(requested().at(0).request_id(), error_of("there is no study \"a\""));
-  EXPECT_EQ(pending()->status, 404U);
-}
-
 TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEndsUnlessItHasCome) {
   ClientRequest trace;
   trace.mutable_trace()->set_study("a");
