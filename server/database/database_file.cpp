@@ -3,14 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
-#include <sys/vfs.h>
+#include <mntent.h>
 #include <unistd.h>
 
 #include <spdlog/fmt/fmt.h>
@@ -25,41 +29,6 @@ namespace fs = std::filesystem;
 
 constexpr mode_t kOwnerOnly = 0600;
 constexpr int kBusyTimeout_ms = 5000;
-
-struct FileSystem {
-  unsigned long type;  // f_type of statfs(2)
-  std::string_view name;
-  bool is_shared;  // between machines
-};
-
-// sshfs and similar programs are FUSE, so all of FUSE counts as shared.
-constexpr std::array kFileSystems{
-    FileSystem{0xef53, "ext4", false},      FileSystem{0x58465342, "xfs", false},
-    FileSystem{0x9123683e, "btrfs", false}, FileSystem{0x01021994, "tmpfs", false},
-    FileSystem{0x858458f6, "ramfs", false}, FileSystem{0x794c7630, "overlay", false},
-    FileSystem{0x6969, "nfs", true},        FileSystem{0xff534d42, "cifs", true},
-    FileSystem{0xfe534d42, "smb2", true},   FileSystem{0x65735546, "fuse", true},
-    FileSystem{0x00c36400, "ceph", true},   FileSystem{0x0bd00bd0, "lustre", true},
-    FileSystem{0x5346414f, "afs", true}};
-
-/// The f_type of the file system of `path`, or of the nearest folder above that exists; 0: unknown.
-unsigned long type_of(const std::string& path) {
-  std::error_code error;
-  fs::path place = fs::weakly_canonical(fs::absolute(path), error);
-  struct statfs found {};
-  while (::statfs(place.c_str(), &found) != 0) {
-    if (!place.has_relative_path()) {
-      return 0;
-    }
-    place = place.parent_path();
-  }
-  return static_cast<unsigned long>(found.f_type);
-}
-
-const FileSystem* known_file_system(unsigned long type) {
-  const auto* const found = std::ranges::find(kFileSystems, type, &FileSystem::type);
-  return found == kFileSystems.end() ? nullptr : found;
-}
 
 /// The lock of a server: a byte that SQLite does not lock.
 struct flock servers_lock() {
@@ -134,23 +103,43 @@ DatabaseHandle open_stored(const std::string& path) {
 }
 
 std::string file_system_of(const std::string& path) {
-  const unsigned long type = type_of(path);
-  const FileSystem* const known = known_file_system(type);
-  return known != nullptr ? std::string(known->name)
-         : type == 0      ? "unknown"
-                          : fmt::format("{:#x}", type);
+  constexpr std::size_t kLongestLine = 16 * 1024;
+  std::error_code error;
+  const std::string place = fs::weakly_canonical(fs::absolute(path), error).string() + '/';
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> mounts(
+      ::setmntent("/proc/self/mounts", "re"), &::endmntent);
+  std::vector<char> line(kLongestLine);
+  mntent mount{};
+  std::string type = "unknown";
+  std::string nearest;
+  while (mounts != nullptr && ::getmntent_r(mounts.get(), &mount, line.data(),
+                                            static_cast<int>(line.size())) != nullptr) {
+    const std::string_view folder(mount.mnt_dir);
+    const std::string prefix = std::string(folder) + (folder.ends_with('/') ? "" : "/");
+    if (place.starts_with(prefix) && prefix.size() >= nearest.size()) {  // the latest one counts
+      nearest = prefix;
+      type = mount.mnt_type;
+    }
+  }
+  return type;
 }
 
 std::string objection_to_shared_disk(const std::string& path) {
-  const FileSystem* const known = known_file_system(type_of(path));
-  if (known == nullptr || !known->is_shared) {
+  // In FUSE, which has local file systems too, the name of the program follows.
+  constexpr std::array<std::string_view, 12> kShared{"nfs",     "cifs",  "smb",    "ceph",
+                                                     "lustre",  "afs",   "gpfs",   "beegfs",
+                                                     "gluster", "sshfs", "rclone", "s3fs"};
+  const std::string type = file_system_of(path);
+  const std::string_view name =
+      std::string_view(type).substr(type.starts_with("fuse.") ? sizeof "fuse." - 1 : 0);
+  if (std::ranges::none_of(kShared, [&](auto shared) { return name.starts_with(shared); })) {
     return {};
   }
   return fmt::format(
       "{} is on a network file system ({}), where two machines could write at once and damage the "
       "database: name a file on a local disk, or pass --allow-network-disk if no other machine "
       "uses it",
-      path, known->name);
+      path, type);
 }
 
 const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk) {

@@ -22,8 +22,8 @@ DatabaseHandle open_for_reading(const std::string& path);
 /// database of ours with tables.
 DatabaseHandle open_stored(const std::string& path);
 
-/// Name of the file system that holds `path`, such as "ext4"; its number for one without a name
-/// here, "unknown" when unknown. `path` need not exist.
+/// Type of the file system that holds `path`, such as "ext4" or "fuse.sshfs", as the system names
+/// it. `path` need not exist.
 std::string file_system_of(const std::string& path);
 
 /// Why a database at `path` (which need not exist) is not safe on its file system, or an empty

@@ -1,5 +1,6 @@
 #include "server/maintenance/backup.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <vector>
@@ -38,21 +39,6 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
 
 // ---- Salvage ------------------------------------------------------------------------------------
 
-/// Throws StorageError unless the list of tables can be read.
-void check_tables(sqlite3* database, const std::string& path) {
-  try {
-    if (identify(database, path) != DatabaseKind::kEmpty) {
-      return;
-    }
-  } catch (const StorageError&) {
-    if ((static_cast<unsigned>(sqlite3_errcode(database)) & 0xffU) != SQLITE_CORRUPT) {
-      throw;
-    }
-    throw StorageError(path + " has a damaged list of tables: nothing can be salvaged");
-  }
-  throw StorageError(path + " is empty: no study was ever stored in it");
-}
-
 std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   Statement rows(database, sql);
   std::vector<std::string> found;
@@ -65,7 +51,7 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
 /// Rows of one table that have ascending integer keys.
 struct KeyedRows {
   std::string table;
-  std::string key = "rowid";
+  std::string key;
   std::string condition = "1";    ///< which rows are copied, in SQL
   std::string is_sound = "1";     ///< false for a damaged row, in SQL
   std::int64_t before_first = 0;  ///< smaller than every key
@@ -97,14 +83,25 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
   // Larger than every key that is used, so that no row can follow.
   constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
   const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
-  if (texts(from, columns_sql).empty()) {
+  const std::vector<std::string> found = texts(from, columns_sql);
+  if (found.empty()) {
     return 0;  // the table is lost
   }
-  const std::vector<std::string> columns = texts(to, columns_sql);
+  std::vector<std::string> columns;
+  std::vector<std::string> lost;  // columns, and with them the checksum over them
+  for (const std::string& column : texts(to, columns_sql)) {
+    (std::ranges::count(found, column) > 0 ? columns : lost).push_back(column);
+  }
+  if (!lost.empty() && std::erase(columns, "checksum") > 0) {
+    lost.emplace_back("checksum");
+  }
+  const std::string source =
+      lost.empty() ? rows.table
+                   : fmt::format("(SELECT {}, NULL AS {} FROM {})", fmt::join(columns, ", "),
+                                 fmt::join(lost, ", NULL AS "), rows.table);
   Statement read(
-      from,
-      fmt::format("SELECT {0}, {1}, {2} FROM {3} WHERE {4} AND {0} > ? ORDER BY {0}", rows.key,
-                  rows.is_sound, fmt::join(columns, ", "), rows.table, rows.condition));
+      from, fmt::format("SELECT {0}, {1}, {2} FROM {3} WHERE {4} AND {0} > ? ORDER BY {0}",
+                        rows.key, rows.is_sound, fmt::join(columns, ", "), source, rows.condition));
   Statement insert(
       to, fmt::format("INSERT INTO {} ({}) VALUES ({})", rows.table, fmt::join(columns, ", "),
                       fmt::join(std::vector<std::string>(columns.size(), "?"), ", ")));
@@ -134,10 +131,9 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
 
 /// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
-  saved.studies = copy_rows(from, to, {.table = "studies"}, saved);
-  for (const std::string table : {"models", "workers"}) {
-    copy_rows(from, to, {.table = table}, saved);
-  }
+  saved.studies = copy_rows(from, to, {.table = "studies", .key = "study_id"}, saved);
+  copy_rows(from, to, {.table = "models", .key = "model_id"}, saved);
+  copy_rows(from, to, {.table = "workers", .key = "worker_id"}, saved);
   // Rows of lost studies are not copied, because they have no meaning without the recipe.
   for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
@@ -199,7 +195,9 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   const DatabaseHandle source = open_for_reading(from);
   // So that SQLite reads a file that is shorter than its first page says.
   execute(source.get(), "PRAGMA writable_schema = ON");
-  check_tables(source.get(), from);
+  if (identify(source.get(), from) == DatabaseKind::kEmpty) {
+    throw StorageError(from + " is empty: no study was ever stored in it");
+  }
   const DraftFile draft(to + ".part");
   Salvaged saved;
   {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <iterator>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -32,59 +31,8 @@ void append(std::vector<std::string>& to, sqlite3* database, const std::string& 
   }
 }
 
-/// Compares rows of one study with its recipe. Fast for rows in the order of their points.
-class RecipeCheck {
- public:
-  /// The columns that `fault_of` reads, as a list for SQL. A row must begin with them.
-  static constexpr const char* kColumns = "point, model_id, H, mu, e";
-
-  /// Both must outlive this.
-  RecipeCheck(sqlite3* database, const protocol::PointTable& table)
-      : table_(table), definition_(database, "SELECT definition FROM models WHERE model_id = ?") {}
-
-  /// The first difference between the current row and the recipe, as a part of a sentence; empty if
-  /// they agree. Compares the point, H, mu, e and the model, with the tolerance for values that
-  /// another machine computed (is_close of proto/recipe/point_table.h).
-  std::string fault_of(const Statement& row) {
-    if (row.number(0) >= table_.size()) {  // negative numbers are large
-      return "the study has no such point";
-    }
-    const protocol::Point point = table_.point(row.number(0));
-    int column = 2;
-    for (const auto& [key, value] :
-         {std::pair("H", point.H_m), {"mu", point.mu}, {"e", point.e_star}}) {
-      if (!protocol::is_close(row.real(column), value)) {
-        return fmt::format("{} is {:.17g}, and {:.17g} in the recipe", key, row.real(column),
-                           value);
-      }
-      ++column;
-    }
-    const std::pair models{point.model, row.integer(1)};
-    if (models != equal_models_) {
-      if (!agrees(table_.model(point.model), row.integer(1))) {
-        return "its model is not that of the recipe";
-      }
-      equal_models_ = models;
-    }
-    return {};
-  }
-
- private:
-  bool agrees(const solver::ModelParameters& model, std::int64_t model_id) {
-    definition_.reset();
-    definition_.bind_all(model_id);
-    try {
-      return definition_.step() &&
-             protocol::is_close(protocol::model_of_canonical(definition_.text(0)), model);
-    } catch (const std::runtime_error&) {  // the definition is damaged
-      return false;
-    }
-  }
-
-  const protocol::PointTable& table_;
-  Statement definition_;
-  std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};  // of the recipe, and its row
-};
+/// The columns that `recipe_fault` reads. A row must begin with them.
+constexpr const char* kRecipeColumns = "point, model_id, H, mu, e";
 
 /// Checks studies one after the other, each with all its rows in one pass.
 class StudyCheck {
@@ -104,7 +52,8 @@ class StudyCheck {
                                     " (SELECT worker_id FROM workers)"
                                     " THEN 'its worker does not exist' END)"
                                     " FROM results WHERE study_id = ? ORDER BY point",
-                                    RecipeCheck::kColumns, row_fault_sql())) {}
+                                    kRecipeColumns, row_fault_sql())),
+        definition_(database, "SELECT definition FROM models WHERE model_id = ?") {}
 
   void run() {
     while (studies_.step()) {
@@ -162,18 +111,15 @@ class StudyCheck {
     constexpr int kNoChecksum = 5;
     constexpr int kFault = 6;
     IntervalSet points;
-    std::optional<RecipeCheck> recipe;
-    if (table.is_made()) {
-      recipe.emplace(database_, *table.get());
-    }
+    equal_models_ = {0, -1};
     rows_.bind(1, studies_.integer(0));
     while (rows_.step()) {
       points.insert(rows_.number(0));
       ++all_rows_;
       without_checksum_ += rows_.integer(kNoChecksum) != 0 ? 1U : 0U;
       std::string fault = rows_.text(kFault);
-      if (fault.empty() && recipe) {
-        fault = recipe->fault_of(rows_);
+      if (fault.empty() && table.is_made()) {
+        fault = recipe_fault(*table.get());
       }
       if (!fault.empty() && row_faults_.size() < kMostOfAKind) {
         row_faults_.push_back(
@@ -182,6 +128,45 @@ class StudyCheck {
     }
     rows_.reset();
     return points;
+  }
+
+  /// The first difference between the current row and the recipe, as a part of a sentence; empty if
+  /// they agree. Compares the point, H, mu, e and the model, with the tolerance for values that
+  /// another machine computed (is_close of proto/recipe/point_table.h). Fast for rows in the order
+  /// of their points.
+  std::string recipe_fault(const protocol::PointTable& table) {
+    if (rows_.number(0) >= table.size()) {  // negative numbers are large
+      return "the study has no such point";
+    }
+    const protocol::Point point = table.point(rows_.number(0));
+    int column = 2;
+    for (const auto& [key, value] :
+         {std::pair("H", point.H_m), {"mu", point.mu}, {"e", point.e_star}}) {
+      if (!protocol::is_close(rows_.real(column), value)) {
+        return fmt::format("{} is {:.17g}, and {:.17g} in the recipe", key, rows_.real(column),
+                           value);
+      }
+      ++column;
+    }
+    const std::pair models{point.model, rows_.integer(1)};
+    if (models != equal_models_) {
+      if (!is_model(rows_.integer(1), table.model(point.model))) {
+        return "its model is not that of the recipe";
+      }
+      equal_models_ = models;
+    }
+    return {};
+  }
+
+  bool is_model(std::int64_t model_id, const solver::ModelParameters& model) {
+    definition_.reset();
+    definition_.bind_all(model_id);
+    try {
+      return definition_.step() &&
+             protocol::is_close(protocol::model_of_canonical(definition_.text(0)), model);
+    } catch (const std::runtime_error&) {  // the definition is damaged
+      return false;
+    }
   }
 
   /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can
@@ -219,7 +204,9 @@ class StudyCheck {
   Diagnosis& found_;
   Statement studies_;
   Statement rows_;
-  std::string name_;  // of the current study
+  Statement definition_;
+  std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};  // of the recipe, and its row
+  std::string name_;                                            // of the current study
   std::vector<std::string> study_faults_;
   std::vector<std::string> row_faults_;
   std::uint64_t all_rows_ = 0;

@@ -1,6 +1,7 @@
 #include "server/maintenance/merge.h"
 
 #include <algorithm>
+#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -47,20 +48,6 @@ constexpr const char* kStudyColumns = "study_id, name, recipe, points";
 StudyRow study_in(const Statement& row) {
   return {row.number(0), row.text(1), StudyTable(row.text(2), row.number(3))};
 }
-
-/// The source, attached to the connection of the target as `source`.
-class Attached {
- public:
-  Attached(sqlite3* database, const std::string& path) : database_(database) {
-    execute_with(database, "ATTACH ? AS source", path);
-  }
-  ~Attached() { sqlite3_exec(database_, "DETACH source", nullptr, nullptr, nullptr); }
-  Attached(const Attached&) = delete;
-  Attached& operator=(const Attached&) = delete;
-
- private:
-  sqlite3* database_;
-};
 
 // Parameters of the statements on rows: ?1 the study's number in the source, ?2 in the target.
 
@@ -279,7 +266,11 @@ Merged Merger::merge(const std::string& source, const std::string& rename_prefix
   Merged merged;
   try {
     const DatabaseHandle opened = open_sound_source(copy.path());
-    const Attached attached(target_.connection(), copy.path());
+    execute_with(target_.connection(), "ATTACH ? AS source", copy.path());
+    const auto detach = [](sqlite3* database) {
+      sqlite3_exec(database, "DETACH source", nullptr, nullptr, nullptr);
+    };
+    const std::unique_ptr<sqlite3, decltype(detach)> attached(target_.connection(), detach);
     // Changed pages beyond the cache are written to the log.
     execute(target_.connection(), "PRAGMA main.cache_size = -65536");
     target_.write([&] {

@@ -1,13 +1,9 @@
 #include "server/network/access.h"
 
 #include <array>
-#include <chrono>
-#include <filesystem>
 #include <map>
-#include <system_error>
 #include <utility>
 
-#include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -17,6 +13,7 @@
 #include "proto/keys/key_file.h"
 #include "proto/system/descriptor.h"
 #include "proto/text.h"
+#include "server/network/listener.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
@@ -32,20 +29,6 @@ std::string numeric(const std::string& address) {
     return v6.is_open() ? "::" : "0.0.0.0";
   }
   return address;
-}
-
-/// Nothing for text that is not a numeric address.
-std::optional<bool> is_loopback(const std::string& address) {
-  in_addr v4{};
-  in6_addr v6{};
-  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) {
-    return (ntohl(v4.s_addr) >> 24U) == 127;
-  }
-  // A link-local address may name its interface, as fe80::1%eth0.
-  if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &v6) == 1) {
-    return IN6_IS_ADDR_LOOPBACK(&v6);
-  }
-  return std::nullopt;
 }
 
 AccessMode mode_of(const AccessSettings& settings) {
@@ -117,10 +100,8 @@ class KeyList {
   /// Throws solver::InputError when the list cannot be read.
   explicit KeyList(std::string path) : path_(std::move(path)), keys_(read()) {}
 
-  using Time = std::filesystem::file_time_type;
-
-  /// Reads the file again if it may have changed. True if the keys have.
-  bool reload(Time now);
+  /// Reads the file again. True if the keys have changed.
+  bool reload();
   /// Null if the key is not listed.
   std::shared_ptr<const KeyIdentity> find(const protocol::CurveKey& key) const {
     const auto found = keys_.find(key);
@@ -142,24 +123,17 @@ class KeyList {
 
   std::string path_;
   Keys keys_;
-  Time written_ = Time::min();
-  std::string fault_;  // why the list could not be read the last time; empty if it could
+  int empty_reads_ = 0;  // in a row
+  std::string fault_;    // why the list could not be read the last time; empty if it could
 };
 
-bool KeyList::reload(Time now) {
-  // File systems record times in steps of up to a second or two: a second change may not show.
-  constexpr std::chrono::seconds kStep{2};
-  std::error_code missing;
-  const Time written = std::filesystem::last_write_time(path_, missing);
-  const bool is_recent = written > now - kStep;
-  if (std::exchange(written_, written) == written && !is_recent && fault_.empty()) {
-    return false;
-  }
+bool KeyList::reload() {
+  constexpr int kEmptyReads = 4;
   try {
     Keys keys = read();
-    if (keys.empty() && !keys_.empty() && is_recent) {
-      written_ = Time::min();  // to read it again: an editor may have emptied it before it writes
-      return false;
+    empty_reads_ = keys.empty() ? empty_reads_ + 1 : 0;
+    if (keys.empty() && empty_reads_ < kEmptyReads) {
+      return false;  // an editor may have emptied the file before it writes
     }
     const bool had_fault = !std::exchange(fault_, {}).empty();
     keys.swap(keys_);
@@ -177,37 +151,6 @@ bool KeyList::reload(Time now) {
   }
 }
 
-namespace {
-
-/// Admits the listed keys whose role is for its port.
-class RoleFilter final : public Authenticator {
- public:
-  RoleFilter(std::shared_ptr<const KeyList> list, AccessControl::PortRole port)
-      : list_(std::move(list)), port_(port) {}
-
-  AuthResult authenticate(const protocol::CurveKey& public_key) const override {
-    auto identity = list_->find(public_key);
-    if (!identity) {
-      return Refusal{RefusalCause::kUnknownKey,
-                     fmt::format("its key {} is not listed", protocol::z85(public_key))};
-    }
-    const bool is_worker = identity->role == protocol::Role::kWorker;
-    if (is_worker != (port_ == AccessControl::PortRole::kWorkers)) {
-      return Refusal{
-          RefusalCause::kOtherRole,
-          fmt::format("its key \"{}\" has the role {}, and this port is for {}", identity->name,
-                      name_of(identity->role), is_worker ? "clients" : "workers")};
-    }
-    return identity;
-  }
-
- private:
-  std::shared_ptr<const KeyList> list_;
-  AccessControl::PortRole port_;
-};
-
-}  // namespace
-
 AccessControl::AccessControl(const AccessSettings& settings)
     : address_(address_to_bind(settings)), mode_(mode_of(settings)) {
   if (mode_ == AccessMode::kKeys) {
@@ -221,10 +164,25 @@ std::optional<PortSecurity> AccessControl::security(PortRole port) const {
   if (!list_) {
     return std::nullopt;
   }
-  return PortSecurity{server_, std::make_shared<const RoleFilter>(list_, port)};
+  return PortSecurity{
+      server_, [list = list_, port](const auto& public_key) -> AuthResult {
+        auto identity = list->find(public_key);
+        if (!identity) {
+          return Refusal{RefusalCause::kUnknownKey,
+                         fmt::format("its key {} is not listed", protocol::z85(public_key))};
+        }
+        const bool is_worker = identity->role == protocol::Role::kWorker;
+        if (is_worker != (port == PortRole::kWorkers)) {
+          return Refusal{
+              RefusalCause::kOtherRole,
+              fmt::format("its key \"{}\" has the role {}, and this port is for {}", identity->name,
+                          name_of(identity->role), is_worker ? "clients" : "workers")};
+        }
+        return identity;
+      }};
 }
 
-bool AccessControl::refresh(std::int64_t now_ms, std::filesystem::file_time_type file_now) {
+bool AccessControl::refresh(std::int64_t now_ms) {
   constexpr std::int64_t kRefreshInterval_ms = 500;
   constexpr std::int64_t kWarningInterval_ms = 600'000;
   if (mode_ == AccessMode::kInsecure && now_ms >= next_warning_ms_) {
@@ -239,7 +197,7 @@ bool AccessControl::refresh(std::int64_t now_ms, std::filesystem::file_time_type
     return false;
   }
   next_refresh_ms_ = now_ms + kRefreshInterval_ms;
-  return list_->reload(file_now);
+  return list_->reload();
 }
 
 }  // namespace oblique::server

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,12 +46,11 @@ class AccessControl {
   /// For `Network::listen`. Nothing without keys.
   std::optional<PortSecurity> security(PortRole port) const;
 
-  /// To be called often, with milliseconds of a monotonic clock and the time of the file system.
-  /// Twice a second it reads the list of keys again; a list that cannot be read, as in the middle
-  /// of an edit, changes nothing. True if the admitted keys have changed. Without any protection it
-  /// logs a warning every ten minutes.
-  bool refresh(std::int64_t now_ms, std::filesystem::file_time_type file_now =
-                                        std::filesystem::file_time_type::clock::now());
+  /// To be called often, with milliseconds of a monotonic clock. Twice a second it reads the list
+  /// of keys again; a list that cannot be read, as in the middle of an edit, changes nothing, and
+  /// an empty one counts from its fourth time. True if the admitted keys have changed. Without any
+  /// protection it logs a warning every ten minutes.
+  bool refresh(std::int64_t now_ms);
 
  private:
   std::string address_;

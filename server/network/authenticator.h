@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -46,20 +47,23 @@ struct KeyIdentity {
   bool operator==(const KeyIdentity&) const = default;
 };
 
+/// What became of a message to a peer.
+enum class Delivery {
+  kSent,  ///< it is on its way
+  kBusy,  ///< the same, but so much waits to go out that the peer should get no further work yet
+  kGone,  ///< there is no such peer any more
+};
+
 using AuthResult = std::variant<std::shared_ptr<const KeyIdentity>, Refusal>;
 
-/// Decides which keys are admitted at a port.
-class Authenticator {
- public:
-  virtual ~Authenticator() = default;
-  /// Called on the event loop, and only for a key that the peer has proved to hold.
-  virtual AuthResult authenticate(const protocol::CurveKey& public_key) const = 0;
-};
+/// Decides whether a key is admitted. Called on the event loop, and only for a key that the peer
+/// has proved to hold.
+using Authenticate = std::function<AuthResult(const protocol::CurveKey& public_key)>;
 
 /// What a port with keys needs.
 struct PortSecurity {
   protocol::KeyPair server;
-  std::shared_ptr<const Authenticator> authenticator;
+  Authenticate authenticate;
 };
 
 }  // namespace oblique::server

@@ -134,7 +134,7 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
                   own_brief_secret)) {
     return Refusal{RefusalCause::kFaulty, "it does not hold the key that it shows"};
   }
-  AuthResult result = security_.authenticator->authenticate(key_);
+  AuthResult result = security_.authenticate(key_);
   if (auto* const refusal = std::get_if<Refusal>(&result)) {
     return std::move(*refusal);
   }

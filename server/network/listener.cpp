@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <arpa/inet.h>
 #include <netdb.h>
 #include <sys/socket.h>
 
@@ -16,11 +17,6 @@
 
 namespace oblique::server {
 namespace {
-
-bool accepts_both_families(int socket) {
-  const int no = 0;
-  return setsockopt(socket, IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no) == 0;
-}
 
 sockaddr* generic(sockaddr_in6& address) {
   return reinterpret_cast<sockaddr*>(&address);
@@ -48,6 +44,18 @@ PeerAddress::PeerAddress(sockaddr_in6 address) {
   source = is_v6 ? std::string(v6, kNetworkBytes) : std::string(host.data());
 }
 
+std::optional<bool> is_loopback(const std::string& address) {
+  in_addr v4{};
+  in6_addr v6{};
+  if (inet_pton(AF_INET, address.c_str(), &v4) == 1) {
+    return (ntohl(v4.s_addr) >> 24U) == 127;
+  }
+  if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &v6) == 1) {
+    return IN6_IS_ADDR_LOOPBACK(&v6);
+  }
+  return std::nullopt;
+}
+
 Listener::Listener(const std::string& address, const std::string& port) {
   addrinfo hints{};
   hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
@@ -63,10 +71,12 @@ Listener::Listener(const std::string& address, const std::string& port) {
   socket_ = protocol::Descriptor(
       ::socket(found->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, IPPROTO_TCP));
   const int yes = 1;
+  const int no = 0;
   socklen_t bytes = sizeof own;
   const bool listens =
       socket_.is_open() &&
-      (found->ai_family == AF_INET || accepts_both_families(socket_.number())) &&
+      (found->ai_family == AF_INET ||
+       setsockopt(socket_.number(), IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no) == 0) &&
       setsockopt(socket_.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) == 0 &&
       bind(socket_.number(), found->ai_addr, found->ai_addrlen) == 0 &&
       listen(socket_.number(), protocol::kWaitingConnections) == 0 &&

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <netinet/in.h>
@@ -19,6 +20,10 @@ struct PeerAddress {
   /// The IPv4 address, or the first 64 bits of an IPv6 address: one host can have all of the rest.
   std::string source;
 };
+
+/// Whether only this machine can reach a numeric address, which may name its interface as in
+/// fe80::1%eth0; nothing for other text.
+std::optional<bool> is_loopback(const std::string& address);
 
 /// A non-blocking TCP socket that accepts connections.
 class Listener {

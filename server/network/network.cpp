@@ -13,7 +13,6 @@
 #include <sys/epoll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/uio.h>
 
 #include "proto/socket/limits.h"
 #include "server/network/zmtp.h"
@@ -41,7 +40,6 @@ constexpr std::int64_t kPartOfOldest = 10;
 constexpr std::int64_t kPartOfNewest = 100;
 
 constexpr const char* kLeavesTooMuchUnread = "it leaves too much unread";
-constexpr const char* kTooManyOfSource = "too many handshakes of its address are under way";
 
 void set_option(int socket, int level, int option, int value) {
   // This may fail for a peer that has left, which reading reports.
@@ -50,14 +48,6 @@ void set_option(int socket, int level, int option, int value) {
 
 bool would_block() {
   return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
-}
-
-/// How many connections the system's limit on descriptors allows.
-std::size_t most_connections() {
-  rlimit limit{};
-  static_cast<void>(getrlimit(RLIMIT_NOFILE, &limit));
-  return std::max<std::size_t>(limit.rlim_cur, kOtherDescriptors + kFewestConnections) -
-         kOtherDescriptors;
 }
 
 }  // namespace
@@ -143,25 +133,12 @@ class Network::Connection {
 
 /// Sends a message as far as the system takes it, and keeps the rest.
 void Network::Connection::send(std::string_view body) {
-  const std::string header = zmtp_.begin_message(body);
-  std::size_t taken = 0;
-  if (unsent_bytes() == 0) {
-    // sendmsg does not change what it is given.
-    std::array<iovec, 2> parts{{{const_cast<char*>(header.data()), header.size()},
-                                {const_cast<char*>(body.data()), body.size()}}};
-    msghdr message{};
-    message.msg_iov = parts.data();
-    message.msg_iovlen = parts.size();
-    const ssize_t count = ::sendmsg(socket_.number(), &message, MSG_NOSIGNAL | MSG_DONTWAIT);
-    if (count < 0 && !would_block()) {
-      stop_sending();
-      return;
-    }
-    taken = static_cast<std::size_t>(std::max<ssize_t>(count, 0));
+  const bool is_waiting = unsent_bytes() > 0;
+  out_ += zmtp_.begin_message(body);
+  out_ += body;
+  if (!is_waiting) {
+    flush();
   }
-  const std::size_t of_header = std::min(taken, header.size());
-  out_ += std::string_view(header).substr(of_header);
-  out_ += body.substr(taken - of_header);
 }
 
 void Network::Connection::flush() {
@@ -221,7 +198,11 @@ Network::Network(NetworkLimits limits)
   if (!epoll_.is_open()) {
     throw std::system_error(errno, std::generic_category(), "epoll_create1");
   }
-  limits_.connections = std::min(limits_.connections, most_connections());
+  rlimit limit{};
+  static_cast<void>(getrlimit(RLIMIT_NOFILE, &limit));
+  limits_.connections = std::min<std::size_t>(
+      limits_.connections,
+      std::max<rlim_t>(limit.rlim_cur, kOtherDescriptors + kFewestConnections) - kOtherDescriptors);
 }
 
 Network::~Network() = default;
@@ -254,14 +235,14 @@ void Network::collect(std::int64_t now_ms) {
   for (int i = 0; i < count; ++i) {
     const epoll_event& event = events[static_cast<std::size_t>(i)];
     if (event.data.u64 < kFirstPeer) {
-      accept_all(event.data.u64, now_ms);
+      accept_all(event.data.u64);
     } else {
-      serve(event.data.u64, event.events, now_ms);
+      serve(event.data.u64, event.events);
     }
   }
   run_handshakes();
   for (Port port = 0; port < ports_.size(); ++port) {
-    if (!ports_[port].is_accepting && !must_newcomers_wait(now_ms)) {
+    if (!ports_[port].is_accepting && !must_newcomers_wait()) {
       set_accepting(port, true);
     }
   }
@@ -281,25 +262,25 @@ bool Network::has_more() const {
 
 // ---- New connections --------------------------------------------------------------------------
 
-void Network::accept_all(Port port, std::int64_t now_ms) {
+void Network::accept_all(Port port) {
   constexpr std::size_t kMostAtATime = 64;
   // No more than can be admitted in a turn: a crowd, as after a restart, waits in the system.
   const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
   std::size_t taken = 0;
   for (std::size_t i = 0;
        i < kMostAtATime && taken < most && pending_steps_.size() < kMostPendingSteps; ++i) {
-    if (must_newcomers_wait(now_ms)) {
+    if (must_newcomers_wait()) {
       set_accepting(port, false);
       return;
     }
     Listener::Accepted accepted = ports_[port].listener->accept();
     if (!accepted.socket.is_open()) {
       if (errno == EMFILE || errno == ENFILE) {
-        make_room_for_connection(port, now_ms);
+        make_room_for_connection(port);
       }
       return;
     }
-    if (!make_room(port, accepted.address, now_ms)) {
+    if (!make_room(port, accepted.address)) {
       count_refusal(RefusalCause::kBound);
       continue;
     }
@@ -307,7 +288,7 @@ void Network::accept_all(Port port, std::int64_t now_ms) {
     ++ports_[port].connections;
     const Number number = ++last_number_;
     auto& peer = peers_[number];
-    peer = std::make_unique<Peer>(std::move(accepted), ports_[port].security.get(), port, now_ms);
+    peer = std::make_unique<Peer>(std::move(accepted), ports_[port].security.get(), port, now_ms_);
     handshakes_.insert(number);
     handshakes_of_[peer->address.source].insert(number);
     peer->connection.send_answers();
@@ -317,13 +298,12 @@ void Network::accept_all(Port port, std::int64_t now_ms) {
 
 /// There are as many handshakes as may be, and the oldest has not had its time. It is not ended: it
 /// would come again at once, and nobody of a slow crowd would ever be admitted.
-bool Network::must_newcomers_wait(std::int64_t now_ms) const {
-  return handshakes_.size() >= limits_.handshakes &&
-         !has_had(*handshakes_.begin(), kPartOfOldest, now_ms);
+bool Network::must_newcomers_wait() const {
+  return handshakes_.size() >= limits_.handshakes && !has_had(*handshakes_.begin(), kPartOfOldest);
 }
 
-bool Network::has_had(Number handshake, std::int64_t part, std::int64_t now_ms) const {
-  return now_ms - peers_.at(handshake)->since_ms >= limits_.handshake_ms / part;
+bool Network::has_had(Number handshake, std::int64_t part) const {
+  return now_ms_ - peers_.at(handshake)->since_ms >= limits_.handshake_ms / part;
 }
 
 void Network::set_accepting(Port port, bool is_accepting) {
@@ -333,21 +313,21 @@ void Network::set_accepting(Port port, bool is_accepting) {
 }
 
 /// Ends connections where one more would exceed a bound. False if the new one is to be refused.
-bool Network::make_room(Port port, const PeerAddress& address, std::int64_t now_ms) {
-  if (ports_[port].security && !make_room_at_source(address, now_ms)) {
+bool Network::make_room(Port port, const PeerAddress& address) {
+  if (ports_[port].security && !make_room_at_source(address)) {
     return false;
   }
   if (handshakes_.size() >= limits_.handshakes) {
     end_oldest_handshake();
   }
-  return peers_.size() < limits_.connections || make_room_for_connection(port, now_ms);
+  return peers_.size() < limits_.connections || make_room_for_connection(port);
 }
 
 /// Of one source. A newcomer does not wait in the system, where it would keep those of other
 /// sources waiting. The oldest handshake is ended once it has had its time, else one of the newest:
 /// most finish even if all are slow, and a fast peer is soon admitted beside many that never
 /// finish.
-bool Network::make_room_at_source(const PeerAddress& address, std::int64_t now_ms) {
+bool Network::make_room_at_source(const PeerAddress& address) {
   constexpr std::size_t kPartForNewest = 8;
   const auto found = handshakes_of_.find(address.source);
   if (found == handshakes_of_.end() || found->second.size() < limits_.handshakes_of_source) {
@@ -357,19 +337,18 @@ bool Network::make_room_at_source(const PeerAddress& address, std::int64_t now_m
   const auto newest = static_cast<std::ptrdiff_t>(handshakes.size() / kPartForNewest);
   const Number oldest = *handshakes.begin();
   const Number one_of_newest = *std::prev(handshakes.end(), newest + 1);
-  if (has_had(oldest, kPartOfOldest, now_ms)) {
-    end(oldest, kTooManyOfSource, RefusalCause::kBound);
-  } else if (has_had(one_of_newest, kPartOfNewest, now_ms)) {
-    end(one_of_newest, kTooManyOfSource, RefusalCause::kBound);
-  } else {
+  const bool is_oldest_due = has_had(oldest, kPartOfOldest);
+  if (!is_oldest_due && !has_had(one_of_newest, kPartOfNewest)) {
     return false;
   }
+  end(is_oldest_due ? oldest : one_of_newest, "too many handshakes of its address are under way",
+      RefusalCause::kBound);
   return true;
 }
 
 /// Ends the oldest handshake; without keys, if there is none, the connection that was silent for
 /// longest. A peer with a key never makes room. False if no connection may be ended.
-bool Network::make_room_for_connection(Port port, std::int64_t now_ms) {
+bool Network::make_room_for_connection(Port port) {
   if (end_oldest_handshake()) {
     return true;
   }
@@ -380,7 +359,7 @@ bool Network::make_room_for_connection(Port port, std::int64_t now_ms) {
       std::min_element(peers_.begin(), peers_.end(), [](const auto& left, const auto& right) {
         return left.second->last_input_ms < right.second->last_input_ms;
       });
-  if (quietest == peers_.end() || now_ms - quietest->second->last_input_ms < limits_.active_ms) {
+  if (quietest == peers_.end() || now_ms_ - quietest->second->last_input_ms < limits_.active_ms) {
     return false;
   }
   end(quietest->first, "there are too many connections, and it was silent for longest");
@@ -389,7 +368,7 @@ bool Network::make_room_for_connection(Port port, std::int64_t now_ms) {
 
 // ---- Input ------------------------------------------------------------------------------------
 
-void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
+void Network::serve(Number number, std::uint32_t events) {
   const auto found = peers_.find(number);
   if (found == peers_.end()) {
     return;
@@ -409,7 +388,7 @@ void Network::serve(Number number, std::uint32_t events, std::int64_t now_ms) {
       peer.is_paused = true;
       ports_[peer.port].paused.push_back(number);
     }
-    peer.last_input_ms = now_ms;
+    peer.last_input_ms = now_ms_;
     if (!peer.wants_input()) {
       watch(number, peer, peer.wanted_events());
     } else if (!connection.read()) {
@@ -590,10 +569,6 @@ bool Network::is_busy(const std::string& identity) const {
   return peer != nullptr && peer->waiting_out_bytes > limits_.busy_bytes;
 }
 
-bool Network::is_connected(const std::string& identity) const {
-  return find(identity) != nullptr;
-}
-
 void Network::flush(std::chrono::milliseconds longest) {
   using Clock = std::chrono::steady_clock;
   const auto until = Clock::now() + longest;
@@ -642,10 +617,6 @@ void Network::end_peer_that_left(Number number, const Peer& peer) {
   }
 }
 
-std::vector<Disconnect> Network::take_disconnects() {
-  return std::exchange(disconnects_, {});
-}
-
 /// Ends the connections that hold most, until the sums of all are within their bounds.
 void Network::end_largest() {
   const auto end_while = [this](const std::size_t& sum, std::size_t bound, std::size_t Peer::*bytes,
@@ -680,8 +651,7 @@ void Network::admission_changed() {
     if (!peer->key) {
       continue;
     }
-    const Authenticator& authenticator = *ports_[peer->port].security->authenticator;
-    AuthResult result = authenticator.authenticate(peer->connection.zmtp().key());
+    AuthResult result = ports_[peer->port].security->authenticate(peer->connection.zmtp().key());
     if (auto* const refusal = std::get_if<Refusal>(&result)) {
       refused.emplace_back(number, std::move(*refusal));
     } else {

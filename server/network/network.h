@@ -13,10 +13,10 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "server/network/authenticator.h"
-#include "server/network/delivery.h"
 #include "server/network/listener.h"
 #include "server/study/limits.h"
 
@@ -94,7 +94,7 @@ class Network {
   Delivery send(const std::string& identity, std::string_view body);
   /// Its unsent output exceeds `busy_bytes`.
   bool is_busy(const std::string& identity) const;
-  bool is_connected(const std::string& identity) const;
+  bool is_connected(const std::string& identity) const { return find(identity) != nullptr; }
   /// It has sent something that was not taken, or a message is coming in.
   bool has_unread_input(const std::string& identity) const;
   /// Sends unsent output, for at most this long.
@@ -105,7 +105,7 @@ class Network {
   void admission_changed();
 
   /// Connections that ended since the last call.
-  std::vector<Disconnect> take_disconnects();
+  std::vector<Disconnect> take_disconnects() { return std::exchange(disconnects_, {}); }
   std::size_t connections() const { return peers_.size(); }
   std::size_t connections(Port port) const {
     return port < ports_.size() ? ports_[port].connections : 0;
@@ -131,16 +131,16 @@ class Network {
   class Connection;
   struct Peer;
 
-  void accept_all(Port port, std::int64_t now_ms);
-  bool must_newcomers_wait(std::int64_t now_ms) const;
+  void accept_all(Port port);
+  bool must_newcomers_wait() const;
   void set_accepting(Port port, bool is_accepting);
-  bool make_room(Port port, const PeerAddress& address, std::int64_t now_ms);
-  bool make_room_at_source(const PeerAddress& address, std::int64_t now_ms);
-  bool make_room_for_connection(Port port, std::int64_t now_ms);
+  bool make_room(Port port, const PeerAddress& address);
+  bool make_room_at_source(const PeerAddress& address);
+  bool make_room_for_connection(Port port);
   bool end_oldest_handshake();
-  bool has_had(Number handshake, std::int64_t part, std::int64_t now_ms) const;
+  bool has_had(Number handshake, std::int64_t part) const;
 
-  void serve(Number number, std::uint32_t events, std::int64_t now_ms);
+  void serve(Number number, std::uint32_t events);
   void run_handshakes();
   bool examine(Number number, Peer& peer);
   void handshake_ended(Number number, Peer& peer);

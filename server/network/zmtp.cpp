@@ -125,7 +125,7 @@ std::shared_ptr<const KeyIdentity> Zmtp::identity() const {
   return curve_ ? curve_->identity() : nullptr;
 }
 
-void Zmtp::fail(RefusalCause cause, std::string reason) {
+void Zmtp::fail(std::string reason, RefusalCause cause) {
   fault_ = {cause, std::move(reason)};
   if (curve_ && state_ == State::kHandshake) {
     const std::string_view code = error_code(cause);
@@ -159,7 +159,7 @@ bool Zmtp::take_greeting() {
   if (is_wrong(0, [](unsigned byte) { return byte == 0xffU; }) ||
       is_wrong(9, [](unsigned byte) { return byte == 0x7fU; }) ||
       is_wrong(10, [](unsigned byte) { return byte >= kMajorVersion; })) {
-    fail(RefusalCause::kFaulty, "it does not use ZMTP 3");
+    fail("it does not use ZMTP 3");
     return false;
   }
   if (bytes.size() < kGreetingBytes) {
@@ -167,9 +167,9 @@ bool Zmtp::take_greeting() {
   }
   const std::string own = greeting_of(curve_ ? "CURVE" : "NULL");
   if (bytes.substr(kMechanismAt, kMechanismBytes) != own.substr(kMechanismAt, kMechanismBytes)) {
-    fail(RefusalCause::kOtherMechanism, curve_
-                                            ? "it has no key, and this server requires one"
-                                            : "it uses a key, and this server runs without keys");
+    fail(curve_ ? "it has no key, and this server requires one"
+                : "it uses a key, and this server runs without keys",
+         RefusalCause::kOtherMechanism);
     return false;
   }
   begin_ += kGreetingBytes;
@@ -189,11 +189,11 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
   }
   const unsigned flags = byte_at(bytes, 0);
   if (flags > (kFrameMore | kFrameLong | kFrameCommand)) {
-    fail(RefusalCause::kFaulty, "it sends a frame of an unknown kind");
+    fail("it sends a frame of an unknown kind");
     return std::nullopt;
   }
   if ((flags & kFrameMore) != 0) {
-    fail(RefusalCause::kFaulty, "it sends a message of several frames");
+    fail("it sends a message of several frames");
     return std::nullopt;
   }
   Header header{(flags & kFrameLong) != 0 ? kLongBytes : kShortBytes, 0,
@@ -208,8 +208,8 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
       is_message ? protocol::kMaxFrameBytes + (curve_ ? CurveSession::kAddedBytes : 0)
                  : kLongestCommand;
   if (header.body_bytes > longest) {
-    fail(RefusalCause::kFaulty, "it sends a frame of " + std::to_string(header.body_bytes) +
-                                    " bytes; the limit is " + std::to_string(longest));
+    fail("it sends a frame of " + std::to_string(header.body_bytes) + " bytes; the limit is " +
+         std::to_string(longest));
     return std::nullopt;
   }
   return header;
@@ -222,11 +222,11 @@ bool Zmtp::take_frame() {
     return false;
   }
   if (!header->is_command && !is_open()) {
-    fail(RefusalCause::kFaulty, "it sends a message before the handshake is done");
+    fail("it sends a message before the handshake is done");
     return false;
   }
   if (header->is_command && is_open() && !curve_) {
-    fail(RefusalCause::kFaulty, "it sends a command after the handshake, as ZMTP heartbeats are");
+    fail("it sends a command after the handshake, as ZMTP heartbeats are");
     return false;
   }
   if (pending().size() - header->bytes < header->body_bytes) {
@@ -259,9 +259,9 @@ void Zmtp::run_step() {
   } else {
     message_ = curve_->session().open(body);
     if (!message_) {
-      fail(RefusalCause::kFaulty,
-           "it sends a frame that is not encrypted with its keys, is not new, or is no message of "
-           "one frame");
+      fail(
+          "it sends a frame that is not encrypted with its keys, is not new, or is no message of "
+          "one frame");
     }
   }
   begin_ += header.bytes + body.size();
@@ -273,7 +273,7 @@ void Zmtp::run_step() {
 void Zmtp::take_command(std::string_view body) {
   const std::size_t name_bytes = body.empty() ? 0 : byte_at(body, 0);
   if (name_bytes == 0 || body.size() < 1 + name_bytes) {
-    fail(RefusalCause::kFaulty, "it sends a command without a name");
+    fail("it sends a command without a name");
     return;
   }
   const std::string_view name = body.substr(1, name_bytes);
@@ -281,7 +281,7 @@ void Zmtp::take_command(std::string_view body) {
   if (curve_) {
     CurveHandshake::Outcome outcome = curve_->take(name, data);
     if (auto* const refusal = std::get_if<Refusal>(&outcome)) {
-      fail(refusal->cause, std::move(refusal->reason));
+      fail(std::move(refusal->reason), refusal->cause);
     } else if (const auto& answer = std::get<std::string>(outcome); !curve_->is_done()) {
       answers_ += command_frame("WELCOME", answer);
     } else if (take_properties(answer)) {
@@ -290,7 +290,7 @@ void Zmtp::take_command(std::string_view body) {
   } else if (name == "READY") {
     take_properties(data);
   } else {
-    fail(RefusalCause::kFaulty, "its handshake does not begin with READY");
+    fail("its handshake does not begin with READY");
   }
 }
 
@@ -298,7 +298,7 @@ void Zmtp::take_command(std::string_view body) {
 bool Zmtp::take_properties(std::string_view properties) {
   std::string fault = validate_properties(properties);
   if (!fault.empty()) {
-    fail(RefusalCause::kFaulty, std::move(fault));
+    fail(std::move(fault));
     return false;
   }
   state_ = State::kOpen;

@@ -83,7 +83,7 @@ class Zmtp {
   bool take_frame();
   void take_command(std::string_view body);
   bool take_properties(std::string_view properties);
-  void fail(RefusalCause cause, std::string reason);
+  void fail(std::string reason, RefusalCause cause = RefusalCause::kFaulty);
   std::string_view pending() const { return std::string_view(buffer_).substr(begin_); }
 
   std::unique_ptr<CurveHandshake> curve_;

@@ -30,7 +30,7 @@
 #include "proto/program/usage.h"
 #include "server/event_loop/event_loop.h"
 #include "server/query/query_pool.h"
-#include "server/web/http_options.h"
+#include "server/web/web.h"
 #include "worker/solver/model/version.h"
 
 namespace {

@@ -407,46 +407,35 @@ void add_condition(Intervals& intervals, SqlTokens tokens) {
   }
 }
 
-/// Appends the conditions that `tokens` join with AND; all of `tokens` if it cannot separate them.
-void add_conjuncts(SqlTokens tokens, int depth, std::vector<SqlTokens>& conjuncts) {
+/// The conditions that `tokens` join with AND; all of `tokens` if it cannot separate them.
+std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   const bool is_in_brackets =
       !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;
   if (is_in_brackets && depth < kDeepest) {
-    add_conjuncts(tokens.subspan(1, tokens.size() - 2), depth + 1, conjuncts);
-    return;
+    return conjuncts_of(tokens.subspan(1, tokens.size() - 2), depth + 1);
   }
-  std::vector<SqlTokens> parts;
+  std::vector<SqlTokens> conjuncts;
   std::size_t begin = 0;
   std::size_t open_betweens = 0;
-  for (std::size_t i = 0; i < tokens.size(); ++i) {
-    if (is_word(tokens[i], "or") || is_word(tokens[i], "case")) {
-      parts.clear();  // not a conjunction
-      break;
+  for (std::size_t i = 0; i <= tokens.size(); ++i) {
+    const bool is_end = i == tokens.size();
+    if (!is_end && (is_word(tokens[i], "or") || is_word(tokens[i], "case"))) {
+      return {tokens};  // not a conjunction
     }
-    if (tokens[i].is_sign("(")) {
-      i = std::min(closing_bracket(tokens, i), tokens.size() - 1);
+    if (is_end || (is_word(tokens[i], "and") && open_betweens == 0)) {
+      const SqlTokens part = tokens.subspan(begin, i - begin);
+      const bool is_whole = part.size() == tokens.size();
+      const auto inner = is_whole ? std::vector{part} : conjuncts_of(part, depth);
+      conjuncts.insert(conjuncts.end(), inner.begin(), inner.end());
+      begin = i + 1;
+    } else if (is_word(tokens[i], "and")) {
+      --open_betweens;
     } else if (is_word(tokens[i], "between")) {
       ++open_betweens;
-    } else if (is_word(tokens[i], "and") && open_betweens > 0) {
-      --open_betweens;
-    } else if (is_word(tokens[i], "and")) {
-      parts.push_back(tokens.subspan(begin, i - begin));
-      begin = i + 1;
+    } else if (tokens[i].is_sign("(")) {
+      i = std::min(closing_bracket(tokens, i), tokens.size() - 1);
     }
   }
-  if (parts.empty()) {
-    conjuncts.push_back(tokens);
-    return;
-  }
-  parts.push_back(tokens.subspan(begin));
-  for (const SqlTokens part : parts) {
-    add_conjuncts(part, depth, conjuncts);
-  }
-}
-
-std::vector<SqlTokens> conjuncts_of(SqlTokens condition) {
-  std::vector<SqlTokens> conjuncts;
-  add_conjuncts(condition, 0, conjuncts);
   return conjuncts;
 }
 
@@ -540,7 +529,7 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   if (!study.step()) {
     throw InputError(no_such_study(database, name));
   }
-  QueriedStudy found{name, study.integer(0), static_cast<std::uint64_t>(study.integer(1))};
+  QueriedStudy found{name, study.integer(0), study.number(1)};
   if (!protocol::parse_recipe(study.bytes(2), found.recipe)) {
     found.recipe.Clear();
   }

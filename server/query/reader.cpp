@@ -50,12 +50,11 @@ void add_taken(Statement& origins, protocol::StudyStatus& status) {
   origins.bind(1, status.study_id());
   while (origins.step()) {
     auto& taken = *status.mutable_taken();
-    const auto points = static_cast<std::uint64_t>(origins.integer(1));
-    taken.set_points(taken.points() + points);
+    taken.set_points(taken.points() + origins.number(1));
     if (taken.from_size() < kMostNamed) {
       auto& from = *taken.add_from();
       from.set_study(origins.text(0));
-      from.set_points(points);
+      from.set_points(origins.number(1));
     }
   }
   origins.reset();
@@ -100,18 +99,6 @@ std::string took_too_long(std::int64_t time_limit_ms) {
 
 void restrict_to_reading(sqlite3* database) {
   execute(database, "PRAGMA temp_store = MEMORY; PRAGMA case_sensitive_like = ON");
-  constexpr std::array<std::pair<int, int>, 9> kLimits{{{SQLITE_LIMIT_SQL_LENGTH, kLongestSql},
-                                                        {SQLITE_LIMIT_COLUMN, 1000},
-                                                        {SQLITE_LIMIT_EXPR_DEPTH, 1000},
-                                                        {SQLITE_LIMIT_COMPOUND_SELECT, 100},
-                                                        {SQLITE_LIMIT_VDBE_OP, 1'000'000},
-                                                        {SQLITE_LIMIT_FUNCTION_ARG, 100},
-                                                        {SQLITE_LIMIT_ATTACHED, 0},
-                                                        {SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 1000},
-                                                        {SQLITE_LIMIT_WORKER_THREADS, 0}}};
-  for (const auto& [limit, most] : kLimits) {
-    sqlite3_limit(database, limit, most);
-  }
   // The schema stays trusted: SQLite 3.40 treats json_extract, which our views use, as unsafe.
   // Without DQS_DML an unknown name in double quotes is an error instead of a text.
   constexpr std::array<std::pair<int, int>, 5> kSwitches{
@@ -334,18 +321,16 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
   std::vector<protocol::StudyStatus> found;
   while (list.step()) {
     protocol::StudyStatus status;
-    const std::int64_t settled = list.integer(5);
-    status.set_study_id(static_cast<std::uint64_t>(list.integer(0)));
+    const std::uint64_t completed = list.number(5);
+    status.set_study_id(list.number(0));
     status.set_name(list.text(1));
     // A server that was killed may not have stored that the study is done.
-    status.set_state(settled == list.integer(3) ? "done" : list.text(2));
-    status.set_points(static_cast<std::uint64_t>(list.integer(3)));
+    status.set_state(completed == list.number(3) ? "done" : list.text(2));
+    status.set_points(list.number(3));
     status.set_created_at(list.text(4));
-    status.set_failed(static_cast<std::uint64_t>(list.integer(6)));
-    status.set_left_out(static_cast<std::uint64_t>(list.integer(10)));
-    const std::uint64_t unsolved = status.failed() + status.left_out();
-    const auto completed = static_cast<std::uint64_t>(settled);
-    status.set_solved(completed - std::min(completed, unsolved));
+    status.set_failed(list.number(6));
+    status.set_left_out(list.number(10));
+    status.set_solved(completed - std::min(completed, status.failed() + status.left_out()));
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_submitted_by(list.text(8));
     status.set_solver_version(list.text(9));

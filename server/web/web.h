@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -9,6 +10,11 @@
 #include "server/web/http/http_server.h"
 #include "server/web/page/page.h"
 #include "server/web/status/snapshot.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace oblique::server {
 
@@ -21,6 +27,23 @@ struct WebSettings {
   std::string database;  ///< file
   PageSettings page;
   std::string solver_version;
+};
+
+/// The flags of what is shown over HTTP, and to whom.
+class HttpOptions {
+ public:
+  /// This must outlive the parsing.
+  void add_to(CLI::App& app);
+  /// Of the parsed flags; nothing: no HTTP. Throws std::runtime_error for an invalid address or
+  /// name.
+  std::optional<WebSettings> settings() const;
+
+ private:
+  std::string address_ = "127.0.0.1:7602";
+  std::vector<std::string> names_;
+  bool shows_without_token_ = false;
+  std::string token_file_;
+  const CLI::Option* address_option_ = nullptr;
 };
 
 /// The server over HTTP: metrics and health for machines, and the page for people. The event loop
@@ -57,7 +80,6 @@ class Web {
   std::int64_t published_ms_ = 0;  // used by the event loop only
   SnapshotCache snapshots_;
   ServiceClient service_;
-  EventFeed events_{snapshots_};
   Page page_;
   HttpServer http_;  // last: its thread uses the other members
 };

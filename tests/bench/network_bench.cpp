@@ -50,7 +50,7 @@ class TurnedNetwork {
  public:
   using Take = std::function<void(Network&, const Incoming&)>;
   explicit TurnedNetwork(Take take) : take_(std::move(take)) {
-    authenticator_->add(own_.public_key, "bench");
+    authenticator_.add(own_.public_key, "bench");
     network_.listen("127.0.0.1", "*", PortSecurity{server_, authenticator_});
     network_.listen("127.0.0.1", "*");
     thread_ = std::thread([this] { turn(); });
@@ -94,7 +94,7 @@ class TurnedNetwork {
 
   protocol::KeyPair server_ = protocol::made_key_pair();
   protocol::KeyPair own_ = protocol::made_key_pair();
-  std::shared_ptr<ListAuthenticator> authenticator_ = std::make_shared<ListAuthenticator>();
+  ListAuthenticator authenticator_;
   Network network_{{}};
   Take take_;
   std::atomic<bool> is_stopped_ = false;
@@ -116,20 +116,20 @@ void be_unknown(const TurnedNetwork& server) {
   }
   client.take_welcome(std::string_view(heard).substr(kGreetingBytes + 10));
   peer.send(command_frame("INITIATE", client.initiate()));
-  peer.await_end();
+  peer.read_to_the_end();
 }
 
 void be_astray(const TurnedNetwork& server) {
   RawPeer peer(server.endpoint(0));
   CurveClient client(server.own(), server.own().public_key);
   peer.send(curve_greeting() + command_frame("HELLO", client.hello()));
-  peer.await_end();
+  peer.read_to_the_end();
 }
 
 void be_without_key(const TurnedNetwork& server) {
   RawPeer peer(server.endpoint(0));
   peer.send(zmtp_greeting());
-  peer.await_end();
+  peer.read_to_the_end();
 }
 
 void measure_refusals(const char* what, int count, void (*be_refused)(const TurnedNetwork&)) {

@@ -16,9 +16,9 @@ namespace oblique::server {
 struct KeyedPort {
   protocol::KeyPair server = protocol::made_key_pair();
   protocol::KeyPair own = protocol::made_key_pair();
-  std::shared_ptr<ListAuthenticator> authenticator = std::make_shared<ListAuthenticator>();
+  ListAuthenticator authenticator;
   PortSecurity security{server, authenticator};
-  KeyedPort() { authenticator->add(own.public_key, "fuzz"); }
+  KeyedPort() { authenticator.add(own.public_key, "fuzz"); }
 };
 
 inline std::string send(Zmtp& zmtp, std::string_view bytes) {

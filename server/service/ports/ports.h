@@ -8,7 +8,6 @@
 
 #include "proto/oblique.pb.h"
 #include "server/network/authenticator.h"
-#include "server/network/delivery.h"
 #include "server/query/query_pool.h"
 #include "server/store/writer.h"
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,20 +11,9 @@
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
+#include "server/web/http/http_message.h"
 
 namespace oblique::server {
-namespace {
-
-template <typename Number>
-std::optional<Number> read_as(const std::string& text) {
-  Number number{};
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
-}
-
-}  // namespace
-
 bool is_text(const Fields& fields) {
   return std::all_of(fields.begin(), fields.end(), [](const auto& field) {
     return protocol::is_utf8(field.first) && protocol::is_utf8(field.second);
@@ -44,7 +31,7 @@ std::optional<std::uint64_t> FieldReader::whole(const std::string& name) const {
   if (!field) {
     return std::nullopt;
   }
-  const auto number = read_as<std::uint64_t>(*field);
+  const auto number = read_number<std::uint64_t>(*field);
   if (!number) {
     throw std::invalid_argument(fmt::format("{} must be a whole number from 0", name));
   }
@@ -56,7 +43,7 @@ std::optional<double> FieldReader::number(const std::string& name) const {
   if (!field) {
     return std::nullopt;
   }
-  const auto number = read_as<double>(*field);
+  const auto number = read_number<double>(*field);
   if (!number || !std::isfinite(*number)) {
     throw std::invalid_argument(fmt::format("{} must be a number", name));
   }
@@ -79,10 +66,6 @@ std::string FieldReader::condition() const {
   return condition;
 }
 
-double real_of(const protocol::Cell& cell) {
-  return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
-}
-
 std::optional<PictureColumn> find_picture_column(std::string_view name) {
   constexpr std::array<std::string_view, 3> kCategories{"mode", "major_mode", "margin_event"};
   if (std::ranges::find(kCategories, name) != kCategories.end()) {
@@ -94,18 +77,6 @@ std::optional<PictureColumn> find_picture_column(std::string_view name) {
                            kind_of_values(name) != protocol::CellKind::kText;
   return is_quantity ? std::optional(PictureColumn{column->name, column->unit, false})
                      : std::nullopt;
-}
-
-PictureColumn picture_column(const FieldReader& fields, const std::string& name,
-                             bool may_be_category) {
-  const std::string text = fields.text(name).value_or("");
-  auto column = find_picture_column(text);
-  if (!column || (column->is_category && !may_be_category)) {
-    throw std::invalid_argument(fmt::format("{} must be a column of numbers{}; \"{}\" is none",
-                                            name, may_be_category ? " or categories" : "",
-                                            protocol::excerpt(text)));
-  }
-  return *std::move(column);
 }
 
 }  // namespace oblique::server

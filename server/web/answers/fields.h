@@ -6,9 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "proto/wire/chunk.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
@@ -50,15 +48,6 @@ auto parse_request(const Parse& parse) {
   }
 }
 
-/// The bytes of numbers, for the end of `numbers_answer`.
-template <typename Number>
-std::string bytes_of(const std::vector<Number>& numbers) {
-  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
-}
-
-/// The value of a cell that is an integer or a real number.
-double real_of(const protocol::Cell& cell);
-
 /// A column that a picture can show.
 struct PictureColumn {
   std::string name;
@@ -68,10 +57,5 @@ struct PictureColumn {
 
 /// The column of that name; none if it is neither a number nor a category.
 std::optional<PictureColumn> find_picture_column(std::string_view name);
-
-/// The column that a field names. Throws std::invalid_argument unless it is a number or, where
-/// allowed, a category.
-PictureColumn picture_column(const FieldReader& fields, const std::string& name,
-                             bool may_be_category);
 
 }  // namespace oblique::server

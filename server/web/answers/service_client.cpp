@@ -8,12 +8,6 @@
 #include "server/web/http/http_message.h"
 
 namespace oblique::server {
-namespace {
-
-/// Most frames that `take` returns, so that the loop can serve other clients in between.
-constexpr std::size_t kMostATurn = 8;
-
-}  // namespace
 
 RecipeCache::Table RecipeCache::find(std::uint64_t study, std::uint64_t points) const {
   const auto found =
@@ -85,6 +79,7 @@ void ServiceClient::send(protocol::ClientRequest request) {
 }
 
 std::vector<std::string> ServiceClient::take() {
+  constexpr std::size_t kMostATurn = 8;  // so that the loop can serve other clients in between
   woken_.clear();
   const std::lock_guard lock(mutex_);
   std::vector<std::string> some;
@@ -104,13 +99,10 @@ void ServiceClient::put(std::string frame) {
 }
 
 HttpAnswer failure(const protocol::ErrorReply& error) {
-  constexpr unsigned kBadRequest = 400;
-  constexpr unsigned kNotFound = 404;
-  constexpr unsigned kConflict = 409;
-  const bool is_unknown = error.message().starts_with("there is no study");
-  return error_answer(is_unknown              ? kNotFound
-                      : error.wrong_request() ? kBadRequest
-                                              : kConflict,
+  if (error.message().starts_with("there is no study")) {
+    return error_answer(MHD_HTTP_NOT_FOUND, "there is no such study");
+  }
+  return error_answer(error.wrong_request() ? MHD_HTTP_BAD_REQUEST : MHD_HTTP_CONFLICT,
                       error.message());
 }
 

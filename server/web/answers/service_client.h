@@ -128,7 +128,7 @@ class ServiceExchange {
   std::uint64_t chunks_ = 0;
 };
 
-/// The HTTP answer to an error of the service.
+/// The HTTP answer to an error of the service; it does not repeat the name of an unknown study.
 HttpAnswer failure(const protocol::ErrorReply& error);
 
 }  // namespace oblique::server

@@ -182,10 +182,6 @@ ordered_json json_of(const std::optional<double>& number) {
   return number ? ordered_json(*number) : ordered_json();
 }
 
-HttpAnswer no_such_study() {
-  return error_answer(MHD_HTTP_NOT_FOUND, "there is no such study");
-}
-
 class Flow {
  public:
   Flow(ServiceClient& service, std::uint64_t study, std::unique_ptr<StudyAnswer> answer,
@@ -243,9 +239,6 @@ class Flow {
   }
 
   std::optional<HttpAnswer> on_status(const protocol::StatusReply& status) {
-    if (status.studies_size() != 1) {
-      return no_such_study();
-    }
     const protocol::StudyStatus& found = status.studies(0);
     study_.name = found.name();
     study_.state = found.state();
@@ -272,10 +265,8 @@ class Flow {
 
   std::optional<HttpAnswer> on_error(const protocol::ErrorReply& error) {
     HttpAnswer answer = failure(error);
-    if (answer.status == MHD_HTTP_NOT_FOUND) {
-      return no_such_study();
-    }
-    if (error_ || answer_->condition().empty() || !error.wrong_request() || !study_.table) {
+    if (answer.status == MHD_HTTP_NOT_FOUND || error_ || answer_->condition().empty() ||
+        !error.wrong_request() || !study_.table) {
       return answer;
     }
     error_ = std::move(answer);

@@ -3,7 +3,9 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -14,8 +16,8 @@
 #include "server/web/answers/service_client.h"
 #include "server/web/http/http_message.h"
 
-// Answers about a study; server/web/page/README.md lists their fields. Functions throw
-// std::invalid_argument for a wrong request.
+// Answers of the service and about a study; server/web/page/README.md lists their fields. Functions
+// throw std::invalid_argument for a wrong request.
 namespace oblique::server {
 
 /// A study as reported by the service.
@@ -78,5 +80,18 @@ protocol::SubmitRequest study_of_body(const std::string& body);
 
 /// Validates the recipe in the body of a submission; the answer has the size of the study.
 HttpAnswer check_answer(const std::string& body);
+
+// ---- Requests that the service answers
+
+PendingAnswer list_studies(ServiceClient& service, const Fields& fields);
+PendingAnswer list_workers(ServiceClient& service, const Fields& fields);
+PendingAnswer query_rows(ServiceClient& service, std::uint64_t study, const Fields& fields);
+PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint64_t point,
+                          const Fields& fields);
+PendingAnswer submit_study(ServiceClient& service, const std::string& body);
+PendingAnswer change_study(ServiceClient& service, std::uint64_t study,
+                           protocol::StudyChange change);
+/// Parses pause, resume, cancel or retry.
+std::optional<protocol::StudyChange> study_change(std::string_view name);
 
 }  // namespace oblique::server

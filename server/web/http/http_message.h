@@ -1,11 +1,13 @@
 #pragma once
 
+#include <charconv>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -49,6 +51,15 @@ struct HttpAnswer {
 using PendingAnswer = std::function<std::optional<HttpAnswer>()>;
 
 using HttpOutcome = std::variant<HttpAnswer, PendingAnswer>;
+
+/// The number that is the whole of a text; none for other texts.
+template <typename Number>
+std::optional<Number> read_number(const std::string& text) {
+  Number number{};
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
+}
 
 /// A sentence as plain text.
 HttpAnswer text_answer(unsigned status, std::string_view sentence);

@@ -1,41 +1,23 @@
 #include "server/web/http/request_rules.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstddef>
 #include <regex>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
 #include <vector>
-
-#include <arpa/inet.h>
-#include <netinet/in.h>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
+#include "server/network/listener.h"
 
 namespace oblique::server {
 namespace {
 
-template <typename Number>
-std::optional<Number> whole_number(const std::string& text) {
-  Number number = 0;
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, number);
-  return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
-}
-
-bool is_numeric(const std::string& host) {
-  in6_addr address{};
-  return inet_pton(AF_INET, host.c_str(), &address) == 1 ||
-         inet_pton(AF_INET6, host.c_str(), &address) == 1;
-}
-
 bool is_own(const std::string& host, const OwnNames& own) {
   return host == "localhost" || own.names.contains(host) ||
-         (own.is_loopback ? is_loopback(host) : is_numeric(host));
+         (own.is_loopback ? is_loopback(host).value_or(false) : is_loopback(host).has_value());
 }
 
 /// Whether a header is present once, with this value.
@@ -61,13 +43,6 @@ bool is_followed_link(const HttpRequest& request) {
 
 }  // namespace
 
-bool is_loopback(const std::string& address) {
-  in_addr v4{};
-  in6_addr v6{};
-  return (inet_pton(AF_INET, address.c_str(), &v4) == 1 && (ntohl(v4.s_addr) >> 24U) == 127) ||
-         (inet_pton(AF_INET6, address.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6));
-}
-
 std::string host_without_port(const std::string& header) {
   constexpr std::size_t kLongest = 300;  // a name has 253 characters at most
   static const std::regex kHost(
@@ -89,8 +64,8 @@ std::optional<HttpAddress> parse_http_address(const std::string& text) {
   }
   const std::string host = host_without_port(text);
   const std::string address = host == "localhost" ? "127.0.0.1" : host;
-  const auto port = whole_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
-  if (!port || !is_numeric(address)) {
+  const auto port = read_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
+  if (!port || !is_loopback(address)) {
     throw std::runtime_error(fmt::format(
         "--http {} is no ADDRESS:PORT, as 127.0.0.1:7602 or [::1]:7602 with a port from 0 to 65535 "
         "(0: the system picks one), and not \"off\"",
@@ -133,7 +108,7 @@ std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own
   const std::string length = request.header("content-length");
   if (request.headers.contains("transfer-encoding") ||
       (!length.empty() &&
-       whole_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
+       read_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
     return text_answer(
         MHD_HTTP_CONTENT_TOO_LARGE,
         fmt::format("a body states its length, which is at most {} bytes", kMostBodyBytes));

@@ -19,9 +19,6 @@ struct HttpAddress {
 /// system picks one. Throws std::runtime_error that says what is allowed.
 std::optional<HttpAddress> parse_http_address(const std::string& text);
 
-/// Whether a numeric address is reached from this machine only.
-bool is_loopback(const std::string& address);
-
 /// The host of a Host header in lower case, without port and brackets; empty if it is malformed.
 std::string host_without_port(const std::string& header);
 

@@ -10,7 +10,6 @@
 
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
-#include "server/web/page/request_flow.h"
 
 namespace oblique::server {
 namespace {
@@ -85,8 +84,12 @@ std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
 
 }  // namespace
 
-Page::Page(PageSettings settings, ServiceClient& service, EventFeed& events)
-    : settings_(std::move(settings)), service_(service), events_(events) {}
+Page::Page(PageSettings settings, std::string database, ServiceClient& service,
+           const SnapshotCache& snapshots)
+    : settings_(std::move(settings)),
+      database_(std::move(database)),
+      service_(service),
+      events_(snapshots) {}
 
 bool Page::is_trusted(const HttpRequest& request) const {
   return token().is_in(request.all("cookie"), request.header("host"));
@@ -115,10 +118,10 @@ HttpAnswer Page::enter(const HttpRequest& request) const {
 
 HttpAnswer Page::session(const HttpRequest& request) const {
   const bool trusted = is_trusted(request);
-  return json_answer({{"version", settings_.version},
+  return json_answer({{"version", OBLIQUE_VERSION},
                       {"may_look", trusted || settings_.shows_without_token},
                       {"may_change", trusted},
-                      {"file", trusted && settings_.is_of_file ? settings_.database : ""},
+                      {"file", trusted && settings_.is_of_file ? database_ : ""},
                       {"how_to_enter", trusted ? "" : kHowToEnter}});
 }
 

@@ -1,11 +1,12 @@
-#include "server/web/page/page_token.h"
-
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -19,6 +20,7 @@
 #include "proto/small_file.h"
 #include "proto/system/descriptor.h"
 #include "proto/text.h"
+#include "server/web/page/page.h"
 
 namespace oblique::server {
 namespace {

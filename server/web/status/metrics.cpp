@@ -1,14 +1,16 @@
-#include "server/web/status/metrics.h"
-
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <map>
+#include <string>
 #include <string_view>
 #include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "server/web/status/snapshot.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::server {

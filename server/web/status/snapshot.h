@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -66,9 +67,36 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms);
 /// With `left_s`, the time left [s]; null while it is unknown.
 nlohmann::ordered_json study_json(const protocol::StudyStatus& study);
 nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker);
+/// The JSON of each element of a list.
+template <class List, class ToJson>
+nlohmann::ordered_json json_list(const List& list, const ToJson& to_json) {
+  auto json = nlohmann::ordered_json::array();
+  for (const auto& element : list) {
+    json.push_back(to_json(element));
+  }
+  return json;
+}
 
 /// What the page shows of a server, as one line.
 std::string overview_json(const Snapshot& snapshot);
+
+/// What the file system reports about the database [bytes]. NaN: it reports nothing.
+struct DiskUsage {
+  double database = 0.0;
+  double wal = 0.0;  ///< 0 if there is no write-ahead log
+  double free = 0.0;
+};
+DiskUsage disk_usage(const std::string& database);
+
+struct MetricSources {
+  const Snapshot& snapshot;
+  DiskUsage disk;
+  const std::map<unsigned, std::uint64_t>& http_answers;  ///< by status
+  std::string solver_version;
+};
+
+/// All metrics, which README.md lists, in Prometheus' text format 0.0.4.
+std::string metrics_text(const MetricSources& sources);
 
 /// The latest snapshot, published by the event loop for the HTTP thread.
 class SnapshotCache {

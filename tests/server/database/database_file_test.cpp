@@ -1,17 +1,116 @@
 #include "server/database/database_file.h"
 
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <string>
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "server/maintenance/backup.h"
+#include "server/maintenance/check.h"
+#include "server/query/reader.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {
 namespace {
 
-TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
-  EXPECT_EQ(file_system_of("/dev/shm/none/oblique.db"), "tmpfs");
-  EXPECT_EQ(file_system_of("/proc/self/oblique.db"), "0x9fa0");
+namespace fs = std::filesystem;
+
+/// A database that lies in a folder where nothing can be written. What it holds: two rows in the
+/// file and, with a log beside it, a third one there.
+class ReadOnlyFolderTest : public StoreFixture {
+ protected:
+  ReadOnlyFolderTest() {
+    const auto study = study_of(10);
+    commit({study, worker(1), solved(study, {0, 1})});
+    store().merge_log();
+    commit({solved(study, {2})});
+    place("", "alone");
+    place("", "with_log");
+    place("-wal", "with_log");
+    ::chmod(folder_.file("").c_str(), 0755);
+    fs::create_directory(folder_.file("out"));
+    ::chmod(folder_.file("out").c_str(), 0777);
+  }
+  ~ReadOnlyFolderTest() override {
+    for (const char* name : {"alone", "with_log"}) {
+      ::chmod(folder_.file(name).c_str(), 0755);
+    }
+  }
+
+  std::string file_in(const std::string& name) const {
+    return folder_.file(name + "/some % results?.db");
+  }
+
+  /// Runs `what` as a user who can write nowhere but in `out`: root could write in every folder.
+  /// Ends the process with 0 when `what` gives true.
+  void as_stranger(const std::function<bool()>& what) const {
+    constexpr uid_t kNobody = 65534;
+    if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) {
+      std::_Exit(2);
+    }
+    try {
+      std::_Exit(what() ? 0 : 1);
+    } catch (const std::exception& error) {
+      std::cerr << error.what() << '\n';
+      std::_Exit(3);
+    }
+  }
+
+ private:
+  void place(const std::string& suffix, const std::string& name) {
+    fs::create_directories(folder_.file(name));
+    fs::copy_file(path_ + suffix, file_in(name) + suffix);
+    ::chmod((file_in(name) + suffix).c_str(), 0444);
+    if (name == "alone" || suffix == "-wal") {
+      ::chmod(folder_.file(name).c_str(), 0555);
+    }
+  }
+};
+
+std::size_t rows_of(const std::string& path) {
+  return Reader(path).query("SELECT point FROM results", kNoLimits).rows.size();
 }
 
-TEST(FileSystemOf, ALocalPathHasNoObjection) {
-  EXPECT_EQ(objection_to_shared_disk("/dev/shm/oblique.db"), "");
+TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
+  for (const auto& [name, rows] : {std::pair{"alone", 2U}, std::pair{"with_log", 3U}}) {
+    const std::string file = file_in(name);
+    EXPECT_EXIT(as_stranger([&, expected = rows] { return rows_of(file) == expected; }),
+                testing::ExitedWithCode(0), "")
+        << name;
+  }
+}
+
+TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
+  const std::string file = file_in("with_log");
+  const std::string copy = folder_.file("out/copy.db");
+  const std::string saved = folder_.file("out/saved.db");
+  EXPECT_EXIT(as_stranger([&] {
+                back_up(file, copy);
+                return Reader(file).study_status("a").at(0).solved() == 3 &&
+                       diagnose(file).faults.empty() && rows_of(copy) == 3 &&
+                       salvage(file, saved).results == 3;
+              }),
+              testing::ExitedWithCode(0), "");
+}
+
+TEST_F(ReadOnlyFolderTest, ADatabaseThatMayNotBeReadIsSaidToBeItsOwnersAlone) {
+  const std::string file = file_in("alone");
+  ::chmod(file.c_str(), ::geteuid() == 0 ? 0600 : 0);
+  EXPECT_EXIT(as_stranger([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
+              "permission denied; a database is its owner's alone");
+}
+
+TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
+  EXPECT_EQ(file_system_of("/dev/shm/none/oblique.db"), "tmpfs");
+  EXPECT_EQ(file_system_of("/proc/self/oblique.db"), "proc");
+  EXPECT_EQ(objection_to_shared_disk("/dev/shm/oblique.db"), "") << "it is local";
 }
 
 }  // namespace

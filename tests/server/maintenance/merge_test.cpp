@@ -19,9 +19,7 @@
 #include <gtest/gtest.h>
 
 #include "server/database/sqlite.h"
-#include "server/maintenance/check.h"
-#include "server/store/store.h"
-#include "tests/server/maintenance/maintenance_fixture.h"
+#include "tests/server/store/store_fixture.h"
 
 namespace oblique::server {
 namespace {
@@ -30,8 +28,6 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-using Table = std::shared_ptr<const protocol::PointTable>;
 
 /// Results of one study in one database.
 struct Part {
@@ -46,42 +42,39 @@ struct Part {
 };
 
 /// Databases that are made, and merged into the one called `all`.
-class MergeTest : public testing::Test {
+class MergeTest : public StoreFixture {
  protected:
   std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
 
   /// A database with these studies and results; some may be there already.
-  void store(const std::string& name, const std::vector<Part>& parts) const {
+  void make(const std::string& name, const std::vector<Part>& parts) const {
     Store store(file(name));
     for (const Part& part : parts) {
-      commit(store, part);
+      add_part(store, part);
     }
   }
 
-  static void commit(Store& store, const Part& part) {
+  static void add_part(Store& store, const Part& part) {
     const auto studies = store.studies();
-    const auto known = std::find_if(studies.begin(), studies.end(),
-                                    [&](const auto& study) { return study.name == part.study; });
+    const auto known = std::ranges::find(studies, part.study, &StoredStudy::name);
     const bool is_new = known == studies.end();
-    const std::uint64_t study = is_new ? store.last_study_id() + 1 : known->study_id;
+    const AddStudy study =
+        study_of(part.table, is_new ? store.last_study_id() + 1 : known->study_id, part.study);
     const std::uint64_t worker = store.last_worker_id() + 1;
     std::vector<Change> changes;
     if (is_new) {
-      changes.emplace_back(AddStudy{study, part.study, part.table, "2024-01-01T00:00:00.000Z"});
+      changes.emplace_back(study);
     }
     changes.emplace_back(AddWorker{worker, part.worker, 1, part.solver_version, "avx2", "then"});
-    AddResults results{study, part.table, worker, part.solver_version, "avx2", 1, "now", {}};
-    for (std::uint64_t point = part.first; point < part.end; ++point) {
-      const bool failed =
-          std::find(part.failed.begin(), part.failed.end(), point) != part.failed.end();
-      protocol::PointResult result =
-          failed ? protocol::failed_point(point, "why") : solved_point(point);
-      if (!failed && part.closure != 0.0) {
+    AddResults results = solved(study, numbers(part.first, part.end), worker);
+    for (protocol::PointResult& result : results.results) {
+      if (std::ranges::find(part.failed, result.point()) != part.failed.end()) {
+        result = protocol::failed_point(result.point(), "why");
+      } else if (part.closure != 0.0) {
         solver::CaseResult other = protocol::from_message(result);
         other.energy.closure += part.closure;
-        result = protocol::to_message(point, other);
+        result = protocol::to_message(result.point(), other);
       }
-      results.results.push_back(std::move(result));
     }
     changes.emplace_back(std::move(results));
     store.commit(changes);
@@ -101,13 +94,7 @@ class MergeTest : public testing::Test {
   }
 
   std::vector<std::string> texts(const std::string& name, const std::string& sql) const {
-    const DatabaseHandle database = open_database(file(name), SQLITE_OPEN_READWRITE);
-    Statement statement(database.get(), sql);
-    std::vector<std::string> found;
-    while (statement.step()) {
-      found.push_back(statement.text(0));
-    }
-    return found;
+    return rows(file(name), sql);
   }
   std::string text(const std::string& name, const std::string& sql) const {
     return texts(name, sql).at(0);
@@ -117,13 +104,11 @@ class MergeTest : public testing::Test {
   std::string ranges(const std::string& name) const {
     return text(name, "SELECT group_concat(first_point || '+' || points) FROM completed_ranges");
   }
-
-  test::TemporaryFolder folder_;
 };
 
 TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
-  store("one", {{.study = "a", .end = 10}, {.study = "b", .end = 3, .worker = "other host"}});
-  store("two", {{.study = "c", .end = 7, .failed = {2}}});
+  make("one", {{.study = "a", .end = 10}, {.study = "b", .end = 3, .worker = "other host"}});
+  make("two", {{.study = "c", .end = 7, .failed = {2}}});
   EXPECT_EQ(merge("one").studies_added, 2U);
   const Merged two = merge("two");
   EXPECT_EQ(two.studies_added, 1U);
@@ -132,7 +117,7 @@ TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
                     "SELECT study || ' ' || count(*) || ' ' || worker_name || ' ' ||"
                     " sum(status = 'failed') FROM runs GROUP BY study ORDER BY study"),
               ElementsAre("a 10 host 0", "b 3 other host 0", "c 7 host 1"));
-  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_THAT(faults(file("all")), IsEmpty());
   const std::string outputs =
       "SELECT group_concat(quote(H) || quote(mu) || quote(fn_peak_N) || quote(closure) ||"
       " quote(peaks) || quote(reaction_peaks) || quote(steps) || quote(wall_s) || solved_at)"
@@ -147,9 +132,9 @@ TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
 }
 
 TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndItIsDoneWhenNoneIsLeft) {
-  store("all", {{.end = 4}});
-  store("one", {{.first = 4, .end = 7}});
-  store("two", {{.first = 5, .end = 10}});
+  make("all", {{.end = 4}});
+  make("one", {{.first = 4, .end = 7}});
+  make("two", {{.first = 5, .end = 10}});
   EXPECT_EQ(merge("one").studies_united, 1U);
   EXPECT_EQ(text("all", "SELECT state FROM studies"), "running");
   const Merged two = merge("two");
@@ -157,23 +142,23 @@ TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndItIsDoneWhenNoneIsLeft) {
   EXPECT_EQ(two.results_known, 2U);
   EXPECT_EQ(two.results_differing, 0U);
   EXPECT_EQ(text("all", "SELECT state FROM studies"), "done");
-  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_THAT(faults(file("all")), IsEmpty());
   EXPECT_EQ(Store(file("all")).studies().at(0).completed, IntervalSet(0, 10));
 }
 
 TEST_F(MergeTest, AServerMayUseTheSourceButNotTheTarget) {
   Store served(file("one"));
-  commit(served, {.end = 3});
+  add_part(served, {.end = 3});
   EXPECT_EQ(merge("one").results_added, 3U);
-  commit(served, {.first = 3, .end = 5});
+  add_part(served, {.first = 3, .end = 5});
   EXPECT_EQ(merge("one").results_added, 2U);
   const Store busy(file("all"));
   EXPECT_THROW(merge("one"), StorageError);
 }
 
 TEST_F(MergeTest, ARowOfTheTargetStaysAndThoseThatDifferAreCountedAndTheFirstOnesNamed) {
-  store("all", {{.table = table_of(1000), .end = 900}});
-  store("one", {{.table = table_of(1000), .end = 1000, .closure = 1e-12}});
+  make("all", {{.table = table_of(1000), .end = 900}});
+  make("one", {{.table = table_of(1000), .end = 1000, .closure = 1e-12}});
   const std::string before = text("all", "SELECT quote(closure) FROM results WHERE point = 2");
   const Merged merged = merge("one");
   EXPECT_EQ(merged.results_known, 900U);
@@ -184,19 +169,19 @@ TEST_F(MergeTest, ARowOfTheTargetStaysAndThoseThatDifferAreCountedAndTheFirstOne
 }
 
 TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
-  store("all", {{.end = 10, .failed = {1, 2}}});
-  store("one", {{.end = 10, .failed = {2, 3}}});
+  make("all", {{.end = 10, .failed = {1, 2}}});
+  make("one", {{.end = 10, .failed = {2, 3}}});
   const Merged merged = merge("one");
   EXPECT_EQ(merged.failures_replaced, 1U);
   EXPECT_EQ(merged.results_added, 1U);
   EXPECT_EQ(merged.results_known, 9U);
   EXPECT_EQ(text("all", "SELECT group_concat(point) FROM results WHERE status = 'failed'"), "2");
-  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
 TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabaseUnlessAPrefixIsGiven) {
-  store("all", {{.study = "a", .end = 1}});
-  store("one", {{.study = "b", .end = 2}, {.study = "a", .table = table_of(11), .end = 5}});
+  make("all", {{.study = "a", .end = 1}});
+  make("one", {{.study = "b", .end = 2}, {.study = "a", .table = table_of(11), .end = 5}});
   EXPECT_THAT(refusal("one"), AllOf(HasSubstr("a study called \"a\""), HasSubstr("block 1 differs"),
                                     HasSubstr("--rename-prefix")));
   EXPECT_EQ(text("all", "SELECT count(*) FROM results"), "1");
@@ -204,14 +189,14 @@ TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabaseUnlessAPrefixI
   EXPECT_THAT(texts("all", "SELECT name FROM studies ORDER BY name"),
               ElementsAre("a", "b", "lab a"));
   EXPECT_EQ(merge("one", "lab ").results_known, 7U);
-  store("two", {{.study = "a", .table = table_of(12), .end = 5}});
+  make("two", {{.study = "a", .table = table_of(12), .end = 5}});
   EXPECT_THAT(refusal("two", "lab "), HasSubstr("\"lab a\""));
   EXPECT_THAT(refusal("two", std::string(100, 'x')), HasSubstr("bytes"));
 }
 
 TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefused) {
-  store("all", {{.end = 4}});
-  store("one", {{.study = "b", .end = 4}, {.first = 4, .end = 7, .solver_version = "0.2"}});
+  make("all", {{.end = 4}});
+  make("one", {{.study = "b", .end = 4}, {.first = 4, .end = 7, .solver_version = "0.2"}});
   EXPECT_THAT(refusal("one"), HasSubstr("results of study a come from solver version 0.2"));
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "1");
 }
@@ -224,16 +209,16 @@ TEST_F(MergeTest, AnyFaultThatACheckFindsRefusesTheWholeDatabase) {
         "DROP TABLE reused_points; CREATE VIEW reused_points AS WITH RECURSIVE t (x) AS"
         " (SELECT 0 UNION ALL SELECT x FROM t) SELECT x AS study_id FROM t"}) {
     const std::string source = "source" + std::to_string(++number);
-    store(source, {{.study = "b", .end = 2}, {.end = 9}});
-    execute(open_database(file(source), SQLITE_OPEN_READWRITE).get(), change);
+    make(source, {{.study = "b", .end = 2}, {.end = 9}});
+    by_hand(file(source), change);
     EXPECT_THROW(merge(source), StorageError) << change;
   }
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
 TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
-  store("one", {{.end = 5}});
-  texts("one", "UPDATE studies SET priority = 7");
+  make("one", {{.end = 5}});
+  by_hand(file("one"), "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
   const auto bytes = [&] {
     std::ifstream stream(file("one"), std::ios::binary);
@@ -266,8 +251,8 @@ void kill_when_a_study_is_updated() {
 }
 
 TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
-  store("all", {{.study = "before", .end = 5}});
-  store("one", {{.table = table_of(20'000), .end = 20'000}});
+  make("all", {{.study = "before", .end = 5}});
+  make("one", {{.table = table_of(20'000), .end = 20'000}});
   const pid_t child = fork();
   if (child == 0) {
     kill_when_a_study_is_updated();
@@ -277,27 +262,20 @@ TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
   int status = 0;
   waitpid(child, &status, 0);
   ASSERT_TRUE(WIFSIGNALED(status));
-  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_THAT(faults(file("all")), IsEmpty());
   EXPECT_EQ(Store(file("all")).studies().size(), 1U);
   EXPECT_EQ(merge("one").results_added, 20'000U);
   EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging")) << "nor a copy of the source";
 }
 
-/// Ten points, and as many behind them.
-Table grown_table() {
-  protocol::Recipe recipe = table_of(10)->recipe();
-  *recipe.add_blocks() = table_of(10)->recipe().blocks(0);
-  return std::make_shared<const protocol::PointTable>(recipe);
-}
-
 TEST_F(MergeTest, AStudyThatGrewInOneDatabaseIsUnitedWithWhatItWas) {
   for (const bool source_grew : {true, false}) {
     const std::string name = source_grew ? "grown" : "shorter";
-    store("all", {{.study = name, .table = source_grew ? table_of(10) : grown_table(), .end = 5}});
-    store(name, {{.study = name,
-                  .table = source_grew ? grown_table() : table_of(10),
-                  .first = 3,
-                  .end = source_grew ? 15U : 10U}});
+    make("all", {{.study = name, .table = source_grew ? table_of(10) : grown_table(), .end = 5}});
+    make(name, {{.study = name,
+                 .table = source_grew ? grown_table() : table_of(10),
+                 .first = 3,
+                 .end = source_grew ? 15U : 10U}});
     Store(file("all"))
         .commit(
             std::vector<Change>{SetStudyState{source_grew ? 1U : 2U, StudyState::kDone, "then"}});
@@ -309,7 +287,7 @@ TEST_F(MergeTest, AStudyThatGrewInOneDatabaseIsUnitedWithWhatItWas) {
     EXPECT_EQ(text("all", "SELECT count(*)" + where), source_grew ? "15" : "10");
     EXPECT_EQ(text("all", "SELECT state || points FROM studies WHERE name = '" + name + "'"),
               "running20");
-    EXPECT_THAT(find_faults(file("all")), IsEmpty());
+    EXPECT_THAT(faults(file("all")), IsEmpty());
     EXPECT_EQ(merge(name).results_added, 0U) << "merged again";
   }
 }
@@ -324,8 +302,8 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
   const auto state = [&] {
     return text("all", "SELECT state || ' ' || counted || ' ' || left_out FROM studies");
   };
-  store("one", {{.table = filtered, .first = 5, .end = 8}});
-  store("two", {{.table = filtered, .first = 7, .end = 10}});
+  make("one", {{.table = filtered, .first = 5, .end = 8}});
+  make("two", {{.table = filtered, .first = 7, .end = 10}});
   leave_out("one", 0, 2);
   leave_out("two", 1, 5);
   merge("one");
@@ -334,29 +312,30 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
   merge("two");
   EXPECT_EQ(ranges("all"), "0+10");
   EXPECT_EQ(state(), "done 1 5");
-  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
 TEST_F(MergeTest, ASourceWhoseRowsWereChangedByHandIsMergedByItsRows) {
-  store("one", {{.end = 10}});
-  texts("one", "DELETE FROM results WHERE point = 3");
-  texts("one", "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
+  make("one", {{.end = 10}});
+  by_hand(file("one"),
+          "DELETE FROM results WHERE point = 3;"
+          "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
   merge("one");
   EXPECT_EQ(ranges("all"), "0+3,4+6");
   EXPECT_EQ(text("all", "SELECT group_concat(point) FROM results WHERE checksum IS NULL"), "1");
-  EXPECT_THAT(find_faults(file("all")), IsEmpty());
+  EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
 TEST_F(MergeTest, ReusedResultsKeepTheNamesOfTheirSourceAndAreCounted) {
-  store("one",
-        {{.study = "a/b", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "c"}});
+  make("one",
+       {{.study = "a/b", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "c"}});
   {
     Store store(file("one"));
     const auto outcome = std::make_shared<ReusedResults>();
     store.commit(
         std::vector<Change>{ReuseResults{3, table_of(10), 0, "0.1", outcome}, DeleteStudy{2}});
   }
-  store("all", {{.study = "c", .end = 2}});
+  make("all", {{.study = "c", .end = 2}});
   for (int i = 0; i < 2; ++i) {
     merge("one");
     EXPECT_EQ(text("all",
@@ -365,7 +344,7 @@ TEST_F(MergeTest, ReusedResultsKeepTheNamesOfTheirSourceAndAreCounted) {
               "a/b/2,a/b/3,gone/4,gone/5,gone/6,gone/7,gone/8,gone/9");
     EXPECT_THAT(texts("all", "SELECT source || ' ' || points FROM reused_points ORDER BY source"),
                 ElementsAre("a/b 2", "gone 6"));
-    EXPECT_THAT(find_faults(file("all")), IsEmpty());
+    EXPECT_THAT(faults(file("all")), IsEmpty());
   }
 }
 

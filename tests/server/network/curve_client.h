@@ -15,24 +15,25 @@
 
 namespace oblique::server {
 
-/// Admits the keys that were added.
-class ListAuthenticator final : public Authenticator {
+/// Admits the keys that were added to it or a copy of it.
+class ListAuthenticator {
  public:
   void add(const protocol::CurveKey& key, const std::string& name) {
-    keys_[key] = std::make_shared<const KeyIdentity>(KeyIdentity{name, protocol::Role::kWorker});
+    (*keys_)[key] = std::make_shared<const KeyIdentity>(KeyIdentity{name, protocol::Role::kWorker});
   }
-  void revoke(const protocol::CurveKey& key) { keys_.erase(key); }
+  void revoke(const protocol::CurveKey& key) { keys_->erase(key); }
 
-  AuthResult authenticate(const protocol::CurveKey& key) const override {
-    const auto found = keys_.find(key);
-    if (found == keys_.end()) {
+  AuthResult operator()(const protocol::CurveKey& key) const {
+    const auto found = keys_->find(key);
+    if (found == keys_->end()) {
       return Refusal{RefusalCause::kUnknownKey, "its key is not authorized"};
     }
     return found->second;
   }
 
  private:
-  std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>> keys_;
+  using Keys = std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>>;
+  std::shared_ptr<Keys> keys_ = std::make_shared<Keys>();
 };
 
 inline std::string text_of_key(const protocol::CurveKey& key) {

@@ -1,20 +1,32 @@
-// The protocol without keys.
+// The protocol without keys, and with keys for a client that can send what no library sends.
 #include "server/network/zmtp.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <set>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
-#include "tests/server/network/raw_peer.h"
+#include "tests/server/network/curve_client.h"
 
 namespace oblique::server {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 /// A connection whose handshake is done.
 Zmtp opened() {
@@ -34,33 +46,6 @@ TEST(ZmtpTest, SendsGreetingAtOnceAndReadyAfterTheGreetingOfThePeer) {
   zmtp.receive(command_frame("READY", zmtp_properties("DEALER") + identity));
   EXPECT_TRUE(zmtp.is_open());
   EXPECT_THAT(zmtp.fault(), IsEmpty());
-}
-
-TEST(ZmtpTest, MessagesAreTheSameHoweverTheirBytesAreCut) {
-  const std::string long_body(1000, 'l');
-  const std::string bytes = zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("") +
-                            zmtp_frame("short") + zmtp_frame(long_body);
-  for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, std::size_t{300}, bytes.size()}) {
-    Zmtp zmtp;
-    std::vector<std::string> bodies;
-    for (std::size_t at = 0; at < bytes.size(); at += piece) {
-      zmtp.receive(std::string_view(bytes).substr(at, piece));
-      while (zmtp.has_message()) {
-        bodies.push_back(zmtp.take_message());
-      }
-    }
-    EXPECT_THAT(bodies, testing::ElementsAre("", "short", long_body)) << piece;
-  }
-}
-
-TEST(ZmtpTest, AFrameOfTheLargestSizeIsTakenAndALargerOneIsAFaultAtItsHeader) {
-  Zmtp zmtp = opened();
-  zmtp.receive(zmtp_frame(std::string(protocol::kMaxFrameBytes, 'x')));
-  ASSERT_TRUE(zmtp.has_message());
-  EXPECT_EQ(zmtp.take_message().size(), protocol::kMaxFrameBytes);
-  EXPECT_LT(zmtp.held_bytes(), 300'000U);
-  zmtp.receive(message_header(protocol::kMaxFrameBytes + 1));
-  EXPECT_THAT(zmtp.fault(), HasSubstr(std::to_string(protocol::kMaxFrameBytes + 1)));
 }
 
 TEST(ZmtpTest, AFaultBehindAMessageWaitsForItsTurn) {
@@ -100,6 +85,530 @@ TEST(ZmtpTest, WhatBreaksTheProtocolIsAFaultAtItsFirstBytes) {
     EXPECT_THAT(zmtp.fault(), HasSubstr(fault)) << bytes;
     EXPECT_FALSE(zmtp.has_message());
   }
+}
+
+// ---- With keys ----------------------------------------------------------------------------------
+
+std::string error_frame(const std::string& code) {
+  return command_frame("ERROR", "\x03" + code);
+}
+
+std::string flipped(std::string bytes, std::size_t at) {
+  bytes[at] = static_cast<char>(static_cast<unsigned>(bytes[at]) ^ (1U << at % 8));
+  return bytes;
+}
+
+/// Both ends of a connection.
+struct Link {
+  /// What the server answers to these bytes.
+  std::string send(std::string_view bytes) {
+    zmtp.receive(bytes);
+    while (zmtp.pending_step() != Zmtp::PendingStep::kNone) {
+      zmtp.run_step();
+    }
+    return zmtp.take_answers();
+  }
+  std::string hello_frame() { return command_frame("HELLO", client.hello()); }
+  std::string initiate_frame() { return command_frame("INITIATE", client.initiate()); }
+  /// The server refuses these bytes with that answer, or without any.
+  void expect_refused(std::string_view bytes, const std::string& answer = error_frame("500")) {
+    EXPECT_EQ(send(bytes), answer);
+    EXPECT_THAT(zmtp.fault(), Not(IsEmpty()));
+    EXPECT_FALSE(zmtp.has_message());
+  }
+
+  Zmtp zmtp;
+  CurveClient client;
+};
+
+class CurveTest : public testing::Test {
+ protected:
+  CurveTest() { authenticator_.add(own_.public_key, "anna"); }
+
+  CurveClient client() const { return {own_, server_.public_key}; }
+  /// The server's greeting has been read.
+  Link greeted() const {
+    Link link{Zmtp(&security_), client()};
+    static_cast<void>(link.zmtp.take_answers());
+    return link;
+  }
+  /// The client has taken WELCOME.
+  Link welcomed(const CurveClient& client) const {
+    Link link = greeted();
+    link.client = client;
+    const std::string welcome = link.send(curve_greeting() + link.hello_frame());
+    EXPECT_EQ(welcome.size(), 170U);
+    EXPECT_TRUE(link.client.take_welcome(std::string_view(welcome).substr(10)));
+    return link;
+  }
+  Link welcomed() const { return welcomed(client()); }
+  Link open() const {
+    Link link = welcomed();
+    EXPECT_THAT(link.send(link.initiate_frame()), HasSubstr("READY"));
+    EXPECT_TRUE(link.zmtp.is_open());
+    return link;
+  }
+
+  protocol::KeyPair server_ = protocol::made_key_pair();
+  protocol::KeyPair own_ = protocol::made_key_pair();
+  ListAuthenticator authenticator_;
+  PortSecurity security_{server_, authenticator_};
+};
+
+// ---- Handshakes -------------------------------------------------------------------------------
+
+TEST_F(CurveTest, APeerWithAnAuthorizedKeyIsAdmittedAndTheServerProvesItsOwnKey) {
+  Link link = welcomed();
+  const std::string answer = link.send(link.initiate_frame());
+  EXPECT_EQ(static_cast<unsigned char>(answer[0]), kFrameCommand);
+  const std::string_view ready = std::string_view(answer).substr(2);
+  const auto properties =
+      CurveClient::opened(ready.substr(14), curve_nonce("CurveZMQREADY---", ready.substr(6, 8)),
+                          link.client.servers_brief, link.client.brief.secret_key);
+  EXPECT_EQ(properties, zmtp_properties("ROUTER"));
+  EXPECT_TRUE(link.zmtp.is_open());
+  EXPECT_EQ(link.zmtp.identity()->name, "anna");
+  EXPECT_EQ(link.zmtp.key(), own_.public_key);
+}
+
+TEST_F(CurveTest, TwoHandshakesWithTheSameClientKeysDiffer) {
+  const CurveClient anna = client();
+  const Link first = welcomed(anna);
+  const Link second = welcomed(anna);
+  EXPECT_NE(first.client.servers_brief, second.client.servers_brief);
+  EXPECT_NE(first.client.cookie, second.client.cookie);
+}
+
+TEST_F(CurveTest, AKeyThatIsNotAuthorizedIsRefused) {
+  Link link = welcomed({protocol::made_key_pair(), server_.public_key});
+  link.expect_refused(link.initiate_frame(), error_frame("400"));
+  EXPECT_EQ(link.zmtp.cause(), RefusalCause::kUnknownKey);
+}
+
+TEST_F(CurveTest, AHelloForAnotherServerIsRefusedAtOnce) {
+  Link link = greeted();
+  link.client = {own_, protocol::made_key_pair().public_key};
+  link.expect_refused(curve_greeting() + link.hello_frame());
+  EXPECT_EQ(link.zmtp.cause(), RefusalCause::kWrongServerKey);
+}
+
+TEST_F(CurveTest, APeerThatDoesNotHoldTheKeyThatItShowsIsRefusedWhetherOrNotTheKeyIsListed) {
+  const protocol::KeyPair other = protocol::made_key_pair();
+  std::set<std::string> faults;
+  for (const protocol::KeyPair& shown : {own_, protocol::made_key_pair()}) {
+    std::vector<CurveClient> thieves(3, {shown, server_.public_key});
+    thieves[0].vouching_secret = other.secret_key;
+    thieves[1].vouched_brief = other.public_key;
+    thieves[2].vouched_server = other.public_key;
+    for (const CurveClient& client : thieves) {
+      Link thief = welcomed(client);
+      thief.expect_refused(thief.initiate_frame());
+      faults.insert(thief.zmtp.fault());
+    }
+  }
+  EXPECT_THAT(faults, ElementsAre(HasSubstr("does not hold")));
+}
+
+TEST_F(CurveTest, KeysWithWhichEverySecretIsKnownAreRefused) {
+  // Points of small order: the shared secret is zero, whoever computes it.
+  for (const std::uint8_t first : {std::uint8_t{0}, std::uint8_t{1}}) {
+    Link link = greeted();
+    link.client.brief.public_key = {first};
+    link.expect_refused(curve_greeting() + link.hello_frame());
+  }
+  CurveClient zero = client();
+  zero.own.public_key = {};
+  authenticator_.add(zero.own.public_key, "zero");
+  Link link = welcomed(zero);
+  link.expect_refused(link.initiate_frame());
+}
+
+TEST_F(CurveTest, PropertiesThatARouterCannotUseAreRefused) {
+  const std::string endless("\x01x\xff\xff\xff\xff", 6);
+  for (const std::string& properties : {std::string(), std::string("\x0bSocket-Type"),
+                                        zmtp_properties("PUB"), std::string("\xff"), endless}) {
+    Link link = welcomed();
+    link.client.properties = properties;
+    EXPECT_EQ(link.send(link.initiate_frame()), error_frame("500"));
+    EXPECT_FALSE(link.zmtp.is_open());
+  }
+}
+
+// ---- Bytes that are changed, cut off, repeated or out of order ----------------------------------
+
+TEST_F(CurveTest, ACommandOfAnotherLengthIsRefused) {
+  const std::string hello = client().hello();
+  for (const std::string& data : {std::string(), hello.substr(0, 1), hello.substr(1),
+                                  hello.substr(0, 193), hello + "x", std::string(194, '\0')}) {
+    greeted().expect_refused(curve_greeting() + command_frame("HELLO", data));
+  }
+  for (const std::size_t bytes : {0U, 1U, 95U, 96U, 103U, 104U, 119U, 120U, 247U, 248U}) {
+    Link link = welcomed();
+    link.expect_refused(command_frame("INITIATE", link.client.initiate().substr(0, bytes)));
+  }
+}
+
+TEST_F(CurveTest, AHandshakeHoldsNoMoreThanItsLongestCommand) {
+  Link greedy = welcomed();
+  greedy.client.properties.append(16'000'000, 'p');
+  greedy.expect_refused(greedy.initiate_frame().substr(0, 9));
+  EXPECT_LT(greedy.zmtp.held_bytes(), 10'000U);
+
+  Link link = welcomed();
+  link.client.properties += "\x01x" + std::string("\0\0\x0d\0", 4) + std::string(0x0d00, 'v');
+  const std::string frame = link.initiate_frame();
+  ASSERT_LT(frame.size(), 4096U);
+  link.send(frame);
+  EXPECT_TRUE(link.zmtp.is_open());
+  EXPECT_LT(link.zmtp.held_bytes(), 10'000U);
+}
+
+TEST_F(CurveTest, AHandshakeThatIsCutOffAnywhereAdmitsNobody) {
+  const std::string hello = curve_greeting() + greeted().hello_frame();
+  for (std::size_t bytes = 0; bytes < hello.size(); ++bytes) {
+    Link link = greeted();
+    EXPECT_THAT(link.send(std::string_view(hello).substr(0, bytes)), IsEmpty());
+    EXPECT_THAT(link.zmtp.fault(), IsEmpty());
+  }
+  Link link = welcomed();
+  const std::string initiate = link.initiate_frame();
+  for (const char byte : initiate.substr(0, initiate.size() - 1)) {
+    EXPECT_THAT(link.send(std::string(1, byte)), IsEmpty());
+    EXPECT_FALSE(link.zmtp.is_open());
+  }
+  link.send(initiate.substr(initiate.size() - 1));
+  EXPECT_TRUE(link.zmtp.is_open());
+}
+
+TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNobody) {
+  const auto expect_refused = [](Link link, const std::string& begin, const std::string& bytes,
+                                 std::size_t at) {
+    const std::string answers = link.send(begin + flipped(bytes, at));
+    EXPECT_TRUE(answers.empty() || answers == error_frame("500")) << at;
+    EXPECT_FALSE(link.zmtp.is_open()) << at;
+    EXPECT_EQ(link.zmtp.identity(), nullptr) << at;
+  };
+  for (std::size_t at = 0; at < kGreetingBytes; ++at) {
+    Link link = greeted();
+    const std::string answers = link.send(flipped(curve_greeting(), at) + link.hello_frame());
+    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // some bytes have no meaning
+    EXPECT_FALSE(link.zmtp.is_open()) << at;
+  }
+  const std::string hello = greeted().hello_frame();
+  ASSERT_EQ(hello.size(), 2 + 6 + 194U);
+  for (std::size_t at = 0; at < hello.size(); ++at) {
+    expect_refused(greeted(), curve_greeting(), hello, at);
+  }
+  const std::size_t initiate_bytes = 9 + 9 + 96 + 8 + 16 + 128 + client().properties.size();
+  for (std::size_t at = 0; at < initiate_bytes; ++at) {
+    Link link = welcomed();
+    const std::string initiate = link.initiate_frame();
+    ASSERT_EQ(initiate.size(), initiate_bytes);
+    expect_refused(std::move(link), "", initiate, at);
+  }
+}
+
+TEST_F(CurveTest, ARecordedHandshakeIsRefusedOnAnotherConnection) {
+  CurveClient anna = client();
+  Link recorded = greeted();
+  recorded.client = anna;
+  const std::string hello = curve_greeting() + recorded.hello_frame();
+  const std::string welcome = recorded.send(hello);
+  ASSERT_TRUE(recorded.client.take_welcome(std::string_view(welcome).substr(10)));
+  const std::string initiate = recorded.initiate_frame();
+  recorded.send(initiate);
+  ASSERT_TRUE(recorded.zmtp.is_open());
+
+  Link replayed = greeted();
+  EXPECT_THAT(replayed.send(hello), HasSubstr("WELCOME"));
+  replayed.expect_refused(initiate + recorded.client.sealed("delete everything"));
+}
+
+TEST_F(CurveTest, AnInitiateForTheWelcomeOfAnotherConnectionIsRefused) {
+  Link hers = welcomed();
+  Link others = welcomed();
+  const std::string initiate = hers.initiate_frame();
+  others.expect_refused(initiate);
+  hers.send(initiate);
+  EXPECT_TRUE(hers.zmtp.is_open());
+
+  Link with_old_cookie = welcomed(hers.client);
+  with_old_cookie.client.cookie = hers.client.cookie;
+  with_old_cookie.expect_refused(with_old_cookie.initiate_frame());
+}
+
+TEST_F(CurveTest, AConnectionHasOneHandshake) {
+  for (const bool repeats_hello : {true, false}) {
+    Link link = welcomed();
+    const std::string initiate = link.initiate_frame();
+    link.send(initiate);
+    ASSERT_TRUE(link.zmtp.is_open());
+    link.expect_refused(repeats_hello ? link.hello_frame() : initiate, "");
+  }
+}
+
+TEST_F(CurveTest, CommandsOutOfOrderAreRefused) {
+  CurveClient anna = client();
+  anna.servers_brief = server_.public_key;  // without a WELCOME
+  for (const std::string& bytes :
+       {zmtp_ready("DEALER"), command_frame("WELCOME", std::string(160, 'w')),
+        command_frame("INITIATE", std::string(300, 'i')), zmtp_ping(), anna.sealed("too early"),
+        zmtp_frame("and not encrypted")}) {
+    greeted().expect_refused(curve_greeting() + bytes);
+  }
+  for (const std::string& bytes : {command_frame("HELLO", anna.hello()), zmtp_ready("DEALER"),
+                                   anna.sealed("a message before INITIATE")}) {
+    welcomed().expect_refused(bytes);
+  }
+}
+
+TEST_F(CurveTest, CountersThatDoNotGrowEndTheConnection) {
+  Link link = welcomed();
+  link.client.nonce = 1;  // HELLO's
+  link.expect_refused(link.initiate_frame());
+
+  Link opened = open();
+  opened.client.nonce = 2;  // INITIATE's
+  opened.expect_refused(opened.client.sealed("with the counter of the handshake"), "");
+
+  const auto ends_after_first_message = [&](const auto& second) {
+    Link after = open();
+    after.client.nonce = 100;
+    const std::string first = after.client.sealed("first");
+    after.send(first + second(after.client, first));
+    EXPECT_EQ(after.zmtp.take_message(), "first");
+    after.expect_refused("", "");
+  };
+  ends_after_first_message([](CurveClient&, const std::string& first) { return first; });
+  for (const std::uint64_t counter : {100U, 50U}) {
+    ends_after_first_message([counter](CurveClient& anna, const std::string&) {
+      anna.nonce = counter;
+      return anna.sealed("second");
+    });
+  }
+}
+
+// ---- Messages, with keys and without ------------------------------------------------------------
+
+TEST_F(CurveTest, MessagesAreTheSameHoweverTheirBytesAreCut) {
+  const std::vector<std::string> sent{"", "short", std::string(1000, 'l')};
+  const auto bodies_of = [](Link& link, std::string_view bytes, std::size_t piece) {
+    std::vector<std::string> bodies;
+    for (std::size_t at = 0; at < bytes.size(); at += piece) {
+      link.send(bytes.substr(at, piece));
+      while (link.zmtp.has_message()) {
+        bodies.push_back(link.zmtp.take_message());
+        link.send("");
+      }
+    }
+    return bodies;
+  };
+  for (const std::size_t piece : {1U, 7U, 300U, 10'000U}) {
+    Link keyed = welcomed();
+    Link plain{Zmtp(), client()};
+    std::string sealed = keyed.initiate_frame();
+    std::string bytes = zmtp_greeting() + zmtp_ready("DEALER");
+    for (const std::string& body : sent) {
+      sealed += keyed.client.sealed(body);
+      bytes += zmtp_frame(body);
+    }
+    EXPECT_EQ(bodies_of(keyed, sealed, piece), sent) << piece;
+    EXPECT_EQ(bodies_of(plain, bytes, piece), sent) << piece;
+  }
+}
+
+TEST_F(CurveTest, AFrameOfTheLargestSizeIsTakenAndALargerOneIsAFaultAtItsHeader) {
+  const std::string largest(protocol::kMaxFrameBytes, 'x');
+  Link keyed = open();
+  Link plain{opened(), client()};
+  for (const auto& [link, frame, added] :
+       {std::tuple(&keyed, keyed.client.sealed(largest), CurveSession::kAddedBytes),
+        std::tuple(&plain, zmtp_frame(largest), std::size_t{0})}) {
+    link->send(frame);
+    ASSERT_TRUE(link->zmtp.has_message());
+    EXPECT_EQ(link->zmtp.take_message().size(), largest.size());
+    EXPECT_LT(link->zmtp.held_bytes(), 300'000U);
+    link->zmtp.receive(message_header(largest.size() + added + 1));
+    EXPECT_THAT(link->zmtp.fault(),
+                HasSubstr("frame of " + std::to_string(largest.size() + added + 1)));
+  }
+}
+
+TEST_F(CurveTest, AFlippedBitAnywhereInAMessageIsNoMessage) {
+  constexpr std::size_t kFrameBytes = 2 + CurveSession::kAddedBytes + 4;
+  for (std::size_t at = 0; at < kFrameBytes; ++at) {
+    Link link = open();
+    const std::string bytes = link.client.sealed("body");
+    ASSERT_EQ(bytes.size(), kFrameBytes);
+    link.send(flipped(bytes, at));
+    EXPECT_FALSE(link.zmtp.has_message()) << at;
+  }
+}
+
+TEST_F(CurveTest, MessagesOfTheServerHaveCountersThatGrow) {
+  Link link = open();
+  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has the first one
+    std::string_view body = "reply";
+    const std::string frame = link.zmtp.begin_message(body);
+    EXPECT_THAT(body, IsEmpty());
+    EXPECT_EQ(frame[0], 0);  // libzmq takes the outer bit for the inner one
+    EXPECT_EQ(link.client.opened_message(frame.substr(2)), std::string("\0reply", 6));
+    EXPECT_EQ(number_of(std::string_view(frame).substr(10, 8)), counter);
+  }
+}
+
+TEST_F(CurveTest, AFrameIsDecryptedWhenItsTurnHasComeAndNothingAfterItIsExamined) {
+  Link link = open();
+  Zmtp& zmtp = link.zmtp;
+  zmtp.receive(link.client.sealed("first") + link.client.sealed("second"));
+  EXPECT_FALSE(zmtp.has_message());
+  EXPECT_EQ(zmtp.pending_step(), Zmtp::PendingStep::kSealedFrame);
+  zmtp.run_step();
+  EXPECT_EQ(zmtp.pending_step(), Zmtp::PendingStep::kNone);
+  EXPECT_EQ(zmtp.take_message(), "first");
+  EXPECT_EQ(zmtp.pending_step(), Zmtp::PendingStep::kSealedFrame);
+}
+
+TEST_F(CurveTest, EncryptedFramesMayComeAsCommandsAsTheStandardDefinesThem) {
+  Link link = open();
+  for (const std::string& body : {std::string("short"), std::string(5000, 'l')}) {
+    std::string bytes = link.client.sealed(body);
+    bytes[0] = static_cast<char>(static_cast<unsigned>(bytes[0]) | kFrameCommand);
+    link.send(bytes);
+    ASSERT_TRUE(link.zmtp.has_message());
+    EXPECT_EQ(link.zmtp.take_message(), body);
+  }
+}
+
+TEST_F(CurveTest, FramesThatAreNoWholeMessageEndTheConnection) {
+  const auto ends = [&](const auto& bytes_of) {
+    Link link = open();
+    link.expect_refused(bytes_of(link.client), "");
+  };
+  for (const unsigned flags : {1U, 2U, 3U, 4U, 0x80U}) {  // more, command, both, reserved
+    ends([flags](CurveClient& c) { return c.sealed("\x04PING\0\0", flags); });
+  }
+  ends([](CurveClient&) { return zmtp_frame("not encrypted"); });
+  ends([](CurveClient&) { return zmtp_frame("\x07MESSAGE" + std::string(24, '\xff')); });
+  ends([](CurveClient&) { return zmtp_frame("\x07MESSAGE" + std::string(25, '\xff')); });
+  ends([](CurveClient& c) {
+    std::string in_parts = c.sealed("in parts outside");
+    in_parts[0] = '\x01';
+    return in_parts;
+  });
+}
+
+// ---- A recorded conversation --------------------------------------------------------------------
+
+// Between a DEALER and a ROUTER of libzmq 4.3.4 (libsodium 1.0.18), whose random numbers were
+// replaced by known ones. Bytes are in hex.
+namespace recorded {
+
+constexpr std::string_view kServerSecret =
+    "5e322e4c38adc3397ac9b4b4d3a34b68321d7ee82c04d7a3a4cf77fe4b6f70d6";
+constexpr std::string_view kClientPublic =
+    "8788577ad38d2a17feabf47ef520a22c0a03e76b5f7ad5763b6328a1a73ba71d";
+
+// Random numbers of the server, in the order in which it draws them.
+constexpr std::string_view kServerBriefSecret =
+    "cf672b6843eea1631c1dd4ad8b053866867c1bc3329eccf258bdabdfeee8cc33";
+constexpr std::string_view kCookieKey =
+    "09b51b46f42a70b913a1d181fae2be22f24cdb107f13673a9612d226f03b8ae1";
+constexpr std::string_view kCookieNonce = "20166e0d99a85a530ab55917e9e7db15";
+constexpr std::string_view kWelcomeNonce = "6d177f97016baa0a20ce8d9b29e28b80";
+
+// Bodies of the frames of both directions.
+constexpr std::string_view kClientHello =
+    "0548454c4c4f01000000000000000000000000000000000000000000000000000000000000000000000000000000"
+    "000000000000000000000000000000000000000000000000000000000000000000009906576a0460eb25970f3389"
+    "74d46bf9c5bc53dad11c2b896f67f34fc0c9106b0000000000000001ef0fe8479e54be637edb4c17dd3fd6b092d4"
+    "d787fcc08a0145dabd0a0f439273e258a6c33411e13950535e53d1588c387cdce98cf4ee5246d5e94bdac5e32918"
+    "27ac6f5215cd23d49f86c2f1f8ddfd5e";
+constexpr std::string_view kClientInitiate =
+    "08494e49544941544520166e0d99a85a530ab55917e9e7db15425f0427d428b224d0f2a3f1c5a07c69c748195357"
+    "5ffa158a7c4f2f3040e364c035263b54eb26f76bbf3d9da4dbc4976a467fe0c22b0526ff2a9a9768bbdce29d9401"
+    "102f938d390ef5480e7880b9960000000000000002d7fb6ec2a89addbb492120cb46c0bcdb2efc18b4adeb069297"
+    "a917de35542c092ce0e279ca8abf3883e74dc667d11a91b9295f759a38d281eb189cf85e9cf209d61e98e9b25f30"
+    "7874416e7d3f0e693f1e766e7801479fd33bbacc2a369d0d2ea03056b1f67dc39acc5779049ebcecdb1c70ed0a08"
+    "4b135c33b2d6392fcd6acd282158763964be134a8828fd09fe7cbf5f82f14299fdcbfee2275e6738e0f27388a296"
+    "51c6be5759ea3ff6a7bb1a9362d42914";
+constexpr std::string_view kClientQuestion =
+    "074d4553534147450000000000000003e5dfc0f3d4e114563c09f0e165cc0a7857477e66628cd74b7270a8";
+constexpr std::string_view kServerWelcome =
+    "0757454c434f4d456d177f97016baa0a20ce8d9b29e28b808177b630559f0a5a7d1971d1e83c93e332d0dfba1044"
+    "d5f4f5cd9d9c258a6dffb1c6e78748d85a64170ddeacf112c660cdf5363013bba48187a25dd3bce9b245e4e83855"
+    "d08160e83d1396687627f2af7036c01cc77eab6f0e161b23efccb28524f11169a8e8213c51f69d4e303e8aec7ba9"
+    "5e5c528e6f394d477588d647600c04806c9ffceceff969e39507cc0e6dfb";
+constexpr std::string_view kServerReady =
+    "055245414459000000000000000183d2a0c1b803be69edb04a281439dbb365fda806dd1f4e401f9ef4a01688702b"
+    "756704f8cf7615e15789f484b952c0104562b4";
+constexpr std::string_view kServerAnswer =
+    "074d455353414745000000000000000202eca3023c5a480e98695370da0b6d8047823784da21f9b87fd827";
+
+}  // namespace recorded
+
+std::string bytes_of(std::string_view hex) {
+  std::string bytes(hex.size() / 2, '\0');
+  if (sodium_hex2bin(raw(bytes.data()), bytes.size(), hex.data(), hex.size(), nullptr, nullptr,
+                     nullptr) != 0) {
+    throw std::runtime_error("not hexadecimal");
+  }
+  return bytes;
+}
+
+/// A command without its name.
+std::string data_of(std::string_view hex) {
+  const std::string body = bytes_of(hex);
+  return body.substr(1 + static_cast<unsigned char>(body.front()));
+}
+
+/// During its lifetime libsodium returns the recorded random numbers.
+class RecordedRandomness {
+ public:
+  RecordedRandomness() {
+    left_ = bytes_of(recorded::kServerBriefSecret) + bytes_of(recorded::kCookieKey) +
+            bytes_of(recorded::kCookieNonce) + bytes_of(recorded::kWelcomeNonce);
+    static randombytes_implementation recorded{};
+    recorded.implementation_name = [] { return "recorded"; };
+    recorded.buf = [](void* to, std::size_t size) {
+      std::memcpy(to, left_.data(), std::min(size, left_.size()));
+      left_.erase(0, size);
+    };
+    randombytes_set_implementation(&recorded);
+  }
+  ~RecordedRandomness() { randombytes_set_implementation(&randombytes_sysrandom_implementation); }
+  RecordedRandomness(const RecordedRandomness&) = delete;
+  RecordedRandomness& operator=(const RecordedRandomness&) = delete;
+
+ private:
+  static inline std::string left_;
+};
+
+TEST(CurveVectorsTest, WithTheSameRandomNumbersTheServerSendsTheSameBytesAsLibzmq) {
+  protocol::KeyPair server;
+  std::ranges::copy(bytes_of(recorded::kServerSecret), server.secret_key.bytes().begin());
+  server.public_key = protocol::public_half_of(server.secret_key);
+  protocol::CurveKey client{};
+  std::ranges::copy(bytes_of(recorded::kClientPublic), client.begin());
+  ListAuthenticator authenticator;
+  authenticator.add(client, "anna");
+  const PortSecurity security{server, authenticator};
+  CurveHandshake handshake(security);
+  const RecordedRandomness randomness;
+
+  EXPECT_EQ(std::get<std::string>(handshake.take("HELLO", data_of(recorded::kClientHello))),
+            data_of(recorded::kServerWelcome));
+  const std::string identity("\x08Identity\0\0\0\0", 13);
+  EXPECT_EQ(std::get<std::string>(handshake.take("INITIATE", data_of(recorded::kClientInitiate))),
+            zmtp_properties("DEALER") + identity);
+  ASSERT_TRUE(handshake.is_done());
+  EXPECT_EQ(handshake.key(), client);
+  CurveSession& session = handshake.session();
+  EXPECT_EQ(session.ready(zmtp_properties("ROUTER") + identity), data_of(recorded::kServerReady));
+  EXPECT_EQ(session.open(bytes_of(recorded::kClientQuestion)), "a question");
+  std::string answer;
+  session.seal("A QUESTION", answer);
+  EXPECT_EQ(answer, bytes_of(recorded::kServerAnswer));
 }
 
 }  // namespace

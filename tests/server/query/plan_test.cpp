@@ -12,22 +12,17 @@
 #include <gtest/gtest.h>
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/result_message.h"
 #include "server/database/database_file.h"
 #include "server/query/columns.h"
 #include "server/query/reader.h"
 #include "server/query/sql_text.h"
-#include "server/store/store.h"
-#include "tests/support/points.h"
-#include "tests/support/recipes.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/server/store/store_fixture.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
 namespace {
 
 using testing::AllOf;
-using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -35,22 +30,13 @@ using testing::Not;
 
 /// Study "a" has ten solved points, e = 1, H = 1, mu from 0 to 1; of the five of "it's" 0, 1 and 2
 /// are solved and 4 failed.
-class PlanTest : public testing::Test {
+class PlanTest : public StoreFixture {
  protected:
   PlanTest() {
-    Store store(path_);
-    const auto a = table_of(10);
-    const auto other = table_of(5);
-    AddResults all{1, a, 0, "", "", 1, "now", {}};
-    for (std::uint64_t point = 0; point < 10; ++point) {
-      all.results.push_back(solved_point(point));
-    }
-    AddResults some{2, other, 0, "", "", 1, "now", {}};
-    some.results = {solved_point(2), solved_point(0), solved_point(1),
-                    protocol::failed_point(4, "no")};
-    store.commit(std::vector<Change>{AddStudy{1, "a", a, "2024-01-01T00:00:00.000Z"},
-                                     AddStudy{2, "it's", other, "2024-01-02T00:00:00.000Z"}, all,
-                                     some});
+    const auto all = study_of(10);
+    const auto some = study_of(5, 2, "it's");
+    commit({all, some, worker(1), solved(all, numbers(0, 10)), solved(some, {2, 0, 1}),
+            failed(some, {4})});
     open();
   }
   void open() {
@@ -59,7 +45,7 @@ class PlanTest : public testing::Test {
   }
   void edit(const std::string& sql) {
     database_.reset();
-    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
+    by_hand(sql);
     open();
   }
 
@@ -81,12 +67,11 @@ class PlanTest : public testing::Test {
     return question;
   }
 
-  /// The first value of each row of a statement, as text; NULL as nothing.
+  /// The first value of each row, as text; NULL as nothing.
   std::vector<std::string> texts(const std::string& sql) const {
-    Statement statement(database_.get(), sql);
-    std::vector<std::string> values;
-    while (statement.step()) {
-      values.push_back(statement.text(0));
+    auto values = rows(database_.get(), sql);
+    for (std::string& value : values) {
+      value.resize(std::min(value.find('|'), value.size()));
     }
     return values;
   }
@@ -94,13 +79,10 @@ class PlanTest : public testing::Test {
     return texts(plan(database_.get(), asked).sql);
   }
   /// What SQLite does for a question.
-  std::vector<std::string> steps_of(const protocol::StudyQuery& asked) const {
-    Statement explained(database_.get(), "EXPLAIN QUERY PLAN " + plan(database_.get(), asked).sql);
-    std::vector<std::string> steps;
-    while (explained.step()) {
-      steps.push_back(explained.text(3));
-    }
-    return steps;
+  std::string steps_of(const protocol::StudyQuery& asked) const {
+    return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
+                                                                 plan(database_.get(), asked).sql),
+                                       "; "));
   }
   double number(const protocol::StudyQuery& asked) const {
     Statement statement(database_.get(), plan(database_.get(), asked).sql);
@@ -126,8 +108,6 @@ class PlanTest : public testing::Test {
     return error(question(select, where, group, order));
   }
 
-  test::TemporaryFolder folder_;
-  std::string path_ = folder_.file("studies.db");
   DatabaseHandle database_;
 };
 
@@ -306,12 +286,12 @@ TEST_F(PlanTest, OnlyQueriesThatNameAModelOrWorkerReadTheirTables) {
 
 TEST_F(PlanTest, PointsThatAConditionNamesAreLookedUpAndFailedOnesByTheirIndex) {
   EXPECT_THAT(steps_of(question("fn_peak_N", "point IN (3, 1)")),
-              Contains(HasSubstr("(study_id=? AND point=?)")));
+              HasSubstr("(study_id=? AND point=?)"));
   EXPECT_THAT(steps_of(question("fn_peak_N", "point >= 3 AND point < 5")),
-              Contains(HasSubstr("(study_id=? AND point>? AND point<?)")));
+              HasSubstr("(study_id=? AND point>? AND point<?)"));
   for (const char* select : {"point", "point, k"}) {
     const auto failed = of_other(question(select, "mu > 0 AND error IS NOT NULL"));
-    EXPECT_THAT(steps_of(failed), Contains(HasSubstr("failed_points")));
+    EXPECT_THAT(steps_of(failed), HasSubstr("failed_points"));
     EXPECT_THAT(texts(failed), ElementsAre("4"));
   }
   EXPECT_THAT(texts(of_other(question("point", "error IS NOT NULL OR mu = 0"))),

@@ -1,18 +1,16 @@
 #include "server/query/reader.h"
 
 #include <cstdint>
-#include <memory>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/result_message.h"
 #include "proto/wire/chunk.h"
-#include "server/store/store.h"
-#include "tests/support/points.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/server/store/store_fixture.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::server {
@@ -24,18 +22,12 @@ using testing::HasSubstr;
 constexpr const char* kEndless =
     "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n";
 
-class ReaderTest : public testing::Test {
+class ReaderTest : public StoreFixture {
  protected:
   ReaderTest() {
-    const AddResults results{
-        1,     table_of(4),
-        0,     "",
-        "",    1,
-        "now", {solved_point(0), solved_point(2), protocol::failed_point(3, "no")}};
-    commit({AddStudy{1, "a", table_of(4), "2024-01-01T00:00:00.000Z"},
-            AddStudy{2, "b", table_of(2), "2024-01-02T00:00:00.000Z"}, results});
+    const auto study = study_of(4);
+    commit({study, study_of(2, 2, "b"), worker(1), solved(study, {0, 2}), failed(study, {3})});
   }
-  void commit(const std::vector<Change>& changes) { Store(path_).commit(changes); }
 
   std::string refusal_of(const std::string& sql, const QueryLimits& limits = {}) {
     try {
@@ -47,9 +39,6 @@ class ReaderTest : public testing::Test {
   }
   /// The values of the first row.
   protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows.at(0); }
-
-  test::TemporaryFolder folder_;
-  std::string path_ = folder_.file("studies.db");
 };
 
 TEST_F(ReaderTest, ValuesHaveTheirTypes) {
@@ -146,8 +135,7 @@ TEST_F(ReaderTest, ARunningQueryCanBeInterrupted) {
 }
 
 TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
-  execute(open_database(path_, SQLITE_OPEN_READWRITE).get(),
-          "INSERT INTO reused_points VALUES (1, 'x', 1), (1, 'y', 2), (2, 'y', 5)");
+  by_hand("INSERT INTO reused_points VALUES (1, 'x', 1), (1, 'y', 2), (2, 'y', 5)");
   const auto all = Reader(path_).study_status();
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].name(), "a");
@@ -160,26 +148,15 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(all[0].taken().from(0).study(), "y");
   EXPECT_EQ(Reader(path_).study_status("b").at(0).solved(), 0U);
   EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
-  commit({AddResults{1, table_of(4), 0, "", "", 1, "now", {solved_point(1)}}});
+  commit({solved(study_of(4), {1})});
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
 }
 
 /// Study "a" has points 0 to 9, of which 5 is not solved yet, and rows of a fourth of a chunk.
-class AnswerTest : public testing::Test {
+class AnswerTest : public StoreFixture {
  protected:
-  AnswerTest() : store_(path_), table_(table_of(10)) {
-    std::vector<Change> changes{AddStudy{1, "a", table_, "2024-01-01T00:00:00.000Z"}};
-    for (std::uint64_t point = 0; point < 10; ++point) {
-      if (point != 5) {
-        changes.emplace_back(result_of(point));
-      }
-    }
-    store_.commit(changes);
-  }
+  AnswerTest() { commit({study_, worker(1), solved(study_, {0, 1, 2, 3, 4, 6, 7, 8, 9})}); }
 
-  AddResults result_of(std::uint64_t point) const {
-    return {1, table_, 0, "", "", 1, "now", {solved_point(point)}};
-  }
   /// Only full chunks, however slow the machine is.
   static QueryLimits full_chunks() {
     QueryLimits limits;
@@ -203,10 +180,7 @@ class AnswerTest : public testing::Test {
     return points;
   }
 
-  test::TemporaryFolder folder_;
-  std::string path_ = folder_.file("studies.db");
-  Store store_;
-  std::shared_ptr<const protocol::PointTable> table_;
+  const AddStudy study_ = study_of(10);
 };
 
 TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
@@ -216,8 +190,7 @@ TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
   EXPECT_THAT(points_of(first), ElementsAre(0, 1, 2, 3));
   EXPECT_EQ(first.chunk(), 1U);
   EXPECT_EQ(first.columns_size(), 2);
-  const std::vector<Change> more{result_of(5)};
-  store_.commit(more);
+  commit({solved(study_, {5})});
   const auto second = answer.next();
   EXPECT_THAT(points_of(second), ElementsAre(4, 6, 7, 8));
   EXPECT_EQ(second.chunk(), 2U);
@@ -238,8 +211,7 @@ TEST_F(AnswerTest, HoldsNoTransactionOnceItHasEnded) {
                                      nullptr);
   };
   answer.next();
-  const std::vector<Change> more{result_of(5)};
-  store_.commit(more);
+  commit({solved(study_, {5})});
   EXPECT_EQ(truncate_log(), SQLITE_BUSY);
   while (!answer.next().ends()) {
   }

@@ -25,46 +25,28 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Pair;
 
-using Table = std::shared_ptr<const protocol::PointTable>;
-
-Table table(const protocol::Recipe& recipe) {
-  return std::make_shared<const protocol::PointTable>(recipe);
-}
-
 class ResultReuseTest : public StoreFixture {
  protected:
   ResultReuseTest() { commit({worker(kWorker, "1.0"), worker(kOldWorker, "0.9")}); }
 
   void add(std::uint64_t study, const std::string& name, const Table& points) {
-    commit({AddStudy{study, name, points, "then"}});
+    commit({study_of(points, study, name)});
   }
-  /// Points [0, count) are solved.
-  void solve(std::uint64_t study, const Table& points, std::uint64_t count) {
-    AddResults solved = results(study, points, kWorker);
-    for (std::uint64_t point = 0; point < count; ++point) {
-      solved.results.push_back(solved_point(point));
-    }
-    commit({solved});
-  }
-  static AddResults results(std::uint64_t study, const Table& points, std::uint64_t worker) {
-    return {study, points, worker, "1.0", "avx2", 1, "2024-01-01T00:00:01.000Z", {}};
+  /// All points are solved.
+  void solve(std::uint64_t study, const Table& points) {
+    commit({solved(study_of(points, study), numbers(0, points->size()))});
   }
   ReusedResults reuse_part(std::uint64_t study, const Table& points, std::uint64_t first = 0) {
     const auto outcome = std::make_shared<ReusedResults>();
     commit({ReuseResults{study, points, first, "1.0", outcome}});
     return *outcome;
   }
-  std::map<std::uint64_t, std::string> copies(std::uint64_t study) {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    Statement rows(database.get(),
-                   "SELECT point, reused_from FROM results WHERE study_id = ?"
-                   " AND reused_from IS NOT NULL");
-    rows.bind(1, study);
-    std::map<std::uint64_t, std::string> copies;
-    while (rows.step()) {
-      copies[static_cast<std::uint64_t>(rows.integer(0))] = rows.text(1);
-    }
-    return copies;
+  /// "point of STUDY/POINT" of each copy.
+  std::vector<std::string> copies(std::uint64_t study) const {
+    return rows(
+        fmt::format("SELECT point || ' of ' || reused_from FROM results"
+                    " WHERE study_id = {} AND reused_from IS NOT NULL ORDER BY point",
+                    study));
   }
 
   static constexpr std::uint64_t kWorker = 1;
@@ -77,7 +59,7 @@ class SamePointsTest : public ResultReuseTest {
   SamePointsTest() {
     add(1, "a", points_);
     add(2, "b", points_);
-    solve(1, points_, 10);
+    solve(1, points_);
   }
   IntervalSet reused() { return reuse_part(2, points_).points; }
 
@@ -106,13 +88,13 @@ TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInItsStudyItsPointAndWhereIt
   const std::string sql =
       fmt::format("SELECT {} FROM results WHERE study_id = ", fmt::join(same, ", "));
   EXPECT_EQ(rows(sql + "2"), rows(sql + "1"));
-  EXPECT_EQ(copies(2)[3], "a/3");
+  EXPECT_EQ(copies(2).at(3), "3 of a/3");
   EXPECT_THAT(faults(), IsEmpty());
   commit({RenameStudy{1, "c"}});
-  EXPECT_EQ(copies(2)[3], "a/3") << "the name when it was copied";
+  EXPECT_EQ(copies(2).at(3), "3 of a/3") << "the name when it was copied";
 }
 
-TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfADeletedStudy) {
+TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrToADeletedStudy) {
   const std::vector<std::pair<std::string, Interval>> changes{
       {"UPDATE results SET slide_m = slide_m + 1 WHERE point = 3", {3, 4}},
       {"UPDATE results SET checksum = NULL WHERE point = 4", {4, 5}},
@@ -124,7 +106,8 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfADel
     expected.erase(lost.begin, lost.end);
     add(id, "another", points_);
     EXPECT_EQ(reuse_part(id, points_).points, expected) << change;
-    commit({DeleteStudy{id++}});
+    commit({DeleteStudy{id}});
+    EXPECT_EQ(reuse_part(id++, points_).points, IntervalSet()) << "a deleted study gets no rows";
   }
 }
 
@@ -135,24 +118,18 @@ TEST_F(SamePointsTest, PointsThatAreCompletedWithoutARowGetNone) {
   EXPECT_EQ(reused(), others) << "a condition leaves them out";
 }
 
-TEST_F(SamePointsTest, ALookupThatEndedIsNotedInTheStudy) {
-  commit({AddStudy{3, "c", points_, "then", {}, "", true}});
-  EXPECT_TRUE(store().studies().at(2).reuses);
+TEST_F(ResultReuseTest, ALookupThatEndedIsNotedInTheStudy) {
+  commit({AddStudy{3, "c", table_of(10), "then", {}, "", true}});
+  EXPECT_TRUE(store().studies().at(0).reuses);
   commit({EndReuse{3}});
-  EXPECT_FALSE(store().studies().at(2).reuses);
-}
-
-TEST_F(SamePointsTest, ADeletedStudyGetsNoRows) {
-  commit({DeleteStudy{2}});
-  EXPECT_EQ(reused(), IntervalSet());
-  EXPECT_THAT(copies(2), IsEmpty());
+  EXPECT_FALSE(store().studies().at(0).reuses);
 }
 
 TEST_F(ResultReuseTest, PartsFollowEachOtherAndSkipCompletedPoints) {
   const Table points = table_of(10'000);
   add(1, "a", points);
   add(2, "b", points);
-  solve(1, points, 10'000);
+  solve(1, points);
   const auto first = reuse_part(2, points);
   ASSERT_TRUE(first.next_point);
   const std::uint64_t part = *first.next_point;
@@ -168,7 +145,7 @@ TEST_F(ResultReuseTest, PartsFollowEachOtherAndSkipCompletedPoints) {
 TEST_F(ResultReuseTest, AModelThatNoRowHasCostsOneProbe) {
   const Table known = table_of(10);
   add(1, "a", known);
-  solve(1, known, 10);
+  solve(1, known);
   const Table other =
       table(protocol::recipe_of({{listed("E", {6.5e10}), listed("H", {1.0}),
                                   range("mu", 0.0, 1.0, 1'000'000'000), listed("e", {1.0})}}));
@@ -231,9 +208,10 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
     const Table points = random_table(random);
     add(study, "study " + std::to_string(study), points);
     // Some points fail before, and others are solved by another version: these keep their rows.
-    AddResults own = results(study, points, kWorker);
-    AddResults old = results(study, points, kOldWorker);
-    std::map<std::uint64_t, std::string> expected;
+    const AddStudy added = study_of(points, study);
+    AddResults own = results_of(added, {}, kWorker);
+    AddResults old = results_of(added, {}, kOldWorker);
+    std::vector<std::string> expected;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
       const std::uint64_t fate = random() % 10;
       if (!points->is_left_in(number)) {
@@ -245,7 +223,7 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
         old.results.push_back(solved_point(number));
       } else if (const auto found = solved.find(inputs_of(*points, number));
                  found != solved.end()) {
-        expected[number] = found->second;
+        expected.push_back(fmt::format("{} of {}", number, found->second));
       } else {
         ++open;
       }
@@ -256,7 +234,7 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
     // What is left is solved in part. A copy comes behind its source, so it is never the first.
-    AddResults rest = results(study, points, kWorker);
+    AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
       if (points->is_left_in(number) && !completed.contains(number) && random() % 2 == 0) {

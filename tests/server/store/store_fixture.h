@@ -2,28 +2,60 @@
 
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/fmt/fmt.h>
 
 #include "server/database/sqlite.h"
-#include "server/store/result_rows.h"
+#include "server/maintenance/check.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
 
+using Table = std::shared_ptr<const protocol::PointTable>;
+
+inline Table table(const protocol::Recipe& recipe) {
+  return std::make_shared<const protocol::PointTable>(recipe);
+}
+
+/// Ten points, mu from 0 to 1, of which a condition leaves out some.
+inline Table filtered_table(const std::string& where) {
+  protocol::Recipe recipe = table_of(10)->recipe();
+  recipe.mutable_blocks(0)->set_where(where);
+  return table(recipe);
+}
+
+/// Ten points, and as many behind them.
+inline Table grown_table() {
+  protocol::Recipe recipe = table_of(10)->recipe();
+  *recipe.add_blocks() = recipe.blocks(0);
+  return table(recipe);
+}
+
+/// The numbers from `first` up to, but not including, `end`.
+inline std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end) {
+  std::vector<std::uint64_t> found(end - first);
+  std::iota(found.begin(), found.end(), first);
+  return found;
+}
+
 /// A database in a folder of its own, and what other programs read and write in it.
 class StoreFixture : public testing::Test {
  protected:
+  static AddStudy study_of(Table points, std::uint64_t id = 1, const std::string& name = "a") {
+    return {id, name, std::move(points), "2024-01-01T00:00:00.000Z", {}};
+  }
   static AddStudy study_of(std::uint64_t points, std::uint64_t id = 1,
                            const std::string& name = "a") {
-    return {id, name, table_of(points), "2024-01-01T00:00:00.000Z", {}};
+    return study_of(table_of(points), id, name);
   }
   static AddWorker worker(std::uint64_t id, const std::string& version = "0.1") {
     return {id, "host", 2, version, "avx2", "2024-01-01T00:00:00.000Z"};
@@ -65,13 +97,17 @@ class StoreFixture : public testing::Test {
   void close() { store_.reset(); }
 
   /// As another program does.
-  void by_hand(const std::string& sql) const {
-    execute(open_database(path_, SQLITE_OPEN_READWRITE).get(), sql);
+  void by_hand(const std::string& sql) const { by_hand(path_, sql); }
+  static void by_hand(const std::string& path, const std::string& sql) {
+    execute(open_database(path, SQLITE_OPEN_READWRITE).get(), sql);
   }
   /// The rows of a query, the values of each separated by '|'.
-  std::vector<std::string> rows(const std::string& sql) const {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-    Statement statement(database.get(), sql);
+  std::vector<std::string> rows(const std::string& sql) const { return rows(path_, sql); }
+  static std::vector<std::string> rows(const std::string& path, const std::string& sql) {
+    return rows(open_database(path, SQLITE_OPEN_READONLY).get(), sql);
+  }
+  static std::vector<std::string> rows(sqlite3* database, const std::string& sql) {
+    Statement statement(database, sql);
     std::vector<std::string> found;
     while (statement.step()) {
       std::string& row = found.emplace_back();
@@ -82,27 +118,9 @@ class StoreFixture : public testing::Test {
     return found;
   }
   std::int64_t number(const std::string& sql) const { return std::stoll(rows(sql).at(0)); }
-  /// What is wrong with the file: damage, references to rows that are missing, wrong checksums.
-  /// Rows of a study that is being deleted may refer to it.
-  std::vector<std::string> faults() const {
-    std::vector<std::string> found = rows(
-        "SELECT * FROM pragma_foreign_key_check"
-        " WHERE parent <> 'studies' OR NOT EXISTS (SELECT 1 FROM deletions)");
-    for (const std::string& line : rows("PRAGMA integrity_check")) {
-      if (line != "ok") {
-        found.push_back(line);
-      }
-    }
-    for (const auto& [table, checksum] :
-         {std::pair("results", result_checksum_sql()), std::pair("models", model_checksum_sql()),
-          std::pair("studies", std::string(kStudyChecksum))}) {
-      for (const std::string& row :
-           rows(fmt::format("SELECT * FROM {} WHERE checksum IS NOT {}", table, checksum))) {
-        found.push_back(fmt::format("a row of {}: {}", table, row));
-      }
-    }
-    return found;
-  }
+  /// What a check of the whole file finds.
+  std::vector<std::string> faults() const { return faults(path_); }
+  static std::vector<std::string> faults(const std::string& path) { return diagnose(path).faults; }
   /// Why the database cannot be opened.
   std::string refusal() const {
     try {

@@ -2,6 +2,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <sys/stat.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,10 +18,12 @@
 namespace oblique::server {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::SizeIs;
 
 using StoreTest = StoreFixture;
 
@@ -45,12 +54,8 @@ TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
 TEST_F(StoreTest, AnInterruptEndsALongStatement) {
   const auto study = study_of(100);
   commit({study, worker(1)});
-  AddResults change = results_of(study, {});
-  for (std::uint64_t point = 0; point < 100; ++point) {
-    change.results.push_back(solved_point(point));
-  }
   store().interrupt();
-  EXPECT_THAT([&] { commit({change}); },
+  EXPECT_THAT([&] { commit({solved(study, numbers(0, 100))}); },
               testing::ThrowsMessage<StorageError>(HasSubstr("interrupted")));
 }
 
@@ -97,53 +102,40 @@ TEST_F(StoreTest, TheStateOfAStudyIsKept) {
   EXPECT_THAT(rows("SELECT DISTINCT changed_at FROM studies"), ElementsAre("later"));
 }
 
-TEST_F(StoreTest, OneModelOfTwoStudiesIsOneRowAndEachKeyIsAColumn) {
-  const auto first = study_of(3, 1, "a");
-  const auto second = study_of(5, 2, "b");
-  commit({first, second, worker(1), solved(first, {0}), solved(second, {0})});
-  EXPECT_THAT(rows("SELECT lengths_m FROM models"), ElementsAre("[0.4,0.4,0.4]"));
-  const solver::ModelParameters paper = solver::preset("paper");
-  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
-  for (const auto& key : solver::model_keys()) {
-    Statement value(database.get(), fmt::format("SELECT {} FROM models", key.name));
-    ASSERT_TRUE(value.step()) << key.name;
-    if (key.name == "integrator") {
-      EXPECT_EQ(value.text(0), solver::integrator_name(paper.integrator));
-    } else {
-      EXPECT_EQ(value.real(0), key.get(paper)) << key.name;
-    }
-  }
+/// `points` points for each of `models` values of k.
+StudyTable table_of_models(std::uint64_t models, std::uint64_t points) {
+  return table(protocol::recipe_of(
+      {{protocol::range("k", 1e7, 2e7, models), protocol::listed("H", {1.0}),
+        protocol::range("mu", 0.0, 1.0, points), protocol::listed("e", {1.0})}}));
 }
 
 TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
-  // Two points for each of `models` values of k.
-  const auto study_of_models = [](std::uint64_t id, std::uint64_t models) {
-    return AddStudy{id, "study " + std::to_string(id),
-                    std::make_shared<const protocol::PointTable>(protocol::recipe_of(
-                        {{protocol::range("k", 1e7, 2e7, models), protocol::listed("H", {1.0}),
-                          protocol::listed("mu", {0.4, 0.8}), protocol::listed("e", {1.0})}})),
-                    "now"};
-  };
-  const auto first = study_of_models(1, 11);
-  const auto second = study_of_models(2, 101);  // of which eleven are the same
+  const AddStudy first{1, "a", table_of_models(11, 2), "now"};
+  const AddStudy second{2, "b", table_of_models(101, 2), "now"};  // of which eleven are the same
   commit({first, second, worker(1)});
   commit({solved(first, {8, 0, 2, 4, 6, 10})});
   commit({solved(second, {1, 20, 21, 40, 60, 200, 201})});
   commit({solved(first, {1, 3, 12, 20})});
   std::size_t compared = 0;
-  for (const AddStudy& study : {first, second}) {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+  for (const auto& key : solver::model_keys()) {
     Statement row(database.get(),
-                  "SELECT point, k FROM results JOIN models USING (model_id) WHERE study_id = ?");
-    row.bind(1, study.study_id);
+                  fmt::format("SELECT study_id, point, models.{} FROM results JOIN models"
+                              " USING (model_id)",
+                              key.name));
     for (; row.step(); ++compared) {
-      const auto& table = *study.table.get();
-      const auto point = table.point(static_cast<std::uint64_t>(row.integer(0)));
-      EXPECT_EQ(table.model(point.model).k_N_m, row.real(1));
+      const auto& points = *(row.number(0) == 1 ? first : second).table.get();
+      const solver::ModelParameters model = points.model(points.point(row.number(1)).model);
+      if (key.name == "integrator") {
+        EXPECT_EQ(row.text(2), solver::integrator_name(model.integrator));
+      } else {
+        EXPECT_EQ(row.real(2), key.get(model)) << key.name;
+      }
     }
   }
-  EXPECT_EQ(compared, 17U);
-  EXPECT_THAT(rows("SELECT count(*), count(DISTINCT definition) FROM models"), ElementsAre("8|8"));
+  EXPECT_EQ(compared, 17 * solver::model_keys().size());
+  EXPECT_THAT(rows("SELECT count(*), count(DISTINCT definition), min(lengths_m) FROM models"),
+              ElementsAre("8|8|[0.4,0.4,0.4]"));
 }
 
 TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
@@ -179,18 +171,13 @@ TEST_F(StoreTest, AStudyThatThisVersionDoesNotAcceptIsSkippedAndNamed) {
   commit({study_of(10, 1, "too elastic"), study_of(10, 2, "b"), study_of(3, 3, "c")});
   close();
   // Other versions may take an e that this one cannot solve.
-  auto recipe = table_of(10)->recipe();
-  auto& e = *recipe.mutable_blocks(0)->mutable_axes(recipe.blocks(0).axes_size() - 1);
-  ASSERT_EQ(e.key(), "e");
-  e.clear_values();
-  e.add_values(1e-4);
-  {
-    const auto database = open_database(path_, SQLITE_OPEN_READWRITE);
-    execute_with(database.get(),
-                 "UPDATE studies SET recipe = ?, checksum = NULL WHERE study_id = 1",
-                 Blob{recipe.SerializeAsString()});
-    execute(database.get(), "UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 3");
-  }
+  const protocol::Recipe recipe =
+      protocol::recipe_of({{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, 10),
+                            protocol::listed("e", {1e-4})}});
+  execute_with(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+               "UPDATE studies SET recipe = ?, checksum = NULL WHERE study_id = 1",
+               Blob{recipe.SerializeAsString()});
+  by_hand("UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 3");
   const auto studies = store().studies();
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].name, "b");
@@ -232,6 +219,307 @@ TEST_F(StoreTest, AStudyThatWasChangedByHandIsRefusedWithTheRemedy) {
   }
   EXPECT_THROW(by_hand("UPDATE studies SET study_id = 0"), StorageError);
   EXPECT_THROW(by_hand("UPDATE studies SET study_id = 9223372036854775807"), StorageError);
+}
+
+// ---- Studies that grow, are renamed or deleted --------------------------------------------------
+
+class StudyDeletionTest : public StoreFixture {
+ protected:
+  void reopen() {
+    close();
+    store();
+  }
+  /// A study called by its number, all of whose points are solved by the worker of that number.
+  void add_solved(std::uint64_t id, const Table& points) {
+    const AddStudy study = study_of(points, id, "study " + std::to_string(id));
+    commit({study, worker(id), solved(study, numbers(0, points->size()), id)});
+  }
+  static Table table_with_k(double k, std::uint64_t points) {
+    return table(protocol::recipe_of(
+        {{protocol::listed("k", {k}), protocol::listed("H", {1.0}),
+          protocol::range("mu", 0.0, 1.0, points), protocol::listed("e", {1.0})}}));
+  }
+  std::int64_t rows_in(const std::string& from) const {
+    return number("SELECT count(*) FROM " + from);
+  }
+  /// Number of steps until all is cleared away.
+  int clear_all(std::size_t most) {
+    int steps = 1;
+    while (store().clear_away(most) != ClearedAway::kAll) {
+      ++steps;
+    }
+    return steps;
+  }
+};
+
+TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndARightChecksum) {
+  add_solved(1, table_of(10));
+  commit({SetStudyState{1, StudyState::kDone, "then"}});
+  commit({GrowStudy{1, grown_table(), 2, "now"}, RenameStudy{1, "another name"}});
+  reopen();
+  const auto study = store().studies().at(0);
+  EXPECT_EQ(study.name, "another name");
+  EXPECT_EQ(study.table.size(), 20U);
+  EXPECT_EQ(study.state, StudyState::kRunning);
+  EXPECT_EQ(study.completed, IntervalSet(0, 10));
+  EXPECT_EQ(study.priority, 2);
+  EXPECT_EQ(study.created_at, "2024-01-01T00:00:00.000Z");
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
+  add_solved(1, table_of(100));
+  add_solved(2, table_of(50));
+  commit({DeleteStudy{1}});
+  EXPECT_THAT(store().studies(), SizeIs(1));
+  EXPECT_EQ(rows_in("runs"), 50);
+  commit({study_of(4, 3, "study 1")});  // the name is free
+  EXPECT_EQ(store().clear_away(10), ClearedAway::kPart);
+  EXPECT_EQ(rows_in("results WHERE study_id = 1"), 90);
+  EXPECT_GT(clear_all(10), 9);
+  EXPECT_EQ(rows_in("results WHERE study_id = 1"), 0);
+  EXPECT_EQ(rows_in("results WHERE study_id = 2"), 50);
+  EXPECT_EQ(rows_in("completed_ranges WHERE study_id = 1"), 0);
+  EXPECT_EQ(store().cleared_rows(), 100U);
+  EXPECT_EQ(store().clear_away(10), ClearedAway::kAll);
+}
+
+TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinues) {
+  for (int steps = 0; steps < 8; ++steps) {
+    const std::uint64_t id = static_cast<std::uint64_t>(2 * steps + 1);
+    add_solved(id, table_of(20));
+    add_solved(id + 1, table_with_k(1e7 + steps, 20));
+    commit({DeleteStudy{id + 1}});
+    for (int step = 0; step < steps; ++step) {
+      (void)store().clear_away(4);
+    }
+    reopen();
+    EXPECT_THAT(faults(), IsEmpty()) << "after step " << steps;
+    clear_all(4);
+    EXPECT_EQ(rows_in("results"), 20 * (steps + 1));
+    reopen();
+    EXPECT_EQ(rows_in("models"), 1);
+    EXPECT_EQ(rows_in("workers"), steps + 1);
+    EXPECT_EQ(rows_in("deletions"), 0);
+    EXPECT_EQ(store().last_study_id(), id + 1);
+  }
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(StudyDeletionTest, LateChangesOfADeletedStudyAreDropped) {
+  add_solved(1, table_of(5));
+  const AddResults late = solved(study_of(5), numbers(0, 5));
+  commit({DeleteStudy{1}, late});
+  clear_all(100);
+  commit({late, SetStudyState{1, StudyState::kDone, "now"},
+          ForgetFailures{1, IntervalSet(0, 5), "now"}});
+  EXPECT_EQ(rows_in("results"), 0);
+  EXPECT_THAT(store().studies(), IsEmpty());
+}
+
+TEST_F(StudyDeletionTest, ADeletionThatIsRolledBackDeletesNothing) {
+  add_solved(1, table_of(5));
+  EXPECT_THROW(commit({DeleteStudy{1}, study_of(1, 2, "b"), study_of(1, 3, "b")}), StorageError);
+  clear_all(100);
+  EXPECT_THAT(store().studies(), SizeIs(1));
+  commit({GrowStudy{1, table_of(6), {}, "now"}, solved(study_of(6), numbers(0, 6))});
+  EXPECT_EQ(rows_in("results"), 6) << "later results are stored";
+}
+
+TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRowsAreGone) {
+  add_solved(1, table_with_k(1e7, 20));
+  add_solved(2, table_with_k(2e7, 20));
+  add_solved(3, table_with_k(2e7, 20));
+  commit({DeleteStudy{1}, DeleteStudy{2}});
+  reopen();
+  EXPECT_EQ(rows_in("models"), 2) << "rows are left";
+  clear_all(7);
+  EXPECT_EQ(rows_in("models"), 2) << "they may come into use again";
+  reopen();
+  EXPECT_EQ(rows_in("models"), 1);
+  EXPECT_EQ(rows_in("workers"), 1);
+  EXPECT_EQ(rows_in("results JOIN models USING (model_id)"), 20);
+  EXPECT_EQ(number("SELECT has_orphans FROM about"), 0);
+  add_solved(4, table_with_k(1e7, 3));
+  EXPECT_EQ(rows_in("results JOIN models USING (model_id) WHERE k = 1e7"), 3)
+      << "a model that was deleted comes again";
+}
+
+TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
+  add_solved(1, table_of(2000));
+  add_solved(2, table_of(2000));
+  store().checkpoint_at(1);
+  const DatabaseHandle reader = open_database(path_, SQLITE_OPEN_READONLY);
+  execute(reader.get(), "BEGIN");
+  Statement first(reader.get(), "SELECT count(*) FROM results");
+  ASSERT_TRUE(first.step());
+  commit({DeleteStudy{1}});
+  ClearedAway cleared = ClearedAway::kPart;
+  for (int step = 0; step < 1000 && cleared == ClearedAway::kPart; ++step) {
+    cleared = store().clear_away(50);
+  }
+  EXPECT_EQ(cleared, ClearedAway::kMustWait);
+  first.reset();
+  execute(reader.get(), "COMMIT");
+  clear_all(500);
+  EXPECT_EQ(rows_in("results WHERE study_id = 1"), 0);
+}
+
+// ---- Tables, views and triggers -----------------------------------------------------------------
+
+/// A database with three solved points, and what other programs do to it.
+class SchemaTest : public StoreFixture {
+ protected:
+  SchemaTest() {
+    const auto study = study_of(3);
+    commit({study, worker(1), solved(study, {0, 1, 2})});
+    close();
+  }
+  std::vector<std::string> objects() const {
+    return rows(
+        "SELECT type || ' ' || name || ' ' || sql FROM sqlite_schema"
+        " WHERE type <> 'table' AND sql IS NOT NULL ORDER BY name");
+  }
+};
+
+TEST_F(SchemaTest, EachStartCreatesWhatWasDroppedOrReplacedAndOtherViewsStay) {
+  by_hand("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
+  const auto before = objects();
+  ASSERT_EQ(before.size(), 9U);
+  for (const std::string change :
+       {"DROP VIEW runs", "DROP VIEW peaks", "DROP VIEW phases", "DROP VIEW stick_intervals",
+        "DROP VIEW reaction_peaks", "DROP VIEW peaks; CREATE VIEW peaks AS SELECT 7 AS mine",
+        "DROP TRIGGER row_deleted", "DROP INDEX failed_points", "DROP INDEX solved_points"}) {
+    by_hand(change);
+    EXPECT_EQ(refusal(), "it opened");
+    EXPECT_EQ(objects(), before) << change;
+  }
+  EXPECT_THAT(rows("SELECT count(*) FROM large"), ElementsAre("3"));
+}
+
+TEST_F(SchemaTest, TriggersOfTheFileDoNotRunWithTheChangesOfAServer) {
+  by_hand("CREATE TRIGGER other AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END");
+  EXPECT_THROW(by_hand("UPDATE studies SET priority = 1"), StorageError);
+  commit({SetPriority{1, 7}});
+  EXPECT_THAT(rows("SELECT priority FROM studies"), ElementsAre("7"));
+}
+
+TEST_F(SchemaTest, AFileWithATableInThePlaceOfAViewIsRefusedAndTheTableStays) {
+  by_hand("DROP VIEW runs; CREATE TABLE runs (mine)");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
+  EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
+}
+
+// ---- Files --------------------------------------------------------------------------------------
+
+class StoreFilesTest : public StoreFixture {
+ protected:
+  StoreFilesTest() {
+    fs::create_directory(folder_.file("lab"));
+    path_ = folder_.file("lab/studies.db");
+    make_databases();
+  }
+  void make_databases() {
+    commit({study_});
+    Store other(other_);
+    other.commit(std::vector<Change>{study_of(10, 1, "other")});
+  }
+  void add_result(std::uint64_t point) { commit({solved(study_, {point}, 0)}); }
+  static std::int64_t rows_of(const std::string& path) {
+    return std::stoll(rows(path, "SELECT count(*) FROM results").at(0));
+  }
+  /// Rows in the database file alone, without its log.
+  std::int64_t rows_of_copy(const std::string& name) {
+    fs::copy_file(path_, folder_.file(name));
+    return rows_of(folder_.file(name));
+  }
+
+  const AddStudy study_ = study_of(10);
+  std::string other_ = folder_.file("other.db");
+};
+
+TEST_F(StoreFilesTest, ACommitDuringWhichTheFileIsDeletedIsNotAcknowledged) {
+  sqlite3_commit_hook(
+      store().connection(),
+      [](void* path) {
+        fs::remove(*static_cast<const std::string*>(path));
+        return 0;
+      },
+      &path_);
+  EXPECT_THROW(add_result(0), StorageGone);
+}
+
+TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced) {
+  const std::map<std::string, std::function<void()>> blows{
+      {"the database is deleted", [&] { fs::remove(path_); }},
+      {"it is renamed", [&] { fs::rename(path_, folder_.file("elsewhere.db")); }},
+      {"its folder is renamed",
+       [&] { fs::rename(folder_.file("lab"), folder_.file("laboratory")); }},
+      {"another database takes its name", [&] { fs::rename(other_, path_); }}};
+  for (const auto& [what, blow] : blows) {
+    close();
+    for (const char* name : {"lab", "laboratory", "other.db", "elsewhere.db"}) {
+      fs::remove_all(folder_.file(name));
+    }
+    fs::create_directory(folder_.file("lab"));
+    make_databases();
+    add_result(0);
+    EXPECT_NO_THROW(store().check()) << what;
+    blow();
+    EXPECT_THROW(store().check(), StorageGone) << what;
+    EXPECT_THROW(add_result(1), StorageGone) << what;
+    EXPECT_THROW(store().merge_log(), StorageGone) << what;
+  }
+}
+
+TEST_F(StoreFilesTest, ARenamedDatabaseGetsWhatWasAcknowledgedWhenItsServerEnds) {
+  add_result(0);
+  add_result(1);
+  const std::string elsewhere = folder_.file("elsewhere.db");
+  fs::rename(path_, elsewhere);
+  EXPECT_THROW(add_result(2), StorageGone);
+  close();
+  EXPECT_GE(rows_of(elsewhere), 2);
+  path_ = elsewhere;
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(StoreFilesTest, AReaderInTheMiddleOfAQueryKeepsTheLogAndOneThatOnlyWaitsDoesNot) {
+  add_result(0);
+  EXPECT_EQ(rows_of_copy("before.db"), 0) << "it is in the log";
+  const DatabaseHandle waits = open_database(path_, SQLITE_OPEN_READONLY);
+  EXPECT_THAT(rows(waits.get(), "SELECT count(*) FROM results"), ElementsAre("1"));
+  const DatabaseHandle reads = open_database(path_, SQLITE_OPEN_READONLY);
+  {
+    Statement rows(reads.get(), "SELECT point FROM results");
+    ASSERT_TRUE(rows.step());
+    add_result(1);
+    EXPECT_FALSE(store().merge_log());
+    EXPECT_GT(fs::file_size(path_ + "-wal"), 0U);
+    add_result(2);  // and it goes on
+  }
+  EXPECT_TRUE(store().merge_log());
+  EXPECT_EQ(fs::file_size(path_ + "-wal"), 0U);
+  EXPECT_EQ(rows_of_copy("after.db"), 3);
+}
+
+TEST_F(StoreFilesTest, ANewDatabaseIsForItsOwnerAloneAndAnOldOneKeepsItsMode) {
+  const auto mode_of = [](const std::string& path) {
+    struct stat found {};
+    EXPECT_EQ(::stat(path.c_str(), &found), 0) << path;
+    return found.st_mode & 0777U;
+  };
+  const mode_t before = ::umask(0);
+  const std::string path = folder_.file("private.db");
+  { const Store store(path); }
+  EXPECT_EQ(mode_of(path), 0600U);
+  ASSERT_EQ(::chmod(path.c_str(), 0640), 0);
+  {
+    const Store store(path);
+    EXPECT_EQ(mode_of(path + "-wal"), 0640U);
+  }
+  EXPECT_EQ(mode_of(path), 0640U);
+  ::umask(before);
 }
 
 }  // namespace

@@ -1,19 +1,31 @@
-// Over real sockets of the loopback device, with what sound and hostile peers send.
+// Over real sockets of the loopback device, with what sound and hostile peers send; and the rules
+// alone.
 #include "server/web/http/http_server.h"
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <map>
 #include <memory>
+#include <optional>
 #include <random>
+#include <set>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <CLI/CLI.hpp>
+
+#include "proto/text.h"
+#include "server/web/http/request_rules.h"
+#include "server/web/web.h"
 #include "tests/server/web/raw_http.h"
 
 namespace oblique::server {
@@ -84,6 +96,27 @@ class EchoServer {
   std::shared_ptr<int> token_ = std::make_shared<int>();
   HttpServer server_;  // last: its thread uses the others
 };
+
+/// A peer that has requested a path, and read the head of the answer if it is a stream.
+std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
+  auto peer = std::make_unique<RawHttp>(server.url());
+  peer->send("GET " + path + kEnd);
+  if (path == "/quiet" || path == "/loud" || path == "/large") {
+    peer->read_until("\r\n\r\n");
+  }
+  return peer;
+}
+
+/// Peers that have sent the beginning of a request.
+std::vector<std::unique_ptr<RawHttp>> silent_peers(const EchoServer& server, int count,
+                                                   const std::string& from = "127.0.0.1") {
+  std::vector<std::unique_ptr<RawHttp>> peers;
+  for (int i = 0; i < count; ++i) {
+    peers.push_back(std::make_unique<RawHttp>(server.url(), from));
+    peers.back()->send("GET ");
+  }
+  return peers;
+}
 
 TEST(HttpServer, AnswersBothVersionsAndEndsTheConnection) {
   const EchoServer server;
@@ -179,11 +212,7 @@ TEST(HttpServer, AnAddressWithItsShareOfConnectionsTakesNoneFromOthers) {
   HttpLimits limits;
   limits.connections_of_one_address = 4;
   const EchoServer server(limits);
-  std::vector<std::unique_ptr<RawHttp>> silent;
-  for (int i = 0; i < 4; ++i) {
-    silent.push_back(std::make_unique<RawHttp>(server.url(), "127.0.0.2"));
-    silent.back()->send("GET ");
-  }
+  const auto silent = silent_peers(server, 4, "127.0.0.2");
   EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").ask("GET /a" + kEnd), "");
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
 }
@@ -194,12 +223,7 @@ TEST(HttpServer, AnswersAgainWhenTooManyConnectionsHaveEnded) {
   limits.idle = test::kHangLimit;
   const EchoServer server(limits);
   for (int round = 0; round < 3; ++round) {
-    std::vector<std::unique_ptr<RawHttp>> silent;
-    for (int i = 0; i < 10; ++i) {
-      silent.push_back(std::make_unique<RawHttp>(server.url()));
-      silent.back()->send("GET ");
-    }
-    silent.clear();
+    silent_peers(server, 10).clear();
     EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
   }
 }
@@ -211,27 +235,20 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   RawHttp silent(server.url());
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
-  RawHttp quiet(server.url());
-  quiet.send("GET /quiet" + kEnd);
-  quiet.read_until("\r\n\r\n");
-  RawHttp taking_nothing(server.url());
-  taking_nothing.send("GET /loud" + kEnd);
-  taking_nothing.read_until("\r\n\r\n");
+  const auto quiet = begin(server, "/quiet");
+  const auto taking_nothing = begin(server, "/loud");
   silent.read_to_the_end();
   halting.read_to_the_end();
   server.wake_until_in_progress(1);
-  EXPECT_FALSE(quiet.has_news()) << "it takes all that there is";
+  EXPECT_FALSE(quiet->has_news()) << "it takes all that there is";
 }
 
 TEST(HttpServer, APeerWithoutEndIsEnded) {
   HttpLimits limits;
   limits.idle = test::kHangLimit;
   EchoServer server(limits);
-  RawHttp waiting(server.url());
-  waiting.send("GET /wait" + kEnd);
-  RawHttp quiet(server.url());
-  quiet.send("GET /quiet" + kEnd);
-  quiet.read_until("\r\n\r\n");
+  const auto waiting = begin(server, "/wait");
+  const auto quiet = begin(server, "/quiet");
   server.wake_until_in_progress(2);
   std::vector<std::unique_ptr<RawHttp>> uploading;
   for (int i = 0; i < 2; ++i) {
@@ -241,9 +258,7 @@ TEST(HttpServer, APeerWithoutEndIsEnded) {
         "\r\n");
     uploading.back()->read_until("\r\n\r\n");
   }
-  RawHttp large(server.url());
-  large.send("GET /large" + kEnd);
-  large.read_until("\r\n\r\n");
+  const auto large = begin(server, "/large");
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
   get(server.url(), "/a");  // all before it were accepted
@@ -254,40 +269,36 @@ TEST(HttpServer, APeerWithoutEndIsEnded) {
   server.let_pass(std::chrono::seconds(2));
   EXPECT_EQ(uploading.back()->read_to_the_end(), "");
   server.let_pass(std::chrono::seconds(EchoServer::kLargeBytes / limits.least_bytes_a_second));
-  EXPECT_LT(large.read_to_the_end().size(), EchoServer::kLargeBytes);
+  EXPECT_LT(large->read_to_the_end().size(), EchoServer::kLargeBytes);
   EXPECT_EQ(server.in_progress(), 2);
-  EXPECT_FALSE(waiting.has_news());
-  EXPECT_FALSE(quiet.has_news());
+  EXPECT_FALSE(waiting->has_news());
+  EXPECT_FALSE(quiet->has_news());
 }
 
 TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
   EchoServer server;
-  RawHttp staying(server.url());
-  staying.send("GET /wait" + kEnd);
+  const auto staying = begin(server, "/wait");
   server.wake_until_in_progress(1);
   for (const std::string path : {"/wait", "/quiet", "/loud"}) {
-    auto closing = std::make_unique<RawHttp>(server.url());
-    closing->send("GET " + path + kEnd);
+    auto closing = begin(server, path);
     server.wake_until_in_progress(2);
     closing.reset();
     server.wake_until_in_progress(1);
   }
   for (const std::string path : {"/wait", "/quiet"}) {  // browsers may close their half first
-    RawHttp halving(server.url());
-    halving.send("GET " + path + kEnd);
+    const auto halving = begin(server, path);
     server.wake_until_in_progress(2);
-    ::shutdown(halving.number(), SHUT_WR);
+    ::shutdown(halving->number(), SHUT_WR);
     server.wake_until_in_progress(1);
   }
-  EXPECT_FALSE(staying.has_news());
+  EXPECT_FALSE(staying->has_news());
 }
 
 TEST(HttpServer, APendingAnswerDelaysNoOther) {
   EchoServer server;
   std::vector<std::unique_ptr<RawHttp>> waiting;
   for (int i = 0; i < 20; ++i) {
-    waiting.push_back(std::make_unique<RawHttp>(server.url()));
-    waiting.back()->send("GET /wait" + kEnd);
+    waiting.push_back(begin(server, "/wait"));
   }
   server.wake_until_in_progress(20);
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
@@ -302,14 +313,10 @@ TEST(HttpServer, StreamsAreBounded) {
   HttpLimits limits;
   limits.streams = 2;
   EchoServer server(limits);
-  std::vector<std::unique_ptr<RawHttp>> tabs;
-  for (int i = 0; i < 2; ++i) {
-    tabs.push_back(std::make_unique<RawHttp>(server.url()));
-    tabs.back()->send("GET /quiet" + kEnd);
-    tabs.back()->read_until("\r\n\r\n");
-  }
+  const auto staying = begin(server, "/quiet");
+  auto leaving = begin(server, "/quiet");
   EXPECT_EQ(status_of_answer(get(server.url(), "/quiet")), 503);
-  tabs.pop_back();
+  leaving.reset();
   server.wake_until_in_progress(1);
   RawHttp next(server.url());
   next.send("GET /quiet" + kEnd);
@@ -318,16 +325,14 @@ TEST(HttpServer, StreamsAreBounded) {
 
 TEST(HttpServer, StopsWhileRequestsWait) {
   auto server = std::make_unique<EchoServer>();
-  RawHttp waiting(server->url());
-  waiting.send("GET /wait" + kEnd);
-  RawHttp streaming(server->url());
-  streaming.send("GET /quiet" + kEnd);
+  const auto waiting = begin(*server, "/wait");
+  const auto streaming = begin(*server, "/quiet");
   RawHttp silent(server->url());
   server->wake_until_in_progress(2);
   server.reset();
-  EXPECT_EQ(waiting.read_to_the_end(), "");
+  EXPECT_EQ(waiting->read_to_the_end(), "");
   EXPECT_EQ(silent.read_to_the_end(), "");
-  EXPECT_EQ(body_of(streaming.read_to_the_end()), "");
+  EXPECT_EQ(streaming->read_to_the_end(), "");
 }
 
 TEST(HttpServer, DoesNotListenElsewhereWithoutDescriptors) {
@@ -357,6 +362,188 @@ TEST(HttpServer, NamesAnAddressThatIsTaken) {
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), HasSubstr("127.0.0.1:" + port));
+  }
+}
+
+// ---- Which requests are refused -----------------------------------------------------------------
+
+using Headers = std::multimap<std::string, std::string>;
+
+unsigned status_of(const std::string& method, const std::string& path, const Headers& headers,
+                   const OwnNames& own = {}) {
+  HttpRequest request;
+  request.method = method;
+  request.path = path.substr(0, path.find('?'));
+  request.headers = headers;
+  if (path.find('?') != std::string::npos) {
+    request.fields = {{"token", "x"}};
+  }
+  const auto refusal = refuse(request, own);
+  return refusal ? refusal->status : 200;
+}
+
+TEST(RequestRules, OnLoopbackOnlyNamesOfLoopbackAreAnswered) {
+  for (const auto host : protocol::split(
+           "127.0.0.1:7602 localhost localhost:1 localhost: [::1]:7602 [::1] 127.8.9.10:80"
+           " LOCALHOST:7602",
+           ' ')) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", std::string(host)}}), 200U) << host;
+  }
+  auto others = protocol::split(
+      "evil.example evil.example:7602 localhost.evil.example 127.0.0.1.evil.example:7602"
+      " 192.168.1.5:7602 [2001:db8::1]:7602 0.0.0.0:7602 localhost.:7602 2130706433 127.1 0x7f.1"
+      " [::ffff:127.0.0.1]:7602 :80 [::1 []:80 [localhost]:80 [127.0.0.1]:80 localhost:80:80"
+      " localhost:80@evil.example localhost:x localhost:123456 localhost/evil user@localhost ::1"
+      " [::1]evil [::1%25lo]:80",
+      ' ');
+  others.insert(others.end(), {"", "localhost evil.example", "localhost\t"});
+  for (const auto host : others) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", std::string(host)}}), 403U) << host;
+  }
+}
+
+TEST(RequestRules, BeyondLoopbackAnyAddressIsAnsweredAndOnlyNamesThatWereGiven) {
+  const OwnNames own{false, {"oblique.lab"}};
+  for (const std::string host : {"10.1.2.3:7602", "[2001:db8::1]:7602", "127.0.0.1", "localhost",
+                                 "oblique.lab:7602", "Oblique.Lab"}) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", host}}, own), 200U) << host;
+  }
+  for (const std::string host : {"evil.example:7602", "sub.oblique.lab"}) {
+    EXPECT_EQ(status_of("GET", "/", {{"host", host}}, own), 403U) << host;
+  }
+}
+
+using Header = std::pair<std::string, std::string>;
+const Header kHost{"host", "localhost:7602"};
+const Header kOrigin{"origin", "http://localhost:7602"};
+
+/// A request to this server.
+struct RequestRow {
+  std::string method;
+  std::string path;
+  Headers headers;
+  unsigned status;
+};
+
+void expect_statuses(const std::vector<RequestRow>& rows) {
+  for (const RequestRow& row : rows) {
+    EXPECT_EQ(status_of(row.method, row.path, row.headers), row.status)
+        << row.method << ' ' << row.path << ' ' << testing::PrintToString(row.headers);
+  }
+}
+
+TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
+  expect_statuses({
+      {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
+      {"HEAD", "/", {kHost}, 200},
+      {"GET", "/", {kHost, kHost}, 400},
+      {"GET", "/", {kHost, {"host", "evil.example"}}, 400},
+      {"GET", "/", {kHost, {"content-length", "0"}}, 200},
+      {"GET", "/", {kHost, {"content-length", "262145"}}, 413},
+      {"GET", "/", {kHost, {"transfer-encoding", "chunked"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "262144"}}, 200},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "262145"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "99999999999999999999"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"content-length", "x"}}, 413},
+      {"POST", "/", {kHost, kOrigin, {"transfer-encoding", "chunked"}}, 413},
+  });
+  for (const std::string method : {"PUT", "DELETE", "OPTIONS", "TRACE", "get", "BREW"}) {
+    expect_statuses({{method, "/", {kHost, kOrigin}, 405}});
+  }
+}
+
+TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
+  const Header same{"sec-fetch-site", "same-origin"};
+  expect_statuses({
+      {"POST", "/", {kHost, kOrigin}, 200},
+      {"POST", "/", {kHost, kOrigin, same}, 200},
+      {"POST", "/", {kHost}, 403},
+      {"POST", "/", {kHost, same}, 403},
+      {"POST", "/", {kHost, kOrigin, kOrigin}, 403},
+      {"POST", "/", {kHost, kOrigin, {"sec-fetch-site", "none"}}, 403},
+      {"POST", "/", {kOrigin}, 403},
+      {"GET", "/", {kHost, kOrigin}, 200},
+      {"GET", "/", {kHost, same}, 200},
+      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // typed into the address bar
+  });
+  for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
+                                  "http://localhost", "http://localhost:7603", ""}) {
+    expect_statuses({{"GET", "/", {kHost, {"origin", other}}, 403},
+                     {"POST", "/", {kHost, {"origin", other}}, 403},
+                     {"GET", "/", {kHost, kOrigin, {"origin", other}}, 403}});
+  }
+  for (const std::string site : {"cross-site", "same-site", "", "None", "Cross-Site"}) {
+    expect_statuses({{"GET", "/", {kHost, {"sec-fetch-site", site}}, 403},
+                     {"POST", "/", {kHost, kOrigin, {"sec-fetch-site", site}}, 403}});
+  }
+}
+
+TEST(RequestRules, OfOtherSitesOnlyAFollowedLinkToThePageIsAnswered) {
+  const Header cross{"sec-fetch-site", "cross-site"};
+  const Header tab{"sec-fetch-mode", "navigate"};
+  const Header page{"sec-fetch-dest", "document"};
+  expect_statuses({
+      {"GET", "/", {kHost, cross, tab, page}, 200},
+      {"GET", "/", {kHost, {"sec-fetch-site", "same-site"}, tab, page}, 200},
+      {"GET", "/?token", {kHost, cross, tab, page}, 403},
+      {"GET", "/metrics", {kHost, cross, tab, page}, 403},
+      {"HEAD", "/", {kHost, cross, tab, page}, 403},
+      {"POST", "/", {kHost, cross, tab, page}, 403},
+      {"GET", "/", {{"host", "evil.example"}, cross, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, page, {"origin", "null"}}, 403},
+      {"GET", "/", {kHost, cross, page}, 403},
+      {"GET", "/", {kHost, cross, tab}, 403},
+      {"GET", "/", {kHost, cross, cross, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, tab, page}, 403},
+      {"GET", "/", {kHost, cross, tab, page, page}, 403},
+  });
+  for (const std::string mode : {"no-cors", "cors", "nested-navigate"}) {
+    expect_statuses({{"GET", "/", {kHost, cross, {"sec-fetch-mode", mode}, page}, 403}});
+  }
+  for (const std::string target : {"iframe", "embed", "object", "script", "empty"}) {
+    expect_statuses({{"GET", "/", {kHost, cross, tab, {"sec-fetch-dest", target}}, 403}});
+  }
+}
+
+TEST(HttpAddress, IsAddressAndPortOrOff) {
+  EXPECT_FALSE(parse_http_address("off"));
+  const auto text_of = [](const std::string& text) {
+    const auto address = parse_http_address(text).value();
+    return address.address + " " + address.port;
+  };
+  EXPECT_EQ(text_of("127.0.0.1:7602"), "127.0.0.1 7602");
+  EXPECT_EQ(text_of("localhost:80"), "127.0.0.1 80");
+  EXPECT_EQ(text_of("[::1]:7602"), "::1 7602");
+  EXPECT_EQ(text_of("0.0.0.0:65535"), "0.0.0.0 65535");
+  EXPECT_EQ(text_of("127.0.0.1:0"), "127.0.0.1 *");
+  for (const std::string text : {"", "on", "OFF", "7602", ":7602", "127.0.0.1", "127.0.0.1:",
+                                 "127.0.0.1:65536", "127.0.0.1:-1", "127.0.0.1:+1", "127.0.0.1: 1",
+                                 "::1:7602", "[127.0.0.1]:7602", "[::1]", "example.org:7602"}) {
+    EXPECT_THROW(parse_http_address(text), std::runtime_error) << text;
+  }
+}
+
+WebSettings settings_of(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  HttpOptions options;
+  options.add_to(app);
+  app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+  return options.settings().value();
+}
+
+TEST(HttpOptions, OnlyTheDefaultAddressMayBeTaken) {
+  EXPECT_EQ(settings_of({}).address.address, "127.0.0.1");
+  EXPECT_EQ(settings_of({}).address.port, "7602");
+  EXPECT_TRUE(settings_of({}).may_be_missing);
+  EXPECT_FALSE(settings_of({"--http", "127.0.0.1:7602"}).may_be_missing);
+}
+
+TEST(HttpOptions, NamesAreInLowerCase) {
+  const WebSettings settings =
+      settings_of({"--http-name", "Oblique.Lab", "--http-name", "oblique-server"});
+  EXPECT_EQ(settings.names, (std::set<std::string>{"oblique-server", "oblique.lab"}));
+  for (const std::string name : {"oblique.lab:7602", "", "[::1]", "a b"}) {
+    EXPECT_THROW(settings_of({"--http-name", name}), std::runtime_error) << name;
   }
 }
 

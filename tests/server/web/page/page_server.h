@@ -1,15 +1,21 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/server/event_loop/running_server.h"
 #include "tests/server/web/raw_http.h"
+#include "tests/support/points.h"
+#include "tests/support/recipes.h"
 #include "tests/support/temporary_folder.h"
 
 namespace oblique::server {
@@ -68,6 +74,14 @@ class PageServer {
   }
   /// As the page asks.
   std::string get(const std::string& path) const { return ask("GET", path, cookie_header()); }
+  int status(const std::string& path) const { return status_of_answer(get(path)); }
+  /// A request whose answer is not read here.
+  std::unique_ptr<RawHttp> begin(const std::string& path) const {
+    auto browser = std::make_unique<RawHttp>(url());
+    browser->send("GET " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" + cookie_header() +
+                  "\r\n");
+    return browser;
+  }
   nlohmann::json json(const std::string& path) const {
     return nlohmann::json::parse(body_of(get(path)));
   }
@@ -94,6 +108,53 @@ class PageServer {
   std::string database_;
   RunningServer server_;
   std::string cookie_;
+};
+
+/// As `solved_point` makes it.
+inline float force_of(std::uint64_t point) {
+  return static_cast<float>(std::round((1.0 / 3.0 + static_cast<double>(point)) * 1e4 * 1e5) / 1e5);
+}
+
+/// A server that shows its page, and studies that a pretended worker solves.
+class PageStudyTest : public testing::Test {
+ protected:
+  void submit(const std::string& name, const protocol::Recipe& recipe) {
+    ClientRequest request;
+    request.mutable_submit()->set_name(name);
+    *request.mutable_submit()->mutable_recipe() = recipe;
+    ASSERT_TRUE(client_.ask(request).has_submit());
+  }
+  void solve(std::uint64_t points, const std::set<std::uint64_t>& failing = {}) {
+    PretendedWorker worker(page_.server().worker_endpoint());
+    worker.fail(failing);
+    worker.hello();
+    worker.work(points);
+  }
+  /// 3 heights, 4 frictions, 2 restitutions.
+  static protocol::Recipe grid_recipe() {
+    return protocol::recipe_of(
+        {{protocol::listed("H", {1.0, 0.9, 0.8}), protocol::range("mu", 0.0, 0.6, 4),
+          protocol::listed("e", {1.0, 0.5})}});
+  }
+  static protocol::Recipe filtered_grid(const std::string& where) {
+    protocol::Recipe recipe = grid_recipe();
+    recipe.mutable_blocks(0)->set_where(where);
+    return recipe;
+  }
+  Numbers slice_of(const std::string& query) const {
+    return page_.numbers("/api/studies/1/slice?" + query);
+  }
+  Numbers bins_of(const std::string& query) const {
+    return page_.numbers("/api/studies/1/bins?" + query);
+  }
+  void submit_grid() { submit("grid", grid_recipe()); }
+  void solve_grid() {
+    submit_grid();
+    solve(24);
+  }
+
+  PageServer page_;
+  PretendedClient client_{page_.server().client_endpoint()};
 };
 
 }  // namespace oblique::server

@@ -13,7 +13,6 @@
 #include "proto/frames.h"
 #include "proto/wire/chunk.h"
 #include "server/study/limits.h"
-#include "server/web/page/request_flow.h"
 #include "tests/support/recipes.h"
 
 namespace oblique::server {
@@ -23,6 +22,23 @@ using protocol::ClientReply;
 using protocol::ClientRequest;
 using testing::ElementsAre;
 using testing::IsEmpty;
+
+/// The points of some queries.
+class Points : public StudyAnswer {
+ public:
+  explicit Points(int queries = 1, const std::string& condition = {})
+      : StudyAnswer(condition), queries_(queries) {}
+  Next next(const ServedStudy& /*study*/) override {
+    return queries_-- > 0 ? Next(protocol::StudyQuery()) : Next(HttpAnswer{200, {}, points_});
+  }
+  void take_row(const protocol::ChunkRows& row) override {
+    points_ += std::to_string(row.cell(0).integer) + ' ';
+  }
+
+ private:
+  int queries_;
+  std::string points_;
+};
 
 class StudyFlowTest : public testing::Test {
  protected:
@@ -51,11 +67,16 @@ class StudyFlowTest : public testing::Test {
     reply.set_request_id(number);
     client_.put(protocol::encode(reply));
   }
-  /// Answers the requests for the study and its recipe.
-  void describe(const PendingAnswer& pending) {
+  /// Answers the last request for the status of a study.
+  void reply_with_status(std::uint64_t points = 0) {
     ClientReply status;
     status.mutable_status()->add_studies()->set_name("a");
+    status.mutable_status()->mutable_studies(0)->set_points(points);
     reply(requested().at(0).request_id(), status);
+  }
+  /// Answers the requests for the study and its recipe.
+  void describe(const PendingAnswer& pending) {
+    reply_with_status();
     EXPECT_FALSE(pending());
     ClientReply described;
     *described.mutable_describe()->mutable_recipe() = protocol::recipe_of(
@@ -63,6 +84,13 @@ class StudyFlowTest : public testing::Test {
     const auto requests = requested();
     EXPECT_EQ(requests.at(0).describe().study(), "a");
     reply(requests.at(0).request_id(), described);
+  }
+  /// A flow that has sent its first query.
+  PendingAnswer described(int queries = 1, const std::string& condition = {}) {
+    PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(queries, condition));
+    describe(pending);
+    EXPECT_FALSE(pending());
+    return pending;
   }
   static ClientReply chunk_of(const std::vector<std::int64_t>& points, bool ends) {
     protocol::ChunkWriter rows({"point"});
@@ -81,37 +109,11 @@ class StudyFlowTest : public testing::Test {
     reply.mutable_error()->set_wrong_request(true);
     return reply;
   }
-  static ClientRequest trace_of(std::uint64_t point) {
-    ClientRequest request;
-    request.mutable_trace()->set_study("a");
-    request.mutable_trace()->set_point(point);
-    return request;
-  }
-
   ServiceClient client_;
 };
 
-/// The points of some queries.
-class Points : public StudyAnswer {
- public:
-  explicit Points(int queries = 1, const std::string& condition = {})
-      : StudyAnswer(condition), queries_(queries) {}
-  Next next(const ServedStudy& /*study*/) override {
-    return queries_-- > 0 ? Next(protocol::StudyQuery()) : Next(HttpAnswer{200, {}, points_});
-  }
-  void take_row(const protocol::ChunkRows& row) override {
-    points_ += std::to_string(row.cell(0).integer) + ' ';
-  }
-
- private:
-  int queries_;
-  std::string points_;
-};
-
 TEST_F(StudyFlowTest, AnAnswerIsMadeOfAllChunksOfAQuery) {
-  const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>());
-  describe(pending);
-  EXPECT_FALSE(pending());
+  const PendingAnswer pending = described();
   const ClientRequest query = requested().at(0);
   EXPECT_EQ(query.query().question().study(), "a");
   reply(query.request_id(), chunk_of({1, 2}, false));
@@ -124,9 +126,7 @@ TEST_F(StudyFlowTest, AnAnswerIsMadeOfAllChunksOfAQuery) {
 }
 
 TEST_F(StudyFlowTest, ALateErrorAboutAQueryThatHasEndedDoesNotEndTheNext) {
-  const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(2));
-  describe(pending);
-  EXPECT_FALSE(pending());
+  const PendingAnswer pending = described(2);
   const std::uint64_t first = requested().at(0).request_id();
   reply(first, chunk_of({1}, false));
   reply(first, chunk_of({}, true));
@@ -139,9 +139,7 @@ TEST_F(StudyFlowTest, ALateErrorAboutAQueryThatHasEndedDoesNotEndTheNext) {
 }
 
 TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
-  PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>());
-  describe(pending);
-  EXPECT_FALSE(pending());
+  PendingAnswer pending = described();
   const ClientRequest query = requested().at(0);
   pending = nullptr;
   EXPECT_THAT(ended(), ElementsAre(query.request_id()));
@@ -150,10 +148,7 @@ TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
 TEST_F(StudyFlowTest, ARecipeIsRequestedOnceUntilTheStudyGrows) {
   const auto requests_with_points = [&](std::uint64_t points) {
     const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(0));
-    ClientReply status;
-    status.mutable_status()->add_studies()->set_name("a");
-    status.mutable_status()->mutable_studies(0)->set_points(points);
-    reply(requested().at(0).request_id(), status);
+    reply_with_status(points);
     const bool is_answered = pending().has_value();
     const std::size_t requests = requested().size();
     EXPECT_EQ(is_answered, requests == 0);
@@ -170,9 +165,7 @@ TEST_F(StudyFlowTest, FewRecipesAreRequestedAtATime) {
   std::vector<PendingAnswer> flows;
   for (std::uint64_t study = 1; study <= limits::kRecipesOfPage + 1; ++study) {
     flows.push_back(study_flow(client_, study, std::make_unique<Points>(0)));
-    ClientReply status;
-    status.mutable_status()->add_studies()->set_name("a");
-    reply(requested().at(0).request_id(), status);
+    reply_with_status();
     EXPECT_FALSE(flows.back()());
     EXPECT_EQ(requested().size(), study <= limits::kRecipesOfPage ? 1U : 0U) << study;
   }
@@ -214,9 +207,7 @@ TEST_F(StudyFlowTest, AfterItsDeadlineTheAnswerSaysSo) {
 
 TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
   for (const bool is_condition_wrong : {true, false}) {
-    const PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(1, "muu > 1"));
-    describe(pending);
-    EXPECT_FALSE(pending());
+    const PendingAnswer pending = described(1, "muu > 1");
     reply(requested().at(0).request_id(), error_of("wrong in the whole query"));
     EXPECT_FALSE(pending());
     const ClientRequest alone = requested().at(0);
@@ -230,25 +221,18 @@ TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
   }
 }
 
-TEST_F(StudyFlowTest, AnErrorOfTheServiceIsTheAnswer) {
-  const PendingAnswer pending = study_answer(client_, 1);
-  reply(requested().at(0).request_id(), error_of("there is no study \"a\""));
-  EXPECT_EQ(pending()->status, 404U);
-}
-
-TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEnds) {
-  client_.ask(1, trace_of(7));
+TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEndsUnlessItHasCome) {
+  ClientRequest trace;
+  trace.mutable_trace()->set_study("a");
+  client_.ask(1, trace);
   client_.forget(1);
   EXPECT_THAT(ended(), ElementsAre(1));
-}
-
-TEST_F(StudyFlowTest, ATraceThatCameNeedsNoEnd) {
-  client_.ask(1, trace_of(7));
+  client_.ask(2, trace);
   ClientReply whole;
   whole.mutable_trace()->set_worker("one");
-  reply(1, whole);
-  ASSERT_TRUE(client_.reply(1));
-  client_.forget(1);
+  reply(2, whole);
+  ASSERT_TRUE(client_.reply(2));
+  client_.forget(2);
   EXPECT_THAT(ended(), IsEmpty());
 }
 

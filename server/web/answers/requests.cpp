@@ -1,21 +1,24 @@
-#include "server/web/page/request_flow.h"
+#include "server/web/answers/study_answers.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "proto/recipe/model_message.h"
 #include "proto/wire/chunk.h"
 #include "server/study/limits.h"
-#include "server/web/answers/study_answers.h"
 #include "server/web/status/snapshot.h"
 #include "worker/solver/model/trace_columns.h"
 
@@ -176,8 +179,11 @@ HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::Tr
                         numbers + states);
 }
 
-}  // namespace
+/// What follows from a reply: the answer or the next request.
+using NextStep = std::variant<HttpAnswer, ClientRequest>;
+using OnReply = std::function<NextStep(const ClientReply&)>;
 
+/// Sends requests one after the other until there is an answer. An error of the service is one.
 PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const ClientRequest& first,
                            OnReply on_reply) {
   exchange->send(first);
@@ -194,31 +200,22 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
+/// The same for a study that HTTP identifies by its number and the service by its name, which
+/// `request` gets.
 PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
                                std::function<ClientRequest(const std::string&)> request,
                                OnReply on_reply) {
   ClientRequest first;
   first.mutable_status()->set_study_id(study);
-  exchange->send(first);
-  return
-      [exchange = std::move(exchange), request = std::move(request), on_reply = std::move(on_reply),
-       named = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
-        if (!named) {
-          const auto reply = exchange->reply();
-          if (!reply) {
-            return std::nullopt;
-          }
-          if (reply->has_error()) {
-            HttpAnswer answer = failure(reply->error());
-            return answer.status == MHD_HTTP_NOT_FOUND
-                       ? error_answer(MHD_HTTP_NOT_FOUND, "there is no such study")
-                       : answer;
-          }
-          named = request_flow(exchange, request(reply->status().studies(0).name()), on_reply);
-        }
-        return named();
-      };
+  return request_flow(std::move(exchange), first,
+                      [request = std::move(request),
+                       on_reply = std::move(on_reply)](const ClientReply& reply) -> NextStep {
+                        return reply.has_status() ? request(reply.status().studies(0).name())
+                                                  : on_reply(reply);
+                      });
 }
+
+}  // namespace
 
 PendingAnswer list_studies(ServiceClient& service, const Fields& fields) {
   ClientRequest request;
@@ -227,11 +224,8 @@ PendingAnswer list_studies(ServiceClient& service, const Fields& fields) {
   return request_flow(
       std::make_shared<ServiceExchange>(service), request,
       [](const ClientReply& reply) -> NextStep {
-        ordered_json studies = ordered_json::array();
-        for (const auto& study : reply.status().studies()) {
-          studies.push_back(study_json(study));
-        }
-        return json_answer({{"studies", studies}, {"next_after", reply.status().next_after()}});
+        return json_answer({{"studies", json_list(reply.status().studies(), study_json)},
+                            {"next_after", reply.status().next_after()}});
       });
 }
 
@@ -242,11 +236,8 @@ PendingAnswer list_workers(ServiceClient& service, const Fields& fields) {
   return request_flow(
       std::make_shared<ServiceExchange>(service), request,
       [](const ClientReply& reply) -> NextStep {
-        ordered_json workers = ordered_json::array();
-        for (const auto& worker : reply.workers().workers()) {
-          workers.push_back(worker_json(worker));
-        }
-        return json_answer({{"workers", workers}, {"next_after", reply.workers().next_after()}});
+        return json_answer({{"workers", json_list(reply.workers().workers(), worker_json)},
+                            {"next_after", reply.workers().next_after()}});
       });
 }
 
@@ -329,43 +320,38 @@ PendingAnswer change_study(ServiceClient& service, std::uint64_t study,
 PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint64_t point,
                           const Fields& fields) {
   const auto is_set = [&fields](const char* name) {
-    const auto field = fields.find(name);
-    return field != fields.end() && field->second == "1";
+    return FieldReader(fields).text(name).value_or("") == "1";
   };
   const bool with_shape = is_set("shape");
-  protocol::ClientRequest request;  // `every` stays 0: as many instants as fit
+  ClientRequest request;  // `every` stays 0: as many instants as fit
   request.mutable_trace()->set_point(point);
   request.mutable_trace()->set_shape(with_shape);
   request.mutable_trace()->set_fall(is_set("fall"));
-  const auto begin = [&service, study, point, with_shape,
-                      request](const std::shared_ptr<const void>& slot) {
-    return named_study_flow(
-        std::make_shared<ServiceExchange>(service), study,
-        [request](const std::string& name) {
-          protocol::ClientRequest named = request;
-          named.mutable_trace()->set_study(name);
-          return named;
-        },
-        [point, with_shape, slot](const protocol::ClientReply& reply) -> NextStep {
-          const std::string& error = reply.trace().trace().result().error();
-          HttpAnswer answer = error.empty() ? trace_answer(point, with_shape, reply.trace())
-                                            : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
-          answer.until_sent = slot;
-          return answer;
-        });
-  };
-  using Clock = std::chrono::steady_clock;
-  const auto until = Clock::now() + std::chrono::milliseconds(limits::kTraceTime_ms);
-  return [&service, begin, until, flow = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
-    if (!flow) {
-      const auto slot = service.trace_slots().take();
-      if (!slot) {
-        return Clock::now() < until ? std::nullopt
-                                    : std::optional(error_answer(
-                                          MHD_HTTP_SERVICE_UNAVAILABLE,
-                                          "too many traces are on their way to browsers already"));
-      }
-      flow = begin(slot);
+  const auto until = FlowClock::now() + std::chrono::milliseconds(limits::kTraceTime_ms);
+  return [&service, study, point, with_shape, request, until,
+          flow = PendingAnswer()]() mutable -> std::optional<HttpAnswer> {
+    const auto slot = flow ? nullptr : service.trace_slots().take();
+    if (!flow && !slot) {
+      return FlowClock::now() < until
+                 ? std::nullopt
+                 : std::optional(
+                       error_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
+                                    "too many traces are on their way to browsers already"));
+    }
+    if (slot) {
+      flow = named_study_flow(
+          std::make_shared<ServiceExchange>(service), study,
+          [request](const std::string& name) mutable {
+            request.mutable_trace()->set_study(name);
+            return request;
+          },
+          [point, with_shape, slot](const ClientReply& reply) -> NextStep {
+            const std::string& error = reply.trace().trace().result().error();
+            HttpAnswer answer = error.empty() ? trace_answer(point, with_shape, reply.trace())
+                                              : error_answer(MHD_HTTP_UNPROCESSABLE_CONTENT, error);
+            answer.until_sent = slot;
+            return answer;
+          });
     }
     return flow();
   };

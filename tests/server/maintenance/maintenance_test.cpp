@@ -1,0 +1,469 @@
+// Copies, salvage, checks, and changes of studies without a server.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
+
+#include "proto/frames.h"
+#include "proto/recipe/model_message.h"
+#include "server/maintenance/backup.h"
+#include "server/maintenance/check.h"
+#include "server/maintenance/merge.h"
+#include "server/maintenance/study_changes_offline.h"
+#include "server/store/result_rows.h"
+#include "tests/server/store/store_fixture.h"
+
+namespace oblique::server {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr std::int64_t kPageBytes = 8192;
+
+/// Makes a page unreadable.
+void overwrite_page(const std::string& path, std::int64_t page) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp((page - 1) * kPageBytes);
+  file << std::string(kPageBytes, '\x5a');
+}
+
+/// A database with one study of ten points, five of them solved.
+class MaintenanceTest : public StoreFixture {
+ protected:
+  MaintenanceTest() { commit({study_, worker(1), solved(study_, numbers(0, 5))}); }
+
+  /// The first page of a table.
+  static std::int64_t page_of(const std::string& path, const std::string& table) {
+    return std::stoll(
+        rows(path, "SELECT rootpage FROM sqlite_schema WHERE name = '" + table + "'").at(0));
+  }
+
+  std::string copy_ = folder_.file("copy.db");
+  const AddStudy study_ = study_of(10);
+};
+
+TEST_F(MaintenanceTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
+  back_up(path_, copy_);
+  commit({solved(study_, numbers(5, 10))});
+  Store copy(copy_);
+  const auto studies = copy.studies();
+  ASSERT_EQ(studies.size(), 1U);
+  EXPECT_EQ(studies[0].completed, IntervalSet(0, 5));
+  EXPECT_EQ(copy.database_id(), store().database_id());
+  EXPECT_EQ(std::filesystem::status(copy_).permissions(),
+            std::filesystem::perms::owner_read | std::filesystem::perms::owner_write)
+      << "a copy is its owner's alone";
+}
+
+TEST_F(MaintenanceTest, OnlyADatabaseOfOursIsCopiedOrSalvagedAndNoFileIsReplaced) {
+  const std::string notes = folder_.file("notes.txt");
+  std::ofstream(notes) << "not a database, and long enough to be sure of it";
+  std::ofstream(folder_.file("empty.db"));
+  for (const std::string& other : {notes, folder_.file("nowhere.db"), folder_.file("empty.db")}) {
+    EXPECT_THROW(back_up(other, copy_), StorageError) << other;
+    EXPECT_THROW(salvage(other, copy_), StorageError) << other;
+    EXPECT_FALSE(std::filesystem::exists(copy_)) << other;
+  }
+  EXPECT_THROW(back_up(path_, notes), StorageError);
+  EXPECT_THROW(salvage(path_, notes), StorageError);
+  EXPECT_GT(std::filesystem::file_size(notes), 0U);
+}
+
+class SalvageTest : public MaintenanceTest {
+ protected:
+  /// Study, point and, by its checksum, all else of each row, in the order of the texts.
+  static std::vector<std::string> rows_of(const std::string& file) {
+    return rows(file,
+                "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM results"
+                " ORDER BY study_id, point");
+  }
+};
+
+TEST_F(SalvageTest, WhatCanBeReadOfADamagedFileIsSavedAndTheRestIsPendingAgain) {
+  constexpr std::uint64_t kPoints = 1500;  // with some more the root of their tree splits
+  const std::string whole = folder_.file("whole.db");
+  const auto large = study_of(kPoints);
+  Store(whole).commit(std::vector<Change>{large, worker(1), solved(large, numbers(0, kPoints)),
+                                          SetStudyState{1, StudyState::kDone, "now"}});
+  const auto stored = rows_of(whole);
+  const auto size = std::filesystem::file_size(whole);
+  const auto cut_to = [](std::uintmax_t bytes) {
+    return [bytes](const std::string& file) { std::filesystem::resize_file(file, bytes); };
+  };
+  const struct {
+    const char* what;
+    std::function<void(const std::string&)> damage;
+    double least_share;  ///< of the rows. Upper pages of a tree are behind lower ones.
+  } cases[] = {{"one page of rows",
+                [&](const auto& file) {
+                  overwrite_page(file, static_cast<std::int64_t>(size) / 2 / kPageBytes + 1);
+                },
+                0.95},
+               {"root of results",
+                [](const auto& file) { overwrite_page(file, page_of(file, "results")); }, 0.0},
+               {"root of models",
+                [](const auto& file) { overwrite_page(file, page_of(file, "models")); }, 0.0},
+               {"cut in a page", cut_to(size / 100 * 99 + 7), 0.79},
+               {"cut at a page", cut_to(size / kPageBytes * 3 / 4 * kPageBytes), 0.55},
+               {"cut to a sixth", cut_to(size / 6), 0.0}};
+  for (const auto& [what, damage, least_share] : cases) {
+    const std::string damaged = folder_.file(std::string(what) + ".db");
+    const std::string saved_file = folder_.file(std::string(what) + " saved.db");
+    std::filesystem::copy_file(whole, damaged);
+    damage(damaged);
+    const auto damaged_size = std::filesystem::file_size(damaged);
+    const auto saved = salvage(damaged, saved_file);
+    EXPECT_EQ(saved.studies, 1U) << what;
+    EXPECT_GE(saved.unreadable_places, 1U) << what;
+    EXPECT_GE(static_cast<double>(saved.results), least_share * kPoints) << what;
+    EXPECT_LT(saved.results, kPoints) << what;
+    EXPECT_THAT(rows_of(saved_file), SizeIs(saved.results)) << what;
+    EXPECT_TRUE(std::ranges::includes(stored, rows_of(saved_file))) << what;
+    EXPECT_THAT(faults(saved_file), IsEmpty()) << what;
+    EXPECT_EQ(std::filesystem::file_size(damaged), damaged_size) << what;
+    const auto study = Store(saved_file).studies().at(0);
+    EXPECT_EQ(study.completed.size(), saved.results) << what;
+    EXPECT_EQ(study.state, StudyState::kRunning) << what;
+  }
+}
+
+TEST_F(SalvageTest, ADamagedRowIsNotSavedButAStudyOrModelWithADamagedValueIsWithItsRows) {
+  close();
+  auto others = rows_of(path_);
+  others.erase(others.begin() + 3);
+  by_hand(
+      "UPDATE studies SET created_at = 'x'; UPDATE models SET E = E + 1;"
+      "UPDATE results SET peaks = replace(peaks, '1', '2') WHERE point = 3");
+  EXPECT_EQ(salvage(path_, copy_).unreadable_places, 1U);
+  EXPECT_EQ(rows_of(copy_), others);
+  EXPECT_THAT(faults(copy_), IsEmpty());
+}
+
+TEST_F(SalvageTest, ASoundDatabaseIsSalvagedWholeWithTheRowsInItsLogWhichStaysAsItIs) {
+  const std::string crashed = folder_.file("crashed.db");
+  std::filesystem::copy_file(path_, crashed);
+  std::filesystem::copy_file(path_ + "-wal", crashed + "-wal");
+  const auto log = std::filesystem::file_size(crashed + "-wal");
+  ASSERT_GT(log, 0U);
+  const auto saved = salvage(crashed, copy_);
+  EXPECT_EQ(saved.results, 5U);
+  EXPECT_EQ(saved.unreadable_places, 0U);
+  EXPECT_EQ(rows_of(copy_), rows_of(path_));
+  EXPECT_EQ(std::filesystem::file_size(crashed + "-wal"), log);
+}
+
+TEST_F(SalvageTest, ATableThatLostAColumnIsSavedWithoutItUnlessItsRowsNeedTheColumn) {
+  close();
+  by_hand(
+      "ALTER TABLE studies DROP COLUMN reuses; DROP VIEW runs;"
+      "ALTER TABLE results DROP COLUMN margin");
+  EXPECT_EQ(salvage(path_, copy_).results, 5U);
+  EXPECT_THAT(faults(copy_), IsEmpty());
+  std::filesystem::remove(copy_);
+  by_hand("ALTER TABLE results DROP COLUMN slide_m");
+  const auto saved = salvage(path_, copy_);
+  EXPECT_EQ(saved.studies, 1U);
+  EXPECT_EQ(saved.unreadable_places, 5U) << "a solved point has it";
+  EXPECT_THAT(faults(copy_), IsEmpty());
+}
+
+TEST_F(SalvageTest, ReusedResultsAreCountedAgainAndPointsThatAFilterLeavesOutAreExaminedAgain) {
+  const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
+  const auto outcome = std::make_shared<ReusedResults>();
+  commit({study_of(filtered, 2, "b"), ReuseResults{2, filtered, 0, "0.1", outcome},
+          AddResults{2, filtered, 1, "0.1", "avx2", 1, "now", {}, IntervalSet(4, 10)},
+          SetStudyState{2, StudyState::kDone, "now"}});
+  close();
+  by_hand("DELETE FROM reused_points");
+  salvage(path_, copy_);
+  EXPECT_THAT(faults(copy_), testing::IsEmpty());
+  Store saved(copy_);
+  const auto study = saved.studies().at(1);
+  EXPECT_EQ(study.state, StudyState::kRunning);
+  EXPECT_EQ(study.completed, IntervalSet(0, 4));
+  EXPECT_EQ(study.left_out, 0U);
+  EXPECT_EQ(study.reused, (std::map<std::string, std::uint64_t>{{"a", 4}}));
+}
+
+// ---- Checks -------------------------------------------------------------------------------------
+
+TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
+  protocol::PointResult result = solved_point(5, *study_.table.get());
+  result.set_mu(std::nextafter(result.mu(), 1.0));
+  commit({results_of(study_, {result})});
+  EXPECT_THAT(faults(), IsEmpty());
+  const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
+  Statement row(database.get(), "SELECT mu FROM results WHERE point = 5");
+  ASSERT_TRUE(row.step());
+  EXPECT_EQ(row.real(0), result.mu()) << "as it was solved";
+}
+
+TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheRefusalNamesTheWayOut) {
+  close();  // all is in the one file now
+  overwrite_page(path_, page_of(path_, "studies"));
+  EXPECT_FALSE(faults().empty());
+  EXPECT_THROW(back_up(path_, copy_), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+  EXPECT_THAT(refusal(), HasSubstr("--salvage"));
+}
+
+TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
+  close();
+  std::filesystem::copy_file(path_, copy_);
+  for (const std::string_view column : result_columns()) {
+    by_hand(
+        fmt::format("UPDATE results SET {0} = CASE typeof({0}) WHEN 'text' THEN {0} || ' '"
+                    " WHEN 'null' THEN 1 ELSE {0} + 1 END WHERE point = 4",
+                    column));
+    EXPECT_THAT(faults(), Contains(HasSubstr(column == "study_id" ? "refers to study number 2"
+                                                                  : "not the one that was stored")))
+        << column;
+    std::filesystem::copy_file(copy_, path_, std::filesystem::copy_options::overwrite_existing);
+  }
+}
+
+TEST_F(MaintenanceTest, AStudyOrModelThatWasChangedAndAReferenceToNoStudyAreFound) {
+  close();
+  by_hand(
+      "UPDATE studies SET created_at = 'b'; UPDATE models SET E = E + 1;"
+      "INSERT INTO reused_points VALUES (7, 'b', 1)");
+  EXPECT_THAT(faults(),
+              ElementsAre("table reused_points: refers to study number 7, which does not exist",
+                          "model 1: it is not the one that was stored", HasSubstr("study 1, a")));
+}
+
+TEST_F(MaintenanceTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) {
+  const auto found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks, ElementsAre("study a is running: 5 of 10 points have a result"));
+  commit({solved(study_, numbers(5, 10))});
+  EXPECT_THAT(diagnose(path_).remarks, IsEmpty());
+}
+
+TEST_F(MaintenanceTest, EveryTableThatIsMissingOrHasOtherColumnsOrIsAViewIsNamed) {
+  close();
+  for (const std::string table : {"about", "studies", "models", "workers", "results",
+                                  "completed_ranges", "reused_points", "deletions"}) {
+    for (const char* change :
+         {"DROP TABLE {0}", "ALTER TABLE {0} ADD COLUMN note BLOB AS (zeroblob(1000000))",
+          "DROP TABLE {0}; CREATE VIEW {0} AS WITH RECURSIVE n(i) AS"
+          " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS study_id FROM n WHERE i < 0"}) {
+      std::filesystem::copy_file(path_, copy_, std::filesystem::copy_options::overwrite_existing);
+      by_hand(copy_, fmt::format(fmt::runtime(change), table));
+      EXPECT_THAT(faults(copy_), ElementsAre(HasSubstr("the table " + table + " is")));
+      EXPECT_THROW(Store{copy_}, StorageError) << change << " of " << table;
+    }
+  }
+}
+
+TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemedy) {
+  close();
+  for (const char* change :
+       {"UPDATE completed_ranges SET points = 6", "UPDATE completed_ranges SET points = 4",
+        "UPDATE completed_ranges SET first_point = 1"}) {
+    by_hand(change);
+    EXPECT_THAT(faults(), Contains(HasSubstr("UPDATE studies SET counted = 0"))) << change;
+  }
+  by_hand("UPDATE completed_ranges SET first_point = 0, points = 5");
+  by_hand("UPDATE studies SET state = 'done'");
+  EXPECT_THAT(faults(), ElementsAre("study a is done: 5 of 10 points have a result"));
+}
+
+TEST_F(MaintenanceTest, ADoneStudyOfWhichRowsWereDeletedByHandIsSound) {
+  commit({solved(study_, numbers(5, 10))});
+  close();
+  by_hand("UPDATE studies SET state = 'done'; DELETE FROM results WHERE point > 6");
+  EXPECT_THAT(faults(), IsEmpty());
+  EXPECT_THAT(diagnose(path_).remarks, Contains("study a is done: 7 of 10 points have a result"));
+}
+
+/// Three points, the last of them failed; their rows have no checksums.
+class RowFaultsTest : public StoreFixture {
+ protected:
+  RowFaultsTest() {
+    const auto study = study_of(5);
+    commit({study, worker(1), solved(study, {0, 1}), failed(study, {2})});
+    close();
+    by_hand("UPDATE results SET checksum = NULL; UPDATE studies SET checksum = NULL");
+  }
+};
+
+TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResultIsNamed) {
+  const std::vector<std::pair<std::string, std::string>> damages{
+      {"point = 77", "point 77: the study has no such point"},
+      {"H = 1.000000000002", "H is 1.000000000002"},
+      {"mu = mu + 0.125", "mu is"},
+      {"e = 0.5", "e is"},
+      {"peaks = replace(peaks, ']', '')", "one of its lists cannot be read"},
+      {"phases = '[inf]'", "one of its lists cannot be read"},
+      {"impulse_n_Ns = NULL", "outputs are missing"},
+      {"error = 'none'", "point 1: it is failed, and has outputs"},
+      {"model_id = 7", "point 1: its model does not exist"},
+      {"worker_id = 7", "point 1: its worker does not exist"}};
+  const std::string columns = fmt::format("{}", fmt::join(result_columns(), ", "));
+  EXPECT_THAT(faults(), IsEmpty());
+  EXPECT_THAT(diagnose(path_).remarks, Contains(HasSubstr("3 of 3 results have no checksum")));
+  for (const auto& [change, said] : damages) {
+    by_hand("CREATE TABLE before AS SELECT " + columns + " FROM results WHERE point = 1");
+    by_hand("UPDATE results SET " + change + " WHERE point = 1");
+    EXPECT_THAT(faults(), Contains(HasSubstr(said))) << change;
+    by_hand("DELETE FROM results WHERE point IN (1, 77); INSERT INTO results (" + columns +
+            ") SELECT * FROM before; DROP TABLE before");
+  }
+}
+
+TEST_F(RowFaultsTest, AModelThatIsNotThatOfTheRecipeIsNamed) {
+  solver::ModelParameters other = solver::preset("paper");
+  other.E_Pa += 1.0;
+  execute_with(open_database(path_, SQLITE_OPEN_READWRITE).get(),
+               "UPDATE models SET definition = ?, checksum = NULL",
+               protocol::canonical_model(other));
+  EXPECT_THAT(faults(), Contains(HasSubstr("point 0: its model is not")));
+}
+
+TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
+  by_hand("UPDATE studies SET points = 6");
+  EXPECT_THAT(faults(), Contains(HasSubstr("it has 5 points, and the study 6")));
+  by_hand("UPDATE studies SET points = 5, recipe = x'ff'");
+  EXPECT_THAT(faults(), Contains(HasSubstr("its recipe cannot be read")));
+}
+
+TEST_F(RowFaultsTest, AStudyThatWouldKeepAServerFromStartingIsNamed) {
+  by_hand("CREATE TABLE before AS SELECT * FROM studies");
+  for (const char* change : {"points = 1000000000000000000", "points = -1",
+                             "priority = 9223372036854775807", "name = ''", "name = char(27)",
+                             "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
+    by_hand(std::string("PRAGMA ignore_check_constraints = ON; UPDATE studies SET ") + change);
+    EXPECT_THAT(faults(), Contains(HasSubstr("study 1, "))) << change;
+    by_hand("DELETE FROM studies; INSERT INTO studies SELECT * FROM before");
+  }
+}
+
+// ---- Changes without a server -------------------------------------------------------------------
+
+class OfflineStudyTest : public MaintenanceTest {
+ protected:
+  std::string refusal_of_renaming(std::uint64_t study, const std::string& name) {
+    try {
+      rename_study(path_, study, name);
+    } catch (const StudyRefused& error) {
+      return error.what();
+    }
+    return "it was renamed";
+  }
+};
+
+TEST_F(OfflineStudyTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
+  commit({study_of(10, 2, "b")});
+  EXPECT_THROW(rename_study(path_, 1, "c"), StorageError) << "a server works on it";
+  EXPECT_THROW(delete_study(path_, 1), StorageError);
+  EXPECT_THROW(rename_study(copy_, 1, "c"), StorageError) << "there is no such file";
+  EXPECT_FALSE(std::filesystem::exists(copy_));
+  close();
+  rename_study(path_, 1, "friction");
+  EXPECT_EQ(Store(path_).studies().at(0).name, "friction");
+  EXPECT_THAT(refusal_of_renaming(1, "b"), HasSubstr("there is a study called \"b\""));
+  EXPECT_THAT(refusal_of_renaming(1, ""), HasSubstr("name"));
+  EXPECT_THAT(refusal_of_renaming(7, "c"), HasSubstr("no longer"));
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
+  commit({solved(study_, numbers(5, 10))});
+  close();
+  EXPECT_TRUE(delete_study(path_, 1));
+  { const Store next(path_); }  // a start deletes what no row refers to
+  for (const char* table :
+       {"studies", "models", "workers", "results", "completed_ranges", "deletions"}) {
+    EXPECT_EQ(number(std::string("SELECT count(*) FROM ") + table), 0) << table;
+  }
+  EXPECT_THROW(delete_study(path_, 1), StudyRefused);
+}
+
+TEST_F(OfflineStudyTest, TheRecipeIsThatWhichWasStoredAlsoWhileAServerWorks) {
+  EXPECT_EQ(stored_recipe(path_, 1).SerializeAsString(),
+            study_.table->recipe().SerializeAsString());
+  EXPECT_THROW(stored_recipe(path_, 2), StudyRefused);
+}
+
+TEST_F(OfflineStudyTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
+  close();
+  const std::string block =
+      study_.table->recipe().SerializeAsString();  // a longer recipe goes on so
+  std::string bytes;
+  while (bytes.size() <= protocol::kMaxFrameBytes) {
+    bytes += block;
+  }
+  {
+    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
+    execute_with(database.get(), "UPDATE studies SET recipe = ?", Blob{bytes});
+  }
+  EXPECT_THROW(stored_recipe(path_, 1), StorageError);
+  EXPECT_THAT(faults(), testing::Contains(HasSubstr("more than a recipe may have")));
+}
+
+TEST_F(OfflineStudyTest, RowsThatADeletionHasLeftAreNoFaultsAndAreNotMerged) {
+  commit({study_of(10, 2, "b"), DeleteStudy{1}});
+  close();
+  const Diagnosis found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks.at(0), HasSubstr("5 results of deleted studies are left"));
+  Merger merger(copy_);
+  const Merged merged = merger.merge(path_);
+  EXPECT_EQ(merged.studies_added, 1U);
+  EXPECT_EQ(merged.results_added, 0U);
+}
+
+// ---- Files that another version of the program wrote --------------------------------------------
+
+TEST_F(MaintenanceTest, AFileOfAnotherSchemaIsRefusedWithBothNumbersAndTheRemedy) {
+  const std::vector<std::pair<std::string, std::function<void()>>> openers{
+      {"server", [&] { const Store store(path_); }},
+      {"backup", [&] { back_up(path_, copy_); }},
+      {"salvage", [&] { salvage(path_, copy_); }},
+      {"check", [&] { diagnose(path_); }},
+      {"merge from it", [&] { Merger(copy_).merge(path_); }},
+      {"merge into it", [&] { const Merger merger(path_); }},
+      {"describe", [&] { stored_recipe(path_, 1); }},
+      {"rename", [&] { rename_study(path_, 1, "b"); }}};
+  const auto contents = [&] {
+    std::ifstream file(path_, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  close();
+  for (const auto& [schema, written_by] :
+       {std::pair{kSchemaVersion - 1, "older"}, std::pair{kSchemaVersion + 1, "newer"}}) {
+    by_hand(fmt::format("PRAGMA user_version = {}; PRAGMA journal_mode = DELETE", schema));
+    const std::string before = contents();
+    for (const auto& [name, open] : openers) {
+      EXPECT_THAT(open, testing::ThrowsMessage<StorageError>(fmt::format(
+                            "{} has schema {}, and this version of oblique has schema {}: export "
+                            "its results with the {} version that wrote it (oblique query STUDY "
+                            "--db FILE --format csv), or solve its studies again into a new file",
+                            path_, schema, kSchemaVersion, written_by)))
+          << name;
+      std::filesystem::remove(copy_);
+    }
+    EXPECT_EQ(contents(), before);
+  }
+}
+
+}  // namespace
+}  // namespace oblique::server
