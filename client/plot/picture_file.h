@@ -15,7 +15,6 @@ enum class PictureFormat { kSvg, kPdf, kPng, kScript, kCsv };
 /// solver::InputError for another name, and for a file that ends otherwise without a format.
 PictureFormat picture_format(const std::string& name, const std::string& file);
 
-/// Names of all.
 std::vector<std::string_view> picture_format_names();
 
 /// The figure in that format, in its own size unless one is given. Pictures are made by gnuplot:
@@ -23,6 +22,9 @@ std::vector<std::string_view> picture_format_names();
 /// none.
 std::string picture_of(const Figure& figure, PictureFormat format,
                        const std::optional<Size>& size = {});
+
+/// Its data as CSV in SI units, one panel behind the other.
+std::string csv_of(const Figure& figure);
 
 /// The figure in characters, by gnuplot, in the size of the terminal of standard output; with
 /// colours if that is a terminal and NO_COLOR is not set.

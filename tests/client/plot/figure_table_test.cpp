@@ -1,5 +1,5 @@
 // Figures as CSV.
-#include "client/plot/figure_table.h"
+#include "client/plot/picture_file.h"
 
 #include <algorithm>
 #include <string>
@@ -25,8 +25,8 @@ TEST(FigureTable, OfAMapHasARowACellWithItsState) {
 
 TEST(FigureTable, OfAMapHasTheValuesOfTheStudyWhereItHasAny) {
   Cells cells = test::counted_cells(2, 1);
-  cells.x_values = {0.03, 0.1};
-  cells.y_values = {0.7};
+  cells.x.values = {0.03, 0.1};
+  cells.y.values = {0.7};
   EXPECT_EQ(csv_of(test::map_of(cells)),
             "mu,H,duration_s,state\n0.03,0.7,0,solved\n0.1,0.7,1,solved\n");
 }

@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/axis_choice.h"
 #include "client/plot/plot_request.h"
 #include "client/plot/study_shape.h"
 #include "client/study/study_file.h"
@@ -46,10 +45,10 @@ constexpr const char* kThreeBlocks =
 TEST(StudyShape, HasTheAxesOfTheBlockWithTheMostPoints) {
   const auto shape = shape_of_study(kThreeBlocks);
   EXPECT_TRUE(shape.is_grid);
-  EXPECT_EQ(shape.block.points, 40U);
+  EXPECT_EQ(shape.block_points, 40U);
   EXPECT_EQ(shape.points, 49U);
   EXPECT_THAT(shape.find("H")->values, ElementsAre(1.0));
-  const auto axes = by_preference(shape);
+  const auto axes = shape.by_preference();
   ASSERT_EQ(axes.size(), 2U);
   EXPECT_EQ(axes[0]->key, "mu");
   EXPECT_EQ(axes[1]->key, "e");
@@ -58,7 +57,7 @@ TEST(StudyShape, HasTheAxesOfTheBlockWithTheMostPoints) {
 TEST(Blocks, AreChosenByTheAxesAndValuesThatAreAskedFor) {
   const auto number_for = [](const PlotRequest& request) {
     const auto shape = shape_of_study(kThreeBlocks, request);
-    return shape.is_one_block ? shape.block.number + 1 : 0;
+    return shape.is_one_block ? shape.block + 1 : 0;
   };
   EXPECT_EQ(number_for({}), 2U);
   EXPECT_EQ(number_for({.map = "slide_m", .x = "mu", .y = "H"}), 3U);
@@ -75,7 +74,7 @@ TEST(Blocks, AreAllDrawnWhereNoneIsMeant) {
   EXPECT_TRUE(shape_of_study(kThreeBlocks, {.scatter = "mu,H", .block = "3"}).is_one_block);
   const auto all = shape_of_study(kThreeBlocks, {.block = "all"});
   EXPECT_FALSE(all.is_one_block);
-  EXPECT_THAT(all.find("H")->all_values, ElementsAre(0.9, 0.96, 1.0, 1.04, 1.1));
+  EXPECT_THAT(all.find("H")->values, ElementsAre(0.9, 0.96, 1.0, 1.04, 1.1));
   const auto points =
       shape_of_study("[[block]]\nH = 1\nmu = 1\ne = 1\n[[block]]\nH = 1\nmu = 2\ne = 1\n");
   EXPECT_FALSE(points.is_one_block) << "single points are no picture each";
@@ -100,7 +99,7 @@ TEST(Blocks, OfAHundredThousandAreUnitedAtOnce) {
     auto& block = *recipe.add_blocks() = study.recipe.blocks(0);
     block.mutable_axes(1)->set_values(1, 2.0 + i);
   }
-  EXPECT_EQ(shape_for(recipe, {.block = "all"}).find("mu")->all_values.size(), 100'001U);
+  EXPECT_EQ(shape_for(recipe, {.block = "all"}).find("mu")->values.size(), 100'001U);
 }
 
 TEST(Condition, IsOfThePointsOfTheBlockThatIsDrawn) {
