@@ -25,15 +25,10 @@ Range around(double value, bool is_logarithmic) {
 /// The symbol of a quantity with its name, else the first words of what a column means, else its
 /// name.
 std::string label_of(const std::string& name) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kSymbols{{
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kSymbols{{
       {"H", "drop H"},
       {"mu", "coefficient of friction \u03bc"},
       {"e", "coefficient of restitution e*"},
-      {"E_Pa", "Young's modulus E"},
-      {"A", "cross-section area A"},
-      {"I", "second moment of area I"},
-      {"rho", "density \u03c1"},
-      {"k", "contact stiffness k"},
       {"eta2", "stiffness ratio \u03b7\u00b2"},
   }};
   for (const auto& [symbol, label] : kSymbols) {

@@ -1,5 +1,3 @@
-#include "client/plot/gnuplot_script.h"
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -15,6 +13,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/output/human_units.h"
+#include "client/plot/figure.h"
+#include "client/plot/picture_file.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 
@@ -310,16 +310,6 @@ class Script {
     }
     out_.back() = '\n';
   }
-  /// A row "x y x0 x1 y0 y1" and more for a rectangle of cells.
-  void rectangle(const Panel& panel, std::size_t first_column, std::size_t end_column,
-                 std::size_t line, std::initializer_list<double> more) {
-    const double x0 = panel.x.per_unit * panel.cells->x.edges[first_column];
-    const double x1 = panel.x.per_unit * panel.cells->x.edges[end_column];
-    const double y0 = panel.y.per_unit * panel.cells->y.edges[line];
-    row({x0, y0, x0, x1, y0, panel.y.per_unit * panel.cells->y.edges[line + 1]});
-    out_.back() = ' ';
-    row(more);
-  }
   /// The title of an element, in the key.
   std::string titled(const std::string& title) {
     titles_.push_back(title);
@@ -418,14 +408,7 @@ class Script {
     }
     if (panel.cells && !panel.cells->values.empty()) {
       const auto kinds = kinds_of(*panel.cells);
-      if (is_text_) {
-        write_characters(panel, kinds);
-      } else {
-        if (panel.cells->categories.empty()) {
-          write_values(panel);
-        }
-        write_kinds(panel, kinds);
-      }
+      is_text_ ? write_characters(panel, kinds) : write_cells(panel, kinds);
       write_legend(*panel.cells, kinds);
     }
     if (panel.bars) {
@@ -440,49 +423,40 @@ class Script {
     out_ += figure_.panels.size() == 1 ? "" : "unset label\nunset object\n";
   }
 
-  /// Cells with numbers in the colours of the palette.
-  void write_values(const Panel& panel) {
+  /// Cells by their values and kinds: colours, patterns, borders between categories, and letters.
+  /// Neighbours of one kind in a row are one rectangle.
+  void write_cells(const Panel& panel, const std::vector<Kind>& kinds) {
     const Cells& cells = *panel.cells;
-    out_ += "\n# Cells with values: x y x0 x1 y0 y1 value\n";
+    out_ += "\n# Cells: x y x0 x1 y0 y1 kind, and a colour or, of kind -1, a value\n";
     const auto data = begin_data();
-    for (std::size_t i = 0; i < cells.values.size(); ++i) {
-      if (cells.states[i] == CellState::kSolved) {
-        const std::size_t column = i % cells.columns();
-        rectangle(panel, column, column + 1, i / cells.columns(),
-                  {cells.values[i] * colour_unit()});
+    for (std::size_t i = 0, end = 0; i < cells.values.size(); i = end) {
+      const std::size_t line = i / cells.columns();
+      const int kind = kind_of(cells, i);
+      end = i + 1;
+      while (kind != kNoKind && end < (line + 1) * cells.columns() && kind_of(cells, end) == kind) {
+        ++end;
       }
+      if (kind == kNoKind && cells.states[i] != CellState::kSolved) {
+        continue;
+      }
+      const double x0 = panel.x.per_unit * cells.x.edges[i % cells.columns()];
+      const double x1 = panel.x.per_unit * cells.x.edges[(end - 1) % cells.columns() + 1];
+      const double y0 = panel.y.per_unit * cells.y.edges[line];
+      row({x0, y0, x0, x1, y0, panel.y.per_unit * cells.y.edges[line + 1],
+           static_cast<double>(kind),
+           kind == kNoKind ? cells.values[i] * colour_unit()
+                           : static_cast<double>(kinds[static_cast<std::size_t>(kind)].colour)});
     }
     out_ += "EOD\n";
     // The border closes the seams that viewers leave between rectangles.
-    plot("{} using 1:2:3:4:5:6:7 with boxxyerror fs solid 1 lc palette lw 0.3 notitle", data);
-  }
-
-  /// Cells by their kinds: colours, patterns, borders between categories, and letters. Neighbours
-  /// of one kind in a row are one rectangle.
-  void write_kinds(const Panel& panel, const std::vector<Kind>& kinds) {
-    const Cells& cells = *panel.cells;
-    out_ += "\n# Cells: x y x0 x1 y0 y1 kind colour\n";
-    const auto data = begin_data();
-    bool is_empty = true;
-    for (std::size_t y = 0; y < cells.rows(); ++y) {
-      for (std::size_t begin = 0, x = 0; x < cells.columns(); begin = x) {
-        const int kind = kind_of(cells, y * cells.columns() + x);
-        while (x < cells.columns() && kind_of(cells, y * cells.columns() + x) == kind) {
-          ++x;
-        }
-        if (kind != kNoKind) {
-          is_empty = false;
-          rectangle(panel, begin, x, y,
-                    {static_cast<double>(kind),
-                     static_cast<double>(kinds[static_cast<std::size_t>(kind)].colour)});
-        }
-      }
+    constexpr std::string_view kRectangles =
+        "{} using ($7{}0?$1:NaN):2:3:4:5:6:8 with boxxyerror fs solid 1 lc {} lw 0.3 notitle";
+    if (has_colours()) {
+      plot(kRectangles, data, "<", "palette");
     }
-    out_ += "EOD\n";
-    if (is_empty) {
-      return;
+    if (std::any_of(kinds.begin(), kinds.end(), [](const Kind& kind) { return kind.count > 0; })) {
+      plot(kRectangles, data, ">=", "rgb variable");
     }
-    plot("{} using 1:2:3:4:5:6:8 with boxxyerror fs solid 1 lc rgb variable lw 0.3 notitle", data);
     const bool has_borders = !cells.categories.empty() && write_borders(panel);
     for (std::size_t i = has_borders ? 0 : cells.categories.size(); i < kinds.size(); ++i) {
       if (kinds[i].pattern != 0 && kinds[i].count > 0) {

@@ -18,7 +18,6 @@
 #include "client/formats/new_file.h"
 #include "client/formats/pager.h"
 #include "client/formats/sink.h"
-#include "client/plot/gnuplot_script.h"
 #include "client/service/child_process.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
@@ -124,16 +123,9 @@ PictureFormat picture_format(const std::string& name, const std::string& file) {
   if (file.empty()) {
     return PictureFormat::kSvg;
   }
-  std::string ending = std::filesystem::path(file).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char letter) {
-    return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter + 32)
-                                          : static_cast<char>(letter);
-  });
+  const std::string ending = std::filesystem::path(file).extension().string();
   if (const auto format = format_named(ending.empty() ? ending : ending.substr(1))) {
     return *format;
-  }
-  if (std::filesystem::exists(file) && !std::filesystem::is_regular_file(file)) {
-    return PictureFormat::kSvg;  // a pipe or a device has no ending
   }
   throw solver::InputError(fmt::format(
       "--out {}: its ending is not a format; it must be .svg, .pdf, .png, .gp or .csv, or --format "

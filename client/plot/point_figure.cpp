@@ -19,56 +19,6 @@ namespace {
 using solver::readable_number;
 using solver::TraceRow;
 
-struct Series {
-  std::string name;
-  std::size_t stroke;
-  Column column;
-};
-
-/// A panel over time.
-struct TimePanel {
-  std::string title;
-  std::string label;
-  std::string name;
-  double per_unit;
-  std::vector<Series> series;
-};
-
-/// The panels whose lines are columns of the time histories.
-TimePanel time_panel(PointPanel panel) {
-  switch (panel) {
-    case PointPanel::kForces:
-      return {
-          "Contact forces",
-          "force [N]",
-          "force_N",
-          1.0,
-          {{"normal force F_n", 0, &TraceRow::fn_N}, {"tangential force F_t", 1, &TraceRow::ft_N}}};
-    case PointPanel::kDeformation:
-      return {"Deformation of the contact",
-              "deformation [\u00b5m]",
-              "deformation_m",
-              kMicro,
-              {{"normal u_y", 0, &TraceRow::uy_m}, {"tangential u_x", 1, &TraceRow::ux_m}}};
-    case PointPanel::kVelocities:
-      return {"Velocities",
-              "velocity [m/s]",
-              "velocity_m_s",
-              1.0,
-              {{"tip, tangential", 0, &TraceRow::vt_m_s},
-               {"tip, normal", 1, &TraceRow::vn_m_s},
-               {"P, along the ground", 2, &TraceRow::vP_m_s}}};
-    default:
-      return {"Energies since touch",
-              "energy [J]",
-              "energy_J",
-              1.0,
-              {{"kinetic, change", 0, &TraceRow::kinetic_J},
-               {"strain, change", 2, &TraceRow::strain_J},
-               {"gravity, change", 6, &TraceRow::gravity_J}}};
-  }
-}
-
 /// Compression and restitution, and over them stick, as spans of time.
 std::vector<Span> spans_of(const PointHistory& history) {
   std::vector<Span> spans;
@@ -116,28 +66,33 @@ std::pair<Curve, Curve> contact_energies(const PointHistory& history) {
 }
 
 /// A panel over time, with phases and stick shaded.
-Panel over_time(const PointHistory& history, PointPanel which) {
-  TimePanel plan = time_panel(which);
+Panel over_time(const PointHistory& history, std::string title, FigureAxis axis,
+                std::vector<Curve> curves) {
   Panel panel;
-  panel.title = plan.title;
-  for (const auto& [name, stroke, column] : plan.series) {
-    panel.curves.push_back(curve_of(history, name, stroke, column));
-  }
-  if (which == PointPanel::kEnergies) {
-    for (Curve& curve : panel.curves) {
-      const double first = curve.y.empty() ? 0.0 : curve.y.front();
-      std::transform(curve.y.begin(), curve.y.end(), curve.y.begin(),
-                     [first](double value) { return value - first; });
-    }
-    auto [friction, element] = contact_energies(history);
-    panel.curves.push_back(std::move(friction));
-    panel.curves.push_back(std::move(element));
-  }
+  panel.title = std::move(title);
   panel.x = time_axis(history.duration_s());
-  panel.y = {.label = plan.label, .name = plan.name, .per_unit = plan.per_unit};
-  fit(panel.y, panel.curves, &Curve::y);
+  panel.y = std::move(axis);
   panel.spans = spans_of(history);
+  panel.curves = std::move(curves);
+  fit(panel.y, panel.curves, &Curve::y);
   return panel;
+}
+
+Panel energies_panel(const PointHistory& history) {
+  std::vector<Curve> curves{curve_of(history, "kinetic, change", 0, &TraceRow::kinetic_J),
+                            curve_of(history, "strain, change", 2, &TraceRow::strain_J),
+                            curve_of(history, "gravity, change", 6, &TraceRow::gravity_J)};
+  for (Curve& curve : curves) {
+    const double first = curve.y.empty() ? 0.0 : curve.y.front();
+    for (double& value : curve.y) {
+      value -= first;
+    }
+  }
+  auto [friction, element] = contact_energies(history);
+  curves.push_back(std::move(friction));
+  curves.push_back(std::move(element));
+  return over_time(history, "Energies since touch", {.label = "energy [J]", .name = "energy_J"},
+                   std::move(curves));
 }
 
 /// The rows of compression, or of restitution, with gaps between.
@@ -268,9 +223,30 @@ std::optional<PointPanel> point_panel_named(const std::string& name) {
 }
 
 Panel panel_of(const PointHistory& history, PointPanel panel) {
-  return panel == PointPanel::kLoop    ? loop_panel(history)
-         : panel == PointPanel::kShape ? shape_panel(history)
-                                       : over_time(history, panel);
+  switch (panel) {
+    case PointPanel::kForces:
+      return over_time(history, "Contact forces", {.label = "force [N]", .name = "force_N"},
+                       {curve_of(history, "normal force F_n", 0, &TraceRow::fn_N),
+                        curve_of(history, "tangential force F_t", 1, &TraceRow::ft_N)});
+    case PointPanel::kLoop:
+      return loop_panel(history);
+    case PointPanel::kDeformation:
+      return over_time(
+          history, "Deformation of the contact",
+          {.label = "deformation [\u00b5m]", .name = "deformation_m", .per_unit = kMicro},
+          {curve_of(history, "normal u_y", 0, &TraceRow::uy_m),
+           curve_of(history, "tangential u_x", 1, &TraceRow::ux_m)});
+    case PointPanel::kVelocities:
+      return over_time(history, "Velocities", {.label = "velocity [m/s]", .name = "velocity_m_s"},
+                       {curve_of(history, "tip, tangential", 0, &TraceRow::vt_m_s),
+                        curve_of(history, "tip, normal", 1, &TraceRow::vn_m_s),
+                        curve_of(history, "P, along the ground", 2, &TraceRow::vP_m_s)});
+    case PointPanel::kEnergies:
+      return energies_panel(history);
+    case PointPanel::kShape:
+      break;
+  }
+  return shape_panel(history);
 }
 
 Figure point_figure(const PointHistory& history, std::optional<PointPanel> panel) {

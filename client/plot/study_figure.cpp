@@ -98,7 +98,8 @@ Bars binned(const std::vector<double>& values, const FigureAxis& axis) {
                                    : round_edges(axis.range, bins);
   bars.heights.assign(bars.edges.size() - 1, 0.0);
   for (const double value : values) {
-    bars.heights[interval_of(bars.edges, value)] += 1.0;
+    const double inside = std::clamp(value, bars.edges.front(), bars.edges.back());
+    bars.heights[interval_of(bars.edges, inside)] += 1.0;
   }
   return bars;
 }
@@ -159,24 +160,22 @@ class FigureBuilder {
     note("Nothing to draw: " + why + ".");
   }
 
-  Answer answer_to(ResultQuery query, std::size_t columns) {
+  /// The rows of the columns where the condition holds; grouped: one for each pair of values.
+  Answer query(const std::vector<std::string>& columns, const std::string& where,
+               bool is_grouped = false) {
+    ResultQuery query;
     query.study = request_.study;
+    query.where = where;
+    query.select = fmt::format("{}", fmt::join(columns, ", "));
+    query.group = is_grouped ? query.select : std::string();
     check(query);
     const auto stream = source_.rows(request_for(query));
     auto answer = read_columns(*stream);
-    if (answer.size() != columns) {
+    if (answer.size() != columns.size()) {
       throw InputError(fmt::format("a picture takes one column a flag, and `{}` are {}",
                                    query.select, answer.size()));
     }
     return answer;
-  }
-
-  /// The rows of the columns, where the condition holds.
-  Answer query(const std::vector<std::string>& columns) {
-    ResultQuery query;
-    query.where = condition_.sql;
-    query.select = fmt::format("{}", fmt::join(columns, ", "));
-    return answer_to(std::move(query), columns.size());
   }
 
   /// The axis that a flag names, else the first that is neither taken nor held by --at. Throws
@@ -216,9 +215,8 @@ class FigureBuilder {
   void set_colours(FigureAxis axis, const std::vector<double>& values) {
     axis.is_logarithmic = request_.is_colour_logarithmic;
     const Range all = range_of(values, axis.is_logarithmic);
-    const auto given = range_given(request_);
-    axis.span(given.value_or(all));
-    if (given && (all.from < given->from || all.to > given->to)) {
+    axis.span(range_given(request_).value_or(all));
+    if (all.from < axis.range.from || all.to > axis.range.to) {
       note(fmt::format("Values from {} to {}; those outside the scale have the colour of its end.",
                        readable_number(all.from * axis.per_unit, 4),
                        readable_number(all.to * axis.per_unit, 4)));
@@ -269,32 +267,20 @@ class FigureBuilder {
     return values.size() <= kMostCellsAlong ? values : std::vector<double>();
   }
 
-  /// Sets apart the cells without a row that have one of a point that --where leaves out.
-  void find_filtered(Cells& cells, const ChosenAxis& x, const ChosenAxis& y) {
-    if (request_.where.empty() || cells.count(CellState::kNoResult) == 0) {
-      return;
-    }
-    ResultQuery query;  // one row a cell, however many points it has
-    query.where = condition_.sql_without_where;
-    query.select = query.group = fmt::format("{}, {}", x.column, y.column);
-    const auto answer = answer_to(std::move(query), 2);
-    mark_filtered(cells, answer);
-  }
-
   Gathered gather_map(const Answer& answer, const ChosenAxis& x, const ChosenAxis& y) {
     const auto x_values = cell_values(x, answer[0]);
     const auto y_values = cell_values(y, answer[1]);
-    if (!x_values.empty() && !y_values.empty()) {
-      for (const auto& [flag, axis, values] :
-           {std::tuple{"--log-x", &panel_.x, &x_values}, {"--log-y", &panel_.y, &y_values}}) {
-        if (axis->is_logarithmic && values->front() <= 0.0) {
-          throw InputError(fmt::format("{}: an axis that has {} cannot be logarithmic", flag,
-                                       readable_number(values->front())));
-        }
-      }
+    const auto has_cells = [](const FigureAxis& axis, const std::vector<double>& values) {
+      return !values.empty() && is_drawable(values.front(), axis.is_logarithmic);
+    };
+    if (has_cells(panel_.x, x_values) && has_cells(panel_.y, y_values)) {
       auto gathered = gathered_in(answer, cells_around(x_values, panel_.x.is_logarithmic),
                                   cells_around(y_values, panel_.y.is_logarithmic));
-      find_filtered(gathered.cells, x, y);
+      if (!request_.where.empty() && gathered.cells.count(CellState::kNoResult) > 0) {
+        // Cells without a row may have points that --where leaves out.
+        mark_filtered(gathered.cells,
+                      query({x.column, y.column}, condition_.sql_without_where, true));
+      }
       return gathered;
     }
     // About three points a cell.
@@ -336,9 +322,6 @@ class FigureBuilder {
       }
     }
     set_colours(axis, values);
-    if (const Range all = range_of(values); values.size() > 1 && all.from == all.to) {
-      note(fmt::format("All cells have one value: {}.", shown_value(axis, all.from)));
-    }
   }
 
   void name_categories(Cells& cells, const std::map<std::string, std::uint64_t>& points) {
@@ -382,7 +365,8 @@ class FigureBuilder {
     condition_ = condition_of(request_, shape_, {x, y},
                               x.axis != nullptr && y.axis != nullptr && shape_.is_grid);
     const auto answer =
-        query({x.column, y.column, chosen_axis("--map", request_.map, shape_).column, "status"});
+        query({x.column, y.column, chosen_axis("--map", request_.map, shape_).column, "status"},
+              condition_.sql);
     panel_.x = axis_for("--log-x", x, answer[0], request_.is_x_logarithmic);
     panel_.y = axis_for("--log-y", y, answer[1], request_.is_y_logarithmic);
     Gathered gathered = gather_map(answer, x, y);
@@ -450,7 +434,7 @@ class FigureBuilder {
     }
     const bool is_whole_axis = x.axis != nullptr && shape_.is_grid;
     condition_ = condition_of(request_, shape_, drawn, is_whole_axis);
-    const auto answer = query(columns);
+    const auto answer = query(columns, condition_.sql);
     panel_.x = axis_for("--log-x", x, answer[0], request_.is_x_logarithmic);
     refuse_texts("--lines ", answer[1]);
     panel_.y = axis_for("--log-y", {output.column, answer[1].name, output.axis}, answer[1],
@@ -506,7 +490,7 @@ class FigureBuilder {
     if (has_colour) {
       columns.push_back(chosen_axis("--colour", request_.colour, shape_).column);
     }
-    auto answer = query(columns);
+    auto answer = query(columns, condition_.sql);
     panel_.x = axis_for("--log-x", x, answer[0], request_.is_x_logarithmic);
     panel_.y = axis_for("--log-y", y, answer[1], request_.is_y_logarithmic);
     panel_.x.span(range_of(answer[0].numbers, panel_.x.is_logarithmic), 0.03);
@@ -567,7 +551,7 @@ class FigureBuilder {
           "--histogram {0}: its values are lists; take an element, as {0}[0]", column.column));
     }
     condition_ = condition_of(request_, shape_, {column}, false);
-    const auto answer = query({column.column});
+    const auto answer = query({column.column}, condition_.sql);
     const std::size_t points = answer[0].numbers.size();
     FigureAxis points_axis{.label = "points", .name = "points"};
     if (answer[0].has_texts()) {

@@ -85,35 +85,23 @@ StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   return shape;
 }
 
-struct At {
-  std::string key;
-  std::optional<double> value;  ///< none: it is no finite number
-};
-
-/// KEY=VALUE taken apart; none where there is no key.
-std::optional<At> parsed_at(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    return std::nullopt;
-  }
-  const auto value = solver::number_of(text.substr(equals + 1));
-  return At{text.substr(0, equals), value && std::isfinite(*value) ? value : std::nullopt};
+/// The key and the value of an --at; without a number NaN.
+std::pair<std::string, double> parsed_at(const std::string& text) {
+  const std::size_t equals = std::min(text.find('='), text.size());
+  const auto value = solver::number_of(text.substr(std::min(equals + 1, text.size())));
+  return {text.substr(0, equals), value && std::isfinite(*value) ? *value : std::nan("")};
 }
 
-/// The nearest value of the axis, if it is the one that is meant: tables show six digits.
-std::optional<double> value_meant(const StudyAxis& axis, double wanted) {
-  for (const double value : axis.values) {
-    if (std::abs(value - wanted) <= 1e-5 * std::abs(wanted)) {
-      return value;
-    }
-  }
-  return std::nullopt;
+/// The value of the axis that is nearest to the one wanted.
+double nearest_value(const StudyAxis& axis, double wanted) {
+  return *std::min_element(axis.values.begin(), axis.values.end(), [wanted](double a, double b) {
+    return std::abs(a - wanted) < std::abs(b - wanted);
+  });
 }
 
-/// Whether a name is that of an input, and no column of results.
-bool is_input(const std::string& name) {
-  const auto* column = server::find_column(name);
-  return protocol::is_axis_key(name) || (column != nullptr && column->kind == "input");
+/// Whether a typed value means that of the axis: tables show six digits.
+bool means(double typed, double value) {
+  return std::abs(value - typed) <= 1e-5 * std::abs(typed);
 }
 
 /// Whether the picture can be one of that block alone: the axes that are asked for vary in it, it
@@ -121,14 +109,14 @@ bool is_input(const std::string& name) {
 bool suits(const StudyShape& shape, const PlotRequest& request) {
   for (const std::string& name : {request.x, request.y, request.by}) {
     const StudyAxis* axis = shape.find(name);
-    if (axis == nullptr ? is_input(name) : !axis->varies()) {
+    if (axis == nullptr ? protocol::is_axis_key(name) : !axis->varies()) {
       return false;
     }
   }
   for (const std::string& text : request.at) {
-    const auto at = parsed_at(text);
-    const StudyAxis* axis = at ? shape.find(at->key) : nullptr;
-    if (axis == nullptr || !at->value || !value_meant(*axis, *at->value)) {
+    const auto [key, value] = parsed_at(text);
+    const StudyAxis* axis = shape.find(key);
+    if (axis == nullptr || !axis->is_listed || !means(value, nearest_value(*axis, value))) {
       return false;
     }
   }
@@ -155,51 +143,44 @@ std::optional<std::size_t> block_named(const std::string& text, std::size_t bloc
 
 std::string values_in_words(const StudyAxis& axis) {
   const auto& values = axis.values;
-  constexpr std::size_t kFew = 8;
-  if (values.size() > kFew) {
+  if (values.size() > 8) {
     return fmt::format("{} values from {} to {}", shown_count(values.size()),
                        readable_number(values.front()), readable_number(values.back()));
   }
-  std::string text = values.size() == 1 ? "the value" : "the values";
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    text += (i == 0 ? " " : i + 1 == values.size() ? " and " : ", ") + readable_number(values[i]);
+  std::vector<std::string> texts;
+  for (const double value : values) {
+    texts.push_back(readable_number(value));
   }
-  return text;
+  return fmt::format("the values {}", fmt::join(texts, ", "));
 }
 
 /// The axis and its value that an --at names.
 std::pair<const StudyAxis*, double> checked_at(const std::string& text, const StudyShape& shape) {
-  const auto at = parsed_at(text);
-  if (!at) {
-    throw InputError(fmt::format("--at {} is not allowed: it must be KEY=VALUE, as e=1",
-                                 protocol::excerpt(text)));
+  const auto [key, value] = parsed_at(text);
+  const auto refused = [&text](const std::string& why) {
+    return InputError(fmt::format("--at {}: {}", protocol::excerpt(text), why));
+  };
+  if (key.empty() || std::isnan(value)) {
+    throw refused("it must be a key and a number, as e=1");
   }
-  const auto& [key, value] = *at;
   const StudyAxis* axis = shape.find(key);
   if (axis == nullptr) {
-    throw InputError(fmt::format("--at {}: the study has no axis {}{}; it has {}",
-                                 protocol::excerpt(text), protocol::excerpt(key),
-                                 protocol::did_you_mean(key, shape.keys()),
-                                 protocol::joined(shape.keys())));
-  }
-  if (!value) {
-    throw InputError(fmt::format("--at {} is not allowed: {} takes a number", text, key));
+    throw refused(fmt::format("the study has no axis {}{}; it has {}", protocol::excerpt(key),
+                              protocol::did_you_mean(key, shape.keys()),
+                              protocol::joined(shape.keys())));
   }
   if (!axis->is_listed) {
-    throw InputError(fmt::format(
-        "--at {}: values of {} lie scattered, and hardly a point has that one; take a range, as "
-        "--where \"{} BETWEEN {} AND {}\"",
-        text, key, axis->column, readable_number(*value * 0.95), readable_number(*value * 1.05)));
+    throw refused(fmt::format(
+        "values of {} lie scattered, and hardly a point has that one; take a range, as --where "
+        "\"{} BETWEEN {} AND {}\"",
+        key, axis->column, readable_number(value * 0.95), readable_number(value * 1.05)));
   }
-  const auto meant = value_meant(*axis, *value);
-  if (!meant) {
-    const double nearest = *std::min_element(
-        axis->values.begin(), axis->values.end(),
-        [&at](double a, double b) { return std::abs(a - *at->value) < std::abs(b - *at->value); });
-    throw InputError(fmt::format("--at {}: no point has that {}; the nearest is {}={}. It has {}",
-                                 text, key, key, readable_number(nearest), values_in_words(*axis)));
+  const double nearest = nearest_value(*axis, value);
+  if (!means(value, nearest)) {
+    throw refused(fmt::format("no point has that {}; the nearest is {}={}. It has {}", key, key,
+                              readable_number(nearest), values_in_words(*axis)));
   }
-  return {axis, *meant};
+  return {axis, nearest};
 }
 
 void add_term(std::string& sql, const std::string& term) {

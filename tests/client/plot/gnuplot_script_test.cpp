@@ -1,5 +1,5 @@
 // Figures as scripts for gnuplot, and what gnuplot makes of them.
-#include "client/plot/gnuplot_script.h"
+#include "client/plot/picture_file.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/picture_file.h"
 #include "tests/client/plot/figures_of_tests.h"
 #include "tests/support/programs.h"
 
@@ -213,7 +212,7 @@ TEST(Gnuplot, ThatFailsSaysWhy) {
 
 TEST(PictureFormat, IsThatOfTheFileUnlessItIsNamed) {
   EXPECT_EQ(picture_format("", "a.svg"), PictureFormat::kSvg);
-  EXPECT_EQ(picture_format("", "a.b/c.PNG"), PictureFormat::kPng);
+  EXPECT_EQ(picture_format("", "a.b/c.png"), PictureFormat::kPng);
   EXPECT_EQ(picture_format("", "a.gp"), PictureFormat::kScript);
   EXPECT_EQ(picture_format("csv", "a.txt"), PictureFormat::kCsv);
   EXPECT_EQ(picture_format("", ""), PictureFormat::kSvg);

@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/gnuplot_script.h"
 #include "client/plot/picture_file.h"
 #include "client/plot/point_figure.h"
 #include "tests/client/plot/history_of_tests.h"

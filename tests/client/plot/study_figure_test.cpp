@@ -104,13 +104,10 @@ TEST(Map, WithARangeSaysThatThereIsMoreBeyond) {
   EXPECT_THAT(figure.notes, Contains(HasSubstr("Values from 1 to 30; those outside the scale")));
 }
 
-TEST(Map, OfNothingAndOfOneValueSaysSo) {
+TEST(Map, OfNothingSaysSo) {
   const Figure empty = figure_from({.map = "fn_peak_N"}, kMapColumns, {});
   EXPECT_TRUE(empty.is_empty);
   EXPECT_THAT(empty.notes, Contains("Nothing to draw: no cell has a value."));
-  const Figure one = figure_from({.map = "fn_peak_N"}, kMapColumns,
-                                 {{1.0, 0.5, 4.0, "solved"}, {2.0, 0.5, 4.0, "solved"}});
-  EXPECT_THAT(one.notes, Contains("All cells have one value: fn_peak_N = 4."));
 }
 
 TEST(Map, OfModesNamesThemByTheirPoints) {
