@@ -189,7 +189,7 @@ std::vector<std::size_t> letter_places(const Cells& cells, const Raster& raster)
     const auto is_near = [&](std::size_t other) {
       return kind_at(other) == kind &&
              std::hypot(raster.x_share(other) - raster.x_share(place),
-                        raster.y_share(other) - raster.y_share(place)) < 0.4;
+                        raster.y_share(other) - raster.y_share(place)) < 0.35;
     };
     if (4 * sides[corner] >= largest.emplace(kind, sides[corner]).first->second &&
         std::none_of(places.begin(), places.end(), is_near)) {
@@ -378,7 +378,8 @@ class Script {
     const double columns =
         std::clamp(std::floor(room / static_cast<double>(longest + 8)), 1.0, 3.0);
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
-    add("set key {} maxcols {}\n", is_below ? "bmargin left horizontal" : "rmargin top vertical",
+    add("set key {} maxcols {}\n",
+        is_below ? "bmargin left horizontal width -2" : "rmargin top vertical",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {
       add("set bmargin at screen {:.4f}\n",
@@ -388,7 +389,7 @@ class Script {
       // The axes of panels below each other are aligned.
       add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\n",
           (frame_.left + 13.0 * kLetter) / size_.width,
-          (frame_.left + frame_.width - (is_below ? 3.0 : 25.0) * kLetter) / size_.width);
+          (frame_.left + frame_.width - (is_below ? 3.0 : 28.0) * kLetter) / size_.width);
     }
   }
 

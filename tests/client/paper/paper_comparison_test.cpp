@@ -142,16 +142,6 @@ TEST(PublishedTable, HoldsTheSixtyThreeTrustworthyNumbers) {
   EXPECT_EQ(sticks, 3U);
 }
 
-TEST(PublishedTable, HasAsManyPeaksAsItsModesSay) {
-  for (const auto& published : published_table().cases) {
-    EXPECT_EQ(published_peaks(published), published.mu < 1.0 ? 3 : 2);
-    if (!published.fn_kN.empty()) {
-      EXPECT_EQ(published.fn_kN.size(), static_cast<std::size_t>(published_peaks(published)));
-    }
-    EXPECT_EQ(published.fn_kN.size(), published.ft_kN.size());
-  }
-}
-
 TEST(PublishedTable, HasTheCasesOfTheExampleStudyInItsOrder) {
   const auto published = published_table().cases;
   const protocol::PointTable study(

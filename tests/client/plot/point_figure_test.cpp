@@ -30,24 +30,6 @@ TEST(PointSpans, ArePhasesAndOverThemStick) {
   EXPECT_DOUBLE_EQ(spans[2].to, 5e-5);
 }
 
-TEST(PointSpans, ThatComeAgainAreSpansOfTheirOwn) {
-  auto history = test::small_history();
-  history.rows[15].state = "SR";
-  const auto spans = panel_of(history, PointPanel::kForces).spans;
-  ASSERT_EQ(spans.size(), 4U);
-  EXPECT_DOUBLE_EQ(spans[3].from, 1.5e-4);
-  EXPECT_DOUBLE_EQ(spans[3].to, 1.6e-4);
-}
-
-TEST(PointPanels, OverTimeReachFromTouchToSeparation) {
-  for (const auto panel : {PointPanel::kForces, PointPanel::kDeformation, PointPanel::kVelocities,
-                           PointPanel::kEnergies}) {
-    const Panel drawn = panel_of(test::small_history(), panel);
-    EXPECT_EQ(drawn.x.range, (Range{0.0, 2e-4}));
-    EXPECT_EQ(drawn.x.label, "time since touch [\u00b5s]");
-  }
-}
-
 TEST(PointPanels, HysteresisPartsBranchesAndJoinsThemAtTheTurn) {
   const auto curves = panel_of(test::small_history(), PointPanel::kLoop).curves;
   ASSERT_EQ(curves.size(), 2U);

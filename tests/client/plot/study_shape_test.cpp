@@ -102,13 +102,6 @@ TEST(Blocks, OfAHundredThousandAreUnitedAtOnce) {
   EXPECT_EQ(shape_for(recipe, {.block = "all"}).find("mu")->values.size(), 100'001U);
 }
 
-TEST(Condition, IsOfThePointsOfTheBlockThatIsDrawn) {
-  const auto shape = shape_of_study(kThreeBlocks, {.where = "e < 1"});
-  const auto condition = condition_of({.where = "e < 1"}, shape, {}, false);
-  EXPECT_EQ(condition.sql, "point >= 3 AND point < 43 AND (e < 1)");
-  EXPECT_THAT(condition.shown, testing::Contains("block 2 of 3"));
-}
-
 TEST(StudyShape, KnowsModelKeysByTheirColumns) {
   const auto shape =
       shape_of_study("[[block]]\nE = [6e10, 7e10]\nlength1 = [0.3, 0.4]\nH = 0.5\nmu = 1\ne = 1\n");
@@ -126,14 +119,6 @@ TEST(StudyShape, OfASampleIsNoGridAndHasNoListedValues) {
   EXPECT_THAT(error_of({.at = {"H=0.5"}}, shape), HasSubstr("lie scattered"));
 }
 
-TEST(StudyShape, OfABillionPointsCostsNothing) {
-  const auto shape = shape_of_study(
-      "[[block]]\nH = { from = 0.1, to = 1, count = 100000 }\n"
-      "mu = { from = 0.1, to = 2, count = 100001 }\ne = 1\n");
-  EXPECT_TRUE(shape.find("H")->is_listed);
-  EXPECT_FALSE(shape.find("mu")->is_listed) << "too many to be listed";
-}
-
 TEST(Condition, TakesTheFirstValueOfAnAxisThatIsLeftOpenAndSaysSo) {
   const auto condition = condition_of({}, grid(), {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "H = 0.5 AND e = 0.5");
@@ -146,12 +131,6 @@ TEST(Condition, LeavesOpenWhatWhereSpeaksOf) {
   const auto condition = condition_of({.where = "e > 0.6 OR slide_m > 1"}, grid(),
                                       {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "(e > 0.6 OR slide_m > 1) AND H = 0.5");
-}
-
-TEST(Condition, FixesNothingWhereNothingIsToBeFixed) {
-  const auto condition = condition_of({}, grid(), {chosen_axis("--scatter", "mu", grid())}, false);
-  EXPECT_EQ(condition.sql, "");
-  EXPECT_THAT(condition.said, IsEmpty());
 }
 
 TEST(At, TakesAValueAsTablesShowIt) {
@@ -187,34 +166,24 @@ TEST(Axes, ThatThereAreNotAreNamedWithTheNearest) {
   EXPECT_EQ(chosen_axis("--x", "slide_m / 2", grid()).column, "slide_m / 2");
 }
 
-TEST(UsualPicture, HasALineAValueWhereAnAxisHasFew) {
-  const auto few = completed(
-      {},
-      shape_of_study("[[block]]\nH = 1\nmu = { from = 0.2, to = 2, count = 10 }\ne = [0.8, 1]\n"));
-  EXPECT_EQ(few.lines, "fn_peak_N");
-  EXPECT_EQ(few.x, "mu");
-  const auto few_across = completed(
-      {},
-      shape_of_study("[[block]]\nH = { from = 0.2, to = 1, count = 9 }\nmu = [0.4, 0.8]\ne = 1\n"));
-  EXPECT_EQ(few_across.lines, "fn_peak_N");
-  EXPECT_EQ(few_across.x, "H");
-}
-
 TEST(UsualPicture, SuitsTheStudy) {
+  const auto usual = [](const std::string& blocks) {
+    return completed({}, shape_of_study(blocks));
+  };
   EXPECT_EQ(completed({}, grid()).map, "fn_peak_N");
-  EXPECT_EQ(completed({.at = {"e=1", "H=1"}}, grid()).lines, "fn_peak_N");
   EXPECT_EQ(completed({.at = {"e=1"}}, grid()).lines, "fn_peak_N");
   EXPECT_EQ(completed({.y = "H"}, grid()).map, "fn_peak_N");
-  EXPECT_EQ(completed({}, shape_of_study("[[block]]\nH = [0.5, 1]\nmu = 1\ne = 1\n")).lines,
-            "fn_peak_N");
-  EXPECT_EQ(completed({}, shape_of_study("[[block]]\nH = 0.5\nmu = 1\ne = 1\n")).histogram,
-            "fn_peak_N");
-  const auto scattered = completed(
-      {}, shape_of_study("[[block]]\nsample = { kind = \"lhs\", count = 10, seed = 1 }\n"
-                         "H = { from = 0.3, to = 1.1 }\nmu = { from = 0.1, to = 2 }\ne = 1\n"));
+  EXPECT_EQ(completed({.histogram = "e"}, grid()).map, "");
+  const auto few =
+      usual("[[block]]\nH = { from = 0.2, to = 1, count = 9 }\nmu = [0.4, 0.8]\ne = 1\n");
+  EXPECT_EQ(few.lines, "fn_peak_N") << "a line a value where an axis has few";
+  EXPECT_EQ(few.x, "H");
+  EXPECT_EQ(usual("[[block]]\nH = 0.5\nmu = 1\ne = 1\n").histogram, "fn_peak_N");
+  const auto scattered = usual(
+      "[[block]]\nsample = { kind = \"lhs\", count = 10, seed = 1 }\n"
+      "H = { from = 0.3, to = 1.1 }\nmu = { from = 0.1, to = 2 }\ne = 1\n");
   EXPECT_EQ(scattered.scatter, "mu,H");
   EXPECT_EQ(scattered.colour, "fn_peak_N");
-  EXPECT_EQ(completed({.histogram = "e"}, grid()).map, "");
 }
 
 }  // namespace
