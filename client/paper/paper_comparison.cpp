@@ -8,9 +8,11 @@
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
+#include <toml++/toml.h>
 #include <nlohmann/json.hpp>
 
 #include "client/output/printer.h"
+#include "client/paper/published_toml.h"
 #include "worker/solver/contact/contact_record.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"
@@ -25,9 +27,27 @@ using solver::signed_number;
 constexpr double kKilo = 1.0 / 1e3;  // per unit
 constexpr double kMilli = 1e3;       // per unit
 
-// Values of files and databases went through decimal text; nothing closer is told apart.
-bool same(double a, double b) {
-  return std::abs(a - b) <= 1e-9;
+template <typename Value>
+std::vector<Value> list(const toml::table& table, std::string_view key) {
+  std::vector<Value> values;
+  if (const auto* array = table[key].as_array()) {
+    for (const auto& item : *array) {
+      values.push_back(item.value<Value>().value());
+    }
+  }
+  return values;
+}
+
+PublishedCase case_of(const toml::table& table) {
+  return {{.mode = table["mode"].value<std::string>().value(),
+           .fn_kN = list<double>(table, "fn_kN"),
+           .ft_kN = list<double>(table, "ft_kN"),
+           .phases_ms = list<double>(table, "phases_ms"),
+           .stick_ms = table["stick_ms"].value<double>()},
+          table["H"].value<double>().value(),
+          table["mu"].value<double>().value(),
+          table["e"].value<double>().value(),
+          table["read"].value<std::string>().value()};
 }
 
 // Rows do not have F_n at valleys, so they do not say which turns a ripple takes with it: phases
@@ -67,29 +87,12 @@ std::vector<double> values_of(const CaseNumbers& numbers, Quantity quantity) {
   }
 }
 
-const char* name_of(Quantity quantity) {
-  switch (quantity) {
-    case Quantity::kFn:
-      return "fn_peak_kN";
-    case Quantity::kFt:
-      return "ft_peak_kN";
-    case Quantity::kPhase:
-      return "phase_ms";
-    default:
-      return "stick_ms";
-  }
+protocol::Row row_of(const PublishedCase& published) {
+  return {published.H_m, published.mu, published.e_star};
 }
 
-void add_header(protocol::Table& table, const std::vector<std::string>& columns) {
-  for (const auto& column : columns) {
-    table.columns.emplace_back(column);
-  }
-}
-
-void add_case(protocol::Row& row, const PublishedCase& published) {
-  add_value(row, published.H_m);
-  add_value(row, published.mu);
-  add_value(row, published.e_star);
+protocol::Value value_or_null(const std::optional<double>& value) {
+  return value ? protocol::Value(*value) : protocol::Value();
 }
 
 // "5.058 / 5.07 / -0.24", or what there is of it.
@@ -104,67 +107,53 @@ std::string beside(const std::vector<Difference>& differences, std::size_t case_
     return {};
   }
   const auto published = fixed_number(found->published, decimals);
-  if (!found->ours) {
-    return fmt::format("- / {}", published);
-  }
-  return fmt::format("{} / {} / {}", fixed_number(*found->ours, decimals + 1), published,
-                     signed_number(*found->percent(), 2));
+  return found->ours ? fmt::format("{} / {} / {}", fixed_number(*found->ours, decimals + 1),
+                                   published, signed_number(*found->percent(), 2))
+                     : fmt::format("- / {}", published);
 }
 
 void print_forces(std::ostream& out, const PublishedTable& published,
                   const std::vector<Difference>& differences) {
-  constexpr std::array<const char*, 3> kPeaks{"1st", "2nd", "3rd"};
   out << "Peaks of the contact forces (Tab. 2): ours / published [kN] / difference [%]\n\n";
-  protocol::Table table;
-  add_header(table, {"H", "mu", "e*", "force", kPeaks[0], kPeaks[1], kPeaks[2]});
+  protocol::Table table{.columns = {"H", "mu", "e*", "force", "1st", "2nd", "3rd"}};
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
-    if (published.cases[i].fn_kN.empty()) {
-      continue;
-    }
     for (const auto& [quantity, name] :
          {std::pair(Quantity::kFn, "F_n"), std::pair(Quantity::kFt, "F_t")}) {
-      auto& row = table.rows.emplace_back();
-      add_case(row, published.cases[i]);
-      add_value(row, std::string(name));
-      for (std::size_t peak = 0; peak < kPeaks.size(); ++peak) {
-        add_value(row, beside(differences, i, quantity, peak, 2));
+      if (published.cases[i].fn_kN.empty()) {
+        continue;
+      }
+      auto& row = table.rows.emplace_back(row_of(published.cases[i]));
+      row.emplace_back(name);
+      for (std::size_t peak = 0; peak < 3; ++peak) {
+        row.emplace_back(beside(differences, i, quantity, peak, 2));
       }
     }
   }
   print(out, table, Format::kTable);
 }
 
-void print_durations(std::ostream& out, const PublishedTable& published,
-                     const std::vector<Difference>& differences) {
-  out << "\nDurations of compression and restitution (section 4.2): ours / published [ms] / "
-         "difference [%]\n\n";
-  protocol::Table table;
-  add_header(table, {"H", "mu", "e*", "phase", "ours / published / difference"});
+void print_times(std::ostream& out, const PublishedTable& published,
+                 const std::vector<Difference>& differences) {
+  const std::string last = "ours / published / difference";
+  protocol::Table phases{.columns = {"H", "mu", "e*", "phase", last}};
+  protocol::Table sticks{.columns = {"H", "mu", "e*", last}};
   for (std::size_t i = 0; i < published.cases.size(); ++i) {
     for (std::size_t phase = 0; phase < published.cases[i].phases_ms.size(); ++phase) {
-      auto& row = table.rows.emplace_back();
-      add_case(row, published.cases[i]);
-      add_value(
-          row, fmt::format("{} {}", phase / 2 + 1, phase % 2 == 0 ? "compression" : "restitution"));
-      add_value(row, beside(differences, i, Quantity::kPhase, phase, 3));
+      auto& row = phases.rows.emplace_back(row_of(published.cases[i]));
+      row.emplace_back(
+          fmt::format("{} {}", phase / 2 + 1, phase % 2 == 0 ? "compression" : "restitution"));
+      row.emplace_back(beside(differences, i, Quantity::kPhase, phase, 3));
     }
-  }
-  print(out, table, Format::kTable);
-}
-
-void print_sticks(std::ostream& out, const PublishedTable& published,
-                  const std::vector<Difference>& differences) {
-  out << "\nTime in stick (section 4.3): ours / published [ms] / difference [%]\n\n";
-  protocol::Table table;
-  add_header(table, {"H", "mu", "e*", "ours / published / difference"});
-  for (std::size_t i = 0; i < published.cases.size(); ++i) {
     if (published.cases[i].stick_ms) {
-      auto& row = table.rows.emplace_back();
-      add_case(row, published.cases[i]);
-      add_value(row, beside(differences, i, Quantity::kStick, 0, 3));
+      auto& row = sticks.rows.emplace_back(row_of(published.cases[i]));
+      row.emplace_back(beside(differences, i, Quantity::kStick, 0, 3));
     }
   }
-  print(out, table, Format::kTable);
+  out << "\nDurations of compression and restitution (section 4.2): ours / published [ms] / "
+         "difference [%]\n\n";
+  print(out, phases, Format::kTable);
+  out << "\nTime in stick (section 4.3): ours / published [ms] / difference [%]\n\n";
+  print(out, sticks, Format::kTable);
 }
 
 std::string place_of(const PublishedCase& in) {
@@ -172,70 +161,15 @@ std::string place_of(const PublishedCase& in) {
                      exact_number(in.e_star));
 }
 
-// Says plainly which published modes are not ours.
-void print_other_modes(std::ostream& out, const PublishedTable& published, const OwnCases& own) {
-  std::string others;
-  std::size_t solved = 0;
-  std::size_t same = 0;
-  for (std::size_t i = 0; i < published.cases.size(); ++i) {
-    const auto& in = published.cases[i];
-    if (!own[i]) {
-      continue;
-    }
-    ++solved;
-    if (own[i]->mode == in.mode) {
-      ++same;
-      continue;
-    }
-    others += fmt::format("- {}: {} ({} peaks), published {} ({})\n", place_of(in), own[i]->mode,
-                          own[i]->fn_kN.size(), in.mode, published_peaks(in));
-  }
-  if (solved == 0) {
-    return;
-  }
-  out << fmt::format("\nThe mode is the published one in {} of {} cases solved", same, solved);
-  out << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
-}
-
-void print_modes_table(std::ostream& out, const PublishedTable& published, const OwnCases& own) {
-  out << "Peaks and modes, ripples merged (Figs. 4 to 6)\n\n";
-  protocol::Table table;
-  add_header(table, {"H", "mu", "e*", "peaks", "published", "mode", "published mode"});
-  for (std::size_t i = 0; i < published.cases.size(); ++i) {
-    auto& row = table.rows.emplace_back();
-    add_case(row, published.cases[i]);
-    if (own[i]) {
-      add_value(row, static_cast<std::int64_t>(own[i]->fn_kN.size()));
-    } else {
-      row.emplace_back();
-    }
-    add_value(row, std::int64_t{published_peaks(published.cases[i])});
-    add_value(row, own[i] ? own[i]->mode : std::string("not solved"));
-    add_value(row, own[i] && own[i]->mode == published.cases[i].mode ? std::string("the same")
-                                                                     : published.cases[i].mode);
-  }
-  print(out, table, Format::kTable);
-}
-
 std::string place_of(const PublishedTable& published, const Difference& difference) {
-  const auto& in = published.cases[difference.case_index];
-  std::string what;
-  switch (difference.quantity) {
-    case Quantity::kFn:
-      what = fmt::format("peak {} of F_n", difference.index + 1);
-      break;
-    case Quantity::kFt:
-      what = fmt::format("peak {} of F_t", difference.index + 1);
-      break;
-    case Quantity::kPhase:
-      what = fmt::format("{} {}", difference.index % 2 == 0 ? "compression" : "restitution",
-                         difference.index / 2 + 1);
-      break;
-    case Quantity::kStick:
-      what = "time in stick";
-      break;
-  }
-  return what + " at " + place_of(in);
+  const std::size_t number = difference.index + 1;
+  const auto what = difference.quantity == Quantity::kFn   ? fmt::format("peak {} of F_n", number)
+                    : difference.quantity == Quantity::kFt ? fmt::format("peak {} of F_t", number)
+                    : difference.quantity == Quantity::kStick
+                        ? std::string("time in stick")
+                        : fmt::format("{} {}", number % 2 == 1 ? "compression" : "restitution",
+                                      difference.index / 2 + 1);
+  return what + " at " + place_of(published.cases[difference.case_index]);
 }
 
 void print_differences_summary(std::ostream& out, const PublishedTable& published,
@@ -253,18 +187,35 @@ void print_differences_summary(std::ostream& out, const PublishedTable& publishe
   out << "\n";
 }
 
-void print_misprints(std::ostream& out, const PublishedTable& published) {
-  out << "\nNot counted, for they are misprinted:\n\n";
-  for (const auto& misprint : published.misprints) {
-    out << "- " << misprint.where << ": ";
-    for (std::size_t i = 0; i < misprint.printed.size(); ++i) {
-      out << (i > 0 ? "; " : "") << misprint.printed[i];
-    }
-    out << "\n    " << misprint.why << "\n";
+}  // namespace
+
+PublishedTable published_table() {
+  const auto top = toml::parse(kPublishedToml);
+  PublishedTable published;
+  for (const auto& node : *top["case"].as_array()) {
+    published.cases.push_back(case_of(*node.as_table()));
   }
+  for (const auto& node : *top["misprint"].as_array()) {
+    const auto& table = *node.as_table();
+    published.misprints.push_back({.where = table["where"].value<std::string>().value(),
+                                   .printed = list<std::string>(table, "printed"),
+                                   .why = table["why"].value<std::string>().value()});
+  }
+  return published;
 }
 
-}  // namespace
+int published_peaks(const PublishedCase& published) {
+  int peaks = 0;
+  for (std::size_t i = 1; i < published.mode.size(); i += 3) {
+    peaks += published.mode[i] == 'C' ? 1 : 0;
+  }
+  return peaks;
+}
+
+bool PublishedCase::is_at(double H, double friction, double e) const {
+  return std::abs(H - H_m) <= 1e-9 && std::abs(friction - mu) <= 1e-9 &&
+         std::abs(e - e_star) <= 1e-9;
+}
 
 CaseNumbers own_case(const solver::CaseResult& result) {
   CaseNumbers own;
@@ -362,19 +313,17 @@ std::vector<OwnCases> solved_cases(const PublishedTable& table,
 
 OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows) {
   OwnCases own(table.cases.size());
-  for (std::size_t i = 0; i < table.cases.size(); ++i) {
-    const auto& published = table.cases[i];
-    for (const auto& row : rows.rows) {
-      if (!same(std::get<double>(row[1]), published.H_m) ||
-          !same(std::get<double>(row[2]), published.mu) ||
-          !same(std::get<double>(row[3]), published.e_star)) {
+  for (const auto& row : rows.rows) {
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      if (!table.cases[i].is_at(std::get<double>(row[1]), std::get<double>(row[2]),
+                                std::get<double>(row[3]))) {
         continue;
       }
       if (own[i]) {
         throw std::runtime_error(
-            "the study has several points with H = " + solver::exact_number(published.H_m) +
-            ", mu = " + solver::exact_number(published.mu) + ", e = " +
-            solver::exact_number(published.e_star) + ": the comparison needs a study of one model");
+            fmt::format("the study has several points with {}: the comparison needs a study of one "
+                        "model",
+                        place_of(table.cases[i])));
       }
       own[i] = own_case(row);
     }
@@ -383,38 +332,64 @@ OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows) {
 }
 
 protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences) {
+  // In the order of Quantity.
+  constexpr std::array<const char*, 4> kNames{"fn_peak_kN", "ft_peak_kN", "phase_ms", "stick_ms"};
   protocol::Table reply{
       .columns = {"H", "mu", "e", "quantity", "seq", "published", "ours", "difference_percent"}};
   for (const auto& difference : differences) {
-    const auto& published = table.cases[difference.case_index];
-    auto& row = reply.rows.emplace_back();
-    add_value(row, published.H_m);
-    add_value(row, published.mu);
-    add_value(row, published.e_star);
-    add_value(row, std::string(name_of(difference.quantity)));
-    add_value(row, static_cast<std::int64_t>(difference.index));
-    add_value(row, difference.published);
-    for (const auto& value : {difference.ours, difference.percent()}) {
-      row.push_back(value ? protocol::Value(*value) : protocol::Value());
-    }
+    auto& row = reply.rows.emplace_back(row_of(table.cases[difference.case_index]));
+    row.emplace_back(kNames[static_cast<std::size_t>(difference.quantity)]);
+    row.emplace_back(static_cast<std::int64_t>(difference.index));
+    row.emplace_back(difference.published);
+    row.push_back(value_or_null(difference.ours));
+    row.push_back(value_or_null(difference.percent()));
   }
   return reply;
 }
 
 void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases& own) {
-  print_modes_table(out, table, own);
-  print_other_modes(out, table, own);
+  out << "Peaks and modes, ripples merged (Figs. 4 to 6)\n\n";
+  protocol::Table modes{
+      .columns = {"H", "mu", "e*", "peaks", "published", "mode", "published mode"}};
+  std::string others;
+  std::size_t solved = 0;
+  std::size_t same_modes = 0;
+  for (std::size_t i = 0; i < table.cases.size(); ++i) {
+    const auto& published = table.cases[i];
+    const bool is_same = own[i] && own[i]->mode == published.mode;
+    auto& row = modes.rows.emplace_back(row_of(published));
+    row.push_back(own[i] ? protocol::Value(static_cast<std::int64_t>(own[i]->fn_kN.size()))
+                         : protocol::Value());
+    row.emplace_back(std::int64_t{published_peaks(published)});
+    row.emplace_back(own[i] ? own[i]->mode : "not solved");
+    row.emplace_back(is_same ? "the same" : published.mode);
+    solved += own[i] ? 1U : 0U;
+    same_modes += is_same ? 1U : 0U;
+    if (own[i] && !is_same) {
+      others +=
+          fmt::format("- {}: {} ({} peaks), published {} ({})\n", place_of(published), own[i]->mode,
+                      own[i]->fn_kN.size(), published.mode, published_peaks(published));
+    }
+  }
+  print(out, modes, Format::kTable);
+  if (solved > 0) {
+    out << fmt::format("\nThe mode is the published one in {} of {} cases solved", same_modes,
+                       solved)
+        << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
+  }
 }
 
 void print_comparison(std::ostream& out, const PublishedTable& table, const OwnCases& own) {
   const auto differences = compare(table, own);
   print_forces(out, table, differences);
-  print_durations(out, table, differences);
-  print_sticks(out, table, differences);
+  print_times(out, table, differences);
   out << '\n';
   print_modes(out, table, own);
   print_differences_summary(out, table, differences);
-  print_misprints(out, table);
+  out << "\nNot counted, for they are misprinted:\n\n";
+  for (const auto& [where, printed, why] : table.misprints) {
+    out << fmt::format("- {}: {}\n    {}\n", where, fmt::join(printed, "; "), why);
+  }
 }
 
 }  // namespace oblique::client

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "client/paper/paper_comparison.h"
-#include "client/paper/published_table.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,41 +17,25 @@ struct Range {
   bool operator==(const Range&) const = default;
 };
 
-/// The smallest range that has all numbers but NaN and infinities, and only positive ones if asked
-/// for; none: {0, 1}, respectively {0.1, 1}.
+/// The smallest range that has all finite values, or all positive ones. Without any it is {0, 1},
+/// respectively {0.1, 1}.
 Range range_of(const std::vector<double>& values, bool positive_only = false);
 Range united(const Range& one, const Range& other);
-/// Wider at both ends by a share of the range, or of its logarithm. A range that does not reach 0
-/// does not cross it.
-Range widened(const Range& range, double by_share, bool is_logarithmic = false);
-
-/// Maps values to shares: 0 at `from`, 1 at `to`.
-class Scale {
- public:
-  /// Equal ends become a range around them. Throws std::invalid_argument for a logarithmic scale
-  /// with an end that is not positive.
-  explicit Scale(Range range, bool is_logarithmic = false);
-
-  Range range() const { return range_; }
-  /// Below 0 and above 1 outside the range; NaN for values without a place, as 0 on a logarithmic
-  /// scale.
-  double share_of(double value) const;
-  double value_at(double share) const;
-  /// The edges of that many cells of equal size.
-  std::vector<double> edges(std::size_t cells) const;
-
- private:
-  Range range_;
-  bool is_logarithmic_;
-};
 
 /// An axis of a panel, or the scale of its colours.
 struct FigureAxis {
-  std::string label;  ///< with the unit: "duration of contact [\u00b5s]"
-  std::string name;   ///< column of results
+  std::string label = {};  ///< with the unit: "duration of contact [\u00b5s]"
+  std::string name = {};   ///< column of results
   Range range{0.0, 1.0};
   bool is_logarithmic = false;
   double per_unit = 1.0;  ///< what ticks show for 1 in SI units
+
+  /// Sets the range: that of the values, wider at both ends by a share of it. Equal ends get room
+  /// around them, and a range that does not reach 0 does not cross it.
+  void span(const Range& values, double wider_by = 0.0);
+  /// Where a value is on the axis: 0 at the start of the range, 1 at its end. NaN: nowhere.
+  double share_of(double value) const;
+  double value_at(double share) const;
 };
 
 /// The axis of a column or key. `unit`: SI; empty: none, or unknown. Short times, slides and the
@@ -62,15 +45,17 @@ FigureAxis axis_of(const std::string& name, const std::string& unit);
 /// "H = 1 m": a value with its name and unit.
 std::string shown_value(const FigureAxis& axis, double value);
 
-/// A line through points in their order, with marks at them if wanted. NaN is a gap.
+/// A line through points in their order, or the points alone. NaN is a gap.
 struct Curve {
+  enum class Mark { kLine, kLineAndMarks, kDots, kDiamonds };
   std::string name = {};  ///< in the key; empty: none
   std::vector<double> x = {};
   std::vector<double> y = {};
   std::size_t stroke = 0;         ///< number of colour, dashes and mark
   std::optional<double> by = {};  ///< the value that tells it from others
-  bool is_coloured_by = false;    ///< its colour is that of `by` on the scale of colours
-  bool has_marks = false;
+  /// Values of its points on the scale of colours; empty: it has the colour of `stroke`.
+  std::vector<double> colours = {};
+  Mark mark = Mark::kLine;
 };
 
 /// A shaded interval of the horizontal axis.
@@ -79,13 +64,6 @@ struct Span {
   double from;
   double to;
   Kind kind;
-};
-
-/// A published number.
-struct KnownPoint {
-  double x;
-  double y;
-  std::string name;  ///< in the key
 };
 
 enum class CellState : std::uint8_t {
@@ -104,20 +82,24 @@ struct Category {
   bool is_other = false;  ///< stands for all categories without an entry of their own
 };
 
-/// Cells between edges, row by row from the lowest. With categories the values are their numbers.
+/// The cells along an axis.
+struct CellAxis {
+  std::vector<double> values = {};  ///< that they stand for, rising
+  std::vector<double> edges = {};   ///< one more
+};
+
+/// Cells row by row from the lowest. With categories the values are their numbers.
 struct Cells {
-  std::string name = {};             ///< column of the values
-  std::vector<double> x_edges = {};  ///< rising, one more than columns
-  std::vector<double> y_edges = {};
+  std::string name = {};  ///< column of the values
+  CellAxis x = {};
+  CellAxis y = {};
   std::vector<double> values = {};  ///< NaN unless the state is kSolved
   std::vector<CellState> states = {};
-  std::vector<double> x_values = {};  ///< the values that cells stand for; empty: intervals
-  std::vector<double> y_values = {};
   std::vector<std::string> names = {};  ///< texts of the cells; empty: they have numbers
   std::vector<Category> categories = {};
 
-  std::size_t columns() const { return x_edges.empty() ? 0 : x_edges.size() - 1; }
-  std::size_t rows() const { return y_edges.empty() ? 0 : y_edges.size() - 1; }
+  std::size_t columns() const { return x.values.size(); }
+  std::size_t rows() const { return y.values.size(); }
   std::uint64_t count(CellState state) const;
 };
 
@@ -126,12 +108,6 @@ struct Bars {
   std::vector<double> edges = {};
   std::vector<double> heights = {};
   std::vector<std::string> names = {};
-};
-
-struct Dots {
-  std::vector<double> x = {};
-  std::vector<double> y = {};
-  std::vector<double> shades = {};  ///< values of the scale of colours; empty: one colour
 };
 
 struct Panel {
@@ -144,9 +120,7 @@ struct Panel {
   std::vector<Span> spans = {};
   std::optional<Cells> cells = {};
   std::optional<Bars> bars = {};
-  std::optional<Dots> dots = {};
   std::vector<Curve> curves = {};
-  std::vector<KnownPoint> known = {};
 };
 
 /// In pixels.
@@ -154,8 +128,6 @@ struct Size {
   double width = 760.0;
   double height = 520.0;
 };
-inline constexpr double kSmallestSide = 240.0;
-inline constexpr double kLargestSide = 10'000.0;
 
 struct Figure {
   std::string title = {};
@@ -168,13 +140,11 @@ struct Figure {
   std::vector<std::string> notes = {};     ///< sentences below the picture
 };
 
-/// Notes that there is nothing to draw, for that reason.
-void note_empty(Figure& figure, const std::string& why);
-
-/// Middles of the cells between edges.
-std::vector<double> middles_of(const std::vector<double>& edges, bool is_logarithmic);
-
 /// Edges halfway between rising values; a single one gets room around it.
 std::vector<double> edges_between(const std::vector<double>& values, bool is_logarithmic);
+
+/// The number of the interval between rising edges that has the value, from 0; an edge belongs to
+/// the interval above it, the last edge to the last interval. SIZE_MAX: none has it.
+std::size_t interval_of(const std::vector<double>& edges, double value);
 
 }  // namespace oblique::client::plot

@@ -2,12 +2,13 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "client/plot/figure.h"
 #include "client/service/source.h"
+#include "proto/wire/chunk.h"
 
 namespace oblique::client::plot {
 
@@ -18,29 +19,32 @@ struct AnswerColumn {
   std::vector<double> numbers = {};             ///< of each row; NaN: NULL, or a text
   std::vector<std::string> words = {};          ///< the different texts
   std::vector<std::uint32_t> word_of_row = {};  ///< empty: there is no text in it
+  std::unordered_map<std::string, std::uint32_t> number_of_word = {};
   static constexpr std::uint32_t kNoWord = UINT32_MAX;
 
+  void add(const protocol::Cell& cell);
   bool has_texts() const { return !words.empty(); }
-  /// Whether a row has neither a number nor a text.
+  std::uint32_t word(std::size_t row) const {
+    return word_of_row.empty() ? kNoWord : word_of_row[row];
+  }
+  /// Whether a row has no value; in a column with texts numbers are none.
   bool is_null(std::size_t row) const;
-  /// "" where the row has no text.
-  const std::string& text(std::size_t row) const;
 };
+using Answer = std::vector<AnswerColumn>;
 
-/// More rows are not held: a picture of them wants a narrower question.
+/// More rows are not held: a picture of them wants a narrower query.
 inline constexpr std::size_t kMostRows = 20'000'000;
 
 /// All rows of an answer: 8 bytes a value. Throws what the stream throws, and std::runtime_error
 /// for more than kMostRows.
-std::vector<AnswerColumn> read_columns(RowStream& stream);
+Answer read_columns(RowStream& stream);
 
-/// Rows for a map: where each lies, its value there, and whether it failed.
-struct MapRows {
-  const AnswerColumn& x;
-  const AnswerColumn& y;
-  const AnswerColumn& value;
-  const AnswerColumn& status;
-};
+/// Cells around the values of a study, or of equal size for scattered points.
+CellAxis cells_around(const std::vector<double>& values, bool is_logarithmic);
+CellAxis cells_between(const FigureAxis& axis, std::size_t cells);
+
+/// The values of an axis of cells: those of the study, which rise, and others that rows have.
+std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column);
 
 /// The rows in cells.
 struct Gathered {
@@ -49,25 +53,14 @@ struct Gathered {
   std::map<std::string, std::uint64_t> points_of_name = {};  ///< in all cells, of texts
   std::uint64_t points = 0;                                  ///< rows that are in a cell
   std::uint64_t most_in_a_cell = 0;                          ///< of them, of those with a value
-  std::uint64_t mixed_cells = 0;  ///< cells whose points have different texts
 };
 
-/// The values of an axis of cells: those of the study, and others that rows have.
-std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column);
+/// Gathers rows of x, y, value and status, which may be missing. One cell per (x, y); several rows
+/// are averaged, of texts the most frequent is taken. Cells without a row have no result.
+Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y);
 
-/// One cell per (x, y); several rows are averaged, of texts the most frequent is taken.
-Gathered gathered_on(const MapRows& rows, const std::vector<double>& x_values,
-                     const std::vector<double>& y_values, bool is_x_logarithmic,
-                     bool is_y_logarithmic);
-
-/// Marks cells without a row in which `x` and `y` have one as left out by the condition. The cells
-/// stand for values.
-void mark_filtered(Cells& cells, const AnswerColumn& x, const AnswerColumn& y);
-
-/// Cells of equal size, so many along each scale, for scattered points. Cells without a row have no
-/// point.
-Gathered gathered_in_bins(const MapRows& rows, const Scale& x, std::size_t x_cells, const Scale& y,
-                          std::size_t y_cells);
+/// Marks cells without a row that have one in an answer of x and y as left out by the condition.
+void mark_filtered(Cells& cells, const Answer& answer);
 
 /// Rows as lines.
 struct GatheredLines {
@@ -76,9 +69,9 @@ struct GatheredLines {
   std::uint64_t most_at_a_place = 0;  ///< rows with a value
 };
 
-/// One line per value of `by` (nullptr: one line), by rising x; several rows at one x are averaged.
-/// Rows without a value are gaps, and so are `x_values` without a row between the ends of a line.
-GatheredLines gathered_lines(const AnswerColumn& x, const AnswerColumn& y, const AnswerColumn* by,
-                             const std::vector<double>& x_values);
+/// Gathers rows of x, y and perhaps the value that tells lines apart. Lines are by rising x;
+/// several rows at one x are averaged. Rows without a value are gaps, and so are `x_values` without
+/// a row between the ends of a line.
+GatheredLines gathered_lines(const Answer& answer, const std::vector<double>& x_values);
 
 }  // namespace oblique::client::plot

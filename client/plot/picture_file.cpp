@@ -5,17 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "client/io/child_process.h"
+#include "client/io/row_output.h"
 #include "client/io/sink.h"
-#include "client/plot/figure_table.h"
-#include "client/plot/gnuplot_script.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -23,38 +24,89 @@
 namespace oblique::client::plot {
 namespace {
 
-struct NamedFormat {
-  std::string_view name;
-  PictureFormat format;
-};
-// A file's ending is a point and the name.
-constexpr std::array<NamedFormat, 5> kFormats{{
-    {"svg", PictureFormat::kSvg},
-    {"pdf", PictureFormat::kPdf},
-    {"png", PictureFormat::kPng},
-    {"gp", PictureFormat::kScript},
-    {"csv", PictureFormat::kCsv},
-}};
+/// Names and endings, in the order of PictureFormat.
+constexpr std::array<std::string_view, 5> kFormats{"svg", "pdf", "png", "gp", "csv"};
 constexpr std::string_view kAllowed = "svg, pdf, png, gp or csv";
-
+constexpr double kSmallestSide = 240.0;
+constexpr double kLargestSide = 10'000.0;
 constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
-// A map of 10^6 cells takes about 5 s.
-constexpr std::chrono::seconds kTimeLimit{120};
+constexpr std::chrono::seconds kTimeLimit{120};  // a map of 10^5 cells takes about 2 s
 
 std::optional<PictureFormat> format_named(std::string_view name) {
-  const auto* found = std::find_if(kFormats.begin(), kFormats.end(),
-                                   [name](const NamedFormat& each) { return each.name == name; });
-  return found == kFormats.end() ? std::nullopt : std::optional(found->format);
+  const auto* found = std::find(kFormats.begin(), kFormats.end(), name);
+  return found == kFormats.end()
+             ? std::nullopt
+             : std::optional(static_cast<PictureFormat>(found - kFormats.begin()));
+}
+
+using Field = std::variant<std::string, double>;
+
+/// Appends a row; NaN is an empty field.
+void append_row(std::string& out, const std::vector<Field>& fields) {
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    out += i == 0 ? "" : ",";
+    if (const auto* text = std::get_if<std::string>(&fields[i])) {
+      append_csv_field(out, *text);
+    } else if (const double value = std::get<double>(fields[i]); !std::isnan(value)) {
+      append_number(out, value);
+    }
+  }
+  out += '\n';
+}
+
+void append_cells(std::string& out, const Panel& panel, const Cells& cells) {
+  // In the order of CellState.
+  static const std::array<std::string, 6> kStates{"solved", "no result", "filtered",
+                                                  "failed", "no value",  "no point"};
+  append_row(out, {panel.x.name, panel.y.name, cells.name, "state"});
+  for (std::size_t i = 0; i < cells.values.size(); ++i) {
+    Field value = std::nan("");
+    if (cells.states[i] == CellState::kSolved) {
+      value = cells.names.empty() ? Field(cells.values[i]) : Field(cells.names[i]);
+    }
+    append_row(out, {cells.x.values[i % cells.columns()], cells.y.values[i / cells.columns()],
+                     value, kStates[static_cast<std::size_t>(cells.states[i])]});
+  }
+}
+
+void append_bars(std::string& out, const Panel& panel, const Bars& bars) {
+  const bool has_names = !bars.names.empty();
+  append_row(out, has_names
+                      ? std::vector<Field>{panel.y.name, "points"}
+                      : std::vector<Field>{panel.x.name + "_from", panel.x.name + "_to", "points"});
+  for (std::size_t i = 0; i < bars.heights.size(); ++i) {
+    append_row(out, has_names
+                        ? std::vector<Field>{bars.names[i], bars.heights[i]}
+                        : std::vector<Field>{bars.edges[i], bars.edges[i + 1], bars.heights[i]});
+  }
+}
+
+void append_curves(std::string& out, const Panel& panel, const Figure& figure) {
+  const bool has_names = panel.curves.size() > 1 || !panel.by_name.empty();
+  std::vector<Field> heading{panel.x.name, panel.y.name};
+  if (has_names) {
+    heading.insert(heading.begin(), panel.by_name.empty() ? "line" : panel.by_name);
+  } else if (figure.colours) {
+    heading.emplace_back(figure.colours->name);
+  }
+  append_row(out, heading);
+  for (const Curve& curve : panel.curves) {
+    for (std::size_t i = 0; i < curve.x.size(); ++i) {
+      std::vector<Field> row{curve.x[i], curve.y[i]};
+      if (has_names) {
+        row.insert(row.begin(), curve.by ? Field(*curve.by) : Field(curve.name));
+      } else if (figure.colours) {
+        row.emplace_back(curve.colours[i]);
+      }
+      append_row(out, row);
+    }
+  }
 }
 
 }  // namespace
 
 std::vector<std::string_view> picture_format_names() {
-  std::vector<std::string_view> names;
-  for (const auto& format : kFormats) {
-    names.push_back(format.name);
-  }
-  return names;
+  return {kFormats.begin(), kFormats.end()};
 }
 
 PictureFormat picture_format(const std::string& name, const std::string& file) {
@@ -69,16 +121,9 @@ PictureFormat picture_format(const std::string& name, const std::string& file) {
   if (file.empty()) {
     return PictureFormat::kSvg;
   }
-  std::string ending = std::filesystem::path(file).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char letter) {
-    return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter + 32)
-                                          : static_cast<char>(letter);
-  });
+  const std::string ending = std::filesystem::path(file).extension().string();
   if (const auto format = format_named(ending.empty() ? ending : ending.substr(1))) {
     return *format;
-  }
-  if (std::filesystem::exists(file) && !std::filesystem::is_regular_file(file)) {
-    return PictureFormat::kSvg;  // a pipe or a device has no ending
   }
   throw solver::InputError(fmt::format(
       "--out {}: its ending is not a format; it must be .svg, .pdf, .png, .gp or .csv, or --format "
@@ -120,18 +165,33 @@ std::string picture_of(const Figure& figure, PictureFormat format,
                        const std::optional<Size>& size) {
   const Size in_pixels = size.value_or(own_size(figure));
   switch (format) {
-    case PictureFormat::kSvg:
-      return output_of_gnuplot(script_of(figure, Terminal::kSvg, in_pixels));
-    case PictureFormat::kPdf:
-      return output_of_gnuplot(script_of(figure, Terminal::kPdf, in_pixels));
-    case PictureFormat::kPng:
-      return output_of_gnuplot(script_of(figure, Terminal::kPng, in_pixels));
     case PictureFormat::kScript:
       return script_of(figure, Terminal::kSvg, in_pixels, "picture.svg");
     case PictureFormat::kCsv:
       return csv_of(figure);
+    case PictureFormat::kPdf:
+      return output_of_gnuplot(script_of(figure, Terminal::kPdf, in_pixels));
+    case PictureFormat::kPng:
+      return output_of_gnuplot(script_of(figure, Terminal::kPng, in_pixels));
+    case PictureFormat::kSvg:
+      break;
   }
-  throw std::logic_error("unknown picture format");
+  return output_of_gnuplot(script_of(figure, Terminal::kSvg, in_pixels));
+}
+
+std::string csv_of(const Figure& figure) {
+  std::string out;
+  for (const Panel& panel : figure.panels) {
+    out += out.empty() ? "" : "\n";
+    if (panel.cells) {
+      append_cells(out, panel, *panel.cells);
+    } else if (panel.bars) {
+      append_bars(out, panel, *panel.bars);
+    } else {
+      append_curves(out, panel, figure);
+    }
+  }
+  return out;
 }
 
 std::string text_of(const Figure& figure) {
@@ -139,14 +199,17 @@ std::string text_of(const Figure& figure) {
   const bool is_terminal = terminal.lines > 0;
   const char* no_colour = std::getenv("NO_COLOR");
   const bool has_colours = is_terminal && (no_colour == nullptr || *no_colour == '\0');
-  constexpr std::size_t kLinesOfPanel = 20;
-  const std::size_t rows = figure.panels.size();
   const std::size_t columns = is_terminal ? std::clamp<std::size_t>(terminal.columns, 40, 200) : 80;
-  const std::size_t lines = is_terminal ? std::clamp<std::size_t>(terminal.lines - 1, 20, 60) : 30;
+  std::size_t lines = is_terminal ? std::clamp<std::size_t>(terminal.lines - 1, 20, 60) : 30;
+  if (figure.panels.size() > 1) {
+    lines = 20 * figure.panels.size();
+  } else if (!figure.panels.empty() && figure.panels.front().cells) {
+    lines += figure.panels.front().cells->categories.size();  // for the legend below
+  }
   Figure below = figure;
   below.columns = 1;
-  const std::string drawn = output_of_gnuplot(
-      script_for_terminal(below, columns, rows > 1 ? rows * kLinesOfPanel : lines, has_colours));
+  const std::string drawn =
+      output_of_gnuplot(script_for_terminal(below, columns, lines, has_colours));
   std::string text;
   for (const auto line : protocol::split(drawn, '\n')) {
     const auto end = line.find_last_not_of(" \f");

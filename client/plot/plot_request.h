@@ -1,7 +1,8 @@
 #pragma once
 
-#include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/plot/figure.h"
@@ -35,6 +36,12 @@ struct PlotRequest {
 /// Throws solver::InputError, naming the flag, for what is wrong whatever the study is.
 void check(const PlotRequest& request);
 
+/// What --range says; none: nothing. Throws solver::InputError for a range that is none.
+std::optional<Range> range_given(const PlotRequest& request);
+
+/// The columns of --scatter.
+std::pair<std::string, std::string> scatter_columns(const PlotRequest& request);
+
 /// The same with what suits the study where nothing is asked for: a map of the largest normal force
 /// over two axes, lines over one or where another has few values, points where they lie scattered.
 PlotRequest completed(PlotRequest request, const StudyShape& shape);
@@ -44,8 +51,5 @@ PlotRequest completed(PlotRequest request, const StudyShape& shape);
 /// what the source throws.
 Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& request,
                  const Tell& tell);
-
-/// What is drawn where no output is named.
-inline constexpr const char* kUsualOutput = "fn_peak_N";
 
 }  // namespace oblique::client::plot

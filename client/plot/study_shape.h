@@ -15,46 +15,73 @@ namespace oblique::client::plot {
 struct StudyAxis {
   std::string key;     ///< as studies write it: "E"
   std::string column;  ///< as queries do: "E_Pa"; for single lengths an expression
-  /// Values of the chosen block, rising; none where they are drawn from a distribution or follow
-  /// from others, or are more than kMostListed.
+  /// Values in what is drawn, rising; none where they are drawn from a distribution or follow from
+  /// others, or are more than kMostListed.
   std::vector<double> values = {};
-  std::vector<double> all_values = {};  ///< the same of all blocks that are drawn
-  bool is_listed = true;                ///< `values` has them all
-  bool is_logarithmic = false;          ///< its range is
+  bool is_listed = true;        ///< `values` has them all
+  bool is_logarithmic = false;  ///< its range is
 
-  /// Whether it has more than one value in the chosen block.
   bool varies() const { return !is_listed || values.size() > 1; }
   bool is_named(std::string_view name) const { return name == key || name == column; }
+  /// As pictures label it: E is E_Pa, which SQL can tell from e.
+  const std::string& label() const { return key == "E" ? column : key; }
 };
 inline constexpr std::uint64_t kMostListed = 100'000;
-
-/// One of a study's blocks, whose points follow each other.
-struct BlockOfStudy {
-  std::size_t number = 0;  ///< from 0
-  std::uint64_t first_point = 0;
-  std::uint64_t points = 0;
-};
 
 /// What a study is made of, as far as pictures need it.
 struct StudyShape {
   std::vector<StudyAxis> axes;  ///< in the order of the recipe: model keys, then H, mu and e
   bool is_grid = true;          ///< the chosen block is a product of its axes
-  BlockOfStudy block = {};      ///< whose axes these are
-  std::size_t blocks = 1;       ///< of the study
-  std::uint64_t points = 0;     ///< of all blocks, with those that filters leave out
-  bool is_one_block = false;    ///< of several blocks pictures show the chosen one alone
+  std::size_t block = 0;        ///< the chosen block, from 0
+  std::uint64_t first_point = 0;
+  std::uint64_t block_points = 0;
+  std::size_t blocks = 1;     ///< of the study
+  std::uint64_t points = 0;   ///< of all blocks, with those that filters leave out
+  bool is_one_block = false;  ///< of several blocks pictures show the chosen one alone
 
   /// nullptr: there is none of that key or column.
   const StudyAxis* find(std::string_view name) const;
-  /// The keys with more than one value.
-  std::vector<const StudyAxis*> varying() const;
+  /// The keys with more than one value, in the order in which pictures take them for axes: mu, H,
+  /// then those with the most values.
+  std::vector<const StudyAxis*> by_preference() const;
+  std::vector<std::string_view> keys() const;
 };
 
 /// The study as a picture of it needs it. Of several blocks a map, or lines, show one: that of
-/// `--block`, else that with the most points of those in which the axes vary that are asked for and
-/// which have what `--at` holds. Where there is none, where that block is no grid, with `--block
-/// all`, and of points and histograms unless a block is named, all of them are shown. Throws
-/// solver::InputError for a block that the study does not have, and for a recipe without points.
+/// `--block`, else that with the most points of those that have the axes and values asked for.
+/// Where there is none, or that block is no grid, with `--block all`, and for points and histograms
+/// unless a block is named, all are shown. Throws solver::InputError for a block that the study
+/// does not have, and for a recipe without points.
 StudyShape shape_for(const protocol::Recipe& recipe, const PlotRequest& request);
+
+/// An axis of a picture.
+struct ChosenAxis {
+  std::string column;               ///< as queries have it
+  std::string name;                 ///< as it is labelled
+  const StudyAxis* axis = nullptr;  ///< nullptr: it is a column of results
+};
+
+/// The key or column that a flag names. Throws solver::InputError for a word that is none, with the
+/// nearest; other expressions are left to the source to check.
+ChosenAxis chosen_axis(const std::string& flag, const std::string& text, const StudyShape& shape);
+
+/// What holds for all points of a picture.
+struct Condition {
+  std::string sql;                 ///< empty: all points
+  std::string sql_without_where;   ///< the same, also of points that --where leaves out
+  std::vector<std::string> shown;  ///< "e = 0.9", for the subtitle
+  std::vector<std::string> said;   ///< sentences about what was chosen
+};
+
+/// --where and --at, and with `fixes_others` the first value of each other axis that is left open.
+/// `drawn`: the axes of the picture. Throws solver::InputError for an --at that names no key, or a
+/// value that the key does not have, with the nearest.
+Condition condition_of(const PlotRequest& request, const StudyShape& shape,
+                       const std::vector<ChosenAxis>& drawn, bool fixes_others);
+
+/// Whether --where speaks of the axis.
+bool where_names(const PlotRequest& request, const StudyAxis& axis);
+/// Whether an --at gives the axis a value.
+bool at_holds(const PlotRequest& request, const StudyAxis& axis);
 
 }  // namespace oblique::client::plot

@@ -9,8 +9,8 @@
 
 #include "client/output/printer.h"
 #include "client/output/work_line.h"
-#include "client/paper/figures/paper_figures.h"
 #include "client/paper/paper_comparison.h"
+#include "client/paper/paper_figures.h"
 #include "client/plot/picture_file.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"

@@ -7,7 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "client/output/printer.h"
+#include "client/study/study_file.h"
+#include "client/verbs/tip_reach.h"
+#include "proto/recipe/point_table.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -35,23 +38,18 @@ PublishedTable small_table() {
 // The third peak is a ripple.
 constexpr const char* kLateRipple = "[[1e-5,4040,2020,1],[2e-5,1000,500,1],[3e-5,990,495,0]]";
 
-void add_point(protocol::Table& rows, double H_m, double mu,
-               const std::string& peaks = kLateRipple) {
-  auto& row = rows.rows.emplace_back();
-  add_value(row, std::int64_t{0});
-  add_value(row, H_m);
-  add_value(row, mu);
-  add_value(row, 1.0);
-  add_value(row, peaks);
-  add_value(row, std::string("[[\"compression\",0,1e-4],[\"restitution\",1e-4,3e-4]]"));
-  add_value(row, 1.1e-4);
-  add_value(row, std::string("SC SR sR sC sR"));
+/// The row of a point with e = 1.
+protocol::Table rows_of_point(double H_m, double mu, const std::string& peaks = kLateRipple) {
+  protocol::Table rows;
+  rows.rows.push_back({std::int64_t{0}, H_m, mu, 1.0, peaks,
+                       "[[\"compression\",0,1e-4],[\"restitution\",1e-4,3e-4]]", 1.1e-4,
+                       "SC SR sR sC sR"});
+  return rows;
 }
 
 TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
   const auto table = small_table();
-  protocol::Table rows;
-  add_point(rows, 1.0, 1.2);
+  const auto rows = rows_of_point(1.0, 1.2);
   const auto differences = compare(table, own_cases(table, rows));
   ASSERT_EQ(differences.size(), 7U);
   EXPECT_NEAR(differences[0].percent().value(), 1.0, 1e-9);
@@ -67,8 +65,8 @@ TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
 
 TEST(Comparison, LeavesOutPhasesOfARowFromTheFirstRippleOn) {
   const auto table = small_table();
-  protocol::Table rows;
-  add_point(rows, 1.0, 1.2, "[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]");
+  const auto rows =
+      rows_of_point(1.0, 1.2, "[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]");
   const auto own = own_cases(table, rows).front().value();
   EXPECT_EQ(own.phases_ms, std::vector<double>{0.1});
   EXPECT_EQ(own.fn_kN, (std::vector<double>{4.04, 1.0}));
@@ -85,24 +83,25 @@ TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
   EXPECT_EQ(own_case(result).phases_ms, (std::vector<double>{1e3, 2e3, 6e3, 7e3}));
 }
 
-TEST(Comparison, CountsWhatWeDoNotHaveAsMissing) {
+TEST(Comparison, HasARowForEachNumberAndCountsWhatWeDoNotHaveAsMissing) {
   const auto table = small_table();
-  const auto summary = summary_of(compare(table, own_cases(table, {})));
-  EXPECT_EQ(summary.counted, 0U);
-  EXPECT_EQ(summary.missing, 7U);
+  const auto differences = compare(table, own_cases(table, {}));
+  EXPECT_EQ(summary_of(differences).counted, 0U);
+  EXPECT_EQ(summary_of(differences).missing, 7U);
+  const auto rows = rows_of(table, differences);
+  EXPECT_EQ(rows.rows.size(), 7U);
+  EXPECT_EQ(rows.rows[0].size(), rows.columns.size());
 }
 
 TEST(Comparison, RefusesAStudyWithSeveralAnswersToOneCase) {
-  protocol::Table rows;
-  add_point(rows, 1.0, 1.2);
-  add_point(rows, 1.0, 1.2);
+  auto rows = rows_of_point(1.0, 1.2);
+  rows.rows.push_back(rows.rows.front());
   EXPECT_THROW(own_cases(small_table(), rows), std::runtime_error);
 }
 
 TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
   const auto table = small_table();
-  protocol::Table rows;
-  add_point(rows, 1.0, 1.2);
+  const auto rows = rows_of_point(1.0, 1.2);
   std::ostringstream out;
   print_comparison(out, table, own_cases(table, rows));
   const auto text = out.str();
@@ -117,24 +116,44 @@ TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
 TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
   auto table = small_table();
   table.cases[0].mode = "sC sR";
-  protocol::Table rows;
-  add_point(rows, 1.0, 1.2);
   std::ostringstream out;
-  print_comparison(out, table, own_cases(table, rows));
-  EXPECT_NE(out.str().find("The mode is the published one in 0 of 1 cases solved"),
-            std::string::npos);
-  EXPECT_NE(
-      out.str().find("- H = 1, mu = 1.2, e* = 1: SC SR sR sC sR (2 peaks), published sC sR (1)"),
-      std::string::npos)
-      << out.str();
-  EXPECT_NE(out.str().find("4.040 / 4.00 / +1.00"), std::string::npos) << out.str();
+  print_modes(out, table, own_cases(table, rows_of_point(1.0, 1.2)));
+  for (const char* part :
+       {"The mode is the published one in 0 of 1 cases solved",
+        "- H = 1, mu = 1.2, e* = 1: SC SR sR sC sR (2 peaks), published sC sR (1)"}) {
+    EXPECT_NE(out.str().find(part), std::string::npos) << out.str();
+  }
 }
 
-TEST(Comparison, HasOneRowForEachNumber) {
-  const auto table = small_table();
-  const auto rows = rows_of(table, compare(table, own_cases(table, {})));
-  EXPECT_EQ(rows.rows.size(), 7U);
-  EXPECT_EQ(rows.rows[0].size(), rows.columns.size());
+TEST(PublishedTable, HoldsTheSixtyThreeTrustworthyNumbers) {
+  std::size_t fn = 0;
+  std::size_t ft = 0;
+  std::size_t phases = 0;
+  std::size_t sticks = 0;
+  for (const auto& published : published_table().cases) {
+    fn += published.fn_kN.size();
+    ft += published.ft_kN.size();
+    phases += published.phases_ms.size();
+    sticks += published.stick_ms ? 1U : 0U;
+  }
+  EXPECT_EQ(fn, 24U);
+  EXPECT_EQ(ft, 24U);
+  EXPECT_EQ(phases, 12U);
+  EXPECT_EQ(sticks, 3U);
+}
+
+TEST(PublishedTable, HasTheCasesOfTheExampleStudyInItsOrder) {
+  const auto published = published_table().cases;
+  const protocol::PointTable study(
+      read_study_file(std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml", tip_reach())
+          .recipe);
+  ASSERT_EQ(published.size(), study.size());
+  for (std::uint64_t i = 0; i < study.size(); ++i) {
+    EXPECT_EQ(published[i].H_m, study.point(i).H_m);
+    EXPECT_EQ(published[i].mu, study.point(i).mu);
+    EXPECT_EQ(published[i].e_star, study.point(i).e_star);
+  }
+  EXPECT_EQ(study.model(0), solver::preset("paper"));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/plot/figure.h"
+#include "client/plot/gathered.h"
 
 namespace oblique::client::plot::test {
 
@@ -25,9 +26,10 @@ inline Panel panel_over_mu_and_H() {
 
 /// Cells n by m, all solved, with the values 0, 1, 2, ...
 inline Cells counted_cells(std::size_t columns, std::size_t rows) {
-  Cells cells;
-  cells.x_edges = Scale({0.0, 0.1 * static_cast<double>(columns)}).edges(columns);
-  cells.y_edges = Scale({0.5, 0.5 + 0.05 * static_cast<double>(rows)}).edges(rows);
+  const auto along = [](double from, double step, std::size_t count) {
+    return cells_between({.range = {from, from + step * static_cast<double>(count)}}, count);
+  };
+  Cells cells{.x = along(0.0, 0.1, columns), .y = along(0.5, 0.05, rows)};
   for (std::size_t i = 0; i < columns * rows; ++i) {
     cells.values.push_back(static_cast<double>(i));
   }
@@ -37,11 +39,11 @@ inline Cells counted_cells(std::size_t columns, std::size_t rows) {
 
 inline Figure map_of(Cells cells) {
   Panel panel = panel_over_mu_and_H();
-  panel.x.range = {cells.x_edges.front(), cells.x_edges.back()};
-  panel.y.range = {cells.y_edges.front(), cells.y_edges.back()};
+  panel.x.range = {cells.x.edges.front(), cells.x.edges.back()};
+  panel.y.range = {cells.y.edges.front(), cells.y.edges.back()};
   const bool has_numbers = cells.names.empty();
   FigureAxis colours = axis_of("duration_s", "s");
-  colours.range = Scale(range_of(cells.values)).range();
+  colours.span(range_of(cells.values));
   cells.name = has_numbers ? colours.name : "major_mode";
   panel.cells = std::move(cells);
   Figure figure = figure_with(std::move(panel));
@@ -85,7 +87,7 @@ inline Figure lines_of(std::size_t lines, std::size_t points) {
   panel.x.range = {0.01, 0.01 * static_cast<double>(points)};
   panel.y.range = {0.0, 1e-4 * static_cast<double>(lines * points)};
   for (std::size_t i = 0; i < lines; ++i) {
-    Curve curve{.stroke = i, .has_marks = true};
+    Curve curve{.stroke = i, .mark = Curve::Mark::kLineAndMarks};
     if (lines > 1) {
       curve.by = 0.1 * static_cast<double>(i + 1);
       curve.name = shown_value(axis_of("e", ""), *curve.by);
@@ -102,13 +104,13 @@ inline Figure lines_of(std::size_t lines, std::size_t points) {
 
 inline Figure some_dots() {
   Panel panel = panel_over_mu_and_H();
-  Dots dots;
+  Curve dots{.mark = Curve::Mark::kDots};
   for (int i = 0; i < 50; ++i) {
     dots.x.push_back(std::fmod(i * 0.618, 1.0));
     dots.y.push_back(i == 7 ? std::nan("") : std::fmod(i * 0.414, 1.0));
-    dots.shades.push_back(i);
+    dots.colours.push_back(i);
   }
-  panel.dots = std::move(dots);
+  panel.curves = {std::move(dots)};
   Figure figure = figure_with(std::move(panel));
   figure.colours = axis_of("fn_peak_N", "N");
   figure.colours->range = {0.0, 49.0};
@@ -148,8 +150,12 @@ inline Figure panels() {
     tangential.x.push_back(t);
     tangential.y.push_back(i == 20 ? std::nan("") : t * 1e7);
   }
-  forces.curves = {normal, tangential};
-  forces.known = {{57e-6, 4282.0, "published"}};
+  const Curve published{.name = "published",
+                        .x = {57e-6},
+                        .y = {4282.0},
+                        .stroke = 7,
+                        .mark = Curve::Mark::kDiamonds};
+  forces.curves = {normal, tangential, published};
   Panel shape;
   shape.title = "shape at touch";
   shape.x = {"x [m]", "x_m", {-0.1, 1.2}};

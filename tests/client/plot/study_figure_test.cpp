@@ -1,12 +1,11 @@
 // From the rows of a source to a figure.
-#include "client/plot/figure_builder.h"
+#include "client/plot/plot_request.h"
 
 #include <cmath>
 #include <memory>
 #include <numeric>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -24,27 +23,13 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-using Value = std::variant<std::monostate, double, std::string>;
-using Rows = std::vector<std::vector<Value>>;
+using Rows = std::vector<protocol::Row>;
 
 /// Answers each query with rows that were made before.
 class MadeRows : public Source {
  public:
-  explicit MadeRows(std::vector<std::string> columns, Rows rows) {
-    protocol::ChunkWriter writer(columns);
-    for (const auto& row : rows) {
-      for (const auto& value : row) {
-        if (const auto* number = std::get_if<double>(&value)) {
-          writer.real(*number);
-        } else if (const auto* text = std::get_if<std::string>(&value)) {
-          writer.text(*text);
-        } else {
-          writer.null();
-        }
-      }
-      writer.end_row();
-    }
-    answer_ = writer.take();
+  MadeRows(std::vector<std::string> columns, Rows rows)
+      : answer_(protocol::chunk_of({std::move(columns), std::move(rows)})) {
     answer_.set_ends(true);
   }
   std::unique_ptr<RowStream> rows(protocol::QueryRequest) override {
@@ -99,15 +84,6 @@ TEST(Map, OfNumbersHasACellAPointAndTheScaleOfItsValues) {
   EXPECT_EQ(figure.subtitle, "e = 1, 3 points");
 }
 
-TEST(Map, ByLogarithmsLeavesOutWhatHasNone) {
-  const Figure figure = figure_from(
-      {.map = "fn_peak_N", .is_colour_logarithmic = true}, kMapColumns,
-      {{1.0, 0.5, 0.0, "solved"}, {2.0, 0.5, 1.0, "solved"}, {3.0, 1.0, 8.0, "solved"}});
-  EXPECT_EQ(figure.panels[0].cells->count(CellState::kNoValue), 1U);
-  EXPECT_EQ(figure.colours->range, (Range{1.0, 8.0}));
-  EXPECT_THAT(figure.notes, Contains(HasSubstr("1 cell is blank")));
-}
-
 TEST(Map, WithARangeSaysThatThereIsMoreBeyond) {
   const Figure figure = figure_from({.map = "fn_peak_N", .range = "2:20"}, kMapColumns,
                                     {{1.0, 0.5, 1.0, "solved"}, {2.0, 0.5, 30.0, "solved"}});
@@ -115,13 +91,10 @@ TEST(Map, WithARangeSaysThatThereIsMoreBeyond) {
   EXPECT_THAT(figure.notes, Contains(HasSubstr("Values from 1 to 30; those outside the scale")));
 }
 
-TEST(Map, OfNothingAndOfOneValueSaysSo) {
+TEST(Map, OfNothingSaysSo) {
   const Figure empty = figure_from({.map = "fn_peak_N"}, kMapColumns, {});
   EXPECT_TRUE(empty.is_empty);
   EXPECT_THAT(empty.notes, Contains("Nothing to draw: no cell has a value."));
-  const Figure one = figure_from({.map = "fn_peak_N"}, kMapColumns,
-                                 {{1.0, 0.5, 4.0, "solved"}, {2.0, 0.5, 4.0, "solved"}});
-  EXPECT_THAT(one.notes, Contains("All cells have one value: fn_peak_N = 4."));
 }
 
 TEST(Map, OfModesNamesThemByTheirPoints) {
@@ -137,23 +110,18 @@ TEST(Map, OfModesNamesThemByTheirPoints) {
   EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("S stick, s slip")));
 }
 
-TEST(Categories, ThoseWithNextToNoPointsAreGathered) {
-  Cells cells{.name = "mode"};
-  std::map<std::string, std::uint64_t> points;
+TEST(Map, OfManyModesGathersThoseWithNextToNoPoints) {
+  Rows rows;
   for (int i = 0; i < 20; ++i) {
-    const std::string name = "mode " + std::to_string(10 + i);
-    points[name] = i < 15 ? 1000 - static_cast<std::uint64_t>(i) : 1;
-    cells.names.push_back(name);
-    cells.values.push_back(0.0);
-    cells.states.push_back(CellState::kSolved);
+    const std::size_t points = i < 15 ? 100 - static_cast<std::size_t>(i) : 1;
+    rows.insert(rows.end(), points, {1.0 * i, 0.5, "mode " + std::to_string(10 + i), "solved"});
   }
-  Figure figure;
-  add_categories(figure, cells, points, "modes");
-  ASSERT_EQ(cells.categories.size(), kMostCategories + 1);
-  EXPECT_TRUE(cells.categories.back().is_other);
-  EXPECT_EQ(cells.categories.back().name, "8 other modes");
-  EXPECT_EQ(cells.categories.back().points, 988U + 987U + 986U + 5U);
-  EXPECT_EQ(cells.values[19], static_cast<double>(kMostCategories));
+  const Figure figure = figure_from({.map = "mode"}, {"mu", "H", "mode", "status"}, rows);
+  const auto& categories = figure.panels[0].cells->categories;
+  ASSERT_EQ(categories.size(), 13U);
+  EXPECT_TRUE(categories.back().is_other);
+  EXPECT_EQ(categories.back().name, "8 other modes");
+  EXPECT_EQ(categories.back().points, 88U + 87U + 86U + 5U);
   EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv has all 20")));
 }
 
@@ -165,7 +133,7 @@ TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
   }
   const std::vector<std::string> columns{"mu", "fn_peak_N", "e"};
   const Figure many = figure_from({.lines = "fn_peak_N", .x = "mu", .by = "e"}, columns, rows);
-  EXPECT_TRUE(many.panels[0].curves[0].is_coloured_by);
+  EXPECT_THAT(many.panels[0].curves[1].colours, ElementsAre(0.1, 0.1));
   ASSERT_TRUE(many.colours);
   EXPECT_EQ(many.colours->name, "e");
   rows.resize(10);
@@ -173,6 +141,20 @@ TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
   EXPECT_FALSE(few.colours);
   ASSERT_EQ(few.panels[0].curves.size(), 5U);
   EXPECT_EQ(few.panels[0].curves[2].name, "e = 0.2");
+}
+
+TEST(Outputs, ThatThereAreNotAreNamedWithTheirFlag) {
+  for (const auto& [flag, request] :
+       {std::pair<std::string, PlotRequest>{"--lines", {.lines = "fn_peak"}},
+        {"--map", {.map = "fn_peak"}},
+        {"--colour", {.scatter = "mu,H", .colour = "fn_peak"}}}) {
+    try {
+      (void)figure_from(request, {}, {});
+      FAIL() << flag;
+    } catch (const solver::InputError& error) {
+      EXPECT_THAT(error.what(), testing::StartsWith(flag + " fn_peak: there is no such"));
+    }
+  }
 }
 
 TEST(Lines, CountTheirGaps) {
@@ -185,7 +167,7 @@ TEST(Lines, CountTheirGaps) {
 TEST(Scatter, DrawsFewPointsEachAndSaysHowManyLackAValue) {
   const Figure figure = figure_from({.scatter = "mu,slide_m"}, {"mu", "slide_m"},
                                     {{1.0, 1.0}, {2.0, {}}, {3.0, 2.0}});
-  EXPECT_EQ(figure.panels[0].dots->x.size(), 3U);
+  EXPECT_EQ(figure.panels[0].curves[0].x.size(), 3U);
   EXPECT_THAT(figure.notes, ElementsAre("1 of 3 points lack a value that can be drawn."));
 }
 
@@ -202,29 +184,17 @@ TEST(Scatter, CountsManyPointsInCells) {
   EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("10,000 points, gathered in ")));
 }
 
-TEST(Histogram, HoldsEachValueOnceInBinsOfRoundWidth) {
-  for (const std::size_t count : {1U, 2U, 10U, 1000U, 100'000U}) {
-    std::vector<double> values;
-    for (std::size_t i = 0; i < count; ++i) {
-      values.push_back(std::fmod(static_cast<double>(i) * 0.618, 1.0) * 2e-4 + 3e-4);
-    }
-    const Bars bars = binned(values, range_of(values), false);
-    EXPECT_EQ(std::accumulate(bars.heights.begin(), bars.heights.end(), 0.0),
-              static_cast<double>(count));
-    EXPECT_LE(bars.heights.size(), 110U);
-    EXPECT_EQ(bars.edges.size(), bars.heights.size() + 1);
-  }
-}
-
-TEST(Histogram, PutsAValueOnAnEdgeIntoTheBinThatBeginsThere) {
-  std::vector<double> values(30, 0.5);
-  values.insert(values.end(), 30, 0.8);
-  values.insert(values.end(), 30, 1.0);
-  const Bars bars = binned(values, range_of(values), false);
+TEST(Histogram, HoldsEachValueOnceInTheBinThatBeginsAtIt) {
+  Rows rows(30, {0.5});
+  rows.insert(rows.end(), 30, {0.8});
+  rows.insert(rows.end(), 40, {1.0});
+  const Figure figure = figure_from({.histogram = "e"}, {"e"}, rows);
+  const Bars& bars = *figure.panels[0].bars;
+  EXPECT_EQ(bars.edges.size(), bars.heights.size() + 1);
+  EXPECT_EQ(std::accumulate(bars.heights.begin(), bars.heights.end(), 0.0), 100.0);
   for (std::size_t i = 0; i < bars.heights.size(); ++i) {
     if (bars.heights[i] > 0.0) {
-      EXPECT_TRUE(bars.edges[i] == 0.5 || bars.edges[i] == 0.8 || bars.edges[i] == 1.0)
-          << bars.edges[i];
+      EXPECT_THAT(bars.edges[i], testing::AnyOf(0.5, 0.8, 1.0));
     }
   }
 }
@@ -264,11 +234,14 @@ TEST(Edges, LieHalfwayBetweenValues) {
   EXPECT_THAT(edges_between({}, false), testing::IsEmpty());
 }
 
-TEST(Ranges, LeaveOutWhatHasNoPlaceAndDoNotCrossZeroWhenWidened) {
+TEST(Ranges, LeaveOutWhatHasNoPlaceAndDoNotCrossZeroWhenTheyAreWidened) {
   EXPECT_EQ(range_of({2.0, std::nan(""), -1.0, INFINITY}), (Range{-1.0, 2.0}));
   EXPECT_EQ(range_of({-1.0, 0.0, 3.0, 5.0}, true), (Range{3.0, 5.0}));
-  EXPECT_EQ(widened({1.0, 101.0}, 0.05), (Range{0.0, 106.0}));
-  EXPECT_EQ(Scale({3.0, 3.0}).share_of(3.0), 0.5);
+  FigureAxis axis;
+  axis.span({1.0, 101.0}, 0.05);
+  EXPECT_EQ(axis.range, (Range{0.0, 106.0}));
+  axis.span({3.0, 3.0});
+  EXPECT_EQ(axis.share_of(3.0), 0.5);
 }
 
 }  // namespace
