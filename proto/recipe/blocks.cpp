@@ -73,7 +73,8 @@ std::size_t key_number(std::string_view name) {
   }
   if (name == "preset" || name == "lengths") {
     throw solver::InputError(
-        fmt::format("{} cannot be an axis of a block: it stands in [model]", name));
+        std::string(name),
+        fmt::format("{} cannot be an axis of a block: it belongs to [model]", name));
   }
   std::vector<std::string_view> known;
   for (const auto& key : solver::model_keys()) {
@@ -81,8 +82,8 @@ std::size_t key_number(std::string_view name) {
   }
   known.insert(known.end(), {"length1", "length2", "length3", "..."});
   known.insert(known.end(), kPointKeyOrder.begin(), kPointKeyOrder.end());
-  throw solver::InputError(
-      fmt::format("{}: the keys are {}", unknown_key(name, known), joined(known)));
+  throw solver::InputError(std::string(name), fmt::format("{}: the keys are {}",
+                                                          unknown_key(name, known), joined(known)));
 }
 
 const solver::ParameterKey& axis_key(std::string_view name) {

@@ -29,9 +29,11 @@ using solver::ParameterKey;
 /// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// Unless `is_met`, throws InputError with `sentence`, formatted with the arguments.
+/// Unless `is_met`, throws InputError for `key` with `sentence`, formatted with the key and the
+/// arguments.
 template <typename... Arguments>
-void require(bool is_met, std::string_view sentence, const Arguments&... arguments) {
+void require(bool is_met, std::string_view sentence, std::string_view key,
+             const Arguments&... arguments) {
   [[maybe_unused]] const auto readable = [](const auto& argument) {
     if constexpr (std::is_same_v<std::decay_t<decltype(argument)>, double>) {
       return solver::exact_number(argument);
@@ -40,7 +42,8 @@ void require(bool is_met, std::string_view sentence, const Arguments&... argumen
     }
   };
   if (!is_met) {
-    throw InputError(fmt::format(fmt::runtime(sentence), readable(arguments)...));
+    throw InputError(std::string(key),
+                     fmt::format(fmt::runtime(sentence), key, readable(arguments)...));
   }
 }
 
@@ -194,8 +197,9 @@ void check_axes(const Block& block) {
   }
   for (const auto& key : solver::point_keys()) {
     if (!keys.test(key_number(key.name))) {
-      throw MissingKey(fmt::format("{} is missing: every block needs H, mu and e ({}: {}, {})",
-                                   key.name, key.name, key.meaning, key.allowed));
+      throw InputError(std::string(key.name),
+                       fmt::format("{0} is missing: every block needs H, mu and e ({0}: {1}, {2})",
+                                   key.name, key.meaning, key.allowed));
     }
   }
   const auto last = point_axes(block);
@@ -229,17 +233,18 @@ void check_zip(const Block& block) {
 void check_sample(const Block& block) {
   const Sample& sample = block.sample();
   constexpr std::uint64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  require(!block.zip(), "a block has both `zip` and `sample`: give one of them");
-  require(SampleKind_IsValid(sample.kind()), "sample: its kind is unknown");
+  constexpr std::string_view kKey = "sample";
+  require(!block.zip(), "a block has both `zip` and `{}`: give one of them", kKey);
+  require(SampleKind_IsValid(sample.kind()), "{}: its kind is unknown", kKey);
   require(sample.seed() <= kLargestSeed,
-          "sample: seed = {} is not allowed: it must be at most {}, the largest in a study file",
+          "{}: seed = {} is not allowed: it must be at most {}, the largest in a study file", kKey,
           sample.seed(), kLargestSeed);
-  require(sample.count() > 0, "sample: count = 0 is not allowed: count must be at least 1");
+  require(sample.count() > 0, "{}: count = 0 is not allowed: count must be at least 1", kKey);
   const auto drawn = std::count_if(block.axes().begin(), block.axes().end(), is_drawn);
   require(drawn > 0,
-          "sample: there is nothing to draw, for every axis has one value: give one from and to");
+          "{}: there is nothing to draw, for every axis has one value: give one from and to", kKey);
   require(sample.kind() != SAMPLE_SOBOL || drawn <= sampling::kSobolDimensions,
-          "sample: {} axes are drawn, and Sobol's sequence has {} dimensions: take lhs or random",
+          "{}: {} axes are drawn, and Sobol's sequence has {} dimensions: take lhs or random", kKey,
           drawn, sampling::kSobolDimensions);
 }
 
@@ -294,18 +299,15 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
   }
 }
 
-std::string expression_in_words(std::string_view key, std::string_view text) {
-  return fmt::format("{} = \"{}\"", key, excerpt(text));
-}
-
 void check_size(const Recipe& recipe) {
   const std::size_t bytes = recipe.ByteSizeLong();
-  require(
-      bytes <= kLongestRecipe,
-      "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
-      "values as ranges, or long columns of a CSV file as several studies; a value that is "
-      "listed takes 8 bytes",
-      bytes, kLongestRecipe);
+  if (bytes > kLongestRecipe) {
+    throw InputError(fmt::format(
+        "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
+        "values as ranges, or long columns of a CSV file as several studies; a value that is "
+        "listed takes 8 bytes",
+        bytes, kLongestRecipe));
+  }
 }
 
 bool parse_recipe(std::string_view bytes, Recipe& recipe) {

@@ -5,18 +5,13 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
+#include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
-// The rules for studies. Parsers of files and flags call these functions and put the place before
-// the message; the server calls them again for a received study.
+// The rules for studies. Parsers of files and flags call these functions, and the server calls them
+// again for a received study. Every InputError has the key.
 namespace oblique::protocol {
-
-/// A block lacks H, mu or e. The message begins with the key.
-class MissingKey : public solver::InputError {
- public:
-  using solver::InputError::InputError;
-};
 
 /// Throws InputError, which names key, value and what is allowed, unless the axis is a list, a
 /// rising range, an expression or, in a sample, a distribution, and each value is finite and in the
@@ -28,25 +23,22 @@ void check_axis(const Axis& axis, BlockKind kind = BlockKind::kProduct);
 void check_ends(const solver::ParameterKey& key, double from, double to);
 
 /// Throws InputError unless the axes of a block are allowed, each once, in order, and fit the kind
-/// of the block, and no H is larger than the length of the shortest finger of the block. Throws
-/// MissingKey if H, mu or e is missing. H is not compared with the length in blocks where this
-/// depends on the point (`is_judged_by_points`).
+/// of the block, and no H is larger than the length of the shortest finger of the block. H is not
+/// compared with the length in blocks where this depends on the point (`is_judged_by_points`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
 /// Whether some values, or whether H is within the finger's length, can be checked only point by
 /// point.
 bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
 
-/// The beginning of a message about an expression: `I = "A^2 / (4 * pi)"`.
-std::string expression_in_words(std::string_view key, std::string_view text);
-
-/// Calls `act` and puts these words before the message of an InputError.
-template <typename Act>
-auto in_expression(std::string_view key, std::string_view text, Act act) {
+/// Calls `work`. An InputError that it throws gets the key and the expression.
+template <typename Work>
+auto in_expression(std::string_view key, std::string_view text, Work work) {
   try {
-    return act();
-  } catch (const solver::InputError& fault) {
-    throw solver::InputError(expression_in_words(key, text) + ": " + fault.what());
+    return work();
+  } catch (const solver::InputError& error) {
+    throw solver::InputError(
+        {.text = error.fields().text, .key = std::string(key), .expression = excerpt(text)});
   }
 }
 
