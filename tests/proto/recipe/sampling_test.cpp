@@ -27,22 +27,6 @@ using protocol::SAMPLE_SOBOL;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// ---- Permutations -----------------------------------------------------------------------------
-
-TEST(PermutationTest, EveryNumberBelowNIsTheImageOfOne) {
-  for (const std::uint64_t n : {1U, 2U, 3U, 5U, 8U, 100U, 1023U, 1025U, 100'000U}) {
-    std::vector<bool> hit(n, false);
-    for (std::uint64_t i = 0; i < n; ++i) {
-      const std::uint64_t image = permuted(i, n, 12345);
-      ASSERT_LT(image, n);
-      ASSERT_FALSE(hit[image]) << image << " of " << n;
-      hit[image] = true;
-    }
-  }
-}
-
-// ---- Sobol's sequence -------------------------------------------------------------------------
-
 /// Digest of points in all dimensions, each coordinate times 2^64 in eight bytes, the least first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   std::string bytes;
@@ -94,8 +78,6 @@ TEST(SobolTest, EveryElementaryIntervalOfTheFirstTwoDimensionsHasOnePoint) {
     }
   }
 }
-
-// ---- Samples ----------------------------------------------------------------------------------
 
 TEST(SampleTest, ALatinHypercubeHasOnePointInEachStratumOfEachDimension) {
   for (const std::uint64_t count : {1U, 2U, 3U, 10U, 1000U, 4097U}) {
@@ -168,8 +150,6 @@ TEST(SampleTest, ValuesAreThoseOfTheFirstVersion) {
   }
 }
 
-// ---- Distributions ----------------------------------------------------------------------------
-
 Quantiles of_kind(protocol::DistributionKind kind, double from, double to, double mean = 0.0,
                   double sd = 0.0) {
   protocol::Axis axis = protocol::uniform("k", from, to);
@@ -178,7 +158,6 @@ Quantiles of_kind(protocol::DistributionKind kind, double from, double to, doubl
   axis.mutable_distribution()->set_sd(sd);
   return Quantiles(axis);
 }
-
 Quantiles uniform(double from, double to) {
   return of_kind(protocol::DISTRIBUTION_UNIFORM, from, to);
 }
