@@ -60,8 +60,8 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
   const auto parts = protocol::split(text, ':');
   if (kind == BlockKind::kSample && parts.size() == 2) {
     return protocol::drawn_axis(
-        key, {protocol::DISTRIBUTION_UNIFORM, flag_number(parts[0]), flag_number(parts[1]), {}, {}},
-        kind);
+        key,
+        {protocol::DISTRIBUTION_UNIFORM, flag_number(parts[0]), flag_number(parts[1]), {}, {}});
   }
   const bool has_spacing = parts.size() == 4;
   const bool has_step = parts.size() == 3 && parts[2].starts_with(kStep);
@@ -86,8 +86,7 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
 }
 
 /// @FILE:COLUMN, or @FILE for its only column or the one that is called as the key.
-protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, BlockKind kind,
-                              CsvFiles& files) {
+protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, CsvFiles& files) {
   const auto colon = text.rfind(':');
   const CsvFile& file =
       files.at(std::string(text.substr(1, colon == std::string_view::npos ? colon : colon - 1)));
@@ -97,7 +96,7 @@ protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, Bl
   } else if (file.columns().size() == 1) {
     column = file.columns().front();
   }
-  return protocol::listed_axis(key, file.values(column, key), kind);
+  return protocol::listed_axis(key, file.values(column, key));
 }
 
 /// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with either end left empty, uniform(FROM,TO) or
@@ -334,13 +333,13 @@ protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text, Bloc
                             CsvFiles& files) {
   return solver::with_key(key.name, [&] {
     if (text.starts_with('@')) {
-      return column_of_flag(key, text, kind, files);
+      return column_of_flag(key, text, files);
     }
     if (key.name == "integrator") {
-      return protocol::listed_axis(key, integrators(text), kind);
+      return protocol::listed_axis(key, integrators(text));
     }
     if (is_distribution(text, kind)) {
-      return protocol::drawn_axis(key, distribution_of_flag(text), kind);
+      return protocol::drawn_axis(key, distribution_of_flag(text));
     }
     // The error of an expression with `a ? b : c` says how to choose.
     const bool chooses = text.find('?') != std::string_view::npos;
@@ -348,7 +347,7 @@ protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text, Bloc
       return range_of_flag(key, text, kind);
     }
     return is_expression(text) ? protocol::expressed_axis(key, text)
-                               : protocol::listed_axis(key, flag_numbers(text), kind);
+                               : protocol::listed_axis(key, flag_numbers(text));
   });
 }
 
@@ -377,9 +376,8 @@ protocol::Recipe written_recipe(const PointFlags& flags) {
   std::vector<protocol::Axis> axes;
   for (const auto& [name, text] : flags.axes) {
     auto axis = axis_of_flag(protocol::axis_key(name), text, kind_of_block(flags), files);
-    const bool is_one_value = protocol::has_own_values(axis) && protocol::axis_size(axis) == 1;
-    if (solver::find_model_key(name) != nullptr && is_one_value) {
-      model.set(name, protocol::axis_value(axis, 0));
+    if (solver::find_model_key(name) != nullptr && axis.values_size() == 1) {
+      model.set(name, axis.values(0));
     } else {
       axes.push_back(std::move(axis));
     }

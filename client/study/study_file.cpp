@@ -113,7 +113,7 @@ class AxisTable {
     } else if (csv.columns().size() == 1) {
       name = csv.columns().front();
     }
-    return protocol::listed_axis(key_, csv.values(name, key_), kind_);
+    return protocol::listed_axis(key_, csv.values(name, key_));
   }
 
   protocol::Axis distribution() const {
@@ -123,14 +123,14 @@ class AxisTable {
                 "where it is cut off");
     const auto drawn = protocol::distribution_named(
         text("distribution", "uniform, log-uniform or normal, in quotes"));
-    return protocol::drawn_axis(
-        key_, {drawn, value("from"), value("to"), value("mean"), value("sd")}, kind_);
+    return protocol::drawn_axis(key_,
+                                {drawn, value("from"), value("to"), value("mean"), value("sd")});
   }
 
   protocol::Axis uniform() const {
     check_parts(kRangeParts, "in a sample an axis is { from, to } or { distribution, ... }");
     return protocol::drawn_axis(
-        key_, {protocol::DISTRIBUTION_UNIFORM, value("from"), value("to"), {}, {}}, kind_);
+        key_, {protocol::DISTRIBUTION_UNIFORM, value("from"), value("to"), {}, {}});
   }
 
   protocol::Axis range() const {
@@ -227,11 +227,9 @@ class BlockReader {
       return protocol::expressed_axis(key, text->get());
     }
     const auto* list = value.as_array();
-    return protocol::listed_axis(key,
-                                 list != nullptr
-                                     ? numbers(file_, key, *list, kAxisForms)
-                                     : std::vector{number(file_, key, value, kAxisForms)},
-                                 kind);
+    return protocol::listed_axis(key, list != nullptr
+                                          ? numbers(file_, key, *list, kAxisForms)
+                                          : std::vector{number(file_, key, value, kAxisForms)});
   }
 
   protocol::Sample sample(const toml::node& node) const {
@@ -298,7 +296,7 @@ class BlockReader {
                         protocol::excerpt(name)));
       }
       const auto& key = protocol::axis_key(name);
-      axes.push_back(protocol::listed_axis(key, csv.values(column, key), BlockKind::kZip));
+      axes.push_back(protocol::listed_axis(key, csv.values(column, key)));
     });
   }
 

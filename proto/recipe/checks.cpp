@@ -14,7 +14,6 @@
 
 #include "proto/frames.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/expression.h"
 #include "proto/recipe/sampling.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"
@@ -144,31 +143,16 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   }
 }
 
-/// Checks the text and its names. PointTable finds circular expressions.
-void check_expression(const Axis& axis) {
-  in_expression(axis.key(), axis.expression(), [&] {
-    const expressions::Expression expression(axis.expression());
-    for (const std::string& name : expression.names()) {
-      key_number(name);
-    }
-  });
-}
-
 /// Throws unless the axis has at most one kind of values, and nothing that belongs to another.
 void check_kind(const ParameterKey& key, const Axis& axis, BlockKind kind) {
-  std::vector<std::string_view> given;
-  for (const auto& [is_given, what] : {std::pair{!axis.values().empty(), "listed values"},
-                                       {axis.count() > 0, "a range"},
-                                       {axis.has_distribution(), "a distribution"},
-                                       {!axis.expression().empty(), "an expression"}}) {
-    if (is_given) {
-      given.emplace_back(what);
-    }
-  }
-  require(given.size() < 2, "{} has both {}: give one of them", key.name,
-          fmt::format("{}", fmt::join(given, " and ")));
+  const int kinds = (axis.values().empty() ? 0 : 1) + (axis.count() > 0 ? 1 : 0) +
+                    (axis.has_distribution() ? 1 : 0) + (axis.expression().empty() ? 0 : 1);
+  require(kinds < 2,
+          "{} has values of several kinds: give a list, a range, a distribution or an "
+          "expression",
+          key.name);
   require(Spacing_IsValid(axis.spacing()) && (axis.count() > 0 || axis.spacing() == SPACING_LINEAR),
-          "{}: its spacing is unknown, or stands beside no range", key.name);
+          "{}: its spacing is unknown, or there is no range", key.name);
   require(!axis.has_distribution() || kind == BlockKind::kSample,
           "{} has a distribution: only a sample draws from one; give the block `sample`", key.name);
 }
@@ -179,9 +163,7 @@ void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
     check_range(key, axis);
   } else if (axis.has_distribution()) {
     check_distribution(key, axis);
-  } else if (!axis.expression().empty()) {
-    check_expression(axis);
-  } else {
+  } else if (axis.expression().empty()) {
     check_list(key, axis, kind);
   }
 }
@@ -280,10 +262,6 @@ void check_ends(const ParameterKey& key, double from, double to) {
   solver::check_value(key, to);
   require(from <= to, "{} from {} to {} is reversed: a range must rise; swap `from` and `to`",
           key.name, from, to);
-}
-
-void check_axis(const Axis& axis, BlockKind kind) {
-  check_values(axis_key(axis.key()), axis, kind);
 }
 
 void check_block(const solver::ModelParameters& model, const Block& block) {

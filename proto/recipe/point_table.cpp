@@ -19,6 +19,7 @@
 #include "proto/recipe/expression.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/sampling.h"
+#include "proto/text.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
 
@@ -39,6 +40,17 @@ std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, con
       places.begin(), places.end(), number,
       [&](std::uint64_t wanted, const Place& place) { return wanted < first(place); });
   return static_cast<std::size_t>(next - places.begin()) - 1;
+}
+
+/// Calls `work`. An InputError that it throws gets the key and the expression.
+template <typename Work>
+auto in_expression(std::string_view key, std::string_view text, Work work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw InputError(
+        {.text = error.fields().text, .key = std::string(key), .expression = excerpt(text)});
+  }
 }
 
 }  // namespace

@@ -43,11 +43,9 @@ int number_of_name(std::string_view name, std::span<const std::string_view> name
 
 }  // namespace
 
-Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values,
-                 BlockKind kind) {
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values) {
   Axis axis = axis_of(key);
   axis.mutable_values()->Assign(values.begin(), values.end());
-  check_axis(axis, kind);
   return axis;
 }
 
@@ -68,7 +66,6 @@ Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::
   axis.set_to(to);
   axis.set_count(static_cast<std::uint64_t>(count));
   axis.set_spacing(spacing);
-  check_axis(axis);
   return axis;
 }
 
@@ -97,8 +94,7 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   return counted_axis(key, from, to, static_cast<std::int64_t>(whole_steps) + 1);
 }
 
-Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written,
-                BlockKind kind) {
+Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written) {
   const bool is_normal = written.kind == DISTRIBUTION_NORMAL;
   const bool has_all = is_normal ? written.mean && written.sd : written.from && written.to;
   if (!has_all || (!is_normal && (written.mean || written.sd))) {
@@ -123,14 +119,12 @@ Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& writ
   }
   distribution.set_mean(written.mean.value_or(0.0));
   distribution.set_sd(written.sd.value_or(0.0));
-  check_axis(axis, kind);
   return axis;
 }
 
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text) {
   Axis axis = axis_of(key);
   axis.set_expression(std::string(text));
-  check_axis(axis);
   return axis;
 }
 

@@ -67,7 +67,7 @@ class DrawnRecipe {
   protocol::Axis axis(const std::string& name, BlockKind kind, double from, double to) {
     const auto& key = protocol::axis_key(name);
     if (chance(0.3)) {
-      return protocol::listed_axis(key, chance(0.5) ? several(from, to) : std::vector{from}, kind);
+      return protocol::listed_axis(key, chance(0.5) ? several(from, to) : std::vector{from});
     }
     if (kind != BlockKind::kSample) {
       return chance(0.3) ? protocol::expressed_axis(key, std::to_string(from) + " + 0 * (e - e)")
@@ -76,8 +76,8 @@ class DrawnRecipe {
     }
     const auto drawn = static_cast<protocol::DistributionKind>(below(3));
     return drawn == protocol::DISTRIBUTION_NORMAL
-               ? protocol::drawn_axis(key, {drawn, from, to, real(from, to), 0.5}, kind)
-               : protocol::drawn_axis(key, {drawn, from, to, {}, {}}, kind);
+               ? protocol::drawn_axis(key, {drawn, from, to, real(from, to), 0.5})
+               : protocol::drawn_axis(key, {drawn, from, to, {}, {}});
   }
 
   std::vector<double> several(double from, double to) {
@@ -94,9 +94,8 @@ class DrawnRecipe {
     // At least one that is drawn, and none that asks for itself.
     axes.push_back(kind == BlockKind::kSample
                        ? protocol::drawn_axis(protocol::axis_key("e"),
-                                              {protocol::DISTRIBUTION_UNIFORM, 0.5, 1.0, {}, {}},
-                                              kind)
-                       : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0), kind));
+                                              {protocol::DISTRIBUTION_UNIFORM, 0.5, 1.0, {}, {}})
+                       : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0)));
     if (chance(0.4)) {
       axes.push_back(axis("k", kind, 1e7, 4e7));
     }
@@ -104,7 +103,7 @@ class DrawnRecipe {
       axes.push_back(axis("length2", kind, 0.35, 0.45));
     }
     if (chance(0.3)) {
-      axes.push_back(protocol::listed_axis(protocol::axis_key("integrator"), {1.0, 0.0}, kind));
+      axes.push_back(protocol::listed_axis(protocol::axis_key("integrator"), {1.0, 0.0}));
       if (kind == BlockKind::kZip) {
         axes.pop_back();
       }

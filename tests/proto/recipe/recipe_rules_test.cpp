@@ -114,7 +114,7 @@ TEST(RecipeRules, ListsAndRangesHaveAllowedValues) {
       {with(range("links", 3, 6, 4))},
       {with(log_range("elements_per_link", 1.0, 8.0, 4))},
       {of_mu(listed("mu", {})), "mu", "mu = [] has no values"},
-      {of_mu(with_value(range("mu", 0.1, 0.2, 2), 0.4)), "mu", "both listed values and a range"},
+      {of_mu(with_value(range("mu", 0.1, 0.2, 2), 0.4)), "mu", "mu has values of several kinds"},
       {of_mu(range("mu", 2.0, 0.5, 4)), "mu", "from 2 to 0.5 is reversed"},
       {of_mu(range("mu", 0.5, 2.0, 1)), "mu", "holds both ends"},
       {of_mu(range("mu", 0.5, 0.5, 7)), "mu", "count = 7 is not allowed with equal ends, 0.5"},
