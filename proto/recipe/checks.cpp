@@ -41,8 +41,7 @@ void require(bool is_met, std::string_view sentence, std::string_view key,
     }
   };
   if (!is_met) {
-    throw InputError(std::string(key),
-                     fmt::format(fmt::runtime(sentence), key, readable(arguments)...));
+    throw InputError(key, fmt::format(fmt::runtime(sentence), key, readable(arguments)...));
   }
 }
 
@@ -179,7 +178,7 @@ void check_axes(const Block& block) {
   }
   for (const auto& key : solver::point_keys()) {
     if (!keys.test(key_number(key.name))) {
-      throw InputError(std::string(key.name),
+      throw InputError(key.name,
                        fmt::format("{0} is missing: every block needs H, mu and e ({0}: {1}, {2})",
                                    key.name, key.meaning, key.allowed));
     }

@@ -192,7 +192,7 @@ void PointTable::BlockPoints::sort(std::vector<Formula> formulas) {
         circle.emplace_back(sources_[formula.axis].layout.axis->key());
       }
       throw InputError(
-          std::string(circle.front()),
+          circle.front(),
           fmt::format(
               "{}: the expressions go round in a circle: one must follow from keys that do not",
               fmt::join(circle, ", ")));

@@ -34,9 +34,8 @@ int number_of_name(std::string_view name, std::span<const std::string_view> name
                    std::string_view key) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
-    throw InputError(std::string(key),
-                     fmt::format("the {} \"{}\" is not known{}: it must be one of {}", key,
-                                 excerpt(name), did_you_mean(name, names), joined(names)));
+    throw InputError(key, fmt::format("the {} \"{}\" is not known{}: it must be one of {}", key,
+                                      excerpt(name), did_you_mean(name, names), joined(names)));
   }
   return static_cast<int>(found - names.begin());
 }
@@ -51,7 +50,7 @@ Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& val
 
 void throw_wrong_count(const solver::ParameterKey& key, std::string_view written) {
   throw InputError(
-      std::string(key.name),
+      key.name,
       fmt::format("{}: count = {} is not allowed: count must be a whole number, at least 1",
                   key.name, written));
 }
@@ -74,7 +73,7 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   const double steps = (to - from) / step;
   if (!(std::isfinite(step) && step > 0.0 && steps <= static_cast<double>(kMaxPoints))) {
     throw InputError(
-        std::string(key.name),
+        key.name,
         fmt::format("{}: step = {} is not allowed: step must be > 0 and make at most {} values",
                     key.name, exact_number(step), kMaxPoints));
   }
@@ -85,7 +84,7 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;
     throw InputError(
-        std::string(key.name),
+        key.name,
         fmt::format("{}: step = {} does not lead from {} to {}: the value after {} would be {}; "
                     "change `to` or the step, or give `count`",
                     key.name, exact_number(step), exact_number(from), exact_number(to),
@@ -96,10 +95,11 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
 
 Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written) {
   const bool is_normal = written.kind == DISTRIBUTION_NORMAL;
-  const bool has_all = is_normal ? written.mean && written.sd : written.from && written.to;
-  if (!has_all || (!is_normal && (written.mean || written.sd))) {
+  const bool is_complete = is_normal ? written.mean && written.sd
+                                     : written.from && written.to && !written.mean && !written.sd;
+  if (!is_complete) {
     throw InputError(
-        std::string(key.name),
+        key.name,
         fmt::format(
             "{}: {}", key.name,
             is_normal
@@ -168,8 +168,8 @@ const solver::ParameterKey& model_key(std::string_view name) {
   for (const auto& key : solver::model_keys()) {
     known.push_back(key.name);
   }
-  throw InputError(std::string(name), fmt::format("{} of a model: the keys are {}",
-                                                  unknown_key(name, known), joined(known)));
+  throw InputError(
+      name, fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
 }
 
 void WrittenModel::set_preset(std::string_view name) {
@@ -180,8 +180,7 @@ void WrittenModel::set_lengths(std::vector<double> lengths_m) {
   lengths_m_ = std::move(lengths_m);
   check_lengths_alone();
   if (lengths_m_->empty()) {
-    throw InputError(std::string(kLengths),
-                     "lengths = [] is not allowed: give the lengths in m, one a link");
+    throw InputError(kLengths, "lengths = [] is not allowed: give the lengths in m, one a link");
   }
   solver::ParameterKey key = model_key("length");
   key.name = kLengths;
@@ -198,7 +197,7 @@ void WrittenModel::set(std::string_view key, double value) {
 
 void WrittenModel::check_lengths_alone() const {
   if (lengths_m_ && (values_.contains("links") || values_.contains("length"))) {
-    throw InputError(std::string(kLengths), std::string(kLengthsStandAlone));
+    throw InputError(kLengths, std::string(kLengthsStandAlone));
   }
 }
 

@@ -52,38 +52,6 @@ solver::CaseResult distinct_result() {
   return result;
 }
 
-std::vector<double> numbers(const google::protobuf::RepeatedField<double>& field) {
-  return {field.begin(), field.end()};
-}
-
-TEST(PointResultTest, ScalarsTravelByTypeInTheOrderThatTheWorkerSays) {
-  const PointResult message = to_message(42, distinct_result());
-  EXPECT_EQ(message.point(), 42U);
-  EXPECT_TRUE(message.error().empty());
-  // As rows of the database were made of them before they stood in one table.
-  EXPECT_EQ(
-      sent_outputs(),
-      "fall_time_s impact_x_m vt_in_m_s vn_in_m_s duration_s fn_peak_N ft_peak_N"
-      " impulse_n_Ns impulse_t_Ns slide_m vt_out_m_s vn_out_m_s margin stick_total_s kinetic_in_J"
-      " friction_J restitution_J kinetic_change_J strain_change_J gravity_change_J"
-      " exchanged_J closure fn_peak_error ft_peak_error duration_error stick_total_error "
-      "slide_error"
-      " impulse_n_error impulse_t_error v_out_error dt_s wall_s mode_same steps mode major_mode"
-      " margin_event");
-  EXPECT_EQ(
-      numbers(message.reals()),
-      (std::vector<double>{0.43, 0.58,  -5.7, -5.2, 5.5e-4, 5057.0, 2023.0, 0.7,  0.3,  1e-3, -4.0,
-                           2.0,  0.021, 7e-5, 1.0,  2.0,    3.0,    4.0,    5.0,  6.0,  7.0,  8.0,
-                           0.01, 0.02,  0.03, 0.04, 0.05,   0.06,   0.07,   0.08, 4e-6, 3e-4}));
-  ASSERT_EQ(message.whole_numbers_size(), 2);
-  EXPECT_EQ(message.whole_numbers(0), 1);
-  EXPECT_EQ(message.whole_numbers(1), 138);
-  ASSERT_EQ(message.texts_size(), 3);
-  EXPECT_EQ(message.texts(0), "SC SR sR");
-  EXPECT_EQ(message.texts(1), "SC SR");
-  EXPECT_EQ(message.texts(2), "turn");
-}
-
 TEST(PointResultTest, AResultComesBackFromItsFrame) {
   const auto sent = distinct_result();
   PointResult message;

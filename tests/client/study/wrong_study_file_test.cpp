@@ -10,14 +10,6 @@
 namespace oblique::client {
 namespace {
 
-std::string dotted(const std::string& part, int parts) {
-  std::string key = part;
-  for (int i = 1; i < parts; ++i) {
-    key += "." + part;
-  }
-  return key;
-}
-
 struct Wrong {
   std::string text;   // of a file, of [model], or a line of a block
   std::string place;  // line and column
@@ -57,9 +49,6 @@ TEST(WrongStudyFile, IsRefusedWithThePlace) {
        {"block = [3]\n", "1:9", "write one or more [[block]]"},
        {"[block]\nH = 1\nmu = 0.4\ne = 1\n", "1:1", "write one or more [[block]]"},
        {"model = 3\n" + point, "1:9", "write [model]"},
-       {"name = 'x'\n  " + dotted("a", 101) + " = 1\n", "2", "100 parts"},
-       {"[" + dotted(" 'a.\"' ", 50'000) + "]\n", "1", "100 parts"},
-       {dotted("a", 100) + " = 1\n", "1:1", "unknown key `a`"},
        {point + block_with("H = 1.3"), "6:5", "H = 1.3"},
        {"[[block]]\nmu = 0.4\ne = 1\n", "1:1", "H is missing: every block needs H, mu and e"},
        {"[[block]]\nzip = true\nH = [0.5, 0.6]\nmu = [0.4, 0.5, 0.6]\ne = 1\n", "3:5", "H has 2 v"},

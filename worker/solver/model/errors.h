@@ -24,8 +24,8 @@ class InputError : public std::runtime_error {
   };
 
   explicit InputError(std::string text) : InputError(Fields{std::move(text)}) {}
-  InputError(std::string key, std::string text)
-      : InputError(Fields{std::move(text), std::move(key)}) {}
+  InputError(std::string_view key, std::string text)
+      : InputError(Fields{std::move(text), std::string(key)}) {}
   explicit InputError(Fields fields)
       : runtime_error(sentence(fields)), fields_(std::move(fields)) {}
 
