@@ -20,8 +20,8 @@ std::string shown(const toml::node& node);
 /// A text as a string of TOML, in quotes.
 std::string toml_string(std::string_view text);
 
-/// Reads a TOML file: studies, keys and settings. Every error is a solver::InputError with the place
-/// "study.toml:3:6": file, line and column.
+/// Reads a TOML file: studies, keys and settings. Every error is a solver::InputError with the
+/// place "study.toml:3:6": file, line and column.
 class TomlReader {
  public:
   /// `file` is the name that errors give.

@@ -79,12 +79,6 @@ TEST(StudyFile, TakesEveryModelKeyWithItsOwnDefault) {
   EXPECT_EQ(protocol::from_message(study.recipe.model()), defaults);
 }
 
-TEST(StudyFile, TakesLengthsOneALink) {
-  const auto study = parsed("[model]\nlengths = [0.5, 0.3]\n" + block_with("H = 0.5"));
-  EXPECT_EQ(protocol::from_message(study.recipe.model()).lengths_m,
-            (std::vector<double>{0.5, 0.3}));
-}
-
 TEST(StudyFile, WithoutANameIsCalledAsTheFile) {
   EXPECT_EQ(parsed(kPoint, "some/where/sweep.toml").name, "sweep");
 }
@@ -167,14 +161,6 @@ TEST_F(StudyBesideAFile, NamesThePlaceInBothFiles) {
   std::ofstream(folder_.file("measured.csv")) << "mu\n0.5\n-1\n";
   expect(block_with("mu = { csv = 'measured.csv' }"),
          {"study.toml:3:6: ", "measured.csv:3: column `mu`: mu = -1 is not allowed"});
-}
-
-TEST(StudyFile, TakesAxesSideBySide) {
-  const protocol::PointTable table(
-      parsed("[[block]]\nzip = true\nH = [0.5, 0.6]\nmu = [0.4, 0.4]\ne = 1\n").recipe);
-  ASSERT_EQ(table.size(), 2U);
-  EXPECT_EQ(table.point(1).H_m, 0.6);
-  EXPECT_EQ(table.point(1).mu, 0.4);
 }
 
 TEST(StudyFile, TakesSamplesOfDistributions) {
