@@ -8,6 +8,7 @@
 #include <exception>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <memory>
 #include <new>
 #include <span>
@@ -21,7 +22,6 @@
 #include <unistd.h>
 
 #include <sodium.h>
-#include <zmq.h>
 
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
@@ -36,16 +36,34 @@ namespace oblique::protocol {
 
 namespace {
 
-/// False unless `text` is a key. Leaves no copy of it.
+constexpr std::string_view kDigits =
+    "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.-:+=^!/*?&<>()[]{}@%$#";
+constexpr std::size_t kBytesOfGroup = 4;
+constexpr std::size_t kDigitsOfGroup = 5;
+
+/// False unless `text` stands for a key.
 bool decode_z85(std::string_view text, SecretKey::Bytes key) {
-  std::array<char, kKeyCharacters + 1> copy{};  // ends with a zero
-  if (text.size() != kKeyCharacters || text.find('\0') != std::string_view::npos) {
+  if (text.size() != kKeyCharacters) {
     return false;
   }
-  std::copy(text.begin(), text.end(), copy.begin());
-  const bool is_key = zmq_z85_decode(key.data(), copy.data()) != nullptr;
-  sodium_memzero(copy.data(), copy.size());
-  return is_key;
+  for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
+    std::uint64_t number = 0;
+    for (const char digit : text.substr(group * kDigitsOfGroup, kDigitsOfGroup)) {
+      const std::size_t value = kDigits.find(digit);
+      if (value == std::string_view::npos) {
+        return false;
+      }
+      number = number * kDigits.size() + value;
+    }
+    if (number > std::numeric_limits<std::uint32_t>::max()) {
+      return false;
+    }
+    for (std::size_t i = kBytesOfGroup; i > 0; --i) {
+      key[group * kBytesOfGroup + i - 1] = static_cast<std::uint8_t>(number & 0xffU);
+      number >>= 8U;
+    }
+  }
+  return true;
 }
 
 /// In the order of `Role`.
@@ -92,10 +110,22 @@ CurveKey public_half_of(const SecretKey& secret_key) {
   return public_key;
 }
 
+// Four bytes are one number, the first byte its highest, and so are five digits.
 std::string z85(SecretKey::ConstBytes key) {
-  std::string text(kKeyCharacters + 1, '\0');  // libzmq ends it with a zero
-  zmq_z85_encode(text.data(), key.data(), key.size());
-  text.pop_back();
+  std::string text;
+  text.reserve(kKeyCharacters);  // growing would leave parts of a secret key behind
+  for (std::size_t at = 0; at < key.size(); at += kBytesOfGroup) {
+    std::uint32_t number = 0;
+    for (std::size_t i = 0; i < kBytesOfGroup; ++i) {
+      number = number << 8U | key[at + i];
+    }
+    std::string group(kDigitsOfGroup, '0');
+    for (std::size_t i = kDigitsOfGroup; i > 0; --i) {
+      group[i - 1] = kDigits[number % kDigits.size()];
+      number /= static_cast<std::uint32_t>(kDigits.size());
+    }
+    text += group;
+  }
   return text;
 }
 

@@ -69,9 +69,12 @@ class KeyFileTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST(CurveKeyTest, AreTheKeysOfLibzmq) {
+TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
   const KeyPair pair = made_key_pair();
   const std::string secret = z85(pair.secret_key.bytes());
+  char text[kKeyCharacters + 1];
+  ASSERT_NE(zmq_z85_encode(text, pair.secret_key.data(), pair.public_key.size()), nullptr);
+  EXPECT_EQ(secret, text);
   EXPECT_EQ(secret_key_of_z85(secret), pair.secret_key);
   char public_half[kKeyCharacters + 1];
   ASSERT_EQ(zmq_curve_public(public_half, secret.c_str()), 0);
