@@ -88,13 +88,21 @@ std::string shown(const toml::node& node) {
   return line.size() > kMost ? line.substr(0, kMost) + "..." : line;
 }
 
+std::string toml_string(std::string_view text) {
+  std::ostringstream quoted;
+  quoted << toml::toml_formatter(toml::value<std::string>(std::string(text)),
+                                 toml::format_flags::none);
+  return quoted.str();
+}
+
 toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
   if (const auto found = too_deep_key(text)) {
     const auto line =
         std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*found), '\n');
-    throw solver::InputError(fmt::format("{}:{}: more than {} parts with dots between them", file_,
-                                         line + 1, kMostKeyParts));
+    throw solver::InputError(
+        {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
+         .place = fmt::format("{}:{}", file_, line + 1)});
   }
   try {
     return toml::parse(text, file_);
@@ -103,12 +111,12 @@ toml::table TomlReader::parse(std::string_view text) const {
   }
 }
 
-std::string TomlReader::before(const toml::source_region& at) const {
-  return fmt::format("{}:{}:{}: ", file_, at.begin.line, at.begin.column);
+std::string TomlReader::place(const toml::source_region& at) const {
+  return fmt::format("{}:{}:{}", file_, at.begin.line, at.begin.column);
 }
 
 void TomlReader::fail_at(const toml::source_region& at, std::string_view message) const {
-  throw solver::InputError(fmt::format("{}{}", before(at), message));
+  throw solver::InputError({.text = std::string(message), .place = place(at)});
 }
 
 double TomlReader::number(std::string_view key, const toml::node& node,

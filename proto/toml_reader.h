@@ -17,8 +17,11 @@ std::string kind_of(const toml::node& node);
 /// A value as the file has it, on one line and shortened for a message.
 std::string shown(const toml::node& node);
 
-/// Reads a TOML file: studies, keys and settings. Every error is a solver::InputError that begins
-/// with file, line and column, as "study.toml:3:6: ".
+/// A text as a string of TOML, in quotes.
+std::string toml_string(std::string_view text);
+
+/// Reads a TOML file: studies, keys and settings. Every error is a solver::InputError with the
+/// place "study.toml:3:6": file, line and column.
 class TomlReader {
  public:
   /// `file` is the name that errors give.
@@ -35,16 +38,19 @@ class TomlReader {
     fail_at(at.source(), message);
   }
 
-  /// The beginning of an error: "study.toml:3:6: "
-  std::string before(const toml::source_region& at) const;
+  /// "study.toml:3:6"
+  std::string place(const toml::source_region& at) const;
 
-  /// Runs `work` and puts the place before an InputError that it throws.
-  template <typename At, typename Work>
-  decltype(auto) located(const At& at, Work work) const {
+  /// Calls `work`. An InputError without a place gets that of its key in the table `at`, or else
+  /// that of `at`.
+  template <typename Work>
+  decltype(auto) located(const toml::node& at, Work work) const {
     try {
       return work();
     } catch (const solver::InputError& error) {
-      fail(at, error.what());
+      const auto* table = at.as_table();
+      const auto* value = table != nullptr ? table->get(error.fields().key) : nullptr;
+      throw error.at(place((value != nullptr ? *value : at).source()));
     }
   }
 

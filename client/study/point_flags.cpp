@@ -1,27 +1,172 @@
 #include "client/study/point_flags.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/study/flag_axis.h"
-#include "client/study/study.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
+#include "proto/recipe/expression.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/written.h"
 #include "proto/text.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
 
+using protocol::BlockKind;
 using solver::InputError;
 using solver::ParameterKey;
+
+/// The number of a part of a flag's text.
+double flag_number(std::string_view part) {
+  const auto value = solver::number_of(part);
+  if (!value) {
+    throw InputError(
+        (part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)) +
+        "; write one value (0.4), a list (0.4,0.6,0.8), a range from:to:count (0.1:2.0:40), "
+        "@FILE.csv:COLUMN, normal(MEAN,SD) in a sample, or an expression (A^2/(4*pi))");
+  }
+  return *value;
+}
+
+std::vector<double> flag_numbers(std::string_view text) {
+  std::vector<double> values;
+  for (const auto part : protocol::split(text, ',')) {
+    values.push_back(flag_number(part));
+  }
+  return values;
+}
+
+std::optional<std::int64_t> whole_number(std::string_view part) {
+  std::int64_t value = 0;
+  const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+  return error == std::errc() && end == part.data() + part.size() ? std::optional(value)
+                                                                  : std::nullopt;
+}
+
+/// from:to:count, from:to:count:log, from:to:step=STEP, or from:to in a sample.
+protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, BlockKind kind) {
+  constexpr std::string_view kStep = "step=";
+  const auto parts = protocol::split(text, ':');
+  if (kind == BlockKind::kSample && parts.size() == 2) {
+    return protocol::drawn_axis(
+        key,
+        {protocol::DISTRIBUTION_UNIFORM, flag_number(parts[0]), flag_number(parts[1]), {}, {}});
+  }
+  const bool has_spacing = parts.size() == 4;
+  const bool has_step = parts.size() == 3 && parts[2].starts_with(kStep);
+  if ((parts.size() != 3 && !has_spacing) ||
+      (has_spacing && parts[3] != "log" && parts[3] != "linear")) {
+    throw InputError(
+        "this is not a range: write from:to:count, as 0.1:2.0:40, from:to:count:log or "
+        "from:to:step=0.05; from:to alone only in a --sample");
+  }
+  const double from = flag_number(parts[0]);
+  const double to = flag_number(parts[1]);
+  if (has_step) {
+    return protocol::stepped_axis(key, from, to, flag_number(parts[2].substr(kStep.size())));
+  }
+  const auto count = whole_number(parts[2]);
+  if (!count) {
+    protocol::throw_wrong_count(key, parts[2]);
+  }
+  return protocol::counted_axis(
+      key, from, to, *count,
+      has_spacing && parts[3] == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
+}
+
+/// @FILE:COLUMN, or @FILE for its only column or the one that is called as the key.
+protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, CsvFiles& files) {
+  const auto colon = text.rfind(':');
+  const CsvFile& file =
+      files.at(std::string(text.substr(1, colon == std::string_view::npos ? colon : colon - 1)));
+  std::string column(key.name);
+  if (colon != std::string_view::npos) {
+    column = text.substr(colon + 1);
+  } else if (file.columns().size() == 1) {
+    column = file.columns().front();
+  }
+  return protocol::listed_axis(key, file.values(column, key));
+}
+
+/// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with either end left empty, uniform(FROM,TO) or
+/// log-uniform(FROM,TO).
+protocol::WrittenDistribution distribution_of_flag(std::string_view text) {
+  const auto bracket = text.find('(');
+  protocol::WrittenDistribution written;
+  written.kind = protocol::distribution_named(text.substr(0, bracket));
+  auto parts = protocol::split(text.substr(bracket + 1, text.size() - bracket - 2), ',');
+  const bool is_normal = written.kind == protocol::DISTRIBUTION_NORMAL;
+  if (is_normal ? parts.size() < 2 || parts.size() > 4 : parts.size() != 2) {
+    throw InputError(is_normal ? "write normal(MEAN,SD), or normal(MEAN,SD,FROM,TO) to cut it off"
+                               : fmt::format("write {}(FROM,TO)", name_of(written.kind)));
+  }
+  if (is_normal) {
+    written.mean = flag_number(parts[0]);
+    written.sd = flag_number(parts[1]);
+    parts.erase(parts.begin(), parts.begin() + 2);
+    parts.resize(2);
+  }
+  written.from =
+      is_normal && parts[0].empty() ? std::nullopt : std::optional(flag_number(parts[0]));
+  written.to = is_normal && parts[1].empty() ? std::nullopt : std::optional(flag_number(parts[1]));
+  return written;
+}
+
+/// Whether a text is NAME(...) with the name of a distribution or, in a sample, of no function.
+bool is_distribution(std::string_view text, BlockKind kind) {
+  const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
+  const auto functions = expressions::function_names();
+  const auto distributions = protocol::distribution_names();
+  const auto is_in = [name](const auto& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const bool is_call = name.size() < text.size() && text.ends_with(')') && !name.empty() &&
+                       name.find_first_of("+*/^)<>=!&| ") == std::string_view::npos;
+  return is_call && (is_in(distributions) || (kind == BlockKind::kSample && !is_in(functions)));
+}
+
+/// Whether a text that is no list of numbers is an expression: it computes, or names another key.
+bool is_expression(std::string_view text) {
+  const auto parts = protocol::split(text, ',');
+  return !std::all_of(parts.begin(), parts.end(),
+                      [](std::string_view part) {
+                        return part.empty() || solver::number_of(part).has_value();
+                      }) &&
+         (text.find_first_of("+-*/^()<>=!&|?") != std::string_view::npos ||
+          protocol::is_axis_key(text));
+}
+
+std::vector<double> integrators(std::string_view text) {
+  std::vector<double> values;
+  for (const auto name : protocol::split(text, ',')) {
+    values.push_back(static_cast<double>(solver::integrator_named(name)));
+  }
+  return values;
+}
+
+/// kind:count:seed, or kind:count.
+protocol::Sample sample_of_flag(std::string_view text) {
+  const auto parts = protocol::split(text, ':');
+  const auto count = parts.size() > 1 ? whole_number(parts[1]) : std::nullopt;
+  const auto seed = parts.size() > 2 ? whole_number(parts[2]) : protocol::kUsualSeed;
+  if (parts.size() > 3 || !count || !seed) {
+    throw InputError("sample",
+                     "this is no sample: write kind:count:seed, as sobol:100000:1; kinds are "
+                     "random, lhs and sobol, count and seed whole numbers");
+  }
+  return protocol::written_sample(parts[0], *count, *seed);
+}
 
 std::string described(const ParameterKey& key) {
   std::string text(key.meaning);
@@ -29,23 +174,10 @@ std::string described(const ParameterKey& key) {
   return text + std::string(key.allowed);
 }
 
-/// The flag, as it was typed, whose key a sentence about the points begins with; nothing for
-/// others.
-std::string flag_named_by(const PointFlags& flags, std::string_view sentence) {
-  const std::string key(subject_of(sentence).key);
-  if (key == "where") {
-    return shown_flag("--where", flags.where) + ": ";
-  }
-  if (key == "sample") {
-    return shown_flag("--sample", flags.sample) + ": ";
-  }
-  const auto axis = flags.axes.find(key);
-  return axis != flags.axes.end() ? shown_flag(flag_of_key(key), axis->second) + ": " : "";
-}
-
-protocol::BlockKind kind_of_block(const PointFlags& flags) {
-  using enum protocol::BlockKind;
-  return !flags.sample.empty() ? kSample : flags.zip ? kZip : kProduct;
+BlockKind kind_of_block(const PointFlags& flags) {
+  return !flags.sample.empty() ? BlockKind::kSample
+         : flags.zip           ? BlockKind::kZip
+                               : BlockKind::kProduct;
 }
 
 std::vector<double> lengths_of_flag(std::string_view text) {
@@ -53,19 +185,16 @@ std::vector<double> lengths_of_flag(std::string_view text) {
   for (const auto part : protocol::split(text, ',')) {
     const auto length = solver::number_of(part);
     if (!length) {
-      throw InputError(fmt::format(
-          "{}; write the length of each link [m], as 0.4,0.3; --length1, --length2, ... take more "
-          "for one link, as --length1 0.2:0.4:5 or --length1 mu",
-          part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)));
+      throw InputError("lengths",
+                       fmt::format("{}; write the length of each link [m], as 0.4,0.3; --length1, "
+                                   "--length2, ... take more "
+                                   "for one link, as --length1 0.2:0.4:5 or --length1 mu",
+                                   part.empty() ? "a value is missing"
+                                                : fmt::format("\"{}\" is not a number", part)));
     }
     lengths.push_back(*length);
   }
   return lengths;
-}
-
-/// One number, which may as well stand in the model.
-bool is_one_value(const protocol::Axis& axis) {
-  return protocol::has_own_values(axis) && protocol::axis_size(axis) == 1;
 }
 
 std::string default_of(const ParameterKey& key) {
@@ -194,22 +323,73 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
   }
 }
 
-protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
+std::string flag_of_key(std::string_view key) {
+  std::string flag = "--" + std::string(key);
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text, BlockKind kind,
+                            CsvFiles& files) {
+  return solver::with_key(key.name, [&] {
+    if (text.starts_with('@')) {
+      return column_of_flag(key, text, files);
+    }
+    if (key.name == "integrator") {
+      return protocol::listed_axis(key, integrators(text));
+    }
+    if (is_distribution(text, kind)) {
+      return protocol::drawn_axis(key, distribution_of_flag(text));
+    }
+    // The error of an expression with `a ? b : c` says how to choose.
+    const bool chooses = text.find('?') != std::string_view::npos;
+    if (!chooses && text.find(':') != std::string_view::npos) {
+      return range_of_flag(key, text, kind);
+    }
+    return is_expression(text) ? protocol::expressed_axis(key, text)
+                               : protocol::listed_axis(key, flag_numbers(text));
+  });
+}
+
+Places places_of(const PointFlags& flags) {
+  std::map<std::string, std::string, std::less<>> places;
+  const auto add = [&](const std::string& key, const std::string& text) {
+    places[key] = fmt::format("{} {}", flag_of_key(key), protocol::excerpt(text));
+  };
+  add("preset", flags.preset);
+  add("lengths", flags.lengths);
+  add("sample", flags.sample);
+  add("where", flags.where);
+  for (const auto& [key, text] : flags.axes) {
+    add(key, text);
+  }
+  return {"", {std::move(places)}};
+}
+
+namespace {
+
+/// The recipe before its points are checked.
+protocol::Recipe written_recipe(const PointFlags& flags) {
   protocol::WrittenModel model;
-  at_flag("--preset", flags.preset, [&] { model.set_preset(flags.preset); });
-  const auto kind = kind_of_block(flags);
+  model.set_preset(flags.preset);
   CsvFiles files(".");
   std::vector<protocol::Axis> axes;
   for (const auto& [name, text] : flags.axes) {
-    auto axis = axis_of_flag(protocol::axis_key(name), text, kind, files);
-    if (solver::find_model_key(name) != nullptr && is_one_value(axis)) {
-      model.set(name, protocol::axis_value(axis, 0));
+    auto axis = axis_of_flag(protocol::axis_key(name), text, kind_of_block(flags), files);
+    if (solver::find_model_key(name) != nullptr && axis.values_size() == 1) {
+      model.set(name, axis.values(0));
     } else {
       axes.push_back(std::move(axis));
     }
   }
   if (!flags.lengths.empty()) {
-    at_flag("--lengths", flags.lengths, [&] { model.set_lengths(lengths_of_flag(flags.lengths)); });
+    model.set_lengths(lengths_of_flag(flags.lengths));
+  }
+  for (const auto& key : solver::point_keys()) {
+    if (!flags.axes.contains(std::string(key.name))) {
+      throw InputError(fmt::format("{} is missing: give --H, --mu and --e ({}: {}, {})",
+                                   flag_of_key(key.name), key.name, key.meaning, key.allowed));
+    }
   }
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(model.model());
@@ -219,31 +399,27 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& chec
   if (!flags.sample.empty()) {
     *block.mutable_sample() = sample_of_flag(flags.sample);
   }
-  try {
-    check_reach(protocol::PointTable(recipe));
-  } catch (const protocol::MissingKey& error) {
-    throw InputError(std::string("--") + error.what());  // it begins with the key
-  } catch (const InputError& error) {
-    throw InputError(with_flag(flags, error.what()));
-  }
-  protocol::check_size(recipe);
   return recipe;
+}
+
+}  // namespace
+
+protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
+  const Places places = places_of(flags);
+  try {
+    protocol::Recipe recipe = written_recipe(flags);
+    check_reach(protocol::PointTable(recipe));
+    protocol::check_size(recipe);
+    return recipe;
+  } catch (const InputError& error) {
+    throw places.located(error);
+  }
 }
 
 protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
   protocol::PointTable table(recipe_of_flags(flags, check_reach));
-  judge_points(table, [&flags](const std::string& sentence) { return with_flag(flags, sentence); });
+  judge_points(table, places_of(flags));
   return table;
-}
-
-std::string with_flag(const PointFlags& flags, const std::string& sentence) {
-  const std::string flag = flag_named_by(flags, sentence);
-  const std::string key(subject_of(sentence).key);
-  const auto axis = flags.axes.find(key);
-  return flag.empty()
-             ? sentence
-             : flag + without_text(key, axis != flags.axes.end() ? axis->second : flags.where,
-                                   sentence);
 }
 
 }  // namespace oblique::client

@@ -6,14 +6,17 @@
 
 #include <CLI/CLI.hpp>
 
+#include "client/study/csv_file.h"
 #include "client/study/reach.h"
+#include "client/study/study.h"
 #include "proto/oblique.pb.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 
-/// What the flags of points and models said, as plain text until they are read together.
+/// The texts of the flags for points and models.
 struct PointFlags {
   std::string preset{solver::preset_names().front()};
   std::string lengths;                      ///< "0.4,0.4,0.3"; empty: by links and length
@@ -21,6 +24,8 @@ struct PointFlags {
   bool zip = false;
   std::string sample;  ///< "sobol:1000:1"; empty: none
   std::string where;   ///< empty: all points
+
+  bool operator==(const PointFlags&) const = default;
 };
 
 /// Whether flags may give one value only (`solve`) or lists and ranges as well.
@@ -32,16 +37,25 @@ enum class FlagValues { kOne, kMany };
 void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
                      bool with_single_lengths);
 
-/// The recipe of all flags together, judged as study files are, also by `check_reach`. Model keys
-/// with one value shape the model; with several they are axes. Throws InputError. What only its
-/// points tell, as of an expression, is not judged yet.
+/// How a key is written as a flag: `tip_mass` is --tip-mass.
+std::string flag_of_key(std::string_view key);
+
+/// The axis of a flag's text: `0.4`, `0.4,0.6,0.8`, `0.1:2.0:40` (from:to:count, both ends
+/// included), `0.01:2:40:log`, `0.5:1:step=0.05`, `@measured.csv:drop`, an expression such as
+/// `A^2/(4*pi)`; in a sample also `0.3:1.1` and `normal(0.4,0.05)`. Throws InputError for the key.
+protocol::Axis axis_of_flag(const solver::ParameterKey& key, std::string_view text,
+                            protocol::BlockKind kind, CsvFiles& files);
+
+/// The recipe of the flags, checked like that of a file, `check_reach` included. Model keys with
+/// one value belong to the model; with several they are axes. Throws InputError with the flag as
+/// its place. Values that only points show are not checked yet.
 protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
 
-/// The points of that recipe, for whoever solves them here: what only they tell is judged too, as
-/// `judge_points` does. Throws InputError.
+/// The points of that recipe for a caller that solves them here: all values are checked. Throws
+/// InputError.
 protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& check_reach);
 
-/// The sentence about the points, with the flag that it speaks of before it, as that was typed.
-std::string with_flag(const PointFlags& flags, const std::string& sentence);
+/// The flags as they were typed.
+Places places_of(const PointFlags& flags);
 
 }  // namespace oblique::client

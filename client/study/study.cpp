@@ -1,40 +1,29 @@
 #include "client/study/study.h"
 
-#include <charconv>
-
-#include "worker/solver/model/errors.h"
-
 namespace oblique::client {
 
-Subject subject_of(std::string_view sentence) {
-  constexpr std::string_view kBlock = "block ";
-  constexpr std::string_view kPoint = "point ";
-  constexpr std::string_view kEnd = ": ";
-  const auto leave_out_first = [&] {
-    const auto end = sentence.find(kEnd);
-    sentence.remove_prefix(end == std::string_view::npos ? sentence.size() : end + kEnd.size());
-  };
-  std::size_t block = 1;
-  if (sentence.starts_with(kBlock)) {
-    std::from_chars(sentence.data() + kBlock.size(), sentence.data() + sentence.size(), block);
-    leave_out_first();
+using solver::InputError;
+
+InputError Places::located(const InputError& error) const {
+  const auto& fields = error.fields();
+  if (!fields.block && blocks.size() != 1) {
+    return error.at(whole);
   }
-  if (sentence.starts_with(kPoint)) {
-    leave_out_first();
-  }
-  return {block - 1, sentence.substr(0, sentence.find_first_of(" :"))};
+  const auto& block = blocks.at(fields.block.value_or(0));
+  const auto found = block.contains(fields.key) ? block.find(fields.key) : block.find("");
+  return error.at(found != block.end() ? found->second : whole);
 }
 
-void judge_points(const protocol::PointTable& table, const Located& located) {
+void judge_points(const protocol::PointTable& table, const Places& places) {
   try {
     table.judge_points();
-  } catch (const solver::InputError& error) {
-    throw solver::InputError(located ? located(error.what()) : error.what());
+  } catch (const InputError& error) {
+    throw places.located(error);
   }
 }
 
 void judge_points(const Study& study) {
-  judge_points(protocol::PointTable(study.recipe), study.located);
+  judge_points(protocol::PointTable(study.recipe), study.places);
 }
 
 }  // namespace oblique::client

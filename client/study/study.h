@@ -1,36 +1,36 @@
 #pragma once
 
-#include <cstddef>
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 
-/// Puts the place of what a sentence of PointTable::judge_points speaks of before it: file, line
-/// and column, or the flag.
-using Located = std::function<std::string(const std::string& sentence)>;
+/// Where the values of a study were written: "study.toml:3:6" or "--mu 0.4".
+struct Places {
+  std::string whole;  ///< of the study; empty: none
+  /// By key; that of the empty key is the block's.
+  std::vector<std::map<std::string, std::string, std::less<>>> blocks;
 
-/// A study as people write it: a name and what makes its points.
+  /// The error with the place of its key, or else of its block or the study.
+  solver::InputError located(const solver::InputError& error) const;
+};
+
+/// A study as people write it: a name and the definition of its points.
 struct Study {
   std::string name;
   protocol::Recipe recipe;
-  Located located = {};  ///< none: no place is known
+  Places places = {};
 };
 
-/// What a sentence of PointTable::judge_points speaks of, by its beginning.
-struct Subject {
-  std::size_t block;     ///< its number, from 0
-  std::string_view key;  ///< of an axis, or `where`; part of the sentence
-};
-Subject subject_of(std::string_view sentence);
-
-/// Judges what only the points tell (PointTable::judge_points). Throws solver::InputError with the
-/// place.
-void judge_points(const protocol::PointTable& table, const Located& located);
+/// Checks the values that only single points show (PointTable::judge_points). Throws
+/// solver::InputError with the place.
+void judge_points(const protocol::PointTable& table, const Places& places);
 void judge_points(const Study& study);
 
 }  // namespace oblique::client

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
-#include <map>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -13,202 +16,388 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/study/csv_file.h"
-#include "client/study/toml_axis.h"
-#include "client/study/toml_block.h"
+#include "proto/recipe/blocks.h"
 #include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/written.h"
 #include "proto/small_file.h"
 #include "proto/text.h"
+#include "proto/toml_reader.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
 
+using protocol::BlockKind;
 using solver::InputError;
+using solver::ParameterKey;
+using Names = std::span<const std::string_view>;
 
 constexpr std::array<std::string_view, 4> kTopKeys{"name", "errors", "model", "block"};
+constexpr std::array<std::string_view, 5> kBlockKeys{"zip", "sample", "where", "csv", "columns"};
+constexpr std::array<std::string_view, 3> kSampleParts{"kind", "count", "seed"};
+constexpr std::array<std::string_view, 5> kRangeParts{"from", "to", "count", "step", "spacing"};
+constexpr std::array<std::string_view, 2> kCsvParts{"csv", "column"};
+constexpr std::array<std::string_view, 5> kDistributionParts{"distribution", "from", "to", "mean",
+                                                             "sd"};
+constexpr std::string_view kAxisForms =
+    "a number, a list of numbers, { from, to, count }, { from, to, step }, { csv, column }, "
+    "{ distribution, ... } or an expression in quotes";
 
-/// Turns the tables of one file into a study; every error carries file, line and column.
-class StudyReader {
+/// The number of a single value; integrators have names.
+double number(const protocol::TomlReader& file, const ParameterKey& key, const toml::node& value,
+              std::string_view expected) {
+  if (key.name != "integrator") {
+    return file.number(key.name, value, expected);
+  }
+  const std::string name =
+      file.text(key.name, value,
+                "the name of one, in quotes: " + protocol::joined(solver::integrator_names()));
+  return file.located(value, [&] { return static_cast<double>(solver::integrator_named(name)); });
+}
+
+/// The numbers of a list, each of which the key allows.
+std::vector<double> numbers(const protocol::TomlReader& file, const ParameterKey& key,
+                            const toml::array& list, std::string_view expected) {
+  std::vector<double> values;
+  for (const auto& item : list) {
+    values.push_back(number(file, key, item, expected));
+    file.located(item, [&] { solver::check_value(key, values.back()); });
+  }
+  return values;
+}
+
+/// The table of one axis.
+class AxisTable {
  public:
-  StudyReader(const std::string& file, const ReachCheck& check_reach)
-      : place_(file),
-        files_(std::filesystem::path(file).parent_path()),
-        check_reach_(check_reach) {}
+  AxisTable(const protocol::TomlReader& file, const ParameterKey& key, const toml::table& table,
+            BlockKind kind)
+      : file_(file), key_(key), table_(table), kind_(kind) {}
 
-  Study study(const toml::table& top);
+  protocol::Axis axis(CsvFiles& files) const {
+    if (has("csv") || has("column")) {
+      return column(files);
+    }
+    if (has("distribution")) {
+      return distribution();
+    }
+    const bool is_uniform =
+        kind_ == BlockKind::kSample && !has("count") && !has("step") && !has("spacing");
+    return is_uniform ? uniform() : range();
+  }
 
  private:
-  std::string name(const toml::table& top) const;
-  solver::ModelParameters model(const toml::node& node) const;
-  void add_model_key(protocol::WrittenModel& model, std::string_view name,
-                     const toml::node& value) const;
-  void add_lengths(protocol::WrittenModel& model, const toml::node& value) const;
-  const toml::array& blocks(const toml::table& top) const;
-  void add_block(Study& study, const toml::node& node);
-  /// By key, and by none the block itself; each as it stands before a sentence.
-  using BlockPlaces = std::map<std::string, std::string, std::less<>>;
-  BlockPlaces places_of(const toml::node& node) const;
+  bool has(std::string_view part) const { return table_.contains(part); }
+  void check_parts(Names known, std::string_view forms) const {
+    file_.refuse_unknown(table_, known, fmt::format("{}: ", key_.name), forms);
+  }
+  std::optional<double> value(std::string_view part) const {
+    return has(part) ? std::optional(file_.number(fmt::format("{}: {}", key_.name, part),
+                                                  *table_.get(part), "a number"))
+                     : std::nullopt;
+  }
+  std::string text(std::string_view part, std::string_view expected) const {
+    return file_.text(fmt::format("{}: {}", key_.name, part), *table_.get(part), expected);
+  }
 
-  protocol::TomlReader place_;
-  std::vector<BlockPlaces> places_;
-  CsvFiles files_;
-  const ReachCheck& check_reach_;
+  protocol::Axis column(CsvFiles& files) const {
+    check_parts(kCsvParts, "a column of a file is { csv = \"FILE.csv\", column = \"NAME\" }");
+    if (!has("csv")) {
+      file_.fail(table_, fmt::format("{}: `column` needs `csv`, the file", key_.name));
+    }
+    const CsvFile& csv = files.at(text("csv", "the name of a file, in quotes"));
+    std::string name(key_.name);
+    if (has("column")) {
+      name = text("column", "the name of a column, in quotes");
+    } else if (csv.columns().size() == 1) {
+      name = csv.columns().front();
+    }
+    return protocol::listed_axis(key_, csv.values(name, key_));
+  }
+
+  protocol::Axis distribution() const {
+    check_parts(kDistributionParts,
+                "a distribution is { distribution = \"uniform\", from, to }, the same with "
+                "\"log-uniform\", or { distribution = \"normal\", mean, sd } with `from` and `to` "
+                "where it is cut off");
+    const auto drawn = protocol::distribution_named(
+        text("distribution", "uniform, log-uniform or normal, in quotes"));
+    return protocol::drawn_axis(key_,
+                                {drawn, value("from"), value("to"), value("mean"), value("sd")});
+  }
+
+  protocol::Axis uniform() const {
+    check_parts(kRangeParts, "in a sample an axis is { from, to } or { distribution, ... }");
+    return protocol::drawn_axis(
+        key_, {protocol::DISTRIBUTION_UNIFORM, value("from"), value("to"), {}, {}});
+  }
+
+  protocol::Axis range() const {
+    check_parts(kRangeParts, "a range is { from, to, count } or { from, to, step }");
+    if (!has("from") || !has("to") || has("count") == has("step")) {
+      file_.fail(table_, fmt::format("{} = {} is not a range: give `from`, `to` and either `count` "
+                                     "or `step`",
+                                     key_.name, protocol::shown(table_)));
+    }
+    const std::string spacing =
+        has("spacing") ? text("spacing", "linear or log, in quotes") : "linear";
+    if (spacing != "linear" && (spacing != "log" || has("step"))) {
+      file_.fail(*table_.get("spacing"),
+                 fmt::format("{}: spacing = \"{}\" is not allowed: it must be linear or log, and "
+                             "linear with `step`",
+                             key_.name, protocol::excerpt(spacing)));
+    }
+    const double from = *value("from");
+    const double to = *value("to");
+    if (has("step")) {
+      return protocol::stepped_axis(key_, from, to, *value("step"));
+    }
+    const auto& count = *table_.get("count");
+    if (!count.is_integer()) {
+      protocol::throw_wrong_count(key_, protocol::shown(count));
+    }
+    return protocol::counted_axis(
+        key_, from, to, *count.value<std::int64_t>(),
+        spacing == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
+  }
+
+  const protocol::TomlReader& file_;
+  const ParameterKey& key_;
+  const toml::table& table_;
+  BlockKind kind_;
 };
 
-std::string StudyReader::name(const toml::table& top) const {
-  const auto* node = top.get("name");
-  if (node == nullptr) {
-    const auto text = std::filesystem::path(place_.file()).stem().string();
-    if (const auto objection = protocol::objection_to_study_name(text); !objection.empty()) {
-      throw InputError(fmt::format("{}: a study without `name` is called as its file: {}",
-                                   place_.file(), objection));
+/// One [[block]].
+class BlockReader {
+ public:
+  BlockReader(const protocol::TomlReader& file, const toml::table& table, CsvFiles& files)
+      : file_(file), table_(table), files_(files) {}
+
+  protocol::Block block() const {
+    const auto* zip = table_.get("zip");
+    const auto* csv = table_.get("csv");
+    const auto* sampled = table_.get("sample");
+    const bool is_zip = zip != nullptr ? file_.yes("zip", *zip) : csv != nullptr;
+    if (csv != nullptr && !is_zip) {
+      file_.fail(*zip, "zip = false is not allowed with csv: the lines of a file are points");
     }
-    return text;
+    const BlockKind kind = sampled != nullptr ? BlockKind::kSample
+                           : is_zip           ? BlockKind::kZip
+                                              : BlockKind::kProduct;
+    std::vector<protocol::Axis> axes;
+    for (const auto& [key, value] : table_) {
+      if (std::find(kBlockKeys.begin(), kBlockKeys.end(), key.str()) == kBlockKeys.end()) {
+        check_key(key);
+        axes.push_back(solver::with_key(
+            key.str(), [&, name = key.str(), &node = value] { return axis(name, node, kind); }));
+      }
+    }
+    add_columns(axes);
+    protocol::Block block = protocol::block_of(std::move(axes));
+    block.set_zip(is_zip);
+    if (sampled != nullptr) {
+      *block.mutable_sample() = sample(*sampled);
+    }
+    if (const auto* where = table_.get("where")) {
+      block.set_where(file_.text("where", *where, "a condition in quotes, as \"mu > 0.5 * e\""));
+    }
+    return block;
   }
-  const auto text = place_.text("name", *node, "a string");
-  if (const auto objection = protocol::objection_to_study_name(text); !objection.empty()) {
-    place_.fail(*node, objection);
+
+ private:
+  /// Throws for a key that resembles one of a block and none of an axis.
+  void check_key(const toml::key& key) const {
+    if (!protocol::nearest(key.str(), kBlockKeys).empty() && !protocol::is_axis_key(key.str())) {
+      file_.fail(key, fmt::format("{}: beside its axes a block has {}",
+                                  protocol::unknown_key(key.str(), kBlockKeys),
+                                  protocol::joined(kBlockKeys)));
+    }
   }
-  return text;
+
+  protocol::Axis axis(std::string_view name, const toml::node& value, BlockKind kind) const {
+    const auto& key = protocol::axis_key(name);
+    if (const auto* table = value.as_table()) {
+      return AxisTable(file_, key, *table, kind).axis(files_);
+    }
+    if (const auto* text = value.as_string(); text != nullptr && key.name != "integrator") {
+      if (text->get().empty()) {
+        file_.fail(value, fmt::format("{} = \"\" is empty: it must be {}", key.name, kAxisForms));
+      }
+      return protocol::expressed_axis(key, text->get());
+    }
+    const auto* list = value.as_array();
+    return protocol::listed_axis(key, list != nullptr
+                                          ? numbers(file_, key, *list, kAxisForms)
+                                          : std::vector{number(file_, key, value, kAxisForms)});
+  }
+
+  protocol::Sample sample(const toml::node& node) const {
+    constexpr std::string_view kForm = "{ kind = \"sobol\", count = 1000, seed = 1 }";
+    const auto& parts = file_.table("sample", node, kForm);
+    file_.refuse_unknown(parts, kSampleParts, "sample: ", "a sample is { kind, count, seed }");
+    const auto whole = [&](std::string_view part) {
+      const auto& value = *parts.get(part);
+      if (!value.is_integer()) {
+        file_.fail(value, fmt::format("sample: {} = {} is not allowed: it must be a whole number, "
+                                      "written without point and exponent",
+                                      part, protocol::shown(value)));
+      }
+      return *value.value<std::int64_t>();
+    };
+    if (!parts.contains("kind") || !parts.contains("count")) {
+      file_.fail(node, fmt::format("sample = {} lacks `{}`: write {}", protocol::shown(parts),
+                                   parts.contains("kind") ? "count" : "kind", kForm));
+    }
+    return protocol::written_sample(
+        file_.text("sample: kind", *parts.get("kind"), "random, lhs or sobol, in quotes"),
+        whole("count"), parts.contains("seed") ? whole("seed") : protocol::kUsualSeed);
+  }
+
+  /// Adds the axes of the file `csv`: the columns that `columns` names, or all by their own names.
+  void add_columns(std::vector<protocol::Axis>& axes) const {
+    const auto* node = table_.get("csv");
+    const auto* columns = table_.get("columns");
+    if (node == nullptr) {
+      if (columns != nullptr) {
+        file_.fail(*columns, "columns needs `csv`, the file");
+      }
+      return;
+    }
+    const std::string path = file_.text("csv", *node, "the name of a file, in quotes");
+    const CsvFile& csv = solver::with_key(
+        "csv", [&]() -> auto& { return files_.at(path); });
+    if (columns == nullptr) {
+      for (const std::string& column : csv.columns()) {
+        add_column(axes, csv, column, column, "csv");
+      }
+      return;
+    }
+    for (const auto& [key, column] :
+         file_.table("columns", *columns, "a table from keys to columns, { H = \"drop\" }")) {
+      const std::string name = file_.text(fmt::format("columns: {}", key.str()), column,
+                                          "the name of a column, in quotes");
+      add_column(axes, csv, key.str(), name, "columns");
+    }
+  }
+
+  /// Errors are about the key `from`.
+  void add_column(std::vector<protocol::Axis>& axes, const CsvFile& csv, std::string_view name,
+                  const std::string& column, std::string_view from) const {
+    solver::with_key(from, [&] {
+      if (table_.contains(name)) {
+        throw InputError(
+            fmt::format("{} is given twice: by the block and by a column of the file", name));
+      }
+      if (from == "csv" && !protocol::is_axis_key(name)) {
+        throw InputError(
+            fmt::format("the column `{}` of the file has the name of no key: name the columns to "
+                        "use, as columns = {{ H = \"drop\", mu = \"friction\" }}",
+                        protocol::excerpt(name)));
+      }
+      const auto& key = protocol::axis_key(name);
+      axes.push_back(protocol::listed_axis(key, csv.values(column, key)));
+    });
+  }
+
+  const protocol::TomlReader& file_;
+  const toml::table& table_;
+  CsvFiles& files_;
+};
+
+/// The study's name: that of the key, or else that of the file.
+std::string name_of(const protocol::TomlReader& file, const toml::table& top) {
+  const auto* node = top.get("name");
+  const std::string name = node != nullptr ? file.text("name", *node, "a string")
+                                           : std::filesystem::path(file.file()).stem().string();
+  if (const auto objection = protocol::objection_to_study_name(name); !objection.empty()) {
+    throw node != nullptr
+        ? InputError("name", objection)
+        : InputError({.text = "a study without `name` is called as its file: " + objection,
+                      .place = file.file()});
+  }
+  return name;
 }
 
-void StudyReader::add_model_key(protocol::WrittenModel& model, std::string_view name,
-                                const toml::node& value) const {
-  const auto& key = place_.located(
-      value, [&]() -> auto& { return protocol::model_key(name); });
-  if (value.is_array() || value.is_table()) {
-    place_.fail(value,
-                fmt::format("{} = {} is {}: in [model] it must be one value; a key with several "
-                            "values stands in a [[block]]",
-                            name, protocol::shown(value), protocol::kind_of(value)));
-  }
-  const double chosen = toml_number(place_, key, value,
-                                    "a number; one that follows from others stands in a [[block]]");
-  place_.located(value, [&] { model.set(name, chosen); });
-}
-
-void StudyReader::add_lengths(protocol::WrittenModel& model, const toml::node& value) const {
-  if (!value.is_array()) {
-    place_.fail(value, fmt::format("lengths = {} is not allowed: it must be a list of lengths in "
-                                   "m, one a link",
-                                   protocol::shown(value)));
-  }
-  const auto& key = protocol::model_key("length");
-  std::vector<double> lengths_m;
-  for (const auto& length : *value.as_array()) {
-    lengths_m.push_back(place_.number("lengths", length, "a list of numbers"));
-    place_.located(length, [&] { solver::check_value(key, lengths_m.back()); });
-  }
-  place_.located(value, [&] { model.set_lengths(std::move(lengths_m)); });
-}
-
-solver::ModelParameters StudyReader::model(const toml::node& node) const {
+solver::ModelParameters model_of(const protocol::TomlReader& file, const toml::node& node) {
   const auto* table = node.as_table();
   if (table == nullptr) {
-    place_.fail(node,
-                "model is " + protocol::kind_of(node) + ": write [model], and the keys below it");
+    file.fail(node,
+              "model is " + protocol::kind_of(node) + ": write [model], and the keys below it");
   }
-  protocol::WrittenModel model;
-  for (const auto& [key, value] : *table) {
-    if (key.str() == protocol::WrittenModel::kPreset) {
-      const auto preset = place_.text("preset", value, protocol::joined(solver::preset_names()));
-      place_.located(value, [&] { model.set_preset(preset); });
-    } else if (key.str() != protocol::WrittenModel::kLengths) {
-      const std::string_view name = key.str();
-      place_.located(key, [name] { (void)protocol::model_key(name); });
-      add_model_key(model, name, value);
+  return file.located(node, [&] {
+    protocol::WrittenModel model;
+    for (const auto& [written, value] : *table) {
+      const std::string_view name = written.str();
+      if (name == protocol::WrittenModel::kPreset) {
+        model.set_preset(file.text(name, value, protocol::joined(solver::preset_names())));
+      } else if (name == protocol::WrittenModel::kLengths) {
+        ParameterKey key = protocol::model_key("length");
+        key.name = name;
+        constexpr std::string_view kForm = "a list of numbers, the lengths in m, one a link";
+        if (!value.is_array()) {
+          file.fail(value, fmt::format("lengths = {} is not allowed: it must be {}",
+                                       protocol::shown(value), kForm));
+        }
+        model.set_lengths(numbers(file, key, *value.as_array(), kForm));
+      } else {
+        model.set(name, number(file, protocol::model_key(name), value,
+                               "a number in [model]; several values and expressions belong in a "
+                               "[[block]]"));
+      }
     }
-  }
-  if (const auto* lengths = table->get(protocol::WrittenModel::kLengths)) {
-    add_lengths(model, *lengths);
-  }
-  return place_.located(node, [&] { return model.model(); });
+    return model.model();
+  });
 }
 
-const toml::array& StudyReader::blocks(const toml::table& top) const {
+const toml::array& blocks_of(const protocol::TomlReader& file, const toml::table& top) {
   const auto* blocks = top.get("block");
   if (blocks == nullptr) {
-    throw InputError(place_.file() +
-                     ": no [[block]]: a study needs at least one, with H, mu and e");
+    throw InputError({.text = "no [[block]]: a study needs at least one, with H, mu and e",
+                      .place = file.file()});
   }
-  if (!blocks->is_array()) {
-    place_.fail(*blocks,
-                "block is " + protocol::kind_of(*blocks) + ": write [[block]], in double brackets");
-  }
-  if (blocks->as_array()->empty()) {
-    place_.fail(*blocks, "block = [] is empty: a study needs at least one, with H, mu and e");
+  if (!blocks->is_array_of_tables()) {
+    file.fail(*blocks, fmt::format("block = {} is not allowed: write one or more [[block]], in "
+                                   "double brackets, and the axes below",
+                                   protocol::shown(*blocks)));
   }
   return *blocks->as_array();
 }
 
-/// The value of the key that a sentence about a block begins with, else the block.
-const toml::node& named_value(const toml::node& block, std::string_view sentence) {
-  const auto* table = block.as_table();
-  const auto* value =
-      table != nullptr ? table->get(sentence.substr(0, sentence.find_first_of(" :"))) : nullptr;
-  return value != nullptr ? *value : block;
-}
-
-/// Where a block and its values stand, kept for sentences that come later.
-StudyReader::BlockPlaces StudyReader::places_of(const toml::node& node) const {
-  BlockPlaces places{{"", place_.before(node.source())}};
-  if (const auto* table = node.as_table()) {
-    for (const auto& [key, value] : *table) {
-      places.emplace(key.str(), place_.before(value.source()));
-    }
-  }
-  return places;
-}
-
-/// Each block is checked alone, so that the error can say where it stands.
-void StudyReader::add_block(Study& study, const toml::node& node) {
-  places_.push_back(places_of(node));
-  *study.recipe.add_blocks() = block_of_toml(place_, node, files_);
-  protocol::Recipe alone;
-  *alone.mutable_model() = study.recipe.model();
-  *alone.add_blocks() = study.recipe.blocks(study.recipe.blocks_size() - 1);
-  try {
-    check_reach_(protocol::PointTable(alone));
-  } catch (const InputError& error) {
-    place_.fail(named_value(node, error.what()), error.what());
-  }
-}
-
-Study StudyReader::study(const toml::table& top) {
-  place_.refuse_unknown(top, kTopKeys, "",
-                        "a study file has name, errors, [model] and one or more [[block]]; H, mu "
-                        "and e stand in a block");
-  Study study;
-  study.name = name(top);
-  const auto* errors = top.get("errors");
-  study.recipe.set_errors(errors != nullptr && place_.yes("errors", *errors));
-  const auto* base = top.get("model");
-  *study.recipe.mutable_model() =
-      protocol::to_message(base != nullptr ? model(*base) : solver::ModelParameters());
-  for (const auto& node : blocks(top)) {
-    add_block(study, node);
-  }
-  study.located = [places = places_](const std::string& sentence) {
-    const Subject subject = subject_of(sentence);
-    const BlockPlaces& block = places.at(std::min(subject.block, places.size() - 1));
-    const auto found = block.find(subject.key);
-    return (found != block.end() ? found : block.find(""))->second + sentence;
-  };
-  try {
-    const protocol::PointTable whole(study.recipe);
-    protocol::check_size(study.recipe);
-  } catch (const InputError& error) {
-    throw InputError(place_.file() + ": " + error.what());
-  }
-  return study;
-}
-
 }  // namespace
 
-Study parse_study(std::string_view text, const std::string& file, const ReachCheck& check_reach) {
-  return StudyReader(file, check_reach).study(protocol::TomlReader(file).parse(text));
+Study parse_study(std::string_view text, const std::string& name, const ReachCheck& check_reach) {
+  const protocol::TomlReader file(name);
+  const toml::table top = file.parse(text);
+  file.refuse_unknown(top, kTopKeys, "",
+                      "a study file has name, errors, [model] and one or more [[block]]; H, mu "
+                      "and e belong in a block");
+  return file.located(top, [&] {
+    Study study{.name = name_of(file, top), .recipe = {}, .places = {file.file(), {}}};
+    const auto* errors = top.get("errors");
+    study.recipe.set_errors(errors != nullptr && file.yes("errors", *errors));
+    const auto* model = top.get("model");
+    *study.recipe.mutable_model() =
+        protocol::to_message(model != nullptr ? model_of(file, *model) : solver::ModelParameters());
+    CsvFiles files(std::filesystem::path(name).parent_path());
+    for (const auto& block : blocks_of(file, top)) {
+      const toml::table& table = *block.as_table();
+      auto& places = study.places.blocks.emplace_back();
+      places.emplace("", file.place(table.source()));
+      for (const auto& [key, value] : table) {
+        places.emplace(key.str(), file.place(value.source()));
+      }
+      *study.recipe.add_blocks() =
+          file.located(table, [&] { return BlockReader(file, table, files).block(); });
+    }
+    try {
+      check_reach(protocol::PointTable(study.recipe));
+      protocol::check_size(study.recipe);
+    } catch (const InputError& error) {
+      throw study.places.located(error);
+    }
+    return study;
+  });
 }
 
 Study read_study_file(const std::filesystem::path& path, const ReachCheck& check_reach) {

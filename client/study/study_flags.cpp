@@ -35,10 +35,7 @@ void add_study_flags(CLI::App& verb, StudyFlags& flags, bool with_single_lengths
 }
 
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
-  const PointFlags none;
-  const bool by_flags = !flags.points.axes.empty() || !flags.points.lengths.empty() ||
-                        flags.points.preset != none.preset || flags.points.zip ||
-                        !flags.points.sample.empty() || !flags.points.where.empty();
+  const bool by_flags = flags.points != PointFlags();
   if (flags.file.empty() && !by_flags) {
     throw InputError("no points: give a study file, or --H, --mu and --e");
   }
@@ -50,9 +47,7 @@ Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
   Study study;
   if (flags.file.empty()) {
     study.recipe = recipe_of_flags(flags.points, check_reach);
-    study.located = [points = flags.points](const std::string& sentence) {
-      return with_flag(points, sentence);
-    };
+    study.places = places_of(flags.points);
   } else {
     study = read_study_file(flags.file, check_reach);
   }
@@ -62,7 +57,7 @@ Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
   }
   if (!flags.name.empty()) {
     if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {
-      throw InputError("--name: " + objection);
+      throw InputError({.text = objection, .key = "name", .place = "--name"});
     }
     study.name = flags.name;
   }

@@ -14,47 +14,14 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/written.h"
+#include "proto/toml_reader.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
 
+using protocol::toml_string;
 using solver::exact_number;
-
-/// Longest line of a list.
-constexpr std::size_t kWidth = 100;
-
-/// A string of TOML: all but quotes, backslashes and control characters stands for itself.
-std::string toml_string(std::string_view text) {
-  std::string line = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      line += '\\';
-      line += c;
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      line += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    } else {
-      line += c;
-    }
-  }
-  return line + '"';
-}
-
-/// [0.1, 0.2], on several lines where it is long.
-std::string list(const std::vector<std::string>& items) {
-  std::string text = "[";
-  std::size_t line = kWidth / 4;  // room for the key
-  for (std::size_t i = 0; i < items.size(); ++i) {
-    line += items[i].size() + 2;
-    if (line > kWidth) {
-      text += "\n   ";
-      line = items[i].size() + 5;
-    }
-    text += (i == 0 || text.ends_with(' ') ? "" : " ") + items[i];
-    text += i + 1 < items.size() ? "," : "";
-  }
-  return text + "]";
-}
 
 std::string value_of(std::string_view key, double value) {
   return key == "integrator"
@@ -67,7 +34,7 @@ std::string list_of_values(std::string_view key, const protocol::Axis& axis) {
   for (std::uint64_t i = 0; i < protocol::axis_size(axis); ++i) {
     items.push_back(value_of(key, protocol::axis_value(axis, i)));
   }
-  return items.size() == 1 ? items.front() : list(items);
+  return items.size() == 1 ? items.front() : fmt::format("[{}]", fmt::join(items, ", "));
 }
 
 std::string distribution(const protocol::Distribution& drawn) {
@@ -134,7 +101,7 @@ std::vector<std::string> overrides(const solver::ModelParameters& model,
   if (lengths_m != preset.lengths_m && !are_alike) {
     std::vector<std::string> items;
     std::transform(lengths_m.begin(), lengths_m.end(), std::back_inserter(items), exact_number);
-    lines.push_back("lengths = " + list(items));
+    lines.push_back(fmt::format("lengths = [{}]", fmt::join(items, ", ")));
   }
   for (const auto& key : solver::model_keys()) {
     const bool differs = is_length(key.name) ? are_alike && lengths_m != preset.lengths_m

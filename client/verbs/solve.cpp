@@ -8,7 +8,6 @@
 #include "client/output/case_report.h"
 #include "client/output/mesh_note.h"
 #include "client/output/value_notes.h"
-#include "client/study/flag_axis.h"
 #include "client/study/point_flags.h"
 #include "client/trace/trace_output.h"
 #include "client/verbs/solve_here.h"

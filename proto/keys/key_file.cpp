@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <ctime>
@@ -393,29 +392,26 @@ void write_key_file(const std::string& path, const KeyFile& key) {
 
 std::string objection_to_key_name(std::string_view name) {
   constexpr std::size_t kLongest = 64;
-  const auto is_plain = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) != 0 && static_cast<unsigned char>(c) < 0x80;
-  };
-  const auto is_allowed = [&](char c) {
-    return is_plain(c) || std::string_view("._-@").find(c) != std::string_view::npos;
-  };
-  return !name.empty() && name.size() <= kLongest && is_plain(name.front()) &&
-                 std::all_of(name.begin(), name.end(), is_allowed)
+  constexpr std::string_view kAllowed =
+      "._-@0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
+  const bool is_allowed = !name.empty() && name.size() <= kLongest &&
+                          name.find_first_not_of(kAllowed) == std::string_view::npos &&
+                          kAllowed.find(name.front()) >= std::string_view("._-@").size();
+  return is_allowed
              ? ""
              : "the name of a key has 1 to 64 letters, digits or . _ - @, and begins with a letter "
                "or digit";
 }
 
 const AuthorizedKey* AuthorizedKeys::find(const CurveKey& public_key) const {
-  const auto found = std::find_if(keys_.begin(), keys_.end(), [&](const AuthorizedKey& key) {
-    return key.public_key == public_key;
-  });
+  const auto found = std::find_if(keys_.begin(), keys_.end(),
+                                  [&](const auto& key) { return key.public_key == public_key; });
   return found == keys_.end() ? nullptr : &*found;
 }
 
 const AuthorizedKey* AuthorizedKeys::find(std::string_view name) const {
-  const auto found = std::find_if(keys_.begin(), keys_.end(),
-                                  [&](const AuthorizedKey& key) { return key.name == name; });
+  const auto found =
+      std::find_if(keys_.begin(), keys_.end(), [&](const auto& key) { return key.name == name; });
   return found == keys_.end() ? nullptr : &*found;
 }
 

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-// Files with keys (TOML, README.md): of one program, the list of a server, and a folder with both.
-// Errors in a file are solver::InputError with file, line and key, and never show a secret.
+// Files with keys (TOML, README.md). Errors in a file are solver::InputError with file, line and
+// key, and never show a secret.
 namespace oblique::protocol {
 
 /// One half of a CURVE key pair (Curve25519): 32 bytes.
@@ -21,8 +21,8 @@ using CurveKey = std::array<std::uint8_t, 32>;
 /// Characters of a key in files and in ZeroMQ's options (Z85, rfc.zeromq.org 32).
 inline constexpr std::size_t kKeyCharacters = 40;
 
-/// A secret key. Its bytes are in memory that is locked where the system permits (RLIMIT_MEMLOCK),
-/// is no part of a core dump and is wiped at the end. Copies share that memory.
+/// A secret key in memory that is locked (within RLIMIT_MEMLOCK), left out of core dumps and wiped
+/// at the end. Copies share that memory.
 class SecretKey {
  public:
   using Bytes = std::span<std::uint8_t, std::tuple_size_v<CurveKey>>;
@@ -42,7 +42,6 @@ class SecretKey {
   std::shared_ptr<std::uint8_t> bytes_;
 };
 
-/// What the holder of a key is to the server.
 enum class Role {
   kServer,
   kClient,  ///< may read and change everything at the port for clients
@@ -59,16 +58,13 @@ struct KeyPair {
   SecretKey secret_key{};
 };
 
-/// A new random pair. Throws std::runtime_error when the system gives no random numbers.
+/// A new random pair.
 KeyPair made_key_pair();
-
-/// The public half that belongs to a secret one.
 CurveKey public_half_of(const SecretKey& secret_key);
 
 /// A key as 40 printable characters, none of which is a quote, a backslash or a space.
 std::string z85(SecretKey::ConstBytes key);
-
-/// None unless `text` is 40 characters that stand for 32 bytes.
+/// None for a text that is no key.
 std::optional<CurveKey> key_of_z85(std::string_view text);
 std::optional<SecretKey> secret_key_of_z85(std::string_view text);
 
@@ -81,17 +77,15 @@ struct KeyFile {
   std::string path = {};                ///< of the file that it was read from
 };
 
-/// Reads a key file. Throws solver::InputError unless it is whole and private: as with ssh, a file
-/// of ours that the group may read is refused, and one that others may read whoever owns it, with
-/// the chmod that mends it.
+/// Throws solver::InputError unless the file is complete and private. As with ssh, a file of ours
+/// that the group may read is refused, and any that others may read, with the chmod as the remedy.
 KeyFile read_key_file(const std::string& path);
 
 /// Writes a new file of mode 0600 and flushes it to the disk. Throws std::runtime_error, also when
 /// the file exists: it is never overwritten.
 void write_key_file(const std::string& path, const KeyFile& key);
 
-/// Why a key cannot have this name, or an empty text: 1 to 64 letters, digits, '.', '_', '-' or
-/// '@', the first a letter or digit, so that a file can have the name too.
+/// Why a key cannot have this name, or an empty text. A file can have an allowed name too.
 std::string objection_to_key_name(std::string_view name);
 
 /// A key that the server admits.
@@ -102,7 +96,7 @@ struct AuthorizedKey {
   std::string added_at;  ///< UTC, ISO 8601
 };
 
-/// The keys that a server admits, each once, by name and by key.
+/// The keys that a server admits. Names and keys are unique.
 class AuthorizedKeys {
  public:
   /// Null for a key that is not admitted.
@@ -111,7 +105,7 @@ class AuthorizedKeys {
   /// In the order of the file.
   const std::vector<AuthorizedKey>& all() const { return keys_; }
 
-  /// Throws solver::InputError when name or key exist, naming which, or the name is not allowed.
+  /// Throws solver::InputError when the name or the key exists or the name is not allowed.
   void add(AuthorizedKey key);
   /// Throws solver::InputError, with the known names, for an unknown name.
   void remove(std::string_view name);
@@ -119,9 +113,6 @@ class AuthorizedKeys {
  private:
   std::vector<AuthorizedKey> keys_;
 };
-
-/// The list beside a server's key file: DIR/authorized_keys.toml.
-std::string authorized_keys_beside(const std::string& server_key_file);
 
 /// Reads a list; an empty file is an empty list. Throws solver::InputError when any part of it is
 /// wrong, or when everybody may write it.
@@ -136,12 +127,13 @@ void change_authorized_keys(const std::string& path,
 /// The time now, as in `added_at`.
 std::string utc_now();
 
-/// Paths in a folder with the keys of a server.
+// Paths of the files in a folder with the keys of a server.
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
+std::string authorized_keys_beside(const std::string& server_key_file);
 
-/// `named` or, where that is empty, this folder or the `keys` in it, whichever has a server's key
-/// or list. Throws solver::InputError where it has neither.
+/// `named` or, if that is empty, the current folder or the `keys` in it. Throws solver::InputError
+/// for a folder without a server's key or list.
 std::string key_folder_meant(const std::string& named);
 
 /// Makes server.key, client.key, worker.key, reader.key and the list with the last three, and a
@@ -149,8 +141,8 @@ std::string key_folder_meant(const std::string& named);
 /// one of them exists or cannot be made; then what was made is removed.
 CurveKey make_key_folder(const std::string& folder);
 
-/// Lists a key of that name: `public_key`, or that of a new pair, which NAME.key gets. Throws
-/// solver::InputError when name or key are listed already, or the server's key cannot be read, and
+/// Lists `public_key`, or the key of a new pair, which is written to NAME.key. Throws
+/// solver::InputError when name or key are listed already or the server's key cannot be read, and
 /// std::runtime_error when a file cannot be written or exists; then nothing is listed.
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key);

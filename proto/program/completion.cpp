@@ -7,22 +7,30 @@
 namespace oblique::protocol {
 namespace {
 
-// NAME stands for the program, CASES for what the words offer. A key of CASES is a verb, or a verb
-// and a flag that takes a value.
-constexpr std::string_view kBash =
-    R"(# Completion of bash for NAME, as `NAME completion bash` prints it.
-_NAME_offers() {
+// NAME stands for the program, CASES for the words that are offered. A key of CASES is a verb, or a
+// verb and a flag that takes a value.
+constexpr std::string_view kBothShells = R"(_NAME_offers() {
   case $1 in
 CASES    *) return 1 ;;
   esac
 }
-_NAME() {
-  local word=${2-} verb='' before=${COMP_WORDS[COMP_CWORD - 1]} offers=() i
-  for ((i = 1; i < COMP_CWORD; ++i)); do
-    if [[ ${COMP_WORDS[i]} != -* ]] && _NAME_offers "${verb:+$verb }${COMP_WORDS[i]}"; then
-      verb=${verb:+$verb }${COMP_WORDS[i]}
+# Sets `verb` to the verb in the words.
+_NAME_verb() {
+  local each
+  verb=''
+  for each; do
+    if [[ $each != -* ]] && _NAME_offers "${verb:+$verb }$each"; then
+      verb=${verb:+$verb }$each
     fi
   done
+}
+)";
+
+constexpr std::string_view kBash =
+    R"(# Completion of bash for NAME, as `NAME completion bash` prints it.
+BOTH_SHELLS_NAME() {
+  local word=${2-} verb before=${COMP_WORDS[COMP_CWORD - 1]} offers=()
+  _NAME_verb "${COMP_WORDS[@]:1:COMP_CWORD-1}"
   # bash makes three words of --flag=value.
   [[ $before != '=' ]] || before=${COMP_WORDS[COMP_CWORD - 2]}
   if [[ $before != --* ]] || ! _NAME_offers "${verb:+$verb }$before"; then
@@ -38,19 +46,10 @@ complete -o default -F _NAME NAME
 
 constexpr std::string_view kZsh = R"(#compdef NAME
 # Completion of zsh for NAME, as `NAME completion zsh` prints it.
-_NAME_offers() {
-  case $1 in
-CASES    *) return 1 ;;
-  esac
-}
-_NAME() {
-  local verb='' before=$words[CURRENT-1] i
+BOTH_SHELLS_NAME() {
+  local verb before=$words[CURRENT-1]
   local -a offers
-  for ((i = 2; i < CURRENT; ++i)); do
-    if [[ $words[i] != -* ]] && _NAME_offers "${verb:+$verb }$words[i]"; then
-      verb=${verb:+$verb }$words[i]
-    fi
-  done
+  _NAME_verb "${(@)words[2,CURRENT-1]}"
   if [[ $PREFIX == --*=* ]]; then
     before=${PREFIX%%=*}
     compset -P '--*='
@@ -86,10 +85,10 @@ std::string quoted(const std::string& text) {
   return "'" + replaced(text, "'", R"('\'')") + "'";
 }
 
-/// Writes the cases of a script.
+/// The cases of a script.
 class Cases {
  public:
-  Cases(const ValueWords& words, bool has_meanings) : words_(words), has_meanings_(has_meanings) {}
+  explicit Cases(const ValueWords& words) : words_(words) {}
 
   /// Adds those of a verb, which is reached by the words `path`, and of its verbs.
   void add(CLI::App& verb, const std::string& path) {
@@ -97,7 +96,7 @@ class Cases {
     std::string offers;
     std::string without_words;
     for (auto* each : verb.get_subcommands({})) {
-      offers += offer(each->get_name(), each->get_description());
+      offers += ' ' + quoted(each->get_name());
       add(*each, before + each->get_name());
     }
     for (auto* option : verb.get_options()) {
@@ -105,7 +104,7 @@ class Cases {
       offers += option->get_positional() ? values : "";
       for (const std::string& name : option->get_lnames()) {
         const std::string flag = "--" + name;
-        offers += offer(flag, option->get_description());
+        offers += ' ' + quoted(flag);
         if (!values.empty()) {
           add_case(quoted(before + flag), values);
         } else if (option->get_items_expected_min() > 0) {
@@ -126,13 +125,6 @@ class Cases {
     text_ += "    " + keys + ") offers=(" + offers + ") ;;\n";
   }
 
-  /// Behind a blank.
-  std::string offer(const std::string& word, const std::string& meaning) const {
-    return ' ' + quoted(has_meanings_ && !meaning.empty()
-                            ? word + ':' + meaning.substr(0, meaning.find('\n'))
-                            : word);
-  }
-
   std::string values_of(CLI::Option& option) const {
     std::vector<std::string> values = choices_of(option);
     for (const std::string& key : {option.get_type_name(), option.get_name()}) {
@@ -142,13 +134,12 @@ class Cases {
     }
     std::string offers;
     for (const std::string& value : values) {
-      offers += offer(value, "");
+      offers += ' ' + quoted(value);
     }
     return offers;
   }
 
   const ValueWords& words_;
-  bool has_meanings_;
   std::string text_;
 };
 
@@ -163,9 +154,10 @@ std::optional<int> print_completion(CLI::App& app, int argc, const char* const* 
   if (shell != "bash" && shell != "zsh") {
     return tell_wrong_usage(app.get_name(), "write `completion bash` or `completion zsh`");
   }
-  Cases cases(words, shell == "zsh");
+  Cases cases(words);
   cases.add(app, "");
-  const std::string script(shell == "zsh" ? kZsh : kBash);
+  const std::string script =
+      replaced(std::string(shell == "zsh" ? kZsh : kBash), "BOTH_SHELLS", kBothShells);
   std::cout << replaced(replaced(script, "NAME", app.get_name()), "CASES", cases.text());
   return std::cout.flush() ? kDone : kFailed;
 }

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <span>
-#include <sstream>
 #include <string_view>
 
 #include <toml++/toml.h>
@@ -104,9 +103,7 @@ std::string toml_value(const CLI::Option& option, const std::string& value) {
   if (number && (is_whole || solver::exact_number(*number) == value)) {
     return value;
   }
-  std::ostringstream quoted;
-  quoted << toml::toml_formatter(toml::value<std::string>(value), toml::format_flags::none);
-  return quoted.str();
+  return toml_string(value);
 }
 
 CLI::Option* add_choice(CLI::App& app, const std::string& flag, std::string& value,
@@ -245,7 +242,7 @@ void Configuration::read_file(const std::string& path, Given& given) const {
     if (given.contains(name)) {
       file.fail(key, fmt::format("{} is given twice", name));
     }
-    given[name] = {typed_values(file, name, node), file.before(key.source())};
+    given[name] = {typed_values(file, name, node), file.place(key.source()) + ": "};
   };
   for (const auto& [key, node] : top) {
     const std::string name(key.str());

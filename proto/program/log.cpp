@@ -1,9 +1,5 @@
 #include "proto/program/log.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <chrono>
 #include <cstdlib>
 #include <ctime>
 #include <iostream>
@@ -11,9 +7,12 @@
 #include <string_view>
 #include <utility>
 
-#include <spdlog/fmt/chrono.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <spdlog/fmt/fmt.h>
-#include <spdlog/formatter.h>
+#include <spdlog/logger.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
@@ -26,42 +25,29 @@ namespace {
 
 enum class Form { kText, kJournal, kJson };
 
-/// Lines of the log in one of the forms of `set_up_log`.
-class LineFormatter : public spdlog::formatter {
+/// The message of a line in the form of the log.
+class Message : public spdlog::custom_flag_formatter {
  public:
-  explicit LineFormatter(Form form) : form_(form) {}
+  explicit Message(Form form) : form_(form) {}
 
-  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& line) override {
-    using std::chrono::milliseconds;
-    const auto since_1970 =
-        std::chrono::duration_cast<milliseconds>(message.time.time_since_epoch()).count();
-    const auto seconds = fmt::gmtime(static_cast<std::time_t>(since_1970 / 1000));
-    const std::string time = fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", seconds, since_1970 % 1000);
-    const std::string level = text_of(spdlog::level::to_string_view(message.level));
-    const std::string program = text_of(message.logger_name);
-    const std::string text = text_of(message.payload);
-    const auto add = [&line](std::string_view part) { line.append(part.begin(), part.end()); };
-    if (form_ == Form::kJson) {
-      const nlohmann::ordered_json object{
-          {"time", time}, {"level", level}, {"program", program}, {"message", text}};
-      // Bytes that are no UTF-8 become U+FFFD; all beyond ASCII is escaped, so that a line is one
-      // line for every reader.
-      add(object.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace));
-    } else if (form_ == Form::kJournal) {
-      add(fmt::format("<{}>{}", syslog_level(message.level), visible(text)));
-    } else {
-      add(fmt::format("{} {} {}: {}", time, program, level, visible(text)));
-    }
-    add("\n");
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
+              spdlog::memory_buf_t& line) override {
+    const std::string text(message.payload.data(), message.payload.size());
+    // Of JSON, bytes that are no UTF-8 become U+FFFD, and all beyond ASCII is escaped, so that a
+    // line is one line for every reader.
+    const std::string shown =
+        form_ == Form::kJson
+            ? nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)
+        : form_ == Form::kJournal
+            ? fmt::format("<{}>{}", syslog_level(message.level), visible(text))
+            : visible(text);
+    line.append(shown.data(), shown.data() + shown.size());
   }
-  std::unique_ptr<formatter> clone() const override {
-    return std::make_unique<LineFormatter>(form_);
+  std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<Message>(form_);
   }
 
  private:
-  static std::string text_of(const spdlog::string_view_t& view) {
-    return {view.data(), view.size()};
-  }
   static int syslog_level(spdlog::level::level_enum level) {
     return level >= spdlog::level::err    ? 3
            : level == spdlog::level::warn ? 4
@@ -72,8 +58,8 @@ class LineFormatter : public spdlog::formatter {
   Form form_;
 };
 
-/// The variable JOURNAL_STREAM names the file that systemd made standard error; it is inherited
-/// also by those whose standard error was turned elsewhere since.
+/// The variable JOURNAL_STREAM names the file that systemd made standard error. Programs inherit it
+/// also when their standard error was redirected since.
 bool journal_reads_standard_error() {
   const char* const stream = std::getenv("JOURNAL_STREAM");
   struct stat file {};
@@ -84,12 +70,18 @@ bool journal_reads_standard_error() {
 }  // namespace
 
 void set_up_log(const std::string& program, const LogSettings& settings) {
+  Form form = journal_reads_standard_error() ? Form::kJournal : Form::kText;
+  std::string pattern = form == Form::kJournal ? "%*" : "%Y-%m-%dT%H:%M:%S.%eZ %n %l: %*";
+  if (settings.format == "json") {
+    form = Form::kJson;
+    pattern = R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l","program":"%n","message":%*})";
+  }
+  auto formatter =
+      std::make_unique<spdlog::pattern_formatter>(spdlog::pattern_time_type::utc, "\n");
+  formatter->add_flag<Message>('*', form).set_pattern(pattern);
   auto logger =
       std::make_shared<spdlog::logger>(program, std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  logger->set_formatter(std::make_unique<LineFormatter>(settings.format == "json" ? Form::kJson
-                                                        : journal_reads_standard_error()
-                                                            ? Form::kJournal
-                                                            : Form::kText));
+  logger->set_formatter(std::move(formatter));
   logger->set_level(spdlog::level::from_str(settings.level));
   spdlog::set_default_logger(std::move(logger));
 }

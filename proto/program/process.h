@@ -29,14 +29,11 @@ class StopSignals {
   /// Readable while a signal is pending.
   int descriptor() const { return descriptor_.number(); }
 
-  /// Whether a signal has arrived so far; consumes pending ones.
+  /// Whether a signal has arrived so far; consumes pending ones. `wait` waits at most `longest`.
   bool requested();
-
-  /// Waits for a signal, at most `longest`. Whether one has arrived so far.
   bool wait(std::chrono::nanoseconds longest);
 
-  /// The exit code of a program that ends because of the first signal, as in shells: 128 plus its
-  /// number, 130 for Ctrl-C.
+  /// 128 plus the number of the first signal, as in shells: 130 for Ctrl-C.
   int exit_code() const { return 128 + signal_; }
 
  private:
@@ -49,8 +46,7 @@ class StopSignals {
 /// instead of ending the program.
 void survive_failed_writes();
 
-/// The option --stop-with-parent [PID]: this process gets SIGTERM when the process that started it
-/// ends, however that ended.
+/// The option --stop-with-parent [PID]: this process gets SIGTERM when its parent ends.
 class StopWithParent {
  public:
   /// Construct it as the program begins: it stores the present parent.
@@ -58,13 +54,11 @@ class StopWithParent {
 
   /// Adds the option. This must live as long as `app`.
   void add_to(CLI::App& app);
-
-  /// After the command line is parsed: whether the option was given.
   bool is_wanted() const;
 
-  /// After the command line is parsed and signals are watched: requests the signal, if the option
-  /// was given. False when the parent has ended already; with PID, also when it ended before this
-  /// process began. Throws std::system_error when the system refuses.
+  /// Requests the signal if the option was given. Call it when signals are watched. False when the
+  /// parent has ended already; with PID, also when it ended before this process began. Throws
+  /// std::system_error when the system refuses.
   bool begin() const;
 
  private:
@@ -74,8 +68,7 @@ class StopWithParent {
 };
 
 /// Sends the state of the program to the service manager (systemd), as datagrams to the socket
-/// NOTIFY_SOCKET, which may be an abstract one. Without that variable all calls do nothing. Errors
-/// are ignored.
+/// NOTIFY_SOCKET, which may be an abstract one. Does nothing without that variable. Ignores errors.
 class Notifier {
  public:
   using Clock = std::chrono::steady_clock;
@@ -96,7 +89,7 @@ class Notifier {
  private:
   void send(const std::string& state) const;
 
-  std::string socket_;  // empty: none
+  std::string socket_;  ///< empty: none
   std::optional<Clock::duration> heartbeat_;
   Clock::time_point next_heartbeat_;
   std::string status_;

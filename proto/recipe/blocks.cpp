@@ -73,7 +73,7 @@ std::size_t key_number(std::string_view name) {
   }
   if (name == "preset" || name == "lengths") {
     throw solver::InputError(
-        fmt::format("{} cannot be an axis of a block: it stands in [model]", name));
+        name, fmt::format("{} cannot be an axis of a block: it belongs to [model]", name));
   }
   std::vector<std::string_view> known;
   for (const auto& key : solver::model_keys()) {
@@ -82,7 +82,7 @@ std::size_t key_number(std::string_view name) {
   known.insert(known.end(), {"length1", "length2", "length3", "..."});
   known.insert(known.end(), kPointKeyOrder.begin(), kPointKeyOrder.end());
   throw solver::InputError(
-      fmt::format("{}: the keys are {}", unknown_key(name, known), joined(known)));
+      name, fmt::format("{}: the keys are {}", unknown_key(name, known), joined(known)));
 }
 
 const solver::ParameterKey& axis_key(std::string_view name) {
@@ -129,6 +129,7 @@ RangeValues::RangeValues(const Axis& axis)
     if (!(std::abs(first) < kExactBelow && std::abs(end) < kExactBelow && last < kExactBelow)) {
       break;
     }
+    // Value i is the double nearest to the decimal, so that 0.1:1:10 has 0.3.
     if (first / per_unit == from_ && end / per_unit == to_ && std::fmod(end - first, last) == 0.0) {
       decimals_ = {first, (end - first) / last, per_unit};
       break;

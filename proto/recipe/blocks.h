@@ -17,9 +17,9 @@ namespace oblique::protocol {
 /// Most links of a model.
 inline constexpr std::size_t kMostLinks = 64;
 
-/// Keys of axes have numbers: those of a model in the order of listings, then the single lengths
-/// `length1`, `length2`, ... from the pin outwards, then H, mu and e. Throws InputError for an
-/// unknown key, with the nearest and the list of all.
+/// The number of a key: those of a model in the order of listings, then the single lengths
+/// `length1`, `length2`, ..., then H, mu and e. Throws InputError for an unknown key, with the
+/// nearest and the list of all.
 std::size_t key_number(std::string_view name);
 /// The key called `name`; throws as `key_number` does.
 const solver::ParameterKey& axis_key(std::string_view name);
@@ -50,9 +50,7 @@ bool has_own_values(const Axis& axis);
 /// Value i of a list or range. Throws std::out_of_range if the axis has no such value.
 double axis_value(const Axis& axis, std::uint64_t i);
 
-/// The values of a range. Both ends are exact. Value i of a linear range is (from (n - 1 - i) + to
-/// i) / (n - 1). If ends and step are decimals, it is the double nearest to the decimal: 0.1:1:10
-/// has 0.3. In a logarithmic range the logarithms are equally spaced.
+/// The values of a range (README.md). Both ends are exact.
 class RangeValues {
  public:
   /// `axis` must have a count.
@@ -117,13 +115,11 @@ struct AxisLayout {
 /// The axes of a checked block, in their order.
 std::vector<AxisLayout> layout_of(const Block& block);
 
-/// The model of the shortest finger in the block, without expressions: it has the smallest value of
-/// each key that sets lengths, because the length grows with each of them.
+/// The model of the shortest finger in the block, without expressions.
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
 
-/// The tip of every finger can drop by at least this part of the finger's length. For drops between
-/// this part and the whole length, which is the limit for H, only the computed fall shows whether
-/// the tip gets there.
+/// The tip of every finger drops by at least this part of the finger's length. Between this part
+/// and the whole length, the limit for H, only a computed fall shows whether the tip gets there.
 inline constexpr double kSurelyReached = 0.9;
 
 /// The drop [m] that the tip of every finger of the block reaches; empty if no H is larger.

@@ -14,7 +14,6 @@
 
 #include "proto/frames.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/expression.h"
 #include "proto/recipe/sampling.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"
@@ -29,9 +28,11 @@ using solver::ParameterKey;
 /// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// Unless `is_met`, throws InputError with `sentence`, formatted with the arguments.
+/// Unless `is_met`, throws InputError for `key` with `sentence`, formatted with the key and the
+/// arguments.
 template <typename... Arguments>
-void require(bool is_met, std::string_view sentence, const Arguments&... arguments) {
+void require(bool is_met, std::string_view sentence, std::string_view key,
+             const Arguments&... arguments) {
   [[maybe_unused]] const auto readable = [](const auto& argument) {
     if constexpr (std::is_same_v<std::decay_t<decltype(argument)>, double>) {
       return solver::exact_number(argument);
@@ -40,7 +41,7 @@ void require(bool is_met, std::string_view sentence, const Arguments&... argumen
     }
   };
   if (!is_met) {
-    throw InputError(fmt::format(fmt::runtime(sentence), readable(arguments)...));
+    throw InputError(key, fmt::format(fmt::runtime(sentence), key, readable(arguments)...));
   }
 }
 
@@ -141,31 +142,16 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   }
 }
 
-/// Checks the text and its names. PointTable finds circular expressions.
-void check_expression(const Axis& axis) {
-  in_expression(axis.key(), axis.expression(), [&] {
-    const expressions::Expression expression(axis.expression());
-    for (const std::string& name : expression.names()) {
-      key_number(name);
-    }
-  });
-}
-
 /// Throws unless the axis has at most one kind of values, and nothing that belongs to another.
 void check_kind(const ParameterKey& key, const Axis& axis, BlockKind kind) {
-  std::vector<std::string_view> given;
-  for (const auto& [is_given, what] : {std::pair{!axis.values().empty(), "listed values"},
-                                       {axis.count() > 0, "a range"},
-                                       {axis.has_distribution(), "a distribution"},
-                                       {!axis.expression().empty(), "an expression"}}) {
-    if (is_given) {
-      given.emplace_back(what);
-    }
-  }
-  require(given.size() < 2, "{} has both {}: give one of them", key.name,
-          fmt::format("{}", fmt::join(given, " and ")));
+  const int kinds = (axis.values().empty() ? 0 : 1) + (axis.count() > 0 ? 1 : 0) +
+                    (axis.has_distribution() ? 1 : 0) + (axis.expression().empty() ? 0 : 1);
+  require(kinds < 2,
+          "{} has values of several kinds: give a list, a range, a distribution or an "
+          "expression",
+          key.name);
   require(Spacing_IsValid(axis.spacing()) && (axis.count() > 0 || axis.spacing() == SPACING_LINEAR),
-          "{}: its spacing is unknown, or stands beside no range", key.name);
+          "{}: its spacing is unknown, or there is no range", key.name);
   require(!axis.has_distribution() || kind == BlockKind::kSample,
           "{} has a distribution: only a sample draws from one; give the block `sample`", key.name);
 }
@@ -176,9 +162,7 @@ void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
     check_range(key, axis);
   } else if (axis.has_distribution()) {
     check_distribution(key, axis);
-  } else if (!axis.expression().empty()) {
-    check_expression(axis);
-  } else {
+  } else if (axis.expression().empty()) {
     check_list(key, axis, kind);
   }
 }
@@ -194,8 +178,9 @@ void check_axes(const Block& block) {
   }
   for (const auto& key : solver::point_keys()) {
     if (!keys.test(key_number(key.name))) {
-      throw MissingKey(fmt::format("{} is missing: every block needs H, mu and e ({}: {}, {})",
-                                   key.name, key.name, key.meaning, key.allowed));
+      throw InputError(key.name,
+                       fmt::format("{0} is missing: every block needs H, mu and e ({0}: {1}, {2})",
+                                   key.name, key.meaning, key.allowed));
     }
   }
   const auto last = point_axes(block);
@@ -229,17 +214,18 @@ void check_zip(const Block& block) {
 void check_sample(const Block& block) {
   const Sample& sample = block.sample();
   constexpr std::uint64_t kLargestSeed = std::numeric_limits<std::int64_t>::max();
-  require(!block.zip(), "a block has both `zip` and `sample`: give one of them");
-  require(SampleKind_IsValid(sample.kind()), "sample: its kind is unknown");
+  constexpr std::string_view kKey = "sample";
+  require(!block.zip(), "a block has both `zip` and `{}`: give one of them", kKey);
+  require(SampleKind_IsValid(sample.kind()), "{}: its kind is unknown", kKey);
   require(sample.seed() <= kLargestSeed,
-          "sample: seed = {} is not allowed: it must be at most {}, the largest in a study file",
+          "{}: seed = {} is not allowed: it must be at most {}, the largest in a study file", kKey,
           sample.seed(), kLargestSeed);
-  require(sample.count() > 0, "sample: count = 0 is not allowed: count must be at least 1");
+  require(sample.count() > 0, "{}: count = 0 is not allowed: count must be at least 1", kKey);
   const auto drawn = std::count_if(block.axes().begin(), block.axes().end(), is_drawn);
   require(drawn > 0,
-          "sample: there is nothing to draw, for every axis has one value: give one from and to");
+          "{}: there is nothing to draw, for every axis has one value: give one from and to", kKey);
   require(sample.kind() != SAMPLE_SOBOL || drawn <= sampling::kSobolDimensions,
-          "sample: {} axes are drawn, and Sobol's sequence has {} dimensions: take lhs or random",
+          "{}: {} axes are drawn, and Sobol's sequence has {} dimensions: take lhs or random", kKey,
           drawn, sampling::kSobolDimensions);
 }
 
@@ -277,10 +263,6 @@ void check_ends(const ParameterKey& key, double from, double to) {
           key.name, from, to);
 }
 
-void check_axis(const Axis& axis, BlockKind kind) {
-  check_values(axis_key(axis.key()), axis, kind);
-}
-
 void check_block(const solver::ModelParameters& model, const Block& block) {
   check_axes(block);
   if (block.has_sample()) {
@@ -294,18 +276,15 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
   }
 }
 
-std::string expression_in_words(std::string_view key, std::string_view text) {
-  return fmt::format("{} = \"{}\"", key, excerpt(text));
-}
-
 void check_size(const Recipe& recipe) {
   const std::size_t bytes = recipe.ByteSizeLong();
-  require(
-      bytes <= kLongestRecipe,
-      "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
-      "values as ranges, or long columns of a CSV file as several studies; a value that is "
-      "listed takes 8 bytes",
-      bytes, kLongestRecipe);
+  if (bytes > kLongestRecipe) {
+    throw InputError(fmt::format(
+        "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
+        "values as ranges, or long columns of a CSV file as several studies; a value that is "
+        "listed takes 8 bytes",
+        bytes, kLongestRecipe));
+  }
 }
 
 bool parse_recipe(std::string_view bytes, Recipe& recipe) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <string>
 #include <string_view>
 
 #include "proto/oblique.pb.h"
@@ -8,47 +7,23 @@
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 
-// The rules for studies. Parsers of files and flags call these functions and put the place before
-// the message; the server calls them again for a received study.
+// The rules for studies. Parsers of files and flags call these functions, and the server calls them
+// again for a received study. Every InputError has the key.
 namespace oblique::protocol {
 
-/// A block lacks H, mu or e. The message begins with the key.
-class MissingKey : public solver::InputError {
- public:
-  using solver::InputError::InputError;
-};
-
-/// Throws InputError, which names key, value and what is allowed, unless the axis is a list, a
-/// rising range, an expression or, in a sample, a distribution, and each value is finite and in the
-/// key's domain. Except in a zip a list must not have a value twice. Of an expression only the text
-/// is checked. Reads each value of a list, and three of a range.
-void check_axis(const Axis& axis, BlockKind kind = BlockKind::kProduct);
-
-/// The same for the two ends of a range whose count is not known yet.
+/// Throws InputError unless the ends of a range are allowed and rise.
 void check_ends(const solver::ParameterKey& key, double from, double to);
 
-/// Throws InputError unless the axes of a block are allowed, each once, in order, and fit the kind
-/// of the block, and no H is larger than the length of the shortest finger of the block. Throws
-/// MissingKey if H, mu or e is missing. H is not compared with the length in blocks where this
-/// depends on the point (`is_judged_by_points`).
+/// Throws InputError, which names key, value and what is allowed, unless each axis of a block is a
+/// list, a rising range, an expression or, in a sample, a distribution, and each value is finite
+/// and in the key's domain; unless the axes are in order, each once, and fit the kind of the block,
+/// and no H is larger than the length of the shortest finger of the block. H is not compared with
+/// the length in blocks where this depends on the point (`is_judged_by_points`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
 /// Whether some values, or whether H is within the finger's length, can be checked only point by
 /// point.
 bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
-
-/// The beginning of a message about an expression: `I = "A^2 / (4 * pi)"`.
-std::string expression_in_words(std::string_view key, std::string_view text);
-
-/// Calls `act` and puts these words before the message of an InputError.
-template <typename Act>
-auto in_expression(std::string_view key, std::string_view text, Act act) {
-  try {
-    return act();
-  } catch (const solver::InputError& fault) {
-    throw solver::InputError(expression_in_words(key, text) + ": " + fault.what());
-  }
-}
 
 /// Throws InputError for a recipe that is too long to be sent to a worker in one frame.
 void check_size(const Recipe& recipe);

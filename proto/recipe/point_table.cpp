@@ -19,6 +19,7 @@
 #include "proto/recipe/expression.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/sampling.h"
+#include "proto/text.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
 
@@ -41,6 +42,17 @@ std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, con
   return static_cast<std::size_t>(next - places.begin()) - 1;
 }
 
+/// Calls `work`. An InputError that it throws gets the key and the expression.
+template <typename Work>
+auto in_expression(std::string_view key, std::string_view text, Work work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw InputError(
+        {.text = error.fields().text, .key = std::string(key), .expression = excerpt(text)});
+  }
+}
+
 }  // namespace
 
 /// The points of one block of any kind, each computed from its number.
@@ -60,7 +72,9 @@ class PointTable::BlockPoints {
   std::vector<double> values_at(std::uint64_t point) const;
   bool is_left_in(std::span<const double> values) const;
   solver::ModelParameters model(solver::ModelParameters base, std::span<const double> values) const;
-  std::string fault(const solver::ModelParameters& base, std::span<const double> values) const;
+  /// Why the point cannot be solved, with the values; none if it can be.
+  std::optional<InputError> fault(const solver::ModelParameters& base,
+                                  std::span<const double> values) const;
   /// H, mu and e.
   std::span<const double> point_values(std::span<const double> values) const {
     return values.subspan(sources_.size() - kPointKeyOrder.size(), kPointKeyOrder.size());
@@ -177,9 +191,11 @@ void PointTable::BlockPoints::sort(std::vector<Formula> formulas) {
       for (const Formula& formula : formulas) {
         circle.emplace_back(sources_[formula.axis].layout.axis->key());
       }
-      throw InputError(fmt::format(
-          "{}: the expressions go round in a circle: one must follow from keys that do not",
-          fmt::join(circle, ", ")));
+      throw InputError(
+          circle.front(),
+          fmt::format(
+              "{}: the expressions go round in a circle: one must follow from keys that do not",
+              fmt::join(circle, ", ")));
     }
     formulas_.push_back(std::move(*next));
     formulas.erase(next);
@@ -257,13 +273,13 @@ solver::ModelParameters PointTable::BlockPoints::model(solver::ModelParameters b
   return base;
 }
 
-std::string PointTable::BlockPoints::fault(const solver::ModelParameters& base,
-                                           std::span<const double> values) const {
+std::optional<InputError> PointTable::BlockPoints::fault(const solver::ModelParameters& base,
+                                                         std::span<const double> values) const {
   if (filter_ && std::isnan(filter_->expression.value_at(values))) {
-    return fmt::format("where has no value: {}", in_words(values));
+    return InputError("where", "where has no value: " + in_words(values));
   }
   if (!is_left_in(values)) {
-    return {};
+    return std::nullopt;
   }
   try {
     for (const Formula& formula : formulas_) {
@@ -271,10 +287,11 @@ std::string PointTable::BlockPoints::fault(const solver::ModelParameters& base,
     }
     const auto point = point_values(values);
     solver::validate_point(model(base, values), point[0], point[1], point[2]);
-  } catch (const InputError& fault) {
-    return fmt::format("{}: {}", fault.what(), in_words(values));
+  } catch (const InputError& error) {
+    const auto& fields = error.fields();
+    return InputError(fields.key, fields.text + ": " + in_words(values));
   }
-  return {};
+  return std::nullopt;
 }
 
 /// "k = 1e7, H = 0.3, mu = 0.1, e = 1"
@@ -287,17 +304,17 @@ std::string PointTable::BlockPoints::in_words(std::span<const double> values) co
   return words;
 }
 
-/// Calls `act`. If there are several blocks, puts the block's number before the message of its
-/// error.
+/// Calls `act`. Its error gets the block's number, if there are several blocks.
 template <typename Act>
 void PointTable::in_block(std::size_t number, Act act) const {
   try {
     act();
   } catch (const InputError& error) {
-    if (recipe_->blocks_size() == 1) {
-      throw;
+    InputError::Fields fields = error.fields();
+    if (recipe_->blocks_size() > 1) {
+      fields.block = number;
     }
-    throw InputError(fmt::format("block {}: {}", number + 1, error.what()));
+    throw InputError(std::move(fields));
   }
 }
 
@@ -438,9 +455,12 @@ std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) 
 std::string PointTable::fault(std::uint64_t index) const {
   const std::size_t block = block_of_point(index);
   const BlockPoints& points = block_points_[block];
-  return blocks_[block].is_judged_by_points
-             ? points.fault(base_model_, points.values_at(index - blocks_[block].first_point))
-             : "";
+  if (!blocks_[block].is_judged_by_points) {
+    return {};
+  }
+  const auto fault =
+      points.fault(base_model_, points.values_at(index - blocks_[block].first_point));
+  return fault ? fault->what() : "";
 }
 
 bool PointTable::needs_judging() const {
@@ -467,14 +487,16 @@ void PointTable::judge_block(std::size_t number, std::uint64_t most) const {
   for (std::uint64_t look = 0; look < std::min(place.points, most); ++look) {
     const std::uint64_t i = judges_all ? look : sampling::hashed(number, look) % place.points;
     const auto values = points.values_at(i);
-    if (const std::string fault = points.fault(base_model_, values); !fault.empty()) {
-      throw InputError(fmt::format("point {}: {}", place.first_point + i, fault));
+    if (const auto fault = points.fault(base_model_, values)) {
+      throw InputError({.text = fault->fields().text,
+                        .key = fault->fields().key,
+                        .point = place.first_point + i});
     }
     leaves_any_in = leaves_any_in || points.is_left_in(values);
   }
   if (judges_all && !leaves_any_in) {
-    const std::string& where = recipe_->blocks(static_cast<int>(number)).where();
-    throw InputError(expression_in_words("where", where) + " leaves no point in");
+    in_expression("where", recipe_->blocks(static_cast<int>(number)).where(),
+                  [] { throw InputError("it leaves no point in"); });
   }
 }
 

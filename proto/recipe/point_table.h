@@ -46,9 +46,8 @@ struct BlockPlace {
 /// not grow with the number of points. Threads may share it once it is const.
 class PointTable {
  public:
-  /// Throws solver::InputError naming key, value and what is allowed for a recipe without a model
-  /// or blocks, for too many points, blocks or expressions, for expressions that have unknown names
-  /// or depend on themselves, and for what `check_block` refuses. `judge_points` judges the rest.
+  /// Throws solver::InputError for a recipe without a model or blocks, too many points, blocks or
+  /// expressions, expressions with unknown names or circles, and for what `check_block` refuses.
   explicit PointTable(Recipe recipe);
   ~PointTable();
   PointTable(PointTable&&) noexcept;
@@ -65,17 +64,15 @@ class PointTable {
   bool has_filter() const { return has_filter_; }
   /// Whether the filter keeps the point. A filter that is NaN does not.
   bool is_left_in(std::uint64_t index) const;
-  /// The first point of [begin, end) that filters keep, or `end`. Throws std::out_of_range for an
-  /// end beyond the last point.
+  /// The first point of [begin, end) that filters keep, or `end`.
   std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
 
   /// Whether some values or filters can be checked only at points.
   bool needs_judging() const;
-  /// Checks such blocks at all of their points or, if these are more than `kMostJudged` in all
-  /// blocks together, at random points. Takes up to about 0.1 s. Throws solver::InputError, which
-  /// names block, point and values, for a value that is not allowed. Also throws for a filter that
-  /// leaves out all points of its block, if all were checked. A point with a wrong value that was
-  /// not found fails later (`fault`).
+  /// Checks such blocks at all of their points, or at `kMostJudged` random points of all blocks
+  /// together (about 0.1 s). Throws solver::InputError with block and point for a value that is not
+  /// allowed, and for a filter that leaves out all points of its block. A wrong value that was not
+  /// found fails later (`fault`).
   void judge_points() const;
   static constexpr std::uint64_t kMostJudged = 100'000;
 
@@ -83,18 +80,17 @@ class PointTable {
   /// if nothing is wrong.
   std::string fault(std::uint64_t index) const;
 
-  /// Throw std::out_of_range for a point or model outside the study. A value that is not finite is
-  /// returned as 0, a model value that is not allowed as that of the recipe's model.
+  // The functions below throw std::out_of_range for a point, model or block outside the study.
+
+  /// A value that is not finite becomes 0, a model value that is not allowed that of the recipe.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
-  /// The values of a point in the order of the axes of its block. Those of expressions may be out
-  /// of range or NaN.
+  /// In the order of the axes of the point's block. Those of expressions may not be allowed.
   std::vector<double> values(std::uint64_t index) const;
   /// The longest run of points around `index` that share its model. Adjacent blocks without model
-  /// axes are one run, so that many small blocks are leased and solved like one large block.
+  /// axes are one run.
   Segment segment_at(std::uint64_t index) const;
 
-  /// Throw std::out_of_range for a block or point outside the study.
   const BlockPlace& block(std::size_t number) const { return blocks_.at(number); }
   std::size_t block_of_point(std::uint64_t index) const;
 

@@ -29,29 +29,28 @@ Axis axis_of(const solver::ParameterKey& key) {
 constexpr std::array<std::string_view, 3> kDistributions{"uniform", "log-uniform", "normal"};
 constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
 
-/// The index of a name in `names`. `what` begins the message about an unknown name.
+/// The index of a name in `names`.
 int number_of_name(std::string_view name, std::span<const std::string_view> names,
-                   std::string_view what) {
+                   std::string_view key) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
-    throw InputError(fmt::format("{} \"{}\" is not known{}: it must be one of {}", what,
-                                 excerpt(name), did_you_mean(name, names), joined(names)));
+    throw InputError(key, fmt::format("the {} \"{}\" is not known{}: it must be one of {}", key,
+                                      excerpt(name), did_you_mean(name, names), joined(names)));
   }
   return static_cast<int>(found - names.begin());
 }
 
 }  // namespace
 
-Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values,
-                 BlockKind kind) {
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values) {
   Axis axis = axis_of(key);
   axis.mutable_values()->Assign(values.begin(), values.end());
-  check_axis(axis, kind);
   return axis;
 }
 
 void throw_wrong_count(const solver::ParameterKey& key, std::string_view written) {
   throw InputError(
+      key.name,
       fmt::format("{}: count = {} is not allowed: count must be a whole number, at least 1",
                   key.name, written));
 }
@@ -66,7 +65,6 @@ Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::
   axis.set_to(to);
   axis.set_count(static_cast<std::uint64_t>(count));
   axis.set_spacing(spacing);
-  check_axis(axis);
   return axis;
 }
 
@@ -75,6 +73,7 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   const double steps = (to - from) / step;
   if (!(std::isfinite(step) && step > 0.0 && steps <= static_cast<double>(kMaxPoints))) {
     throw InputError(
+        key.name,
         fmt::format("{}: step = {} is not allowed: step must be > 0 and make at most {} values",
                     key.name, exact_number(step), kMaxPoints));
   }
@@ -85,6 +84,7 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;
     throw InputError(
+        key.name,
         fmt::format("{}: step = {} does not lead from {} to {}: the value after {} would be {}; "
                     "change `to` or the step, or give `count`",
                     key.name, exact_number(step), exact_number(from), exact_number(to),
@@ -93,17 +93,20 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   return counted_axis(key, from, to, static_cast<std::int64_t>(whole_steps) + 1);
 }
 
-Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written,
-                BlockKind kind) {
+Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& written) {
   const bool is_normal = written.kind == DISTRIBUTION_NORMAL;
-  const bool has_all = is_normal ? written.mean && written.sd : written.from && written.to;
-  if (!has_all || (!is_normal && (written.mean || written.sd))) {
-    throw InputError(fmt::format(
-        "{}: {}", key.name,
-        is_normal ? "a normal distribution needs mean and sd, its standard deviation; from and to "
-                    "cut it off"
-                  : fmt::format("a {} distribution needs from and to, and nothing else",
-                                name_of(written.kind))));
+  const bool is_complete = is_normal ? written.mean && written.sd
+                                     : written.from && written.to && !written.mean && !written.sd;
+  if (!is_complete) {
+    throw InputError(
+        key.name,
+        fmt::format(
+            "{}: {}", key.name,
+            is_normal
+                ? "a normal distribution needs mean and sd, its standard deviation; from and to "
+                  "cut it off"
+                : fmt::format("a {} distribution needs from and to, and nothing else",
+                              name_of(written.kind))));
   }
   Axis axis = axis_of(key);
   Distribution& distribution = *axis.mutable_distribution();
@@ -116,14 +119,12 @@ Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& writ
   }
   distribution.set_mean(written.mean.value_or(0.0));
   distribution.set_sd(written.sd.value_or(0.0));
-  check_axis(axis, kind);
   return axis;
 }
 
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text) {
   Axis axis = axis_of(key);
   axis.set_expression(std::string(text));
-  check_axis(axis);
   return axis;
 }
 
@@ -131,12 +132,13 @@ Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t se
   for (const auto& [name, value, least] : {std::tuple{"count", count, 1}, {"seed", seed, 0}}) {
     if (value < least) {
       throw InputError(
+          "sample",
           fmt::format("sample: {} = {} is not allowed: it must be a whole number, at least {}",
                       name, value, least));
     }
   }
   Sample sample;
-  sample.set_kind(static_cast<SampleKind>(number_of_name(kind, kSamples, "the sample")));
+  sample.set_kind(static_cast<SampleKind>(number_of_name(kind, kSamples, "sample")));
   sample.set_count(static_cast<std::uint64_t>(count));
   sample.set_seed(static_cast<std::uint64_t>(seed));
   return sample;
@@ -155,8 +157,7 @@ std::string_view name_of(SampleKind kind) {
 }
 
 DistributionKind distribution_named(std::string_view name) {
-  return static_cast<DistributionKind>(
-      number_of_name(name, distribution_names(), "the distribution"));
+  return static_cast<DistributionKind>(number_of_name(name, distribution_names(), "distribution"));
 }
 
 const solver::ParameterKey& model_key(std::string_view name) {
@@ -167,8 +168,8 @@ const solver::ParameterKey& model_key(std::string_view name) {
   for (const auto& key : solver::model_keys()) {
     known.push_back(key.name);
   }
-  throw solver::InputError(
-      fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
+  throw InputError(
+      name, fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
 }
 
 void WrittenModel::set_preset(std::string_view name) {
@@ -179,10 +180,12 @@ void WrittenModel::set_lengths(std::vector<double> lengths_m) {
   lengths_m_ = std::move(lengths_m);
   check_lengths_alone();
   if (lengths_m_->empty()) {
-    throw solver::InputError("lengths = [] is not allowed: give the lengths in m, one a link");
+    throw InputError(kLengths, "lengths = [] is not allowed: give the lengths in m, one a link");
   }
+  solver::ParameterKey key = model_key("length");
+  key.name = kLengths;
   for (const double length_m : *lengths_m_) {
-    solver::check_value(model_key("length"), length_m);
+    solver::check_value(key, length_m);
   }
 }
 
@@ -194,7 +197,7 @@ void WrittenModel::set(std::string_view key, double value) {
 
 void WrittenModel::check_lengths_alone() const {
   if (lengths_m_ && (values_.contains("links") || values_.contains("length"))) {
-    throw solver::InputError(std::string(kLengthsStandAlone));
+    throw InputError(kLengths, std::string(kLengthsStandAlone));
   }
 }
 

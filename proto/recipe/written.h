@@ -9,15 +9,13 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "proto/recipe/blocks.h"
 #include "worker/solver/model/parameters.h"
 
-// What people write of a study in files and flags. Each function throws InputError, which names
-// key, value and what is allowed.
+// Parts of study files and flags as parts of recipes. Each function throws InputError for what a
+// recipe cannot hold; PointTable checks the values.
 namespace oblique::protocol {
 
-Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values,
-                 BlockKind kind = BlockKind::kProduct);
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values);
 
 /// `count` values including both ends.
 Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,
@@ -35,9 +33,7 @@ struct WrittenDistribution {
   std::optional<double> mean;
   std::optional<double> sd;
 };
-/// `kind` must be `kSample`.
-Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& distribution,
-                BlockKind kind);
+Axis drawn_axis(const solver::ParameterKey& key, const WrittenDistribution& distribution);
 
 /// An axis computed from others by an expression such as "A^2 / (4 * pi)".
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text);

@@ -40,42 +40,21 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
              zmq::const_buffer(key.pair.secret_key.data(), key.pair.secret_key.bytes().size()));
 }
 
-constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
-                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
-
-constexpr int kAttemptEvents = ZMQ_EVENT_CONNECTED | ZMQ_EVENT_CONNECT_RETRIED;
-
-/// Makes libzmq report `events` of `socket` under the name that is returned. That of a socket which
-/// was closed just now may still be taken.
-std::string monitored(zmq::socket_t& socket, int events) {
-  for (int number = 0;; ++number) {
-    std::string name = "inproc://connections-" + std::to_string(number);
-    if (zmq_socket_monitor(socket.handle(), name.c_str(), events) == 0) {
-      return name;
-    }
-    if (zmq_errno() != EADDRINUSE) {
-      throw zmq::error_t();
-    }
-  }
-}
-
 /// Why a server that has keys rejected ours. It sends the same answer for unknown keys and for keys
 /// for its other port.
 std::string key_objection(std::uint32_t status, const DealerSettings& settings) {
   constexpr std::uint32_t kNotAdmitted = 400;
   if (status != kNotAdmitted) {
-    return fmt::format(
-        "the public key of the server in that file, {}, is not its own, which its log shows at the "
-        "start",
-        z85(settings.key->server.value_or(CurveKey{})));
+    return "the public key of the server in that file is not its own, which its log shows at the "
+           "start";
   }
   if ((settings.key->role == Role::kWorker) != settings.is_worker) {
     return settings.is_worker ? "it is for clients, and this port is for workers"
                               : "it is for workers, and this port is for clients";
   }
   return fmt::format(
-      "the key is not on the server's list, or was revoked, or this is not its port for {}. Where "
-      "the server is, `oblique keys list` shows the list and `oblique keys add` adds to it",
+      "the key is not on the server's list, or was revoked, or this is not its port for {}. On the "
+      "server, `oblique keys list` shows the list and `oblique keys add` adds to it",
       settings.is_worker ? "workers (by default 7601)" : "clients (by default 7600)");
 }
 
@@ -123,9 +102,19 @@ void connect_again(zmq::socket_t& socket, const DealerSettings& settings, unsign
 SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,
                              DealerSettings settings, bool with_attempts)
     : socket_(socket), settings_(std::move(settings)), events_(context, zmq::socket_type::pair) {
-  const std::string name = monitored(socket_, kEvents | (with_attempts ? kAttemptEvents : 0));
+  const int events = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
+                     ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL |
+                     (with_attempts ? ZMQ_EVENT_CONNECTED | ZMQ_EVENT_CONNECT_RETRIED : 0);
+  const auto name = [](int number) { return "inproc://connections-" + std::to_string(number); };
+  int number = 0;
+  while (zmq_socket_monitor(socket_.handle(), name(number).c_str(), events) != 0) {
+    if (zmq_errno() != EADDRINUSE) {  // the name of a socket that was closed just now
+      throw zmq::error_t();
+    }
+    ++number;
+  }
   events_.set(zmq::sockopt::linger, 0);
-  events_.connect(name);
+  events_.connect(name(number));
 }
 
 SocketMonitor::~SocketMonitor() {

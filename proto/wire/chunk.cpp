@@ -28,10 +28,10 @@ bool take(std::string_view& bytes, Number& number) {
 
 /// Moves a cell from the beginning of `bytes`; false when there is no whole one.
 bool take_cell(std::string_view& bytes, Cell& cell) {
+  std::uint32_t length = 0;
   if (!take(bytes, cell.kind)) {
     return false;
   }
-  std::uint32_t length = 0;
   switch (cell.kind) {
     case CellKind::kNull:
       return true;
@@ -50,31 +50,26 @@ bool take_cell(std::string_view& bytes, Cell& cell) {
   return false;
 }
 
+/// The alternatives of a Value are in the order of the kinds.
 Cell cell_of(const Value& value) {
+  Cell cell{.kind = static_cast<CellKind>(value.index())};
   if (const auto* integer = std::get_if<std::int64_t>(&value)) {
-    return {.kind = CellKind::kInteger, .integer = *integer};
+    cell.integer = *integer;
+  } else if (const auto* real = std::get_if<double>(&value)) {
+    cell.real = *real;
+  } else if (const auto* text = std::get_if<std::string>(&value)) {
+    cell.text = *text;
   }
-  if (const auto* real = std::get_if<double>(&value)) {
-    return {.kind = CellKind::kReal, .real = *real};
-  }
-  const auto* text = std::get_if<std::string>(&value);
-  return text == nullptr ? Cell{} : Cell{.kind = CellKind::kText, .text = *text};
+  return cell;
 }
 
 }  // namespace
 
 Value value_of(const Cell& cell) {
-  switch (cell.kind) {
-    case CellKind::kInteger:
-      return cell.integer;
-    case CellKind::kReal:
-      return cell.real;
-    case CellKind::kText:
-      return std::string(cell.text);
-    case CellKind::kNull:
-      break;
-  }
-  return {};
+  return cell.kind == CellKind::kInteger ? Value(cell.integer)
+         : cell.kind == CellKind::kReal  ? Value(cell.real)
+         : cell.kind == CellKind::kText  ? Value(std::string(cell.text))
+                                         : Value();
 }
 
 bool is_sound(const QueryReply& chunk) {
@@ -108,26 +103,18 @@ bool ChunkRows::next() {
   return true;
 }
 
-ChunkWriter::ChunkWriter(std::vector<std::string> columns) : columns_(std::move(columns)) {}
-
 void ChunkWriter::cell(const Cell& value) {
   if (column_++ >= columns_.size()) {
     throw std::logic_error("a row has more values than there are columns");
   }
-  cells_.push_back(static_cast<char>(value.kind));
-  switch (value.kind) {
-    case CellKind::kNull:
-      break;
-    case CellKind::kInteger:
-      append(cells_, value.integer);
-      break;
-    case CellKind::kReal:
-      append(cells_, value.real);
-      break;
-    case CellKind::kText:
-      append(cells_, static_cast<std::uint32_t>(value.text.size()));
-      cells_.append(value.text);
-      break;
+  append(cells_, value.kind);
+  if (value.kind == CellKind::kInteger) {
+    append(cells_, value.integer);
+  } else if (value.kind == CellKind::kReal) {
+    append(cells_, value.real);
+  } else if (value.kind == CellKind::kText) {
+    append(cells_, static_cast<std::uint32_t>(value.text.size()));
+    cells_.append(value.text);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -57,11 +58,10 @@ class ChunkRows {
   std::uint64_t rows_left_;
 };
 
-/// Collects rows into chunks. A row is written value by value, in the order of the columns, and
-/// then ended.
+/// Collects rows into chunks, value by value in the order of the columns.
 class ChunkWriter {
  public:
-  explicit ChunkWriter(std::vector<std::string> columns);
+  explicit ChunkWriter(std::vector<std::string> columns) : columns_(std::move(columns)) {}
 
   void null() { cell({}); }
   void integer(std::int64_t value) { cell({.kind = CellKind::kInteger, .integer = value}); }
@@ -69,22 +69,20 @@ class ChunkWriter {
   void text(std::string_view value) { cell({.kind = CellKind::kText, .text = value}); }
   /// Throws std::logic_error when the row has a value for each column already.
   void cell(const Cell& value);
-  /// Throws std::logic_error when the row does not have as many values as there are columns.
+  /// Throws std::logic_error unless the row has a value for each column.
   void end_row();
 
-  /// Complete rows since the last `take`.
+  /// Complete rows since the last `take`, and bytes including an unfinished row.
   std::uint64_t rows() const { return rows_; }
-  /// Size of the chunk's cells, including the row that is being written.
   std::uint64_t bytes() const { return cells_.size(); }
 
-  /// The rows written since the last call. The caller sets the number of the chunk and whether it
-  /// is the last one.
+  /// The rows since the last call. The caller numbers the chunk and marks the last one.
   QueryReply take();
 
  private:
   std::vector<std::string> columns_;
   std::string cells_;
-  std::size_t column_ = 0;  // of the next value
+  std::size_t column_ = 0;  ///< of the next value
   std::uint64_t rows_ = 0;
 };
 

@@ -20,7 +20,7 @@ CodedInputStream stream_of(std::string_view bytes) {
                           static_cast<int>(bytes.size()));
 }
 
-/// What a message holds at a path of field numbers.
+/// The fields of a message at a path of field numbers.
 struct Found {
   std::size_t fields = 0;
   std::size_t bytes = 0;  ///< of texts, packed lists and messages
@@ -30,29 +30,26 @@ struct Found {
 void find(std::string_view message, std::span<const int> path, Found& found) {
   CodedInputStream in = stream_of(message);
   while (const std::uint32_t tag = in.ReadTag()) {
-    std::string_view bytes;
-    bool is_read = true;
-    if (WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
-      std::uint32_t length = 0;
-      is_read = in.ReadVarint32(&length);
-      const auto begin = static_cast<std::size_t>(in.CurrentPosition());
-      is_read = is_read && length <= message.size() - begin && in.Skip(static_cast<int>(length));
-      bytes = is_read ? message.substr(begin, length) : bytes;
-    } else {
-      is_read = WireFormatLite::SkipField(&in, tag);
-    }
-    if (!is_read) {
+    const auto begin = static_cast<std::size_t>(in.CurrentPosition());
+    if (!WireFormatLite::SkipField(&in, tag)) {
       break;
     }
     if (WireFormatLite::GetTagFieldNumber(tag) != path.front()) {
       continue;
     }
+    std::string_view bytes;
+    if (WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
+      bytes = message.substr(begin, static_cast<std::size_t>(in.CurrentPosition()) - begin);
+      std::uint32_t length = 0;
+      stream_of(bytes).ReadVarint32(&length);
+      bytes.remove_prefix(bytes.size() - length);
+    }
     if (path.size() > 1) {
       find(bytes, path.subspan(1), found);
-      continue;
+    } else {
+      ++found.fields;
+      found.bytes += bytes.size();
     }
-    ++found.fields;
-    found.bytes += bytes.size();
   }
   found.is_whole = found.is_whole && in.ConsumedEntireMessage();
 }

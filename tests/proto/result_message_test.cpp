@@ -1,8 +1,9 @@
 #include "proto/result_message.h"
 
-#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -51,51 +52,6 @@ solver::CaseResult distinct_result() {
   return result;
 }
 
-std::vector<double> numbers(const google::protobuf::RepeatedField<double>& field) {
-  return {field.begin(), field.end()};
-}
-
-TEST(PointResultTest, ScalarsTravelByTypeInTheOrderThatTheWorkerSays) {
-  const PointResult message = to_message(42, distinct_result());
-  EXPECT_EQ(message.point(), 42U);
-  EXPECT_TRUE(message.error().empty());
-  // As rows of the database were made of them before they stood in one table.
-  EXPECT_EQ(
-      sent_outputs(),
-      "fall_time_s impact_x_m vt_in_m_s vn_in_m_s duration_s fn_peak_N ft_peak_N"
-      " impulse_n_Ns impulse_t_Ns slide_m vt_out_m_s vn_out_m_s margin stick_total_s kinetic_in_J"
-      " friction_J restitution_J kinetic_change_J strain_change_J gravity_change_J"
-      " exchanged_J closure fn_peak_error ft_peak_error duration_error stick_total_error "
-      "slide_error"
-      " impulse_n_error impulse_t_error v_out_error dt_s wall_s mode_same steps mode major_mode"
-      " margin_event");
-  EXPECT_EQ(
-      numbers(message.reals()),
-      (std::vector<double>{0.43, 0.58,  -5.7, -5.2, 5.5e-4, 5057.0, 2023.0, 0.7,  0.3,  1e-3, -4.0,
-                           2.0,  0.021, 7e-5, 1.0,  2.0,    3.0,    4.0,    5.0,  6.0,  7.0,  8.0,
-                           0.01, 0.02,  0.03, 0.04, 0.05,   0.06,   0.07,   0.08, 4e-6, 3e-4}));
-  ASSERT_EQ(message.whole_numbers_size(), 2);
-  EXPECT_EQ(message.whole_numbers(0), 1);
-  EXPECT_EQ(message.whole_numbers(1), 138);
-  ASSERT_EQ(message.texts_size(), 3);
-  EXPECT_EQ(message.texts(0), "SC SR sR");
-  EXPECT_EQ(message.texts(1), "SC SR");
-  EXPECT_EQ(message.texts(2), "turn");
-}
-
-TEST(PointResultTest, ListsOfAResultArePackedInOrder) {
-  const PointResult message = to_message(0, distinct_result());
-  EXPECT_EQ(numbers(message.peaks()),
-            (std::vector<double>{1e-5, 5057.0, 2023.0, 2e-5, 40.0, 16.0, 3e-5, 1516.0, 606.0}));
-  EXPECT_EQ(std::vector<std::uint32_t>(message.major_peaks().begin(), message.major_peaks().end()),
-            (std::vector<std::uint32_t>{0, 2}));
-  EXPECT_EQ(numbers(message.ft_peaks()), (std::vector<double>{1.1e-5, 2023.0, 3.1e-5, 607.0}));
-  EXPECT_EQ(numbers(message.phase_ends_s()), (std::vector<double>{6.8e-5, 5.5e-4}));
-  EXPECT_EQ(numbers(message.stick_intervals()), (std::vector<double>{0.0, 6e-5, 8e-5, 9e-5}));
-  EXPECT_EQ(numbers(message.reaction_peaks()),
-            (std::vector<double>{3.2e-4, 5053.0, 3.4e-4, 4611.0}));
-}
-
 TEST(PointResultTest, AResultComesBackFromItsFrame) {
   const auto sent = distinct_result();
   PointResult message;
@@ -138,46 +94,28 @@ TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
   EXPECT_EQ(fault_of(failed_point(7, "")), "");
 }
 
-TEST(PointResultTest, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
+TEST(PointResultTest, ANumberThatCannotBeStoredIsFoundWhereverItIs) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const PointResult sound = to_message(0, distinct_result());
-  int i = 0;
-  solver::for_each_sent<double>([&](const auto& field, const auto& member) {
-    PointResult message = sound;
-    message.set_reals(i, kNotANumber);
-    EXPECT_THAT(fault_of(message),
-                member.may_be_absent ? HasSubstr("") : HasSubstr("not a finite number"))
-        << field.name;
-    message.set_reals(i++, std::numeric_limits<double>::infinity());
-    EXPECT_THAT(fault_of(message), HasSubstr("not a finite number")) << field.name;
-  });
-  PointResult closing = sound;
-  closing.set_reals(21, std::numeric_limits<double>::infinity());
-  EXPECT_THAT(fault_of(closing), HasSubstr("closure"));
-  for (auto* (PointResult::*list)() :
-       {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
-        &PointResult::mutable_phase_ends_s, &PointResult::mutable_stick_intervals,
-        &PointResult::mutable_reaction_peaks}) {
-    PointResult message = sound;
-    (message.*list)()->Set(1, kNotANumber);
-    EXPECT_THAT(fault_of(message), HasSubstr("not a finite number"));
-  }
-}
-
-TEST(PointResultTest, ANumberThatNoUnitOfADatabaseHoldsIsFoundWhereverItIs) {
-  const PointResult sound = to_message(0, distinct_result());
-  for (const double number : {1e308, -1e300, 1.1e100}) {
-    for (int i = 0; i < sound.reals_size(); ++i) {
-      PointResult message = sound;
-      message.set_reals(i, number);
-      EXPECT_THAT(fault_of(message), HasSubstr("too large to be stored")) << i;
-    }
+  for (const auto& [number, says] : {std::pair{kNotANumber, "is not a finite number"},
+                                     {kInfinity, "is not a finite number"},
+                                     {1e308, "too large to be stored"},
+                                     {-1.1e100, "too large to be stored"}}) {
+    int i = 0;
+    solver::for_each_sent<double>(
+        [&, number = number, says = says](const auto& field, const auto& member) {
+          PointResult message = sound;
+          message.set_reals(i++, number);
+          const bool is_absent = member.may_be_absent && std::isnan(number);
+          EXPECT_THAT(fault_of(message), HasSubstr(is_absent ? "" : says)) << field.name;
+        });
     for (auto* (PointResult::*list)() :
          {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
           &PointResult::mutable_phase_ends_s, &PointResult::mutable_stick_intervals,
           &PointResult::mutable_reaction_peaks}) {
       PointResult message = sound;
       (message.*list)()->Set(1, number);
-      EXPECT_THAT(fault_of(message), HasSubstr("too large to be stored"));
+      EXPECT_THAT(fault_of(message), HasSubstr(says));
     }
   }
   PointResult largest = sound;

@@ -1,9 +1,7 @@
 #include "proto/toml_reader.h"
 
-#include <array>
 #include <functional>
 #include <string>
-#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +9,6 @@
 namespace oblique::protocol {
 namespace {
 
-using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 TomlReader reader() {
@@ -58,13 +55,6 @@ TEST(TomlReader, SaysWhatAValueIsAndMustBe) {
             "a.toml:1:5: x = 'text' is a string: it must be a number");
   EXPECT_EQ(error_of([&] { (void)reader().yes("y", *top.get("y")); }),
             "a.toml:2:5: y = [1, 2.5] is a list: it must be true or false");
-}
-
-TEST(TomlReader, NamesTheKeyThatAnUnknownOneMayMean) {
-  constexpr std::array<std::string_view, 2> kKnown{"count", "seed"};
-  const auto top = reader().parse("count = 1\n\nsed = 2\n");
-  EXPECT_EQ(error_of([&] { reader().refuse_unknown(top, kKnown, "sample: ", "give count"); }),
-            "a.toml:3:1: sample: unknown key `sed` (did you mean `seed`?): give count");
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 
 std::vector<double> column(const std::string& text, const std::string& name = "drop") {
-  return CsvFile::parse(text, "measured.csv").values(name, protocol::axis_key("mu"));
+  return CsvFile(text, "measured.csv").values(name, protocol::axis_key("mu"));
 }
 
 std::string csv_error(const std::string& text, const std::string& name = "drop") {
@@ -48,29 +48,9 @@ TEST(CsvFile, TakesLinesThatEndAsOldMacsEndThem) {
   EXPECT_THAT(csv_error("drop\r0.4\r0.x\r"), HasSubstr("measured.csv:3: column `drop`"));
 }
 
-TEST(CsvFile, HasAtMost4096Columns) {
-  std::string names = "drop";
-  std::string values = "0.5";
-  for (int i = 1; i < 4096; ++i) {
-    names += ",c" + std::to_string(i);
-    values += ",1";
-  }
-  EXPECT_EQ(column(names + "\n" + values + "\n"), std::vector{0.5});
-  EXPECT_THAT(csv_error(names + ",one\n" + values + ",1\n"),
-              HasSubstr("measured.csv:1: the line has more than 4096 fields"));
-}
-
 TEST(CsvFile, TakesIntegratorsByName) {
-  const auto file = CsvFile::parse("integrator\nexplicit\ngeneralized-alpha\n", "x.csv");
+  const CsvFile file("integrator\nexplicit\ngeneralized-alpha\n", "x.csv");
   EXPECT_EQ(file.values("integrator", protocol::axis_key("integrator")), (std::vector{0.0, 1.0}));
-}
-
-TEST(CsvFile, TakesAHundredThousandLines) {
-  std::string text = "n,drop\n";
-  for (int i = 0; i < 100'000; ++i) {
-    text += std::to_string(i) + ",0.5\n";
-  }
-  EXPECT_EQ(column(text).size(), 100'000U);
 }
 
 // A line is that of the file, also behind line breaks in quotes.
@@ -90,8 +70,8 @@ TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
 }
 
 TEST(CsvFile, WantsNamesAboveItsColumns) {
-  EXPECT_THAT(csv_error(""), HasSubstr("it is empty"));
-  EXPECT_THAT(csv_error("drop\n"), HasSubstr("no line with values"));
+  EXPECT_THAT(csv_error(""), HasSubstr("it needs a line with the names of columns"));
+  EXPECT_THAT(csv_error("drop\n"), HasSubstr("and lines with values"));
   EXPECT_THAT(csv_error("0.4,0.5\n0.6,0.7\n"), HasSubstr("it must name the columns"));
   EXPECT_THAT(csv_error("drop;mu\n1;2\n"), HasSubstr("semicolons"));
   EXPECT_THAT(csv_error("drop,\n1,2\n"), HasSubstr("column 2 has no name"));
@@ -104,8 +84,8 @@ TEST(CsvFiles, AreFoundBesideTheStudyAndMustBeFiles) {
   const test::TemporaryFolder folder;
   { std::ofstream(folder.file("beside.csv")) << "drop\n0.4\n"; }
   CsvFiles files(folder.path());
-  EXPECT_EQ(files.at("beside.csv").rows(), 1U);
-  EXPECT_EQ(files.at(folder.file("beside.csv")).rows(), 1U) << "also by the whole path";
+  EXPECT_EQ(files.at("beside.csv").columns().size(), 1U);
+  EXPECT_EQ(files.at(folder.file("beside.csv")).columns().size(), 1U) << "also by the whole path";
   for (const std::string path : {"nowhere.csv", ".", "/dev/zero"}) {
     EXPECT_THROW(files.at(path), solver::InputError) << path;
   }

@@ -7,9 +7,9 @@
 
 namespace oblique::client {
 
-inline constexpr const char* kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
+inline const std::string kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
 
-/// A block of one point, with a line of it replaced, or one more.
+/// A block of one point, with a line of it replaced or one added.
 inline std::string block_with(const std::string& line) {
   std::string text = "[[block]]\n";
   for (const std::string key : {"H = 1\n", "mu = 0.4\n", "e = 1\n"}) {
@@ -18,8 +18,8 @@ inline std::string block_with(const std::string& line) {
   return text;
 }
 
-/// What the text of a study file means, where falls are pretended.
-inline Study parsed(const std::string& text, const std::string& file) {
+/// The study of a file with this text, with invented falls.
+inline Study parsed(const std::string& text, const std::string& file = "x.toml") {
   return parse_study(text, file, pretended_reach());
 }
 

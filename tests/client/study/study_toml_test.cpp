@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "client/study/study_file.h"
@@ -18,7 +17,6 @@ namespace oblique::client {
 namespace {
 
 using protocol::BlockKind;
-using testing::HasSubstr;
 
 /// What is left out: whether the tip reaches H.
 void no_reach_check(const protocol::PointTable&) {}
@@ -65,33 +63,21 @@ class DrawnRecipe {
     return model;
   }
 
+  /// A list, a range or an expression; in a sample also a distribution.
   protocol::Axis axis(const std::string& name, BlockKind kind, double from, double to) {
     const auto& key = protocol::axis_key(name);
-    switch (below(5)) {
-      case 0:
-        return protocol::listed_axis(key, {real(from, to)}, kind);
-      case 1:
-        return protocol::listed_axis(key, several(from, to), kind);
-      case 2:
-        return kind == BlockKind::kSample
-                   ? protocol::drawn_axis(
-                         key, {protocol::DISTRIBUTION_LOG_UNIFORM, from, to, {}, {}}, kind)
-                   : protocol::counted_axis(
-                         key, from, to, kCount,
-                         chance(0.5) ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
-      case 3:
-        return kind == BlockKind::kSample
-                   ? protocol::drawn_axis(
-                         key,
-                         {protocol::DISTRIBUTION_NORMAL, from, to, real(from, to), real(0.1, 1.0)},
-                         kind)
-                   : protocol::counted_axis(key, from, from, 1);
-      default:
-        return kind == BlockKind::kSample
-                   ? protocol::drawn_axis(key, {protocol::DISTRIBUTION_UNIFORM, from, to, {}, {}},
-                                          kind)
-                   : protocol::expressed_axis(key, std::to_string(from) + " + 0 * (e - e)");
+    if (chance(0.3)) {
+      return protocol::listed_axis(key, chance(0.5) ? several(from, to) : std::vector{from});
     }
+    if (kind != BlockKind::kSample) {
+      return chance(0.3) ? protocol::expressed_axis(key, std::to_string(from) + " + 0 * (e - e)")
+                         : protocol::counted_axis(key, from, to, kCount,
+                                                  static_cast<protocol::Spacing>(below(2)));
+    }
+    const auto drawn = static_cast<protocol::DistributionKind>(below(3));
+    return drawn == protocol::DISTRIBUTION_NORMAL
+               ? protocol::drawn_axis(key, {drawn, from, to, real(from, to), 0.5})
+               : protocol::drawn_axis(key, {drawn, from, to, {}, {}});
   }
 
   std::vector<double> several(double from, double to) {
@@ -108,9 +94,8 @@ class DrawnRecipe {
     // At least one that is drawn, and none that asks for itself.
     axes.push_back(kind == BlockKind::kSample
                        ? protocol::drawn_axis(protocol::axis_key("e"),
-                                              {protocol::DISTRIBUTION_UNIFORM, 0.5, 1.0, {}, {}},
-                                              kind)
-                       : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0), kind));
+                                              {protocol::DISTRIBUTION_UNIFORM, 0.5, 1.0, {}, {}})
+                       : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0)));
     if (chance(0.4)) {
       axes.push_back(axis("k", kind, 1e7, 4e7));
     }
@@ -118,7 +103,7 @@ class DrawnRecipe {
       axes.push_back(axis("length2", kind, 0.35, 0.45));
     }
     if (chance(0.3)) {
-      axes.push_back(protocol::listed_axis(protocol::axis_key("integrator"), {1.0, 0.0}, kind));
+      axes.push_back(protocol::listed_axis(protocol::axis_key("integrator"), {1.0, 0.0}));
       if (kind == BlockKind::kZip) {
         axes.pop_back();
       }
@@ -172,19 +157,10 @@ TEST(StudyToml, IsAsAPersonWouldWriteIt) {
             "where = \"mu>e\"\n");
 }
 
-TEST(StudyToml, EscapesWhatANameMayHoldAndBreaksLongLists) {
+TEST(StudyToml, EscapesNames) {
   const std::string name = "\"quoted\\ \xc3\xa9";
-  std::string list;
-  for (int i = 1; i < 100; ++i) {
-    list += std::to_string(i * i) + ".5, ";
-  }
-  const auto text = written("[[block]]\nH=1\nmu=[" + list + "]\ne=1\n", name);
+  const auto text = written("[[block]]\nH=1\nmu=[0.5,1]\ne=1\n", name);
   EXPECT_EQ(parse_study(text, "x.toml", no_reach_check).name, name);
-  for (std::size_t begin = 0; begin < text.size();) {
-    const auto end = text.find('\n', begin);
-    EXPECT_LE(end - begin, 100U);
-    begin = end + 1;
-  }
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "proto/program/configuration.h"
 
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <optional>
@@ -90,16 +89,30 @@ class ConfigurationTest : public testing::Test {
 };
 
 TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
-  const std::string file = write("db = \"file.db\"\nport = 1\n[limits]\nconnections = 3\n");
+  const std::string file = write(
+      "db = \"file.db\"\nport = 1\nloud = true\n"
+      "listen = [\"127.0.0.1\", \"::1\"]\n[limits]\nconnections = 3\n");
   set("TEST_PROGRAM_PORT", "2");
   set("TEST_PROGRAM_LIMITS_CONNECTIONS", "4");
+  set("TEST_PROGRAM_LOUD", "false");
+  set("TEST_KEYS", "shared.key");
   EXPECT_EQ(parse({"--config", file, "--limits-connections", "5"}), std::nullopt) << told_;
   EXPECT_EQ(options_.db, "file.db");
   EXPECT_EQ(options_.port, 2);
   EXPECT_EQ(options_.connections, 5);
+  EXPECT_FALSE(options_.loud);
+  EXPECT_EQ(options_.listen, (std::vector<std::string>{"127.0.0.1", "::1"}));
+  EXPECT_EQ(options_.keys, "shared.key") << "of several programs";
+  set("TEST_PROGRAM_KEYS", "own.key");
+  set("TEST_PROGRAM_PORT", "");
+  set("TEST_PROGRAM_SERVICE_HOST", "10.0.0.1");
+  EXPECT_EQ(parse({"--config", file, "--listen", "::2"}), std::nullopt) << told_;
+  EXPECT_EQ(options_.keys, "own.key");
+  EXPECT_EQ(options_.port, 1) << "an empty variable and one of no setting are ignored";
+  EXPECT_EQ(options_.listen, std::vector<std::string>{"::2"}) << "a flag replaces the list";
 }
 
-TEST_F(ConfigurationTest, TheFileOfTheEnvironmentComesBeforeTheDefaultOneAndTheFlagBeforeBoth) {
+TEST_F(ConfigurationTest, TheFileIsThatOfTheFlagOrOfTheEnvironmentOrTheDefaultOne) {
   write("port = 1\n", "default.toml");
   EXPECT_EQ(parse({}), std::nullopt);
   EXPECT_EQ(options_.port, 1);
@@ -108,6 +121,9 @@ TEST_F(ConfigurationTest, TheFileOfTheEnvironmentComesBeforeTheDefaultOneAndTheF
   EXPECT_EQ(options_.port, 2);
   EXPECT_EQ(parse({"--config", write("port = 3\n")}), std::nullopt);
   EXPECT_EQ(options_.port, 3);
+  expect_refused({"--config", folder_.path().string()}, "cannot be read");
+  set("TEST_PROGRAM_CONFIG", folder_.file("gone.toml"));
+  expect_refused({}, "gone.toml");
 }
 
 TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
@@ -120,39 +136,6 @@ TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
   EXPECT_EQ(options_.keys, "");
   expect_refused({"--no-config", "--config", folder_.file("default.toml")},
                  "--config excludes --no-config");
-}
-
-TEST_F(ConfigurationTest, AVariableWithoutValueOrSettingIsIgnored) {
-  set("TEST_PROGRAM_SERVICE_HOST", "10.0.0.1");
-  set("TEST_PROGRAM_PORT", "");
-  set("TEST_PROGRAM_CONFIG", "");
-  EXPECT_EQ(parse({}), std::nullopt) << told_;
-  EXPECT_EQ(options_.port, 7600);
-}
-
-TEST_F(ConfigurationTest, AVariableOfSeveralProgramsIsWeakerThanTheProgramsOwn) {
-  set("TEST_KEYS", "shared.key");
-  EXPECT_EQ(parse({}), std::nullopt);
-  EXPECT_EQ(options_.keys, "shared.key");
-  set("TEST_PROGRAM_KEYS", "own.key");
-  EXPECT_EQ(parse({}), std::nullopt);
-  EXPECT_EQ(options_.keys, "own.key");
-}
-
-TEST_F(ConfigurationTest, ListsOfAFileAreSeveralValues) {
-  EXPECT_EQ(parse({"--config", write("listen = [\"127.0.0.1\", \"::1\"]\n")}), std::nullopt);
-  EXPECT_EQ(options_.listen, (std::vector<std::string>{"127.0.0.1", "::1"}));
-  EXPECT_EQ(parse({"--config", folder_.file("a.toml"), "--listen", "::2"}), std::nullopt);
-  EXPECT_EQ(options_.listen, std::vector<std::string>{"::2"}) << "a flag replaces the list";
-}
-
-TEST_F(ConfigurationTest, AFlagCanBeTakenBackByAStrongerPlace) {
-  const std::string file = write("loud = true\n");
-  EXPECT_EQ(parse({"--config", file}), std::nullopt);
-  EXPECT_TRUE(options_.loud);
-  set("TEST_PROGRAM_LOUD", "false");
-  EXPECT_EQ(parse({"--config", file}), std::nullopt);
-  EXPECT_FALSE(options_.loud);
 }
 
 TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
@@ -201,18 +184,10 @@ TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
   refuse("limits = 5\n", "a.toml:1:1: there is no setting limits");
 }
 
-TEST_F(ConfigurationTest, AValueOutOfRangeIsToldWithItsPlace) {
+TEST_F(ConfigurationTest, AWrongValueIsNamedWithItsPlace) {
   set("TEST_PROGRAM_PORT", "70000");
   expect_refused({}, "environment variable TEST_PROGRAM_PORT: --port: Value 70000");
   expect_refused({"--port", "80000"}, "program: --port: Value 80000");
-}
-
-TEST_F(ConfigurationTest, AFileThatIsNamedMustBeThere) {
-  expect_refused({"--config", folder_.file("missing.toml")}, "missing.toml");
-  expect_refused({"--config", folder_.path().string()}, "cannot be read");
-  expect_refused({"--config", "/dev/zero"}, "/dev/zero cannot be read: it is a device");
-  set("TEST_PROGRAM_CONFIG", folder_.file("gone.toml"));
-  expect_refused({}, "gone.toml");
 }
 
 TEST_F(ConfigurationTest, QuietIsTheShortFormOfALevel) {

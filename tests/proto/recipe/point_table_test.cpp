@@ -17,17 +17,19 @@ namespace {
 
 /// A study with every feature: several blocks, listed and ranged axes, model axes in two of them.
 Recipe varied_recipe() {
-  return recipe_of({
+  Recipe recipe = recipe_of({
       {listed("H", {0.96, 1.0, 1.04}), listed("mu", {0.4, 0.8}), range("e", 0.5, 1.0, 6)},
       {listed("k", {1e7, 2e7, 3e7}), listed("elements_per_link", {4, 8}), range("H", 0.9, 1.1, 5),
        listed("mu", {0.1}), listed("e", {1.0, 0.6})},
       {listed("H", {1.0}), range("mu", 0.0, 2.0, 9), listed("e", {0.7})},
       {range("eta2", 1.2, 1.4, 3), listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})},
   });
+  *recipe.mutable_model() = to_message(solver::preset("printed"));
+  return recipe;
 }
 
 struct ExpectedPoint {
-  solver::ModelParameters model = solver::preset("paper");
+  solver::ModelParameters model = solver::preset("printed");
   double H_m;
   double mu;
   double e_star;
@@ -105,23 +107,6 @@ TEST(PointTableTest, BlocksThatShareAModelAndFollowEachOtherAreOneSegment) {
   EXPECT_THROW(table.segment_at(13), std::out_of_range);
 }
 
-TEST(PointTableTest, BlocksWithoutModelAxesShareOneModel) {
-  const PointTable table(varied_recipe());
-  EXPECT_EQ(table.models(), 1U + 6U + 3U);
-  EXPECT_EQ(table.point(0).model, table.segment_at(36 + 60).model);
-  EXPECT_EQ(table.model(0), solver::preset("paper"));
-}
-
-TEST(PointTableTest, TheModelOfTheRecipeIsTheBaseOfEveryModelAxis) {
-  Recipe recipe = recipe_of(
-      {{listed("k", {1e7, 2e7}), listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})}});
-  *recipe.mutable_model() = to_message(solver::preset("printed"));
-  const PointTable table(recipe);
-  solver::ModelParameters expected = solver::preset("printed");
-  expected.k_N_m = 2e7;
-  EXPECT_EQ(table.model(table.point(1).model), expected);
-}
-
 TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {
   const PointTable table(recipe_of({{range("H", 0.5, 1.1, 10'000), range("mu", 0.0, 1.0, 10'000),
                                      range("e", 0.5, 1.0, 10'000)}}));
@@ -147,8 +132,6 @@ TEST(PointTableTest, ABillionModelsAreReadAtAnyModelAndNoneBeyond) {
   EXPECT_THROW(table.model(table.models()), std::out_of_range);
 }
 
-// ---- Inputs that workers send -----------------------------------------------------------------
-
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -164,20 +147,10 @@ PointResult result_of(std::uint64_t point, const PointTable& table) {
   return result;
 }
 
-TEST(PointInputs, OfEveryPointAreThoseOfItsStudy) {
-  const PointTable table = table_of_lengths();
-  for (std::uint64_t i = 0; i < table.size(); ++i) {
-    const PointResult result = result_of(i, table);
-    EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
-    const Point point = inputs_of(result, table);
-    EXPECT_EQ(point.model, table.point(i).model);
-    EXPECT_EQ(point.mu, table.point(i).mu);
-  }
-}
-
 TEST(PointInputs, MayDifferInTheLastBitsAndAreKeptAsTheyWereSent) {
   const PointTable table = table_of_lengths();
   PointResult result = result_of(3, table);
+  EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
   const double H_m = std::nextafter(result.h_m(), 1.0);
   result.set_h_m(H_m);
   result.set_mu(result.mu() * (1.0 - 0.9e-12));
@@ -240,6 +213,78 @@ TEST(PointInputs, MayBeMissingOnlyInAFailedPoint) {
   result.set_error("it never fell");
   EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
   EXPECT_EQ(inputs_of(result, table).mu, table.point(3).mu) << "the study's own";
+}
+
+using testing::AllOf;
+using testing::Each;
+using testing::Ge;
+using testing::Le;
+
+const Axis kSomeH = listed("H", {0.9});
+const Axis kSomeMu = listed("mu", {0.4});
+const Axis kSomeE = listed("e", {1.0});
+
+StudySize size_of_blocks(const std::vector<Block>& blocks) {
+  return size_of(PointTable(recipe_of_blocks(blocks)));
+}
+
+TEST(StudySize, CountsDifferentFallsExactlyUpToAHundredThousandPoints) {
+  const auto drawn = size_of_blocks(
+      {sampled({uniform("E", 6e10, 8e10), uniform("k", 1e7, 1e8), kSomeH, kSomeMu, kSomeE},
+               SAMPLE_SOBOL, 100'000)});
+  EXPECT_EQ(drawn.falls, 100'000U) << "every E falls in its own way";
+  EXPECT_FALSE(drawn.falls_estimated);
+  const auto several = size_of_blocks({sampled(
+      {range("E", 6e10, 8e10, 21), uniform("k", 1e7, 1e8), kSomeH, uniform("mu", 0.1, 1), kSomeE},
+      SAMPLE_LATIN_HYPERCUBE, 20'000)});
+  EXPECT_EQ(several.models, 20'000U);
+  EXPECT_EQ(several.falls, 21U) << "k acts in contact alone";
+}
+
+TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
+  const auto size = size_of_blocks(
+      {filtered({range("E", 6e10, 8e10, 21), kSomeH, kSomeMu, kSomeE}, "E > 7.45e10")});
+  EXPECT_EQ(size.points, 6U);
+  EXPECT_EQ(size.falls, 6U);
+  EXPECT_THAT(size.examples, Each(AllOf(Ge(15U), Le(20U))));
+}
+
+// 0.02 is four standard deviations of a share of a third in 10^4 points.
+TEST(StudySize, EstimatesWhatAFilterLeavesInOfMorePoints) {
+  const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
+  const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");
+  const auto size = size_of_blocks({plain, large});
+  EXPECT_TRUE(size.points_estimated);
+  EXPECT_NEAR(static_cast<double>(size.points), 1'001'000.0, 0.02 * 3e6);
+  const auto counted =
+      size_of_blocks({plain, filtered({kSomeH, kSomeMu, listed("e", {0.5, 1})}, "e > 0.6")});
+  EXPECT_FALSE(counted.points_estimated);
+  EXPECT_EQ(counted.points, 1'001U);
+}
+
+// 400 is more than four standard deviations of the estimate.
+TEST(StudySize, EstimatesTheFallsOfMorePointsFromTenThousand) {
+  const auto shared = size_of_blocks(
+      {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});
+  EXPECT_TRUE(shared.falls_estimated);
+  EXPECT_NEAR(static_cast<double>(shared.falls), 5'000.0, 400.0);
+  const auto known = size_of_blocks({filtered(
+      {listed("E", {6e10, 7e10, 8e10}), kSomeH, range("mu", 0.1, 1, 100'000), kSomeE}, "")});
+  EXPECT_EQ(known.falls, 3U);
+  EXPECT_FALSE(known.falls_estimated) << "each was met many times";
+  EXPECT_EQ(known.examples.size(), 64U);
+  const auto drawn = size_of_blocks(
+      {sampled({uniform("E", 6e10, 8e10), kSomeH, kSomeMu, kSomeE}, SAMPLE_RANDOM, 1'000'000'000)});
+  EXPECT_TRUE(drawn.falls_estimated);
+  EXPECT_EQ(drawn.falls, 1'000'000'000U);
+}
+
+TEST(StudySize, IsOfAResultForEachPointAndOfEachModel) {
+  EXPECT_EQ(size_of_blocks({filtered({kSomeH, range("mu", 0.1, 1, 100), kSomeE}, "")}).bytes,
+            100U * 970 + 600);
+  EXPECT_EQ(
+      size_of_blocks({filtered({range("k", 1e7, 2e7, 100), kSomeH, kSomeMu, kSomeE}, "")}).bytes,
+      100U * (970 + 600));
 }
 
 }  // namespace

@@ -27,22 +27,6 @@ using protocol::SAMPLE_SOBOL;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// ---- Permutations -----------------------------------------------------------------------------
-
-TEST(PermutationTest, EveryNumberBelowNIsTheImageOfOne) {
-  for (const std::uint64_t n : {1U, 2U, 3U, 5U, 8U, 100U, 1023U, 1025U, 100'000U}) {
-    std::vector<bool> hit(n, false);
-    for (std::uint64_t i = 0; i < n; ++i) {
-      const std::uint64_t image = permuted(i, n, 12345);
-      ASSERT_LT(image, n);
-      ASSERT_FALSE(hit[image]) << image << " of " << n;
-      hit[image] = true;
-    }
-  }
-}
-
-// ---- Sobol's sequence -------------------------------------------------------------------------
-
 /// Digest of points in all dimensions, each coordinate times 2^64 in eight bytes, the least first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   std::string bytes;
@@ -77,25 +61,6 @@ TEST(OwenScramblingTest, ValuesShareAsManyFirstDigitsAfterAsBefore) {
     EXPECT_EQ(changed >> (kSobolBits - 1 - shared), 1U) << shared << " digits";
   }
 }
-
-/// Whether 2^k points are one in each of the 2^k boxes that are 2^-a long in x and 2^(a-k) in y,
-/// for every a. True of (0, 2)-sequences: dimensions 1 and 2 of Sobol's.
-TEST(SobolTest, EveryElementaryIntervalOfTheFirstTwoDimensionsHasOnePoint) {
-  for (const int k : {1, 4, 10}) {
-    const auto sample = sample_of(SAMPLE_SOBOL, std::uint64_t{1} << k, 77);
-    for (int a = 0; a <= k; ++a) {
-      std::vector<int> hits(std::size_t{1} << k, 0);
-      for (std::uint64_t i = 0; i < sample.count(); ++i) {
-        const auto column = static_cast<std::size_t>(std::ldexp(fraction(sample, 0, i), a));
-        const auto row = static_cast<std::size_t>(std::ldexp(fraction(sample, 1, i), k - a));
-        ++hits[(column << (k - a)) + row];
-      }
-      EXPECT_EQ(std::count(hits.begin(), hits.end(), 1), 1 << k) << k << ", " << a;
-    }
-  }
-}
-
-// ---- Samples ----------------------------------------------------------------------------------
 
 TEST(SampleTest, ALatinHypercubeHasOnePointInEachStratumOfEachDimension) {
   for (const std::uint64_t count : {1U, 2U, 3U, 10U, 1000U, 4097U}) {
@@ -137,26 +102,6 @@ TEST(SampleTest, RandomAndSobolPointsStayWhenTheCountGrowsAndThoseOfALatinHyperc
   }
 }
 
-// The mean of n independent uniform numbers is 1/2 within 5 sqrt(1/12/n), the correlation of two
-// rows of them 0 within 5/sqrt(n). True of random points and of strata in random order.
-TEST(SampleTest, RandomDimensionsAreUniformAndUnrelated) {
-  constexpr std::uint64_t kCount = 10'000;
-  for (const auto kind : {SAMPLE_RANDOM, SAMPLE_LATIN_HYPERCUBE}) {
-    const auto sample = sample_of(kind, kCount, 3);
-    for (std::uint32_t d = 0; d < 20; ++d) {
-      double sum = 0.0;
-      double covariance = 0.0;
-      for (std::uint64_t i = 0; i < kCount; ++i) {
-        const double x = fraction(sample, d, i) - 0.5;
-        sum += x;
-        covariance += x * (fraction(sample, d + 1, i) - 0.5);
-      }
-      EXPECT_LT(std::abs(sum / kCount), 5.0 * std::sqrt(1.0 / 12.0 / kCount));
-      EXPECT_LT(std::abs(covariance / kCount) * 12.0, 5.0 / std::sqrt(kCount));
-    }
-  }
-}
-
 // Stored studies have these points.
 TEST(SampleTest, ValuesAreThoseOfTheFirstVersion) {
   for (const auto& [kind, of_first, of_last] :
@@ -168,8 +113,6 @@ TEST(SampleTest, ValuesAreThoseOfTheFirstVersion) {
   }
 }
 
-// ---- Distributions ----------------------------------------------------------------------------
-
 Quantiles of_kind(protocol::DistributionKind kind, double from, double to, double mean = 0.0,
                   double sd = 0.0) {
   protocol::Axis axis = protocol::uniform("k", from, to);
@@ -178,7 +121,6 @@ Quantiles of_kind(protocol::DistributionKind kind, double from, double to, doubl
   axis.mutable_distribution()->set_sd(sd);
   return Quantiles(axis);
 }
-
 Quantiles uniform(double from, double to) {
   return of_kind(protocol::DISTRIBUTION_UNIFORM, from, to);
 }
@@ -225,18 +167,6 @@ TEST(NormalTest, QuantileAndPartBelowUndoEachOther) {
     const double z = normal_quantile(p);
     EXPECT_NEAR(normal_part_below(z) / p, 1.0, 1e-15 * (2.0 + z * z)) << p;
   }
-}
-
-TEST(DistributionTest, ValuesHaveTheMomentsOfTheirDistribution) {
-  EXPECT_NEAR(mean(uniform(0.3, 1.1)), 0.7, 1e-12);
-  EXPECT_NEAR(variance(uniform(0.3, 1.1)), 0.8 * 0.8 / 12.0, 1e-9);
-  const auto decades = log_uniform(1e4, 1e8);
-  EXPECT_NEAR(decades.value_at(0.25), 1e5, 1e-10);
-  EXPECT_NEAR(mean_of(decades, [](double x) { return std::log10(x); }), 6.0, 1e-9);
-  const auto bell = normal(0.4, 0.05, -kInfinity, kInfinity);
-  EXPECT_NEAR(mean(bell), 0.4, 1e-12);
-  EXPECT_NEAR(variance(bell), 0.05 * 0.05, 1e-6);
-  EXPECT_EQ(bell.part_left(), 1.0);
 }
 
 // Mean and variance of a normal distribution that is cut off at a and b, in units of sd from the

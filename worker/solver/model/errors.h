@@ -1,15 +1,75 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
 
 namespace oblique::solver {
 
-/// A value from the user that the solver cannot take. The message names key, value and what is
-/// allowed.
+/// A value from the user that is not allowed. Front ends add the place by key and block; nothing
+/// parses the message.
 class InputError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  struct Fields {
+    std::string text;                         ///< names key, value and what is allowed
+    std::string key = {};                     ///< also "where", "sample" and the like
+    std::string expression = {};              ///< the text in which `text` finds a fault
+    std::optional<std::size_t> block = {};    ///< its number from 0, in a study of several
+    std::optional<std::uint64_t> point = {};  ///< its number in the study
+    std::string place = {};                   ///< "study.toml:3:6" or "--mu 0.4"
+  };
+
+  explicit InputError(std::string text) : InputError(Fields{std::move(text)}) {}
+  InputError(std::string_view key, std::string text)
+      : InputError(Fields{std::move(text), std::string(key)}) {}
+  explicit InputError(Fields fields)
+      : runtime_error(sentence(fields)), fields_(std::move(fields)) {}
+
+  const Fields& fields() const { return fields_; }
+
+  /// The same error about another key.
+  InputError with_key(std::string_view key) const {
+    Fields fields = fields_;
+    fields.key = key;
+    return InputError(std::move(fields));
+  }
+
+  /// The same error with a place, unless it has one.
+  InputError at(const std::string& place) const {
+    Fields fields = fields_;
+    fields.place = fields.place.empty() ? place : fields.place;
+    return InputError(std::move(fields));
+  }
+
+ private:
+  /// `study.toml:3:6: block 2: point 7: mu = "k": ...`. A place that ends with the expression
+  /// stands for it.
+  static std::string sentence(const Fields& fields) {
+    std::string line = fields.place.empty() ? "" : fields.place + ": ";
+    line += fields.block ? "block " + std::to_string(*fields.block + 1) + ": " : "";
+    line += fields.point ? "point " + std::to_string(*fields.point) + ": " : "";
+    if (!fields.expression.empty() && !fields.place.ends_with(fields.expression)) {
+      line += fields.key + " = \"" + fields.expression + "\": ";
+    }
+    return line + fields.text;
+  }
+
+  Fields fields_;
 };
+
+/// Calls `work`. An InputError that it throws gets this key.
+template <typename Work>
+decltype(auto) with_key(std::string_view key, Work work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw error.with_key(key);
+  }
+}
 
 /// A point that has no answer: the contact does not end, a step diverged.
 class SolveError : public std::runtime_error {

@@ -130,14 +130,16 @@ void check_value(const ParameterKey& key, double value) {
     message += ' ';
     message += key.unit;
   }
-  throw InputError(message + " is not allowed: " + name + " must be " +
-                   (std::isfinite(value) ? "" : "finite and ") + std::string(key.allowed));
+  throw InputError(name, message + " is not allowed: " + name + " must be " +
+                             (std::isfinite(value) ? "" : "finite and ") +
+                             std::string(key.allowed));
 }
 
 void validate(const ModelParameters& model) {
   if (model.lengths_m.empty() || model.lengths_m.size() > kMaxLinks) {
-    throw InputError("lengths has " + std::to_string(model.lengths_m.size()) +
-                     " values: it must have one a link, from 1 to " + std::to_string(kMaxLinks));
+    throw InputError("lengths", "lengths has " + std::to_string(model.lengths_m.size()) +
+                                    " values: it must have one a link, from 1 to " +
+                                    std::to_string(kMaxLinks));
   }
   for (const double length_m : model.lengths_m) {
     check_value(*find_model_key("length"), length_m);
@@ -153,9 +155,9 @@ void validate_point(const ModelParameters& model, double H_m, double mu, double 
   check_value(kPointKeys[2], e_star);
   const double reach_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
   if (H_m > reach_m) {
-    throw InputError("H = " + exact_number(H_m) +
-                     " m is not allowed: the tip drops at most the length of the chain, " +
-                     readable_number(reach_m, 10) + " m");
+    throw InputError("H", "H = " + exact_number(H_m) +
+                              " m is not allowed: the tip drops at most the length of the chain, " +
+                              readable_number(reach_m, 10) + " m");
   }
 }
 
@@ -166,8 +168,9 @@ std::string_view integrator_name(Integrator integrator) {
 Integrator integrator_named(std::string_view name) {
   const auto found = std::find(kIntegratorNames.begin(), kIntegratorNames.end(), name);
   if (found == kIntegratorNames.end()) {
-    throw InputError("integrator = \"" + std::string(name) +
-                     "\" is not allowed: integrator must be " + joined(kIntegratorNames));
+    throw InputError("integrator", "integrator = \"" + std::string(name) +
+                                       "\" is not allowed: integrator must be " +
+                                       joined(kIntegratorNames));
   }
   return static_cast<Integrator>(found - kIntegratorNames.begin());
 }
@@ -189,8 +192,8 @@ ModelParameters preset(std::string_view name) {
   } else if (name == "converged") {
     model.elements_per_link = 48;
   } else if (name != kPresetNames[0]) {
-    throw InputError("preset = \"" + std::string(name) + "\" is not allowed: preset must be " +
-                     joined(kPresetNames));
+    throw InputError("preset", "preset = \"" + std::string(name) +
+                                   "\" is not allowed: preset must be " + joined(kPresetNames));
   }
   return model;
 }

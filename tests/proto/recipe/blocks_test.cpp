@@ -1,19 +1,82 @@
-// Points of blocks that are more than a product of lists and ranges.
+#include "proto/recipe/blocks.h"
+
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <map>
-#include <thread>
+#include <random>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "tests/support/recipes.h"
 
 namespace oblique::protocol {
 namespace {
+
+TEST(AxisTest, ARangeHasBothEndsExactlyAndRisesBetweenThem) {
+  const Axis axis = range("mu", 0.1, 0.1 + 1e-12, 1000);
+  EXPECT_EQ(axis_value(axis, 0), axis.from());
+  EXPECT_EQ(axis_value(axis, 999), axis.to());
+  for (std::uint64_t i = 1; i < 1000; ++i) {
+    EXPECT_GE(axis_value(axis, i), axis_value(axis, i - 1)) << "value " << i;
+  }
+}
+
+// Of 1,000 grids from 0 to 5 with steps of up to 50 units of their last decimal, and from 1e7 on.
+TEST(AxisTest, EveryValueOfADecimalGridIsTheNumberThatPeopleType) {
+  std::mt19937 random(1);
+  const auto pick = [&](int from, int to) {
+    return std::uniform_int_distribution<std::int64_t>(from, to)(random);
+  };
+  std::size_t values = 0;
+  for (int grid = 0; grid < 1000; ++grid) {
+    const auto decimals = static_cast<int>(pick(grid % 5 == 0 ? -7 : 1, 6));
+    const std::int64_t first = pick(0, 5000);
+    const std::int64_t step = pick(1, 50);
+    const std::int64_t last = pick(1, 200);
+    const auto number = [&](std::int64_t i) {
+      const std::string text = std::to_string(first + step * i) + "e" + std::to_string(-decimals);
+      return std::strtod(text.c_str(), nullptr);
+    };
+    const Axis axis = range("mu", number(0), number(last), static_cast<std::uint64_t>(last) + 1);
+    for (std::int64_t i = 0; i <= last; ++i, ++values) {
+      EXPECT_EQ(axis_value(axis, static_cast<std::uint64_t>(i)), number(i))
+          << axis.from() << ":" << axis.to() << ":" << axis.count() << ", value " << i;
+    }
+  }
+  EXPECT_GT(values, 50'000U);
+}
+
+TEST(AxisTest, ARangeWhoseStepHasMoreDecimalsOrNoneIsRoundedOnce) {
+  EXPECT_EQ(axis_value(range("mu", 0.0, 1.0, 5), 3), 0.75);
+  EXPECT_EQ(axis_value(range("mu", 0.1, 1.0, 19), 5), 0.35);
+  const Axis huge = range("E", 1e300, 1e308, 1'000'000'001);
+  EXPECT_DOUBLE_EQ(axis_value(huge, 500'000'000), 0.5 * (1e300 + 1e308));
+  EXPECT_THROW(axis_value(huge, 1'000'000'001), std::out_of_range);
+  EXPECT_EQ(axis_value(range("mu", 0.0, 1.0, 4), 1), 1.0 / 3.0);
+  EXPECT_EQ(axis_value(range("mu", 0.0, 1.0 / 3.0, 3), 1), 1.0 / 6.0);
+}
+
+TEST(AxisTest, ALogarithmicRangeHasItsEndsAndTheNumbersThatPeopleType) {
+  const Axis decades = log_range("mu", 0.01, 100.0, 5);
+  const Axis octaves = log_range("links", 1.0, 64.0, 7);
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(axis_value(decades, i), std::vector({0.01, 0.1, 1.0, 10.0, 100.0})[i]);
+  }
+  for (std::uint64_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(axis_value(octaves, i), std::ldexp(1.0, static_cast<int>(i)));
+  }
+  const Axis many = log_range("mu", 0.3, 1.7, 1'000'000'000'000);
+  EXPECT_NEAR(axis_value(many, many.count() / 2), std::sqrt(0.3 * 1.7), 1e-11);
+  EXPECT_EQ(axis_value(many, many.count() - 1), 1.7);
+  EXPECT_EQ(first_value_from(many, axis_value(many, 12345)), 12345U);
+}
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -35,14 +98,6 @@ TEST(BlockKindsTest, AxesOfAZipGoSideBySideAndSingleValuesAreConstant) {
     EXPECT_EQ(table.model(i).k_N_m, k[i]);
     EXPECT_EQ(table.segment_at(i).count, 1U);
   }
-}
-
-TEST(BlockKindsTest, AZipWithoutModelKeysSharesItsModelWithOtherBlocks) {
-  const PointTable table(recipe_of_blocks(
-      {zipped({listed("H", {0.3, 0.2}), listed("mu", {0.1, 0.2}), listed("e", {1.0})}),
-       filtered({listed("H", {0.3}), listed("mu", {0.1, 0.2}), listed("e", {1.0})}, "")}));
-  EXPECT_EQ(table.models(), 1U);
-  EXPECT_EQ(table.segment_at(1).count, 4U);
 }
 
 TEST(BlockKindsTest, ASampleDrawsWithinItsDistributionsAndKeepsSingleValues) {
@@ -84,24 +139,6 @@ TEST(BlockKindsTest, ValuesOfAListAreDrawnWithEqualChances) {
               ElementsAre(testing::Pair(2, 100), testing::Pair(4, 100), testing::Pair(8, 100)));
 }
 
-TEST(BlockKindsTest, ATrillionSobolPointsCostNothingAndThoseOfASmallerSampleAreTheFirst) {
-  const auto of_count = [](std::uint64_t count) {
-    return PointTable(
-        recipe_of_blocks({sampled({following("I", "A^2 / (4 * pi)"), uniform("H", 0.3, 1.1),
-                                   uniform("mu", 0.1, 0.5), uniform("e", 0.5, 1.0)},
-                                  SAMPLE_SOBOL, count)}));
-  };
-  const PointTable few = of_count(10);
-  const PointTable many = of_count(1'000'000'000'000);
-  EXPECT_EQ(many.models(), 1U);
-  EXPECT_NE(many.values(many.size() - 1), many.values(0));
-  for (std::uint64_t i = 0; i < few.size(); ++i) {
-    EXPECT_EQ(few.values(i), many.values(i));
-  }
-}
-
-// ---- Expressions ------------------------------------------------------------------------------
-
 TEST(BlockKindsTest, AnAxisFollowsFromOthersInAnyOrder) {
   const PointTable table(
       recipe_of({{following("I", "A^2 / (4 * pi) * eta2"), listed("A", {1e-4, 2e-4}),
@@ -126,27 +163,6 @@ TEST(BlockKindsTest, AModelThatFollowsFromThePointIsItsOwn) {
   EXPECT_EQ(table.model(3).k_N_m, 6e6);
   EXPECT_EQ(table.segment_at(2).count, 1U);
 }
-
-TEST(BlockKindsTest, SeveralThreadsMayUseOneTable) {
-  const PointTable table(recipe_of({{following("k", "1e7 * (1 + mu)"), listed("H", {0.5}),
-                                     range("mu", 0.0, 1.0, 5001), listed("e", {1.0})}}));
-  std::vector<std::thread> threads;
-  std::vector<int> wrong(4, 0);
-  for (std::size_t t = 0; t < wrong.size(); ++t) {
-    threads.emplace_back([&, t] {
-      for (std::uint64_t i = t; i < table.size(); i += 3) {
-        const Point point = table.point(i);
-        wrong[t] += table.model(point.model).k_N_m == 1e7 * (1.0 + point.mu) ? 0 : 1;
-      }
-    });
-  }
-  for (std::thread& thread : threads) {
-    thread.join();
-  }
-  EXPECT_THAT(wrong, testing::Each(0));
-}
-
-// ---- Single lengths ---------------------------------------------------------------------------
 
 TEST(BlockKindsTest, SingleLengthsActAfterLinksAndLength) {
   const PointTable table(recipe_of(
@@ -180,8 +196,6 @@ TEST(KeysTest, EveryKeyHasItsNumber) {
   EXPECT_EQ(link_of_key(key_number("length2")), 1U);
   EXPECT_EQ(link_of_key(key_number("length")), std::nullopt);
 }
-
-// ---- Filters, and what only the points of a block show ----------------------------------------
 
 std::string fault_of_points(const Block& block) {
   try {
