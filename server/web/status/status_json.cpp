@@ -67,9 +67,9 @@ std::string overview_json(const Snapshot& snapshot) {
   }
   std::uint64_t workers_there = 0;
   std::uint64_t threads = 0;
-  for (const Crew& crew : snapshot.crews) {
-    workers_there += crew.workers;
-    threads += crew.threads;
+  for (const WorkerGroup& group : snapshot.groups) {
+    workers_there += group.workers;
+    threads += group.threads;
   }
   return json_text({{"studies", std::move(studies)},
                     {"unlisted", snapshot.unlisted},
