@@ -30,12 +30,10 @@ protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) {
   return protocol::to_message(point, result);
 }
 
-SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer,
-                                 Killers killers, bool leaves)
+SimulatedWorker::SimulatedWorker(World& world, Network& network, std::uint64_t peer, bool leaves)
     : world_(world),
       network_(network),
       peer_(peer),
-      killers_(std::move(killers)),
       leaves_(leaves),
       ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)),
       ms_per_fall_(world.chance(0.3) ? world.between(5, 50) : 0) {}
@@ -202,12 +200,6 @@ void SimulatedWorker::solve_some() {
   if (position < work.batch.size()) {
     const std::uint64_t point = work.batch.point_at(position);
     const std::uint64_t mark = mark_of(work.batch.points().point(point).H_m);
-    const auto killers = killers_.find(mark);
-    if (killers != killers_.end() && killers->second.contains(point)) {
-      ++deaths_;
-      restart(world_.between(100, 1000));
-      return;
-    }
     fallen_model_ = next_model();
     work.solved = position + 1;
     progress.results.push_back(answer_to(mark, point));

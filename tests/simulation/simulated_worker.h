@@ -5,7 +5,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 
 #include "tests/simulation/network.h"
@@ -25,13 +24,10 @@ double marked_H(std::uint64_t mark);
 /// while, or told to end; it always starts again.
 class SimulatedWorker {
  public:
-  /// Points of studies with that mark whose solving kills the process.
-  using Killers = std::map<std::uint64_t, std::set<std::uint64_t>>;
-
   /// `peer` is its number in the network. A model's first point takes some of them longer than the
   /// others. One that `leaves` has now and then a time by which it
   /// is gone; another one comes then.
-  SimulatedWorker(World& world, Network& network, std::uint64_t peer, Killers killers, bool leaves);
+  SimulatedWorker(World& world, Network& network, std::uint64_t peer, bool leaves);
 
   /// The process, if there is one, dies; another one starts after a while. The first one starts so
   /// too.
@@ -43,8 +39,6 @@ class SimulatedWorker {
   /// The results of that message of the socket, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const;
   bool holds_nothing() const { return batches_.empty(); }
-  /// How often a point has killed it.
-  std::uint64_t deaths() const { return deaths_; }
 
  private:
   struct Work {
@@ -64,7 +58,6 @@ class SimulatedWorker {
   World& world_;
   Network& network_;
   std::uint64_t peer_;
-  Killers killers_;
   bool leaves_;
   std::int64_t ms_per_point_;
   std::int64_t ms_per_fall_;
@@ -76,8 +69,7 @@ class SimulatedWorker {
   bool solving_ = false;
   std::int64_t frozen_until_ms_ = 0;
   std::int64_t planned_time_ms_ = -1;
-  std::uint64_t life_ = 0;  // counts processes: what an earlier one planned does not happen
-  std::uint64_t deaths_ = 0;
+  std::uint64_t life_ = 0;     // counts processes: what an earlier one planned does not happen
   std::uint64_t sockets_ = 0;  // counts sockets: what waits in an earlier one is gone
   std::map<std::pair<Network::LinkId, std::uint64_t>, protocol::Results> sent_;
 };

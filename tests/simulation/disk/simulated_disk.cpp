@@ -77,11 +77,6 @@ void SimulatedDisk::commit(std::span<const server::Change> changes) {
   model_.stored(changes);
 }
 
-bool SimulatedDisk::merge_log() {
-  ++merges;
-  return store_->merge_log();
-}
-
 server::ClearedAway SimulatedDisk::clear_away(std::size_t most) {
   const std::uint64_t before = store_->cleared_rows();
   const auto cleared = store_->clear_away(most);

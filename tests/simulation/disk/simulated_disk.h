@@ -37,14 +37,12 @@ class SimulatedDisk final : public server::Storage {
 
   void commit(std::span<const server::Change> changes) override;
   void check() override { store_->check(); }
-  bool merge_log() override;
+  bool merge_log() override { return store_->merge_log(); }
   server::ClearedAway clear_away(std::size_t most) override;
   std::uint64_t cleared_rows = 0;  ///< of deleted studies
 
   /// Compares every row with the model's, and lets SQLite look for damage. Throws Violation.
   void check_rows();
-
-  std::uint64_t merges = 0;  ///< of the write-ahead log, tried
 
   const StoreModel& model() const { return model_; }
   SimulatedFiles& files() { return files_; }

@@ -2,10 +2,26 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
+#include <variant>
 
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {
+
+namespace {
+
+/// The study that a change is of.
+template <typename Kind>
+std::uint64_t study_of(const Kind& change) {
+  if constexpr (requires { change.study_id; }) {
+    return change.study_id;
+  } else {
+    return 0;
+  }
+}
+
+}  // namespace
 
 using server::AddResults;
 using server::AddStudy;
@@ -22,83 +38,53 @@ using server::StudyState;
 bool StoreModel::apply(const Change& change, Contents& contents) {
   if (const auto* study = std::get_if<AddStudy>(&change)) {
     contents.last_study_id = std::max(contents.last_study_id, study->study_id);
-    contents.studies[study->study_id] = {study->study_id,
-                                         study->name,
-                                         study->table,
-                                         StudyState::kRunning,
-                                         study->created_at,
-                                         study->priority,
-                                         {},
-                                         {},
-                                         {}};
+    server::StoredStudy& added = contents.studies[study->study_id];
+    added.study_id = study->study_id;
+    added.name = study->name;
+    added.table = study->table;
+    added.created_at = study->created_at;
+    added.priority = study->priority;
     return true;
   }
   if (const auto* worker = std::get_if<AddWorker>(&change)) {
     contents.last_worker_id = std::max(contents.last_worker_id, worker->worker_id);
     return true;
   }
-  return apply_to_study(change, contents);
-}
-
-/// Of one that is there: results of a deleted study are dropped.
-bool StoreModel::apply_to_study(const Change& change, Contents& contents) {
-  const auto study_of = [&](const auto& one) { return contents.studies.find(one.study_id); };
-  const auto none = contents.studies.end();
+  const std::uint64_t id = std::visit([](const auto& of) { return study_of(of); }, change);
+  const auto known = contents.studies.find(id);
+  if (known == contents.studies.end()) {
+    return false;  // results of a deleted study are dropped
+  }
+  server::StoredStudy& study = known->second;
   if (const auto* state = std::get_if<SetStudyState>(&change)) {
-    const auto study = study_of(*state);
-    if (study != none) {
-      study->second.state = state->state;
-    }
-    return study != none;
+    study.state = state->state;
+  } else if (const auto* priority = std::get_if<SetPriority>(&change)) {
+    return std::exchange(study.priority, priority->priority) != priority->priority;
+  } else if (const auto* name = std::get_if<RenameStudy>(&change)) {
+    study.name = name->name;
+  } else if (const auto* growth = std::get_if<GrowStudy>(&change)) {
+    study.table = growth->table;
+    study.priority = growth->priority;
+    study.state = StudyState::kRunning;
+  } else if (std::holds_alternative<DeleteStudy>(change)) {
+    contents.studies.erase(known);
+    contents.rows.erase(id);
+    contents.has_deleted = true;
+  } else if (const auto* forget = std::get_if<ForgetFailures>(&change)) {
+    return apply(*forget, study, contents.rows[id]);
+  } else {
+    return apply(std::get<AddResults>(change), study, contents.rows[id]);
   }
-  if (const auto* priority = std::get_if<SetPriority>(&change)) {
-    const auto study = study_of(*priority);
-    const bool changes = study != none && study->second.priority != priority->priority;
-    if (changes) {
-      study->second.priority = priority->priority;
-    }
-    return changes;
-  }
-  if (const auto* name = std::get_if<RenameStudy>(&change)) {
-    contents.studies.at(name->study_id).name = name->name;
-    return true;
-  }
-  if (const auto* growth = std::get_if<GrowStudy>(&change)) {
-    return apply(*growth, contents);
-  }
-  if (const auto* deletion = std::get_if<DeleteStudy>(&change)) {
-    return apply(*deletion, contents);
-  }
-  if (const auto* forget = std::get_if<ForgetFailures>(&change)) {
-    return study_of(*forget) != none && apply(*forget, contents);
-  }
-  const auto& results = std::get<AddResults>(change);
-  return study_of(results) != none && apply(results, contents);
-}
-
-bool StoreModel::apply(const GrowStudy& change, Contents& contents) {
-  auto& study = contents.studies.at(change.study_id);
-  study.table = change.table;
-  study.priority = change.priority;
-  study.state = StudyState::kRunning;
   return true;
 }
 
-bool StoreModel::apply(const DeleteStudy& change, Contents& contents) {
-  contents.studies.erase(change.study_id);
-  contents.rows.erase(change.study_id);
-  contents.has_deleted = true;
-  return true;
-}
-
-bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
-  auto& study = contents.studies.at(change.study_id);
+bool StoreModel::apply(const ForgetFailures& change, server::StoredStudy& study, Rows& rows) {
   bool changes = study.state == StudyState::kDone;
   study.state = changes ? StudyState::kRunning : study.state;
   change.points.for_each([&](const server::Interval& interval) {
     for (std::uint64_t point = interval.begin; point < interval.end; ++point) {
       if (study.failures.contains(point)) {
-        contents.rows[change.study_id].erase(point);
+        rows.erase(point);
         study.failures.erase(point);
         study.completed.erase(point);
         changes = true;
@@ -108,14 +94,10 @@ bool StoreModel::apply(const ForgetFailures& change, Contents& contents) {
   return changes;
 }
 
-bool StoreModel::apply(const AddResults& change, Contents& contents) {
-  if (change.results.empty() && change.left_out.empty()) {
-    return false;  // of a probe, perhaps, which is of no study
-  }
-  auto& study = contents.studies.at(change.study_id);
+bool StoreModel::apply(const AddResults& change, server::StoredStudy& study, Rows& rows) {
   for (const auto& result : change.results) {
     auto row = std::make_shared<const protocol::PointResult>(result);
-    if (!contents.rows[change.study_id].emplace(result.point(), std::move(row)).second) {
+    if (!rows.emplace(result.point(), std::move(row)).second) {
       throw Violation("point " + std::to_string(result.point()) + " was stored twice");
     }
     study.completed.insert(result.point());
@@ -125,12 +107,12 @@ bool StoreModel::apply(const AddResults& change, Contents& contents) {
   }
   change.left_out.for_each([&](const server::Interval& points) {
     if (!study.completed.within(points.begin, points.end).empty()) {
-      throw Violation("a filter leaves out points that were settled before");
+      throw Violation("a filter leaves out points that were completed before");
     }
     study.completed.insert(points.begin, points.end);
     study.left_out += points.end - points.begin;
   });
-  return true;
+  return !change.results.empty() || !change.left_out.empty();
 }
 
 void StoreModel::stored(std::span<const Change> changes) {
@@ -188,7 +170,7 @@ void StoreModel::restarted(const Found& found, bool power_was_lost) {
     }
   }
   if (!matching) {
-    refuse(found, power_was_lost);
+    throw Violation("after a restart the store has other contents than were stored");
   }
   undone_commits += undone;
   refused_kept += came_back != entries_.end() ? 1U : 0U;
@@ -210,18 +192,6 @@ void StoreModel::apply_all(const Entry& entry, Contents& contents) {
   }
 }
 
-void StoreModel::refuse(const Found& found, bool power_was_lost) const {
-  Contents there;
-  for (const auto& study : found.studies) {
-    there.studies[study.study_id] = study;
-  }
-  there.last_study_id = found.last_study_id;
-  there.last_worker_id = found.last_worker_id;
-  throw Violation("after a restart the store has " + there.description() + " and not " +
-                  now_.description() +
-                  (power_was_lost ? ", nor what was there since " + synced_.description() : ""));
-}
-
 bool StoreModel::Contents::operator==(const Found& found) const {
   return last_study_id == found.last_study_id &&
          (last_worker_id == found.last_worker_id ||
@@ -236,15 +206,6 @@ bool StoreModel::Contents::operator==(const Found& found) const {
                              here.table->recipe().SerializeAsString() ==
                                  there.table->recipe().SerializeAsString();
                     });
-}
-
-std::string StoreModel::Contents::description() const {
-  std::string text = std::to_string(last_worker_id) + " workers";
-  for (const auto& [id, study] : studies) {
-    text += ", " + study.name + " " + server::state_name(study.state) + " with " +
-            std::to_string(study.completed.size()) + " points";
-  }
-  return text;
 }
 
 const server::StoredStudy* StoreModel::study(const std::string& name) const {

@@ -56,7 +56,6 @@ class StoreModel {
     bool has_deleted = false;  ///< then rows of workers may be gone, the last one's too
 
     bool operator==(const Found& found) const;
-    std::string description() const;
   };
   struct Entry {
     std::vector<server::Change> changes;
@@ -64,13 +63,9 @@ class StoreModel {
   };
   /// Says whether anything had to be written.
   static bool apply(const server::Change& change, Contents& contents);
-  static bool apply(const server::AddResults& change, Contents& contents);
-  static bool apply(const server::GrowStudy& change, Contents& contents);
-  static bool apply(const server::DeleteStudy& change, Contents& contents);
-  static bool apply_to_study(const server::Change& change, Contents& contents);
-  static bool apply(const server::ForgetFailures& change, Contents& contents);
+  static bool apply(const server::AddResults& change, server::StoredStudy& study, Rows& rows);
+  static bool apply(const server::ForgetFailures& change, server::StoredStudy& study, Rows& rows);
   static void apply_all(const Entry& entry, Contents& contents);
-  [[noreturn]] void refuse(const Found& found, bool power_was_lost) const;
 
   Contents now_;
   Contents synced_;             // at the last commit with a full sync
