@@ -5,6 +5,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "proto/frames.h"
@@ -116,7 +117,7 @@ class Simulation {
         ++outcome_["worker faults"];
         break;
       case 3:
-        workers_network_.break_peer(static_cast<std::uint64_t>(world_.between(0, last)));
+        workers_network_.break_links(static_cast<std::uint64_t>(world_.between(0, last)));
         ++outcome_["cuts"];
         break;
       default:
@@ -152,36 +153,26 @@ class Simulation {
   }
 
   void fault() {
-    switch (world_.between(0, 17)) {
-      case 0:
-      case 1:
-      case 2:
-      case 3:
-      case 4:
-      case 5:
-        fault_of_disk_or_server();
-        break;
-      case 6: {
-        std::set<std::uint64_t> parted;
-        for (std::uint64_t peer = 0; peer < workers_.size(); ++peer) {
-          if (world_.chance(0.6)) {
-            parted.insert(peer);
-          }
+    const std::int64_t kind = world_.between(0, 17);
+    if (kind < 6) {
+      fault_of_disk_or_server();
+    } else if (kind == 6) {
+      std::set<std::uint64_t> parted;
+      for (std::uint64_t peer = 0; peer < workers_.size(); ++peer) {
+        if (world_.chance(0.6)) {
+          parted.insert(peer);
         }
-        (world_.chance(0.8) ? workers_network_ : clients_network_)
-            .part(std::move(parted), world_.between(500, 15'000));
-        ++outcome_["partitions"];
-        break;
       }
-      case 7:
-        // By hours, either way, and sometimes by the moment that a server was away.
-        world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
-                                            : world_.between(-20'000'000, 20'000'000));
-        ++outcome_["clock jumps"];
-        break;
-      default:
-        fault_of_worker();
-        break;
+      (world_.chance(0.8) ? workers_network_ : clients_network_)
+          .part(std::move(parted), world_.between(500, 15'000));
+      ++outcome_["partitions"];
+    } else if (kind == 7) {
+      // By hours, either way, and sometimes by the moment that a server was away.
+      world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
+                                          : world_.between(-20'000'000, 20'000'000));
+      ++outcome_["clock jumps"];
+    } else {
+      fault_of_worker();
     }
   }
 
@@ -229,17 +220,13 @@ class Simulation {
     SimulatedWorker& worker = *workers_[static_cast<std::size_t>(
         world_.between(0, static_cast<std::int64_t>(workers_.size()) - 1))];
     ++outcome_["worker faults"];
-    switch (world_.between(0, 6)) {
-      case 0:
-      case 1:
-        worker.freeze(world_.between(100, 8000));
-        break;
-      case 2:
-        worker.stop();
-        break;
-      default:
-        worker.restart(world_.between(0, 3000));
-        break;
+    const std::int64_t kind = world_.between(0, 6);
+    if (kind < 2) {
+      worker.freeze(world_.between(100, 8000));
+    } else if (kind == 2) {
+      worker.stop();
+    } else {
+      worker.restart(world_.between(0, 3000));
     }
   }
 

@@ -163,18 +163,6 @@ int check_reserved_lock(sqlite3_file* raw, int* reserved) {
   return handle.is_dead() ? SQLITE_IOERR_CHECKRESERVEDLOCK : SQLITE_OK;
 }
 
-int file_control(sqlite3_file*, int, void*) {
-  return SQLITE_NOTFOUND;
-}
-
-int sector_size(sqlite3_file*) {
-  return 4096;
-}
-
-int device_characteristics(sqlite3_file*) {
-  return SQLITE_IOCAP_POWERSAFE_OVERWRITE;
-}
-
 int map_memory(sqlite3_file* raw, int region, int, int extend, void volatile** where) {
   Handle& handle = handle_of(raw);
   *where = nullptr;
@@ -228,13 +216,13 @@ int lock_memory(sqlite3_file* raw, int first, int count, int flags) {
   return SQLITE_OK;
 }
 
-void memory_barrier(sqlite3_file*) {}
-
 // clang-format off
 constexpr sqlite3_io_methods kMethods{
     2, close, read, write, truncate, sync, file_size, lock, unlock, check_reserved_lock,
-    file_control, sector_size, device_characteristics, map_memory, lock_memory, memory_barrier,
-    unmap, nullptr, nullptr};
+    [](sqlite3_file*, int, void*) { return SQLITE_NOTFOUND; },
+    [](sqlite3_file*) { return 4096; },
+    [](sqlite3_file*) { return SQLITE_IOCAP_POWERSAFE_OVERWRITE; },
+    map_memory, lock_memory, [](sqlite3_file*) {}, unmap, nullptr, nullptr};
 // clang-format on
 
 int open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* flags_out) {
@@ -280,10 +268,6 @@ int randomness(sqlite3_vfs*, int size, char* bytes) {
   return size;
 }
 
-int sleep(sqlite3_vfs*, int duration_us) {
-  return duration_us;
-}
-
 void register_once() {
   if (vfs().original != nullptr) {
     return;
@@ -299,7 +283,7 @@ void register_once() {
   methods.xDelete = remove;
   methods.xAccess = access;
   methods.xRandomness = randomness;
-  methods.xSleep = sleep;
+  methods.xSleep = [](sqlite3_vfs*, int duration_us) { return duration_us; };
   sqlite3_vfs_register(&methods, 1);
 }
 
