@@ -259,26 +259,26 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   }
   const std::uint64_t leased_before = leased_.size();
   std::uint64_t end = lease_fresh(*free, wanted);
-  const auto taken = [&] { return leased_.size() - leased_before; };
+  const auto newly_leased = [&] { return leased_.size() - leased_before; };
   const std::uint64_t enough =
       std::max(wanted.points, std::min(wanted.groups > 1 ? wanted.groups : 0, wanted.most_points));
   std::uint64_t run_end = free->end;
-  while (const auto next = fresh_near(end, run_end, enough, taken())) {
-    end = lease_fresh(*next, {enough - taken()});
+  while (const auto next = fresh_near(end, run_end, enough, newly_leased())) {
+    end = lease_fresh(*next, {enough - newly_leased()});
     run_end = next->end;
   }
   begun_until_ = std::max(begun_until_, order_.group_at(*table_.get(), end - 1).end);
-  return Batch{free->begin, end - free->begin, 0, {}, taken()};
+  return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
 }
 
-/// The next fresh points for a batch that ends at `end`, has `taken` points and wants `enough`:
-/// those behind a few completed ones, as where a finer grid has taken over a coarser one. Not what
+/// The next fresh points for a batch that ends at `end`, has `leased` points and wants `enough`:
+/// those behind a few completed ones, as where a finer grid has reused a coarser one. Not what
 /// is left of the run up to `run_end`, where the batch was cut, and not those of a group of which
 /// there is no room for all points.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
-                                                std::uint64_t enough, std::uint64_t taken) const {
+                                                std::uint64_t enough, std::uint64_t leased) const {
   constexpr std::uint64_t kNear = 64;
-  const auto next = taken < enough ? fresh_.first_from(end) : std::nullopt;
+  const auto next = leased < enough ? fresh_.first_from(end) : std::nullopt;
   if (!next || next->begin < run_end || next->begin - end > kNear) {
     return std::nullopt;
   }
@@ -286,7 +286,7 @@ std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t
   const auto between = completed_.within(end, next->begin);
   const Interval group = order_.group_at(*table_.get(), next->begin);
   if (between.size() != 1 || !(between.front() == Interval{end, next->begin}) ||
-      (group.begin >= end && group.end - group.begin > enough - taken)) {
+      (group.begin >= end && group.end - group.begin > enough - leased)) {
     return std::nullopt;
   }
   return next;

@@ -70,7 +70,7 @@ class StudyPoints {
   const PointOrder& order() const { return order_; }
 
   /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
-  /// that are left of the group that `wanted` follows, then groups of which nothing was taken yet,
+  /// that are left of the group that `wanted` follows, then groups of which nothing was leased yet,
   /// then the second half of what is left of the last. Nothing when there are none.
   std::optional<Batch> take(const BatchSize& wanted);
   /// The same out of the returned ones of that standing.
@@ -121,7 +121,7 @@ class StudyPoints {
   bool may_leave_out(const IntervalSet& points) const;
   /// Returned points of that standing.
   bool has(Standing standing) const { return !returned(standing).empty(); }
-  /// When the next points to be taken of that standing came back. There must be one.
+  /// When the next points to be leased of that standing came back. There must be one.
   std::int64_t returned_ms(Standing standing) const {
     return returned(standing).begin()->second.returned_ms;
   }
@@ -158,7 +158,7 @@ class StudyPoints {
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   std::uint64_t lease_fresh(const Interval& free, const BatchSize& wanted);
   std::optional<Interval> fresh_near(std::uint64_t end, std::uint64_t run_end, std::uint64_t enough,
-                                     std::uint64_t taken) const;
+                                     std::uint64_t leased) const;
   std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
   IntervalSet extract(const IntervalSet& places);
 
@@ -166,7 +166,7 @@ class StudyPoints {
   PointOrder order_;
   LossLimits limits_;
   IntervalSet fresh_;
-  std::uint64_t begun_until_ = 0;  // of all groups before, points were taken
+  std::uint64_t begun_until_ = 0;  // of all groups before, points were leased
   bool was_arranged_ = false;      // or stays as it is numbered
   std::uint64_t falls_a_group_ = 1;
   std::array<Returned, 4> returned_;  // by standing
