@@ -1,13 +1,13 @@
 #include "server/event_loop/event_loop.h"
 
 #include <algorithm>
-#include <bit>
 #include <map>
 #include <stdexcept>
 #include <utility>
 
 #include <poll.h>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include "server/database/database_file.h"
@@ -183,7 +183,7 @@ void EventLoop::take_completions() {
 /// True when messages are left that could be taken at once.
 bool EventLoop::take_worker_messages() {
   return take_messages(
-      workers_, [this](const std::string& worker) { return service_->has_room(worker); },
+      workers_, [this](const std::string& /*worker*/) { return service_->has_room(); },
       [this](const Incoming& incoming) {
         service_->worker_frame(incoming.identity, incoming.body, now(), incoming.key);
       });
@@ -211,19 +211,13 @@ bool EventLoop::take_messages(Network::Port port, const Network::MayTake& may_ta
   return false;
 }
 
-/// Logs ended connections, the first of a kind and then at each power of two.
 void EventLoop::note_disconnects() {
   for (const Disconnect& disconnect : network_.take_disconnects()) {
     service_->client_left(disconnect.identity);
     if (disconnect.refused) {
-      std::uint64_t& so_far = refused_.at(static_cast<std::size_t>(*disconnect.refused));
-      if (std::has_single_bit(++so_far)) {
-        spdlog::warn("{} was refused: {} ({} refused so far: {})", disconnect.address,
-                     disconnect.reason, so_far, name_of(*disconnect.refused));
-      }
-    } else if (!disconnect.reason.empty() && std::has_single_bit(++ended_connections_)) {
-      spdlog::warn("a connection was ended: {} ({} ended so far)", disconnect.reason,
-                   ended_connections_);
+      service_->log_peer(fmt::format("{} was refused: {}", disconnect.address, disconnect.reason));
+    } else if (!disconnect.reason.empty()) {
+      service_->log_peer(fmt::format("a connection was ended: {}", disconnect.reason));
     }
   }
 }

@@ -21,7 +21,7 @@
 #include "server/network/access.h"
 #include "server/network/network.h"
 #include "server/query/query_pool.h"
-#include "server/service/ports/ports.h"
+#include "server/service/ports.h"
 #include "server/service/service.h"
 #include "server/store/store.h"
 #include "server/store/writer.h"
@@ -191,8 +191,6 @@ class EventLoop final : private Ports {
   Network::Port workers_;
   Network::Port clients_;
   std::unique_ptr<Web> web_;
-  std::uint64_t ended_connections_ = 0;
-  std::array<std::uint64_t, kRefusalCauses> refused_{};  ///< by cause
   bool is_ending_ = false;
   std::vector<std::string> last_answered_;  ///< clients that were sent something at the end
   std::optional<Service> service_;

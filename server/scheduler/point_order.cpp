@@ -41,28 +41,7 @@ struct Falls {
       at = points.end;
     }
   }
-
-  /// Numbers the falls anew, those with open points first, and sorts the pieces by fall. Returns
-  /// how many have open points.
-  std::uint64_t sort() {
-    std::vector<std::uint64_t> order(heads.size());
-    std::iota(order.begin(), order.end(), std::uint64_t{0});
-    const auto middle = std::stable_partition(
-        order.begin(), order.end(), [this](std::uint64_t fall) { return heads[fall] != kNone; });
-    std::vector<std::uint64_t> new_heads(heads.size());
-    std::vector<std::uint64_t> numbers(heads.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      numbers[order[i]] = i;
-      new_heads[i] = heads[order[i]];
-    }
-    heads = std::move(new_heads);
-    for (Piece& piece : pieces) {
-      piece.fall = numbers[piece.fall];
-    }
-    std::stable_sort(pieces.begin(), pieces.end(),
-                     [](const Piece& a, const Piece& b) { return a.fall < b.fall; });
-    return static_cast<std::uint64_t>(middle - order.begin());
-  }
+  bool is_open(std::uint64_t fall) const { return heads[fall] != kNone; }
 
   std::vector<Piece> pieces;
   std::vector<std::uint64_t> heads;  ///< by fall; kNone: it has no open point
@@ -90,30 +69,35 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
   if (falls.pieces.size() == falls.heads.size()) {
     return;  // no fall lies apart
   }
-  const std::uint64_t open_falls = std::max<std::uint64_t>(falls.sort(), 1);
-  const std::uint64_t groups = (open_falls + falls_a_group - 1) / falls_a_group;
-  const auto group_of = [&](std::uint64_t fall) {  // the last one has what is settled, too
-    return std::min(fall / falls_a_group, groups - 1);
-  };
+  // Falls with open points come first, and pieces of one fall follow each other.
+  std::ranges::stable_sort(falls.pieces, {}, [&](const Piece& piece) {
+    return std::pair(!falls.is_open(piece.fall), piece.fall);
+  });
   end_ = first;
-  for (auto begin = falls.pieces.begin(); begin != falls.pieces.end();) {
-    const std::uint64_t group = group_of(begin->fall);
-    const auto end = std::find_if(begin, falls.pieces.end(), [&](const Piece& piece) {
-      return group_of(piece.fall) != group;
-    });
+  for (auto begin = falls.pieces.cbegin(); begin != falls.pieces.cend();) {
     groups_.push_back(end_);
-    for (std::uint64_t fall = begin->fall; fall <= std::prev(end)->fall; ++fall) {
-      if (const std::uint64_t head = falls.heads[fall]; head != Falls::kNone) {
-        append({head, head + 1});
+    std::uint64_t number = 0;  // of falls in the group
+    auto end = begin;
+    for (; end != falls.pieces.cend(); ++end) {
+      if (end != begin && end->fall == std::prev(end)->fall) {
+        continue;
       }
+      const std::uint64_t head = falls.heads[end->fall];
+      if (head == Falls::kNone) {
+        continue;  // the last group has these, too
+      }
+      if (number == falls_a_group) {
+        break;
+      }
+      ++number;
+      append({head, head + 1});
     }
-    for (auto piece = begin; piece != end; ++piece) {
-      const std::uint64_t head = falls.heads[piece->fall];
-      const bool has_head = head >= piece->points.begin && head < piece->points.end;
-      append({piece->points.begin, has_head ? head : piece->points.end});
-      append({has_head ? head + 1 : piece->points.end, piece->points.end});
+    for (; begin != end; ++begin) {
+      const std::uint64_t head = falls.heads[begin->fall];
+      const bool has_head = head >= begin->points.begin && head < begin->points.end;
+      append({begin->points.begin, has_head ? head : begin->points.end});
+      append({has_head ? head + 1 : begin->points.end, begin->points.end});
     }
-    begin = end;
   }
   by_point_.resize(runs_.size());
   std::iota(by_point_.begin(), by_point_.end(), 0U);
@@ -192,19 +176,9 @@ IntervalSet PointOrder::places(const IntervalSet& points) const {
       at += count;
     }
   });
-  // In order they are merged as they come.
-  std::sort(parts.begin(), parts.end(),
-            [](const Interval& a, const Interval& b) { return a.begin < b.begin; });
+  std::ranges::sort(parts, {}, &Interval::begin);  // so that each is inserted behind the last
   IntervalSet places;
-  Interval joined{0, 0};
-  for (const Interval& part : parts) {
-    if (part.begin != joined.end) {
-      places.insert(joined.begin, joined.end);
-      joined.begin = part.begin;
-    }
-    joined.end = part.end;
-  }
-  places.insert(joined.begin, joined.end);
+  places.insert(parts);
   return places;
 }
 

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 namespace oblique::server {
@@ -27,19 +30,35 @@ constexpr double kLongestPoint_s = 86'400.0;
 std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   now_ms_ = std::max(now_ms_, now_ms);
   effects_.clear();
-  seeks_stragglers_ = std::holds_alternative<Tick>(event);
-  std::visit([this](const auto& e) { on(e); }, event);
+  std::visit([this](const auto& e) { pass(e); }, event);
   dispatch();
+  if (std::holds_alternative<Tick>(event)) {
+    duplicate_stragglers();
+  }
   return std::exchange(effects_, {});
+}
+
+/// Events of unknown studies and workers are ignored where the handler needs a known one.
+template <typename Kind>
+void Scheduler::pass(const Kind& event) {
+  if constexpr (requires(Study & study) { on(study, event); }) {
+    if (const auto found = studies_.find(event.study); found != studies_.end()) {
+      on(found->second, event);
+      requeue(event.study);
+    }
+  } else if constexpr (requires(Worker & worker) { on(worker, event); }) {
+    if (const auto found = workers_.find(event.worker); found != workers_.end()) {
+      found->second.last_heard_ms = now_ms_;
+      ready_workers_.unpark(event.worker);
+      on(found->second, event);
+    }
+  } else {
+    on(event);
+  }
 }
 
 void Scheduler::on(const DispatchHeld& event) {
   held_ = event.held;
-}
-
-Scheduler::Study* Scheduler::find_study(StudyId id) {
-  const auto found = studies_.find(id);
-  return found == studies_.end() ? nullptr : &found->second;
 }
 
 // ---- Studies ----------------------------------------------------------------------------------
@@ -48,65 +67,48 @@ void Scheduler::on(const StudyAdded& event) {
   if (studies_.contains(event.study)) {
     return;
   }
-  studies_.emplace(
-      event.study,
-      Study{StudyPoints(event.table, event.settled, event.left_out, settings_.loss_limits),
-            event.failed, event.cancelled, event.paused, false, event.priority,
-            least_served(event.study), event.solver_version});
+  studies_.emplace(event.study, Study{StudyPoints(event.table, event.completed, event.left_out,
+                                                  settings_.loss_limits),
+                                      event.failed, event.cancelled, event.paused, false,
+                                      event.priority, 0.0, event.solver_version});
   studies_.at(event.study).held = event.held;
+  level(studies_.at(event.study));
   finish_if_complete(event.study);
   requeue(event.study);
 }
 
-void Scheduler::on(const StudyHeld& event) {
-  Study* const study = find_study(event.study);
-  if (study == nullptr || study->held == event.held) {
-    return;
+void Scheduler::on(Study& study, const StudyHeld& event) {
+  if (study.held != event.held) {
+    study.held = event.held;
+    level(study);
   }
-  study->held = event.held;
-  study->served = least_served(event.study);
-  requeue(event.study);
 }
 
-void Scheduler::on(const PointsTaken& event) {
-  Study* const study = find_study(event.study);
-  if (study == nullptr) {
-    return;
+void Scheduler::on(Study& study, const PointsReused& event) {
+  const std::uint64_t completed = study.points.complete_reused(event.points);
+  if (completed > 0 && study.solver_version.empty()) {
+    study.solver_version = solver_version_;
   }
-  const std::uint64_t settled = study->points.settle_unsolved(event.points);
-  if (settled > 0 && study->solver_version.empty()) {
-    study->solver_version = settings_.solver_version;
-  }
-  for (const LeaseId id : study->leases.all()) {
+  for (const LeaseId id : std::set<LeaseId>(study.leases)) {
     release_if_answered(id);
   }
   finish_if_complete(event.study);
-  requeue(event.study);
 }
 
-void Scheduler::on(const StudyCancelled& event) {
-  Study* const study = find_study(event.study);
-  if (study == nullptr || study->cancelled || study->finished) {
+void Scheduler::on(Study& study, const StudyCancelled& event) {
+  if (study.cancelled || study.finished) {
     return;
   }
-  study->cancelled = true;
-  end_all_leases(event.study);
-  study->points.rest(false);
-  requeue(event.study);
+  study.cancelled = true;
   withdraw(event.study);
+  study.points.rest(false);
 }
 
-/// None of its points counts as lost.
-void Scheduler::end_all_leases(StudyId id) {
-  Study& study = studies_.at(id);
-  study.overlaps = false;  // all leases end: whose point it was does not matter
-  for (const LeaseId lease : study.leases.all()) {
+/// All leases end, and workers that have the study drop it. No point counts as lost.
+void Scheduler::withdraw(StudyId study) {
+  for (const LeaseId lease : std::set<LeaseId>(studies_.at(study).leases)) {
     end_lease(lease, std::nullopt);
   }
-}
-
-/// Who was told of the study is told to drop it.
-void Scheduler::withdraw(StudyId study) {
   for (auto& [id, worker] : workers_) {
     if (worker.defined.erase(study) != 0) {
       effects_.emplace_back(WithdrawStudy{id, study});
@@ -114,114 +116,118 @@ void Scheduler::withdraw(StudyId study) {
   }
 }
 
-void Scheduler::on(const StudyPaused& event) {
-  Study* const study = find_study(event.study);
-  if (study != nullptr && !study->cancelled && !study->finished) {
-    study->paused = true;
-    requeue(event.study);
+void Scheduler::on(Study& study, const StudyPaused& /*event*/) {
+  if (!study.cancelled && !study.finished) {
+    study.paused = true;
   }
 }
 
-void Scheduler::on(const StudyReopened& event) {
-  Study* const study = find_study(event.study);
-  if (study != nullptr && !is_open(*study)) {
-    study->cancelled = false;
-    study->paused = false;
-    study->served = least_served(event.study);
-    requeue(event.study);
+void Scheduler::on(Study& study, const StudyReopened& /*event*/) {
+  if (!is_open(study)) {
+    study.cancelled = false;
+    study.paused = false;
+    level(study);
   }
 }
 
-void Scheduler::on(const PriorityChanged& event) {
-  Study* const study = find_study(event.study);
-  if (study == nullptr) {
+void Scheduler::on(Study& study, const PriorityChanged& event) {
+  study.priority = event.priority;
+  level(study);
+}
+
+void Scheduler::on(Study& study, const FailuresForgotten& event) {
+  // The lease that a point failed in may still run. It must not hold the point beside a new lease.
+  const IntervalSet places = study.points.order().places(event.points);
+  for (const LeaseId id : std::set<LeaseId>(study.leases)) {
+    const Lease& lease = leases_.at(id);
+    if (!places.within(lease.batch.first_place, lease.batch.end()).empty()) {
+      effects_.emplace_back(ReleaseBatch{lease.worker, id});
+      end_lease(id, std::nullopt);
+    }
+  }
+  study.failed -= std::min(study.failed, study.points.reopen(event.points));
+  if (study.leases.empty() && !study.points.has_results()) {
+    study.solver_version.clear();
+  }
+  if (study.finished && !study.points.is_complete()) {
+    study.finished = false;
+    level(study);
+  }
+}
+
+void Scheduler::on(Study& study, const StudyGrown& event) {
+  if (event.table.size() <= study.points.size()) {
     return;
   }
-  study->priority = event.priority;
-  study->served = least_served(event.study);
-  requeue(event.study);
-}
-
-void Scheduler::on(const FailuresForgotten& event) {
-  Study* const study = find_study(event.study);
-  if (study == nullptr) {
-    return;
+  const bool was_open = is_open(study);
+  study.points.grow(event.table);
+  study.cancelled = false;
+  study.paused = false;
+  study.finished = false;
+  if (!was_open || study.priority != event.priority) {
+    study.priority = event.priority;
+    level(study);
   }
-  study->failed -= std::min(study->failed, study->points.reopen(event.points));
-  study->overlaps = !study->leases.empty();  // the lease that a point failed in may still be there
-  if (study->leases.empty() && !study->points.has_results()) {
-    study->solver_version.clear();
-  }
-  if (study->finished && !study->points.is_complete()) {
-    study->finished = false;
-    study->served = least_served(event.study);
-  }
-  requeue(event.study);
-}
-
-void Scheduler::on(const StudyGrown& event) {
-  Study* const study = find_study(event.study);
-  if (study == nullptr || event.table.size() <= study->points.size()) {
-    return;
-  }
-  const bool was_open = is_open(*study);
-  study->points.grow(event.table);
-  study->cancelled = false;
-  study->paused = false;
-  study->finished = false;
-  if (!was_open || study->priority != event.priority) {
-    study->priority = event.priority;
-    study->served = least_served(event.study);
-  }
-  requeue(event.study);
 }
 
 void Scheduler::on(const StudyRemoved& event) {
-  if (!studies_.contains(event.study)) {
+  const auto study = studies_.find(event.study);
+  if (study == studies_.end()) {
     return;
   }
-  end_all_leases(event.study);
   withdraw(event.study);
   for (auto& [id, worker] : workers_) {
     worker.paces.erase(event.study);
   }
-  std::erase_if(condemned_, [&](const Condemned& point) { return point.study == event.study; });
+  condemned_.erase(event.study);
   processes_.forget_study(event.study);
-  queue_.put(event.study, {});
-  studies_.erase(event.study);
+  if (study->second.rank) {
+    free_.erase(*study->second.rank);
+  }
+  suspects_.erase(event.study);
+  studies_.erase(study);
   ready_workers_.unpark_all();  // suspect points of it may have kept some from others
 }
 
-/// Where a study begins that opens now: level with the one served least, so that it neither waits
-/// for nor catches up with what went before.
-double Scheduler::least_served(StudyId but) const {
-  return queue_.least_served(but).value_or(0.0);
+/// A study that opens begins level with the one of its priority that is served least, so that it
+/// neither waits for nor catches up with what went before.
+void Scheduler::level(Study& study) const {
+  const std::int64_t rank = -std::int64_t{study.priority};
+  const auto least = free_.lower_bound({rank, 0.0, 0});
+  study.served = least != free_.end() && std::get<0>(*least) == rank ? std::get<1>(*least) : 0.0;
 }
 
 /// The study has no results, or of the solver version of the workers.
 bool Scheduler::is_current(const Study& study) const {
-  return study.solver_version.empty() || study.solver_version == settings_.solver_version;
+  return study.solver_version.empty() || study.solver_version == solver_version_;
 }
 
 bool Scheduler::is_open(const Study& study) const {
   return !study.cancelled && !study.paused && !study.finished && !study.held && is_current(study);
 }
 
-StudyQueue::Place Scheduler::place_of(const Study& study) const {
-  const bool has_free = study.points.has_free();
-  if (!is_open(study) || !(has_free || study.has_suspect())) {
-    return {};
-  }
-  return {has_free, study.has_suspect(), study.priority, study.served};
+std::optional<Scheduler::Rank> Scheduler::rank_of(StudyId id, const Study& study) const {
+  return is_open(study) && study.points.has_free()
+             ? std::optional<Rank>({-std::int64_t{study.priority}, study.served, id})
+             : std::nullopt;
 }
 
 void Scheduler::requeue(StudyId id) {
-  const StudyQueue::Place* known = queue_.find(id);
-  const StudyQueue::Place before = known == nullptr ? StudyQueue::Place{} : *known;
-  const StudyQueue::Place place = place_of(studies_.at(id));
-  queue_.put(id, place);
-  // Suspect points stop some workers.
-  if ((place.has_free && !before.has_free) || place.has_suspect != before.has_suspect) {
+  Study& study = studies_.at(id);
+  const std::optional<Rank> rank = rank_of(id, study);
+  const bool had_free = study.rank.has_value();
+  if (rank != study.rank) {
+    if (study.rank) {
+      free_.erase(*study.rank);
+    }
+    if (rank) {
+      free_.insert(*rank);
+    }
+    study.rank = rank;
+  }
+  const bool has_suspect = is_open(study) && study.has_suspect();
+  const bool changes_suspect = has_suspect ? suspects_.insert(id).second : suspects_.erase(id) > 0;
+  if ((rank && !had_free) || changes_suspect) {  // suspect points stop some workers
     ready_workers_.unpark_all();
   }
 }
@@ -262,39 +268,22 @@ void Scheduler::on(const WorkerJoined& event) {
   ready_workers_.unpark_all();
 }
 
-Scheduler::Worker* Scheduler::heard_from(WorkerId worker) {
-  const auto found = workers_.find(worker);
-  if (found == workers_.end()) {
-    return nullptr;
-  }
-  found->second.last_heard_ms = now_ms_;
-  ready_workers_.unpark(worker);
-  return &found->second;
-}
-
-void Scheduler::on(const CreditGiven& event) {
-  if (Worker* worker = heard_from(event.worker)) {
-    const std::uint32_t room = settings_.max_credit - worker->credit;
-    worker->credit += std::min(event.batches, room);
-    if (worker->credit > 0) {
-      ready_workers_.add(event.worker);
-    }
+void Scheduler::on(Worker& worker, const CreditGiven& event) {
+  worker.credit += std::min(event.batches, settings_.max_credit - worker.credit);
+  if (worker.credit > 0) {
+    ready_workers_.add(event.worker);
   }
 }
 
-void Scheduler::on(const HeartbeatReceived& event) {
-  Worker* worker = heard_from(event.worker);
-  if (worker == nullptr) {
-    return;
-  }
+void Scheduler::on(Worker& worker, const HeartbeatReceived& event) {
   // A lease that the worker still does not name when a batch must long have reached it never did.
   const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
-  if (worker->probe != 0 && !held.contains(worker->probe) &&
-      now_ms_ - *worker->probed_ms > settings_.lost_after_ms) {
-    worker->probe = 0;
+  if (worker.probe != 0 && !held.contains(worker.probe) &&
+      now_ms_ - *worker.probed_ms > settings_.lost_after_ms) {
+    worker.probe = 0;
   }
   std::vector<LeaseId> strayed;
-  for (const LeaseId id : worker->leases) {
+  for (const LeaseId id : worker.leases) {
     if (!held.contains(id) && now_ms_ - leases_.at(id).granted_ms > settings_.lost_after_ms) {
       strayed.push_back(id);
     }
@@ -304,16 +293,12 @@ void Scheduler::on(const HeartbeatReceived& event) {
   }
 }
 
-void Scheduler::on(const BatchesReturned& event) {
-  Worker* worker = heard_from(event.worker);
-  if (worker == nullptr) {
-    return;
-  }
+void Scheduler::on(Worker& worker, const BatchesReturned& event) {
   for (const LeaseId lease : event.leases) {
-    if (worker->leases.contains(lease)) {
+    if (worker.leases.contains(lease)) {
       end_lease(lease, std::nullopt);
-    } else if (lease == worker->probe) {
-      worker->probe = 0;
+    } else if (lease == worker.probe) {
+      worker.probe = 0;
     }
   }
 }
@@ -378,7 +363,7 @@ void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
     end_lease(lease, loss);
   }
   ready_workers_.remove(id);
-  set_draining(found->second, false);
+  stop_draining(id);
   threads_ -= found->second.threads;
   workers_.erase(found);
   processes_.leave(process, id);
@@ -389,7 +374,9 @@ void Scheduler::on(const WorkerBusy& event) {
   const auto found = workers_.find(event.worker);
   if (found != workers_.end()) {
     found->second.is_busy = event.is_busy;
-    set_draining(found->second, found->second.draining && !event.is_busy);
+    if (event.is_busy) {
+      stop_draining(event.worker);
+    }
     ready_workers_.unpark(event.worker);
   }
 }
@@ -403,47 +390,32 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   worker.leases.erase(id);
   worker.paces.at(lease.study).held_points -= lease.batch.points;
   ready_workers_.unpark(lease.worker);
-  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
-    twin->second.twin = 0;
-  }
   Study& study = studies_.at(lease.study);
-  study.leases.erase(id, lease.batch);
-  const std::vector<Interval> held = held_by(lease);
-  if (loss) {
+  study.leases.erase(id);
+  const std::vector<Interval> held = open_places(lease);
+  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {  // it holds the same
+    twin->second.twin = 0;
+    if (loss && !held.empty()) {
+      // What killed one worker may kill the other: that must not be forgotten.
+      note_process(lease.study, loss->process);
+      twin->second.batch.losses.add({loss->process, false});
+    }
+  } else if (loss && !held.empty()) {
+    note_process(lease.study, loss->process);
     note_loss(lease, held, *loss);
-  } else if (!held.empty()) {
+  } else {
     study.points.give_back(held, lease.batch.attempts + 1, lease.batch.losses, now_ms_);
   }
-  if (study.leases.empty()) {
-    study.overlaps = false;
-    if (!study.points.has_results()) {
-      study.solver_version.clear();
-    }
+  if (study.leases.empty() && !study.points.has_results()) {
+    study.solver_version.clear();
   }
   requeue(lease.study);
 }
 
-/// Points that are leased by this lease, which has ended, and by no other.
-std::vector<Interval> Scheduler::held_by(const Lease& lease) const {
-  const Study& study = studies_.at(lease.study);
-  const auto leased = study.points.leased_set().within(lease.batch.first_place, lease.batch.end());
-  if (!study.overlaps || leased.empty()) {
-    return leased;
-  }
-  IntervalSet held;
-  for (const Interval& interval : leased) {
-    held.insert(interval.begin, interval.end);
-  }
-  for (const LeaseId id : study.leases.near(lease.batch)) {
-    const Batch& other = leases_.at(id).batch;
-    held.erase(other.first_place, other.end());
-  }
-  return held.within(lease.batch.first_place, lease.batch.end());
-}
-
-bool Scheduler::has_open_points(const Lease& lease) const {
-  const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
-  return !leased.within(lease.batch.first_place, lease.batch.end()).empty();
+std::vector<Interval> Scheduler::open_places(const Lease& lease) const {
+  return studies_.at(lease.study)
+      .points.leased_set()
+      .within(lease.batch.first_place, lease.batch.end());
 }
 
 /// A batch whose points were all answered by others is nobody's work any more.
@@ -455,11 +427,7 @@ void Scheduler::release_if_answered(LeaseId id) {
   }
 }
 
-void Scheduler::on(const ResultsReceived& event) {
-  Worker* worker = heard_from(event.worker);
-  if (worker == nullptr) {
-    return;
-  }
+void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   if (names_other_points(event)) {
     remove_worker(event.worker, WorkerEnd::kLost);
     effects_.emplace_back(
@@ -475,19 +443,19 @@ void Scheduler::on(const ResultsReceived& event) {
       }
     }
     if (!store.accepted.empty() && study->second.solver_version.empty()) {
-      study->second.solver_version = settings_.solver_version;
+      study->second.solver_version = solver_version_;
     }
     // Of a lease that has ended since others name them again.
-    if (worker->leases.contains(event.lease)) {
+    if (worker.leases.contains(event.lease)) {
       store.left_out = study->second.points.receive(event.left_out);
     }
     if (!store.accepted.empty() || !store.left_out.empty()) {
-      worker->stored_ms = now_ms_;
+      worker.stored_ms = now_ms_;
     }
     requeue(event.study);
-    learn_pace(*worker, event);
+    learn_pace(worker, event);
   }
-  note_answers(*worker, event, !store.accepted.empty());
+  note_answers(worker, event, !store.accepted.empty());
   effects_.emplace_back(std::move(store));
   const auto lease = leases_.find(event.lease);
   if (lease == leases_.end() || lease->second.worker != event.worker ||
@@ -496,11 +464,11 @@ void Scheduler::on(const ResultsReceived& event) {
   }
   const LeaseId twin = lease->second.twin;
   if (event.batch_done) {
-    const bool is_solved = is_proven(*worker) && !has_open_points(lease->second);
-    worker->solved_batches += is_solved ? 1U : 0U;
+    const bool is_solved = is_proven(worker) && !has_open_points(lease->second);
+    worker.solved_batches += is_solved ? 1U : 0U;
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.
-    end_lease(event.lease, Loss{kNobody, is_proven(*worker) && worker->leases.size() == 1});
+    end_lease(event.lease, Loss{kNobody, is_proven(worker) && worker.leases.size() == 1});
   }
   release_if_answered(twin);
 }
@@ -551,14 +519,14 @@ void Scheduler::on(const ResultsStored& event) {
   const auto worker = workers_.find(event.worker);
   if (study != studies_.end()) {
     for (const PointOutcome& outcome : event.outcomes) {
-      if (study->second.points.settle(outcome.point)) {
+      if (study->second.points.complete(outcome.point)) {
         study->second.failed += outcome.failed ? 1U : 0U;
         if (worker != workers_.end()) {
           worker->second.solved_points += outcome.failed ? 0U : 1U;
         }
       }
     }
-    study->second.points.settle(event.left_out);
+    study->second.points.complete(event.left_out);
     finish_if_complete(event.study);
     requeue(event.study);
   }
@@ -572,21 +540,10 @@ void Scheduler::on(const ResultsStored& event) {
 StudyCounts Scheduler::study(StudyId id) const {
   const Study& study = studies_.at(id);
   const StudyPoints& points = study.points;
-  return {points.size(),        points.settled(),
+  return {points.size(),        points.completed(),
           study.failed,         points.left_out(),
           points.leased(),      study.cancelled,
           study.solver_version, !is_current(study) && !points.is_complete()};
-}
-
-QuietWorkers Scheduler::quiet_workers(StudyId id, std::int64_t now_ms) const {
-  std::set<WorkerId> holders;
-  std::int64_t last_stored_ms = 0;
-  for (const LeaseId lease : studies_.at(id).leases.all()) {
-    const WorkerId worker = leases_.at(lease).worker;
-    holders.insert(worker);
-    last_stored_ms = std::max(last_stored_ms, workers_.at(worker).stored_ms);
-  }
-  return {holders.size(), std::max<std::int64_t>(0, now_ms - last_stored_ms)};
 }
 
 bool Scheduler::sets_all_aside() const {
@@ -594,23 +551,23 @@ bool Scheduler::sets_all_aside() const {
                              [this](const auto& entry) { return is_set_aside(entry.second); });
 }
 
-std::array<Crew, kCrewStates> Scheduler::crews(std::int64_t now_ms,
-                                               std::int64_t silent_after_ms) const {
-  std::array<Crew, kCrewStates> crews{};
+WorkerState Scheduler::state_of(const Worker& worker, std::int64_t now_ms) const {
+  constexpr std::int64_t kSilentAfter_ms = 1500;
+  return now_ms - worker.last_heard_ms > kSilentAfter_ms ? WorkerState::kSilent
+         : is_set_aside(worker)                          ? WorkerState::kSetAside
+         : worker.is_busy                                ? WorkerState::kBusy
+         : !worker.leases.empty() || worker.probe != 0   ? WorkerState::kWorking
+                                                         : WorkerState::kIdle;
+}
+
+WorkerGroups Scheduler::groups(std::int64_t now_ms) const {
+  WorkerGroups groups{};
   for (const auto& [id, worker] : workers_) {
-    CrewState state = CrewState::kIdle;
-    if (now_ms - worker.last_heard_ms >= silent_after_ms) {
-      state = CrewState::kSilent;
-    } else if (is_set_aside(worker)) {
-      state = CrewState::kSetAside;
-    } else if (!worker.leases.empty() || worker.probe != 0) {
-      state = CrewState::kWorking;
-    }
-    Crew& crew = crews.at(static_cast<std::size_t>(state));
-    ++crew.workers;
-    crew.threads += worker.threads;
+    WorkerGroup& group = groups.at(static_cast<std::size_t>(state_of(worker, now_ms)));
+    ++group.workers;
+    group.threads += worker.threads;
   }
-  return crews;
+  return groups;
 }
 
 std::int64_t Scheduler::silent_ms(WorkerId id, std::int64_t now_ms) const {
@@ -624,13 +581,10 @@ WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
                       silent_ms(id, now_ms),
                       processes_.at(worker.process).losses,
                       is_proven(worker),
-                      is_set_aside(worker)};
-  for (const LeaseId lease_id : worker.leases) {
-    const Lease& lease = leases_.at(lease_id);
-    const IntervalSet& leased = studies_.at(lease.study).points.leased_set();
-    for (const Interval& interval : leased.within(lease.batch.first_place, lease.batch.end())) {
-      counts.leased_points += interval.end - interval.begin;
-    }
+                      is_set_aside(worker),
+                      state_of(worker, now_ms)};
+  for (const LeaseId lease : worker.leases) {
+    counts.leased_points += size_of(open_places(leases_.at(lease)));
   }
   return counts;
 }

@@ -9,21 +9,21 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
-#include "server/scheduler/lease_index.h"
-#include "server/scheduler/ready_queue.h"
+#include "server/scheduler/losses.h"
 #include "server/scheduler/scheduler_events.h"
 #include "server/scheduler/study_points.h"
-#include "server/scheduler/study_queue.h"
-#include "server/scheduler/worker_processes.h"
 
 namespace oblique::server {
 
 /// A study as others see it.
 struct StudyCounts {
   std::uint64_t points;
-  std::uint64_t settled;  ///< also those that failed or are left out
+  std::uint64_t completed;  ///< also those that failed or are left out
   std::uint64_t failed;
   std::uint64_t left_out;  ///< by a filter, as far as workers have reported it
   std::uint64_t leased;
@@ -31,34 +31,26 @@ struct StudyCounts {
   std::string solver_version;  ///< of its results; empty without results
   bool is_of_other_solver;     ///< points are open, and the server has another version
 
-  std::uint64_t open() const { return points - settled; }
-  std::uint64_t solved() const { return settled - std::min(settled, failed + left_out); }
-};
-
-/// Workers that hold points of a study, all of which have stored nothing for a time.
-struct QuietWorkers {
-  std::size_t workers;
-  std::int64_t quiet_ms;  ///< of the one that stored something last
+  std::uint64_t open() const { return points - completed; }
+  std::uint64_t solved() const { return completed - std::min(completed, failed + left_out); }
 };
 
 /// What a worker does; of several the first that is true.
-enum class CrewState {
-  kSilent,    ///< nothing came of it lately
+enum class WorkerState {
+  kSilent,    ///< no message for 1.5 s: heartbeats come every 900 ms
   kSetAside,  ///< it gets nothing until it has solved a probe
-  kWorking,   ///< it holds a batch
+  kBusy,      ///< it does not read what it is sent
+  kWorking,   ///< it holds a batch or a probe
   kIdle,
 };
-inline constexpr std::size_t kCrewStates = 4;
-constexpr const char* crew_name(CrewState state) {
-  constexpr std::array kNames{"silent", "set_aside", "working", "idle"};
-  return kNames.at(static_cast<std::size_t>(state));
-}
+inline constexpr std::array kWorkerStates{"silent", "set aside", "busy", "working", "idle"};
 
-/// Workers that do the same.
-struct Crew {
+/// The workers of one state.
+struct WorkerGroup {
   std::uint64_t workers = 0;
   std::uint64_t threads = 0;
 };
+using WorkerGroups = std::array<WorkerGroup, kWorkerStates.size()>;
 
 struct WorkerCounts {
   std::uint64_t leased_points;
@@ -66,14 +58,61 @@ struct WorkerCounts {
   std::int64_t silent_ms;
   std::uint64_t losses;  ///< leases of its process that ended without an answer
   bool is_proven;        ///< its process has solved points that were handed to it
-  bool is_set_aside;     ///< it gets nothing until it has solved a probe
+  bool is_set_aside;
+  WorkerState state;
+};
+
+/// The workers with credit, first come first served. A worker for which there was nothing is
+/// parked: it keeps its place and is skipped until something changes for it, so that an event costs
+/// what it changes, however many workers wait.
+class ReadyQueue {
+ public:
+  using ByPlace = std::map<std::uint64_t, WorkerId>;
+
+  /// At the end, unless it is in the queue already.
+  void add(WorkerId worker) {
+    if (places_.emplace(worker, last_place_ + 1).second) {
+      active_.emplace(++last_place_, worker);
+    }
+  }
+  void remove(WorkerId worker) {
+    if (const auto found = places_.find(worker); found != places_.end()) {
+      active_.erase(found->second);
+      parked_.erase(found->second);
+      places_.erase(found);
+    }
+  }
+  void park(WorkerId worker) { move(worker, active_, parked_); }
+  void unpark(WorkerId worker) { move(worker, parked_, active_); }
+  void unpark_all() { active_.merge(parked_); }
+
+  bool contains(WorkerId worker) const { return places_.contains(worker); }
+  std::size_t size() const { return places_.size(); }
+  /// In the order in which they are served.
+  const ByPlace& active() const { return active_; }
+  const ByPlace& parked() const { return parked_; }
+
+ private:
+  void move(WorkerId worker, ByPlace& from, ByPlace& to) {
+    if (const auto found = places_.find(worker); found != places_.end()) {
+      to.insert(from.extract(found->second));
+    }
+  }
+
+  std::unordered_map<WorkerId, std::uint64_t> places_;
+  ByPlace active_;
+  ByPlace parked_;
+  std::uint64_t last_place_ = 0;
 };
 
 /// Decides who solves which points: (state, event, now) -> effects. No I/O, no clock, no thread, no
 /// randomness; README.md has the table of states and events. Not thread-safe.
 class Scheduler {
  public:
-  explicit Scheduler(SchedulerSettings settings) : settings_(settings) {}
+  /// `solver_version` is that of the server and all its workers. A study whose results have another
+  /// version is not handed out.
+  explicit Scheduler(const SchedulerSettings& settings, std::string solver_version = {})
+      : settings_(settings), solver_version_(std::move(solver_version)) {}
 
   /// Takes one event at `now_ms` (any steady clock that never runs backwards) and returns what is
   /// to be done, in order. Events of unknown workers and studies have no effect but the answers
@@ -88,29 +127,27 @@ class Scheduler {
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
-  /// Those that hold points of the study. Throws std::out_of_range for an unknown study.
-  QuietWorkers quiet_workers(StudyId study, std::int64_t now_ms) const;
   /// No worker gets points before it has solved a probe; true without workers.
   bool sets_all_aside() const;
-  /// All workers, by CrewState. Those count as silent of which nothing came for so long.
-  std::array<Crew, kCrewStates> crews(std::int64_t now_ms, std::int64_t silent_after_ms) const;
+  /// All workers, by WorkerState.
+  WorkerGroups groups(std::int64_t now_ms) const;
   /// Batches that are at workers.
   std::size_t leases() const { return leases_.size(); }
   /// Time of a thread that a point takes, over the last results, in s; 0: not known.
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
-  /// The same.
-  std::uint64_t solved_points(WorkerId worker) const { return workers_.at(worker).solved_points; }
   /// Since its last message. Throws std::out_of_range for an unknown worker.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
 
   /// Throws std::logic_error when the state contradicts itself: a point in two places or in none, a
-  /// lease without worker or study, a leased point without lease, two leases of one point where no
-  /// batch was given to a second worker.
+  /// lease without worker or study, a leased point without lease, two leases of one point
+  /// that are not twins.
   void check_invariants() const;
 
  private:
+  /// The order in which studies get batches: minus the priority, served, number.
+  using Rank = std::tuple<std::int64_t, double, StudyId>;
   struct Study {
     StudyPoints points;
     std::uint64_t failed;
@@ -121,9 +158,9 @@ class Scheduler {
     /// Batches handed out since the study was last open; long ones count for more.
     double served = 0.0;
     std::string solver_version{};  ///< of its results and leases; empty while there are none
-    LeaseIndex leases{};
+    std::set<LeaseId> leases{};
     bool held = false;
-    bool overlaps = false;  ///< a point of it may be under several of these leases
+    std::optional<Rank> rank{};  ///< in `free_`
 
     bool has_suspect() const {
       return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
@@ -154,8 +191,7 @@ class Scheduler {
   struct Worker {
     std::uint32_t threads;
     std::uint32_t credit = 0;
-    bool is_busy = false;   ///< gets nothing
-    bool draining = false;  ///< gets nothing until it holds nothing, then suspect points
+    bool is_busy = false;  ///< gets nothing
     ProcessNumber process = kNobody;
     LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
@@ -169,22 +205,24 @@ class Scheduler {
   };
   using Effects = std::vector<Effect>;
 
+  template <typename Kind>
+  void pass(const Kind& event);
   void on(const StudyAdded& event);
-  void on(const StudyHeld& event);
-  void on(const PointsTaken& event);
-  void on(const StudyCancelled& event);
-  void on(const StudyPaused& event);
-  void on(const StudyReopened& event);
-  void on(const PriorityChanged& event);
-  void on(const FailuresForgotten& event);
-  void on(const StudyGrown& event);
+  void on(Study& study, const StudyHeld& event);
+  void on(Study& study, const PointsReused& event);
+  void on(Study& study, const StudyCancelled& event);
+  void on(Study& study, const StudyPaused& event);
+  void on(Study& study, const StudyReopened& event);
+  void on(Study& study, const PriorityChanged& event);
+  void on(Study& study, const FailuresForgotten& event);
+  void on(Study& study, const StudyGrown& event);
   void on(const StudyRemoved& event);
   void on(const WorkerJoined& event);
-  void on(const CreditGiven& event);
-  void on(const ResultsReceived& event);
+  void on(Worker& worker, const CreditGiven& event);
+  void on(Worker& worker, const ResultsReceived& event);
   void on(const ResultsStored& event);
-  void on(const HeartbeatReceived& event);
-  void on(const BatchesReturned& event);
+  void on(Worker& worker, const HeartbeatReceived& event);
+  void on(Worker& worker, const BatchesReturned& event);
   void on(const WorkerLeft& event);
   void on(const WorkerUnreachable& event);
   void on(const WorkerBusy& event);
@@ -192,27 +230,30 @@ class Scheduler {
   void on(const Tick& event);
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
-  Study* find_study(StudyId id);
-  void end_all_leases(StudyId id);
   void withdraw(StudyId id);
-  Worker* heard_from(WorkerId worker);
   /// `loss`: who went with it without an answer; nothing: its points are given back.
   void end_lease(LeaseId lease, const std::optional<Loss>& loss);
-  std::vector<Interval> held_by(const Lease& lease) const;
-  /// Whether points of its batch have no answer yet.
-  bool has_open_points(const Lease& lease) const;
+  /// Places of its batch whose points have no answer yet.
+  std::vector<Interval> open_places(const Lease& lease) const;
+  bool has_open_points(const Lease& lease) const { return !open_places(lease).empty(); }
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
   bool names_other_points(const ResultsReceived& event) const;
   void learn_pace(Worker& worker, const ResultsReceived& event);
+  /// The fastest workers' time of a thread for a point, by study; 0: unknown.
+  using FastestPaces = std::map<StudyId, double>;
+  double fastest_pace(StudyId id, FastestPaces& known) const;
   void end_stalled();
-  std::int64_t longest_stall_ms(const Worker& worker, std::map<StudyId, double>& paces) const;
+  std::int64_t longest_stall_ms(const Worker& worker, FastestPaces& paces) const;
   void finish_if_complete(StudyId id);
   bool is_open(const Study& study) const;
-  StudyQueue::Place place_of(const Study& study) const;
+  std::optional<Rank> rank_of(StudyId id, const Study& study) const;
+  void level(Study& study) const;
   /// To be called after every change of a study or its points.
   void requeue(StudyId id);
 
+  WorkerState state_of(const Worker& worker, std::int64_t now_ms) const;
+  void note_process(StudyId study, ProcessNumber process);
   void note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss);
   void note_end(const Worker& worker, WorkerEnd how);
   void note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted);
@@ -222,46 +263,41 @@ class Scheduler {
   bool is_set_aside(const Worker& worker) const;
   bool is_longest_proven(const Worker& worker) const;
   bool probe(WorkerId id, Worker& worker);
+  void check_leases() const;
   void check_losses() const;
-  void check_lines() const;
 
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
-  bool serve_suspect(WorkerId id, Worker& worker);
-  std::optional<Standing> suspect_for(const Study& study, const Worker& worker) const;
-  bool serve_straggler(WorkerId id, Worker& worker);
-  bool is_straggling(const Lease& lease, const Worker& helper) const;
+  void serve_suspect(WorkerId id, Worker& worker, StudyId study);
+  std::optional<Standing> suspect_for(const StudyPoints& points, const Worker& worker) const;
+  bool may_hold_more(const Worker& worker) const;
+  void duplicate_stragglers();
+  bool is_straggling(const Lease& lease, FastestPaces& paces) const;
   bool is_current(const Study& study) const;
-  double least_served(StudyId but) const;
   StudyId next_suspect_study(const Worker& worker) const;
-  void set_draining(Worker& worker, bool is_draining);
+  void stop_draining(WorkerId worker);
   BatchSize portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
   void fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
+  void use_credit(WorkerId id, Worker& worker);
   LeaseId grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch, bool alone);
 
-  /// A point that is to fail, unless it is condemned no more.
-  struct Condemned {
-    std::int64_t due_ms;
-    StudyId study;
-    std::uint64_t point;
-  };
-
   SchedulerSettings settings_;
+  std::string solver_version_;
   WorkerProcesses processes_{settings_.most_absent_processes};
-  std::deque<Condemned> condemned_;       // the one that is due first in front
   std::deque<std::int64_t> vanished_ms_;  // when the last newcomers vanished with points
   std::map<StudyId, Study> studies_;
-  StudyQueue queue_;  // of the studies that have something to hand out
+  std::set<Rank> free_;          // studies with free points to hand out, the next one first
+  std::set<StudyId> suspects_;   // those with suspect points to hand out
+  std::set<StudyId> condemned_;  // those with condemned points
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // with credit
-  std::size_t draining_ = 0;  // workers
+  WorkerId draining_ = 0;     // gets nothing until it holds nothing, then suspect points; 0: none
   std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;
-  bool seeks_stragglers_ = false;  // of the event being handled: they are sought at ticks only
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
   Effects effects_;      // of the event being handled

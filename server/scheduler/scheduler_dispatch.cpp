@@ -1,41 +1,43 @@
 // The part of the scheduler that decides who gets what next.
 #include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "server/scheduler/scheduler.h"
 
 namespace oblique::server {
 
 void Scheduler::dispatch() {
-  if (held_) {
-    return;
-  }
-  const auto has_work = [this] { return seeks_stragglers_ || !queue_.empty(); };
-  if (seeks_stragglers_) {
-    // Each tick another worker comes first, in case this one may not help any straggler.
-    ready_workers_.rotate();
-  }
-  while (ready_workers_.has_active() && has_work()) {
-    const WorkerId id = ready_workers_.first_active();
-    Worker& worker = workers_.at(id);
+  while (!held_ && !ready_workers_.active().empty() && !(free_.empty() && suspects_.empty())) {
+    const WorkerId id = ready_workers_.active().begin()->second;
     ++examined_workers_;
-    if (!serve(id, worker)) {
+    if (!serve(id, workers_.at(id))) {
       ready_workers_.park(id);
-      continue;
-    }
-    ready_workers_.remove(id);
-    if (worker.credit > 0) {
-      ready_workers_.add(id);
     }
   }
 }
 
-bool Scheduler::serve(WorkerId id, Worker& worker) {
-  if (worker.is_busy) {
-    return false;
+/// The worker gets a batch or a probe: it waits for the next one behind all others.
+void Scheduler::use_credit(WorkerId id, Worker& worker) {
+  worker.credit -= std::min(worker.credit, 1U);
+  ready_workers_.remove(id);
+  if (worker.credit > 0) {
+    ready_workers_.add(id);
   }
+}
+
+/// The worker reads what it is sent, holds nothing that must be alone, and solves what it gets.
+bool Scheduler::may_hold_more(const Worker& worker) const {
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
-  if (holds_suspect || worker.probe != 0) {
+  return !worker.is_busy && !holds_suspect && worker.probe == 0 &&
+         worker.leases.size() < settings_.newcomer_batches + worker.solved_batches;
+}
+
+bool Scheduler::serve(WorkerId id, Worker& worker) {
+  if (!may_hold_more(worker)) {
     return false;
   }
   if (is_set_aside(worker)) {
@@ -43,26 +45,24 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   }
   const StudyId suspect_study = next_suspect_study(worker);
   if (suspect_study == 0) {
-    set_draining(worker, false);
+    stop_draining(id);
   } else if (!is_proven(worker)) {
     // It may have nothing else by which to show that it is fit for them.
-    if (worker.leases.empty() && queue_.next_free() == 0) {
+    if (worker.leases.empty() && free_.empty()) {
       return probe(id, worker);
     }
   } else if (worker.leases.empty()) {
-    return serve_suspect(id, worker);
-  } else if (worker.draining || draining_ == 0) {
+    serve_suspect(id, worker, suspect_study);
+    return true;
+  } else if (draining_ == id || draining_ == 0) {
     // Suspect points wait for one worker to empty, the others go on.
-    set_draining(worker, true);
+    draining_ = id;
     return false;
   }
-  if (worker.leases.size() >= settings_.newcomer_batches + worker.solved_batches) {
+  if (free_.empty()) {
     return false;
   }
-  const StudyId study = queue_.next_free();
-  if (study == 0) {
-    return seeks_stragglers_ && serve_straggler(id, worker);
-  }
+  const StudyId study = std::get<StudyId>(*free_.begin());
   const BatchSize wanted = portion_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
   // A batch that ended early with its run of points says nothing of the worker's capacity.
@@ -71,81 +71,76 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   return true;
 }
 
-bool Scheduler::serve_suspect(WorkerId id, Worker& worker) {
-  const StudyId id_of_study = next_suspect_study(worker);
-  Study& study = studies_.at(id_of_study);
-  set_draining(worker, false);
+void Scheduler::serve_suspect(WorkerId id, Worker& worker, StudyId study) {
+  StudyPoints& points = studies_.at(study).points;
+  stop_draining(id);
   // The sooner these are known to be sound, the better: its lanes may stay empty.
-  const BatchSize wanted = portion_for(worker, id_of_study, false);
-  if (const auto batch = study.points.take(*suspect_for(study, worker), wanted)) {
-    grant(id, worker, id_of_study, *batch, true);
-  }
-  return true;
+  const BatchSize wanted = portion_for(worker, study, false);
+  grant(id, worker, study, *points.take(*suspect_for(points, worker), wanted), true);
 }
 
-/// What is left of the batch that straggles longest, also to this worker.
-bool Scheduler::serve_straggler(WorkerId id, Worker& worker) {
-  // Leases are numbered as they are granted: the first that straggles does so longest, and none
-  // after one that is too young does.
-  const auto longest = std::find_if(leases_.begin(), leases_.end(), [&](const auto& entry) {
-    const Lease& lease = entry.second;
-    return now_ms_ - lease.granted_ms < settings_.straggler_after_ms ||
-           (lease.worker != id && is_straggling(lease, worker));
-  });
-  if (longest == leases_.end() ||
-      now_ms_ - longest->second.granted_ms < settings_.straggler_after_ms) {
-    seeks_stragglers_ = false;  // searching all leases costs: the next search is at the next tick
-    return false;
+/// With nothing else to hand out, what is left of batches that take too long goes to idle workers
+/// too. The first answer wins.
+void Scheduler::duplicate_stragglers() {
+  const auto is_old = [this](const Lease& lease) {
+    return now_ms_ - lease.granted_ms >= settings_.straggler_after_ms;
+  };
+  if (held_ || !free_.empty() || !suspects_.empty() || leases_.empty() ||
+      !is_old(leases_.begin()->second)) {
+    return;
   }
-  Lease& straggler = longest->second;
-  Study& study = studies_.at(straggler.study);
-  const auto left =
-      study.points.leased_set().within(straggler.batch.first_place, straggler.batch.end());
-  study.overlaps = true;
-  const Batch rest{left.front().begin, left.back().end - left.front().begin,
-                   straggler.batch.attempts + 1, straggler.batch.losses, size_of(left)};
-  const LeaseId twin = grant(id, worker, straggler.study, rest, false);
-  straggler.twin = twin;
-  leases_.at(twin).twin = longest->first;
-  return true;
+  std::vector<WorkerId> helpers;
+  for (const auto* workers : {&ready_workers_.active(), &ready_workers_.parked()}) {
+    for (const auto& [place, id] : *workers) {
+      if (may_hold_more(workers_.at(id)) && !is_set_aside(workers_.at(id))) {
+        helpers.push_back(id);
+      }
+    }
+  }
+  FastestPaces paces;
+  // Leases are numbered as they are granted: the oldest comes first.
+  for (auto entry = leases_.begin(); entry != leases_.end() && is_old(entry->second); ++entry) {
+    Lease& lease = entry->second;
+    const auto helper = std::find_if(helpers.begin(), helpers.end(),
+                                     [&](WorkerId id) { return id != lease.worker; });
+    if (helper == helpers.end() || !is_straggling(lease, paces)) {
+      continue;
+    }
+    const std::vector<Interval> left = open_places(lease);
+    const Batch rest{left.front().begin, left.back().end - left.front().begin,
+                     lease.batch.attempts + 1, lease.batch.losses, size_of(left)};
+    lease.twin = grant(*helper, workers_.at(*helper), lease.study, rest, false);
+    leases_.at(lease.twin).twin = entry->first;
+    helpers.erase(helper);
+  }
 }
 
-bool Scheduler::is_straggling(const Lease& lease, const Worker& helper) const {
-  const Study& study = studies_.at(lease.study);
-  const std::int64_t age_ms = now_ms_ - lease.granted_ms;
+bool Scheduler::is_straggling(const Lease& lease, FastestPaces& paces) const {
   if (lease.twin != 0 || lease.alone || !lease.batch.losses.empty() ||
-      age_ms < settings_.straggler_after_ms || !is_open(study) ||
-      study.points.leased_set().within(lease.batch.first_place, lease.batch.end()).empty()) {
+      !is_open(studies_.at(lease.study)) || !has_open_points(lease)) {
     return false;
   }
   const Worker& holder = workers_.at(lease.worker);
   if (leases_.at(*holder.leases.begin()).granted_ms < lease.granted_ms) {
     return true;  // it waits behind another batch of its worker
   }
-  for (const Worker* judge : {&helper, &holder}) {
-    const auto pace = judge->paces.find(lease.study);
-    if (pace != judge->paces.end() && pace->second.s_per_point() > 0.0) {
-      const double expected_ms = 1e3 * pace->second.s_per_point() *
-                                 static_cast<double>(lease.batch.points) / judge->threads;
-      return static_cast<double>(age_ms) > settings_.straggler_factor * expected_ms;
-    }
-  }
-  return true;
+  const double expected_ms = 1e3 * fastest_pace(lease.study, paces) *
+                             static_cast<double>(lease.batch.points) / holder.threads;
+  return static_cast<double>(now_ms_ - lease.granted_ms) > settings_.straggler_factor * expected_ms;
 }
 
 StudyId Scheduler::next_suspect_study(const Worker& worker) const {
-  const auto& suspects = queue_.with_suspects();
-  const auto found = std::find_if(suspects.begin(), suspects.end(), [&](StudyId study) {
-    return suspect_for(studies_.at(study), worker).has_value();
+  const auto found = std::find_if(suspects_.begin(), suspects_.end(), [&](StudyId study) {
+    return suspect_for(studies_.at(study).points, worker).has_value();
   });
-  return found == suspects.end() ? 0 : *found;
+  return found == suspects_.end() ? 0 : *found;
 }
 
 /// Which of the study's suspect points the worker may get. For accused ones the worker is wanted
 /// that is least likely to be lost for a reason of its own. A newcomer gets none, but is told so
 /// here, that it may be probed.
-std::optional<Standing> Scheduler::suspect_for(const Study& study, const Worker& worker) const {
-  const StudyPoints& points = study.points;
+std::optional<Standing> Scheduler::suspect_for(const StudyPoints& points,
+                                               const Worker& worker) const {
   if (points.has(Standing::kAccused) &&
       (!is_proven(worker) ||
        now_ms_ - points.returned_ms(Standing::kAccused) >= settings_.longest_proven_within_ms ||
@@ -155,14 +150,9 @@ std::optional<Standing> Scheduler::suspect_for(const Study& study, const Worker&
   return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
 }
 
-void Scheduler::set_draining(Worker& worker, bool is_draining) {
-  if (std::exchange(worker.draining, is_draining) == is_draining) {
-    return;
-  }
-  if (is_draining) {
-    ++draining_;
-  } else {
-    --draining_;
+void Scheduler::stop_draining(WorkerId worker) {
+  if (draining_ == worker) {
+    draining_ = 0;
     ready_workers_.unpark_all();  // another one may have to
   }
 }
@@ -250,20 +240,20 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
                                       settings_.lanes_batch_s + settings_.batch_target_s);
   served.served += counted_s / settings_.batch_target_s;
   if (served.solver_version.empty()) {
-    served.solver_version = settings_.solver_version;
+    served.solver_version = solver_version_;
   }
   worker.stored_ms = worker.leases.empty() ? now_ms_ : worker.stored_ms;
   const LeaseId lease = next_lease_++;
   leases_.emplace(lease, Lease{id, study, batch, alone, now_ms_});
-  served.leases.insert(lease, batch);
+  served.leases.insert(lease);
   worker.leases.insert(lease);
-  worker.credit -= std::min(worker.credit, 1U);
+  use_credit(id, worker);
   pace.last_batch_points = batch.points;
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
   SendBatch send{id, study, {}, batch.attempts + 1, lease};
-  for (const Interval& places : served.points.leased_set().within(batch.first_place, batch.end())) {
+  for (const Interval& places : open_places(leases_.at(lease))) {
     const auto points = served.points.order().points(places);
     send.points.insert(send.points.end(), points.begin(), points.end());
   }

@@ -6,8 +6,7 @@
 #include <variant>
 #include <vector>
 
-#include "server/scheduler/loss_history.h"
-#include "server/scheduler/worker_processes.h"
+#include "server/scheduler/losses.h"
 #include "server/study/interval_set.h"
 #include "server/study/limits.h"
 #include "server/study/study_table.h"
@@ -18,9 +17,6 @@ namespace oblique::server {
 using LeaseId = std::uint64_t;
 
 struct SchedulerSettings {
-  /// Solver version of the server and all its workers. A study whose results have another version
-  /// is not handed out.
-  std::string solver_version{};
   /// A worker silent for longer is lost: three missed heartbeats, noticed within 3 s.
   std::int64_t lost_after_ms = 2800;
   double batch_target_s = 0.1;                ///< duration of a batch once a worker's pace is known
@@ -80,14 +76,14 @@ struct PointOutcome {
 struct StudyAdded {
   StudyId study;
   StudyTable table;
-  IntervalSet settled;       ///< points with a row, or left out by a filter
-  std::uint64_t failed = 0;  ///< number of settled points that failed
+  IntervalSet completed;     ///< points with a row, or left out by a filter
+  std::uint64_t failed = 0;  ///< number of completed points that failed
   bool cancelled = false;
   bool paused = false;
   std::int32_t priority = 0;
   std::string solver_version{};  ///< of its results; empty without results
   bool held = false;
-  std::uint64_t left_out = 0;  ///< number of settled points that a filter leaves out
+  std::uint64_t left_out = 0;  ///< number of completed points that a filter leaves out
 };
 /// A held study is not handed out, whatever else happens to it.
 struct StudyHeld {
@@ -95,7 +91,7 @@ struct StudyHeld {
   bool held;
 };
 /// It is durable that these points have rows copied from other studies.
-struct PointsTaken {
+struct PointsReused {
   StudyId study;
   IntervalSet points;
 };
@@ -191,7 +187,7 @@ struct DispatchHeld {
 struct Tick {};
 
 using Event =
-    std::variant<StudyAdded, StudyHeld, PointsTaken, StudyCancelled, StudyPaused, StudyReopened,
+    std::variant<StudyAdded, StudyHeld, PointsReused, StudyCancelled, StudyPaused, StudyReopened,
                  PriorityChanged, FailuresForgotten, StudyGrown, StudyRemoved, WorkerJoined,
                  CreditGiven, ResultsReceived, ResultsStored, HeartbeatReceived, BatchesReturned,
                  WorkerLeft, WorkerUnreachable, WorkerBusy, DispatchHeld, Tick>;
@@ -254,7 +250,7 @@ struct DropWorker {
   WorkerId worker;
   std::string reason;
 };
-/// Every point of the study is settled.
+/// Every point of the study is completed.
 struct StudyFinished {
   StudyId study;
 };

@@ -1,5 +1,9 @@
 // What must hold of the scheduler's state between two events.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "server/scheduler/scheduler.h"
@@ -16,49 +20,25 @@ void require(bool holds, const char* what) {
 }  // namespace
 
 void Scheduler::check_invariants() const {
-  std::map<StudyId, IntervalSet> under_lease;
-  std::map<StudyId, std::size_t> leases_of;
-  for (const auto& [id, lease] : leases_) {
-    const auto worker = workers_.find(lease.worker);
-    require(worker != workers_.end() && worker->second.leases.contains(id),
-            "a lease has no worker");
-    require(studies_.contains(lease.study), "a lease has no study");
-    require(!lease.alone || worker->second.leases.size() == 1, "a suspect lease is not alone");
-    require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
-            "a lease is malformed");
-    // Between the points of a batch, and of one that is answered, there may be settled ones.
-    IntervalSet& covered = under_lease[lease.study];
-    for (const Interval& held : studies_.at(lease.study)
-                                    .points.leased_set()
-                                    .within(lease.batch.first_place, lease.batch.end())) {
-      require(studies_.at(lease.study).overlaps || covered.within(held.begin, held.end).empty(),
-              "two leases hold one point");
-      covered.insert(held.begin, held.end);
-    }
-    require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
-                                leases_.at(lease.twin).worker != lease.worker),
-            "a batch's second lease is not one");
-    require(is_current(studies_.at(lease.study)), "a study of another solver version is leased");
-    ++leases_of[lease.study];
-  }
+  check_leases();
+  check_losses();
+  std::size_t with_free = 0;
   for (const auto& [id, study] : studies_) {
     study.points.check_invariants();
     require(study.finished == study.points.is_complete(), "a study is finished and is not");
-    require(study.failed + study.points.left_out() <= study.points.settled(),
-            "more points failed or are left out than were settled");
+    require(study.failed + study.points.left_out() <= study.points.completed(),
+            "more points failed or are left out than were completed");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
-    require(study.leases.size() == leases_of[id], "a study's leases are miscounted");
-    const StudyQueue::Place* place = queue_.find(id);
-    require(place_of(study) == (place == nullptr ? StudyQueue::Place{} : *place),
+    require(study.rank == rank_of(id, study) && (!study.rank || free_.contains(*study.rank)) &&
+                suspects_.contains(id) == (is_open(study) && study.has_suspect()),
             "a study is not where it belongs in the queue");
-    study.points.leased_set().for_each([&, study_id = id](const Interval& interval) {
-      const auto covered = under_lease[study_id].within(interval.begin, interval.end);
-      require(covered.size() == 1 && covered.front() == interval, "a leased point has no lease");
-    });
+    require(condemned_.contains(id) || !study.points.has(Standing::kCondemned),
+            "a condemned point is forgotten");
+    with_free += study.rank ? 1U : 0U;
   }
+  require(with_free == free_.size(), "a study that is gone is in the queue");
   std::uint64_t threads = 0;
   std::size_t leases = 0;
-  std::size_t draining = 0;
   for (const auto& [id, worker] : workers_) {
     std::map<StudyId, std::uint64_t> held;
     for (const LeaseId lease : worker.leases) {
@@ -71,17 +51,46 @@ void Scheduler::check_invariants() const {
             "a worker with credit is not in the queue, or one without is");
     threads += worker.threads;
     leases += worker.leases.size();
-    draining += worker.draining ? 1U : 0U;
   }
-  check_losses();
   require(ready_workers_.size() <= workers_.size(), "a worker that is gone is in the queue");
-  require(draining == draining_, "workers are miscounted");
+  require(draining_ == 0 || workers_.contains(draining_), "a worker that is gone drains");
   require(threads == threads_, "the number of threads is wrong");
   require(leases == leases_.size(), "a worker holds a lease that does not exist");
 }
 
+void Scheduler::check_leases() const {
+  std::map<StudyId, IntervalSet> under_lease;
+  std::map<StudyId, std::set<LeaseId>> leases_of;
+  for (const auto& [id, lease] : leases_) {
+    const auto worker = workers_.find(lease.worker);
+    require(worker != workers_.end() && worker->second.leases.contains(id),
+            "a lease has no worker");
+    require(studies_.contains(lease.study), "a lease has no study");
+    require(!lease.alone || (worker->second.leases.size() == 1 && is_proven(worker->second)),
+            "suspect points are not alone with a proven worker");
+    require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
+            "a lease is malformed");
+    // Between the points of a batch, and of one that is answered, there may be completed ones.
+    IntervalSet& covered = under_lease[lease.study];
+    for (const Interval& held : open_places(lease)) {
+      require(lease.twin != 0 || covered.within(held.begin, held.end).empty(),
+              "two leases hold one point");
+      covered.insert(held.begin, held.end);
+    }
+    require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
+                                leases_.at(lease.twin).worker != lease.worker),
+            "a batch's second lease is not one");
+    require(is_current(studies_.at(lease.study)), "a study of another solver version is leased");
+    leases_of[lease.study].insert(id);
+  }
+  for (const auto& [id, study] : studies_) {
+    require(study.leases == leases_of[id], "a study has other leases than it should");
+    require(study.points.leased_set() == under_lease[id], "a leased point has no lease");
+  }
+}
+
 void Scheduler::check_losses() const {
-  processes_.check_invariants();
+  processes_.check_invariants(workers_.size());
   for (const auto& [id, worker] : workers_) {
     const WorkerProcess& process = processes_.at(worker.process);
     require(process.workers.contains(id), "a worker is not known as one of its process");
@@ -91,21 +100,24 @@ void Scheduler::check_losses() const {
     require(worker.solved_batches == 0 || process.proven_since_ms,
             "a worker that is not proven has solved batches");
   }
-  require(processes_.workers() == workers_.size(), "a process has workers that are not there");
-  for (const auto& [id, lease] : leases_) {
-    require(!lease.alone || is_proven(workers_.at(lease.worker)),
-            "suspect points are with a newcomer");
-  }
   require(vanished_ms_.size() <= settings_.vanished_newcomers, "too many newcomers are noted");
-  std::map<StudyId, IntervalSet> to_fail;
-  for (const Condemned& condemned : condemned_) {
-    to_fail[condemned.study].insert(condemned.point);
+}
+
+void WorkerProcesses::check_invariants(std::size_t workers) const {
+  std::size_t absent = 0;
+  std::size_t connected = 0;
+  for (const auto& [number, process] : processes_) {
+    const auto by_id = numbers_.find(process.id);
+    require(process.id.empty() ? !process.workers.empty()
+                               : by_id != numbers_.end() && by_id->second == number,
+            "a worker process cannot be found");
+    connected += process.workers.size();
+    absent += process.workers.empty() ? 1U : 0U;
+    require(!process.workers.empty() || std::ranges::count(absent_, number) == 1,
+            "an absent process is not remembered once");
   }
-  for (const auto& [id, study] : studies_) {
-    for (const std::uint64_t point : study.points.condemned()) {
-      require(to_fail[id].contains(point), "a condemned point is forgotten");
-    }
-  }
+  require(connected == workers, "a process has workers that are not there");
+  require(absent == absent_.size() && absent <= most_absent_, "the wrong processes are remembered");
 }
 
 }  // namespace oblique::server

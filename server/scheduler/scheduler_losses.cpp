@@ -1,8 +1,12 @@
 // The part of the scheduler that weighs lost workers: what it makes of the points that they held,
 // and of the workers themselves.
 #include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/scheduler/scheduler.h"
 
@@ -23,22 +27,16 @@ std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
 
 // ---- Points -----------------------------------------------------------------------------------
 
-/// The lease ended without an answer to some of its points. It alone held `held` of them.
+/// The process was lost with points of that study, and may come back.
+void Scheduler::note_process(StudyId study, ProcessNumber process) {
+  if (process != kNobody) {
+    processes_.at(process).in_histories.insert(study);
+  }
+}
+
+/// The lease ended without an answer to the points at `held`.
 void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss) {
   StudyPoints& points = studies_.at(lease.study).points;
-  if (points.leased_set().within(lease.batch.first_place, lease.batch.end()).empty()) {
-    return;
-  }
-  if (loss.process != kNobody) {
-    processes_.at(loss.process).in_histories.insert(lease.study);
-  }
-  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
-    // What killed one worker may kill the other: that must not be forgotten.
-    twin->second.batch.losses.add({loss.process, false});
-  }
-  if (held.empty()) {
-    return;
-  }
   loss.alone = loss.alone && size_of(held) == 1;
   LossHistory losses = lease.batch.losses;
   losses.add(loss);
@@ -49,8 +47,7 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
     points.give_back(split(interval, parts), lease.batch.attempts + 1, losses, now_ms_);
   }
   if (standing == Standing::kCondemned) {
-    condemned_.push_back({now_ms_ + settings_.return_within_ms, lease.study,
-                          points.order().point(held.front().begin)});
+    condemned_.insert(lease.study);
   }
 }
 
@@ -59,7 +56,7 @@ void Scheduler::take_back_losses(ProcessNumber number) {
   const std::set<StudyId> in_histories = std::exchange(processes_.at(number).in_histories, {});
   for (const StudyId study : in_histories) {
     studies_.at(study).points.take_back_losses(number);
-    for (const LeaseId lease : studies_.at(study).leases.all()) {
+    for (const LeaseId lease : studies_.at(study).leases) {
       leases_.at(lease).batch.losses.take_back(number);
     }
     requeue(study);
@@ -68,21 +65,19 @@ void Scheduler::take_back_losses(ProcessNumber number) {
 
 /// None of the processes that these points cost came back.
 void Scheduler::fail_condemned() {
-  while (!condemned_.empty() && condemned_.front().due_ms <= now_ms_) {
-    const Condemned condemned = condemned_.front();
-    condemned_.pop_front();
-    StudyPoints& points = studies_.at(condemned.study).points;
-    const auto batch = points.take_condemned(condemned.point, now_ms_ - settings_.return_within_ms);
-    if (!batch) {
-      continue;
+  for (const StudyId id : std::set<StudyId>(condemned_)) {
+    StudyPoints& points = studies_.at(id).points;
+    for (const auto& [point, attempts, alone] :
+         points.fail_condemned(now_ms_ - settings_.return_within_ms)) {
+      effects_.emplace_back(StoreFailure{
+          id, point, attempts,
+          "no answer: " + std::to_string(attempts) + " leases of this point ended without one, " +
+              std::to_string(alone) +
+              " of them because the worker was lost or gave up while it held nothing else"});
     }
-    points.receive(condemned.point);
-    requeue(condemned.study);
-    effects_.emplace_back(StoreFailure{
-        condemned.study, condemned.point, batch->attempts,
-        "no answer: " + std::to_string(batch->attempts) +
-            " leases of this point ended without one, " + std::to_string(batch->losses.alone()) +
-            " of them because the worker was lost or gave up while it held nothing else"});
+    if (!points.has(Standing::kCondemned)) {
+      condemned_.erase(id);
+    }
   }
 }
 
@@ -146,7 +141,7 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
 /// never solves anything cannot be told: nothing counts as lost, what it sends later is stored, and
 /// it gets points again once it has solved something.
 void Scheduler::end_stalled() {
-  std::map<StudyId, double> paces;
+  FastestPaces paces;
   bool any_stalled = false;
   for (auto& [id, worker] : workers_) {
     const std::int64_t quiet_ms = now_ms_ - worker.stored_ms;
@@ -156,7 +151,7 @@ void Scheduler::end_stalled() {
     }
     any_stalled = true;
     worker.solved_batches = 0;
-    set_draining(worker, false);
+    stop_draining(id);
     WorkerProcess& process = processes_.at(worker.process);
     process.lost_in_a_row = std::max(process.lost_in_a_row, settings_.set_aside_after);
     process.losses += worker.leases.size();
@@ -170,27 +165,29 @@ void Scheduler::end_stalled() {
   }
 }
 
-/// How long the worker may store nothing. `paces` are the fastest of the studies looked at, in
-/// seconds of a thread a point; 0: unknown.
-std::int64_t Scheduler::longest_stall_ms(const Worker& worker,
-                                         std::map<StudyId, double>& paces) const {
-  double longest_s = 0.0;
-  for (const LeaseId id : worker.leases) {
-    const Lease& lease = leases_.at(id);
-    const auto [fastest, is_new] = paces.try_emplace(lease.study, 0.0);
-    for (auto other = is_new ? workers_.begin() : workers_.end(); other != workers_.end();
-         ++other) {
-      const auto pace = other->second.paces.find(lease.study);
-      const double s_per_point =
-          pace == other->second.paces.end() ? 0.0 : pace->second.s_per_solved();
+double Scheduler::fastest_pace(StudyId id, FastestPaces& known) const {
+  const auto [fastest, is_new] = known.try_emplace(id, 0.0);
+  if (is_new) {
+    for (const auto& [number, worker] : workers_) {
+      const auto pace = worker.paces.find(id);
+      const double s_per_point = pace == worker.paces.end() ? 0.0 : pace->second.s_per_solved();
       if (s_per_point > 0.0 && (fastest->second == 0.0 || s_per_point < fastest->second)) {
         fastest->second = s_per_point;
       }
     }
+  }
+  return fastest->second;
+}
+
+/// How long the worker may store nothing.
+std::int64_t Scheduler::longest_stall_ms(const Worker& worker, FastestPaces& paces) const {
+  double longest_s = 0.0;
+  for (const LeaseId id : worker.leases) {
+    const Lease& lease = leases_.at(id);
     // A thread solves its lanes side by side, and one point alone takes as long.
     const double points = std::max(static_cast<double>(lease.batch.points) / worker.threads,
                                    static_cast<double>(settings_.lanes));
-    longest_s = std::max(longest_s, fastest->second * points);
+    longest_s = std::max(longest_s, fastest_pace(lease.study, paces) * points);
   }
   return static_cast<std::int64_t>(std::clamp(1e3 * settings_.stall_factor * longest_s,
                                               static_cast<double>(settings_.shortest_stall_ms),
@@ -226,9 +223,55 @@ bool Scheduler::probe(WorkerId id, Worker& worker) {
   }
   worker.probe = next_lease_++;
   worker.probed_ms = now_ms_;
-  --worker.credit;
+  use_credit(id, worker);
   effects_.emplace_back(SendProbe{id, worker.probe});
   return true;
+}
+
+// ---- Processes --------------------------------------------------------------------------------
+
+ProcessNumber WorkerProcesses::join(const std::string& id, WorkerId worker) {
+  const auto known = id.empty() ? numbers_.end() : numbers_.find(id);
+  const ProcessNumber number = known == numbers_.end() ? ++last_number_ : known->second;
+  WorkerProcess& process = processes_[number];
+  if (known == numbers_.end()) {
+    process.id = id;
+    if (!id.empty()) {
+      numbers_.emplace(id, number);
+    }
+  } else if (process.workers.empty()) {
+    std::erase(absent_, number);
+  }
+  process.workers.insert(worker);
+  return number;
+}
+
+void WorkerProcesses::leave(ProcessNumber number, WorkerId worker) {
+  WorkerProcess& process = processes_.at(number);
+  process.workers.erase(worker);
+  if (!process.workers.empty()) {
+    return;
+  }
+  if (process.id.empty()) {
+    forget(number);
+    return;
+  }
+  absent_.push_back(number);
+  if (absent_.size() > most_absent_) {
+    forget(absent_.front());
+    absent_.pop_front();
+  }
+}
+
+void WorkerProcesses::forget(ProcessNumber number) {
+  numbers_.erase(processes_.at(number).id);
+  processes_.erase(number);
+}
+
+void WorkerProcesses::forget_study(StudyId study) {
+  for (auto& [number, process] : processes_) {
+    process.in_histories.erase(study);
+  }
 }
 
 }  // namespace oblique::server

@@ -24,13 +24,13 @@ std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_
 
 }  // namespace
 
-StudyPoints::StudyPoints(StudyTable table, IntervalSet settled, std::uint64_t left_out,
+StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
                          const LossLimits& limits)
-    : table_(std::move(table)), limits_(limits), settled_(std::move(settled)) {
-  settled_.erase(size(), std::numeric_limits<std::uint64_t>::max());  // rows of other points
-  left_out_ = std::min(left_out, settled_.size());  // a database that was edited may say more
+    : table_(std::move(table)), limits_(limits), completed_(std::move(completed)) {
+  completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());  // rows of other points
+  left_out_ = std::min(left_out, completed_.size());  // a database that was edited may say more
   fresh_.insert(0, size());
-  settled_.for_each(
+  completed_.for_each(
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
 }
 
@@ -41,47 +41,29 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
   was_arranged_ = true;
   falls_a_group_ = falls_a_group;
   order_.arrange(*table_.get(), 0, fresh_, falls_a_group);
-  if (order_.is_arranged()) {
-    move_all([this](const IntervalSet& points) { return order_.places(points); });
-    begun_until_ = 0;
+  if (!order_.is_arranged()) {
+    return;
+  }
+  begun_until_ = 0;
+  for (IntervalSet* set : {&fresh_, &leased_, &committing_, &completed_}) {
+    *set = order_.places(*set);
+  }
+  for (Returned& intervals : returned_) {
+    for (const auto& [first, history] : std::exchange(intervals, {})) {
+      order_.places(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
+        History& part = intervals.emplace(interval.begin, history).first->second;
+        part.end = interval.end;
+      });
+    }
   }
 }
 
 void StudyPoints::rest(bool has_leases) {
   table_.release();
-  if (order_.is_arranged() && is_complete() && !has_leases) {
-    move_all([this](const IntervalSet& places) {
-      IntervalSet points;
-      places.for_each([&](const Interval& interval) {
-        for (const Interval& part : order_.points(interval)) {
-          points.insert(part.begin, part.end);
-        }
-      });
-      return points;
-    });
+  if (is_complete() && !has_leases) {  // the places of all points are all points
     order_ = {};
     was_arranged_ = false;
     begun_until_ = 0;
-  }
-}
-
-/// Replaces what is in each place by what `map` makes of it.
-template <typename Map>
-void StudyPoints::move_all(const Map& map) {
-  for (IntervalSet* set : {&fresh_, &leased_, &committing_, &settled_}) {
-    *set = map(*set);
-  }
-  for (Returned& intervals : returned_) {
-    Returned moved;
-    for (const auto& entry : intervals) {
-      const History& history = entry.second;
-      map(IntervalSet(entry.first, history.end)).for_each([&](const Interval& interval) {
-        History part = history;
-        part.end = interval.end;
-        moved.emplace(interval.begin, part);
-      });
-    }
-    intervals = std::move(moved);
   }
 }
 
@@ -119,39 +101,22 @@ bool StudyPoints::receive(std::uint64_t number) {
     leased_.erase(point);
   } else if (fresh_.contains(point)) {
     fresh_.erase(point);
-  } else if (std::none_of(returned_.begin(), returned_.end(),
-                          [&](Returned& intervals) { return erase_from(intervals, point); })) {
+  } else if (std::none_of(returned_.begin(), returned_.end(), [&](Returned& intervals) {
+               return !extract_from(intervals, {point, point + 1}).empty();
+             })) {
     return false;
   }
   committing_.insert(point);
   return true;
 }
 
-bool StudyPoints::erase_from(Returned& intervals, std::uint64_t point) {
-  auto interval = intervals.upper_bound(point);
-  if (interval == intervals.begin() || (--interval)->second.end <= point) {
-    return false;
-  }
-  const History history = interval->second;
-  if (interval->first == point) {
-    intervals.erase(interval);
-  } else {
-    interval->second.end = point;
-  }
-  if (point + 1 < history.end) {
-    intervals.emplace(point + 1, history);
-  }
-  --returned_points_;
-  return true;
-}
-
-bool StudyPoints::settle(std::uint64_t number) {
+bool StudyPoints::complete(std::uint64_t number) {
   const std::uint64_t point = order_.place(number);
   if (!committing_.contains(point)) {
     return false;
   }
   committing_.erase(point);
-  settled_.insert(point);
+  completed_.insert(point);
   return true;
 }
 
@@ -161,18 +126,16 @@ IntervalSet StudyPoints::receive(const IntervalSet& left_out) {
   IntervalSet points;
   places.for_each([&](const Interval& interval) {
     committing_.insert(interval.begin, interval.end);
-    for (const Interval& part : order_.points(interval)) {
-      points.insert(part.begin, part.end);
-    }
+    points.insert(order_.points(interval));
   });
   return points;
 }
 
-void StudyPoints::settle(const IntervalSet& left_out) {
+void StudyPoints::complete(const IntervalSet& left_out) {
   order_.places(left_out).for_each([&](const Interval& range) {
     for (const Interval& interval : committing_.within(range.begin, range.end)) {
       committing_.erase(interval.begin, interval.end);
-      settled_.insert(interval.begin, interval.end);
+      completed_.insert(interval.begin, interval.end);
       left_out_ += interval.end - interval.begin;
       committing_left_out_ -= interval.end - interval.begin;
     }
@@ -202,28 +165,23 @@ void StudyPoints::grow(StudyTable table) {
   table_ = std::move(table);
 }
 
-std::uint64_t StudyPoints::settle_unsolved(const IntervalSet& points) {
+std::uint64_t StudyPoints::complete_reused(const IntervalSet& points) {
   const IntervalSet places = extract(order_.places(points));
   places.for_each(
-      [this](const Interval& interval) { settled_.insert(interval.begin, interval.end); });
+      [this](const Interval& interval) { completed_.insert(interval.begin, interval.end); });
   return places.size();
 }
 
-/// Takes those of these places that are neither committing nor settled out of where they are.
+/// Takes those of these places that are neither committing nor completed out of where they are.
 IntervalSet StudyPoints::extract(const IntervalSet& places) {
   IntervalSet extracted;
-  const auto add = [&](const std::vector<Interval>& intervals) {
-    for (const Interval& interval : intervals) {
-      extracted.insert(interval.begin, interval.end);
-    }
-  };
   places.for_each([&](const Interval& range) {
     for (IntervalSet* set : {&fresh_, &leased_}) {
-      add(set->within(range.begin, range.end));
+      extracted.insert(set->within(range.begin, range.end));
       set->erase(range.begin, range.end);
     }
     for (Returned& intervals : returned_) {
-      add(extract_from(intervals, range));
+      extracted.insert(extract_from(intervals, range));
     }
   });
   return extracted;
@@ -259,8 +217,8 @@ std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Inter
 std::uint64_t StudyPoints::reopen(const IntervalSet& points) {
   std::uint64_t reopened = 0;
   order_.places(points).for_each([&](const Interval& asked) {
-    for (const Interval& interval : settled_.within(asked.begin, asked.end)) {
-      settled_.erase(interval.begin, interval.end);
+    for (const Interval& interval : completed_.within(asked.begin, asked.end)) {
+      completed_.erase(interval.begin, interval.end);
       fresh_.insert(interval.begin, interval.end);
       reopened += interval.end - interval.begin;
     }
@@ -301,34 +259,34 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   }
   const std::uint64_t leased_before = leased_.size();
   std::uint64_t end = lease_fresh(*free, wanted);
-  const auto taken = [&] { return leased_.size() - leased_before; };
+  const auto newly_leased = [&] { return leased_.size() - leased_before; };
   const std::uint64_t enough =
       std::max(wanted.points, std::min(wanted.groups > 1 ? wanted.groups : 0, wanted.most_points));
   std::uint64_t run_end = free->end;
-  while (const auto next = fresh_near(end, run_end, enough, taken())) {
-    end = lease_fresh(*next, {enough - taken()});
+  while (const auto next = fresh_near(end, run_end, enough, newly_leased())) {
+    end = lease_fresh(*next, {enough - newly_leased()});
     run_end = next->end;
   }
   begun_until_ = std::max(begun_until_, order_.group_at(*table_.get(), end - 1).end);
-  return Batch{free->begin, end - free->begin, 0, {}, taken()};
+  return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
 }
 
-/// The next fresh points for a batch that ends at `end`, has `taken` points and wants `enough`:
-/// those behind a few settled ones, as where a finer grid has taken over a coarser one. Not what is
-/// left of the run up to `run_end`, where the batch was cut, and not those of a group of which
+/// The next fresh points for a batch that ends at `end`, has `leased` points and wants `enough`:
+/// those behind a few completed ones, as where a finer grid has reused a coarser one. Not what
+/// is left of the run up to `run_end`, where the batch was cut, and not those of a group of which
 /// there is no room for all points.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
-                                                std::uint64_t enough, std::uint64_t taken) const {
+                                                std::uint64_t enough, std::uint64_t leased) const {
   constexpr std::uint64_t kNear = 64;
-  const auto next = taken < enough ? fresh_.first_from(end) : std::nullopt;
+  const auto next = leased < enough ? fresh_.first_from(end) : std::nullopt;
   if (!next || next->begin < run_end || next->begin - end > kNear) {
     return std::nullopt;
   }
   // Others may have the points between, or get them.
-  const auto between = settled_.within(end, next->begin);
+  const auto between = completed_.within(end, next->begin);
   const Interval group = order_.group_at(*table_.get(), next->begin);
   if (between.size() != 1 || !(between.front() == Interval{end, next->begin}) ||
-      (group.begin >= end && group.end - group.begin > enough - taken)) {
+      (group.begin >= end && group.end - group.begin > enough - leased)) {
     return std::nullopt;
   }
   return next;
@@ -379,26 +337,21 @@ std::optional<Batch> StudyPoints::take(Standing standing, const BatchSize& wante
   return Batch{first, end - first, history.attempts, history.losses};
 }
 
-std::optional<Batch> StudyPoints::take_condemned(std::uint64_t point, std::int64_t until_ms) {
+std::vector<StudyPoints::Failure> StudyPoints::fail_condemned(std::int64_t until_ms) {
+  std::vector<Failure> failures;
   Returned& condemned = returned(Standing::kCondemned);
-  const auto found = condemned.find(order_.place(point));
-  if (found == condemned.end() || found->second.returned_ms > until_ms) {
-    return std::nullopt;
+  for (auto entry = condemned.begin(); entry != condemned.end();) {
+    const auto& [place, history] = *entry;
+    if (history.returned_ms > until_ms) {
+      ++entry;
+      continue;
+    }
+    failures.push_back({order_.point(place), history.attempts, history.losses.alone()});
+    committing_.insert(place);
+    --returned_points_;
+    entry = condemned.erase(entry);
   }
-  const History history = found->second;
-  condemned.erase(found);
-  const std::uint64_t place = order_.place(point);
-  leased_.insert(place);
-  --returned_points_;
-  return Batch{place, 1, history.attempts, history.losses, 1};
-}
-
-std::vector<std::uint64_t> StudyPoints::condemned() const {
-  std::vector<std::uint64_t> points;
-  for (const auto& [first, history] : returned(Standing::kCondemned)) {
-    points.push_back(order_.point(first));
-  }
-  return points;
+  return failures;
 }
 
 void StudyPoints::check_invariants() const {
@@ -412,7 +365,7 @@ void StudyPoints::check_invariants() const {
     all.insert(interval.begin, interval.end);
     numbers += interval.end - interval.begin;
   };
-  for (const auto* set : {&fresh_, &leased_, &committing_, &settled_}) {
+  for (const auto* set : {&fresh_, &leased_, &committing_, &completed_}) {
     set->for_each(add);
   }
   for (const Standing standing :
@@ -431,8 +384,8 @@ void StudyPoints::check_invariants() const {
   if (came_back != returned_points_) {
     throw std::logic_error("returned points are miscounted");
   }
-  if (left_out_ > settled_.size()) {
-    throw std::logic_error("a filter leaves out more points than are settled");
+  if (left_out_ > completed_.size()) {
+    throw std::logic_error("a filter leaves out more points than are completed");
   }
 }
 

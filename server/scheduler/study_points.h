@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scheduler/loss_history.h"
+#include "server/scheduler/losses.h"
 #include "server/scheduler/point_order.h"
 #include "server/study/interval_set.h"
 #include "server/study/study_table.h"
@@ -34,7 +34,7 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
                            const Interval& free, const BatchSize& wanted);
 
 /// Points that are handed out together, under one lease: a run of places (PointOrder), without some
-/// that were settled before.
+/// that were completed before.
 struct Batch {
   std::uint64_t first_place;
   std::uint64_t count;
@@ -47,17 +47,17 @@ struct Batch {
 
 /// Where the points of one study stand. Every point is in exactly one place: fresh (never leased by
 /// this run of the server), returned with one of the four standings that its losses give it,
-/// leased, committing (its result is on the way to the disk) or settled. The cost grows with the
+/// leased, committing (its result is on the way to the disk) or completed. The cost grows with the
 /// number of intervals, not of points. Intervals, here and in Batch, are of places: the first lease
 /// brings the points into an order in which those that share a fall follow each other.
 ///
 /// Points that a filter leaves out are handed out as all others. The worker names them, and they
-/// are settled without a row.
+/// are completed without a row.
 class StudyPoints {
  public:
-  /// `settled` are the points that are settled already, `left_out` of them by a filter. Of a study
-  /// that is complete the table is not made.
-  StudyPoints(StudyTable table, IntervalSet settled, std::uint64_t left_out,
+  /// `completed` are the points that are completed already, `left_out` of them by a filter. Of a
+  /// study that is complete the table is not made.
+  StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 
   std::uint64_t size() const { return table_.size(); }
@@ -70,13 +70,19 @@ class StudyPoints {
   const PointOrder& order() const { return order_; }
 
   /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
-  /// that are left of the group that `wanted` follows, then groups of which nothing was taken yet,
+  /// that are left of the group that `wanted` follows, then groups of which nothing was leased yet,
   /// then the second half of what is left of the last. Nothing when there are none.
   std::optional<Batch> take(const BatchSize& wanted);
   /// The same out of the returned ones of that standing.
   std::optional<Batch> take(Standing standing, const BatchSize& wanted);
-  /// The condemned point if it came back at `until_ms` or before, else nothing.
-  std::optional<Batch> take_condemned(std::uint64_t point, std::int64_t until_ms);
+  /// A point that fails, and why.
+  struct Failure {
+    std::uint64_t point;
+    std::uint32_t attempts;
+    std::uint32_t alone;  ///< losses of workers that held nothing else
+  };
+  /// The points that were condemned at `until_ms` or before. Their failures are committing now.
+  std::vector<Failure> fail_condemned(std::int64_t until_ms);
 
   /// The points at the places `parts`, in order, that are still leased are returned at `now_ms`,
   /// with the history given. Those between the parts stay where they are.
@@ -94,19 +100,19 @@ class StudyPoints {
   IntervalSet receive(const IntervalSet& left_out);
 
   /// The result of a committing point is durable. False when the point was not committing.
-  bool settle(std::uint64_t point);
+  bool complete(std::uint64_t point);
   /// It is durable that a filter leaves these points out, as far as they are committing.
-  void settle(const IntervalSet& left_out);
+  void complete(const IntervalSet& left_out);
 
   /// The study has got points behind those that it had, which are those of `table` too: they are
   /// fresh.
   void grow(StudyTable table);
 
-  /// Those of these points that are not settled, nor on their way, have a row from elsewhere and
-  /// are settled. Returns how many they were.
-  std::uint64_t settle_unsolved(const IntervalSet& points);
+  /// Those of these points that are not completed, nor on their way, have a row from elsewhere and
+  /// are completed. Returns how many they were.
+  std::uint64_t complete_reused(const IntervalSet& points);
 
-  /// The settled ones among these points become fresh. Returns how many they were.
+  /// The completed ones among these points become fresh. Returns how many they were.
   std::uint64_t reopen(const IntervalSet& points);
 
   bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
@@ -115,21 +121,19 @@ class StudyPoints {
   bool may_leave_out(const IntervalSet& points) const;
   /// Returned points of that standing.
   bool has(Standing standing) const { return !returned(standing).empty(); }
-  /// When the next points to be taken of that standing came back. There must be one.
+  /// When the next points to be leased of that standing came back. There must be one.
   std::int64_t returned_ms(Standing standing) const {
     return returned(standing).begin()->second.returned_ms;
   }
-  bool is_complete() const { return settled() >= size(); }
+  bool is_complete() const { return completed() >= size(); }
   /// Some point has a result, durable or on its way. That a filter leaves a point out is none.
   bool has_results() const {
-    return settled() + committing_.size() > left_out_ + committing_left_out_;
+    return completed() + committing_.size() > left_out_ + committing_left_out_;
   }
 
-  std::vector<std::uint64_t> condemned() const;
-
   std::uint64_t free() const { return fresh_.size() + returned_points_; }
-  std::uint64_t settled() const { return settled_.size(); }
-  std::uint64_t left_out() const { return left_out_; }  ///< among the settled ones
+  std::uint64_t completed() const { return completed_.size(); }
+  std::uint64_t left_out() const { return left_out_; }  ///< among the completed ones
   std::uint64_t leased() const { return leased_.size(); }
   /// Places.
   const IntervalSet& leased_set() const { return leased_; }
@@ -151,13 +155,10 @@ class StudyPoints {
     return returned_.at(static_cast<std::size_t>(standing));
   }
   void arrange(std::uint64_t falls_a_group);
-  template <typename Map>
-  void move_all(const Map& map);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   std::uint64_t lease_fresh(const Interval& free, const BatchSize& wanted);
   std::optional<Interval> fresh_near(std::uint64_t end, std::uint64_t run_end, std::uint64_t enough,
-                                     std::uint64_t taken) const;
-  bool erase_from(Returned& intervals, std::uint64_t point);
+                                     std::uint64_t leased) const;
   std::vector<Interval> extract_from(Returned& intervals, const Interval& range);
   IntervalSet extract(const IntervalSet& places);
 
@@ -165,14 +166,14 @@ class StudyPoints {
   PointOrder order_;
   LossLimits limits_;
   IntervalSet fresh_;
-  std::uint64_t begun_until_ = 0;  // of all groups before, points were taken
+  std::uint64_t begun_until_ = 0;  // of all groups before, points were leased
   bool was_arranged_ = false;      // or stays as it is numbered
   std::uint64_t falls_a_group_ = 1;
   std::array<Returned, 4> returned_;  // by standing
   IntervalSet leased_;
   IntervalSet committing_;
-  IntervalSet settled_;
-  std::uint64_t left_out_;  // among the settled ones
+  IntervalSet completed_;
+  std::uint64_t left_out_;  // among the completed ones
   std::uint64_t committing_left_out_ = 0;
   std::uint64_t returned_points_ = 0;  // of any standing
 };

@@ -31,21 +31,13 @@ void ClientHandler::frame(const std::string& identity, std::string_view frame, I
     return;
   }
   const ReadRequest read = read_request(frame, false);
-  const Client client{identity, read.request_id, holder};
-  if (const std::string reason = objection_to(client, read); !reason.empty()) {
-    core_.ports.reply_error(client, reason);
-  } else if (read.needs_judging) {
-    check(client, frame, now);
-  } else {
-    answer(client, read, now);
-  }
+  answer({identity, read.request_id, holder}, read, frame, now);
 }
 
-/// Has the request read on the check thread. A client may have few such requests.
+/// Has the request read on the check thread.
 void ClientHandler::check(const Client& client, std::string_view frame, Instant now) {
   std::size_t bytes = frame.size();
   std::size_t of_all = 0;
-  std::size_t of_client = 0;
   for (const auto& [ticket, request] : pending_) {
     if (request.frame == nullptr) {
       continue;
@@ -55,14 +47,12 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     }
     ++of_all;
     bytes += request.frame->size();
-    of_client += request.client.identity == client.identity ? 1U : 0U;
   }
   if (stopping_) {
     core_.ports.reply_error(client, kStopping);
     return;
   }
-  if (of_all >= limits::kWaitingChecks || of_client >= limits::kWaitingChecksOfClient ||
-      bytes > limits::kWaitingCheckBytes) {
+  if (of_all >= limits::kWaitingChecks || bytes > limits::kWaitingCheckBytes) {
     core_.ports.reply_error(client, "too many long requests wait already: ask again later");
     return;
   }
@@ -81,8 +71,9 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     }
     return [this, ticket, read = std::move(read)](Instant then) { checked(ticket, read, then); };
   });
-  pending_.emplace(ticket, Pending{client, std::move(kept),
-                                   now.steady_ms + settings_.still_working_every_ms, true});
+  Pending& pending = add(ticket, client, now);
+  pending.frame = std::move(kept);
+  pending.runs = true;
 }
 
 void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Instant now) {
@@ -90,13 +81,8 @@ void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Insta
   if (!request) {
     return;
   }
-  const Client client{request.mapped().client.identity, read.request_id,
-                      request.mapped().client.holder};
-  if (const std::string reason = objection_to(client, read); !reason.empty()) {
-    core_.ports.reply_error(client, reason);
-  } else {
-    answer(client, read, now);
-  }
+  const Client& waiting = request.mapped().client;
+  answer({waiting.identity, read.request_id, waiting.holder}, read, {}, now);
 }
 
 /// Why the request is refused whatever it asks for; empty: it is not.
@@ -104,11 +90,11 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
   const protocol::ClientRequest& request = read.request;
   const WriteLedger& ledger = core_.ledger;
   if (!read.is_readable) {
-    bad_frames_.count("a client");
+    log_.bad_frame("a client");
     return "the request cannot be read";
   }
   if (request.protocol_version() == 0) {
-    bad_frames_.count("a client");
+    log_.bad_frame("a client");
     return "this is the port for clients; workers connect to the other one";
   }
   if (std::string reason = protocol::objection_to_version(request.protocol_version(), "client");
@@ -135,49 +121,46 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
           WriteLedger::kSlowAfter_s);
     }
   }
-  if (request.has_submit() && stopping_) {
-    return "the server is stopping: submit again when it is back";
-  }
-  if (request.has_submit() && draining_) {
-    return "the server is draining, that is, it waits for results under way and then stops: submit "
-           "again when it is back";
+  if (request.has_submit() && (stopping_ || draining_)) {
+    return stopping_ ? "the server is stopping: submit again when it is back"
+                     : "the server is draining, that is, it waits for results under way and then "
+                       "stops: submit again when it is back";
   }
   return {};
 }
 
-void ClientHandler::answer(const Client& client, const ReadRequest& read, Instant now) {
+void ClientHandler::answer(const Client& client, const ReadRequest& read, std::string_view frame,
+                           Instant now) {
+  if (const std::string reason = objection_to(client, read); !reason.empty()) {
+    core_.ports.reply_error(client, reason);
+    return;
+  }
+  if (read.needs_judging) {
+    return check(client, frame, now);
+  }
   const protocol::ClientRequest& request = read.request;
   using Kind = protocol::ClientRequest;
   switch (request.kind_case()) {
     case Kind::kSubmit:
-      changes_.submit(client, read, now);
-      break;
+      return changes_.submit(client, read, now);
     case Kind::kStatus:
-      status(client, request.status(), now);
-      break;
+      return status(client, request.status(), now);
     case Kind::kWorkers:
-      workers(client, request.workers(), now);
-      break;
+      return workers(client, request.workers(), now);
     case Kind::kChange:
-      changes_.change(client, request.change(), now);
-      break;
+      return changes_.change(client, request.change(), now);
     case Kind::kQuery:
-      query(client, request.query(), now);
-      break;
+      return query(client, request.query(), now);
     case Kind::kDescribe:
-      describe(client, request.describe());
-      break;
+      return describe(client, request.describe());
     case Kind::kTrace:
-      trace(client, request.trace(), now);
-      break;
+      return trace(client, request.trace(), now);
     case Kind::kMoreRows:
-      more_rows(client, request.more_rows());
-      break;
+      return more_rows(client, request.more_rows());
     case Kind::kEndQuery:
-      end_query(client, request.end_query().request_id());
-      break;
+      return end_query(client, request.end_query().request_id());
     case Kind::KIND_NOT_SET:
-      bad_frames_.count("a client");
+      log_.bad_frame("a client");
       core_.ports.reply_error(client, "the server does not know this kind of request");
       break;
   }
@@ -196,21 +179,26 @@ void ClientHandler::query(const Client& client, const protocol::QueryRequest& re
   } else if (!core_.ports.query({ticket, client.share(), request})) {
     core_.ports.reply_error(client, "too many queries wait already: ask again later");
   } else {
-    pending_.emplace(ticket,
-                     Pending{client, nullptr, now.steady_ms + settings_.still_working_every_ms});
+    add(ticket, client, now);
   }
+}
+
+ClientHandler::Pending& ClientHandler::add(std::uint64_t ticket, const Client& client,
+                                           Instant now) {
+  return pending_.emplace(ticket, Pending{client, now.steady_ms + settings_.still_working_every_ms})
+      .first->second;
 }
 
 void ClientHandler::more_rows(const Client& client, const protocol::MoreRows& request) {
   const Client asker{client.identity, request.request_id(), client.holder};
   const auto found = find(asker.identity, asker.request_id);
-  if (found == pending_.end()) {
+  if (found == pending_.end() || !found->second.is_query()) {
     core_.ports.reply_error(asker, "no answer to that request is under way");
   } else if (request.taken() > found->second.sent) {
     cancel(found);
     core_.ports.reply_error(asker, "more of the answer was taken than was given");
-  } else if (request.taken() > found->second.taken) {
-    found->second.taken = request.taken();
+  } else if (request.taken() > found->second.received) {
+    found->second.received = request.taken();
     core_.ports.more_rows(found->first, request.taken());
   }
 }
@@ -219,7 +207,6 @@ void ClientHandler::end_query(const Client& client, std::uint64_t request_id) {
   if (const auto found = find(client.identity, request_id); found != pending_.end()) {
     cancel(found);
   }
-  traces_.end(client.identity, request_id);
 }
 
 void ClientHandler::query_report(QueryReport report) {
@@ -252,16 +239,28 @@ ClientHandler::PendingRequests::iterator ClientHandler::find(std::string_view id
 }
 
 ClientHandler::PendingRequests::iterator ClientHandler::cancel(PendingRequests::iterator request) {
-  if (request->second.frame == nullptr) {
+  if (request->second.is_query()) {
     core_.ports.cancel_query(request->first);
   }
+  if (const auto& job = request->second.trace; job && job->worker) {
+    // It need not continue. It is free for another order once it has answered.
+    protocol::ServerToWorker message;
+    message.mutable_trace_cancel()->set_trace_id(request->first);
+    core_.workers.send(*job->worker, message);
+  }
   return pending_.erase(request);
+}
+
+ClientHandler::PendingRequests::iterator ClientHandler::refuse(PendingRequests::iterator request,
+                                                               const std::string& reason) {
+  core_.ports.reply_error(request->second.client, reason);
+  return cancel(request);
 }
 
 QueryCounts ClientHandler::query_counts() const {
   QueryCounts counts;
   for (const auto& [ticket, request] : pending_) {
-    if (request.frame == nullptr) {
+    if (request.is_query()) {
       ++(request.runs ? counts.running : counts.waiting);
     }
   }
@@ -278,9 +277,17 @@ protocol::StudyStatus ClientHandler::status_of(StudyId id, Instant now) const {
   return status;
 }
 
+std::optional<StudyId> ClientHandler::find_study(const Client& client, const std::string& name,
+                                                 StudyId id) {
+  const auto known = core_.states.find_durable(name, id);
+  if (!known) {
+    core_.ports.reply_error(client, unknown_study(name, core_.states));
+  }
+  return known;
+}
+
 void ClientHandler::status(const Client& client, const protocol::StatusRequest& request,
                            Instant now) {
-  const StudyStates& states = core_.states;
   protocol::ClientReply reply;
   protocol::StatusReply& fields = *reply.mutable_status();
   fields.set_draining(draining_);
@@ -288,19 +295,16 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
   fields.set_access(settings_.access);
   fields.set_version(settings_.version);
   if (!request.study().empty() || request.study_id() != 0) {
-    const auto known = states.find_durable(request.study(), request.study_id());
-    if (!known) {
-      core_.ports.reply_error(client, unknown_study(request.study(), states));
-      return;
+    if (const auto known = find_study(client, request.study(), request.study_id())) {
+      *fields.add_studies() = status_of(*known, now);
+      core_.ports.reply(client, std::move(reply));
     }
-    *fields.add_studies() = status_of(*known, now);
-    core_.ports.reply(client, std::move(reply));
     return;
   }
   const int most = page_size(request.limit());
   std::size_t bytes = 0;
   std::uint64_t last = request.after_study_id();
-  while (const auto id = states.durable_after(last)) {
+  while (const auto id = core_.states.durable_after(last)) {
     if (fields.studies_size() == most || bytes > limits::kListedBytes) {
       fields.set_next_after(last);
       break;
@@ -314,13 +318,10 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
 
 /// The recipe is sent as it is stored.
 void ClientHandler::describe(const Client& client, const protocol::DescribeRequest& request) {
-  const StudyStates& states = core_.states;
-  if (const auto known = states.find_durable(request.study())) {
+  if (const auto known = find_study(client, request.study())) {
     core_.ports.to_client(client.identity,
-                          protocol::description_around(client.request_id,
-                                                       states.record(*known).table.recipe_bytes()));
-  } else {
-    core_.ports.reply_error(client, unknown_study(request.study(), states));
+                          protocol::description_around(
+                              client.request_id, core_.states.record(*known).table.recipe_bytes()));
   }
 }
 
@@ -328,71 +329,60 @@ void ClientHandler::workers(const Client& client, const protocol::WorkersRequest
                             Instant now) {
   protocol::ClientReply reply;
   protocol::WorkersReply& fields = *reply.mutable_workers();
-  fields.set_bad_frames(bad_frames_.total());
+  fields.set_bad_frames(log_.bad_frames());
   fields.set_access(settings_.access);
   if (request.after_worker_id() == 0) {
     core_.ports.add_peers(fields);
   }
   const int most = page_size(request.limit());
   std::uint64_t last = request.after_worker_id();
-  while (const auto id = core_.workers.next_after(last)) {
+  const auto& workers = core_.workers.all();
+  for (auto next = workers.upper_bound(last); next != workers.end(); ++next) {
     if (fields.workers_size() == most) {
       fields.set_next_after(last);
       break;
     }
-    *fields.add_workers() = worker_status(*id, core_, now);
-    last = *id;
+    last = next->first;
+    *fields.add_workers() = worker_status(last, core_, now);
   }
   core_.ports.reply(client, std::move(reply));
-}
-
-void ClientHandler::trace(const Client& client, const protocol::TraceRequest& request,
-                          Instant now) {
-  const StudyStates& states = core_.states;
-  const auto known = states.find_durable(request.study());
-  if (!known) {
-    core_.ports.reply_error(client, unknown_study(request.study(), states));
-    return;
-  }
-  const StudyRecord& study = states.record(*known);
-  if (study.failures.contains(request.point()) && !request.only_point()) {
-    core_.ports.reply_error(client, fmt::format("point {} of the study \"{}\" failed and has no "
-                                                "trace: `oblique retry` solves it again",
-                                                request.point(), study.name));
-  } else {
-    traces_.request(client, request, *known, study.table, now);
-  }
 }
 
 // ---- Time and ends -----------------------------------------------------------------------------
 
 void ClientHandler::tick(Instant now) {
-  traces_.tick(now);
   for (auto entry = pending_.begin(); entry != pending_.end();) {
     Pending& request = entry->second;
+    const bool runs = request.runs || (request.trace && request.trace->worker);
+    if (request.trace && now.steady_ms >= request.trace->deadline_ms) {
+      entry = refuse(entry, runs ? "the trace took too long: `oblique trace --timeout SECONDS` "
+                                   "gives it more time"
+                                 : "no worker was free to solve the trace in the time it had: "
+                                   "`oblique trace --timeout SECONDS` gives it more");
+      continue;
+    }
     bool is_there = true;
     if (now.steady_ms >= request.next_sign_ms) {
       request.next_sign_ms = now.steady_ms + settings_.still_working_every_ms;
-      const bool waits_for_client = request.sent == request.taken + kChunksAhead;
-      is_there = waits_for_client || core_.ports.reply_still_working(request.client, request.runs);
+      const bool waits_for_client = request.sent == request.received + kChunksAhead;
+      is_there = waits_for_client || core_.ports.reply_still_working(request.client, runs);
     }
     entry = is_there ? std::next(entry) : cancel(entry);
   }
+  dispatch_traces();
 }
 
 void ClientHandler::client_left(std::string_view identity) {
   for (auto entry = pending_.begin(); entry != pending_.end();) {
     entry = entry->second.client.identity == identity ? cancel(entry) : std::next(entry);
   }
-  traces_.client_left(identity);
 }
 
 void ClientHandler::stop() {
   stopping_ = true;
-  for (const auto& [ticket, request] : std::exchange(pending_, {})) {
-    core_.ports.reply_error(request.client, kStopping);
+  while (!pending_.empty()) {
+    refuse(pending_.begin(), kStopping);
   }
-  traces_.stop();
 }
 
 }  // namespace oblique::server

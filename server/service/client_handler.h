@@ -4,14 +4,16 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "proto/oblique.pb.h"
-#include "server/service/ports/ports.h"
+#include "server/service/ports.h"
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
-#include "server/service/trace_handler.h"
 #include "server/service/worker_sessions.h"
 
 namespace oblique::server {
@@ -33,18 +35,17 @@ struct QueryCounts {
 /// traces on. Frames may be malicious. Not thread-safe.
 class ClientHandler {
  public:
-  ClientHandler(ClientHandlerSettings settings, const Core& core, BadFrames& bad_frames,
-                StudyChanges& changes, TraceHandler& traces)
-      : settings_(std::move(settings)),
-        core_(core),
-        bad_frames_(bad_frames),
-        changes_(changes),
-        traces_(traces) {}
+  ClientHandler(ClientHandlerSettings settings, const Core& core, PeerLog& log,
+                StudyChanges& changes)
+      : settings_(std::move(settings)), core_(core), log_(log), changes_(changes) {}
 
   /// `holder`: of the client's key; null without keys.
   void frame(const std::string& identity, std::string_view frame, Instant now,
              const std::shared_ptr<const KeyIdentity>& holder);
   void query_report(QueryReport report);
+  void trace_received(WorkerId worker, protocol::Trace trace);
+  /// For any reason. The sessions must have forgotten the worker.
+  void worker_left(WorkerId worker);
   /// The connection of that client is gone, and all its requests were taken.
   void client_left(std::string_view identity);
   /// To be called several times a second.
@@ -57,21 +58,36 @@ class ClientHandler {
   QueryCounts query_counts() const;
 
  private:
-  /// A request that waits for the check thread or the query pool.
+  /// A trace that a worker is to solve beside its batches.
+  struct TraceJob {
+    bool only_point;
+    std::int64_t deadline_ms;
+    protocol::TraceOrder order{};
+    protocol::TraceReply reply{};       ///< without the trace
+    bool is_ready = false;              ///< the point is known
+    std::optional<WorkerId> worker{};   ///< that solves it
+    std::set<WorkerId> not_taken_by{};  ///< workers
+    bool has_lost_worker = false;
+  };
+  /// A request that waits for the check thread, the query pool or a worker.
   struct Pending {
     Client client;
-    std::shared_ptr<const std::string> frame;  ///< of a long request; null: a query
-    std::int64_t next_sign_ms;                 ///< when the client gets the next such message
+    std::int64_t next_sign_ms;                   ///< when the client gets the next such message
+    std::shared_ptr<const std::string> frame{};  ///< of a check
+    std::optional<TraceJob> trace{};
     bool runs = false;
-    std::uint64_t sent = 0;  ///< chunks of the answer
-    std::uint64_t taken = 0;
+    std::uint64_t sent = 0;      ///< chunks of the answer
+    std::uint64_t received = 0;  ///< by the client
+
+    bool is_query() const { return frame == nullptr && !trace; }
   };
   using PendingRequests = std::map<std::uint64_t, Pending>;
 
   void check(const Client& client, std::string_view frame, Instant now);
   void checked(std::uint64_t ticket, const ReadRequest& read, Instant now);
   std::string objection_to(const Client& client, const ReadRequest& read);
-  void answer(const Client& client, const ReadRequest& read, Instant now);
+  /// `read` is that of `frame`, which may have to be checked.
+  void answer(const Client& client, const ReadRequest& read, std::string_view frame, Instant now);
   void query(const Client& client, const protocol::QueryRequest& request, Instant now);
   void more_rows(const Client& client, const protocol::MoreRows& request);
   void end_query(const Client& client, std::uint64_t request_id);
@@ -80,16 +96,31 @@ class ClientHandler {
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void trace(const Client& client, const protocol::TraceRequest& request, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
+  /// The durable study of that number, or, if that is 0, name. Without one the client gets an
+  /// error.
+  std::optional<StudyId> find_study(const Client& client, const std::string& name, StudyId id = 0);
+  /// The query or trace of that number.
   PendingRequests::iterator find(std::string_view identity, std::uint64_t request_id);
+  Pending& add(std::uint64_t ticket, const Client& client, Instant now);
+  /// Both return the next request.
   PendingRequests::iterator cancel(PendingRequests::iterator request);
+  PendingRequests::iterator refuse(PendingRequests::iterator request, const std::string& reason);
+  static protocol::ClientReply find_point(const StudyTable& study, bool is_table_made,
+                                          std::uint64_t point);
+  void point_found(std::uint64_t ticket, protocol::ClientReply found);
+  void dispatch_traces();
+  std::optional<WorkerId> free_worker(const TraceJob& job) const;
+  protocol::ClientReply trace_reply(TraceJob& job, const WorkerRecord& worker,
+                                    protocol::Trace trace) const;
 
   ClientHandlerSettings settings_;
   const Core& core_;
-  BadFrames& bad_frames_;
+  PeerLog& log_;
   StudyChanges& changes_;
-  TraceHandler& traces_;
   PendingRequests pending_;  // by ticket
   std::uint64_t last_ticket_ = 0;
+  std::size_t point_checks_ = 0;              // of traces, those of clients that are gone included
+  std::map<WorkerId, std::uint64_t> orders_;  // of traces that workers have not answered: tickets
   bool stopping_ = false;
   bool draining_ = false;
 };

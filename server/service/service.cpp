@@ -1,5 +1,6 @@
 #include "server/service/service.h"
 
+#include <optional>
 #include <utility>
 #include <variant>
 
@@ -18,35 +19,26 @@ struct Overloaded : Kinds... {
 template <typename... Kinds>
 Overloaded(Kinds...) -> Overloaded<Kinds...>;
 
-SchedulerSettings scheduler_settings(const ServiceSettings& settings) {
-  SchedulerSettings scheduler = settings.scheduler;
-  scheduler.solver_version = settings.solver_version;
-  return scheduler;
-}
-
 }  // namespace
 
 Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<StoredStudy> studies,
                  Instant now)
     : ports_(ports),
-      scheduler_(scheduler_settings(settings)),
+      scheduler_(settings.scheduler, settings.solver_version),
       ledger_(settings.ledger, ports),
-      reuse_(
-          settings.solver_version, ports, states_, ledger_,
-          [this](const Event& event, Instant then) { feed(event, then); },
-          [this](Instant then) { changes_.release_replies(then); }),
-      bad_frames_(ports),
-      workers_({settings.heartbeat_interval_ms, settings.scheduler.lost_after_ms,
-                settings.solver_version, settings.database_id, settings.last_worker_id,
-                settings.clients.access == "insecure"},
-               ports, bad_frames_, ledger_),
-      core_{
-          ports,   scheduler_,    states_,
-          ledger_, reuse_,        workers_,
-          rates_,  worker_rates_, [this](const Event& event, Instant then) { feed(event, then); }},
+      peer_log_(ports),
+      workers_(settings, settings.scheduler.lost_after_ms, ports, peer_log_, ledger_),
+      core_{ports,
+            scheduler_,
+            states_,
+            ledger_,
+            workers_,
+            rates_,
+            worker_rates_,
+            settings.solver_version,
+            [this](const Event& event, Instant then) { feed(event, then); }},
       changes_(settings.last_study_id, settings.bounds, core_),
-      traces_(settings.solver_version, settings.clients.still_working_every_ms, ports, workers_),
-      clients_(settings.clients, core_, bad_frames_, changes_, traces_) {
+      clients_(settings.clients, core_, peer_log_, changes_) {
   for (StoredStudy& study : studies) {
     restore(std::move(study), settings.only_study, now);
   }
@@ -55,10 +47,6 @@ Service::Service(const ServiceSettings& settings, Ports& ports, std::vector<Stor
 void Service::restore(StoredStudy study, const std::string& only_study, Instant now) {
   const StudyId id = study.study_id;
   states_.restore(study, now.steady_ms);
-  if (!study.completed.empty()) {
-    reuse_.add_source(id);
-  }
-  reuse_.restore(id, study.reused);
   const bool is_excluded = !only_study.empty() && study.name != only_study;
   const bool looks_up = study.reuses && !is_excluded;  // the lookup had not ended
   feed(StudyAdded{id, study.table, std::move(study.completed), study.failures.size(),
@@ -67,7 +55,7 @@ void Service::restore(StoredStudy study, const std::string& only_study, Instant 
                   study.solver_version, looks_up, study.left_out},
        now);
   if (looks_up) {
-    reuse_.begin(id, now);
+    changes_.look_up(id, now);
   }
 }
 
@@ -84,7 +72,7 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
     handle(event, now, &input.results);
   }
   if (input.trace_of != 0) {
-    traces_.trace_received(input.trace_of, std::move(input.trace));
+    clients_.trace_received(input.trace_of, std::move(input.trace));
   }
   handle_worker_events(now);
   hold_or_release_batches(now);
@@ -95,6 +83,7 @@ void Service::tick(Instant now) {
   feed(Tick{}, now);
   ledger_.tick(now.steady_ms);
   clients_.tick(now);
+  peer_log_.tick(now.steady_ms);
   changes_.release_replies(now);
   rates_.forget_old(now.steady_ms);
   worker_rates_.forget_old(now.steady_ms);
@@ -102,7 +91,7 @@ void Service::tick(Instant now) {
 
 void Service::drain(Instant now) {
   draining_ = true;
-  reuse_.stop_all();
+  changes_.stop_lookups();
   hold_or_release_batches(now);
   workers_.stop();
   clients_.drain();
@@ -110,21 +99,19 @@ void Service::drain(Instant now) {
 
 void Service::stop(Instant now) {
   stopping_ = true;
-  reuse_.stop_all();
+  changes_.stop_lookups();
   hold_or_release_batches(now);
   workers_.stop();
   clients_.stop();
 }
 
-protocol::StudyStatus Service::study_status(StudyId id, Instant now) const {
-  return server::study_status(id, core_, now);
-}
-
 std::vector<protocol::WorkerStatus> Service::worker_statuses(std::size_t most, Instant now) const {
   std::vector<protocol::WorkerStatus> statuses;
-  for (auto id = workers_.next_after(0); id && statuses.size() < most;
-       id = workers_.next_after(*id)) {
-    statuses.push_back(worker_status(*id, core_, now));
+  for (const auto& [id, worker] : workers_.all()) {
+    if (statuses.size() == most) {
+      break;
+    }
+    statuses.push_back(worker_status(id, core_, now));
   }
   return statuses;
 }
@@ -144,8 +131,8 @@ void Service::handle(const Event& event, Instant now, protocol::Results* results
                            [&](const StoreResults& effect) { store(effect, *results, now); },
                            [&](const StoreFailure& effect) { store(effect, now); },
                            [&](const DropWorker& effect) {
-                             workers_.drop(effect, now);
-                             traces_.worker_left(effect.worker);
+                             workers_.drop(effect);
+                             clients_.worker_left(effect.worker);
                            },
                            [&](const StudyFinished& effect) { changes_.finish(effect.study, now); },
                            [&](const auto& message) { workers_.send(message); }};
@@ -153,7 +140,7 @@ void Service::handle(const Event& event, Instant now, protocol::Results* results
     std::visit(perform, effect);
   }
   if (const auto* left = std::get_if<WorkerLeft>(&event)) {
-    traces_.worker_left(left->worker);
+    clients_.worker_left(left->worker);
   }
 }
 
@@ -196,19 +183,22 @@ void Service::hold_or_release_batches(Instant now) {
 // ---- The database ------------------------------------------------------------------------------
 
 void Service::store(const StoreResults& effect, protocol::Results& message, Instant now) {
-  const WorkerRecord& worker = *workers_.find(effect.worker);
+  WorkerRecord& worker = *workers_.find(effect.worker);
   const bool has_rows = !effect.accepted.empty() && states_.contains(effect.study);
-  if (has_rows && workers_.needs_row(effect.worker)) {
+  if (has_rows && !std::exchange(worker.has_row, true)) {
     // A worker that only comes and goes gets no row.
-    ledger_.write(AddWorker{effect.worker, worker.name, worker.threads, worker.solver_version,
-                            worker.instruction_set, worker.joined_at});
+    ledger_.write(worker.row);
   }
-  AddResults change{
-      effect.study,           has_rows ? states_.record(effect.study).table.get() : nullptr,
-      effect.worker,          worker.solver_version,
-      worker.instruction_set, message.attempt(),
-      iso_8601(now),          {},
-      effect.left_out,        message.ByteSizeLong()};
+  AddResults change{effect.study,
+                    has_rows ? states_.record(effect.study).table.get() : nullptr,
+                    effect.worker,
+                    worker.row.solver_version,
+                    worker.row.instruction_set,
+                    message.attempt(),
+                    iso_8601(now),
+                    {},
+                    effect.left_out,
+                    message.ByteSizeLong()};
   ResultsStored event{effect.worker, effect.study, effect.sequence, {}, effect.left_out};
   for (const std::size_t index : effect.accepted) {
     protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
@@ -247,7 +237,7 @@ void Service::results_stored(const ResultsStored& event, Instant now) {
   std::uint64_t solved = 0;
   for (const PointOutcome& outcome : event.outcomes) {
     if (outcome.failed) {
-      states_.point_failed(id, outcome.point);
+      states_.record(id).failures.insert(outcome.point);
     }
     solved += outcome.failed ? 0 : 1;
   }
@@ -257,7 +247,7 @@ void Service::results_stored(const ResultsStored& event, Instant now) {
              now.steady_ms);
   worker_rates_.add(event.worker, solved, 0, now.steady_ms);
   if (!event.outcomes.empty()) {
-    reuse_.add_source(id);
+    states_.note_results();
   }
   feed(event, now);
 }
@@ -265,10 +255,10 @@ void Service::results_stored(const ResultsStored& event, Instant now) {
 void Service::written(const WriteReport& report, Instant now) {
   switch (report.kind) {
     case WriteReport::Kind::kStored:
-      ledger_.stored(report.ticket, now);
+      ledger_.end(report.ticket, std::nullopt, now);
       break;
     case WriteReport::Kind::kRefused:
-      ledger_.refused(report.ticket, report.error, now);
+      ledger_.end(report.ticket, report.error, now);
       break;
     case WriteReport::Kind::kFault:
       ports_.log(Severity::kError, "results wait, nothing is handed out: " + report.error);

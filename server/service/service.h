@@ -9,29 +9,22 @@
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler.h"
 #include "server/service/client_handler.h"
-#include "server/service/point_rates.h"
-#include "server/service/ports/ports.h"
-#include "server/service/reuse_tracker.h"
+#include "server/service/ports.h"
 #include "server/service/status.h"
 #include "server/service/study_changes.h"
 #include "server/service/study_states.h"
-#include "server/service/trace_handler.h"
 #include "server/service/worker_sessions.h"
 #include "server/service/write_ledger.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
 
-struct ServiceSettings {
+struct ServiceSettings : WorkerSessionSettings {
   SchedulerSettings scheduler;
   LedgerLimits ledger;
   ClientHandlerSettings clients;
   StudyBounds bounds;
-  std::uint32_t heartbeat_interval_ms = 900;
-  std::string solver_version;
-  std::string database_id;
   std::uint64_t last_study_id = 0;
-  std::uint64_t last_worker_id = 0;
   /// Only points of this study are handed out. Empty: of all.
   std::string only_study{};
 };
@@ -61,6 +54,8 @@ class Service {
   }
   /// The connection of that client is gone.
   void client_left(std::string_view identity) { clients_.client_left(identity); }
+  /// At most 20 such lines in 10 s.
+  void log_peer(const std::string& text) { peer_log_.write(Severity::kWarning, text); }
   void written(const WriteReport& report, Instant now);
   void query_report(QueryReport report) { clients_.query_report(std::move(report)); }
   /// To be called several times a second.
@@ -72,10 +67,8 @@ class Service {
   /// Tells workers and clients that the server stops. Results are still stored.
   void stop(Instant now);
 
-  /// Whether messages of that worker should be read now. Otherwise it does not count as silent.
-  bool has_room(const std::string& identity) const {
-    return ledger_.has_room(workers_.id_of(identity));
-  }
+  /// Whether messages of workers should be read now. Otherwise none counts as silent.
+  bool has_room() const { return ledger_.has_room(); }
   /// Nothing more can be stored, and the server should end.
   bool storage_is_gone() const { return ledger_.is_gone(); }
   bool is_stopping() const { return stopping_ || draining_; }
@@ -86,9 +79,8 @@ class Service {
   const PointRates& rates() const { return rates_; }  ///< of studies
   QueryCounts query_counts() const { return clients_.query_counts(); }
   const StoredPoints& stored_points() const { return stored_points_; }
-  std::uint64_t bad_frames() const { return bad_frames_.total(); }
-  /// Of a durable study.
-  protocol::StudyStatus study_status(StudyId id, Instant now) const;
+  std::uint64_t bad_frames() const { return peer_log_.bad_frames(); }
+  const Core& core() const { return core_; }
   std::vector<protocol::WorkerStatus> worker_statuses(std::size_t most, Instant now) const;
 
  private:
@@ -109,14 +101,12 @@ class Service {
   Scheduler scheduler_;
   WriteLedger ledger_;
   StudyStates states_;
-  ReuseTracker reuse_;
   PointRates rates_;
   PointRates worker_rates_;
-  BadFrames bad_frames_;
+  PeerLog peer_log_;
   WorkerSessions workers_;
   Core core_;
   StudyChanges changes_;
-  TraceHandler traces_;
   ClientHandler clients_;
   StoredPoints stored_points_;
   bool stopping_ = false;

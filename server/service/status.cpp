@@ -1,6 +1,12 @@
 #include "server/service/status.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -8,9 +14,7 @@ namespace oblique::server {
 namespace {
 
 /// Why a running study makes no progress; empty: it does.
-std::string reason_to_wait(StudyId id, const Core& core, const StudyCounts& counts,
-                           const protocol::TakenOver& reused, Instant now) {
-  constexpr std::int64_t kQuietAfter_ms = 20'000;
+std::string reason_to_wait(const Core& core, const StudyCounts& counts, const Reuse& reuse) {
   const WriteLedger& ledger = core.ledger;
   if (ledger.is_gone()) {
     return ledger.fault();
@@ -22,8 +26,8 @@ std::string reason_to_wait(StudyId id, const Core& core, const StudyCounts& coun
     return fmt::format("the database, which stored nothing for over {} s",
                        WriteLedger::kSlowAfter_s);
   }
-  if (reused.under_way()) {
-    return fmt::format("the lookup of results of other studies, {} reused so far", reused.points());
+  if (reuse.lookup) {
+    return fmt::format("the lookup of results of other studies, {} reused so far", reuse.points);
   }
   if (counts.is_of_other_solver) {
     return fmt::format("a server with solver version {}, that of its results",
@@ -32,34 +36,18 @@ std::string reason_to_wait(StudyId id, const Core& core, const StudyCounts& coun
   if (counts.leased == 0 && core.scheduler.sets_all_aside()) {
     return "a worker";
   }
-  const QuietWorkers quiet = core.scheduler.quiet_workers(id, now.steady_ms);
-  if (counts.leased > 0 && quiet.quiet_ms >= kQuietAfter_ms) {
-    return fmt::format("results of {} point{} from {} worker{}, which stored nothing for over {} s",
-                       counts.leased, counts.leased == 1 ? "" : "s", quiet.workers,
-                       quiet.workers == 1 ? "" : "s", kQuietAfter_ms / 1000);
-  }
   return {};
-}
-
-const char* worker_state(const WorkerCounts& counts, bool is_busy) {
-  constexpr std::int64_t kSilentAfter_ms = 1500;  // heartbeats come every 900 ms
-  return counts.silent_ms > kSilentAfter_ms ? "silent"
-         : counts.is_set_aside              ? "set aside"
-         : is_busy                          ? "busy"
-         : counts.leased_points > 0         ? "working"
-                                            : "idle";
 }
 
 }  // namespace
 
 protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
   const StudyRecord& record = core.states.record(id);
-  const StudyState state = core.states.state(id);
   const StudyCounts counts = core.scheduler.study(id);
   protocol::StudyStatus status;
   status.set_study_id(id);
   status.set_name(record.name);
-  status.set_state(state_name(counts.open() == 0 ? StudyState::kDone : state));
+  status.set_state(state_name(counts.open() == 0 ? StudyState::kDone : record.state));
   status.set_points(counts.points);
   status.set_solved(counts.solved());
   status.set_failed(counts.failed);
@@ -69,28 +57,46 @@ protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
   status.set_priority(record.priority);
   status.set_solver_version(counts.solver_version);
   status.set_submitted_by(record.submitted_by);
-  const protocol::TakenOver reused = core.reuse.status(id);
-  if (state == StudyState::kRunning) {
+  if (record.state == StudyState::kRunning) {
     status.set_points_per_s(core.rates.points_per_s(id, now.steady_ms));
     if (counts.open() > 0) {
-      status.set_waits_for(reason_to_wait(id, core, counts, reused, now));
+      status.set_waits_for(reason_to_wait(core, counts, record.reuse));
     }
   }
-  if (reused.points() > 0 || reused.under_way() || reused.cut_short()) {
-    *status.mutable_taken() = reused;
+  if (record.reuse.points > 0 || record.reuse.lookup || record.reuse.cut_short) {
+    *status.mutable_taken() = reuse_status(record.reuse);
   }
   return status;
 }
 
+protocol::TakenOver reuse_status(const Reuse& reuse) {
+  constexpr std::size_t kMostOrigins = 20;
+  protocol::TakenOver message;
+  message.set_points(reuse.points);
+  message.set_under_way(reuse.lookup.has_value());
+  message.set_cut_short(reuse.cut_short);
+  std::vector<std::pair<std::string, std::uint64_t>> origins(reuse.origins.begin(),
+                                                             reuse.origins.end());
+  std::ranges::stable_sort(origins, std::ranges::greater(),
+                           [](const auto& origin) { return origin.second; });
+  origins.resize(std::min(origins.size(), kMostOrigins));
+  for (const auto& [study, points] : origins) {
+    auto& origin = *message.add_from();
+    origin.set_study(study);
+    origin.set_points(points);
+  }
+  return message;
+}
+
 protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now) {
-  const WorkerRecord& worker = *core.workers.find(id);
+  const WorkerRecord& worker = core.workers.all().at(id);
   const WorkerCounts counts = core.scheduler.worker(id, now.steady_ms);
   protocol::WorkerStatus status;
   status.set_worker_id(id);
-  status.set_name(worker.name);
-  status.set_threads(worker.threads);
-  status.set_instruction_set(worker.instruction_set);
-  status.set_solver_version(worker.solver_version);
+  status.set_name(worker.row.name);
+  status.set_threads(worker.row.threads);
+  status.set_instruction_set(worker.row.instruction_set);
+  status.set_solver_version(worker.row.solver_version);
   status.set_leased_points(counts.leased_points);
   status.set_solved_points(counts.solved_points);
   status.set_silent_ms(static_cast<std::uint32_t>(counts.silent_ms));
@@ -100,7 +106,7 @@ protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now)
   status.set_key(worker.key);
   status.set_host(worker.host);
   status.set_points_per_s(core.worker_rates.points_per_s(id, now.steady_ms));
-  status.set_state(worker_state(counts, worker.is_busy));
+  status.set_state(kWorkerStates.at(static_cast<std::size_t>(counts.state)));
   return status;
 }
 

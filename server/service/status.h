@@ -1,18 +1,80 @@
 #pragma once
 
-#include <cstddef>
+#include <algorithm>
 #include <cstdint>
-#include <vector>
+#include <deque>
+#include <functional>
+#include <map>
+#include <string>
 
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler.h"
-#include "server/service/point_rates.h"
-#include "server/service/reuse_tracker.h"
 #include "server/service/study_states.h"
 #include "server/service/worker_sessions.h"
 #include "server/service/write_ledger.h"
 
 namespace oblique::server {
+
+/// Points per second over the last seconds, by study or worker.
+class PointRates {
+ public:
+  using Id = std::uint64_t;
+
+  /// Points were completed. None was between `since_ms` and the first call for this ID.
+  void add(Id id, std::uint64_t points, std::int64_t since_ms, std::int64_t now_ms) {
+    Recent& recent = recent_.try_emplace(id, Recent{since_ms}).first->second;
+    if (recent.points.empty() || now_ms - recent.points.back().at_ms >= kResolution_ms) {
+      recent.points.push_back({now_ms, 0});
+    }
+    recent.points.back().points += points;
+    while (now_ms - recent.points.front().at_ms >= kSpan_ms) {
+      recent.points.pop_front();
+    }
+  }
+  void forget(Id id) { recent_.erase(id); }
+  /// Frees IDs without recent points. To be called now and then.
+  void forget_old(std::int64_t now_ms) {
+    std::erase_if(recent_, [now_ms](const auto& entry) {
+      return now_ms - entry.second.points.back().at_ms >= kSpan_ms;
+    });
+  }
+
+  double points_per_s(Id id, std::int64_t now_ms) const {
+    const auto found = recent_.find(id);
+    return found == recent_.end() ? 0.0 : rate_of(found->second, now_ms);
+  }
+  /// The sum of all.
+  double points_per_s(std::int64_t now_ms) const {
+    double sum = 0.0;
+    for (const auto& [id, recent] : recent_) {
+      sum += rate_of(recent, now_ms);
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr std::int64_t kSpan_ms = 5000;
+  static constexpr std::int64_t kResolution_ms = 100;
+  struct Sample {
+    std::int64_t at_ms;
+    std::uint64_t points;
+  };
+  struct Recent {
+    std::int64_t since_ms;
+    std::deque<Sample> points{};  ///< the oldest first
+  };
+
+  static double rate_of(const Recent& recent, std::int64_t now_ms) {
+    std::uint64_t points = 0;
+    for (const Sample& sample : recent.points) {
+      points += now_ms - sample.at_ms < kSpan_ms ? sample.points : 0;
+    }
+    const std::int64_t span_ms = std::min(kSpan_ms, now_ms - recent.since_ms);
+    return span_ms <= 0 ? 0.0 : 1000.0 * static_cast<double>(points) / static_cast<double>(span_ms);
+  }
+
+  std::map<Id, Recent> recent_;
+};
 
 /// The parts of the service that its handlers share.
 struct Core {
@@ -20,17 +82,20 @@ struct Core {
   Scheduler& scheduler;
   StudyStates& states;
   WriteLedger& ledger;
-  ReuseTracker& reuse;
   WorkerSessions& workers;
   PointRates& rates;  ///< of studies
   PointRates& worker_rates;
-  Feed feed;
+  std::string solver_version;  ///< of the server
+  /// Passes an event to the scheduler and carries out its effects.
+  std::function<void(const Event&, Instant)> feed;
 };
 
 // The status of studies and workers as clients and the page get it.
 
 /// Throws std::out_of_range for a study that is not durable.
 protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now);
+/// Empty without anything to report.
+protocol::TakenOver reuse_status(const Reuse& reuse);
 protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now);
 
 }  // namespace oblique::server

@@ -1,7 +1,5 @@
 #include "server/service/study_changes.h"
 
-#include <algorithm>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -13,7 +11,6 @@
 #include "proto/recipe/written.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"
-#include "server/study/recipe_growth.h"
 
 namespace oblique::server {
 namespace {
@@ -85,10 +82,14 @@ void StudyChanges::write(const Client& client, StudyId id, Change change, OnStor
                                                                            Instant now) {
         const auto ended = pending_.extract(id);
         on_refused();
-        core_.ports.reply_error(client, (core_.states.contains(id)
-                                             ? "the change was not stored, the study is as before: "
-                                             : "the study was not stored: ") +
-                                            error);
+        const bool is_kept = core_.states.contains(id);
+        core_.ports.reply_error(client,
+                                (is_kept ? "the change was not stored, the study is as before: "
+                                         : "the study was not stored: ") +
+                                    error);
+        if (is_kept) {
+          core_.states.record(id).is_doubtful = true;
+        }
         if (ended.mapped().is_complete) {
           finish(id, now);
         }
@@ -134,8 +135,14 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   const StudyRecord& study = core_.states.record(*known);
-  if (!study.table.is_of_the_recipe_of(read.table)) {
-    grow(client, *known, read, priority, now);
+  Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
+  try {
+    growth = study.table.growth_to(read.table);
+  } catch (const std::runtime_error&) {
+    // Only another version can read it.
+  }
+  if (growth.kind != Growth::Kind::kSame) {
+    grow(client, *known, read, growth, priority, now);
   } else if (study.priority != priority) {
     set_priority(client, *known, priority);
   } else {
@@ -151,19 +158,22 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   const StudyId id = ++last_study_id_;
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
-  const bool reuses = !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, {});
+  const bool reuses = should_look_up(read, {});
   core_.states.add(id, {name, read.table, created_at, priority, {}, now.steady_ms, client.key()});
   const auto on_stored = [this, client, id, reuses](Instant then) {
-    core_.states.set_durable(id, then.steady_ms);
-    const StudyRecord& study = core_.states.record(id);
+    StudyRecord& study = core_.states.record(id);
+    study.is_durable = true;
+    study.since_ms = then.steady_ms;
     log(id, fmt::format("of {} points begins", study.table.size()));
     StudyAdded event{id, study.table, {}, 0, false, false, study.priority};
     event.held = reuses;
     core_.feed(event, then);
     if (reuses) {
-      core_.reuse.begin(id, then);
+      look_up(id, then);
     }
-    reply_submitted(client, id, true, then);
+    protocol::SubmitReply reply;
+    reply.set_created(true);
+    reply_submitted(client, id, std::move(reply), then);
   };
   write(client, id, AddStudy{id, name, read.table, created_at, priority, client.key(), reuses},
         on_stored, [this, id] { core_.states.remove(id); });
@@ -171,15 +181,9 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
 
 /// The submitted recipe is not that of the study: appends its further points, or refuses it.
 void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
-                        std::int32_t priority, Instant now) {
+                        const Growth& growth, std::int32_t priority, Instant now) {
   const StudyRecord& study = core_.states.record(id);
   const std::uint64_t points_before = study.table.size();
-  Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
-  try {
-    growth = study.table.growth_to(read.table);
-  } catch (const std::runtime_error&) {
-    // Only another version can read it.
-  }
   if (growth.kind != Growth::Kind::kLonger || read.table.size() <= points_before) {
     core_.ports.reply_error(
         client,
@@ -191,37 +195,45 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
                     growth.difference));
     return;
   }
+  if (study.reuse.lookup) {
+    core_.ports.reply_error(client,
+                            "the study cannot grow while results of other studies are looked up "
+                            "for it: submit again when `oblique status` shows that this has ended");
+    return;
+  }
   const bool is_open = core_.states.is_open(id);
   if (!may_open(client, is_open ? 0 : 1, read.table.size() - (is_open ? points_before : 0))) {
     return;
   }
   const protocol::StudyStatus before = study_status(id, core_, now);
-  const bool reuses =
-      !read.request.submit().no_reuse() && core_.reuse.should_look_up(id, before.solver_version());
+  const bool reuses = should_look_up(read, before.solver_version());
   const auto on_stored = [this, client, id, table = read.table, priority, points_before,
                           was = before.state(), reuses](Instant then) {
-    core_.states.grow(id, table, priority);
+    StudyRecord& grown = core_.states.record(id);
+    grown.table = table;
+    grown.priority = priority;
+    grown.is_doubtful = false;
+    core_.states.reopen(id);
     log(id, fmt::format("grows from {} to {} points", points_before, table.size()));
     if (reuses) {
       core_.feed(StudyHeld{id, true}, then);
     }
     core_.feed(StudyGrown{id, table, priority}, then);
     if (reuses) {
-      core_.reuse.begin(id, then);
+      look_up(id, then);
     }
-    protocol::SubmitReply more;
-    more.set_appended(table.size() - points_before);
-    more.set_was(was);
-    reply_submitted(client, id, false, then, more);
+    protocol::SubmitReply reply;
+    reply.set_appended(table.size() - points_before);
+    reply.set_was(was);
+    reply_submitted(client, id, std::move(reply), then);
   };
-  write(client, id, GrowStudy{id, read.table, priority, iso_8601(now), reuses}, on_stored,
-        [this, id] { core_.states.set_doubtful(id); });
+  write(client, id, GrowStudy{id, read.table, priority, iso_8601(now), reuses}, on_stored);
   pending_.at(id).grows = true;
 }
 
 void StudyChanges::set_priority(const Client& client, StudyId id, std::int32_t priority) {
   write(client, id, SetPriority{id, priority}, [this, client, id, priority](Instant then) {
-    core_.states.set_priority(id, priority);
+    core_.states.record(id).priority = priority;
     core_.feed(PriorityChanged{id, priority}, then);
     change_state(client, id, StudyState::kRunning, submitted_reply(client, id), then);
   });
@@ -239,7 +251,8 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
       protocol::StudyStatus study;
       study.set_study_id(request.study_id());
       study.set_name(request.study());
-      reply_deleted(client, study);
+      study.set_state(kDeletedState);
+      reply_changed(client, study);
     } else {
       core_.ports.reply_error(client, unknown_study(request.study(), core_.states));
     }
@@ -250,30 +263,27 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
              [this, client, request](Instant then) { change(client, request, then); })) {
     return;
   }
-  const auto reply = [this, client, id](Instant then) { reply_changed(client, id, 0, then); };
+  const auto reply = [this, client, id](Instant then) {
+    reply_changed(client, study_status(id, core_, then));
+  };
   switch (request.change()) {
     case protocol::STUDY_CHANGE_CANCEL:
-      change_state(client, id, StudyState::kCancelled, reply, now);
-      break;
+      return change_state(client, id, StudyState::kCancelled, reply, now);
     case protocol::STUDY_CHANGE_PAUSE:
       // Nothing of a cancelled study is handed out either.
-      change_state(client, id,
-                   core_.states.state(id) == StudyState::kCancelled ? StudyState::kCancelled
-                                                                    : StudyState::kPaused,
-                   reply, now);
-      break;
+      return change_state(client, id,
+                          core_.states.record(id).state == StudyState::kCancelled
+                              ? StudyState::kCancelled
+                              : StudyState::kPaused,
+                          reply, now);
     case protocol::STUDY_CHANGE_RESUME:
-      change_state(client, id, StudyState::kRunning, reply, now);
-      break;
+      return change_state(client, id, StudyState::kRunning, reply, now);
     case protocol::STUDY_CHANGE_RETRY:
-      retry(client, id, now);
-      break;
+      return retry(client, id, now);
     case protocol::STUDY_CHANGE_RENAME:
-      rename(client, request, id, now);
-      break;
+      return rename(client, request, id, now);
     case protocol::STUDY_CHANGE_DELETE:
-      remove(client, id);
-      break;
+      return remove(client, id);
     default:
       core_.ports.reply_error(client, "the server does not know this change of a study");
       break;
@@ -282,7 +292,7 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
 
 /// The reply is sent at once if the study has the state already.
 void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted,
-                                std::function<void(Instant)> reply, Instant now) {
+                                const OnStored& reply, Instant now) {
   if (!core_.states.needs_write(id, wanted)) {
     reply(now);
     return;
@@ -290,7 +300,7 @@ void StudyChanges::change_state(const Client& client, StudyId id, StudyState wan
   if (wanted == StudyState::kRunning && !may_reopen(client, id)) {
     return;
   }
-  const auto on_stored = [this, id, wanted, reply = std::move(reply)](Instant then) {
+  const auto on_stored = [this, id, wanted, reply](Instant then) {
     core_.states.set_state(id, wanted);
     if (wanted == StudyState::kRunning) {
       log(id, "goes on");
@@ -301,14 +311,13 @@ void StudyChanges::change_state(const Client& client, StudyId id, StudyState wan
     }
     reply(then);
   };
-  write(client, id, SetStudyState{id, wanted, iso_8601(now)}, on_stored,
-        [this, id] { core_.states.set_doubtful(id); });
+  write(client, id, SetStudyState{id, wanted, iso_8601(now)}, on_stored);
 }
 
 void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
   const IntervalSet failures = core_.states.record(id).failures;
   if (failures.empty()) {
-    reply_changed(client, id, 0, now);
+    reply_changed(client, study_status(id, core_, now));
     return;
   }
   try {
@@ -318,16 +327,22 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
         client, fmt::format("the recipe of the study cannot be read: {}", error.what()));
     return;
   }
-  if (core_.states.state(id) == StudyState::kDone && !may_reopen(client, id)) {
+  if (core_.states.record(id).state == StudyState::kDone && !may_reopen(client, id)) {
     return;
   }
   write(client, id, ForgetFailures{id, failures, iso_8601(now)},
         [this, client, id, failures](Instant then) {
           core_.rates.forget(id);  // fewer points are completed now
-          core_.states.forget_failures(id, failures, then.steady_ms);
+          StudyRecord& study = core_.states.record(id);
+          failures.for_each(
+              [&](const Interval& gone) { study.failures.erase(gone.begin, gone.end); });
+          study.since_ms = then.steady_ms;
+          if (study.state == StudyState::kDone) {
+            core_.states.reopen(id);
+          }
           log(id, fmt::format("tries its failed points again: {}", failures.size()));
           core_.feed(FailuresForgotten{id, failures}, then);
-          reply_changed(client, id, failures.size(), then);
+          reply_changed(client, study_status(id, core_, then), failures.size());
         });
 }
 
@@ -338,7 +353,7 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
   if (const std::string reason = protocol::objection_to_study_name(name); !reason.empty()) {
     core_.ports.reply_error(client, reason);
   } else if (owner == id) {
-    reply_changed(client, id, 0, now);
+    reply_changed(client, study_status(id, core_, now));
   } else if (owner) {
     if (!defers(client, *owner,
                 [this, client, request](Instant then) { change(client, request, then); })) {
@@ -352,7 +367,7 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
         [this, client, id, name](Instant then) {
           log(id, fmt::format("is called {} from now on", name));
           core_.states.rename(id, name);
-          reply_changed(client, id, 0, then);
+          reply_changed(client, study_status(id, core_, then));
         },
         [this, name] { core_.states.release(name); });
   }
@@ -360,14 +375,14 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
 
 void StudyChanges::remove(const Client& client, StudyId id) {
   write(client, id, DeleteStudy{id}, [this, client, id](Instant then) {
-    const protocol::StudyStatus last = study_status(id, core_, then);
+    protocol::StudyStatus last = study_status(id, core_, then);
+    last.set_state(kDeletedState);
     log(id, "is deleted");
     core_.rates.forget(id);
     core_.states.remove(id);
-    core_.reuse.forget(id);
-    release_replies(then, id);
+    release_replies(then);
     core_.feed(StudyRemoved{id}, then);
-    reply_deleted(client, last);
+    reply_changed(client, last);
   });
 }
 
@@ -406,60 +421,130 @@ bool StudyChanges::may_reopen(const Client& client, StudyId id) {
   return core_.states.is_open(id) || may_open(client, 1, core_.states.record(id).table.size());
 }
 
-/// While results of other studies are looked up the reply waits for them, but not long.
-void StudyChanges::reply_submitted(const Client& client, StudyId id, bool created, Instant now,
-                                   const protocol::SubmitReply& more) {
-  constexpr std::int64_t kLongestWait_ms = 1500;
-  const StudyCounts counts = core_.scheduler.study(id);
-  protocol::ClientReply reply;
-  protocol::SubmitReply& fields = *reply.mutable_submit();
-  fields = more;
-  fields.set_study_id(id);
-  fields.set_points(counts.points);
-  fields.set_settled(counts.settled);
-  fields.set_created(created);
-  if (core_.reuse.is_under_way(id)) {
-    held_.push_back({id, client, std::move(reply), now.steady_ms + kLongestWait_ms});
-  } else {
-    core_.ports.reply(client, std::move(reply));
-  }
+StudyChanges::OnStored StudyChanges::submitted_reply(const Client& client, StudyId id) {
+  return [this, client, id](Instant now) { reply_submitted(client, id, {}, now); };
 }
 
-void StudyChanges::release_replies(Instant now, StudyId id) {
-  const auto waits = [&](const HeldReply& held) {
-    return held.study != id && held.until_ms > now.steady_ms &&
-           core_.reuse.is_under_way(held.study);
-  };
-  const auto first = std::stable_partition(held_.begin(), held_.end(), waits);
-  std::vector<HeldReply> released(std::make_move_iterator(first),
-                                  std::make_move_iterator(held_.end()));
-  held_.erase(first, held_.end());
-  for (HeldReply& held : released) {
+/// While results of other studies are looked up the reply waits for them, but not long.
+void StudyChanges::reply_submitted(const Client& client, StudyId id, protocol::SubmitReply reply,
+                                   Instant now) {
+  constexpr std::int64_t kLongestWait_ms = 1500;
+  held_.push_back({id, client, std::move(reply), now.steady_ms + kLongestWait_ms});
+  release_replies(now);
+}
+
+void StudyChanges::release_replies(Instant now) {
+  std::erase_if(held_, [&](const HeldReply& held) {
     if (!core_.states.contains(held.study)) {
       core_.ports.reply_error(held.client, "the study was deleted meanwhile");
-      continue;
+      return true;
     }
-    const protocol::StudyStatus status = study_status(held.study, core_, now);
-    protocol::SubmitReply& fields = *held.reply.mutable_submit();
-    fields.set_settled(status.solved() + status.failed() + status.left_out());
-    *fields.mutable_taken() = status.taken();
-    core_.ports.reply(held.client, std::move(held.reply));
-  }
+    const Reuse& reuse = core_.states.record(held.study).reuse;
+    if (reuse.lookup && held.until_ms > now.steady_ms) {
+      return false;
+    }
+    const StudyCounts counts = core_.scheduler.study(held.study);
+    protocol::ClientReply message;
+    protocol::SubmitReply& fields = *message.mutable_submit();
+    fields = held.reply;
+    fields.set_study_id(held.study);
+    fields.set_points(counts.points);
+    fields.set_settled(counts.completed);
+    *fields.mutable_taken() = reuse_status(reuse);
+    core_.ports.reply(held.client, std::move(message));
+    return true;
+  });
 }
 
-void StudyChanges::reply_changed(const Client& client, StudyId id, std::uint64_t retried,
-                                 Instant now) {
+void StudyChanges::reply_changed(const Client& client, const protocol::StudyStatus& study,
+                                 std::uint64_t retried) {
   protocol::ClientReply reply;
-  *reply.mutable_change()->mutable_study() = study_status(id, core_, now);
+  *reply.mutable_change()->mutable_study() = study;
   reply.mutable_change()->set_retried(retried);
   core_.ports.reply(client, std::move(reply));
 }
 
-void StudyChanges::reply_deleted(const Client& client, const protocol::StudyStatus& study) {
-  protocol::ClientReply reply;
-  *reply.mutable_change()->mutable_study() = study;
-  reply.mutable_change()->mutable_study()->set_state(kDeletedState);
-  core_.ports.reply(client, std::move(reply));
+// ---- Results of other studies ------------------------------------------------------------------
+
+/// Whether a study with results of that solver version (empty: without results) can reuse any.
+bool StudyChanges::should_look_up(const ReadRequest& read, std::string_view solver_version) const {
+  return !read.request.submit().no_reuse() && core_.states.have_results() &&
+         (solver_version.empty() || solver_version == core_.solver_version);
+}
+
+void StudyChanges::look_up(StudyId id, Instant now) {
+  core_.states.record(id).reuse.lookup = Reuse::Lookup{now.steady_ms};
+  write_part(id, 0);
+}
+
+void StudyChanges::write_part(StudyId id, std::uint64_t first_point) {
+  const StudyRecord& study = core_.states.record(id);
+  try {
+    auto outcome = std::make_shared<ReusedResults>();
+    core_.ledger.write(
+        ReuseResults{id, study.table.get(), first_point, core_.solver_version, outcome},
+        [this, id, outcome](Instant now) { part_stored(id, *outcome, now); },
+        [this, id](const std::string& error, Instant /*now*/) { part_refused(id, error); });
+  } catch (const std::runtime_error& error) {  // only another version can read the recipe
+    log(id, fmt::format("reuses no results: {}", error.what()));
+    write_end(id);
+  }
+}
+
+void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant now) {
+  if (!core_.states.contains(id)) {
+    return;  // it was deleted
+  }
+  Reuse& reuse = core_.states.record(id).reuse;
+  reuse.add(part.origins);
+  if (part.points.empty()) {
+    reuse.lookup->probes_in_vain += part.probes;
+  } else {
+    *reuse.lookup = {now.steady_ms};
+    core_.feed(PointsReused{id, part.points}, now);
+  }
+  if (lookups_stop_) {
+    return;
+  }
+  const bool goes_on = part.next_point && core_.states.record(id).state != StudyState::kCancelled;
+  reuse.cut_short = goes_on && (reuse.lookup->probes_in_vain >= kMostProbesInVain ||
+                                now.steady_ms - reuse.lookup->last_result_ms >= kLongestInVain_ms);
+  if (goes_on && !reuse.cut_short) {
+    write_part(id, *part.next_point);
+  } else {
+    write_end(id);
+  }
+}
+
+/// The points that the lookup has not found are solved.
+void StudyChanges::part_refused(StudyId id, const std::string& error) {
+  if (core_.ledger.is_gone() || !core_.states.contains(id)) {
+    return;
+  }
+  log(id, fmt::format("reuses no more results of other studies: {}", error));
+  core_.states.record(id).reuse.cut_short = true;
+  write_end(id);
+}
+
+void StudyChanges::write_end(StudyId id) {
+  core_.ledger.write(EndReuse{id}, [this, id](Instant now) { end_stored(id, now); });
+}
+
+void StudyChanges::end_stored(StudyId id, Instant now) {
+  if (!core_.states.contains(id)) {
+    return;
+  }
+  StudyRecord& study = core_.states.record(id);
+  study.reuse.lookup.reset();
+  if (study.reuse.points > 0) {
+    std::string origins;
+    for (const auto& [source, points] : study.reuse.origins) {
+      origins += fmt::format("{}{} of {}", origins.empty() ? "" : ", ", points, source);
+    }
+    log(id, fmt::format("reuses {} results: {}", study.reuse.points, origins));
+  }
+  core_.feed(StudyHeld{id, false}, now);
+  release_replies(now);
 }
 
 void StudyChanges::log(StudyId id, const std::string& what) {

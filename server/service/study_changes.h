@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "proto/oblique.pb.h"
-#include "server/service/ports/ports.h"
-#include "server/service/reuse_tracker.h"
+#include "server/service/ports.h"
 #include "server/service/status.h"
 #include "server/study/limits.h"
 #include "server/study/study_table.h"
@@ -51,9 +50,18 @@ class StudyChanges {
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
   /// All points that the study had are completed.
   void finish(StudyId id, Instant now);
-  /// Sends the replies to submissions whose lookup of reused results has ended, or takes long; and
-  /// all of that study.
-  void release_replies(Instant now, StudyId id = 0);
+  /// Sends the replies to submissions whose lookup of reused results has ended, or takes long, or
+  /// whose study is gone.
+  void release_replies(Instant now);
+
+  /// A lookup of results ends early after so many probes, or so long, without one.
+  static constexpr std::uint64_t kMostProbesInVain = 1'000'000;
+  static constexpr std::int64_t kLongestInVain_ms = 1500;
+  /// Looks up results of other studies for all open points, part by part. The scheduler must hold
+  /// the study. The lookup of a cancelled study ends with the part that is being written.
+  void look_up(StudyId id, Instant now);
+  /// Starts no further part of any lookup. The next server continues.
+  void stop_lookups() { lookups_stop_ = true; }
 
  private:
   /// A change of a study that is being written.
@@ -62,11 +70,11 @@ class StudyChanges {
     bool is_complete = false;  ///< the points of before are completed meanwhile
     std::vector<std::function<void(Instant)>> deferred{};  ///< later requests
   };
-  /// A reply to a submission that waits until results are reused.
+  /// A reply to a submission, which may wait until results are reused.
   struct HeldReply {
     StudyId study;
     Client client;
-    protocol::ClientReply reply;
+    protocol::SubmitReply reply;
     std::int64_t until_ms;
   };
   using OnStored = std::function<void(Instant)>;
@@ -76,31 +84,35 @@ class StudyChanges {
       std::function<void()> on_refused = [] {});
   bool defers(const Client& client, StudyId id, std::function<void(Instant)> request);
   void add(const Client& client, const ReadRequest& read, std::int32_t priority, Instant now);
-  void grow(const Client& client, StudyId id, const ReadRequest& read, std::int32_t priority,
-            Instant now);
+  void grow(const Client& client, StudyId id, const ReadRequest& read, const Growth& growth,
+            std::int32_t priority, Instant now);
   void set_priority(const Client& client, StudyId id, std::int32_t priority);
-  void change_state(const Client& client, StudyId id, StudyState wanted,
-                    std::function<void(Instant)> reply, Instant now);
-  std::function<void(Instant)> submitted_reply(const Client& client, StudyId id) {
-    return [this, client, id](Instant now) { reply_submitted(client, id, false, now); };
-  }
+  void change_state(const Client& client, StudyId id, StudyState wanted, const OnStored& reply,
+                    Instant now);
+  OnStored submitted_reply(const Client& client, StudyId id);
   void retry(const Client& client, StudyId id, Instant now);
   void rename(const Client& client, const protocol::ChangeRequest& request, StudyId id,
               Instant now);
   void remove(const Client& client, StudyId id);
   bool may_open(const Client& client, std::uint64_t studies, std::uint64_t points);
   bool may_reopen(const Client& client, StudyId id);
-  void reply_submitted(const Client& client, StudyId id, bool created, Instant now,
-                       const protocol::SubmitReply& more = {});
-  void reply_changed(const Client& client, StudyId id, std::uint64_t retried, Instant now);
-  void reply_deleted(const Client& client, const protocol::StudyStatus& study);
+  void reply_submitted(const Client& client, StudyId id, protocol::SubmitReply reply, Instant now);
+  void reply_changed(const Client& client, const protocol::StudyStatus& study,
+                     std::uint64_t retried = 0);
   void log(StudyId id, const std::string& what);
+  bool should_look_up(const ReadRequest& read, std::string_view solver_version) const;
+  void write_part(StudyId id, std::uint64_t first_point);
+  void part_stored(StudyId id, const ReusedResults& part, Instant now);
+  void part_refused(StudyId id, const std::string& error);
+  void write_end(StudyId id);
+  void end_stored(StudyId id, Instant now);
 
   std::uint64_t last_study_id_;
   StudyBounds bounds_;
   const Core& core_;
   std::map<StudyId, Pending> pending_;
   std::vector<HeldReply> held_;
+  bool lookups_stop_ = false;
 };
 
 /// The error for a name that no study has.

@@ -34,29 +34,26 @@ std::uint64_t StudyStates::open_points() const {
 
 void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const bool lacks_rows = stored.completed.size() < stored.table.size();
-  add(stored.study_id, {stored.name, stored.table, stored.created_at, stored.priority,
-                        stored.failures, now_ms, stored.submitted_by});
+  StudyRecord study{stored.name,     stored.table, stored.created_at,  stored.priority,
+                    stored.failures, now_ms,       stored.submitted_by};
+  study.reuse.add(stored.reused);
+  study.is_durable = true;
+  add(stored.study_id, std::move(study));
   move(stored.study_id,
        stored.state == StudyState::kDone && lacks_rows ? StudyState::kRunning : stored.state);
-  set_durable(stored.study_id, now_ms);
+  have_results_ = have_results_ || !stored.completed.empty();
 }
 
 void StudyStates::add(StudyId id, StudyRecord record) {
   ids_.emplace(record.name, id);
-  studies_.emplace(id, Study{std::move(record)});
+  studies_.emplace(id, std::move(record));
   unfinished_.insert(id);
-}
-
-void StudyStates::set_durable(StudyId id, std::int64_t now_ms) {
-  Study& study = studies_.at(id);
-  study.is_durable = true;
-  study.record.since_ms = now_ms;
 }
 
 void StudyStates::remove(StudyId id) {
   const auto study = studies_.find(id);
   unfinished_.erase(id);
-  ids_.erase(study->second.record.name);
+  ids_.erase(study->second.name);
   studies_.erase(study);
 }
 
@@ -67,7 +64,7 @@ std::optional<StudyId> StudyStates::find(std::string_view name) const {
 
 std::optional<StudyId> StudyStates::find_durable(std::string_view name, StudyId id) const {
   const auto known = id != 0 ? std::optional(id) : find(name);
-  return known && contains(*known) && is_durable(*known) ? known : std::nullopt;
+  return known && contains(*known) && record(*known).is_durable ? known : std::nullopt;
 }
 
 std::string StudyStates::nearest(std::string_view name) const {
@@ -76,11 +73,8 @@ std::string StudyStates::nearest(std::string_view name) const {
     return {};
   }
   std::vector<std::string_view> names;
-  names.reserve(ids_.size());
   for (const auto& [known, id] : ids_) {
-    if (is_durable(id)) {
-      names.emplace_back(known);
-    }
+    names.emplace_back(known);
   }
   return std::string(protocol::nearest(name, names));
 }
@@ -94,50 +88,26 @@ std::optional<StudyId> StudyStates::durable_after(StudyId id) const {
 }
 
 bool StudyStates::needs_write(StudyId id, StudyState wanted) const {
-  const Study& study = studies_.at(id);
+  const StudyRecord& study = record(id);
   return study.state != StudyState::kDone && (study.state != wanted || study.is_doubtful);
 }
 
 void StudyStates::set_state(StudyId id, StudyState state) {
-  studies_.at(id).is_doubtful = false;
-  if (studies_.at(id).state != StudyState::kDone) {
+  record(id).is_doubtful = false;
+  if (record(id).state != StudyState::kDone) {
     move(id, state);
   }
 }
 
 bool StudyStates::finish(StudyId id) {
-  const bool is_new = state(id) != StudyState::kDone;
+  const bool is_new = record(id).state != StudyState::kDone;
   move(id, StudyState::kDone);
   return is_new;
 }
 
 void StudyStates::rename(StudyId id, const std::string& name) {
-  StudyRecord& record = studies_.at(id).record;
-  ids_.erase(record.name);
-  record.name = name;
+  ids_.erase(std::exchange(record(id).name, name));
   ids_.insert_or_assign(name, id);
-}
-
-void StudyStates::grow(StudyId id, const StudyTable& table, std::int32_t priority) {
-  Study& study = studies_.at(id);
-  study.record.table = table;
-  study.record.priority = priority;
-  study.is_doubtful = false;
-  move(id, StudyState::kRunning);
-}
-
-void StudyStates::point_failed(StudyId id, std::uint64_t point) {
-  studies_.at(id).record.failures.insert(point);
-}
-
-void StudyStates::forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms) {
-  StudyRecord& record = studies_.at(id).record;
-  points.for_each(
-      [&](const Interval& interval) { record.failures.erase(interval.begin, interval.end); });
-  record.since_ms = now_ms;
-  if (state(id) == StudyState::kDone) {
-    move(id, StudyState::kRunning);
-  }
 }
 
 }  // namespace oblique::server

@@ -18,15 +18,39 @@
 
 namespace oblique::server {
 
+/// The results of other studies that a study reuses.
+struct Reuse {
+  struct Lookup {
+    std::int64_t last_result_ms;
+    std::uint64_t probes_in_vain = 0;
+  };
+  std::map<std::string, std::uint64_t> origins{};  ///< points by name of the source
+  std::uint64_t points = 0;
+  bool cut_short = false;
+  std::optional<Lookup> lookup{};  ///< under way
+
+  void add(const std::map<std::string, std::uint64_t>& more) {
+    for (const auto& [origin, number] : more) {
+      origins[origin] += number;
+      points += number;
+    }
+  }
+};
+
 /// What is known of a study beside the points that the scheduler has.
 struct StudyRecord {
   std::string name;
   StudyTable table;
   std::string created_at;
   std::int32_t priority = 0;
-  IntervalSet failures;        ///< points whose rows say failed
+  IntervalSet failures{};      ///< points whose rows say failed
   std::int64_t since_ms{};     ///< start of the time over which its rate is known
   std::string submitted_by{};  ///< name of the key; empty: without keys
+  Reuse reuse{};
+  StudyState state = StudyState::kRunning;
+  bool is_durable = false;
+  /// A write was refused: what the disk took of it may count after a crash.
+  bool is_doubtful = false;
 };
 
 /// The studies by number and name, as the database has them. A study that is being added is known
@@ -38,7 +62,6 @@ class StudyStates {
   void restore(const StoredStudy& study, std::int64_t now_ms);
   /// Adds a running study that is being written. Its number and name must be unused.
   void add(StudyId id, StudyRecord record);
-  void set_durable(StudyId id, std::int64_t now_ms);
   void remove(StudyId id);
 
   /// The study of that name, durable or being added.
@@ -50,9 +73,9 @@ class StudyStates {
   /// The durable study of the lowest number above this one.
   std::optional<StudyId> durable_after(StudyId id) const;
   bool contains(StudyId id) const { return studies_.contains(id); }
-  bool is_durable(StudyId id) const { return studies_.at(id).is_durable; }
-  const StudyRecord& record(StudyId id) const { return studies_.at(id).record; }
-  StudyState state(StudyId id) const { return studies_.at(id).state; }
+  const StudyRecord& record(StudyId id) const { return studies_.at(id); }
+  /// To be changed, but for name and state, which have functions of their own.
+  StudyRecord& record(StudyId id) { return studies_.at(id); }
   /// It is neither done nor cancelled.
   bool is_open(StudyId id) const { return unfinished_.contains(id); }
 
@@ -62,14 +85,16 @@ class StudyStates {
   const std::set<StudyId>& unfinished() const { return unfinished_; }
   /// Points of the open studies.
   std::uint64_t open_points() const;
+  /// Some study has, or had, results that others can reuse.
+  bool have_results() const { return have_results_; }
+  void note_results() { have_results_ = true; }
 
-  /// Whether the state must be written: the study has another one, or a refused write made it
-  /// doubtful, because what the disk took of it may count after a crash. A done study keeps its
-  /// state.
+  /// Whether the state must be written: the study has another or a doubtful one. A done study keeps
+  /// its state.
   bool needs_write(StudyId id, StudyState wanted) const;
-  void set_doubtful(StudyId id) { studies_.at(id).is_doubtful = true; }
-  /// The state is durable. A study that is done stays so.
+  /// The state is durable. A study that is done stays so until points of it are open again.
   void set_state(StudyId id, StudyState state);
+  void reopen(StudyId id) { move(id, StudyState::kRunning); }
   /// All points are completed. False when that was known.
   bool finish(StudyId id);
 
@@ -77,28 +102,14 @@ class StudyStates {
   void reserve(StudyId id, const std::string& name) { ids_.emplace(name, id); }
   void release(const std::string& name) { ids_.erase(name); }
   void rename(StudyId id, const std::string& name);
-  /// The study has all points of the table, and runs.
-  void grow(StudyId id, const StudyTable& table, std::int32_t priority);
-  void set_priority(StudyId id, std::int32_t priority) {
-    studies_.at(id).record.priority = priority;
-  }
-  void point_failed(StudyId id, std::uint64_t point);
-  /// The failures are forgotten: a study that was done runs.
-  void forget_failures(StudyId id, const IntervalSet& points, std::int64_t now_ms);
 
  private:
-  struct Study {
-    StudyRecord record;
-    StudyState state = StudyState::kRunning;
-    bool is_doubtful = false;
-    bool is_durable = false;
-  };
-
   void move(StudyId id, StudyState state);
 
-  std::map<StudyId, Study> studies_;
+  std::map<StudyId, StudyRecord> studies_;
   std::map<std::string, StudyId, std::less<>> ids_;  // by name
   std::set<StudyId> unfinished_;
+  bool have_results_ = false;
 };
 
 }  // namespace oblique::server

@@ -74,7 +74,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       message.heartbeat().lease_ids_size() + message.give_back().lease_ids_size();
   if (!is_small || lease_count > protocol::kMostLeasesAHeartbeat) {
     if (known == ids_.end()) {
-      bad_frames_.count("a worker");
+      log_.bad_frame("a worker");
     } else {
       give_up(known->second, "it sends more in one message than workers do", input);
     }
@@ -82,7 +82,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
   }
   using Kind = protocol::WorkerMessage;
   if (!is_read || message.kind_case() == Kind::KIND_NOT_SET) {
-    bad_frames_.count("a worker");
+    log_.bad_frame("a worker");
     return input;
   }
   if (message.kind_case() == Kind::kHello) {
@@ -93,7 +93,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
     if (message.kind_case() != Kind::kGoodbye) {
       protocol::ServerToWorker again;
       again.mutable_hello_again();
-      ports_.send(identity, again);
+      ports_.to_worker(identity, protocol::encode(again));
     }
     return input;
   }
@@ -124,7 +124,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       input.trace = std::move(*message.mutable_trace());
       break;
     case Kind::kGoodbye:
-      log_rarely(Severity::kInfo, fmt::format("worker {} leaves", worker), now);
+      log_.write(Severity::kInfo, fmt::format("worker {} leaves", worker));
       forget(worker);
       input.events.emplace_back(WorkerLeft{worker});
       break;
@@ -145,18 +145,11 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
     forget(old);  // it begins anew, and what it held is free again
     input.events.emplace_back(WorkerLeft{old});
   }
-  std::string objection = protocol::objection_to_worker(hello);
-  if (objection.empty() && hello.solver_version() != settings_.solver_version) {
-    objection = fmt::format(
-        "its solver has version {}, the server's {}: results of a study must come from one "
-        "version; install the server's release of oblique there",
-        plain(hello.solver_version()), settings_.solver_version);
-  }
   protocol::ServerToWorker reply;
-  if (!objection.empty()) {
-    log_rarely(Severity::kWarning, fmt::format("a worker is refused: {}", objection), now);
+  if (const std::string objection = objection_to(hello); !objection.empty()) {
+    log_.write(Severity::kWarning, fmt::format("a worker is refused: {}", objection));
     reply.mutable_refused()->set_reason(objection);
-    ports_.send(identity, reply);
+    ports_.to_worker(identity, protocol::encode(reply));
     return;
   }
   const WorkerId id = ++settings_.last_worker_id;
@@ -164,44 +157,39 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
   welcome.set_protocol_version(protocol::kProtocolVersion);
   welcome.set_worker_id(id);
   welcome.set_heartbeat_interval_ms(settings_.heartbeat_interval_ms);
-  welcome.set_lost_after_ms(static_cast<std::uint32_t>(settings_.lost_after_ms));
+  welcome.set_lost_after_ms(static_cast<std::uint32_t>(lost_after_ms_));
   welcome.set_database_id(settings_.database_id);
-  if (ports_.send(identity, reply) == Delivery::kGone) {
+  if (ports_.to_worker(identity, protocol::encode(reply)) == Delivery::kGone) {
     return;
   }
-  const WorkerRecord worker{identity,
-                            plain(hello.name()),
-                            std::clamp(hello.threads(), 1U, kMostThreads),
-                            plain(hello.solver_version()),
-                            plain(hello.instruction_set()),
-                            iso_8601(now),
-                            key,
-                            plain(hello.host()),
-                            now.steady_ms};
+  const WorkerRecord worker{
+      identity,
+      {id, plain(hello.name()), std::clamp(hello.threads(), 1U, kMostThreads),
+       plain(hello.solver_version()), plain(hello.instruction_set()), iso_8601(now)},
+      key,
+      plain(hello.host()),
+      now.steady_ms};
   workers_.emplace(id, worker);
   ids_[identity] = id;
-  greet(id, now);
+  log_.write(Severity::kInfo, fmt::format("worker {} ({}, {} threads{}) joins", id, worker.row.name,
+                                          worker.row.threads, key.empty() ? "" : ", key " + key));
+  if (stopping_) {
+    send_stopping(id);
+  }
   input.events.emplace_back(WorkerJoined{
-      id, worker.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
+      id, worker.row.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
 }
 
-/// Logs that the worker joined, and sends it the notices that concern it.
-void WorkerSessions::greet(WorkerId id, Instant now) {
-  const WorkerRecord& worker = workers_.at(id);
-  log_rarely(Severity::kInfo,
-             fmt::format("worker {} ({}, {} threads{}) joins", id, worker.name, worker.threads,
-                         worker.key.empty() ? "" : ", key " + worker.key),
-             now);
-  if (settings_.is_insecure) {
-    notify(id,
-           "the server runs with --insecure: whoever reaches it can use it, and what is sent "
-           "there is not encrypted");
+/// Why the worker is refused; empty: it is not.
+std::string WorkerSessions::objection_to(const protocol::WorkerHello& hello) const {
+  std::string objection = protocol::objection_to_worker(hello);
+  if (objection.empty() && hello.solver_version() != settings_.solver_version) {
+    objection = fmt::format(
+        "its solver has version {}, the server's {}: results of a study must come from one "
+        "version; install the server's release of oblique there",
+        plain(hello.solver_version()), settings_.solver_version);
   }
-  if (stopping_) {
-    protocol::ServerToWorker stopping;
-    stopping.mutable_stopping();
-    send(id, stopping);
-  }
+  return objection;
 }
 
 void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerInput& input) {
@@ -234,19 +222,18 @@ void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerI
 
 /// Disconnects the worker. A sound one joins again and delivers the results that it has kept.
 void WorkerSessions::give_up(WorkerId worker, const std::string& why, WorkerInput& input) {
-  bad_frames_.count("a worker");
+  log_.bad_frame("a worker");
   protocol::ServerToWorker again;
   again.mutable_hello_again();
   send(worker, again);
   input.events.emplace_back(WorkerUnreachable{worker, why});
 }
 
-void WorkerSessions::drop(const DropWorker& drop, Instant now) {
+void WorkerSessions::drop(const DropWorker& drop) {
   const WorkerRecord* record = find(drop.worker);
-  log_rarely(Severity::kWarning,
+  log_.write(Severity::kWarning,
              fmt::format("worker {} ({}) is lost: {}", drop.worker,
-                         record == nullptr ? "" : record->name, drop.reason),
-             now);
+                         record == nullptr ? "" : record->row.name, drop.reason));
   forget(drop.worker);
 }
 
@@ -272,7 +259,7 @@ void WorkerSessions::tick(const Silence& silent_ms, Instant now) {
       // messages wait here must get a sign of life.
       send(id, sign);
     }
-    if (is_silent && (!ledger_.has_room(id) || ports_.has_unread_input(worker.identity))) {
+    if (is_silent && (!ledger_.has_room() || ports_.has_unread_input(worker.identity))) {
       events_.emplace_back(CreditGiven{id, 0});  // it is not silent: its messages are not read
     }
     if (worker.is_busy && !ports_.is_busy(worker.identity)) {
@@ -290,41 +277,9 @@ std::vector<Event> WorkerSessions::take_events() {
   return events;
 }
 
-WorkerId WorkerSessions::id_of(const std::string& identity) const {
-  const auto known = ids_.find(identity);
-  return known == ids_.end() ? 0 : known->second;
-}
-
-const WorkerRecord* WorkerSessions::find(WorkerId worker) const {
+WorkerRecord* WorkerSessions::find(WorkerId worker) {
   const auto known = workers_.find(worker);
   return known == workers_.end() ? nullptr : &known->second;
-}
-
-std::optional<WorkerId> WorkerSessions::next_after(WorkerId worker) const {
-  const auto next = workers_.upper_bound(worker);
-  return next == workers_.end() ? std::nullopt : std::optional(next->first);
-}
-
-bool WorkerSessions::needs_row(WorkerId worker) {
-  return !std::exchange(workers_.at(worker).has_row, true);
-}
-
-/// For lines that peers can cause at any rate: a span of time gets few of them, and one with the
-/// number of the others.
-void WorkerSessions::log_rarely(Severity severity, const std::string& text, Instant now) {
-  constexpr std::uint64_t kMostLines = 20;
-  constexpr std::int64_t kLogSpan_ms = 10'000;
-  if (now.steady_ms - log_span_began_ms_ >= kLogSpan_ms) {
-    if (log_lines_ > kMostLines) {
-      ports_.log(Severity::kInfo, fmt::format("and {} more lines of workers that come and go",
-                                              log_lines_ - kMostLines));
-    }
-    log_span_began_ms_ = now.steady_ms;
-    log_lines_ = 0;
-  }
-  if (++log_lines_ <= kMostLines) {
-    ports_.log(severity, text);
-  }
 }
 
 // ---- Messages to workers -----------------------------------------------------------------------
@@ -375,30 +330,25 @@ void WorkerSessions::define(const DefineStudy& define, const std::string& recipe
 }
 
 void WorkerSessions::notify_all(const std::string& text) {
-  for (const auto& [id, worker] : workers_) {
-    notify(id, text);
-  }
-}
-
-void WorkerSessions::notify(WorkerId worker, const std::string& text) {
   protocol::ServerToWorker message;
   message.mutable_notice()->set_text(text);
-  send(worker, message);
-}
-
-void WorkerSessions::stop() {
-  if (std::exchange(stopping_, true)) {
-    return;
-  }
-  protocol::ServerToWorker message;
-  message.mutable_stopping();
   for (const auto& [id, worker] : workers_) {
     send(id, message);
   }
 }
 
-void WorkerSessions::send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease) {
-  send_frame(worker, protocol::encode(message), lease);
+void WorkerSessions::stop() {
+  if (!std::exchange(stopping_, true)) {
+    for (const auto& [id, worker] : workers_) {
+      send_stopping(id);
+    }
+  }
+}
+
+void WorkerSessions::send_stopping(WorkerId worker) {
+  protocol::ServerToWorker message;
+  message.mutable_stopping();
+  send(worker, message);
 }
 
 /// `lease`: of the batch in the frame; 0: none. A worker that is gone or busy becomes an event.

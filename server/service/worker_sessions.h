@@ -8,36 +8,32 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/frames.h"
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler_events.h"
-#include "server/service/ports/ports.h"
+#include "server/service/ports.h"
 #include "server/service/write_ledger.h"
+#include "server/store/changes.h"
 
 namespace oblique::server {
 
 struct WorkerSessionSettings {
   std::uint32_t heartbeat_interval_ms = 900;
-  std::int64_t lost_after_ms = 2800;  ///< the scheduler's
-  std::string solver_version;         ///< workers with another one are refused
+  std::string solver_version;  ///< workers with another one are refused
   std::string database_id;
   std::uint64_t last_worker_id = 0;  ///< in the database
-  bool is_insecure = false;          ///< workers get a notice about it
 };
 
 /// A connected worker, as it describes itself.
 struct WorkerRecord {
   std::string identity;
-  std::string name;
-  std::uint32_t threads;
-  std::string solver_version;
-  std::string instruction_set;
-  std::string joined_at;
-  std::string key{};              ///< its name; empty: without keys
-  std::string host{};             ///< its machine
+  AddWorker row;                  ///< stored with its first result
+  std::string key;                ///< its name; empty: without keys
+  std::string host;               ///< its machine
   std::int64_t last_sent_ms = 0;  ///< when it was sent something, to a tick
   bool was_sent = false;          ///< something since the last tick
   bool is_busy = false;           ///< it does not read what it is sent, as the scheduler knows
-  bool has_row = false;           ///< in the database, since its first result
+  bool has_row = false;           ///< in the database
 };
 
 /// What a frame of a worker comes to.
@@ -52,9 +48,14 @@ struct WorkerInput {
 /// Refuses what no sound worker sends. Frames may be malicious. Not thread-safe.
 class WorkerSessions {
  public:
-  WorkerSessions(WorkerSessionSettings settings, Ports& ports, BadFrames& bad_frames,
-                 const WriteLedger& ledger)
-      : settings_(std::move(settings)), ports_(ports), bad_frames_(bad_frames), ledger_(ledger) {}
+  /// `lost_after_ms` is the scheduler's.
+  WorkerSessions(WorkerSessionSettings settings, std::int64_t lost_after_ms, Ports& ports,
+                 PeerLog& log, const WriteLedger& ledger)
+      : settings_(std::move(settings)),
+        lost_after_ms_(lost_after_ms),
+        ports_(ports),
+        log_(log),
+        ledger_(ledger) {}
 
   /// `key`: name of the worker's; empty without keys.
   WorkerInput frame(const std::string& identity, std::string_view frame, Instant now,
@@ -67,14 +68,16 @@ class WorkerSessions {
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
   /// `lease`: of the batch in the message; 0: none.
-  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0);
+  void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0) {
+    send_frame(worker, protocol::encode(message), lease);
+  }
   /// Sends the recipe as it is stored, because encoding a long one for each worker takes long.
   void define(const DefineStudy& define, const std::string& recipe_bytes);
   void notify_all(const std::string& text);
   /// Tells all workers, and those that join later, that the server stops.
   void stop();
 
-  void drop(const DropWorker& drop, Instant now);
+  void drop(const DropWorker& drop);
 
   /// Time since the last message of a worker, in ms.
   using Silence = std::function<std::int64_t(WorkerId)>;
@@ -84,36 +87,29 @@ class WorkerSessions {
   /// Events that were found while messages were sent: workers that are unreachable or busy.
   std::vector<Event> take_events();
 
-  /// 0: no worker has that connection.
-  WorkerId id_of(const std::string& identity) const;
   /// Null for an unknown worker.
-  const WorkerRecord* find(WorkerId worker) const;
-  /// The worker of the lowest number above this one.
-  std::optional<WorkerId> next_after(WorkerId worker) const;
-  /// True at the first call for a worker, whose row is stored with its first result.
-  bool needs_row(WorkerId worker);
+  WorkerRecord* find(WorkerId worker);
+  const std::map<WorkerId, WorkerRecord>& all() const { return workers_; }
 
  private:
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
              const std::string& key, WorkerInput& input);
-  void greet(WorkerId id, Instant now);
+  std::string objection_to(const protocol::WorkerHello& hello) const;
   void results(WorkerId worker, protocol::Results results, WorkerInput& input);
   void give_up(WorkerId worker, const std::string& why, WorkerInput& input);
-  void notify(WorkerId worker, const std::string& text);
+  void send_stopping(WorkerId worker);
   void forget(WorkerId worker);
   void send_frame(WorkerId worker, const std::string& frame, LeaseId lease = 0);
-  void log_rarely(Severity severity, const std::string& text, Instant now);
 
   WorkerSessionSettings settings_;
+  std::int64_t lost_after_ms_;
   Ports& ports_;
-  BadFrames& bad_frames_;
+  PeerLog& log_;
   const WriteLedger& ledger_;
   std::map<WorkerId, WorkerRecord> workers_;
   std::map<std::string, WorkerId, std::less<>> ids_;  // by identity
   std::map<WorkerId, WorkerUnreachable> unreachable_;
   std::vector<Event> events_;
-  std::int64_t log_span_began_ms_ = 0;
-  std::uint64_t log_lines_ = 0;  // since then, written or left out
   bool stopping_ = false;
 };
 

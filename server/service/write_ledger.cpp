@@ -1,21 +1,15 @@
 #include "server/service/write_ledger.h"
 
 #include <utility>
-#include <variant>
 
 namespace oblique::server {
 
 void WriteLedger::write(Change change, OnStored on_stored, OnRefused on_refused) {
   const std::uint64_t ticket = ++last_ticket_;
   const bool can_be_refused = on_refused != nullptr;
-  const auto* const results = std::get_if<AddResults>(&change);
-  const Write write{std::move(on_stored), std::move(on_refused), bytes_of(change),
-                    results == nullptr ? 0 : results->worker_id};
+  const Write write{std::move(on_stored), std::move(on_refused), bytes_of(change)};
   load_of(write).bytes += write.bytes;
   ++load_of(write).writes;
-  if (write.worker != 0) {
-    bytes_of_[write.worker] += write.bytes;
-  }
   writes_.emplace(ticket, write);
   weigh();
   ports_.write({ticket, std::move(change), can_be_refused});
@@ -29,10 +23,6 @@ void WriteLedger::end(std::uint64_t ticket, const std::optional<std::string>& er
   const Write& write = found.mapped();
   load_of(write).bytes -= write.bytes;
   --load_of(write).writes;
-  if (const auto of = bytes_of_.find(write.worker);
-      of != bytes_of_.end() && (of->second -= write.bytes) == 0) {
-    bytes_of_.erase(of);
-  }
   weigh();
   if (error && write.on_refused) {
     write.on_refused(*error, now);
@@ -45,22 +35,16 @@ void WriteLedger::abandon(const std::string& error, Instant now) {
   fault_ = error;
   is_gone_ = true;
   while (!writes_.empty()) {  // a refusal may begin further writes
-    refused(writes_.begin()->first, error, now);
+    end(writes_.begin()->first, error, now);
   }
 }
 
 void WriteLedger::tick(std::int64_t now_ms) {
-  constexpr std::int64_t kMillisecondsASecond = 1000;
   const std::uint64_t oldest = writes_.empty() ? 0 : writes_.begin()->first;
   if (std::exchange(oldest_, oldest) != oldest || oldest == 0) {
     oldest_since_ms_ = now_ms;
   }
-  is_slow_ = now_ms - oldest_since_ms_ >= kSlowAfter_s * kMillisecondsASecond;
-}
-
-bool WriteLedger::has_room(WorkerId worker) const {
-  const auto of = bytes_of_.find(worker);
-  return has_room() && (of == bytes_of_.end() || of->second < limits_.bytes_of_worker);
+  is_slow_ = now_ms - oldest_since_ms_ >= 1000 * kSlowAfter_s;
 }
 
 void WriteLedger::weigh() {

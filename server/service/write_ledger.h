@@ -8,7 +8,7 @@
 #include <string>
 
 #include "server/scheduler/scheduler_events.h"
-#include "server/service/ports/ports.h"
+#include "server/service/ports.h"
 #include "server/study/limits.h"
 
 namespace oblique::server {
@@ -19,8 +19,6 @@ struct LedgerLimits {
   std::size_t bytes = limits::kUnstoredBytes;
   /// The same for their number, so that small messages are bounded, too.
   std::size_t writes = limits::kUnstoredWrites;
-  /// Above it no message of that worker is read.
-  std::size_t bytes_of_worker = limits::kUnstoredBytesOfWorker;
   /// Changes of clients, and bytes of their recipes. Above it no change is accepted.
   std::size_t changes = limits::kUnstoredChanges;
   std::size_t bytes_of_changes = limits::kUnstoredBytesOfChanges;
@@ -38,11 +36,8 @@ class WriteLedger {
   /// Writes a change and calls `on_stored` when it is durable. With `on_refused` a failure is
   /// reported at once, because a client waits; without it the change is tried until it is durable.
   void write(Change change, OnStored on_stored = {}, OnRefused on_refused = {});
-  /// The outcome of a write. Unknown tickets are ignored.
-  void stored(std::uint64_t ticket, Instant now) { end(ticket, std::nullopt, now); }
-  void refused(std::uint64_t ticket, const std::string& error, Instant now) {
-    end(ticket, error, now);
-  }
+  /// The outcome of a write, which was stored without an `error`. Unknown tickets are ignored.
+  void end(std::uint64_t ticket, const std::optional<std::string>& error, Instant now);
   /// The database is gone: refuses all writes, in order.
   void abandon(const std::string& error, Instant now);
 
@@ -69,8 +64,6 @@ class WriteLedger {
   bool has_room() const {
     return results_.bytes < limits_.bytes && results_.writes < limits_.writes;
   }
-  /// Of that worker.
-  bool has_room(WorkerId worker) const;
   /// Whether further changes of clients should be accepted.
   bool has_room_for_changes() const {
     return changes_.bytes < limits_.bytes_of_changes && changes_.writes < limits_.changes;
@@ -81,7 +74,6 @@ class WriteLedger {
     OnStored on_stored;
     OnRefused on_refused;
     std::size_t bytes;
-    WorkerId worker;  ///< whose results they are; 0: nobody's
   };
   struct Load {
     std::size_t writes = 0;
@@ -89,16 +81,14 @@ class WriteLedger {
   };
   /// Of the kind of that write.
   Load& load_of(const Write& write) { return write.on_refused ? changes_ : results_; }
-  void end(std::uint64_t ticket, const std::optional<std::string>& error, Instant now);
   void weigh();
 
   LedgerLimits limits_;
   Ports& ports_;
   std::map<std::uint64_t, Write> writes_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  Load results_;                              // and all else that no client waits for
-  Load changes_;                              // of clients
-  std::map<WorkerId, std::size_t> bytes_of_;  // of the workers that have some
+  Load results_;  // and all else that no client waits for
+  Load changes_;  // of clients
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;

@@ -35,6 +35,11 @@ class IntervalSet {
   /// Adds [begin, end); parts of it may already be in the set. Does nothing when begin >= end.
   void insert(std::uint64_t begin, std::uint64_t end);
   void insert(std::uint64_t point) { insert(point, point + 1); }
+  void insert(const std::vector<Interval>& intervals) {
+    for (const Interval& interval : intervals) {
+      insert(interval.begin, interval.end);
+    }
+  }
 
   /// Removes [begin, end); parts of it may be missing from the set.
   void erase(std::uint64_t begin, std::uint64_t end);

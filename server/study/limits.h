@@ -43,8 +43,6 @@ inline constexpr std::size_t kHandshakesOfSource = kHandshakes / 2;
 
 /// Writes that no client waits for, in number: small ones take memory, too.
 inline constexpr std::size_t kUnstoredWrites = 80'000;
-/// Results of one worker, so that others are read while it fills its share.
-inline constexpr std::size_t kUnstoredBytesOfWorker = 16 * kMiB;
 /// Changes of clients, and bytes of their recipes.
 inline constexpr std::size_t kUnstoredChanges = 10'000;
 inline constexpr std::size_t kUnstoredBytesOfChanges = 64 * kMiB;
@@ -55,9 +53,8 @@ inline constexpr std::size_t kDeferredRequests = 1000;
 
 /// A longer request is parsed on a thread of its own: parsing it takes over a millisecond.
 inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
-/// Such requests that wait, in all and of one client, and their bytes.
+/// Such requests that wait, and their bytes.
 inline constexpr std::size_t kWaitingChecks = 64;
-inline constexpr std::size_t kWaitingChecksOfClient = 2;
 inline constexpr std::size_t kWaitingCheckBytes = 64 * kMiB;
 /// Studies or workers in a reply, and about so many bytes: making it takes the service's thread
 /// some milliseconds.
@@ -82,10 +79,8 @@ inline constexpr std::size_t kWaitingQueryBytes = 16 * kMiB;
 
 /// Traces with workers: each may come back as a message of 16 MiB.
 inline constexpr std::size_t kRunningTraces = 2;
-/// Requests for traces that wait, and checks of their points. Of one connection: of the page, which
-/// is one for all browsers.
+/// Requests for traces that wait, and checks of their points.
 inline constexpr std::size_t kWaitingTraces = 64;
-inline constexpr std::size_t kWaitingTracesOfConnection = 32;
 /// Traces that the page requests or sends at a time; more wait.
 inline constexpr std::size_t kTracesOfPage = 4;
 /// Time from request to answer, waiting included: the usual one, and what clients can request.

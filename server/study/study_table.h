@@ -6,9 +6,26 @@
 #include <string>
 
 #include "proto/recipe/point_table.h"
-#include "server/study/recipe_growth.h"
 
 namespace oblique::server {
+
+/// How a given recipe relates to the stored one of a study.
+struct Growth {
+  enum class Kind {
+    kSame,     ///< the same model and blocks
+    kLonger,   ///< the given one begins with the stored one: the study may grow
+    kShorter,  ///< the stored one begins with the given one
+    kOther,
+  };
+  Kind kind;
+  /// The differences, one per line, if the given recipe is shorter or another one.
+  std::string difference;
+};
+
+/// Compares two checked recipes block by block, as they are written. A study can grow by more
+/// blocks at the end, or by a larger count of its last block's sample unless that is a Latin
+/// hypercube.
+Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given);
 
 /// The recipe of a study in the server: its bytes, and the table of its points, which is made when
 /// needed and can be released. A study that is paused or done needs memory for its bytes only.
@@ -26,10 +43,6 @@ class StudyTable {
   std::uint64_t size() const { return shared_->points; }
   /// oblique.protocol.Recipe, serialised.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
-
-  /// Whether both have the same recipe; false when one cannot be read. Parses both only if their
-  /// bytes differ and their numbers of points do not.
-  bool is_of_the_recipe_of(const StudyTable& other) const;
 
   /// How the recipe of `other` relates to this one. The time is proportional to their sizes. Throws
   /// std::runtime_error when one of them cannot be read.

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -106,17 +108,11 @@ class Network {
     });
   }
 
-  /// Every connection breaks, as when the server dies; the sockets connect again.
-  void break_all() {
+  /// The connections of that peer break, or all, as when the server dies; the sockets connect
+  /// again.
+  void break_links(std::optional<std::uint64_t> peer = std::nullopt) {
     for (auto& [id, link] : links_) {
-      break_link(id, link);
-    }
-  }
-
-  /// The connections of that peer break.
-  void break_peer(std::uint64_t peer) {
-    for (auto& [id, link] : links_) {
-      if (link.peer == peer) {
+      if (!peer || link.peer == *peer) {
         break_link(id, link);
       }
     }

@@ -4,14 +4,61 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "proto/frames.h"
 #include "proto/oblique.pb.h"
+#include "proto/recipe/point_table.h"
 #include "server/store/changes.h"
 #include "tests/simulation/network.h"
+#include "tests/simulation/simulated_worker.h"
 #include "tests/simulation/world.h"
 #include "tests/support/recipes.h"
 
 namespace oblique::simulation {
+
+using server::StudyState;
+
+/// `points` points, in models of `points_a_model` and, if some are left, one more. H has the mark.
+/// Models have three falls in turn: points that share one lie apart.
+inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model,
+                                         double H) {
+  using protocol::listed;
+  using protocol::range;
+  const auto axis = [](const char* key, double from, double to, std::uint64_t count) {
+    return count == 1 ? listed(key, {from}) : range(key, from, to, count);
+  };
+  const std::uint64_t models = points / points_a_model;
+  const std::uint64_t rest = points % points_a_model;
+  std::vector<std::vector<protocol::Axis>> blocks;
+  if (models > 0) {
+    blocks.push_back(
+        {axis("k", 1e7, 2e7, models),
+         protocol::following("E", "6e10 + 1e9 * (floor(k / 3e5) - 3 * floor(floor(k / 3e5) / 3))"),
+         listed("H", {H}), axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})});
+  }
+  if (rest > 0) {
+    blocks.push_back({listed("H", {H}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})});
+  }
+  return protocol::recipe_of(blocks);
+}
+
+/// The same with a filter in every block that leaves out points here and there; nothing if one
+/// leaves none in.
+inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe recipe,
+                                                                   const char* filter) {
+  for (protocol::Block& block : *recipe.mutable_blocks()) {
+    block.set_where(filter);
+  }
+  try {
+    protocol::PointTable table(std::move(recipe));
+    table.judge_points();
+    return table;
+  } catch (const solver::InputError&) {
+    return std::nullopt;
+  }
+}
 
 /// Submits one study, again and again until it is acknowledged, cancels it now and then and goes on
 /// with it. While faults happen it sometimes appends points to it, gives it another name, or
@@ -22,10 +69,20 @@ class SimulatedClient {
   /// (answer_to), and goes up by `kClients` with each study that follows a deleted one. Most
   /// studies have several models, of a point or a few.
   SimulatedClient(World& world, Network& network, std::uint64_t peer, std::string name,
-                  std::uint64_t points, std::uint64_t mark);
+                  std::uint64_t points, std::uint64_t mark)
+      : world_(world), network_(network), peer_(peer), name_(std::move(name)), mark_(mark) {
+    set_recipe(points);
+  }
   static constexpr std::uint64_t kClients = 8;  ///< at most
 
-  void start();
+  void start() {
+    connect();
+    world_.after(world_.between(0, 5000), [this] {
+      ++request_;
+      ask();
+    });
+    world_.after(world_.between(3000, 20'000), [this] { change_mind(); });
+  }
 
   const std::string& name() const { return name_; }
   std::uint64_t points() const { return points_; }
@@ -36,7 +93,12 @@ class SimulatedClient {
   bool was_acknowledged() const { return acknowledged_; }
   /// Throws Violation when a server found that state of the study and the client was told another
   /// one and has not asked for this one since.
-  void check_found(server::StudyState state) const;
+  void check_found(server::StudyState state) const {
+    if (possible_ && state != StudyState::kDone && !possible_->contains(state)) {
+      throw Violation("an acknowledged change of " + name_ + " was forgotten: it is " +
+                      server::state_name(state));
+    }
+  }
   /// The last thing that was acknowledged is a submission.
   bool wants_results() const {
     return acknowledged_ && intent_ == Intent::kSubmit && settled_request_;
@@ -49,14 +111,175 @@ class SimulatedClient {
  private:
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
-  void connect();
-  void set_recipe(std::uint64_t points);
-  void grow();
-  void begin_anew();
-  void ask();
-  void answered(const std::string& frame);
-  void change_mind();
-  void expect(protocol::StudyChange asked);
+  void connect() {
+    // A late request of a closed socket would undo what was asked since.
+    network_.close(link_, false);
+    link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
+  }
+  /// A recipe of its own, of so many points, of which a filter may leave out some; behind the one
+  /// that is there, if any.
+  void set_recipe(std::uint64_t points) {
+    points_ += points;
+    const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
+                                         : world_.chance(0.5)
+                                             ? std::uint64_t{1}
+                                             : static_cast<std::uint64_t>(world_.between(2, 40));
+    const protocol::Recipe recipe = recipe_of_models(points, points_a_model, marked_H(mark_));
+    if (world_.chance(0.4)) {
+      const char* filter = world_.chance(0.3) ? "sin(1234.5 * mu + k) > 0.9"  // a few are left in
+                                              : "sin(1234.5 * mu + k) > -0.3";
+      if (const auto table = filtered_here_and_there(recipe, filter)) {
+        recipe_.mutable_blocks()->MergeFrom(table->recipe().blocks());
+        for (std::uint64_t point = 0; point < points; ++point) {
+          left_in_ += table->is_left_in(point) ? 1U : 0U;
+        }
+        return;
+      }
+    }
+    recipe_.mutable_blocks()->MergeFrom(recipe.blocks());
+    left_in_ += points;
+  }
+  void grow() {
+    appended_ = static_cast<std::uint64_t>(world_.between(1, 60));
+    set_recipe(appended_);
+  }
+  /// The study was deleted: another one under its name.
+  void begin_anew() {
+    acknowledged_ = false;
+    study_id_ = 0;
+    mark_ += kClients;
+    recipe_.clear_blocks();
+    points_ = 0;
+    left_in_ = 0;
+    set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
+  }
+  void ask() {
+    if (settled_request_) {
+      return;
+    }
+    protocol::ClientRequest request;
+    request.set_protocol_version(protocol::kProtocolVersion);
+    request.set_request_id(request_);
+    if (intent_ == Intent::kRename || intent_ == Intent::kDelete) {
+      request.mutable_change()->set_study(name_);
+      request.mutable_change()->set_study_id(study_id_);
+      request.mutable_change()->set_new_name(new_name_);
+      request.mutable_change()->set_change(intent_ == Intent::kRename
+                                               ? protocol::STUDY_CHANGE_RENAME
+                                               : protocol::STUDY_CHANGE_DELETE);
+    } else if (intent_ == Intent::kChange) {
+      request.mutable_change()->set_study(name_);
+      // Any of cancel, pause, resume and retry.
+      const auto asked = static_cast<protocol::StudyChange>(world_.between(1, 4));
+      request.mutable_change()->set_change(asked);
+      expect(asked);
+    } else {
+      expect(protocol::STUDY_CHANGE_RESUME);
+      request.mutable_submit()->set_name(name_);
+      // The model of the store holds what workers solved, not copies.
+      request.mutable_submit()->set_no_reuse(true);
+      if (world_.chance(0.3)) {
+        // Submitting again with another priority changes it, durably before it is acknowledged.
+        request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
+      }
+      *request.mutable_submit()->mutable_recipe() = recipe_;
+    }
+    network_.send(link_, protocol::encode(request), false);
+    world_.after(2000, [this, number = request_] {
+      if (number == request_ && !settled_request_) {
+        connect();
+        ask();
+      }
+    });
+  }
+  void answered(const std::string& frame) {
+    protocol::ClientReply reply;
+    if (!protocol::decode(frame, reply) || reply.request_id() != request_ || settled_request_) {
+      return;
+    }
+    if (reply.has_error()) {
+      if (acknowledged_ && reply.error().message().find("not stored") == std::string::npos) {
+        throw Violation("an acknowledged study is refused: " + reply.error().message());
+      }
+      return;  // asked again later
+    }
+    settled_request_ = true;
+    if (reply.has_submit()) {
+      if (acknowledged_ && reply.submit().created()) {
+        throw Violation("an acknowledged study was forgotten");
+      }
+      if (reply.submit().points() != points_ ||
+          (reply.submit().appended() != 0 && reply.submit().appended() != appended_)) {
+        throw Violation("a study of " + std::to_string(points_) + " points, of which " +
+                        std::to_string(appended_) + " were appended, is called one of " +
+                        std::to_string(reply.submit().points()) + " and " +
+                        std::to_string(reply.submit().appended()));
+      }
+      acknowledged_ = true;
+      study_id_ = reply.submit().study_id();
+      possible_ = {StudyState::kRunning};
+      return;
+    }
+    if (intent_ == Intent::kRename) {
+      if (reply.change().study().name() != new_name_) {
+        throw Violation("a renamed study is called " + reply.change().study().name());
+      }
+      name_ = new_name_;
+      return;
+    }
+    if (intent_ == Intent::kDelete) {
+      begin_anew();
+      return;
+    }
+    const std::string& told = reply.change().study().state();
+    for (const StudyState state :
+         {StudyState::kRunning, StudyState::kPaused, StudyState::kCancelled}) {
+      if (told == server::state_name(state)) {
+        // It may be that of another one of these changes, still on its way.
+        possible_ = asked_.size() > 1 ? std::nullopt : std::optional(std::set{state});
+        return;
+      }
+    }
+    possible_.reset();
+  }
+  void change_mind() {
+    // Once faults end the study is submitted for the last time.
+    const bool last = !world_.faults;
+    if (settled_request_ && (!last || intent_ != Intent::kSubmit)) {
+      const bool is_free = !last && intent_ == Intent::kSubmit && acknowledged_;
+      intent_ = Intent::kSubmit;
+      appended_ = 0;
+      if (is_free && world_.chance(0.3)) {
+        intent_ = Intent::kChange;
+      } else if (is_free && world_.chance(0.15)) {
+        intent_ = Intent::kRename;
+        new_name_ = name_.ends_with("'") ? name_.substr(0, name_.size() - 1) : name_ + "'";
+        ++renamings;
+      } else if (is_free && world_.chance(0.15)) {
+        intent_ = Intent::kDelete;
+        possible_.reset();
+        ++deletions;
+      } else if (is_free && world_.chance(0.3)) {
+        grow();
+        ++growths;
+      }
+      settled_request_ = false;
+      asked_.clear();
+      ++request_;
+      ask();
+    }
+    if (!last || !settled_request_ || intent_ != Intent::kSubmit) {
+      world_.after(world_.between(500, 4000), [this] { change_mind(); });
+    }
+  }
+  void expect(protocol::StudyChange asked) {
+    asked_.insert(asked);
+    if (possible_) {
+      possible_->insert(asked == protocol::STUDY_CHANGE_CANCEL  ? StudyState::kCancelled
+                        : asked == protocol::STUDY_CHANGE_PAUSE ? StudyState::kPaused
+                                                                : StudyState::kRunning);
+    }
+  }
 
   World& world_;
   Network& network_;

@@ -1,16 +1,19 @@
 #include "tests/simulation/simulation.h"
 
-#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "proto/frames.h"
+#include "proto/result_message.h"
 #include "tests/simulation/disk/simulated_disk.h"
 #include "tests/simulation/simulated_client.h"
 #include "tests/simulation/simulated_server.h"
 #include "tests/simulation/simulated_worker.h"
-#include "tests/simulation/vanishing_peers.h"
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {
@@ -23,13 +26,12 @@ class Simulation {
         world_(seed),
         disk_(world_),
         // Random crashes hit innocent points too, so that blame is tried in runs of its own.
-        server_(world_, disk_, settings.killers || settings.storms ? 3 : 1000),
+        server_(world_, disk_, settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
         clients_network_(world_, [this](const std::string& i, const std::string& f) {
           server_.client_frame(i, f);
         }) {
-    world_.faults = !settings.killers;
     disk_.files().forgets = settings.forgetful_syncs;
     server_.workers = &workers_network_;
     server_.clients = &clients_network_;
@@ -43,32 +45,27 @@ class Simulation {
     server_.start();
     add_clients();
     add_workers();
-    if (world_.faults) {
-      plan_faults();
-      const std::int64_t end_ms = world_.now_ms() + settings_.chaos_ms;
-      world_.run(
-          end_ms, [] { return false; }, [this] { check(); });
-    }
-    heal();
-    const std::int64_t healed_ms = world_.now_ms();
+    plan_faults();
     world_.run(
-        healed_ms + settings_.healing_ms, [this] { return is_over(); }, [this] { check(); });
-    outcome_.healed_after_ms = world_.now_ms() - healed_ms;
+        world_.now_ms() + settings_.chaos_ms, [] { return false; }, [this] { check(); });
+    heal();
+    world_.run(
+        world_.now_ms() + settings_.healing_ms, [this] { return is_over(); }, [this] { check(); });
     check_end();
     for (const auto& client : clients_) {
-      outcome_.growths += client->growths;
-      outcome_.renamings += client->renamings;
-      outcome_.deletions += client->deletions;
+      outcome_["growths"] += client->growths;
+      outcome_["renamings"] += client->renamings;
+      outcome_["deletions"] += client->deletions;
     }
-    outcome_.cleared_rows = disk_.cleared_rows;
-    outcome_.vanished_peers = vanishing_peers_.vanished();
-    outcome_.server_kills = server_.crashes - server_.power_losses;
-    outcome_.power_losses = server_.power_losses;
-    outcome_.deaths_in_writes = server_.deaths_in_writes;
-    outcome_.failed_syncs = server_.failed_syncs;
-    outcome_.undone_commits = disk_.model().undone_commits;
-    outcome_.refused_kept = disk_.model().refused_kept;
-    outcome_.failed_commits = disk_.model().failed_commits;
+    outcome_["cleared rows"] = disk_.cleared_rows;
+    outcome_["vanished peers"] = vanished_;
+    outcome_["server kills"] = server_.crashes - server_.power_losses;
+    outcome_["power losses"] = server_.power_losses;
+    outcome_["deaths in writes"] = server_.deaths_in_writes;
+    outcome_["failed syncs"] = server_.failed_syncs;
+    outcome_["undone commits"] = disk_.model().undone_commits;
+    outcome_["refused commits kept"] = disk_.model().refused_kept;
+    outcome_["failed commits"] = disk_.model().failed_commits;
     return outcome_;
   }
 
@@ -81,16 +78,8 @@ class Simulation {
       clients_.push_back(
           std::make_unique<SimulatedClient>(world_, clients_network_, static_cast<std::uint64_t>(i),
                                             "study " + std::to_string(i), points + 2, mark));
-      outcome_.points += clients_.back()->points();
+      outcome_["points"] += clients_.back()->points();
       clients_.back()->start();
-      if (settings_.killers) {
-        auto& killers = killers_[mark];
-        const std::int64_t killing = world_.between(0, 2);
-        while (static_cast<std::int64_t>(killers.size()) < killing) {
-          killers.insert(
-              static_cast<std::uint64_t>(world_.between(0, static_cast<std::int64_t>(points) + 1)));
-        }
-      }
     }
   }
 
@@ -98,7 +87,7 @@ class Simulation {
     const std::int64_t count = world_.between(settings_.storms ? 2 : 1, 5);
     for (std::int64_t i = 0; i < count; ++i) {
       workers_.push_back(std::make_unique<SimulatedWorker>(
-          world_, workers_network_, static_cast<std::uint64_t>(i), killers_, !settings_.storms));
+          world_, workers_network_, static_cast<std::uint64_t>(i), !settings_.storms));
       workers_.back()->restart(world_.between(0, 3000));
     }
   }
@@ -121,53 +110,69 @@ class Simulation {
       case 0:
       case 1:
         victim.restart(world_.between(0, 300));
-        ++outcome_.worker_faults;
+        ++outcome_["worker faults"];
         break;
       case 2:
         victim.freeze(world_.between(100, 8000));
-        ++outcome_.worker_faults;
+        ++outcome_["worker faults"];
         break;
       case 3:
-        workers_network_.break_peer(static_cast<std::uint64_t>(world_.between(0, last)));
-        ++outcome_.cuts;
+        workers_network_.break_links(static_cast<std::uint64_t>(world_.between(0, last)));
+        ++outcome_["cuts"];
         break;
       default:
-        vanishing_peers_.come();
+        come_and_vanish();
         break;
     }
   }
 
+  /// A peer that says that it is a worker, requests many batches and vanishes, under a name of its
+  /// own.
+  void come_and_vanish() {
+    constexpr std::uint64_t kFirstPeer = 1000;  // in the network, above all workers
+    ++came_;
+    const auto has_points = std::make_shared<bool>(false);
+    const auto link = workers_network_.open(kFirstPeer + came_, [has_points](const auto& frame) {
+      protocol::ServerToWorker message;
+      *has_points = *has_points || (protocol::decode(frame, message) && message.has_batch() &&
+                                    message.batch().study_id() != 0);
+    });
+    protocol::WorkerMessage hello;
+    protocol::say_protocol(*hello.mutable_hello());
+    hello.mutable_hello()->set_solver_version("1");
+    hello.mutable_hello()->set_threads(1);
+    hello.mutable_hello()->set_process_id("vanishing " + std::to_string(came_));
+    protocol::WorkerMessage credit;
+    credit.mutable_credit()->set_batches(1000);
+    workers_network_.send(link, protocol::encode(hello), false);
+    workers_network_.send(link, protocol::encode(credit), false);
+    world_.after(world_.between(10, 500), [this, link, has_points] {
+      workers_network_.close(link, false);
+      vanished_ += *has_points ? 1U : 0U;
+    });
+  }
+
   void fault() {
-    switch (world_.between(0, 17)) {
-      case 0:
-      case 1:
-      case 2:
-      case 3:
-      case 4:
-      case 5:
-        fault_of_disk_or_server();
-        break;
-      case 6: {
-        std::set<std::uint64_t> parted;
-        for (std::uint64_t peer = 0; peer < workers_.size(); ++peer) {
-          if (world_.chance(0.6)) {
-            parted.insert(peer);
-          }
+    const std::int64_t kind = world_.between(0, 17);
+    if (kind < 6) {
+      fault_of_disk_or_server();
+    } else if (kind == 6) {
+      std::set<std::uint64_t> parted;
+      for (std::uint64_t peer = 0; peer < workers_.size(); ++peer) {
+        if (world_.chance(0.6)) {
+          parted.insert(peer);
         }
-        (world_.chance(0.8) ? workers_network_ : clients_network_)
-            .part(std::move(parted), world_.between(500, 15'000));
-        ++outcome_.partitions;
-        break;
       }
-      case 7:
-        // By hours, either way, and sometimes by the moment that a server was away.
-        world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
-                                            : world_.between(-20'000'000, 20'000'000));
-        ++outcome_.clock_jumps;
-        break;
-      default:
-        fault_of_worker();
-        break;
+      (world_.chance(0.8) ? workers_network_ : clients_network_)
+          .part(std::move(parted), world_.between(500, 15'000));
+      ++outcome_["partitions"];
+    } else if (kind == 7) {
+      // By hours, either way, and sometimes by the moment that a server was away.
+      world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
+                                          : world_.between(-20'000'000, 20'000'000));
+      ++outcome_["clock jumps"];
+    } else {
+      fault_of_worker();
     }
   }
 
@@ -189,12 +194,12 @@ class Simulation {
       case 4:
         files.full = true;
         world_.after(world_.between(100, 6000), [this] { disk_.files().full = false; });
-        ++outcome_.disk_faults;
+        ++outcome_["disk faults"];
         break;
       case 5:
         files.failing = true;
         world_.after(world_.between(100, 6000), [this] { disk_.files().failing = false; });
-        ++outcome_.disk_faults;
+        ++outcome_["disk faults"];
         break;
       case 6:
         files.plan_failing_sync(world_.between(1, 10));
@@ -202,7 +207,7 @@ class Simulation {
       case 7:
         if (server_.runs()) {
           server_.stop();
-          ++outcome_.server_stops;
+          ++outcome_["server stops"];
         }
         break;
       default:
@@ -214,18 +219,14 @@ class Simulation {
   void fault_of_worker() {
     SimulatedWorker& worker = *workers_[static_cast<std::size_t>(
         world_.between(0, static_cast<std::int64_t>(workers_.size()) - 1))];
-    ++outcome_.worker_faults;
-    switch (world_.between(0, 6)) {
-      case 0:
-      case 1:
-        worker.freeze(world_.between(100, 8000));
-        break;
-      case 2:
-        worker.stop();
-        break;
-      default:
-        worker.restart(world_.between(0, 3000));
-        break;
+    ++outcome_["worker faults"];
+    const std::int64_t kind = world_.between(0, 6);
+    if (kind < 2) {
+      worker.freeze(world_.between(100, 8000));
+    } else if (kind == 2) {
+      worker.stop();
+    } else {
+      worker.restart(world_.between(0, 3000));
     }
   }
 
@@ -240,7 +241,7 @@ class Simulation {
   }
 
   void check() {
-    ++outcome_.events;
+    ++outcome_["events"];
     if (server_.runs()) {
       server_.service().scheduler().check_invariants();
     }
@@ -315,32 +316,11 @@ class Simulation {
       }
     }
     disk_.check_rows();
-    check_deaths();
-  }
-
-  /// Two while the point is among others that nobody suspects, one for each time that these are
-  /// split, three alone.
-  void check_deaths() {
-    constexpr std::uint64_t kMostOfAKiller = 8;
-    std::uint64_t killing = 0;
-    for (const auto& [mark, points] : killers_) {
-      killing += points.size();
-    }
-    for (const auto& worker : workers_) {
-      outcome_.deaths += worker->deaths();
-    }
-    if (outcome_.deaths > kMostOfAKiller * killing) {
-      throw Violation(std::to_string(killing) + " points killed " +
-                      std::to_string(outcome_.deaths) + " workers");
-    }
   }
 
   void check_rows(std::uint64_t mark, const StoreModel::Rows& results) {
-    const auto killers = killers_.find(mark);
     for (const auto& [point, result] : results) {
-      const bool kills = killers != killers_.end() && killers->second.contains(point);
-      outcome_.failed_points += kills ? 1U : 0U;
-      if (kills ? result->error().empty() : !is_answer(*result, mark)) {
+      if (!is_answer(*result, mark)) {
         throw Violation("the row of point " + std::to_string(point) + " is wrong" +
                         (result->error().empty() ? "" : ": " + result->error()));
       }
@@ -361,14 +341,28 @@ class Simulation {
   SimulatedServer server_;
   Network workers_network_;
   Network clients_network_;
-  VanishingPeers vanishing_peers_{world_, workers_network_};
-  SimulatedWorker::Killers killers_;
   std::vector<std::unique_ptr<SimulatedClient>> clients_;
   std::vector<std::unique_ptr<SimulatedWorker>> workers_;
+  std::uint64_t came_ = 0;      // peers to vanish
+  std::uint64_t vanished_ = 0;  // of these, with a batch of a study
   SimulationOutcome outcome_;
 };
 
 }  // namespace
+
+void add(SimulationOutcome& all, const SimulationOutcome& more) {
+  for (const auto& [what, times] : more) {
+    all[what] += times;
+  }
+}
+
+std::string text_of(const SimulationOutcome& outcome) {
+  std::string text;
+  for (const auto& [what, times] : outcome) {
+    text += (text.empty() ? "" : ", ") + std::to_string(times) + " " + what;
+  }
+  return text;
+}
 
 SimulationOutcome simulate(std::uint64_t seed, const SimulationSettings& settings) {
   return Simulation(seed, settings).run();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 
 namespace oblique::simulation {
@@ -11,43 +12,16 @@ struct SimulationSettings {
   /// A failed sync loses what it should have written and later ones succeed, as on Linux. SQLite
   /// cannot live with that: commits that were acknowledged after such a failure can be lost.
   bool forgetful_syncs = false;
-  bool killers = false;  ///< some points kill their workers; no other fault happens then
   /// Beside one worker that nothing happens to but breaking connections, others are killed and
   /// halted again and again, connections are cut, and peers take batches and vanish. No point may
   /// fail for it. No other fault happens then.
   bool storms = false;
 };
 
-/// What happened in one run or more, to show that the faults were real.
-struct SimulationOutcome {
-  std::uint64_t points = 0;
-  std::uint64_t failed_points = 0;
-  std::uint64_t server_kills = 0;
-  std::uint64_t power_losses = 0;
-  std::uint64_t deaths_in_writes = 0;  ///< of the kills and losses of power
-  std::uint64_t failed_syncs = 0;      ///< of these, too: each ends the server
-  std::uint64_t server_stops = 0;
-  std::uint64_t undone_commits = 0;  ///< that losing power undid
-  std::uint64_t refused_kept = 0;    ///< commits that failed and were there after a crash
-  std::uint64_t worker_faults = 0;
-  std::uint64_t disk_faults = 0;     ///< times that the disk was full or failed
-  std::uint64_t failed_commits = 0;  ///< because of that
-  std::uint64_t partitions = 0;
-  std::uint64_t clock_jumps = 0;
-  std::uint64_t cuts = 0;            ///< of single connections, in storms
-  std::uint64_t vanished_peers = 0;  ///< with batches
-  std::uint64_t growths = 0;         ///< of studies
-  std::uint64_t renamings = 0;
-  std::uint64_t deletions = 0;
-  std::uint64_t cleared_rows = 0;  ///< of deleted studies
-  std::uint64_t deaths = 0;        ///< of workers, by points that kill
-  std::uint64_t events = 0;
-  std::int64_t healed_after_ms = 0;  ///< from the last fault to the end of the last study, at most
-
-  SimulationOutcome& operator+=(const SimulationOutcome& other);
-  std::string text() const;
-  bool operator==(const SimulationOutcome&) const = default;
-};
+/// How often things happened in one run or more, by name, to show that the faults were real.
+using SimulationOutcome = std::map<std::string, std::uint64_t>;
+void add(SimulationOutcome& all, const SimulationOutcome& more);
+std::string text_of(const SimulationOutcome& outcome);
 
 /// The real service, scheduler, store and worker conversations in a simulated world of crashes,
 /// broken connections, partitions, jumping clocks, full and failing disks, torn writes and lost

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -78,15 +79,17 @@ void add_progress(MetricText& out, const Snapshot& now) {
 
 void add_workers(MetricText& out, const Snapshot& now) {
   const auto label = [](std::size_t i) {
-    return fmt::format("state=\"{}\"", crew_name(static_cast<CrewState>(i)));
+    std::string state = kWorkerStates.at(i);
+    std::ranges::replace(state, ' ', '_');
+    return fmt::format("state=\"{}\"", state);
   };
   out.gauge("oblique_workers", "Workers.");
-  for (std::size_t i = 0; i < now.crews.size(); ++i) {
-    out.sample(now.crews.at(i).workers, label(i));
+  for (std::size_t i = 0; i < now.groups.size(); ++i) {
+    out.sample(now.groups.at(i).workers, label(i));
   }
   out.gauge("oblique_worker_threads", "Threads of workers.");
-  for (std::size_t i = 0; i < now.crews.size(); ++i) {
-    out.sample(now.crews.at(i).threads, label(i));
+  for (std::size_t i = 0; i < now.groups.size(); ++i) {
+    out.sample(now.groups.at(i).threads, label(i));
   }
   out.gauge("oblique_threads_wanted", "Threads that would solve the open points within a minute.");
   out.sample(now.threads_wanted());

@@ -15,7 +15,6 @@ namespace oblique::server {
 namespace {
 
 /// A worker sends something in each heartbeat interval of 900 ms.
-constexpr std::int64_t kSilentAfter_ms = 1800;
 /// Shorter silences are shown as none.
 constexpr std::uint32_t kSilence_ms = 2000;
 
@@ -32,7 +31,7 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
       continue;  // it is not durable yet
     }
     const StudyCounts points = service.scheduler().study(id);
-    snapshot.points_open += states.state(id) == StudyState::kRunning ? points.open() : 0;
+    snapshot.points_open += states.record(id).state == StudyState::kRunning ? points.open() : 0;
     snapshot.points_leased += points.leased;
     ranked.emplace_back(-std::int64_t{states.record(id).priority}, id);
   }
@@ -41,7 +40,7 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
   std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(shown),
                     ranked.end());
   for (std::size_t i = 0; i < shown; ++i) {
-    snapshot.studies.push_back(service.study_status(ranked[i].second, {now_ms, 0}));
+    snapshot.studies.push_back(study_status(ranked[i].second, service.core(), {now_ms, 0}));
   }
 }
 
@@ -68,7 +67,7 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms) {
   snapshot.thread_s_per_point = scheduler.thread_s_per_point();
   count_studies(service, now_ms, snapshot);
   snapshot.workers = service.worker_statuses(kShownWorkers, {now_ms, 0});
-  snapshot.crews = scheduler.crews(now_ms, kSilentAfter_ms);
+  snapshot.groups = scheduler.groups(now_ms);
   snapshot.commit_s = sources.writer.commits().duration_s;
   snapshot.writer_bytes = service.ledger().bytes();
   snapshot.database_fault = service.ledger().fault();
@@ -122,9 +121,9 @@ std::string overview_json(const Snapshot& snapshot) {
   }
   std::uint64_t workers_there = 0;
   std::uint64_t threads = 0;
-  for (const Crew& crew : snapshot.crews) {
-    workers_there += crew.workers;
-    threads += crew.threads;
+  for (const WorkerGroup& group : snapshot.groups) {
+    workers_there += group.workers;
+    threads += group.threads;
   }
   return json_text({{"studies", json_list(snapshot.studies, study_json)},
                     {"unlisted", snapshot.unlisted},

@@ -38,7 +38,7 @@ struct Snapshot {
   std::vector<protocol::StudyStatus> studies;
   std::uint64_t unlisted = 0;                   ///< further ones
   std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers
-  std::array<Crew, kCrewStates> crews{};        ///< all workers by state
+  WorkerGroups groups{};                        ///< all workers by state
 
   Histogram commit_s{{}};
   std::uint64_t writer_bytes = 0;  ///< of results that are not durable yet

@@ -37,7 +37,7 @@ using protocol::WorkerMessage;
 class RunningServer {
  public:
   explicit RunningServer(const std::string& database, QueueSettings queue = {},
-                         NetworkLimits network = {}, ClientHandlerSettings clients = {},
+                         NetworkLimits network = {}, const ClientHandlerSettings& clients = {},
                          const AccessSettings& access = {},
                          const std::optional<WebSettings>& web = {})
       : loop_(settings(database, queue, network, clients, access, web)) {
@@ -229,12 +229,14 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
     *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
     return ask(request);
   }
-  ClientReply query(const std::string& sql) {
+  static ClientRequest query_request(const std::string& sql) {
     ClientRequest request;
+    request.set_protocol_version(protocol::kProtocolVersion);
     request.mutable_query()->set_sql(sql);
     request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
-    return ask(request);
+    return request;
   }
+  ClientReply query(const std::string& sql) { return ask(query_request(sql)); }
   /// The rows of the first chunk.
   protocol::Table rows(const std::string& sql) {
     protocol::Table table;
@@ -243,11 +245,8 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
   }
   /// Asks for what takes minutes, and waits until it is said that the query runs.
   void start_query(const std::string& sql) {
-    ClientRequest request;
-    request.set_protocol_version(protocol::kProtocolVersion);
+    ClientRequest request = query_request(sql);
     request.set_request_id(++id_);
-    request.mutable_query()->set_sql(sql);
-    request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
     send(request);
     constexpr int kMostWords = 600;  // one a second
     for (int words = 0; words < kMostWords; ++words) {

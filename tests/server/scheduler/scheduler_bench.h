@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "server/scheduler/scheduler.h"
@@ -31,7 +33,8 @@ inline SchedulerSettings trusting() {
 /// A scheduler whose invariants are checked after each event, with a clock that tests set.
 class SchedulerBench {
  public:
-  explicit SchedulerBench(SchedulerSettings settings = {}) : scheduler(settings) {}
+  explicit SchedulerBench(const SchedulerSettings& settings = {}, std::string solver_version = {})
+      : scheduler(settings, std::move(solver_version)) {}
 
   std::vector<Effect> feed(const Event& event) {
     auto effects = scheduler.handle(event, now_ms);
@@ -61,35 +64,57 @@ class SchedulerBench {
     return effects;
   }
 
-  /// The whole batch solved in `busy_s` and the results received.
-  std::vector<Effect> solve(const SendBatch& batch, double busy_s = 1e-3) {
-    return feed(ResultsReceived{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s,
-                                outcomes_of(batch)});
-  }
-
-  /// Each point of the batch solved, in the order of the batch.
-  static std::vector<PointOutcome> outcomes_of(const SendBatch& batch) {
-    std::vector<PointOutcome> outcomes;
+  /// What a worker sends that solved the whole batch in `busy_s`, but for points that the filter of
+  /// `table` leaves out.
+  ResultsReceived answer_to(const SendBatch& batch, double busy_s = 1e-3,
+                            const protocol::PointTable* table = nullptr) {
+    ResultsReceived event{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s, {}};
     for (const Interval& range : batch.points) {
       for (std::uint64_t point = range.begin; point < range.end; ++point) {
-        outcomes.push_back({point, false});
+        if (table == nullptr || table->is_left_in(point)) {
+          event.outcomes.push_back({point, false});
+        } else {
+          event.left_out.insert(point);
+        }
       }
     }
-    return outcomes;
+    return event;
+  }
+  std::vector<Effect> solve(const SendBatch& batch, double busy_s = 1e-3) {
+    return feed(answer_to(batch, busy_s));
   }
 
-  /// `solve`, and the results are made durable. Returns the effects of both.
-  std::vector<Effect> solve_and_store(const SendBatch& batch, double busy_s = 1e-3) {
-    auto effects = solve(batch, busy_s);
-    const std::vector<PointOutcome> outcomes = outcomes_of(batch);
+  /// The results are received and made durable. Returns the effects of both.
+  std::vector<Effect> store(const ResultsReceived& event) {
+    auto effects = feed(event);
     for (const StoreResults& store : only<StoreResults>(effects)) {
-      ResultsStored stored{store.worker, store.study, store.sequence, {}};
+      ResultsStored stored{store.worker, store.study, store.sequence, {}, store.left_out};
       for (const std::size_t index : store.accepted) {
-        stored.outcomes.push_back(outcomes[index]);
+        stored.outcomes.push_back(event.outcomes[index]);
       }
       append(effects, feed(stored));
     }
     return effects;
+  }
+  std::vector<Effect> solve_and_store(const SendBatch& batch, double busy_s = 1e-3,
+                                      const protocol::PointTable* table = nullptr) {
+    return store(answer_to(batch, busy_s, table));
+  }
+
+  /// Solves the batches in turn, and those that their workers get for them, until nothing is left.
+  /// Returns all in the order in which they were solved.
+  std::vector<SendBatch> solve_all(std::vector<SendBatch> batches, double s_per_point = 1e-3,
+                                   const protocol::PointTable* table = nullptr) {
+    for (std::size_t i = 0; i < batches.size(); ++i) {
+      const SendBatch batch = batches[i];
+      auto effects =
+          solve_and_store(batch, s_per_point * static_cast<double>(batch.count()), table);
+      append(effects, feed(CreditGiven{batch.worker, 1}));
+      for (const SendBatch& next : only<SendBatch>(effects)) {
+        batches.push_back(next);
+      }
+    }
+    return batches;
   }
 
   /// What the worker gets once it has solved the batch at so many seconds a point.

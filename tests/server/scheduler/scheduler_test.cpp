@@ -1,9 +1,13 @@
 #include "server/scheduler/scheduler.h"
 
 #include <algorithm>
-#include <deque>
+#include <cstdint>
+#include <functional>
 #include <map>
+#include <memory>
 #include <set>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -46,20 +50,7 @@ TEST(SchedulerTest, ABatchRunsAcrossBlocksOfOnePointEach) {
   SchedulerBench bench;
   bench.feed(StudyAdded{
       1, std::make_shared<const protocol::PointTable>(protocol::recipe_of({kBlocks, point})), {}});
-  std::deque<SendBatch> held;
-  std::uint64_t batches = 0;
-  for (const auto& batch : bench.join(1, 1)) {
-    held.push_back(batch);
-  }
-  while (!held.empty()) {
-    ++batches;
-    bench.solve_and_store(held.front());
-    held.pop_front();
-    for (const auto& batch : only<SendBatch>(bench.feed(CreditGiven{1, 1}))) {
-      held.push_back(batch);
-    }
-  }
-  EXPECT_LT(batches, kBlocks / 10);
+  EXPECT_LT(bench.solve_all(bench.join(1, 1)).size(), kBlocks / 10);
 }
 
 TEST(SchedulerTest, TenPointsSpreadOverTwoWorkers) {
@@ -78,31 +69,11 @@ TEST(SchedulerTest, TenPointsSpreadOverTwoWorkers) {
 TEST(SchedulerTest, AStudyOfABillionPointsCostsNoMoreThanASmallOne) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(1'000'000'000), {}});
-  std::deque<SendBatch> held;
-  for (const auto& batch : bench.join(1, 2)) {
-    held.push_back(batch);
-  }
+  SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < 50; ++i) {
-    const auto batch = held.front();
-    held.pop_front();
-    bench.solve_and_store(batch);
-    for (const auto& next : only<SendBatch>(bench.feed(CreditGiven{1, 1}))) {
-      held.push_back(next);
-    }
+    batch = bench.next_after(batch, 1e-3);
   }
   EXPECT_EQ(bench.scheduler.study(1).points, 1'000'000'000U);
-}
-
-TEST(SchedulerTest, BatchesGrowToTheWorkThatWasAimedAt) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  auto batch = bench.join(1, 1).at(0);
-  EXPECT_LE(batch.count(), 4U);
-  for (int i = 0; i < 10; ++i) {
-    bench.solve_and_store(batch, 1e-3 * static_cast<double>(batch.count()));
-    batch = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
-  }
-  EXPECT_EQ(batch.count(), 100U);  // 0.1 s at 1 ms a point
 }
 
 TEST(SchedulerTest, TheTailGoesOutInEverSmallerBatches) {
@@ -110,21 +81,13 @@ TEST(SchedulerTest, TheTailGoesOutInEverSmallerBatches) {
   settings.shortest_batch_s = 0.0;
   SchedulerBench bench(settings);
   bench.feed(StudyAdded{1, table_of(2000), {}});
-  std::deque<SendBatch> held;
+  std::vector<SendBatch> held;
   for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
-    for (const auto& batch : bench.join(worker, 1)) {
-      held.push_back(batch);
-    }
+    held.push_back(bench.join(worker, 1).at(0));
   }
   std::vector<std::uint64_t> sizes;
-  while (!held.empty()) {
-    const auto batch = held.front();
-    held.pop_front();
+  for (const SendBatch& batch : bench.solve_all(held, 1e-5)) {
     sizes.push_back(batch.count());
-    bench.solve_and_store(batch, 1e-5 * static_cast<double>(batch.count()));
-    for (const auto& next : only<SendBatch>(bench.feed(CreditGiven{batch.worker, 1}))) {
-      held.push_back(next);
-    }
   }
   const auto largest = std::max_element(sizes.begin(), sizes.end());
   EXPECT_GT(*largest, 50U);
@@ -192,13 +155,6 @@ TEST(SchedulerTest, ASilentWorkersPointsGoToAnotherWithinThreeSeconds) {
   EXPECT_EQ(batches[0].attempt, 2U);
 }
 
-TEST(SchedulerTest, AWorkerThatSpeaksIsNotLost) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(4), {}});
-  bench.join(1, 1);
-  EXPECT_TRUE(only<DropWorker>(bench.pass(60'000, {1})).empty());
-}
-
 TEST(SchedulerTest, WorkersAreNotBlamedWhenTheServerItselfStoodStill) {
   SchedulerBench bench;
   bench.feed(StudyAdded{1, table_of(4), {}});
@@ -242,14 +198,6 @@ TEST(SchedulerTest, AWorkerThatSaysGoodbyeReturnsItsPointsAtOnce) {
   const auto effects = bench.feed(WorkerLeft{1});
   ASSERT_EQ(only<SendBatch>(effects).size(), 1U);
   EXPECT_EQ(only<SendBatch>(effects)[0].worker, 2U);
-}
-
-TEST(SchedulerTest, AnUnreachableWorkerIsDroppedAtOnce) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1), {}});
-  bench.join(1, 1);
-  EXPECT_EQ(only<DropWorker>(bench.feed(WorkerUnreachable{1})).size(), 1U);
-  EXPECT_EQ(bench.scheduler.workers(), 0U);
 }
 
 TEST(SchedulerTest, ABatchThatNeverReachedItsWorkerIsLeasedAgain) {
@@ -300,9 +248,9 @@ TEST(SchedulerTest, ResultsOfACancelledStudyAreKept) {
 
 TEST(SchedulerTest, ARestoredStudyHandsOutOnlyWhatIsOpen) {
   SchedulerBench bench(trusting());
-  IntervalSet settled(0, 5);
-  settled.insert(7);
-  bench.feed(StudyAdded{1, table_of(10), settled, 2});
+  IntervalSet completed(0, 5);
+  completed.insert(7);
+  bench.feed(StudyAdded{1, table_of(10), completed, 2});
   std::set<std::uint64_t> leased;
   for (const auto& batch : bench.join(1, 20)) {
     for (std::uint64_t i = 0; i < batch.count(); ++i) {
@@ -318,17 +266,6 @@ TEST(SchedulerTest, ARestoredStudyWithoutOpenPointsIsFinished) {
   SchedulerBench bench;
   EXPECT_EQ(only<StudyFinished>(bench.feed(StudyAdded{1, table_of(3), IntervalSet(0, 3)})).size(),
             1U);
-}
-
-TEST(SchedulerTest, StudiesTakeTurns) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  bench.feed(StudyAdded{2, table_of(1'000'000), {}});
-  std::vector<StudyId> order;
-  for (const auto& batch : bench.join(1, 4)) {
-    order.push_back(batch.study);
-  }
-  EXPECT_EQ(order, (std::vector<StudyId>{1, 2, 1, 2}));
 }
 
 TEST(SchedulerTest, NothingIsHandedOutWhileTheDiskTakesNothing) {
@@ -359,6 +296,146 @@ TEST(SchedulerTest, ResultsOfAnUnknownStudyAreAcknowledgedSoThatTheWorkerForgets
   ASSERT_EQ(store.size(), 1U);
   EXPECT_TRUE(store[0].accepted.empty());
   EXPECT_EQ(only<AcknowledgeResults>(bench.feed(ResultsStored{1, 77, 4, {}})).size(), 1U);
+}
+
+// ---- Batches that a worker gives back ----
+
+TEST(SchedulerTest, ABatchThatIsGivenBackIsFreeAtOnceAndNoLoss) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(100), {}});
+  const SendBatch batch = only<SendBatch>(bench.join_as("a", 1, 1)).at(0);
+  ASSERT_GT(batch.count(), 1U);
+  bench.join_as("b", 2, 1000);  // takes all others and waits for more
+  // One point is solved, the rest goes back.
+  bench.feed(ResultsReceived{1, 1, batch.lease, 1, false, 1e-3, {{batch.first_point(), false}}});
+  const auto again = only<SendBatch>(bench.feed(BatchesReturned{1, {batch.lease}}));
+  std::uint64_t next = batch.first_point() + 1;
+  for (const SendBatch& part : again) {
+    EXPECT_EQ(part.worker, 2U);
+    EXPECT_EQ(part.first_point(), next);
+    EXPECT_EQ(part.attempt, batch.attempt + 1);
+    next += part.count();
+  }
+  EXPECT_EQ(next, batch.first_point() + batch.count());
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).leased_points, 0U);
+}
+
+TEST(SchedulerTest, ResultsThatComeAfterTheirBatchWentBackCount) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(1), {}});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  bench.feed(BatchesReturned{1, {batch.lease}});
+  EXPECT_EQ(only<StoreResults>(bench.feed(ResultsReceived{1, 1, 0, 1, false, 1e-3, {{0, false}}}))
+                .at(0)
+                .accepted.size(),
+            1U);
+}
+
+TEST(SchedulerTest, LeasesOfOthersAndUnknownOnesStay) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(100), {}});
+  const SendBatch batch = bench.join(1, 1).at(0);
+  const SendBatch other = bench.join(2, 1).at(0);
+  bench.feed(BatchesReturned{2, {batch.lease, 0, UINT64_MAX, other.lease, other.lease}});
+  bench.feed(BatchesReturned{99, {batch.lease}});
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).leased_points, batch.count());
+  EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
+}
+
+TEST(SchedulerTest, ASuspectPointStaysSuspectWhenItIsGivenBack) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(1), {}});
+  // Two processes are lost with it: it is suspect.
+  bench.join_as("a", 1, 1);
+  bench.feed(WorkerUnreachable{1});
+  bench.join_as("b", 2, 1);
+  bench.feed(WorkerUnreachable{2});
+  auto effects = bench.join_as("c", 3, 2);
+  const auto probes = only<SendProbe>(effects);
+  ASSERT_EQ(probes.size(), 1U) << "it goes to proven workers only";
+  effects = bench.solve_probe(probes[0]);
+  const auto batches = only<SendBatch>(effects);
+  ASSERT_EQ(batches.size(), 1U);
+  bench.feed(BatchesReturned{3, {batches[0].lease}});
+  effects = bench.join_as("d", 4, 1);
+  EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker gets it";
+}
+
+TEST(SchedulerTest, AProbeThatIsGivenBackKeepsNobodyWaiting) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(1), {}});
+  bench.join_as("a", 1, 1);
+  bench.feed(WorkerUnreachable{1});
+  bench.join_as("b", 2, 1);
+  bench.feed(WorkerUnreachable{2});
+  const auto probe = only<SendProbe>(bench.join_as("c", 3, 2)).at(0);
+  bench.feed(BatchesReturned{3, {probe.lease}});
+  EXPECT_FALSE(only<SendProbe>(bench.pass(2000, {3})).empty());
+}
+
+// ---- What many workers and studies cost, in examined workers ----
+
+constexpr WorkerId kWorkers = 1000;
+
+/// A thousand workers that ask for batches, of which there are none.
+class IdleCrowd : public testing::Test {
+ protected:
+  IdleCrowd() {
+    for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
+      scheduler_.handle(WorkerJoined{worker, 1}, now_ms_);
+      scheduler_.handle(CreditGiven{worker, 2}, now_ms_);
+    }
+  }
+  std::vector<Effect> add_study() {
+    return scheduler_.handle(StudyAdded{2, table_of(100), IntervalSet(0, 1)}, now_ms_);
+  }
+
+  Scheduler scheduler_{SchedulerSettings{}};
+  std::int64_t now_ms_ = 1'000'000;
+};
+
+TEST_F(IdleCrowd, AMessageOfOneWorkerMakesTheServerLookAtNoOther) {
+  const std::uint64_t before = scheduler_.examined_workers();
+  for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
+    scheduler_.handle(HeartbeatReceived{worker, {}}, now_ms_);
+  }
+  EXPECT_LE(scheduler_.examined_workers() - before, kWorkers);
+  scheduler_.check_invariants();
+}
+
+TEST_F(IdleCrowd, TheFirstThatAskedIsServedFirstHoweverOftenItFoundNothing) {
+  scheduler_.handle(HeartbeatReceived{500, {}}, now_ms_);
+  EXPECT_EQ(only<SendBatch>(add_study()).at(0).worker, 1U);
+}
+
+TEST_F(IdleCrowd, PointsOfAWorkerThatLeavesGoToOneThatWaitsAtOnce) {
+  const auto batches = only<SendBatch>(add_study());
+  const auto effects = scheduler_.handle(WorkerLeft{batches.at(0).worker}, now_ms_);
+  ASSERT_GE(only<SendBatch>(effects).size(), 1U);
+  EXPECT_NE(only<SendBatch>(effects)[0].worker, batches[0].worker);
+}
+
+TEST(ManyStudies, ThatRestCostDispatchNothing) {
+  const auto cost_with = [](StudyId resting) {
+    Scheduler scheduler(trusting());
+    for (StudyId study = 1; study <= resting; ++study) {
+      StudyAdded event{study, table_of(3), study % 2 == 0 ? IntervalSet(0, 3) : IntervalSet()};
+      event.paused = study % 2 == 1;
+      scheduler.handle(event, 0);
+    }
+    scheduler.handle(WorkerJoined{1, 1}, 0);
+    scheduler.handle(StudyAdded{resting + 1, table_of(1000), {}}, 0);
+    const std::uint64_t before = scheduler.examined_workers();
+    std::size_t batches = 0;
+    for (int i = 0; i < 100; ++i) {
+      batches += only<SendBatch>(scheduler.handle(CreditGiven{1, 1}, 0)).size();
+      scheduler.handle(Tick{}, i);
+    }
+    EXPECT_EQ(batches, 100U);
+    return scheduler.examined_workers() - before;
+  };
+  EXPECT_EQ(cost_with(10'000), cost_with(10));
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -72,6 +74,22 @@ inline ClientRequest client_request(std::uint64_t request_id = 0) {
   return message;
 }
 
+/// A submission whose recipe has so many bytes at least.
+inline ClientRequest long_submission(const std::string& name, std::size_t bytes) {
+  ClientRequest message = client_request(7);
+  message.mutable_submit()->set_name(name);
+  auto& mu = *message.mutable_submit()->mutable_recipe();
+  mu = protocol::recipe_of(
+      {{protocol::listed("H", {1.0}), protocol::listed("mu", {}), protocol::listed("e", {1.0})}});
+  for (std::size_t i = 0; i < bytes / 8 + 1; ++i) {
+    mu.mutable_blocks(0)->mutable_axes(1)->add_values(0.1 + 1e-9 * static_cast<double>(i));
+  }
+  return message;
+}
+
+/// Bytes of a request that is read on the check thread.
+inline constexpr std::size_t kLongRequest = std::size_t{100} * 1024;
+
 class ServiceTest : public testing::Test {
  protected:
   ServiceTest() { start({}); }
@@ -88,6 +106,17 @@ class ServiceTest : public testing::Test {
     service_->client_frame("client", protocol::encode(message), now_, holder);
     service_->scheduler().check_invariants();
   }
+  /// The same from another connection.
+  void send(const ClientRequest& message, const std::string& identity,
+            const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
+    service_->client_frame(identity, protocol::encode(message), now_, holder);
+  }
+  void end(std::uint64_t request_id, const std::string& identity = "client") {
+    ClientRequest message = client_request(request_id);
+    message.mutable_end_query()->set_request_id(request_id);
+    send(message, identity);
+  }
+  std::string last_error() { return last_reply().error().message(); }
   /// Results of other studies are not reused.
   ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = client_request(42);
@@ -142,6 +171,19 @@ class ServiceTest : public testing::Test {
   /// The point of that study as a worker sends it.
   protocol::PointResult solved(std::uint64_t point, StudyId study = 1) const {
     return solved_point(point, *service_->states().record(study).table.get());
+  }
+  /// A message with results of these points.
+  WorkerMessage results_of(const std::vector<std::uint64_t>& points, StudyId study = 1,
+                           std::uint64_t lease = 0) {
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(study);
+    results.set_lease_id(lease);
+    results.set_sequence(++sequence_);
+    for (const std::uint64_t point : points) {
+      *results.add_results() = solved(point, study);
+    }
+    return message;
   }
   void worker_says(const WorkerMessage& message, const std::string& identity = "worker") {
     service_->worker_frame(identity, protocol::encode(message), now_);

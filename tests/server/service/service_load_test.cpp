@@ -1,31 +1,28 @@
 // What the service does when the disk or a peer does not keep up.
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/service/write_ledger.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
 namespace {
 
+using testing::HasSubstr;
+
 class ServiceLoadTest : public ServiceTest {
  protected:
   /// Begins anew with other settings, a study of 1000 points and a worker.
-  void begin(ServiceSettings settings) {
-    settings.solver_version = "1.0";
-    settings.database_id = "db";
-    service_.emplace(settings, ports_, std::vector<StoredStudy>{}, now_);
-    request(submit_request("a", 1000));
-    write_all();
+  void begin(const ServiceSettings& settings) {
+    start(settings);
+    submit("a", 1000);
     hello();
-    write_all();
-  }
-  /// One result of the last batch, without an end of it.
-  WorkerMessage one_result(std::uint64_t point) {
-    WorkerMessage message;
-    auto& results = *message.mutable_results();
-    results.set_study_id(1);
-    results.set_sequence(++sequence_);
-    *results.add_results() = solved(point);
-    return message;
   }
   std::size_t batches_sent() const {
     std::size_t count = 0;
@@ -43,7 +40,7 @@ TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
   for (std::uint64_t point = 900; point < 910; ++point) {
-    worker_says(one_result(point));
+    worker_says(results_of({point}));
   }
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
@@ -51,23 +48,11 @@ TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
   EXPECT_EQ(batches_sent(), 2U);
 }
 
-TEST_F(ServiceLoadTest, WorkersAreNotReadWhileTooMuchWaitsForTheDisk) {
-  ServiceSettings settings;
-  settings.ledger.bytes = 500;
-  begin(settings);
-  for (std::uint64_t point = 900; service_->has_room("worker") && point < 1000; ++point) {
-    worker_says(one_result(point));
-  }
-  EXPECT_FALSE(service_->has_room("worker"));
-  write_all();
-  EXPECT_TRUE(service_->has_room("worker"));
-}
-
 TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheServerLives) {
   ServiceSettings settings;
   settings.ledger.bytes = 1;
   begin(settings);
-  worker_says(one_result(900));
+  worker_says(results_of({900}));
   ports_.worker_messages.clear();
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 1U);
@@ -96,7 +81,7 @@ TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskHearsSignsOfLifeThoughI
   ports_.worker_messages.clear();
   for (std::uint64_t point = 900; point < 960; ++point) {
     now_.steady_ms += 100;
-    worker_says(one_result(point));
+    worker_says(results_of({point}));
     service_->tick(now_);
   }
   EXPECT_GE(ports_.worker_messages.size(), 4U) << "one in 1.2 s";
@@ -114,6 +99,158 @@ TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatchAndNoStudyCounts
   ports_.busy.clear();
   service_->tick(now_);
   EXPECT_EQ(batches_sent(), 2U);
+}
+
+/// A service with small limits.
+class FloodedServiceTest : public ServiceTest {
+ protected:
+  FloodedServiceTest() {
+    ServiceSettings settings;
+    settings.ledger.writes = 3;
+    settings.ledger.changes = 3;
+    start(settings);
+  }
+};
+
+TEST_F(FloodedServiceTest, NoWorkerJoinsWhileTooMuchWaitsForTheDisk) {
+  hello();
+  WorkerMessage message;
+  message.mutable_results()->set_study_id(1);
+  for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
+    message.mutable_results()->set_sequence(sequence);
+    worker_says(message);
+  }
+  hello("another");
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  write_all();
+  hello("another");
+  EXPECT_EQ(service_->scheduler().workers(), 2U);
+}
+
+TEST_F(FloodedServiceTest, ChangesBeyondTheLimitAreRefusedUntilTheDiskTookOthers) {
+  for (const char* name : {"a", "b", "c", "d"}) {
+    request(submit_request(name));
+  }
+  EXPECT_THAT(last_error(), HasSubstr("ask again later"));
+  write_all();
+  submit("d");
+  EXPECT_TRUE(last_reply().has_submit());
+}
+
+// ---- Writes without an outcome ----
+
+class WriteLedgerTest : public testing::Test {
+ protected:
+  static LedgerLimits small() { return {.bytes = 200, .writes = 24, .changes = 3}; }
+
+  /// A results message of so many bytes.
+  void write_results(std::size_t bytes) {
+    AddResults change{};
+    change.message_bytes = bytes;
+    ledger_.write(std::move(change), [this](Instant) { outcomes_.emplace_back("results"); });
+  }
+  /// A change that a client waits for.
+  void write_change() {
+    ledger_.write(
+        SetStudyState{1, StudyState::kPaused, ""},
+        [this](Instant) { outcomes_.emplace_back("change"); },
+        [this](const std::string& error, Instant) { outcomes_.push_back(error); });
+  }
+  void store_first() {
+    ledger_.end(ports_.jobs.front().ticket, std::nullopt, now_);
+    ports_.jobs.erase(ports_.jobs.begin());
+  }
+
+  const Instant now_{};
+  FakePorts ports_;
+  WriteLedger ledger_{small(), ports_};
+  std::vector<std::string> outcomes_;
+};
+
+TEST_F(WriteLedgerTest, EachWriteHasOneOutcome) {
+  write_results(10);
+  write_change();
+  write_change();
+  ASSERT_EQ(ports_.jobs.size(), 3U);
+  EXPECT_FALSE(ports_.jobs[0].answer_failure) << "results are tried until they are stored";
+  EXPECT_TRUE(ports_.jobs[1].answer_failure) << "a client waits";
+  ledger_.end(ports_.jobs[1].ticket, std::nullopt, now_);
+  ledger_.end(ports_.jobs[2].ticket, "the disk is full", now_);
+  ledger_.end(ports_.jobs[0].ticket, std::nullopt, now_);
+  ledger_.end(ports_.jobs[0].ticket, std::nullopt, now_);
+  ledger_.end(999, "unknown", now_);
+  EXPECT_EQ(outcomes_, (std::vector<std::string>{"change", "the disk is full", "results"}));
+  EXPECT_TRUE(ledger_.is_empty());
+}
+
+TEST_F(WriteLedgerTest, BatchesAreHeldFromAQuarterOfTheBytesUntilHalfOfThatIsStored) {
+  for (const std::size_t bytes : {20U, 10U, 19U}) {
+    write_results(bytes);
+  }
+  EXPECT_FALSE(ledger_.holds_batches());
+  write_results(1);
+  EXPECT_TRUE(ledger_.holds_batches());
+  store_first();
+  EXPECT_TRUE(ledger_.holds_batches()) << "30 bytes wait";
+  store_first();
+  EXPECT_FALSE(ledger_.holds_batches()) << "20 bytes wait";
+  write_results(20);
+  EXPECT_FALSE(ledger_.holds_batches()) << "40 bytes wait";
+}
+
+TEST_F(WriteLedgerTest, BatchesAreHeldDuringAFaultAndAfterItWhileTheDiskIsBehind) {
+  ledger_.set_fault("disk full");
+  EXPECT_TRUE(ledger_.holds_batches());
+  EXPECT_EQ(ledger_.fault(), "disk full");
+  write_results(60);
+  ledger_.set_fault({});
+  EXPECT_TRUE(ledger_.holds_batches());
+  store_first();
+  EXPECT_FALSE(ledger_.holds_batches());
+}
+
+TEST_F(WriteLedgerTest, MessagesAreTakenUntilTheBytesOrWritesAreTooMany) {
+  write_results(199);
+  EXPECT_TRUE(ledger_.has_room());
+  write_results(1);
+  EXPECT_FALSE(ledger_.has_room());
+  store_first();
+  store_first();
+  for (int i = 0; i < 24; ++i) {
+    EXPECT_TRUE(ledger_.has_room());
+    write_results(0);
+  }
+  EXPECT_FALSE(ledger_.has_room());
+}
+
+TEST_F(WriteLedgerTest, ResultsAndChangesOfClientsHaveBoundsOfTheirOwn) {
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(ledger_.has_room_for_changes());
+    write_change();
+  }
+  EXPECT_FALSE(ledger_.has_room_for_changes());
+  EXPECT_TRUE(ledger_.has_room());
+  store_first();
+  write_results(200);
+  EXPECT_TRUE(ledger_.has_room_for_changes());
+  EXPECT_FALSE(ledger_.has_room());
+  ledger_.write(
+      AddStudy{1, "a", StudyTable(std::string(limits::kUnstoredBytesOfChanges, 'x'), 1), ""}, {},
+      [](const std::string&, Instant) {});
+  EXPECT_FALSE(ledger_.has_room_for_changes()) << "recipes count, too";
+}
+
+TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
+  write_results(10);
+  write_change();
+  ledger_.abandon("the file was deleted", now_);
+  EXPECT_EQ(outcomes_, std::vector<std::string>{"the file was deleted"});
+  EXPECT_TRUE(ledger_.is_gone());
+  EXPECT_TRUE(ledger_.is_empty());
+  EXPECT_TRUE(ledger_.holds_batches());
+  EXPECT_EQ(ledger_.fault(), "the file was deleted");
+  store_first();
+  EXPECT_EQ(outcomes_.size(), 1U) << "a late report";
 }
 
 }  // namespace

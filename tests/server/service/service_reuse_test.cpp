@@ -1,8 +1,14 @@
-// Results that other studies have, as the service reuses them.
+// Results that a study reuses, and points that it leaves out.
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/server/service/service_fixture.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::server {
 namespace {
@@ -119,8 +125,8 @@ TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShor
     start({});
     submit_study();
     const auto vain_part = [&](std::uint64_t next) {
-      now_.steady_ms += is_long ? ReuseTracker::kLongestInVain_ms / 2 : 0;
-      write_part({{}, {}, is_long ? 1 : ReuseTracker::kMostProbesInVain / 2, next});
+      now_.steady_ms += is_long ? StudyChanges::kLongestInVain_ms / 2 : 0;
+      write_part({{}, {}, is_long ? 1 : StudyChanges::kMostProbesInVain / 2, next});
     };
     vain_part(1);
     write_part(copies_of_a(IntervalSet(0, 1), 2));  // and both begin again
@@ -158,24 +164,12 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
   EXPECT_EQ(last_reply().submit().appended(), 10U);
 }
 
-TEST_F(ServiceReuseTest, AStudyThatGrowsDuringItsLookupIsLookedUpAgainAtTheEnd) {
-  solve_some();
-  request(reusing("b", 7));
-  write_all();
-  auto longer = reusing("b", 7);
+TEST_F(ServiceReuseTest, AStudyDoesNotGrowDuringItsLookup) {
+  submit_study();
+  auto longer = reusing("b");
   *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
-  const WriteJob part = ports_.jobs.at(0);
-  ports_.jobs.clear();
   request(longer);
-  write_all();
-  EXPECT_THAT(parts(), IsEmpty()) << "one lookup of a study at a time";
-  ports_.jobs.push_back(part);
-  write_part({});
-  EXPECT_THAT(parts(), ElementsAre(0));
-  EXPECT_TRUE(status_of("b").taken().under_way());
-  write_part({});
-  write_all();
-  EXPECT_FALSE(status_of("b").taken().under_way());
+  EXPECT_THAT(last_error(), HasSubstr("cannot grow while results"));
 }
 
 TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
@@ -214,6 +208,114 @@ TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
   write_part(copies_of_a(IntervalSet(3, 5)));
   EXPECT_EQ(ended(), kStudy);
   EXPECT_EQ(status_of("b").taken().points(), 5U);
+}
+
+// ---- Filters ----
+
+class FilteredStudyTest : public ServiceTest {
+ protected:
+  /// mu = 0, 0.1, ..., 1.
+  ClientRequest filtered_request(const std::string& where) {
+    ClientRequest message = submit_request("filtered");
+    *message.mutable_submit()->mutable_recipe() = protocol::recipe_of_blocks(
+        {protocol::filtered({protocol::listed("H", {0.5}), protocol::range("mu", 0.0, 1.0, 11),
+                             protocol::listed("e", {1.0})},
+                            where)});
+    return message;
+  }
+};
+
+TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
+  request(filtered_request("mu > 0.75"));
+  EXPECT_THAT(ports_.replies, IsEmpty());
+  ASSERT_EQ(ports_.checks.size(), 1U);
+  run_checks();
+  write_all();
+  EXPECT_EQ(last_reply().submit().points(), 11U);
+  EXPECT_EQ(status_of("filtered").points(), 11U);
+  EXPECT_EQ(status_of("filtered").left_out(), 0U) << "no worker has named any";
+}
+
+TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
+  request(filtered_request("mu > 0.75"));
+  run_checks();
+  write_all();
+  hello();
+  const auto ask = [&](std::uint64_t point) {
+    ports_.replies.clear();
+    ClientRequest message = client_request(7);
+    message.mutable_trace()->set_study("filtered");
+    message.mutable_trace()->set_point(point);
+    message.mutable_trace()->set_only_point(true);
+    request(message);
+    return last_reply();
+  };
+  EXPECT_NEAR(ask(9).trace().mu(), 0.9, 1e-12);
+  EXPECT_THAT(ask(3).error().message(), HasSubstr("point 3 is left out by the study's filter"));
+  EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
+}
+
+TEST_F(FilteredStudyTest, AChangeOfTheRightNameAndAWrongNumberSaysWhatIsWrong) {
+  submit("a");
+  ClientRequest message = change_request("a", protocol::STUDY_CHANGE_DELETE);
+  message.mutable_change()->set_study_id(9);
+  request(message);
+  EXPECT_THAT(last_error(), HasSubstr("study name \"a\" and study number do not match"));
+}
+
+TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
+  request(filtered_request("mu > 0.75"));
+  run_checks();
+  write_all();
+  hello_and_credit();
+  while (last_message().has_batch()) {
+    answer_batch(100);
+    credit(1);
+  }
+  const auto status = status_of("filtered");
+  EXPECT_EQ(status.state(), "done");
+  EXPECT_EQ(status.solved(), 3U);
+  EXPECT_EQ(status.left_out(), 8U);
+}
+
+TEST_F(FilteredStudyTest, RangesThatAreNoneEndTheConnectionOfTheirWorker) {
+  request(filtered_request("mu > 0.75"));
+  run_checks();
+  write_all();
+  // After three lost workers the next one gets a probe: the first two are of its batch.
+  const std::vector<std::vector<std::uint64_t>> wrong{
+      {0, 12}, {11, 1}, {0}, {0, 0}, {3, ~std::uint64_t{0}}, {~std::uint64_t{0}, 2}, {0, 1, 5}};
+  for (const auto& numbers : wrong) {
+    hello();
+    credit(1);
+    ASSERT_TRUE(last_message().has_batch());
+    WorkerMessage message;
+    auto& results = *message.mutable_results();
+    results.set_study_id(1);
+    results.set_lease_id(last_message().batch().lease_id());
+    results.set_batch_done(true);
+    results.mutable_left_out()->Assign(numbers.begin(), numbers.end());
+    worker_says(message);
+    write_all();
+    EXPECT_EQ(service_->scheduler().workers(), 0U);
+    EXPECT_EQ(status_of("filtered").left_out(), 0U);
+  }
+}
+
+TEST_F(FilteredStudyTest, AValueThatIsNotAllowedIsAnErrorWithThePoint) {
+  ClientRequest message = filtered_request("");
+  *message.mutable_submit()->mutable_recipe() = protocol::recipe_of(
+      {{protocol::following("k", "1e7 * (0.55 - mu)"), protocol::listed("H", {0.5}),
+        protocol::range("mu", 0.0, 1.0, 11), protocol::listed("e", {1.0})}});
+  request(message);
+  run_checks();
+  EXPECT_THAT(last_error(), HasSubstr("point 6: k = "));
+}
+
+TEST_F(FilteredStudyTest, AFilterThatIsNoneIsRefusedAtOnce) {
+  request(filtered_request("mu >"));
+  EXPECT_THAT(ports_.checks, IsEmpty());
+  EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 
 }  // namespace

@@ -1,14 +1,27 @@
+// Studies and workers message by message: what is acknowledged when, and which peers are refused.
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/point_table.h"
+#include "proto/result_message.h"
+#include "proto/wire/frame_scan.h"
 #include "tests/server/service/service_fixture.h"
 
 namespace oblique::server {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 TEST_F(ServiceTest, AStudyIsAcknowledgedOnlyOnceItIsStored) {
   request(submit_request("a"));
@@ -32,84 +45,53 @@ TEST_F(ServiceTest, WhileTheDatabaseStoresNothingForSecondsClientsAreToldSo) {
   now_.steady_ms += 1;
   service_->tick(now_);
   request(submit_request("b"));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("stored nothing for over 5 s"));
+  EXPECT_THAT(last_error(), HasSubstr("stored nothing for over 5 s"));
   EXPECT_THAT(status_of("a").waits_for(), HasSubstr("stored nothing for over 5 s"));
   write_all();
   service_->tick(now_);
   EXPECT_EQ(status_of("a").waits_for(), "a worker");
 }
 
-TEST_F(ServiceTest, TheStatusOfAStudySaysThatItsWorkersStoreNothing) {
+TEST_F(ServiceTest, TheStatusOfAStudySaysThatItsOnlyWorkerIsSetAside) {
   submit("a", 1);
   hello_and_credit();
-  WorkerMessage heartbeat;
-  heartbeat.mutable_heartbeat()->add_lease_ids(last_message().batch().lease_id());
-  const auto pass = [&](int seconds) {
-    for (int second = 0; second < seconds; ++second) {
-      now_.steady_ms += 1000;
-      worker_says(heartbeat);
-      service_->tick(now_);
-    }
-  };
-  pass(19);
-  EXPECT_EQ(status_of("a").waits_for(), "");
-  pass(1);
-  EXPECT_EQ(status_of("a").waits_for(),
-            "results of 1 point from 1 worker, which stored nothing for over 20 s");
-  pass(60);
-  EXPECT_EQ(status_of("a").waits_for(), "a worker") << "one that is not set aside";
+  for (int second = 0; second < 80; ++second) {
+    now_.steady_ms += 1000;
+    credit(0);
+    service_->tick(now_);
+  }
+  EXPECT_EQ(status_of("a").waits_for(), "a worker");
 }
 
 TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
   request(submit_request("a"));
   write_all("the disk is full");
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("the disk is full"));
+  EXPECT_THAT(last_error(), HasSubstr("the disk is full"));
   submit("a", 20);
   EXPECT_EQ(last_reply().submit().points(), 20U);
 }
 
-TEST_F(ServiceTest, TheSameStudyContinuesAndAnotherOfTheNameIsRefused) {
-  submit("a");
-  request(submit_request("a"));
-  EXPECT_FALSE(last_reply().submit().created());
-  request(submit_request("a", 11));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("another name"));
-}
-
 TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
-  request(submit_request(""));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("1 to 100 bytes"));
-  request(submit_request("a\nb"));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("control characters"));
-  auto bad = submit_request("a");
-  bad.mutable_submit()->mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(0, 1.5);
-  request(bad);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("e = 1.5"));
-  bad = submit_request("a");
-  bad.mutable_submit()->set_priority(100'000);
-  request(bad);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("priority = 100000"));
-  bad = submit_request("a");
-  bad.mutable_submit()->mutable_recipe()->clear_model();
-  request(bad);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("the recipe has no model"));
+  const auto error_of = [&](const std::string& name, const auto& spoil) {
+    ClientRequest message = submit_request(name);
+    spoil(*message.mutable_submit());
+    request(message);
+    return last_error();
+  };
+  const auto as_it_is = [](auto&) {};
+  EXPECT_THAT(error_of("", as_it_is), HasSubstr("1 to 100 bytes"));
+  EXPECT_THAT(error_of("a\nb", as_it_is), HasSubstr("control characters"));
+  EXPECT_THAT(error_of("a",
+                       [](auto& submit) {
+                         submit.mutable_recipe()->mutable_blocks(0)->mutable_axes(2)->set_values(
+                             0, 1.5);
+                       }),
+              HasSubstr("e = 1.5"));
+  EXPECT_THAT(error_of("a", [](auto& submit) { submit.set_priority(100'000); }),
+              HasSubstr("priority = 100000"));
+  EXPECT_THAT(error_of("a", [](auto& submit) { submit.mutable_recipe()->clear_model(); }),
+              HasSubstr("the recipe has no model"));
   EXPECT_TRUE(ports_.jobs.empty());
-}
-
-TEST_F(ServiceTest, CancellingIsAcknowledgedOnceItIsStoredAndSubmittingAgainGoesOn) {
-  submit("a");
-  ports_.replies.clear();
-  request(cancel_request("a"));
-  EXPECT_TRUE(ports_.replies.empty());
-  write_all();
-  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
-  request(cancel_request("a"));
-  EXPECT_EQ(last_reply().change().study().state(), "cancelled");
-  submit("a");
-  EXPECT_FALSE(last_reply().submit().created());
-  EXPECT_FALSE(service_->scheduler().study(1).cancelled);
-  request(cancel_request("b"));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("no study called \"b\""));
 }
 
 TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
@@ -137,21 +119,13 @@ TEST_F(ServiceTest, AWorkerThatSaysHelloTwiceBeginsAnew) {
 TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
   submit("a", 1);
   hello_and_credit();
-  const auto batch = last_message().batch();
-  WorkerMessage message;
-  auto& results = *message.mutable_results();
-  results.set_study_id(batch.study_id());
-  results.set_lease_id(batch.lease_id());
-  results.set_attempt(batch.attempt());
-  results.set_sequence(9);
-  results.set_batch_done(true);
-  *results.add_results() = solved(0);
-  write_all();
+  WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
+  message.mutable_results()->set_batch_done(true);
   worker_says(message);
   ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
-  EXPECT_EQ(last_message().results_stored().sequence(), 9U);
+  EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
   // Its end is noted in the database.
   ASSERT_EQ(ports_.jobs.size(), 1U);
   EXPECT_EQ(std::get<SetStudyState>(ports_.jobs[0].change).state, StudyState::kDone);
@@ -160,11 +134,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
 TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFailedPoint) {
   submit("a", 3);
   hello();
-  WorkerMessage message;
-  message.mutable_results()->set_study_id(1);
-  for (std::uint64_t point = 0; point < 3; ++point) {
-    *message.mutable_results()->add_results() = solved(point);
-  }
+  WorkerMessage message = results_of({0, 1, 2});
   auto& results = *message.mutable_results()->mutable_results();
   results.at(0).set_h_m(std::nextafter(results.at(0).h_m(), 2.0));
   results.at(1).set_h_m(1.001 * results.at(1).h_m());
@@ -182,15 +152,12 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
 TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
   submit("a", 2);
   hello_and_credit();
-  WorkerMessage message;
-  message.mutable_results()->set_study_id(1);
-  message.mutable_results()->set_lease_id(last_message().batch().lease_id());
-  auto result = solved(0);
+  WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
+  protocol::PointResult& result = *message.mutable_results()->mutable_results(0);
   result.set_h_m(1.001 * result.h_m());
-  *message.mutable_results()->add_results() = result;
   worker_says(message);
   EXPECT_FALSE(service_->scheduler().worker(1, now_.steady_ms).is_proven);
-  *message.mutable_results()->mutable_results(0) = solved(0);
+  result = solved(0);
   worker_says(message);
   EXPECT_TRUE(service_->scheduler().worker(1, now_.steady_ms).is_proven);
 }
@@ -204,17 +171,10 @@ TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
   EXPECT_TRUE(last_reply().has_error());
   ClientRequest nothing = client_request();
   request(nothing);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("kind of request"));
+  EXPECT_THAT(last_error(), HasSubstr("kind of request"));
   nothing.set_protocol_version(protocol::kProtocolVersion + 1);
   request(nothing);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("protocol version"));
-}
-
-TEST_F(ServiceTest, NoFloodOfBadFramesFloodsTheLog) {
-  for (int i = 0; i < 1000; ++i) {
-    service_->worker_frame("worker", "\xff", now_);
-  }
-  EXPECT_LE(ports_.lines.size(), 10);
+  EXPECT_THAT(last_error(), HasSubstr("protocol version"));
 }
 
 TEST_F(ServiceTest, TooManyQueriesAreRefused) {
@@ -227,23 +187,19 @@ TEST_F(ServiceTest, TooManyQueriesAreRefused) {
   EXPECT_TRUE(ports_.replies.empty());
   message.set_request_id(3);
   request(message);
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("too many queries"));
+  EXPECT_THAT(last_error(), HasSubstr("too many queries"));
   EXPECT_EQ(last_reply().request_id(), 3U);
   answer_query(0, encoded_error("no such column"));
-  EXPECT_EQ(last_reply().error().message(), "no such column");
+  EXPECT_EQ(last_error(), "no such column");
   EXPECT_EQ(last_reply().request_id(), 1U);
 }
 
 TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
   submit("a", 1000);
   hello();
-  WorkerMessage message;
-  message.mutable_results()->set_study_id(1);
-  for (std::uint64_t point = 0; point < 100; ++point) {
-    *message.mutable_results()->add_results() = solved(point);
-  }
-  service_->tick(now_);
-  worker_says(message);
+  std::vector<std::uint64_t> points(100);
+  std::iota(points.begin(), points.end(), std::uint64_t{0});
+  worker_says(results_of(points));
   write_all();
   now_.steady_ms += 500;
   const auto status = status_of("a");
@@ -252,16 +208,248 @@ TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
   EXPECT_EQ(status.created_at(), "2023-11-14T22:13:20.123Z");
 }
 
-TEST_F(ServiceTest, AServerThatStopsTellsItsWorkersAndHandsOutNothing) {
+// ---- Peers of other versions, and those that do what no sound peer does ----
+
+WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver_version) {
+  WorkerMessage message;
+  protocol::say_protocol(*message.mutable_hello());
+  message.mutable_hello()->set_protocol_version(protocol_version);
+  message.mutable_hello()->set_solver_version(solver_version);
+  message.mutable_hello()->set_threads(1);
+  return message;
+}
+
+TEST_F(ServiceTest, AWorkerWithAnotherSolverIsRefusedAndToldBothVersions) {
+  worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
+  EXPECT_THAT(last_message().refused().reason(), AllOf(HasSubstr("0.9"), HasSubstr("1.0")));
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, ARestoredStudyHasItsStateUnlessItsRowsAreLostOrOfAnotherSolver) {
+  for (const auto state :
+       {StudyState::kRunning, StudyState::kPaused, StudyState::kCancelled, StudyState::kDone}) {
+    for (const std::uint64_t completed : {1U, 2U}) {
+      StoredStudy stored{};
+      stored.study_id = 1;
+      stored.name = "a";
+      stored.table = table_of(2);
+      stored.state = state;
+      stored.completed = IntervalSet(0, completed);
+      stored.solver_version = "0.9";
+      start({}, {stored});
+      const bool lacks_rows = state == StudyState::kDone && completed < 2;
+      EXPECT_EQ(service_->states().record(1).state, completed == 2 ? StudyState::kDone
+                                                    : lacks_rows   ? StudyState::kRunning
+                                                                   : state);
+      EXPECT_EQ(status_of("a").waits_for().find("solver version 0.9") != std::string::npos,
+                completed < 2 && (lacks_rows || state == StudyState::kRunning));
+    }
+  }
+}
+
+TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
+  submit("a");
+  ClientRequest again = submit_request("a");
+  again.mutable_submit()->set_priority(7);
+  const std::size_t replies = ports_.replies.size();
+  request(again);
+  EXPECT_EQ(ports_.replies.size(), replies) << "not before it is written";
+  write_all();
+  EXPECT_TRUE(last_reply().has_submit());
+  EXPECT_EQ(status_of("a").priority(), 7);
+  again.mutable_submit()->set_priority(8);
+  request(again);
+  write_all("the disk is full");
+  EXPECT_THAT(last_error(), HasSubstr("disk is full"));
+}
+
+TEST_F(ServiceTest, AWorkerWithOtherOutputsIsRefused) {
+  for (const std::string& outputs : {std::string(), protocol::sent_outputs() + " new_N"}) {
+    WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
+    message.mutable_hello()->set_outputs(outputs);
+    worker_says(message);
+    EXPECT_THAT(last_message().refused().reason(), HasSubstr("other outputs"));
+  }
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
+  const std::string own = fmt::format("version {}", protocol::kProtocolVersion);
+  for (const std::uint32_t version :
+       {0U, protocol::kProtocolVersion - 1, protocol::kProtocolVersion + 1, 77U}) {
+    worker_says(hello_of(version, "1.0"));
+    EXPECT_THAT(last_message().refused().reason(),
+                HasSubstr(fmt::format("{}, the worker {}", own, version)));
+    ClientRequest message = submit_request("a");
+    message.set_protocol_version(version);
+    request(message);
+    EXPECT_THAT(last_error(),
+                HasSubstr(version == 0 ? std::string("the port for clients")
+                                       : fmt::format("{}, the client {}", own, version)));
+  }
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+}
+
+TEST_F(ServiceTest, WhatAWorkerSaysOfItselfCannotForgeLines) {
+  WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
+  message.mutable_hello()->set_name("a\n\x1b[31mb");
+  worker_says(message);
+  EXPECT_THAT(ports_.lines.back(), HasSubstr("(a??[31mb, 1 threads) joins"));
+}
+
+TEST_F(ServiceTest, AWorkerWhoseConnectionIsGoneIsFoundAsSoonAsAHeartbeatIsLate) {
+  submit("a");
+  hello_and_credit();
+  ports_.unreachable = "worker";
+  now_.steady_ms += 1000;
+  service_->tick(now_);
+  EXPECT_EQ(service_->scheduler().workers(), 1U);
+  now_.steady_ms += 200;
+  service_->tick(now_);
+  EXPECT_EQ(service_->scheduler().workers(), 0U);
+  EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
+}
+
+TEST_F(ServiceTest, AStudyWhoseResultsTheDiskDoesNotTakeSaysSoAndForgetsItAfterwards) {
   submit("a");
   hello();
-  service_->stop(now_);
-  EXPECT_TRUE(last_message().has_stopping());
-  const auto before = ports_.worker_messages.size();
+  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
+  EXPECT_THAT(status_of("a").waits_for(), HasSubstr("disk full"));
+  service_->written({WriteReport::Kind::kRecovered, 0, {}}, now_);
+  EXPECT_THAT(status_of("a").waits_for(), IsEmpty());
+}
+
+TEST_F(ServiceTest, MessagesThatAreLongerThanThoseOfWorkersAreBadFramesThatAreNotParsed) {
+  WorkerMessage heartbeat;
+  for (std::uint64_t i = 0; i <= protocol::kMostLeasesAHeartbeat; ++i) {
+    heartbeat.mutable_heartbeat()->add_lease_ids(i);
+  }
+  WorkerMessage results;
+  for (std::size_t i = 0; i <= protocol::kMostResultsAMessage; ++i) {
+    results.mutable_results()->add_results();
+  }
+  worker_says(heartbeat);
+  EXPECT_EQ(service_->bad_frames(), 1U) << "a stranger's";
+  for (const WorkerMessage& message : {heartbeat, results}) {
+    hello();
+    worker_says(message);
+    EXPECT_TRUE(last_message().has_hello_again());
+    EXPECT_EQ(service_->scheduler().workers(), 0U);
+  }
+  EXPECT_EQ(service_->bad_frames(), 3U);
+  EXPECT_TRUE(ports_.jobs.empty());
+}
+
+TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirst) {
+  submit("a", 4);
+  for (int i = 0; i < 1000; ++i) {
+    hello("worker " + std::to_string(i));
+  }
+  EXPECT_TRUE(ports_.jobs.empty());
+  hello_and_credit();
+  worker_says(results_of({0}));
+  worker_says(results_of({0}));
+  ASSERT_EQ(ports_.jobs.size(), 3U) << "one row of the worker, and two messages";
+  EXPECT_EQ(std::get<AddWorker>(ports_.jobs[0].change).worker_id, 1001U);
+  EXPECT_EQ(std::get<AddResults>(ports_.jobs[1].change).worker_id, 1001U);
+}
+
+TEST_F(ServiceTest, WorkersThatComeAndGoWithoutEndDoNotFillTheLog) {
+  WorkerMessage goodbye;
+  goodbye.mutable_goodbye();
+  for (int i = 0; i < 10'000; ++i) {
+    hello("worker " + std::to_string(i));
+    worker_says(goodbye, "worker " + std::to_string(i));
+  }
+  EXPECT_EQ(ports_.lines.size(), 20U);
+  ports_.lines.clear();
+  now_.steady_ms += 10'000;
+  service_->tick(now_);
+  hello();
+  ASSERT_EQ(ports_.lines.size(), 2U);
+  EXPECT_THAT(ports_.lines[0], HasSubstr("and 19980 more lines"));
+  EXPECT_THAT(ports_.lines[1], HasSubstr("joins"));
+}
+
+TEST_F(ServiceTest, StudiesComeInPagesThatHoldEachOnce) {
+  constexpr int kStudies = 2500;
+  for (int i = 0; i < kStudies; ++i) {
+    service_->client_frame("client", protocol::encode(submit_request(std::to_string(i))), now_);
+  }
+  write_all();
+  std::uint64_t after = 0;
+  int seen = 0;
+  for (const int size : {1000, 1000, 500}) {
+    const auto page = statuses(after);
+    ASSERT_EQ(page.studies_size(), size);
+    for (const auto& study : page.studies()) {
+      EXPECT_GT(study.study_id(), after);
+      after = study.study_id();
+    }
+    seen += size;
+    EXPECT_EQ(page.next_after(), seen < kStudies ? after : 0U);
+  }
+  EXPECT_EQ(statuses(0, 10).studies_size(), 10);
+  EXPECT_EQ(statuses(0, 1'000'000).studies_size(), 1000);
+}
+
+// ---- Worker processes and probes ----
+
+class ProcessesTest : public ServiceTest {
+ protected:
+  void hello_as(const std::string& identity, const std::string& process_id,
+                const std::string& name = "lab") {
+    WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
+    message.mutable_hello()->set_name(name);
+    message.mutable_hello()->set_process_id(process_id);
+    worker_says(message, identity);
+  }
+  /// Three newcomers get batches and are gone.
+  void let_newcomers_vanish() {
+    for (const char* identity : {"x", "y", "z"}) {
+      hello_as(identity, identity);
+      credit(1, identity);
+      EXPECT_TRUE(last_message().has_batch());
+      ports_.unreachable = identity;
+      now_.steady_ms += 1200;
+      service_->tick(now_);
+    }
+    ports_.unreachable.clear();
+  }
+};
+
+TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
+  submit("a", 100);
+  hello_as("first", "process 1");
+  credit(2, "first");
+  hello_as("second", "process 1");
+  const auto worker = workers().workers(0);
+  EXPECT_EQ(worker.losses(), 2U);
+  EXPECT_FALSE(worker.proven());
+  EXPECT_FALSE(worker.set_aside());
+}
+
+TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAcknowledged) {
+  submit("a", 100);
+  let_newcomers_vanish();
+  hello_as("worker", "sound");
+  EXPECT_TRUE(workers().workers(0).set_aside());
   credit(1);
-  EXPECT_EQ(ports_.worker_messages.size(), before);
-  request(submit_request("b"));
-  EXPECT_THAT(last_reply().error().message(), HasSubstr("stopping"));
+  ASSERT_TRUE(last_message().has_batch());
+  const auto batch = last_message().batch();
+  EXPECT_EQ(batch.study_id(), 0U);
+  EXPECT_EQ(points_of(batch).size(), 1U);
+  const auto& definition = ports_.worker_messages.at(ports_.worker_messages.size() - 2);
+  ASSERT_TRUE(definition.has_study());
+  EXPECT_EQ(definition.study().study_id(), 0U);
+  EXPECT_EQ(protocol::PointTable(definition.study().recipe()).size(), 1U);
+  answer_batch(1);
+  EXPECT_TRUE(last_message().has_results_stored());
+  EXPECT_TRUE(workers().workers(0).proven());
+  EXPECT_EQ(workers().workers(0).solved_points(), 0U);
+  credit(1);
+  ASSERT_TRUE(last_message().has_batch());
+  EXPECT_EQ(last_message().batch().study_id(), 1U);
 }
 
 }  // namespace

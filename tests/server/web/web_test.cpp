@@ -42,8 +42,8 @@ class SnapshotTest : public ServiceTest {
     request(message);
     write_all();
   }
-  static std::uint64_t workers(const Snapshot& snapshot, CrewState state) {
-    return snapshot.crews.at(static_cast<std::size_t>(state)).workers;
+  static std::uint64_t workers(const Snapshot& snapshot, WorkerState state) {
+    return snapshot.groups.at(static_cast<std::size_t>(state)).workers;
   }
 
   Network network_{NetworkLimits{}};
@@ -56,12 +56,12 @@ TEST_F(SnapshotTest, FollowsPointsOnTheirWay) {
   EXPECT_EQ(snapshot().points_open, 100U);
   EXPECT_EQ(snapshot().points_leased, 0U);
   hello();
-  EXPECT_EQ(workers(snapshot(), CrewState::kIdle), 1U);
+  EXPECT_EQ(workers(snapshot(), WorkerState::kIdle), 1U);
   credit(1);
   const std::vector<std::uint64_t> points = points_of(last_message().batch());
   const std::uint64_t leased = points.size();
   EXPECT_EQ(snapshot().points_leased, leased);
-  EXPECT_EQ(workers(snapshot(), CrewState::kWorking), 1U);
+  EXPECT_EQ(workers(snapshot(), WorkerState::kWorking), 1U);
   now_.steady_ms += 700;
   answer_batch(points.back());  // the last point failed
   const Snapshot after = snapshot();
@@ -81,8 +81,8 @@ TEST_F(SnapshotTest, CountsAWorkerOnce) {
   hello("other");
   now_.steady_ms += 2500;
   credit(1, "one");
-  EXPECT_EQ(workers(snapshot(), CrewState::kSilent), 1U);
-  EXPECT_EQ(workers(snapshot(), CrewState::kIdle), 1U);
+  EXPECT_EQ(workers(snapshot(), WorkerState::kSilent), 1U);
+  EXPECT_EQ(workers(snapshot(), WorkerState::kIdle), 1U);
 }
 
 TEST_F(SnapshotTest, CountsOnlyWhatRunsAsOpen) {

@@ -5,16 +5,50 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <sqlite3.h>
 
-#include "tests/simulation/disk/simulated_file.h"
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {
+
+/// One file on a simulated disk: what a reader sees, and what of it losing power leaves.
+class SimulatedFile {
+ public:
+  SimulatedFile() = default;
+  explicit SimulatedFile(const std::string& durable) : durable_(durable), contents_(durable) {}
+
+  const std::string& contents() const { return contents_; }
+  void write(std::size_t offset, std::string_view bytes);
+  void truncate(std::size_t size);
+  void sync();
+  /// A sync failed, and the system takes the pages for clean nevertheless, as Linux does: what was
+  /// written is read back and never gets to the disk, unless its page is written again.
+  void forget_unsynced();
+
+  /// What was synced stays. Of what was written since, the disk has any part: sectors are written
+  /// whole, in any order, and a sector written several times has any of its states. The size of the
+  /// file is another such thing. What is in the file and was never written is zero.
+  void lose_power(World& world);
+
+ private:
+  struct Step {
+    std::size_t offset;  // or the new size
+    std::string bytes;
+    bool truncates;
+  };
+  class Losses;
+  static void apply(const Step& step, std::string& contents);
+
+  std::string durable_;
+  std::string contents_;
+  std::vector<Step> unsynced_;
+  std::set<std::size_t> forgotten_pages_;
+};
 
 /// What the connections to one database share of its write-ahead index. A crash loses it.
 struct SharedMemory {
@@ -55,8 +89,6 @@ class SimulatedFiles {
   bool sync_failed() const { return sync_failed_; }
   /// Counts processes.
   std::uint64_t life() const { return life_; }
-  /// The last connection that was opened.
-  sqlite3* connection() const { return connection_; }
 
   bool full = false;     ///< no file can grow
   bool failing = false;  ///< reads, writes and syncs fail now and then
@@ -70,7 +102,6 @@ class SimulatedFiles {
   int truncate(SimulatedFile& file, std::size_t size);
   int sync(SimulatedFile& file, bool and_directory);
   bool read_fails() { return failing && world_.chance(0.02); }
-  void opened(sqlite3* connection) { connection_ = connection; }
 
   std::map<const void*, int> locks;  ///< levels of the connections on the database file
   std::weak_ptr<SharedMemory> memory;
@@ -89,7 +120,10 @@ class SimulatedFiles {
   std::uint64_t life_ = 0;
   bool used_ = false;
   bool sync_failed_ = false;
-  sqlite3* connection_ = nullptr;
 };
+
+/// SQLite finds these files at their path from now on, and draws its random numbers from `seed`.
+void add_to_vfs(SimulatedFiles& files, std::uint64_t seed);
+void remove_from_vfs(SimulatedFiles& files);
 
 }  // namespace oblique::simulation

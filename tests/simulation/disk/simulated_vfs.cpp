@@ -1,8 +1,9 @@
 // SQLite's side of the simulated files: a VFS in the place of the default one. It says of itself
 // what the default one says of a Unix file system.
-#include "tests/simulation/disk/simulated_vfs.h"
-
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -162,18 +163,6 @@ int check_reserved_lock(sqlite3_file* raw, int* reserved) {
   return handle.is_dead() ? SQLITE_IOERR_CHECKRESERVEDLOCK : SQLITE_OK;
 }
 
-int file_control(sqlite3_file*, int, void*) {
-  return SQLITE_NOTFOUND;
-}
-
-int sector_size(sqlite3_file*) {
-  return 4096;
-}
-
-int device_characteristics(sqlite3_file*) {
-  return SQLITE_IOCAP_POWERSAFE_OVERWRITE;
-}
-
 int map_memory(sqlite3_file* raw, int region, int, int extend, void volatile** where) {
   Handle& handle = handle_of(raw);
   *where = nullptr;
@@ -227,30 +216,14 @@ int lock_memory(sqlite3_file* raw, int first, int count, int flags) {
   return SQLITE_OK;
 }
 
-void memory_barrier(sqlite3_file*) {}
-
-const sqlite3_io_methods& io_methods() {
-  static const sqlite3_io_methods kMethods{2,
-                                           close,
-                                           read,
-                                           write,
-                                           truncate,
-                                           sync,
-                                           file_size,
-                                           lock,
-                                           unlock,
-                                           check_reserved_lock,
-                                           file_control,
-                                           sector_size,
-                                           device_characteristics,
-                                           map_memory,
-                                           lock_memory,
-                                           memory_barrier,
-                                           unmap,
-                                           nullptr,
-                                           nullptr};
-  return kMethods;
-}
+// clang-format off
+constexpr sqlite3_io_methods kMethods{
+    2, close, read, write, truncate, sync, file_size, lock, unlock, check_reserved_lock,
+    [](sqlite3_file*, int, void*) { return SQLITE_NOTFOUND; },
+    [](sqlite3_file*) { return 4096; },
+    [](sqlite3_file*) { return SQLITE_IOCAP_POWERSAFE_OVERWRITE; },
+    map_memory, lock_memory, [](sqlite3_file*) {}, unmap, nullptr, nullptr};
+// clang-format on
 
 int open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* flags_out) {
   SimulatedFiles* files = name == nullptr ? nullptr : vfs().owner_of(name);
@@ -263,7 +236,7 @@ int open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* fla
     return SQLITE_CANTOPEN;
   }
   auto* handle = new (file) Handle;
-  handle->pMethods = &io_methods();
+  handle->pMethods = &kMethods;
   handle->files = files;
   handle->file = std::move(opened);
   handle->life = files->life();
@@ -295,19 +268,6 @@ int randomness(sqlite3_vfs*, int size, char* bytes) {
   return size;
 }
 
-int sleep(sqlite3_vfs*, int duration_us) {
-  return duration_us;
-}
-
-/// SQLite calls this for each new connection.
-int note_connection(sqlite3* connection, const char**, const sqlite3_api_routines*) {
-  const char* name = sqlite3_db_filename(connection, "main");
-  if (SimulatedFiles* files = name == nullptr ? nullptr : vfs().owner_of(name)) {
-    files->opened(connection);
-  }
-  return SQLITE_OK;
-}
-
 void register_once() {
   if (vfs().original != nullptr) {
     return;
@@ -323,9 +283,8 @@ void register_once() {
   methods.xDelete = remove;
   methods.xAccess = access;
   methods.xRandomness = randomness;
-  methods.xSleep = sleep;
+  methods.xSleep = [](sqlite3_vfs*, int duration_us) { return duration_us; };
   sqlite3_vfs_register(&methods, 1);
-  sqlite3_auto_extension(reinterpret_cast<void (*)()>(note_connection));
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
-#include "server/service/ports/ports.h"
+#include "server/service/ports.h"
 
-#include <bit>
 #include <ctime>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -18,19 +18,13 @@ std::string iso_8601(Instant now) {
                      now.utc_ms % 1000);
 }
 
-Delivery Ports::send(const std::string& worker, const protocol::ServerToWorker& message) {
-  return to_worker(worker, protocol::encode(message));
-}
-
 bool Ports::reply(const Client& client, protocol::ClientReply reply) {
   reply.set_request_id(client.request_id);
   return to_client(client.identity, protocol::encode(reply));
 }
 
 bool Ports::reply_error(const Client& client, const std::string& message) {
-  protocol::ClientReply error;
-  error.mutable_error()->set_message(message);
-  return reply(client, std::move(error));
+  return reply(client, error_reply(message));
 }
 
 bool Ports::reply_still_working(const Client& client, bool runs) {
@@ -42,13 +36,34 @@ bool Ports::reply_still_working(const Client& client, bool runs) {
   return reply({client.identity, kNoRequest}, std::move(message));
 }
 
-void BadFrames::count(std::string_view sender) {
-  ++count_;
-  if (std::has_single_bit(count_)) {
-    ports_.log(
-        Severity::kWarning,
-        fmt::format("{} sent a frame that is no message ({} of them so far)", sender, count_));
+protocol::ClientReply error_reply(const std::string& message) {
+  protocol::ClientReply reply;
+  reply.mutable_error()->set_message(message);
+  return reply;
+}
+
+void PeerLog::write(Severity severity, const std::string& text) {
+  if (++lines_ <= kMostLines) {
+    ports_.log(severity, text);
   }
+}
+
+void PeerLog::bad_frame(std::string_view sender) {
+  ++bad_frames_;
+  write(Severity::kWarning,
+        fmt::format("{} sent a frame that is no message ({} of them so far)", sender, bad_frames_));
+}
+
+void PeerLog::tick(std::int64_t now_ms) {
+  constexpr std::int64_t kSpan_ms = 10'000;
+  if (now_ms - span_began_ms_ < kSpan_ms) {
+    return;
+  }
+  if (lines_ > kMostLines) {
+    ports_.log(Severity::kInfo, fmt::format("and {} more lines about peers", lines_ - kMostLines));
+  }
+  span_began_ms_ = now_ms;
+  lines_ = 0;
 }
 
 }  // namespace oblique::server

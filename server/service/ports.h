@@ -77,7 +77,6 @@ class Ports {
   virtual void log(Severity severity, const std::string& text) = 0;
 
   // ---- The same for messages.
-  Delivery send(const std::string& worker, const protocol::ServerToWorker& message);
   /// Sets the number of the request in `reply`.
   bool reply(const Client& client, protocol::ClientReply reply);
   bool reply_error(const Client& client, const std::string& message);
@@ -85,17 +84,27 @@ class Ports {
   bool reply_still_working(const Client& client, bool runs);
 };
 
-/// Counts frames that no sound peer sends. The log gets a line at each power of two.
-class BadFrames {
- public:
-  explicit BadFrames(Ports& ports) : ports_(ports) {}
+protocol::ClientReply error_reply(const std::string& message);
 
-  void count(std::string_view sender);
-  std::uint64_t total() const { return count_; }
+/// Log lines that peers can cause at any rate: at most 20 in 10 s, then the number of the others.
+class PeerLog {
+ public:
+  explicit PeerLog(Ports& ports) : ports_(ports) {}
+
+  void write(Severity severity, const std::string& text);
+  /// No sound peer sends such a frame.
+  void bad_frame(std::string_view sender);
+  /// To be called several times a second.
+  void tick(std::int64_t now_ms);
+  std::uint64_t bad_frames() const { return bad_frames_; }
 
  private:
+  static constexpr std::uint64_t kMostLines = 20;
+
   Ports& ports_;
-  std::uint64_t count_ = 0;
+  std::uint64_t bad_frames_ = 0;
+  std::int64_t span_began_ms_ = 0;
+  std::uint64_t lines_ = 0;  // since then, written or left out
 };
 
 }  // namespace oblique::server

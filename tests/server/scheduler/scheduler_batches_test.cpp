@@ -1,0 +1,445 @@
+// How large batches are, and which points belong together.
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/server/scheduler/scheduler_bench.h"
+#include "tests/support/recipes.h"
+#include "worker/solver/model/fall_model.h"
+
+namespace oblique::server {
+namespace {
+
+using protocol::listed;
+using protocol::PointTable;
+using protocol::range;
+
+// ---- Pace ----
+
+/// Batches follow a worker's pace and nothing else.
+SchedulerSettings by_pace_alone() {
+  SchedulerSettings settings = trusting();
+  settings.tail_batches_per_thread = 0;
+  settings.growth = 1'000'000;
+  return settings;
+}
+
+TEST(SchedulerPace, ABatchTakesTheTimeAimedAt) {
+  SchedulerBench bench(by_pace_alone());
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch next = bench.next_after(bench.join(1, 1).at(0), 1e-3);
+  EXPECT_EQ(next.count(), 100U) << "0.1 s at 1 ms a point";
+}
+
+TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.first_batch_points = 100;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 1e-3);
+  EXPECT_EQ(bench.next_after(second, 3e-3).count(), 50U) << "0.1 s at 2 ms a point";
+}
+
+TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLittleOfOthers) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.first_batch_points = 1000;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch first = bench.join(1, 1).at(0);
+  const auto part = [&](std::uint64_t from, std::uint64_t to, double busy_s, bool is_last) {
+    ResultsReceived message{1, 1, first.lease, ++bench.sequence, is_last, busy_s, {}};
+    for (std::uint64_t point = from; point < to; ++point) {
+      message.outcomes.push_back({point, false});
+    }
+    bench.feed(message);
+  };
+  part(0, 10, 0.2, false);
+  part(10, 1000, 0.099, true);
+  const SendBatch next = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
+  EXPECT_NEAR(static_cast<double>(next.count()), 0.1 / (0.299 / 1000), 5.0);
+}
+
+TEST(SchedulerPace, WhoSaysThatPointsTakeDaysIsNotBelieved) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.first_batch_points = 100;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  EXPECT_EQ(bench.next_after(bench.join(1, 1).at(0), 1e9).count(), 100U);
+}
+
+TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
+  SchedulerBench bench(by_pace_alone());
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 0.5);
+  EXPECT_EQ(second.count(), 8U) << "0.5 s a point, and eight at a time take little longer than one";
+  const SendBatch third = bench.next_after(second, 5.0);
+  EXPECT_LT(third.count(), 4U) << "but not when they take minutes";
+}
+
+TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
+  SchedulerSettings settings = trusting();
+  settings.shortest_batch_s = 0.01;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1000), {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  std::vector<std::uint64_t> counts;
+  for (std::uint64_t left = 1000 - batch.count(); left > 0; left -= batch.count()) {
+    batch = bench.next_after(batch, 1e-4);
+    counts.push_back(batch.count());
+  }
+  EXPECT_GE(counts.at(counts.size() - 2), 100U) << "0.01 s at 0.1 ms a point";
+  EXPECT_LT(counts.size(), 12U);
+}
+
+TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
+  SchedulerSettings settings = by_pace_alone();
+  settings.growth = 4;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  const SendBatch first = bench.join(1, 1).at(0);
+  EXPECT_EQ(bench.next_after(first, 1e-6).count(), 4 * first.count());
+}
+
+// ---- Where a batch ends ----
+
+/// Two models of 10 points each, then 30 points of the base model, then 40 models of one point.
+PointTable mixed_table() {
+  return PointTable(protocol::recipe_of(
+      {{listed("E", {6e10, 7e10}), listed("H", {1.0}), range("mu", 0.1, 1.0, 10), listed("e", {1})},
+       {listed("H", {1.0}), range("mu", 0.1, 1.0, 30), listed("e", {1.0})},
+       {range("k", 1e7, 2e7, 40), listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})}}));
+}
+
+std::uint64_t cut(const Interval& free, const BatchSize& wanted) {
+  return end_of_batch(mixed_table(), PointOrder{}, free, wanted);
+}
+
+TEST(BatchCut, ABatchEndsWithTheModelThatEndsNearest) {
+  EXPECT_EQ(cut({0, 90}, {.points = 12}), 10U);
+  EXPECT_EQ(cut({0, 90}, {.points = 18, .most_points = 25}), 10U);
+  EXPECT_EQ(cut({8, 90}, {.points = 8, .most_points = 12}), 20U) << "two points would be few";
+}
+
+TEST(BatchCut, AModelOfMorePointsThanABatchMayHaveIsShared) {
+  EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 29}), 32U);
+  EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 30}), 50U);
+}
+
+TEST(BatchCut, ABatchHasSoManyModelsAsItHasRoomFor) {
+  EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 100}), 58U);
+  EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 5}), 55U);
+  EXPECT_EQ(cut({0, 90}, {.points = 3, .groups = 2, .most_points = 20}), 20U);
+  EXPECT_EQ(cut({0, 90}, {.points = 3, .groups = 2, .most_points = 19}), 10U);
+}
+
+TEST(BatchCut, NoBatchLeavesTheFreePoints) {
+  for (std::uint64_t begin = 0; begin < 90; begin += 7) {
+    for (std::uint64_t end = begin + 1; end <= 90; end += 5) {
+      for (const std::uint64_t points : {0U, 1U, 8U, 17U, 1000U}) {
+        for (const std::uint64_t most : {0U, 9U, 40U, 1000U}) {
+          const auto at = cut({begin, end}, {points, 8, most, {}});
+          ASSERT_GT(at, begin);
+          ASSERT_LE(at, end);
+          ASSERT_LE(at - begin, std::max({points, most, std::uint64_t{1}}));
+        }
+      }
+    }
+  }
+}
+
+// ---- Several models ----
+
+/// `models` models of `points` points each.
+std::shared_ptr<const PointTable> table_of_models(std::uint64_t models, std::uint64_t points) {
+  return std::make_shared<const PointTable>(protocol::recipe_of(
+      {{range("E", 6e10, 7e10, models), listed("H", {1.0}),
+        points == 1 ? listed("mu", {0.4}) : range("mu", 0.1, 1.0, points), listed("e", {1.0})}}));
+}
+
+/// In studies of models of many points: the model that a batch begins with.
+constexpr std::uint64_t kMany = 100'000;
+std::uint64_t model_of(const SendBatch& batch) {
+  return batch.first_point() / kMany;
+}
+
+TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of_models(10'000, 1), {}});
+  const auto batches = bench.join(1, 2, 3);
+  ASSERT_EQ(batches.size(), 2U);
+  EXPECT_EQ(batches[0].count(), 24U);
+  EXPECT_EQ(batches[1].first_point(), 24U);
+}
+
+TEST(SchedulerModels, BatchesOfAPointAModelFillLanesAlsoWhereAFallTakesLongerThanABatchShould) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of_models(10'000, 1), {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  for (int i = 0; i < 5; ++i) {
+    batch = bench.next_after(batch, 0.5);
+    EXPECT_EQ(batch.count(), 8U);
+  }
+  for (int i = 0; i < 5; ++i) {
+    batch = bench.next_after(batch, 30.0);
+  }
+  EXPECT_EQ(batch.count(), 1U) << "a lost worker would cost minutes";
+}
+
+TEST(SchedulerModels, InTheEndEveryWorkerHasItsPart) {
+  SchedulerBench bench(trusting());
+  bench.feed(WorkerJoined{1, 1});
+  bench.feed(WorkerJoined{2, 1});
+  bench.feed(CreditGiven{1, 2});
+  bench.feed(CreditGiven{2, 2});
+  const auto batches = only<SendBatch>(bench.feed(StudyAdded{1, table_of_models(14, 1), {}}));
+  ASSERT_EQ(batches.size(), 2U);
+  EXPECT_EQ(batches[0].count(), 7U);
+  EXPECT_EQ(batches[1].count(), 7U);
+  EXPECT_NE(batches[0].worker, batches[1].worker);
+}
+
+TEST(SchedulerModels, ABatchEndsWithAModelWhereItCan) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of_models(2000, 9), {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  std::uint64_t whole = 0;
+  for (int i = 0; i < 12; ++i) {
+    batch = bench.next_after(batch, 1e-3);
+    whole += (batch.first_point() + batch.count()) % 9 == 0 ? 1U : 0U;
+  }
+  EXPECT_GE(whole, 10U) << "at first too little is known of its pace";
+}
+
+TEST(SchedulerModels, ModelsOfManyPointsFillLanesForAsLongAsABatchMayTakeForIt) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of_models(1000, 1000), {}});
+  SendBatch batch = bench.join(1, 1).at(0);
+  for (int i = 0; i < 20; ++i) {
+    batch = bench.next_after(batch, 1e-4);
+  }
+  EXPECT_EQ(batch.count(), 8000U) << "0.8 s, and eight falls side by side";
+  for (int i = 0; i < 20; ++i) {
+    batch = bench.next_after(batch, 5e-4);
+  }
+  EXPECT_EQ(batch.count(), 2000U) << "1 s";
+}
+
+TEST(SchedulerModels, WorkersTakeModelsOfTheirOwnWhileThereAreAny) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of_models(3, kMany), {}});
+  std::vector<SendBatch> held;
+  for (const WorkerId worker : {1U, 2U, 3U}) {
+    held.push_back(bench.join(worker, 1).at(0));
+  }
+  for (int round = 0; round < 10; ++round) {
+    for (std::uint64_t i = 0; i < held.size(); ++i) {
+      EXPECT_EQ(model_of(held[i]), i) << "whose fall it has";
+      held[i] = bench.next_after(held[i], 1e-4);
+    }
+  }
+  EXPECT_EQ(model_of(bench.join(4, 1).at(0)), 0U) << "all models are begun: it helps with one";
+}
+
+TEST(SchedulerModels, AWorkerFinishesItsModelAlsoWhenAnotherTookPartOfIt) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of_models(2, kMany), {}});
+  const SendBatch first = bench.join(1, 1).at(0);
+  const SendBatch other = bench.join(2, 1).at(0);
+  const SendBatch helper = bench.join(3, 1).at(0);
+  EXPECT_EQ(model_of(helper), model_of(first));
+  EXPECT_EQ(model_of(bench.next_after(first, 1e-4)), model_of(first));
+  EXPECT_EQ(model_of(bench.next_after(other, 1e-4)), model_of(other));
+}
+
+TEST(SchedulerModels, ALongBatchCountsForAsManyAsItTakesInTheShareOfAStudy) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of_models(100'000, 1), {}});
+  bench.feed(StudyAdded{2, table_of(1'000'000), {}});
+  std::vector<SendBatch> held = bench.join(1, 2);
+  double busy_s[3] = {};
+  for (std::size_t i = 0; i < 500; ++i) {
+    const SendBatch batch = held[i];
+    const double s_per_point = batch.study == 1 ? 0.1 : 1e-4;
+    busy_s[batch.study] += s_per_point * static_cast<double>(batch.count());
+    held.push_back(bench.next_after(batch, s_per_point));
+  }
+  EXPECT_NEAR(busy_s[1] / busy_s[2], 1.0, 0.1);
+}
+
+// ---- Falls that lie apart ----
+
+std::shared_ptr<const PointTable> sample(std::uint64_t points, std::uint64_t falls) {
+  return std::make_shared<const PointTable>(
+      protocol::sample_with_falls(points, falls, protocol::SAMPLE_LATIN_HYPERCUBE));
+}
+
+/// Every `step`-th of `numbers` points, the first included.
+IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
+  IntervalSet points;
+  for (std::uint64_t point = 0; point < numbers; point += step) {
+    points.insert(point);
+  }
+  return points;
+}
+
+/// The points of all batches, in order.
+std::vector<std::uint64_t> points_in(const std::vector<SendBatch>& batches) {
+  std::vector<std::uint64_t> points;
+  for (const SendBatch& batch : batches) {
+    for (const Interval& range : batch.points) {
+      for (std::uint64_t point = range.begin; point < range.end; ++point) {
+        points.push_back(point);
+      }
+    }
+  }
+  return points;
+}
+
+TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerButForAFewThatAreShared) {
+  SchedulerBench bench;
+  const auto table = sample(20'000, 500);
+  bench.feed(StudyAdded{1, table, {}});
+  std::vector<SendBatch> batches;
+  for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
+    for (const SendBatch& batch : bench.join(worker, 2)) {
+      batches.push_back(batch);
+    }
+  }
+  batches = bench.solve_all(batches, 5e-3);
+  std::set<std::pair<std::uint64_t, WorkerId>> falls_solved;
+  for (const SendBatch& batch : batches) {
+    for (const std::uint64_t point : points_in({batch})) {
+      const auto& model = table->model(table->point(point).model);
+      falls_solved.emplace(solver::fall_hash(model), batch.worker);
+    }
+  }
+  EXPECT_EQ(points_in(batches).size(), 20'000U);
+  EXPECT_GE(falls_solved.size(), 500U);
+  EXPECT_LE(falls_solved.size(), 530U);
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 20'000U);
+}
+
+TEST(SchedulerFalls, AServerThatStartsAgainHandsOutTheRest) {
+  SchedulerBench bench;
+  const IntervalSet completed = every(3, 2'000);
+  bench.feed(StudyAdded{1, sample(2'000, 50), completed});
+  const auto points = points_in(bench.solve_all(bench.join(1, 2), 5e-3));
+  EXPECT_EQ(points.size(), 2'000U - completed.size());
+  EXPECT_TRUE(
+      std::ranges::none_of(points, [&](std::uint64_t point) { return completed.contains(point); }));
+  EXPECT_EQ(bench.scheduler.study(1).solved(), 2'000U);
+}
+
+TEST(SchedulerFalls, PointsOfALostWorkerComeBackAndAFailedPointIsNamedByItsNumber) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, sample(300, 4), {}});
+  const std::uint64_t failed = bench.join(1, 1).at(0).first_point();
+  bench.feed(WorkerLeft{1});
+  EXPECT_EQ(points_in(bench.solve_all(bench.join(2, 2))).size(), 300U);
+  const auto again =
+      only<SendBatch>(bench.feed(FailuresForgotten{1, IntervalSet(failed, failed + 1)}));
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(again[0].points, (std::vector<Interval>{{failed, failed + 1}}));
+}
+
+// ---- Points between completed ones, as where a finer grid has reused a coarser one ----
+
+StudyPoints points_without(std::uint64_t numbers, IntervalSet completed) {
+  return {StudyTable(table_of(numbers)), std::move(completed), 0, LossLimits{}};
+}
+
+Batch taken(StudyPoints& points, const BatchSize& wanted) {
+  const auto batch = points.take(wanted);
+  points.check_invariants();
+  return batch.value();
+}
+
+TEST(ScatteredPointsTest, ABatchGoesOnBehindSettledPointsUntilItHasWhatIsWanted) {
+  StudyPoints points = points_without(100, every(2, 100));
+  const Batch batch = taken(points, {8});
+  EXPECT_EQ(batch.first_place, 1U);
+  EXPECT_EQ(batch.end(), 16U);
+  EXPECT_EQ(batch.points, 8U);
+  EXPECT_EQ(points.leased(), 8U);
+  EXPECT_EQ(taken(points, {8}).first_place, 17U);
+}
+
+TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGap) {
+  StudyPoints points = points_without(1000, [] {
+    IntervalSet completed(0, 3);
+    completed.insert(5, 8);
+    return completed;
+  }());
+  EXPECT_EQ(taken(points, {2}).end(), 5U);
+  points.reopen(IntervalSet(0, 8));
+  EXPECT_EQ(taken(points, {8}).end(), 3U) << "3 and 4 are still out";
+
+  StudyPoints sparse = points_without(1000, [] {
+    IntervalSet completed(3, 500);
+    completed.insert(505, 520);
+    return completed;
+  }());
+  EXPECT_EQ(taken(sparse, {8}).end(), 3U);
+  const Batch next = taken(sparse, {8});
+  EXPECT_EQ(next.first_place, 500U);
+  EXPECT_EQ(next.end(), 523U);
+  EXPECT_EQ(next.points, 8U);
+}
+
+TEST(ScatteredPointsTest, ABatchGoesOnIntoAnotherModelOnlyWhereThatHasRoomInIt) {
+  const auto table = std::make_shared<const protocol::PointTable>(
+      protocol::recipe_of({{protocol::listed("E", {6e10, 7e10}), protocol::listed("H", {1.0}),
+                            protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
+  StudyPoints points(StudyTable(table), every(2, 20), 0, LossLimits{});
+  EXPECT_EQ(taken(points, {8}).end(), 10U) << "the other's fall is another worker's";
+  StudyPoints both(StudyTable(table), every(2, 20), 0, LossLimits{});
+  EXPECT_EQ(taken(both, {18}).end(), 20U);
+}
+
+TEST(ScatteredPointsTest, NothingIsHandedOutTwiceNorWhatIsCompleted) {
+  SchedulerSettings settings = trusting();
+  settings.first_batch_points = 16;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1000), every(2, 1000)});
+  const auto solved = points_in(bench.solve_all(bench.join(1, 2)));
+  ASSERT_EQ(solved.size(), 500U);
+  for (std::size_t i = 0; i < solved.size(); ++i) {
+    EXPECT_EQ(solved[i], 2 * i + 1);
+  }
+}
+
+TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {
+  SchedulerSettings settings = trusting();
+  settings.first_batch_points = 16;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(1000), every(2, 1000)});
+  ResultsReceived answer = bench.answer_to(bench.join(1, 1).at(0));
+  ASSERT_EQ(answer.outcomes.size(), 16U);
+  answer.outcomes.resize(5);
+  answer.batch_done = false;
+  bench.feed(answer);
+  bench.feed(WorkerLeft{1});
+  EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
+  EXPECT_EQ(points_in(bench.join(2, 1000)).size(), 495U);
+}
+
+TEST(ScatteredPointsTest, ResultsOfSettledPointsBetweenThoseOfABatchAreNotTaken) {
+  SchedulerBench bench(trusting());
+  bench.feed(StudyAdded{1, table_of(100), every(2, 100)});
+  SendBatch batch = bench.join(1, 1).at(0);
+  const std::uint64_t wanted = batch.count();
+  ASSERT_GT(batch.points.size(), 1U);
+  batch.points = {{batch.points.front().begin, batch.points.back().end}};
+  const auto stores = only<StoreResults>(bench.solve(batch));
+  ASSERT_EQ(stores.size(), 1U);
+  EXPECT_EQ(stores[0].accepted.size(), wanted);
+}
+
+}  // namespace
+}  // namespace oblique::server

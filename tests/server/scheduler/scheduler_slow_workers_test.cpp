@@ -1,0 +1,312 @@
+// Workers that take too long: others get their points, and nothing counts as lost.
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/server/scheduler/scheduler_bench.h"
+
+namespace oblique::server {
+namespace {
+
+constexpr std::int64_t kMinute_ms = 60'000;
+
+TEST(SchedulerStall, AStudyEndsBesideWorkersThatTakeCreditsAndOnlySendHeartbeats) {
+  SchedulerBench bench;
+  bench.feed(StudyAdded{1, table_of(2000), {}});
+  std::vector<Effect> effects;
+  for (const WorkerId idle : {1U, 2U}) {
+    for (const SendBatch& batch : bench.join(idle, 2)) {
+      bench.solve_and_store(batch);
+    }
+  }
+  for (const WorkerId idle : {1U, 2U}) {
+    bench.feed(CreditGiven{idle, 1024});
+  }
+  SchedulerBench::append(effects, bench.join_as("sound", 3, 2));
+  bool is_finished = false;
+  for (int step = 0; step < 40'000 && !is_finished; ++step) {
+    std::vector<Effect> next = bench.pass(250, {1, 2, 3});
+    for (const SendProbe& probe : only<SendProbe>(effects)) {
+      SchedulerBench::append(next, bench.solve_probe(probe));  // the idle ones solve these, too
+    }
+    for (const SendBatch& batch : only<SendBatch>(effects)) {
+      if (batch.worker == 3) {
+        SchedulerBench::append(next, bench.solve_and_store(batch));
+        SchedulerBench::append(next, bench.feed(CreditGiven{3, 1}));
+      }
+    }
+    EXPECT_TRUE(only<StoreFailure>(next).empty());
+    is_finished = !only<StudyFinished>(next).empty();
+    effects = std::move(next);
+  }
+  EXPECT_TRUE(is_finished) << bench.scheduler.study(1).leased << " points are still leased";
+}
+
+/// Worker 1 holds the only four points, and worker 2 waits.
+class StallTest : public testing::Test {
+ protected:
+  StallTest() : bench_(settings()) {
+    bench_.feed(StudyAdded{1, table_of(4), {}});
+    batch_ = bench_.join(1, 1).at(0);
+    EXPECT_EQ(batch_.count(), 4U);
+  }
+
+  static SchedulerSettings settings() {
+    SchedulerSettings settings;
+    settings.tail_batches_per_thread = 0;
+    return settings;
+  }
+
+  SchedulerBench bench_;
+  SendBatch batch_{};
+};
+
+TEST_F(StallTest, AMinuteWithoutAResultEndsTheLeasesOfAWorker) {
+  EXPECT_TRUE(only<ReleaseBatch>(bench_.pass(kMinute_ms, {1})).empty()) << "too early";
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
+  const auto effects = bench_.pass(1000, {1});
+  const auto released = only<ReleaseBatch>(effects);
+  ASSERT_EQ(released.size(), 1U);
+  EXPECT_EQ(released[0].lease, batch_.lease);
+  EXPECT_TRUE(only<DropWorker>(effects).empty());
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
+  EXPECT_TRUE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside);
+}
+
+TEST_F(StallTest, ItsPointsAreNotSuspectHoweverManyWorkersStallWithThem) {
+  for (WorkerId worker = 2; worker <= 20; ++worker) {
+    EXPECT_TRUE(only<StoreFailure>(bench_.pass(kMinute_ms + 1000, {worker - 1})).empty());
+    bench_.feed(WorkerLeft{worker - 1});
+    const auto batches = bench_.join(worker, 1);
+    ASSERT_EQ(batches.size(), 1U);
+    EXPECT_EQ(batches[0].count(), 4U) << "they go out together";
+    EXPECT_EQ(batches[0].attempt, worker);
+  }
+}
+
+TEST_F(StallTest, WhatItSendsLateIsStoredOnce) {
+  bench_.pass(kMinute_ms + 1000, {1});
+  const auto again = bench_.join(2, 1);
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(only<StoreResults>(bench_.solve_and_store(batch_)).at(0).accepted.size(), 4U);
+  EXPECT_FALSE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside) << "it was slow";
+  EXPECT_TRUE(only<StoreResults>(bench_.solve_and_store(again[0])).at(0).accepted.empty());
+  EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
+}
+
+TEST_F(StallTest, AWorkerThatStoresSomethingInTimeKeepsItsBatch) {
+  for (std::uint64_t point = 0; point < 3; ++point) {
+    bench_.pass(kMinute_ms - 1000, {1});
+    bench_.feed(ResultsReceived{1, 1, batch_.lease, point + 1, false, 50.0, {{point, false}}});
+  }
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 1U);
+}
+
+TEST_F(StallTest, WhileTheDatabaseTakesNothingNoWorkerStalls) {
+  bench_.feed(DispatchHeld{true});
+  bench_.pass(10 * kMinute_ms, {1});
+  bench_.feed(DispatchHeld{false});
+  bench_.pass(kMinute_ms, {1});
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
+}
+
+TEST_F(StallTest, TimeInWhichTheServerDidNotRunDoesNotCount) {
+  bench_.pass(1000, {1});
+  bench_.now_ms += 10 * kMinute_ms;
+  bench_.feed(CreditGiven{1, 0});
+  bench_.pass(kMinute_ms / 2, {1});
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
+}
+
+TEST_F(StallTest, AfterThatItGetsAProbeAndThenTwoBatchesAgain) {
+  bench_.feed(StudyAdded{2, table_of(1'000'000), {}});
+  bench_.feed(CreditGiven{1, 1024});
+  const auto probe = only<SendProbe>(bench_.pass(kMinute_ms + 1000, {1}));
+  ASSERT_EQ(probe.size(), 1U);
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(kMinute_ms, {1})).empty()) << "it solves nothing";
+  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).size(), 2U);
+}
+
+TEST(SchedulerStall, SlowPointsGetAMultipleOfTheTimeThatTheFastestWorkerNeeds) {
+  SchedulerSettings settings = trusting();
+  settings.first_batch_points = 1;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(100), {}});
+  const SendBatch quick = bench.join(1, 1).at(0);
+  const SendBatch slow = bench.join(2, 1).at(0);
+  bench.pass(10'000, {1, 2});
+  bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
+  // Ten times what eight points side by side take.
+  bench.pass(780'000, {1, 2});
+  EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
+  bench.pass(20'000, {1, 2});
+  EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
+}
+
+/// Workers 1 and 2, of which the first holds all four points in one batch and the second waits.
+class StragglerTest : public testing::Test {
+ protected:
+  StragglerTest() : bench_(settings()) {
+    bench_.feed(StudyAdded{1, table_of(4), {}});
+    first_ = bench_.join(1, 1).at(0);
+    EXPECT_EQ(first_.count(), 4U);
+    EXPECT_TRUE(bench_.join(2, 1).empty());
+  }
+
+  static SchedulerSettings settings() {
+    SchedulerSettings settings;
+    settings.tail_batches_per_thread = 0;
+    return settings;
+  }
+
+  /// The batch that worker 2 gets once the first one straggles.
+  SendBatch second() {
+    const auto batches = only<SendBatch>(bench_.pass(1500, {1, 2}));
+    EXPECT_EQ(batches.size(), 1U);
+    return batches.at(0);
+  }
+
+  /// Answers to some points of a batch, which become durable.
+  std::vector<Effect> answer(const SendBatch& batch, const std::vector<std::uint64_t>& points,
+                             bool done) {
+    ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench_.sequence, done, 0.0, {}};
+    for (const std::uint64_t point : points) {
+      event.outcomes.push_back({point, false});
+    }
+    return bench_.store(event);
+  }
+
+  SchedulerBench bench_;
+  SendBatch first_{};
+};
+
+TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(750, {1, 2})).empty()) << "too early";
+  const SendBatch batch = second();
+  EXPECT_EQ(batch.worker, 2U);
+  EXPECT_EQ(batch.first_point(), 0U);
+  EXPECT_EQ(batch.count(), 4U);
+  EXPECT_EQ(batch.attempt, 2U);
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U) << "points count once";
+}
+
+TEST_F(StragglerTest, OnlyWhatIsLeftOfTheBatchGoesToTheSecondWorker) {
+  answer(first_, {0, 1}, false);
+  const SendBatch batch = second();
+  EXPECT_EQ(batch.first_point(), 2U);
+  EXPECT_EQ(batch.count(), 2U);
+}
+
+TEST_F(StragglerTest, TheFirstAnswerWinsAndTheOtherWorkerIsReleased) {
+  const SendBatch batch = second();
+  const auto effects = answer(batch, {0, 1, 2, 3}, true);
+  EXPECT_EQ(only<StudyFinished>(effects).size(), 1U);
+  const auto released = only<ReleaseBatch>(effects);
+  ASSERT_EQ(released.size(), 1U);
+  EXPECT_EQ(released[0].worker, 1U);
+  EXPECT_EQ(released[0].lease, first_.lease);
+  const auto late = only<StoreResults>(answer(first_, {0, 1, 2, 3}, true));
+  EXPECT_TRUE(late.at(0).accepted.empty()) << "what comes late is stored once only";
+}
+
+TEST_F(StragglerTest, TheStragglerMayWinToo) {
+  const SendBatch batch = second();
+  answer(batch, {0}, false);
+  const auto released = only<ReleaseBatch>(answer(first_, {0, 1, 2, 3}, true));
+  ASSERT_EQ(released.size(), 1U);
+  EXPECT_EQ(released[0].worker, 2U);
+  EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
+}
+
+TEST_F(StragglerTest, PointsStayLeasedWhileOneOfTheTwoWorkersHasThem) {
+  const SendBatch batch = second();
+  bench_.feed(WorkerUnreachable{1});
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
+  bench_.feed(WorkerLeft{2});
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
+  EXPECT_EQ(bench_.join(3, 1).at(0).count(), 4U);
+  EXPECT_EQ(batch.worker, 2U);
+}
+
+TEST_F(StragglerTest, AWorkerDoesNotGetItsOwnBatchTwiceNorAThirdWorkerOne) {
+  second();
+  bench_.feed(CreditGiven{1, 1});
+  bench_.join(3, 1);
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(20'000, {1, 2, 3})).empty());
+}
+
+TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStraggler) {
+  // Worker 2 is known to need 10 s a point.
+  SchedulerSettings one = settings();
+  one.first_batch_points = 1;
+  SchedulerBench slow(one);
+  slow.feed(StudyAdded{1, table_of(2), {}});
+  slow.join(1, 1);
+  const auto batch = slow.join(2, 1).at(0);
+  slow.pass(10'000, {1, 2});
+  slow.solve_and_store(batch, 10.0);
+  slow.feed(CreditGiven{2, 1});
+  EXPECT_TRUE(only<SendBatch>(slow.pass(25'000, {1, 2})).empty());
+  EXPECT_EQ(only<SendBatch>(slow.pass(10'000, {1, 2})).size(), 1U);
+}
+
+TEST_F(StragglerTest, ABatchThatWaitsBehindAnotherOfItsWorkerIsTakenOver) {
+  SchedulerSettings one = settings();
+  one.first_batch_points = 1;
+  SchedulerBench bench(one);
+  bench.feed(StudyAdded{1, table_of(3), {}});
+  bench.feed(WorkerJoined{1, 1});
+  bench.feed(CreditGiven{1, 1});
+  const auto batch = bench.join(2, 1).at(0);
+  bench.now_ms += 10;
+  const auto waits = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
+  bench.pass(2000, {1, 2});
+  bench.solve_and_store(batch, 2.0);
+  bench.feed(CreditGiven{2, 1});
+  const auto taken = only<SendBatch>(bench.pass(500, {1, 2}));
+  ASSERT_EQ(taken.size(), 1U);
+  EXPECT_EQ(taken[0].first_point(), waits.first_point());
+}
+
+TEST_F(StragglerTest, ABatchThatKillsWorkersIsFoundAlthoughTwoOfThemHadIt) {
+  second();
+  bench_.feed(WorkerUnreachable{1});
+  bench_.join(3, 1);
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty()) << "not given to a third worker";
+  const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
+  // Two workers were lost: the points are suspect now, and go to a worker that has proven itself.
+  ASSERT_EQ(probe.size(), 1U);
+  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U) << "split";
+}
+
+TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseEndsThatLease) {
+  bench_.store(ResultsReceived{1, 1, first_.lease, 1, false, 0.0, {{2, true}}});
+  const auto effects = bench_.feed(FailuresForgotten{1, IntervalSet(2, 3)});
+  ASSERT_EQ(only<ReleaseBatch>(effects).size(), 1U);
+  EXPECT_EQ(only<ReleaseBatch>(effects)[0].lease, first_.lease);
+  const auto again = only<SendBatch>(effects);
+  ASSERT_EQ(again.size(), 1U);
+  EXPECT_EQ(again[0].worker, 2U);
+  bench_.feed(WorkerLeft{1});
+  EXPECT_EQ(bench_.scheduler.study(1).leased, again[0].count());
+}
+
+TEST(SchedulerStraggler, ACancelGivesBackThePointsOfLeasesThatOverlap) {
+  SchedulerSettings settings;
+  settings.tail_batches_per_thread = 0;
+  SchedulerBench bench(settings);
+  bench.feed(StudyAdded{1, table_of(4), {}});
+  const SendBatch first = bench.join(1, 1).at(0);
+  bench.join(2, 1);
+  ASSERT_EQ(only<SendBatch>(bench.pass(1500, {1, 2})).size(), 1U) << "it straggles";
+  ASSERT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, first.count());
+  EXPECT_EQ(only<WithdrawStudy>(bench.feed(StudyCancelled{1})).size(), 2U);
+  EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
+  bench.feed(CreditGiven{1, 1});
+  EXPECT_EQ(only<SendBatch>(bench.feed(StudyReopened{1})).size(), 1U);
+}
+
+}  // namespace
+}  // namespace oblique::server
