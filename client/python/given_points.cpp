@@ -136,7 +136,7 @@ GivenPoints points_of(const GivenKeys& given) {
       add_model(all, values, model_keys, base);
     }
     const auto point = values.subspan(given.axes.size() - protocol::kPointKeyOrder.size());
-    all.points.push_back({point[0], point[1], point[2], model->second});
+    all.points.push_back({model->second, {point[0], point[1], point[2]}});
   };
   protocol::visit_values(base, block, given.points, add);
   return all;

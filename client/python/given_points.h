@@ -30,7 +30,7 @@ GivenKeys keys_of(const pybind11::dict& keys, std::size_t points);
 struct GivenPoints {
   std::vector<ModelParameters> models;
   std::vector<std::string> faults;  ///< of each model; empty: the model can be solved
-  std::vector<Point> points;
+  std::vector<ModelPoint> points;
 };
 
 /// Needs no lock of the interpreter. Throws InputError for wrong expressions and combinations. A

@@ -27,10 +27,12 @@ namespace {
 
 namespace py = pybind11;
 
+using Falls = std::shared_ptr<FallCache>;
+
 /// A single point with its model.
 struct OnePoint {
   ModelParameters model;
-  Point point;
+  ModelPoint point;
 };
 
 OnePoint one_point(const py::dict& keys) {
@@ -42,15 +44,15 @@ OnePoint one_point(const py::dict& keys) {
 }
 
 /// The outputs with H, mu and e of the points.
-py::dict with_points(ResultArrays& arrays, const std::vector<Point>& points) {
+py::dict with_points(ResultArrays& arrays, const std::vector<ModelPoint>& points) {
   py::dict all = arrays.dict();
   std::vector<double> H_m;
   std::vector<double> mu;
   std::vector<double> e;
-  for (const Point& point : points) {
+  for (const auto& [model, point] : points) {
     H_m.push_back(point.H_m);
     mu.push_back(point.mu);
-    e.push_back(point.e);
+    e.push_back(point.e_star);
   }
   all["H"] = array_of(std::move(H_m));
   all["mu"] = array_of(std::move(mu));
@@ -68,10 +70,10 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
   const OnePoint one = one_point(keys);
   const auto result = interruptibly<CaseResult>([one, falls, errors](const std::atomic<bool>&) {
     const Finger finger(one.model, falls);
-    const Point& point = one.point;
-    CaseResult solved = finger.solve(point.H_m, point.mu, point.e);
+    const Point& point = one.point.point;
+    CaseResult solved = finger.solve(point.H_m, point.mu, point.e_star);
     if (errors) {
-      solved.errors = finger.estimated_errors(solved);
+      solved.errors = errors_by_companion(one.model, solved, *falls);
     }
     return solved;
   });
@@ -99,8 +101,8 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
       solver::append_numbers(row, rows.numbers);
       rows.states.push_back(solver::code_of_state(row.state));
     };
-    const Point& point = one.point;
-    rows.result = Finger(one.model, falls).trace(point.H_m, point.mu, point.e, tracing);
+    const Point& point = one.point.point;
+    rows.result = Finger(one.model, falls).solve(point.H_m, point.mu, point.e_star, tracing);
     return rows;
   });
   const auto headings = solver::trace_headings(solver::trace_shape(
@@ -139,7 +141,7 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
   {
     WithoutLock others_run;
     given = points_of(given_keys);
-    std::vector<Point> points;
+    std::vector<ModelPoint> points;
     std::vector<std::size_t> places;
     for (std::size_t i = 0; i < count; ++i) {
       if (const std::string& fault = given.faults[given.points[i].model]; !fault.empty()) {
@@ -151,7 +153,7 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
     }
     oblique::solve_many(given.models, points,
                         [&](Outcome&& outcome) {
-                          const std::size_t place = places[outcome.point];
+                          const std::size_t place = places[outcome.number];
                           if (outcome.result) {
                             arrays.set(place, *outcome.result);
                           } else {
@@ -187,8 +189,9 @@ py::list fields() {
 }  // namespace
 
 void add_solving(py::module_& module) {
-  py::class_<Falls>(module, "Falls").def(py::init([] {
-    return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory);
+  py::class_<FallCache, Falls>(module, "Falls").def(py::init([] {
+    return std::make_shared<FallCache>(protocol::available_memory_bytes() /
+                                       solver::kFallsPartOfMemory);
   }));
   module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));

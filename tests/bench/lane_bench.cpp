@@ -7,10 +7,10 @@
 
 #include "tests/bench/counted_number.h"
 #include "tests/bench/multiply_add_peak.h"
-#include "worker/solver/chain/chain.h"
-#include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/fast/lane_stepper.h"
 #include "worker/solver/model/parameters.h"
-#include "worker/solver/motion/pefrl.h"
+#include "worker/solver/reference/chain.h"
+#include "worker/solver/reference/pefrl.h"
 
 namespace oblique::bench {
 namespace {

@@ -30,12 +30,13 @@ int main() {
   constexpr int kDrops = 20;
   constexpr int kFrictions = 50;
   constexpr int kRestitutions = 20;
-  std::vector<oblique::Point> points;
+  std::vector<oblique::ModelPoint> points;
   for (int i = 0; i < kDrops; ++i) {
     for (int j = 0; j < kFrictions; ++j) {
       for (int k = 0; k < kRestitutions; ++k) {
-        points.push_back({value(0.3, 1.1, i, kDrops), value(0.0, 2.0, j, kFrictions),
-                          value(0.5, 1.0, k, kRestitutions)});
+        points.push_back({0,
+                          {value(0.3, 1.1, i, kDrops), value(0.0, 2.0, j, kFrictions),
+                           value(0.5, 1.0, k, kRestitutions)}});
       }
     }
   }
@@ -44,7 +45,7 @@ int main() {
   const double user_before_s = user_s();
   const auto begun = std::chrono::steady_clock::now();
   oblique::solve_many(models, points, [&results](oblique::Outcome&& outcome) {
-    results[outcome.point] = std::move(outcome.result);
+    results[outcome.number] = std::move(outcome.result);
   });
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begun;
   const double user = user_s() - user_before_s;
