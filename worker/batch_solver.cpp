@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "worker/solver/library/point_runs.h"
+#include "worker/solver/point_runs.h"
 
 namespace oblique::worker {
 

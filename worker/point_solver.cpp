@@ -12,12 +12,12 @@
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
 #include "worker/solver/estimate.h"
-#include "worker/solver/library/point_runs.h"
+#include "worker/solver/point_runs.h"
 
 namespace oblique::worker {
 namespace {
 
-protocol::PointResult message_of(const solver::PointOutcome& outcome) {
+protocol::PointResult message_of(const solver::Outcome& outcome) {
   return outcome.result ? protocol::to_message(outcome.number, *outcome.result)
                         : protocol::failed_point(outcome.number, outcome.error);
 }
@@ -39,7 +39,7 @@ class BatchPoints : public solver::PointSource {
       throw solver::InputError(fault);
     }
     const protocol::Point point = batch_.points().point(number);
-    return {point.model, point.H_m, point.mu, point.e_star};
+    return {point.model, {point.H_m, point.mu, point.e_star}};
   }
 
   solver::ModelParameters model(std::uint64_t number) override {
@@ -71,7 +71,7 @@ void PointSolver::solve(const Batch& batch, const BatchSolver::NextPoint& next,
                         const BatchSolver::TakeResult& take) {
   BatchPoints points(batch, next);
   solver::solve_points_of_models(points, falls_, batch.points().wants_errors(),
-                                 [&](solver::PointOutcome&& outcome) {
+                                 [&](solver::Outcome&& outcome) {
                                    protocol::PointResult result = message_of(outcome);
                                    protocol::set_inputs(result, batch.points());
                                    take(std::move(result));
@@ -91,10 +91,7 @@ protocol::PointResult PointSolver::trace(const protocol::TraceOrder& order,
     auto result =
         finger.solve(order.h_m(), order.mu(), order.e_star(), {sink, order.shape(), order.fall()});
     if (order.errors()) {
-      result.errors = solver::errors_by_companion(
-          model, result, [this](std::span<const solver::ModelParameters> models) {
-            return solver::falls_of(falls_, models);
-          });
+      result.errors = solver::errors_by_companion(model, result, falls_);
     }
     return message_of({kNumber, std::move(result), {}});
   } catch (const std::exception& error) {

@@ -9,8 +9,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "worker/solver/chain/chain.h"
 #include "worker/solver/fall_cache.h"
+#include "worker/solver/reference/chain.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
 

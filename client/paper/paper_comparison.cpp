@@ -13,8 +13,8 @@
 
 #include "client/output/printer.h"
 #include "client/paper/published_toml.h"
-#include "worker/solver/contact/contact_record.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/reference/contact_record.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -296,9 +296,9 @@ std::vector<OwnCases> solved_cases(const PublishedTable& table,
         }
         const auto& asked = table.cases[next % cases];
         const auto& finger = fingers[next / cases];
-        return solver::FingerPoint{finger, {next++, asked.H_m, asked.mu, asked.e_star}};
+        return solver::FingerPoint{finger, next++, {asked.H_m, asked.mu, asked.e_star}};
       },
-      [&](solver::PointOutcome&& outcome) {
+      [&](solver::Outcome&& outcome) {
         if (outcome.result) {
           own[outcome.number / cases][outcome.number % cases] = own_case(*outcome.result);
         } else {

@@ -36,6 +36,7 @@ namespace {
 
 namespace py = pybind11;
 
+using Falls = std::shared_ptr<FallCache>;
 using solver::Cell;
 using solver::Member;
 
@@ -215,7 +216,7 @@ py::dict ResultArrays::dict() {
 struct GivenPoints {
   std::vector<ModelParameters> models;
   std::vector<std::string> faults;  // of each model; empty: the model can be solved
-  std::vector<Point> points;
+  std::vector<ModelPoint> points;
 };
 
 constexpr std::string_view kIntegrator = "integrator";
@@ -348,7 +349,7 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
       add_model(all, values, model_keys, base);
     }
     const auto point = values.subspan(keyed_axes.size() - protocol::kPointKeyOrder.size());
-    all.points.push_back({point[0], point[1], point[2], place->second});
+    all.points.push_back({place->second, {point[0], point[1], point[2]}});
   };
   protocol::visit_values(base, block, points, add);
   return all;
@@ -364,18 +365,18 @@ GivenPoints one_point(const py::dict& keys) {
 }
 
 /// The outputs with H, mu and e of the points.
-py::dict with_points(ResultArrays& arrays, const std::vector<Point>& points) {
+py::dict with_points(ResultArrays& arrays, const std::vector<ModelPoint>& points) {
   py::dict all = arrays.dict();
   const auto column = [&points](double Point::*member) {
     std::vector<double> values;
-    for (const Point& point : points) {
-      values.push_back(point.*member);
+    for (const ModelPoint& point : points) {
+      values.push_back(point.point.*member);
     }
     return array_of(std::move(values));
   };
   all["H"] = column(&Point::H_m);
   all["mu"] = column(&Point::mu);
-  all["e"] = column(&Point::e);
+  all["e"] = column(&Point::e_star);
   return all;
 }
 
@@ -389,10 +390,10 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
   const GivenPoints one = one_point(keys);
   const auto result = interruptibly<CaseResult>([one, falls, errors](const std::atomic<bool>&) {
     const Finger finger(one.models.front(), falls);
-    const Point& point = one.points.front();
-    CaseResult solved = finger.solve(point.H_m, point.mu, point.e);
+    const Point& point = one.points.front().point;
+    CaseResult solved = finger.solve(point.H_m, point.mu, point.e_star);
     if (errors) {
-      solved.errors = finger.estimated_errors(solved);
+      solved.errors = errors_by_companion(one.models.front(), solved, *falls);
     }
     return solved;
   });
@@ -420,8 +421,9 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
       solver::append_numbers(row, rows.numbers);
       rows.states.push_back(solver::code_of_state(row.state));
     };
-    const Point& point = one.points.front();
-    rows.result = Finger(one.models.front(), falls).trace(point.H_m, point.mu, point.e, tracing);
+    const Point& point = one.points.front().point;
+    rows.result =
+        Finger(one.models.front(), falls).solve(point.H_m, point.mu, point.e_star, tracing);
     return rows;
   });
   const ModelParameters& model = one.models.front();
@@ -442,7 +444,7 @@ struct ManyPoints {
   std::atomic<std::size_t> outcomes = 0;
 
   void solve(ManyOptions options, const std::atomic<bool>& stop) {
-    std::vector<Point> points;
+    std::vector<ModelPoint> points;
     std::vector<std::size_t> places;
     for (std::size_t i = 0; i < given.points.size(); ++i) {
       if (const std::string& fault = given.faults[given.points[i].model]; !fault.empty()) {
@@ -457,7 +459,7 @@ struct ManyPoints {
       return !stop;
     };
     const auto take = [this, &places](Outcome&& outcome) {
-      const std::size_t place = places[outcome.point];
+      const std::size_t place = places[outcome.number];
       if (outcome.result) {
         arrays.set(place, *outcome.result);
       } else {
@@ -504,8 +506,9 @@ py::list fields() {
 }  // namespace
 
 void add_solving(py::module_& module) {
-  py::class_<Falls>(module, "Falls").def(py::init([] {
-    return Falls(protocol::available_memory_bytes() / solver::kFallsPartOfMemory);
+  py::class_<FallCache, Falls>(module, "Falls").def(py::init([] {
+    return std::make_shared<FallCache>(protocol::available_memory_bytes() /
+                                       solver::kFallsPartOfMemory);
   }));
   module.def("solve", &solve, py::arg("falls"), py::arg("keys"), py::arg("errors"));
   module.def("trace", &trace, py::arg("falls"), py::arg("keys"), py::arg("fall"), py::arg("shape"));

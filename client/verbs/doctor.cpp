@@ -8,11 +8,11 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -138,21 +138,17 @@ double measured_point_s() {
   constexpr std::uint64_t kPoints = 600;
   const solver::Finger finger(solver::preset("paper"));
   (void)finger.solve(1.0, 0.4, 1.0);  // solves the fall
+  std::vector<solver::Point> points;
+  for (std::uint64_t i = 0; i < kPoints; ++i) {
+    const double part = static_cast<double>(i) / static_cast<double>(kPoints);
+    points.push_back({1.0, 0.1 + 1.9 * part, 1.0 - 0.5 * part});
+  }
   const double start_s = cpu_time_s();
-  std::uint64_t next = 0;
-  finger.solve_points(
-      [&next]() -> std::optional<solver::PointRequest> {
-        if (next == kPoints) {
-          return std::nullopt;
-        }
-        const double part = static_cast<double>(next) / static_cast<double>(kPoints);
-        return solver::PointRequest{next++, 1.0, 0.1 + 1.9 * part, 1.0 - 0.5 * part};
-      },
-      [](solver::PointOutcome&& outcome) {
-        if (!outcome.result) {
-          throw std::runtime_error("a point of the preset paper fails: " + outcome.error);
-        }
-      });
+  for (const solver::Outcome& outcome : solver::solve_points(finger, points)) {
+    if (!outcome.result) {
+      throw std::runtime_error("a point of the preset paper fails: " + outcome.error);
+    }
+  }
   return (cpu_time_s() - start_s) / static_cast<double>(kPoints);
 }
 

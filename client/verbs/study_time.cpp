@@ -17,8 +17,8 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "worker/solver/estimate.h"
-#include "worker/solver/lanes/lane_stepper.h"
-#include "worker/solver/library/point_runs.h"
+#include "worker/solver/falls.h"
+#include "worker/solver/fast/kernels.h"
 #include "worker/solver/model/fall_model.h"
 
 namespace oblique::client {
@@ -56,7 +56,7 @@ std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::P
       const auto fall = falls.kept_fall(model);
       if (fall && fall->fallen && table.is_left_in(i)) {
         points.push_back(
-            {solver::Finger(model, fall->fallen), {i, point.H_m, point.mu, point.e_star}});
+            {solver::Finger(model, fall->fallen), i, {point.H_m, point.mu, point.e_star}});
       }
     }
   }
@@ -115,10 +115,10 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
     for (std::size_t i = round; i < models.size(); i += rounds) {
       some.push_back(models[i]);
     }
-    solver::falls_of(falls, some);
+    falls.falls(some);
     if (table.wants_errors()) {
       std::transform(some.begin(), some.end(), some.begin(), solver::companion_model);
-      solver::falls_of(falls, some);
+      falls.falls(some);
     }
   });
   cost.falls_s = falls_s / static_cast<double>(rounds);
@@ -139,10 +139,9 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
         }
         return points[(thread * points.size() / cost.threads + i++) % points.size()];
       };
-      const auto drop = [](solver::PointOutcome&&) {};
+      const auto drop = [](solver::Outcome&&) {};
       if (table.wants_errors()) {
-        solver::solve_points_with_errors(
-            next, [&](auto wanted) { return solver::falls_of(falls, wanted); }, drop);
+        solver::solve_points_with_errors(next, falls, drop);
       } else {
         solver::solve_points(next, drop);
       }

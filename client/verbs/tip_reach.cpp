@@ -17,7 +17,7 @@ ReachCheck tip_reach() {
 double largest_drop_m(const solver::Finger& finger, WorkLine& line) {
   const auto falling = line.begin([&finger] {
     return fmt::format("on {} elements a link: {}", finger.model().elements_per_link,
-                       fall_so_far(finger.model(), finger.fall_progress().drop_m()));
+                       fall_so_far(finger.model(), finger.drop_so_far_m()));
   });
   return finger.largest_drop_m();
 }

@@ -3,9 +3,9 @@
 #include <memory>
 #include <utility>
 
-#include "worker/solver/contact/contact.h"
-#include "worker/solver/motion/fall.h"
-#include "worker/solver/motion/generalized_alpha.h"
+#include "worker/solver/reference/contact.h"
+#include "worker/solver/reference/fall.h"
+#include "worker/solver/reference/generalized_alpha.h"
 
 namespace oblique::solver {
 namespace {
@@ -18,7 +18,7 @@ void generalized_alpha_step_in_contact(benchmark::State& bench) {
   model.elements_per_link = static_cast<int>(bench.range(0));
   const auto owned = std::make_shared<GeneralizedAlphaMotion>(model);
   const GeneralizedAlphaMotion& motion = *owned;
-  ChainState touch = Fall(owned, 1e-4, 10.0).state_at(1.0);
+  ChainState touch = solve_stepped_fall(owned, 1e-4, 10.0)->state_at(1.0);
   const Contact contact({model.k_N_m, model.eta2, 0.4, 1.0}, motion.tip(touch), {1e-7, 1e-7});
   const auto force = contact.force();
   motion.restart(force, touch);

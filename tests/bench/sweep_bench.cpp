@@ -11,12 +11,12 @@
 #include <thread>
 #include <vector>
 
-#include "worker/solver/chain/chain.h"
-#include "worker/solver/contact/solve_contact.h"
 #include "worker/solver/fall_cache.h"
 #include "worker/solver/falls.h"
-#include "worker/solver/lanes/lane_stepper.h"
-#include "worker/solver/motion/fall.h"
+#include "worker/solver/fast/kernels.h"
+#include "worker/solver/reference/chain.h"
+#include "worker/solver/reference/fall.h"
+#include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
 
@@ -24,19 +24,18 @@ namespace oblique::bench {
 namespace {
 
 using solver::Chain;
-using solver::Fall;
 using solver::Finger;
 using solver::FingerPoint;
 using solver::ModelParameters;
-using solver::PointRequest;
+using solver::Point;
 
 /// A sweep of 8 drops, 8 frictions and 8 restitutions.
-std::vector<PointRequest> sweep() {
-  std::vector<PointRequest> points;
+std::vector<Point> sweep() {
+  std::vector<Point> points;
   for (int i = 0; i < 8; ++i) {
     for (int j = 0; j < 8; ++j) {
       for (int k = 0; k < 8; ++k) {
-        points.push_back({points.size(), 0.1 + 0.15 * i, 0.05 + 0.13 * j, 0.2 + 0.8 * k / 7.0});
+        points.push_back({0.1 + 0.15 * i, 0.05 + 0.13 * j, 0.2 + 0.8 * k / 7.0});
       }
     }
   }
@@ -56,8 +55,8 @@ void count_cases(benchmark::State& bench, std::size_t cases_an_iteration) {
 }
 
 /// A contact of one case, one number at a time.
-void solve_scalar(const Chain& chain, const Fall& fall, const solver::StepChoice& steps,
-                  const PointRequest& point) {
+void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::StepChoice& steps,
+                  const Point& point) {
   const solver::ExplicitMotion motion(chain);
   const ModelParameters model = solver::preset("paper");
   benchmark::DoNotOptimize(
@@ -67,14 +66,14 @@ void solve_scalar(const Chain& chain, const Fall& fall, const solver::StepChoice
 
 /// What a script would do: the model built and the fall solved for every case, no lanes.
 void naive(benchmark::State& bench) {
-  const std::vector<PointRequest> points = sweep();
+  const std::vector<Point> points = sweep();
   std::size_t next = 0;
   for (auto _ : bench) {
     const ModelParameters model = solver::preset("paper");
     const Chain chain(model);
     const solver::StepChoice steps(chain, model);
-    const Fall fall(chain, steps.fall_s());
-    solve_scalar(chain, fall, steps, points[next]);
+    const auto fall = solver::solve_stepped_fall(chain, steps.fall_s());
+    solve_scalar(chain, *fall, steps, points[next]);
     next = (next + 37) % points.size();  // all over the sweep
   }
   count_cases(bench, 1);
@@ -86,11 +85,11 @@ void shared_fall(benchmark::State& bench) {
   const ModelParameters model = with_elements(bench.range(0));
   const Chain chain(model);
   const solver::StepChoice steps(chain, model);
-  const Fall fall(chain, steps.fall_s());
-  const std::vector<PointRequest> points = sweep();
+  const auto fall = solver::solve_stepped_fall(chain, steps.fall_s());
+  const std::vector<Point> points = sweep();
   std::size_t next = 0;
   for (auto _ : bench) {
-    solve_scalar(chain, fall, steps, points[next]);
+    solve_scalar(chain, *fall, steps, points[next]);
     next = (next + 37) % points.size();
   }
   count_cases(bench, 1);
@@ -101,19 +100,21 @@ BENCHMARK(shared_fall)->Arg(4)->Arg(16)->Unit(benchmark::kMicrosecond);
 void lanes_and_threads(benchmark::State& bench) {
   const Finger finger(with_elements(bench.range(0)));
   const auto threads = static_cast<std::size_t>(bench.range(1));
-  const std::vector<PointRequest> points = sweep();
+  const std::vector<Point> points = sweep();
   finger.largest_drop_m();  // solves the fall
   for (auto _ : bench) {
     std::atomic<std::size_t> next{0};
     std::vector<std::jthread> workers;
     for (std::size_t i = 0; i < threads; ++i) {
       workers.emplace_back([&] {
-        finger.solve_points(
-            [&]() -> std::optional<PointRequest> {
+        solver::solve_points(
+            [&]() -> std::optional<FingerPoint> {
               const std::size_t index = next++;
-              return index < points.size() ? std::optional(points[index]) : std::nullopt;
+              return index < points.size()
+                         ? std::optional(FingerPoint{finger, index, points[index]})
+                         : std::nullopt;
             },
-            [](solver::PointOutcome&& outcome) { benchmark::DoNotOptimize(outcome); });
+            [](solver::Outcome&& outcome) { benchmark::DoNotOptimize(outcome); });
       });
     }
   }
@@ -134,7 +135,7 @@ void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>&
       [&]() -> std::optional<FingerPoint> {
         return next < count ? std::optional(point_at(next++)) : std::nullopt;
       },
-      [](solver::PointOutcome&& outcome) {
+      [](solver::Outcome&& outcome) {
         if (!outcome.result) {
           throw std::runtime_error(outcome.error);
         }
@@ -155,7 +156,7 @@ void distinct_contacts(benchmark::State& bench) {
       mine.k_N_m *= 0.5 + part;
       mine.eta2 *= 1.0 + 0.3 * part;
       const double H_m = 0.3 + 0.1 * static_cast<double>(i % drops);
-      return FingerPoint{Finger(mine, fallen), {i, H_m, 0.05 + part, 1.0 - 0.6 * part}};
+      return FingerPoint{Finger(mine, fallen), i, {H_m, 0.05 + part, 1.0 - 0.6 * part}};
     });
   }
   count_cases(bench, kCases);
@@ -178,7 +179,7 @@ void distinct_chains(benchmark::State& bench) {
     solver::FallCache falls;
     solve_all(cases, [&](std::size_t i) {
       const auto fallen = falls.fall(models[i], std::span(models).subspan(i)).fallen;
-      return FingerPoint{Finger(models[i], fallen), {i, 0.8, 0.4, 0.9}};
+      return FingerPoint{Finger(models[i], fallen), i, {0.8, 0.4, 0.9}};
     });
   }
   count_cases(bench, cases);

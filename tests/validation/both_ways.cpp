@@ -1,6 +1,6 @@
 #include "tests/validation/both_ways.h"
 
-#include "worker/solver/contact/solve_contact.h"
+#include "worker/solver/reference/solve_contact.h"
 
 namespace oblique::validation {
 namespace {
@@ -15,7 +15,7 @@ BothWays::BothWays(const solver::ModelParameters& model)
       chain_(model),
       explicit_(chain_),
       generalized_alpha_(model),
-      fall_(chain_, kFallStep_s) {}
+      fall_(solver::solve_stepped_fall(chain_, kFallStep_s)) {}
 
 solver::CaseResult BothWays::explicit_case(const Point& point, double dt_s) const {
   return solver::solve_contact(explicit_, contact(point), {dt_s, dt_s}, explicit_touch(point.H_m),

@@ -2,21 +2,19 @@
 
 #include <array>
 #include <functional>
+#include <memory>
 
-#include "worker/solver/chain/chain.h"
-#include "worker/solver/contact/contact_law.h"
 #include "worker/solver/model/case_result.h"
-#include "worker/solver/motion/fall.h"
-#include "worker/solver/motion/generalized_alpha.h"
-#include "worker/solver/motion/motion.h"
+#include "worker/solver/reference/chain.h"
+#include "worker/solver/reference/contact_law.h"
+#include "worker/solver/reference/fall.h"
+#include "worker/solver/reference/generalized_alpha.h"
+#include "worker/solver/reference/motion.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::validation {
 
-struct Point {
-  double H_m;
-  double mu;
-  double e_star;
-};
+using solver::Point;
 
 /// The ten distinct impacts of the paper.
 inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
@@ -39,12 +37,12 @@ class BothWays {
   const solver::Chain& chain() const { return chain_; }
   const solver::ExplicitMotion& by_explicit() const { return explicit_; }
   const solver::GeneralizedAlphaMotion& by_generalized_alpha() const { return generalized_alpha_; }
-  const solver::Fall& fall() const { return fall_; }
+  const solver::Fall& fall() const { return *fall_; }
 
   /// The state at touch in the coordinates of each integrator.
-  solver::ChainState explicit_touch(double H_m) const { return fall_.state_at(H_m); }
+  solver::ChainState explicit_touch(double H_m) const { return fall_->state_at(H_m); }
   solver::ChainState generalized_alpha_touch(double H_m) const {
-    return generalized_alpha_.chain().from_eliminated(fall_.state_at(H_m));
+    return generalized_alpha_.chain().from_eliminated(fall_->state_at(H_m));
   }
   solver::ContactParameters contact(const Point& point) const {
     return {model_.k_N_m, model_.eta2, point.mu, point.e_star};
@@ -58,7 +56,7 @@ class BothWays {
   solver::Chain chain_;
   solver::ExplicitMotion explicit_;
   solver::GeneralizedAlphaMotion generalized_alpha_;
-  solver::Fall fall_;
+  std::shared_ptr<const solver::Fall> fall_;
 };
 
 }  // namespace oblique::validation

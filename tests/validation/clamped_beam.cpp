@@ -4,9 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "worker/solver/chain/banded_lu.h"
-#include "worker/solver/chain/beam_element.h"
-#include "worker/solver/chain/beam_tangent.h"
+#include "worker/solver/reference/banded.h"
+#include "worker/solver/reference/beam_element.h"
 
 namespace oblique::validation {
 namespace {
@@ -51,16 +50,12 @@ double ClampedBeam::newton_step(const TipLoad& load) {
   solver::BandedLu<kBandwidth> matrix;
   matrix.set_zero(q_.size() - kClamped);
   std::vector<double> residual(q_.size() - kClamped, 0.0);
-  const double inverse_length = 1.0 / element_length_m_;
-  const double half_EA_length = 0.5 * properties_.EA_N * element_length_m_;
-  const double bending = 2.0 * properties_.EI_N_m2 / element_length_m_;
-  const auto map = solver::gradient_map(inverse_length);
+  const auto constants =
+      solver::element_constants(element_length_m_, properties_.EA_N, properties_.EI_N_m2, 0.0);
   for (std::size_t first = 0; first + 4 < q_.size(); first += 4) {
     const Eigen::Map<const solver::ElementCoordinates> q(&q_[first]);
-    const auto c = solver::gradient_coefficients(q, inverse_length);
-    const solver::ElementCoordinates force =
-        solver::elastic_gradient(c, half_EA_length, bending) * map;
-    const auto tangent = solver::elastic_tangent(c, map, half_EA_length, bending);
+    const solver::ElementCoordinates force = solver::elastic_gradient(q, constants);
+    const auto tangent = solver::elastic_tangent(q, constants);
     for (std::size_t a = 0; a < 8; ++a) {
       if (first + a < kClamped) {
         continue;

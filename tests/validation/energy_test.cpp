@@ -56,12 +56,13 @@ TEST(Energy, IsKeptInTheFallUnderBothIntegrators) {
   const solver::ModelParameters model = solver::preset("paper");
   const solver::Chain chain(model);
   const auto generalized_alpha = std::make_shared<solver::GeneralizedAlphaMotion>(model);
-  const solver::Fall one(chain, 2.5e-6);
-  const solver::Fall other(generalized_alpha, 5e-6, solver::longest_fall_s(chain));
+  const auto one = solver::solve_stepped_fall(chain, 2.5e-6);
+  const auto other =
+      solver::solve_stepped_fall(generalized_alpha, 5e-6, solver::longest_fall_s(chain));
   expect_at_most({"fall to H = 1, explicit, 2.5 us: energy, of the kinetic one", kBalance,
-                  fall_drift(solver::ExplicitMotion(chain), one), 1e-10, "symplectic, no drift"});
+                  fall_drift(solver::ExplicitMotion(chain), *one), 1e-10, "symplectic, no drift"});
   expect_at_most({"fall to H = 1, generalized-alpha, 5 us: energy, of the kinetic one", kBalance,
-                  fall_drift(*generalized_alpha, other), 1e-7,
+                  fall_drift(*generalized_alpha, *other), 1e-7,
                   "the vibration from the release, which is damped away"});
 }
 

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "tests/validation/validation_table.h"
-#include "worker/solver/motion/fall.h"
-#include "worker/solver/motion/generalized_alpha.h"
-#include "worker/solver/motion/motion.h"
+#include "worker/solver/reference/fall.h"
+#include "worker/solver/reference/generalized_alpha.h"
+#include "worker/solver/reference/motion.h"
 
 namespace oblique::validation {
 namespace {
@@ -68,14 +68,16 @@ template <std::size_t n>
 FallErrors explicit_errors(const ModelParameters& model, double dt_s,
                            const std::array<KnownState, n>& known) {
   const Chain chain(model);
-  return errors(solver::ExplicitMotion(chain), Fall(chain, dt_s), known);
+  return errors(solver::ExplicitMotion(chain), *solver::solve_stepped_fall(chain, dt_s), known);
 }
 
 template <std::size_t n>
 FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
                                     const std::array<KnownState, n>& known) {
   const auto motion = std::make_shared<GeneralizedAlphaMotion>(model);
-  return errors(*motion, Fall(motion, dt_s, solver::longest_fall_s(Chain(model))), known);
+  return errors(*motion,
+                *solver::solve_stepped_fall(motion, dt_s, solver::longest_fall_s(Chain(model))),
+                known);
 }
 
 TEST(FreeFall, ExplicitWayReachesTheKnownStates) {

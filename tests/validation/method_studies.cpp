@@ -52,26 +52,16 @@ Fallen fall_of(const solver::ModelParameters& model) {
 /// The results of `points` in their order. Throws SolveError when one has no answer.
 std::vector<CaseResult> contacts_of(const solver::Finger& finger,
                                     const std::vector<ContactPoint>& points) {
-  std::vector<CaseResult> results(points.size());
-  std::size_t next = 0;
-  std::string error;
-  finger.solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        if (next == points.size()) {
-          return std::nullopt;
-        }
-        const auto& point = points[next];
-        return solver::PointRequest{next++, point.H_m, point.mu, point.e_star};
-      },
-      [&](solver::PointOutcome&& outcome) {
-        if (outcome.result) {
-          results[outcome.number] = std::move(*outcome.result);
-        } else {
-          error = outcome.error;
-        }
-      });
-  if (!error.empty()) {
-    throw solver::SolveError(error);
+  std::vector<solver::Point> asked;
+  for (const ContactPoint& point : points) {
+    asked.push_back({point.H_m, point.mu, point.e_star});
+  }
+  std::vector<CaseResult> results;
+  for (solver::Outcome& outcome : solver::solve_points(finger, asked)) {
+    if (!outcome.result) {
+      throw solver::SolveError(outcome.error);
+    }
+    results.push_back(std::move(*outcome.result));
   }
   return results;
 }

@@ -10,7 +10,7 @@
 
 #include "tests/validation/both_ways.h"
 #include "tests/validation/validation_table.h"
-#include "worker/solver/contact/contact.h"
+#include "worker/solver/reference/contact.h"
 
 namespace oblique::validation {
 namespace {

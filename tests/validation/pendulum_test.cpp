@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "tests/validation/validation_table.h"
-#include "worker/solver/motion/generalized_alpha.h"
-#include "worker/solver/motion/motion.h"
-#include "worker/solver/motion/pefrl.h"
+#include "worker/solver/reference/generalized_alpha.h"
+#include "worker/solver/reference/motion.h"
+#include "worker/solver/reference/pefrl.h"
 
 namespace oblique::validation {
 namespace {

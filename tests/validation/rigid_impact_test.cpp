@@ -10,9 +10,9 @@
 
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_rigid_impact.h"
-#include "tests/worker/solver/contact/rigid_tip_motion.h"
-#include "worker/solver/contact/solve_contact.h"
-#include "worker/solver/motion/generalized_alpha.h"
+#include "tests/worker/solver/reference/rigid_tip_motion.h"
+#include "worker/solver/reference/generalized_alpha.h"
+#include "worker/solver/reference/solve_contact.h"
 
 namespace oblique::validation {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_waves.h"
-#include "tests/worker/solver/chain/chain_probe.h"
-#include "worker/solver/motion/generalized_alpha.h"
-#include "worker/solver/motion/motion.h"
-#include "worker/solver/motion/pefrl.h"
+#include "tests/worker/solver/reference/chain_probe.h"
+#include "worker/solver/reference/generalized_alpha.h"
+#include "worker/solver/reference/motion.h"
+#include "worker/solver/reference/pefrl.h"
 
 namespace oblique::validation {
 namespace {

@@ -15,7 +15,7 @@
 
 #include "proto/result_message.h"
 #include "tests/support/points.h"
-#include "worker/solver/library/point_runs.h"
+#include "worker/solver/point_runs.h"
 
 namespace oblique::worker {
 namespace {

@@ -18,7 +18,8 @@
 #include "proto/result_message.h"
 #include "tests/support/recipes.h"
 #include "tests/worker/conversation_fixture.h"
-#include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/falls.h"
+#include "worker/solver/fast/kernels.h"
 
 namespace oblique::worker {
 namespace {

@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 #include <utility>
+#include <vector>
 
 namespace oblique::solver {
 namespace {
@@ -50,29 +52,27 @@ double factor(const ModelParameters& model, int order) {
 /// two shapes share no lanes.
 class EstimatedGroup {
  public:
-  using Source = std::function<std::optional<FingerPoint>()>;
-  using Sink = std::function<void(PointOutcome&&)>;
-
-  EstimatedGroup(const Source& source, const Sink& sink) : source_(source), sink_(sink) {}
+  EstimatedGroup(const FingerPoints& source, const TakeOutcome& sink)
+      : source_(source), sink_(sink) {}
 
   /// Solves the next points of the source, as many as a group has. Hands those that fail on.
   void solve() {
     solve_points([this] { return next(); },
-                 [this](PointOutcome&& outcome) {
+                 [this](Outcome&& outcome) {
                    Waiting& waiting = points_[outcome.number];
                    waiting.result = std::move(outcome.result);
                    if (!waiting.result) {
-                     outcome.number = waiting.point.number;
+                     outcome.number = waiting.number;
                      sink_(std::move(outcome));
                    }
                  });
   }
   /// Solves their companions, and hands all results on.
-  void estimate(const FallSource& companion_falls) {
-    const auto companions = fingers_of(companion_falls);
+  void estimate(FallCache& falls) {
+    const auto companions = fingers_of(falls);
     std::size_t last = 0;
     solve_points([&] { return next_companion(companions, last); },
-                 [this](PointOutcome&& companion) {
+                 [this](Outcome&& companion) {
                    Waiting& waiting = points_[companion.number];
                    if (companion.result) {
                      waiting.result->errors = estimated_errors(models_[waiting.model],
@@ -90,7 +90,8 @@ class EstimatedGroup {
 
   struct Waiting {
     std::size_t model;
-    PointRequest point;
+    std::uint64_t number;
+    Point point;
     std::optional<CaseResult> result;
   };
 
@@ -106,23 +107,23 @@ class EstimatedGroup {
     if (models_.empty() || !(models_.back() == point->finger.model())) {
       models_.push_back(point->finger.model());
     }
-    points_.push_back({models_.size() - 1, point->point, std::nullopt});
-    point->point.number = points_.size() - 1;
+    points_.push_back({models_.size() - 1, point->number, point->point, std::nullopt});
+    point->number = points_.size() - 1;
     return point;
   }
 
   /// Nothing for a companion without a fall, nor where there is no coarser mesh.
-  std::vector<std::optional<Finger>> fingers_of(const FallSource& companion_falls) const {
+  std::vector<std::optional<Finger>> fingers_of(FallCache& falls) const {
     std::vector<ModelParameters> companions;
     for (const ModelParameters& model : models_) {
       companions.push_back(companion_model(model));
     }
-    const std::vector<FallOutcome> falls = companion_falls(companions);
+    const std::vector<FallOutcome> fallen = falls.falls(companions);
     std::vector<std::optional<Finger>> fingers;
     for (std::size_t i = 0; i < companions.size(); ++i) {
       const bool is_coarser = companions[i].elements_per_link < models_[i].elements_per_link;
-      fingers.push_back(falls[i].fallen && is_coarser
-                            ? std::optional(Finger(companions[i], falls[i].fallen))
+      fingers.push_back(fallen[i].fallen && is_coarser
+                            ? std::optional(Finger(companions[i], fallen[i].fallen))
                             : std::nullopt);
     }
     return fingers;
@@ -136,19 +137,17 @@ class EstimatedGroup {
         continue;
       }
       if (const auto& finger = companions[waiting.model]) {
-        PointRequest request = waiting.point;
-        request.number = last++;
-        return FingerPoint{*finger, request};
+        return FingerPoint{*finger, last++, waiting.point};
       }
       hand_on(waiting);
     }
     return std::nullopt;
   }
 
-  void hand_on(Waiting& waiting) { sink_({waiting.point.number, std::move(waiting.result), {}}); }
+  void hand_on(Waiting& waiting) { sink_({waiting.number, std::move(waiting.result), {}}); }
 
-  const Source& source_;
-  const Sink& sink_;
+  const FingerPoints& source_;
+  const TakeOutcome& sink_;
   const Clock::time_point begun_ = Clock::now();
   bool source_has_ended_ = false;
   std::vector<ModelParameters> models_;  ///< those of points that follow each other once
@@ -204,12 +203,12 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
 }
 
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
-                                  const FallSource& companion_falls) {
+                                  FallCache& falls) {
   const ModelParameters companion = companion_model(model);
   if (companion.elements_per_link >= model.elements_per_link) {
     return {};
   }
-  const FallOutcome fall = companion_falls({&companion, 1}).front();
+  const FallOutcome fall = falls.falls({&companion, 1}).front();
   try {
     return fall.fallen
                ? estimated_errors(
@@ -223,14 +222,13 @@ ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult
   }
 }
 
-void solve_points_with_errors(const std::function<std::optional<FingerPoint>()>& source,
-                              const FallSource& companion_falls,
-                              const std::function<void(PointOutcome&&)>& sink) {
+void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
+                              const TakeOutcome& sink) {
   bool has_ended = false;
   while (!has_ended) {
     EstimatedGroup group(source, sink);
     group.solve();
-    group.estimate(companion_falls);
+    group.estimate(falls);
     has_ended = group.source_has_ended();
   }
 }

@@ -1,11 +1,6 @@
 #pragma once
 
-#include <functional>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include "worker/solver/falls.h"
+#include "worker/solver/fall_cache.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/solve.h"
@@ -28,21 +23,17 @@ ModelParameters companion_model(const ModelParameters& model);
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 
-/// Gives the falls of some models, as solve_falls() does.
-using FallSource = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
-
-/// The same of the result of one point, its companion solved here over a fall that
-/// `companion_falls` gives: the bits that solve_points_with_errors() gives it. Empty where there is
+/// The same of the result of one point, its companion solved here over a fall from
+/// `falls`: the bits that solve_points_with_errors() gives it. Empty where there is
 /// no coarser mesh, and where the companion has no answer.
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
-                                  const FallSource& companion_falls);
+                                  FallCache& falls);
 
 /// As solve_points(), and each result has its estimated errors, where its companion has an answer;
 /// every other number has the same bits. Some hundred points at a time, of about a second at most,
-/// are solved before their companions, whose falls `companion_falls` gives, so outcomes come in
+/// are solved before their companions, whose falls come from `falls`, so outcomes come in
 /// bursts.
-void solve_points_with_errors(const std::function<std::optional<FingerPoint>()>& source,
-                              const FallSource& companion_falls,
-                              const std::function<void(PointOutcome&&)>& sink);
+void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
+                              const TakeOutcome& sink);
 
 }  // namespace oblique::solver

@@ -1,11 +1,13 @@
 #include "worker/solver/fall_cache.h"
 
 #include <algorithm>
+#include <exception>
 #include <iterator>
 #include <string>
 #include <utility>
 
-#include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/falls.h"
+#include "worker/solver/fast/kernels.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::solver {
@@ -50,6 +52,18 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
       solve(claimed, lock);
     }
   }
+}
+
+std::vector<FallOutcome> FallCache::falls(std::span<const ModelParameters> models) {
+  std::vector<FallOutcome> outcomes;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    try {
+      outcomes.push_back(fall(models[i], models.subspan(i + 1)));
+    } catch (const std::exception& error) {
+      outcomes.push_back({nullptr, error.what()});
+    }
+  }
+  return outcomes;
 }
 
 std::optional<FallOutcome> FallCache::kept_fall(const ModelParameters& model) {

@@ -4,21 +4,31 @@
 #include <cstddef>
 #include <functional>
 #include <list>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "worker/solver/falls.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::solver {
 
-/// Keeps the falls that were used last, so that one fall serves all points of all models that share
-/// it. A fall that fails fails once: its error is kept as a fall is. What `Solve` throws, as where
-/// memory is short, is not kept: it comes out of `fall`, and who asks next has it solved anew. May
-/// be used from several threads; the falls are solved on the threads that ask for them.
+class FallenChain;  ///< of the implementation: a chain with its fall (falls.h)
+
+/// A fall, or the reason why there is none.
+struct FallOutcome {
+  std::shared_ptr<const FallenChain> fallen;
+  std::string error;
+};
+
+/// Falls that models share, the longest part of a first point: until the tip touches, nothing
+/// depends on k, eta2, mu, e* or the step in contact, and one fall passes every H. Keeps those used
+/// last; one that fails is kept as its error, so it fails once. What the solution throws, as where
+/// memory is short, is not kept: it leaves `fall`, and the next call solves it anew. May be used by
+/// several threads at once; falls are solved by the threads that call.
 class FallCache {
  public:
   struct Bounds {
@@ -31,7 +41,9 @@ class FallCache {
   /// Solves missing falls by `solve`.
   FallCache(const Bounds& bounds, Solve solve) : bounds_(bounds), solve_(std::move(solve)) {}
   explicit FallCache(const Bounds& bounds);
-  FallCache() : FallCache(Bounds{}) {}
+  /// Keeps at most so many bytes of falls, the last one aside.
+  explicit FallCache(std::size_t most_bytes = std::size_t{1} << 30)
+      : FallCache(Bounds{.bytes = most_bytes}) {}
 
   /// The fall of `model`; fall_model() need not have gone through. What is not kept is solved, and
   /// beside it, as far as lanes go, those of `ahead`, the first first, that nobody has solved or is
@@ -39,6 +51,10 @@ class FallCache {
   /// does. Does not wait for falls of `ahead` that others solve. A model outside its domain fails
   /// with what is wrong with it.
   FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
+
+  /// One fall for each model; those that are missing are solved side by side. One for which there
+  /// is no memory just then fails.
+  std::vector<FallOutcome> falls(std::span<const ModelParameters> models);
 
   /// The fall of `model` when it is kept; solves and waits for nothing.
   std::optional<FallOutcome> kept_fall(const ModelParameters& model);

@@ -7,10 +7,9 @@
 #include <tuple>
 #include <utility>
 
-#include "worker/solver/fall/collocation_fall.h"
-#include "worker/solver/lanes/lane_falls.h"
+#include "worker/solver/fast/lane_falls.h"
 #include "worker/solver/model/usual_ranges.h"
-#include "worker/solver/motion/generalized_alpha.h"
+#include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
@@ -23,15 +22,13 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-using SharedChain = std::shared_ptr<const PreparedChain>;
-
 /// Explicit steps in sqrt(2 length / g), up to which they are quicker than collocation
-/// (fall/README.md).
+/// (fast/README.md).
 constexpr double kFewSteps = 150'000.0;
 
 enum class WayToFall { kStepsAlone, kSteps, kCollocation };
 
-WayToFall way_to_fall(const PreparedChain& chain) {
+WayToFall way_to_fall(const FallenChain& chain) {
   const ModelParameters& model = chain.model();
   if (model.integrator != Integrator::kExplicit) {
     return WayToFall::kStepsAlone;
@@ -42,11 +39,10 @@ WayToFall way_to_fall(const PreparedChain& chain) {
              : WayToFall::kCollocation;
 }
 
-FallSolution solve_alone(const SharedChain& chain) {
+FallSolution solve_alone(const FallRequest& request) {
   try {
-    return {Fall(chain->shared_motion(), chain->fall_step_s(), longest_fall_s(chain->chain()),
-                 &chain->fall_progress())
-                .path(),
+    return {solve_stepped_fall(request.motion, request.dt_s, longest_fall_s(*request.chain),
+                               request.progress),
             {}};
   } catch (const std::bad_alloc&) {  // says nothing of this fall
     throw;
@@ -55,34 +51,24 @@ FallSolution solve_alone(const SharedChain& chain) {
   }
 }
 
-/// Solves the falls of `chains`, all in one way and of one shape.
-std::vector<FallSolution> solve(WayToFall way, const std::vector<SharedChain>& chains) {
+/// Solves falls, all in one way and of one shape.
+std::vector<FallSolution> solve(WayToFall way, std::span<const FallRequest> requests) {
   if (way == WayToFall::kCollocation) {
-    std::vector<FallRequest> requests;
-    for (const auto& chain : chains) {
-      requests.push_back(
-          {&chain->chain(), &chain->model(), chain->model().tolerance, &chain->fall_progress()});
-    }
     return solve_by_collocation(requests);
   }
   if (way == WayToFall::kSteps) {
-    std::vector<SteppedFall> falls;
-    for (const auto& chain : chains) {
-      falls.push_back(
-          {&chain->chain(), chain->shared_motion(), chain->fall_step_s(), &chain->fall_progress()});
-    }
-    return solve_by_steps(falls);
+    return solve_by_steps(requests);
   }
   std::vector<FallSolution> solutions;
-  for (const auto& chain : chains) {
-    solutions.push_back(solve_alone(chain));
+  for (const FallRequest& request : requests) {
+    solutions.push_back(solve_alone(request));
   }
   return solutions;
 }
 
 }  // namespace
 
-PreparedChain::PreparedChain(const ModelParameters& model)
+FallenChain::FallenChain(const ModelParameters& model)
     : model_(fall_model(model)),
       chain_(model_),
       motion_(make_motion(model_, chain_)),
@@ -93,7 +79,7 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b) {
          a.lengths_m.size() == b.lengths_m.size() && a.elements_per_link == b.elements_per_link;
 }
 
-std::vector<FallOutcome> solve_falls(std::span<const SharedChain> chains) {
+std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains) {
   using Kind = std::tuple<WayToFall, std::size_t, int>;  // with links and elements a link
   std::map<Kind, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < chains.size(); ++i) {
@@ -102,18 +88,21 @@ std::vector<FallOutcome> solve_falls(std::span<const SharedChain> chains) {
   }
   std::vector<FallOutcome> outcomes(chains.size());
   for (const auto& [kind, alike] : places) {
-    std::vector<SharedChain> group;
+    std::vector<FallRequest> requests;
     for (const std::size_t place : alike) {
-      group.push_back(chains[place]);
+      const FallenChain& chain = *chains[place];
+      requests.push_back({&chain.chain(), chain.motion(), chain.fall_step_s(),
+                          chain.model().tolerance, &chain.fall_progress()});
     }
-    std::vector<FallSolution> solutions = solve(std::get<WayToFall>(kind), group);
+    std::vector<FallSolution> solutions = solve(std::get<WayToFall>(kind), requests);
     for (std::size_t i = 0; i < alike.size(); ++i) {
+      const std::shared_ptr<FallenChain>& chain = chains[alike[i]];
       FallOutcome& outcome = outcomes[alike[i]];
-      if (solutions[i].path) {
-        outcome.fallen =
-            std::make_shared<const FallenChain>(group[i], Fall(std::move(solutions[i].path)));
+      if (solutions[i].fall) {
+        chain->set_fall(std::move(solutions[i].fall));
+        outcome.fallen = chain;
       } else {
-        outcome.error = with_likely_cause(std::move(solutions[i].error), group[i]->model());
+        outcome.error = with_likely_cause(std::move(solutions[i].error), chain->model());
       }
     }
   }
@@ -122,11 +111,11 @@ std::vector<FallOutcome> solve_falls(std::span<const SharedChain> chains) {
 
 std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
   std::vector<FallOutcome> outcomes(models.size());
-  std::vector<std::shared_ptr<const PreparedChain>> chains;
+  std::vector<std::shared_ptr<FallenChain>> chains;
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i < models.size(); ++i) {
     try {
-      chains.push_back(std::make_shared<const PreparedChain>(models[i]));
+      chains.push_back(std::make_shared<FallenChain>(models[i]));
       places.push_back(i);
     } catch (const std::bad_alloc&) {
       throw;

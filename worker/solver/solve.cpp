@@ -1,20 +1,294 @@
 #include "worker/solver/solve.h"
 
+#include <cstdint>
+#include <exception>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <optional>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
-#include "worker/solver/lanes/lane_stepper.h"
-#include "worker/solver/motion/trace_of_chain.h"
-#include "worker/solver/solve_points.h"
+#include "worker/solver/falls.h"
+#include "worker/solver/fast/lane_batch.h"
+#include "worker/solver/model/usual_ranges.h"
+#include "worker/solver/reference/solve_contact.h"
+#include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
+
+/// What copies of a Finger share: the model, its steps in contact, and the fall, solved or not yet.
+class Finger::Parts {
+ public:
+  /// Its fall comes from `falls`, or without these is solved here.
+  explicit Parts(const ModelParameters& model, std::shared_ptr<FallCache> falls = nullptr)
+      : model_(validated(model)),
+        falling_(std::make_shared<FallenChain>(model)),
+        falls_(std::move(falls)),
+        steps_(falling_->chain(), model) {}
+  Parts(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen)
+      : model_(validated(model)),
+        fall_{std::move(fallen), {}},
+        steps_(fall_.fallen->chain(), model) {
+    if (!(fall_model(model) == fall_.fallen->model())) {
+      throw std::invalid_argument("the fall is of another model");
+    }
+    std::call_once(fall_once_, [] {});
+  }
+
+  const ModelParameters& model() const { return model_; }
+  /// The chain, whether its fall is solved or not.
+  const FallenChain& prepared() const { return falling_ ? *falling_ : *fall_.fallen; }
+  const StepChoice& steps() const { return steps_; }
+
+  /// Throws SolveError when the fall has no end, again and at once for every point: what one long
+  /// computation has said need not be computed again.
+  const std::shared_ptr<const FallenChain>& fallen() const {
+    std::call_once(fall_once_, [this] {
+      fall_ = falls_ ? falls_->fall(model_) : solve_falls({&falling_, 1}).front();
+    });
+    if (!fall_.fallen) {
+      throw SolveError(fall_.error);
+    }
+    return fall_.fallen;
+  }
+  const Fall& fall() const { return fallen()->fall(); }
+
+  /// Throws InputError for a value outside its range, a step that is too long, an H never reached.
+  void check(const Point& point) const {
+    validate_point(model_, point.H_m, point.mu, point.e_star);
+    steps_.contact(point.e_star);
+    if (point.H_m > fall().largest_drop_m()) {
+      fall().state_at(point.H_m);
+    }
+  }
+  ContactParameters contact_parameters(const Point& point) const {
+    return {model_.k_N_m, model_.eta2, point.mu, point.e_star};
+  }
+  void sign(SolverReport& report) const {
+    report.integrator = integrator_name(model_.integrator);
+    report.version = solver_version();
+  }
+  CaseResult solve_by_motion(const Point& point, const Tracing& tracing) const {
+    ChainState touch = fall().state_at(point.H_m);
+    const double fall_time_s = touch.t_s;
+    CaseResult result = solve_contact(*prepared().motion(), contact_parameters(point),
+                                      steps_.contact(point.e_star), std::move(touch), tracing);
+    result.H_m = point.H_m;
+    result.fall_time_s = fall_time_s;
+    sign(result.solver);
+    return result;
+  }
+
+ private:
+  static const ModelParameters& validated(const ModelParameters& model) {
+    validate(model);
+    return model;
+  }
+
+  ModelParameters model_;
+  std::shared_ptr<FallenChain> falling_;  ///< none where the fall was given
+  std::shared_ptr<FallCache> falls_;
+  mutable std::once_flag fall_once_;
+  mutable FallOutcome fall_;
+  StepChoice steps_;
+};
+
+namespace {
+
+/// States at touch and steps for points that come in order: neighbours share a fall and H, and
+/// cycle through the same e*.
+class TouchCache {
+ public:
+  /// Valid until the next call.
+  const ChainState& touch(const Finger::Parts& finger, double H_m) {
+    if (fallen_ != finger.fallen() || touches_.size() >= kMostTouches) {
+      fallen_ = finger.fallen();
+      touches_.clear();
+    }
+    auto found = touches_.find(H_m);
+    if (found == touches_.end()) {
+      found = touches_.emplace(H_m, fallen_->fall().state_at(H_m)).first;
+    }
+    return found->second;
+  }
+
+  ContactSteps steps(const std::shared_ptr<const Finger::Parts>& finger, double e_star) {
+    if (finger_ != finger || steps_.size() >= kMostSteps) {
+      finger_ = finger;
+      steps_.clear();
+    }
+    auto found = steps_.find(e_star);
+    if (found == steps_.end()) {
+      found = steps_.emplace(e_star, finger->steps().contact(e_star)).first;
+    }
+    return found->second;
+  }
+
+ private:
+  static constexpr std::size_t kMostTouches = 16;
+  static constexpr std::size_t kMostSteps = 4096;
+
+  std::shared_ptr<const FallenChain> fallen_;  // also keeps its address from being another's
+  std::map<double, ChainState> touches_;
+  std::shared_ptr<const Finger::Parts> finger_;
+  std::map<double, ContactSteps> steps_;
+};
+
+/// Points of any fingers, from a source to a sink.
+class Crowd {
+ public:
+  Crowd(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing)
+      : source_(source), sink_(sink), tracing_(tracing) {}
+
+  void solve() {
+    while (fetch()) {
+      if (is_for_lanes(*upcoming_)) {
+        solve_in_lanes();
+      } else {
+        solve_by_motion(*std::exchange(upcoming_, std::nullopt));
+      }
+    }
+  }
+
+ private:
+  struct Entry {
+    FingerPoint point;
+    double fall_time_s;
+  };
+
+  static bool is_for_lanes(const FingerPoint& point) {
+    return point.finger.model().integrator == Integrator::kExplicit;
+  }
+
+  void solve_by_motion(const FingerPoint& point) {
+    Outcome outcome{point.number, std::nullopt, {}};
+    bool touches = false;
+    try {
+      point.finger.parts()->check(point.point);
+      touches = true;
+      outcome.result = point.finger.parts()->solve_by_motion(point.point, tracing_);
+    } catch (const std::exception& error) {
+      outcome.error =
+          touches ? with_likely_cause(error.what(), point.finger.model()) : error.what();
+    }
+    sink_(std::move(outcome));
+  }
+
+  /// The points from upcoming_ on whose chains can share its lanes.
+  void solve_in_lanes() {
+    const auto first = upcoming_->finger.parts();  // keeps its chain
+    const Chain& shape = first->prepared().chain();
+    LaneBatch batch(shape, runnable_lane_kernels().front());
+    const auto take = [&]() -> std::optional<ContactCase> {
+      while (fetch() && shares_lanes_of(shape)) {
+        if (const auto next = begun(*std::exchange(upcoming_, std::nullopt))) {
+          return next;
+        }
+      }
+      return std::nullopt;
+    };
+    batch.solve(
+        take, [this](ContactOutcome&& contact) { give(std::move(contact)); }, tracing_);
+  }
+
+  /// Makes the next point upcoming_; false when none follows.
+  bool fetch() {
+    if (!upcoming_ && !has_ended_) {
+      upcoming_ = source_();
+      has_ended_ = !upcoming_;
+    }
+    return upcoming_.has_value();
+  }
+  bool shares_lanes_of(const Chain& chain) const {
+    return is_for_lanes(*upcoming_) &&
+           have_one_shape(upcoming_->finger.parts()->prepared().chain().tables(), chain.tables());
+  }
+
+  std::optional<ContactCase> begun(FingerPoint&& point) {
+    const Point& request = point.point;
+    const auto& finger = point.finger.parts();
+    try {
+      validate_point(finger->model(), request.H_m, request.mu, request.e_star);
+      const ContactSteps steps = touches_.steps(finger, request.e_star);
+      const ChainState& touch = touches_.touch(*finger, request.H_m);
+      group_ += continues_group(point, steps) ? 0U : 1U;
+      last_ = point;
+      last_compression_s_ = steps.compression_s;
+      under_way_.insert_or_assign(next_tag_, Entry{point, touch.t_s});
+      return ContactCase{
+          next_tag_++, group_, &finger->prepared().chain(), finger->contact_parameters(request),
+          steps,       &touch};
+    } catch (const std::exception& error) {
+      sink_({point.number, std::nullopt, error.what()});
+      return std::nullopt;
+    }
+  }
+
+  /// Whether the contact comes the same way as that begun last up to its first turn.
+  bool continues_group(const FingerPoint& point, const ContactSteps& steps) const {
+    return last_ && last_->finger.parts() == point.finger.parts() &&
+           last_->point.H_m == point.point.H_m && last_->point.mu == point.point.mu &&
+           last_compression_s_ == steps.compression_s;
+  }
+
+  void give(ContactOutcome&& contact) {
+    const auto entry = under_way_.extract(contact.tag);
+    const auto& [point, fall_time_s] = entry.mapped();
+    if (contact.result) {
+      contact.result->H_m = point.point.H_m;
+      contact.result->fall_time_s = fall_time_s;
+      point.finger.parts()->sign(contact.result->solver);
+    } else {
+      contact.error = with_likely_cause(std::move(contact.error), point.finger.model());
+    }
+    sink_({point.number, std::move(contact.result), std::move(contact.error)});
+  }
+
+  const FingerPoints& source_;
+  const TakeOutcome& sink_;
+  const Tracing& tracing_;
+  TouchCache touches_;
+  std::optional<FingerPoint> upcoming_;  ///< taken from the source, not begun
+  bool has_ended_ = false;
+  std::optional<FingerPoint> last_;  ///< begun last in lanes
+  double last_compression_s_ = 0.0;  ///< its step
+  std::map<std::uint64_t, Entry> under_way_;
+  std::uint64_t next_tag_ = 0;
+  std::uint64_t group_ = 0;
+};
+
+}  // namespace
 
 std::string instruction_set() {
   return std::string(runnable_lane_kernels().front().name);
 }
 
+void solve_points(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing) {
+  Crowd(source, sink, tracing).solve();
+}
+
+std::vector<Outcome> solve_points(const Finger& finger, std::span<const Point> points) {
+  std::vector<Outcome> outcomes(points.size());
+  std::size_t next = 0;
+  solve_points(
+      [&]() -> std::optional<FingerPoint> {
+        if (next == points.size()) {
+          return std::nullopt;
+        }
+        const std::size_t number = next++;
+        return FingerPoint{finger, number, points[number]};
+      },
+      [&](Outcome&& outcome) { outcomes[outcome.number] = std::move(outcome); });
+  return outcomes;
+}
+
 Finger::Finger(const ModelParameters& model) : parts_(std::make_shared<const Parts>(model)) {}
+Finger::Finger(const ModelParameters& model, std::shared_ptr<FallCache> falls)
+    : parts_(std::make_shared<const Parts>(model, std::move(falls))) {}
 Finger::Finger(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen)
     : parts_(std::make_shared<const Parts>(model, std::move(fallen))) {}
 
@@ -24,8 +298,8 @@ const ModelParameters& Finger::model() const {
 double Finger::largest_drop_m() const {
   return parts_->fall().largest_drop_m();
 }
-const FallProgress& Finger::fall_progress() const {
-  return parts_->prepared()->fall_progress();
+double Finger::drop_so_far_m() const {
+  return parts_->prepared().fall_progress();
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star) const {
@@ -33,28 +307,19 @@ CaseResult Finger::solve(double H_m, double mu, double e_star) const {
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tracing) const {
-  parts_->check(H_m, mu, e_star);
+  const Point asked{H_m, mu, e_star};
+  parts_->check(asked);
   if (tracing.sink && tracing.with_fall) {
-    trace_fall(parts_->prepared()->motion(), parts_->fall(), H_m, tracing);
+    trace_fall(*parts_->prepared().motion(), parts_->fall(), H_m, tracing);
   }
-  std::optional<FingerPoint> point = FingerPoint{*this, {0, H_m, mu, e_star}};
-  PointOutcome outcome{};
-  solver::solve_points([&point] { return std::exchange(point, std::nullopt); },
-                       [&outcome](PointOutcome&& o) { outcome = std::move(o); }, tracing);
+  std::optional<FingerPoint> point = FingerPoint{*this, 0, asked};
+  Outcome outcome{};
+  solve_points([&point] { return std::exchange(point, std::nullopt); },
+               [&outcome](Outcome&& o) { outcome = std::move(o); }, tracing);
   if (!outcome.result) {
     throw SolveError(outcome.error);
   }
   return std::move(*outcome.result);
-}
-
-void Finger::solve_points(const std::function<std::optional<PointRequest>()>& source,
-                          const std::function<void(PointOutcome&&)>& sink) const {
-  solver::solve_points(
-      [&]() -> std::optional<FingerPoint> {
-        const auto point = source();
-        return point ? std::optional(FingerPoint{*this, *point}) : std::nullopt;
-      },
-      sink);
 }
 
 }  // namespace oblique::solver

@@ -6,10 +6,10 @@
 #include <numeric>
 #include <string>
 
-#include "worker/solver/contact/contact.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
-#include "worker/solver/motion/pefrl.h"
+#include "worker/solver/reference/contact.h"
+#include "worker/solver/reference/pefrl.h"
 
 namespace oblique::solver {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "worker/solver/chain/chain.h"
-#include "worker/solver/contact/contact_law.h"
 #include "worker/solver/model/smallest_restitution.h"
+#include "worker/solver/reference/chain.h"
+#include "worker/solver/reference/contact_law.h"
 
 namespace oblique::solver {
 

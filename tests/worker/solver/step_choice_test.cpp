@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "worker/solver/model/errors.h"
-#include "worker/solver/motion/pefrl.h"
+#include "worker/solver/reference/pefrl.h"
 
 namespace oblique::solver {
 namespace {

@@ -9,7 +9,7 @@
 
 namespace oblique::solver {
 
-/// How the equations of motion are stepped (worker/solver/motion/README.md).
+/// How the equations of motion are stepped (worker/solver/reference/theory.md).
 enum class Integrator {
   kExplicit,          ///< joints eliminated, PEFRL: explicit, symplectic, order 4
   kGeneralizedAlpha,  ///< joints as constraints with multipliers, generalized-alpha: order 2

@@ -4,13 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <ctime>
-#include <iostream>
 #include <optional>
 #include <random>
-#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -43,7 +41,6 @@ struct Settings {
   double least_e = 0.4;
   double largest_e = 1.0;
   std::string integrator = "explicit";
-  bool cost = false;
 };
 
 ModelParameters model_of(const Settings& settings, int elements_per_link) {
@@ -58,7 +55,7 @@ ModelParameters model_of(const Settings& settings, int elements_per_link) {
 }
 
 /// H up to 0.96 of the length of the chain, as 1.15 m of three links.
-std::vector<solver::PointRequest> random_points(const Settings& settings) {
+std::vector<solver::Point> random_points(const Settings& settings) {
   constexpr double kLeastDrop = 1.0 / 6.0;
   constexpr double kLargestDrop = 0.96;
   std::mt19937_64 random(settings.seed);
@@ -69,10 +66,9 @@ std::vector<solver::PointRequest> random_points(const Settings& settings) {
   for (const double link_m : model_of(settings, 1).lengths_m) {
     length_m += link_m;
   }
-  std::vector<solver::PointRequest> points;
+  std::vector<solver::Point> points;
   for (int i = 0; i < settings.points; ++i) {
-    solver::PointRequest point{};
-    point.number = static_cast<std::uint64_t>(i);
+    solver::Point point{};
     point.H_m = between(kLeastDrop * length_m, kLargestDrop * length_m);
     point.mu = between(settings.least_mu, settings.largest_mu);
     point.e_star = between(settings.least_e, settings.largest_e);
@@ -81,14 +77,11 @@ std::vector<solver::PointRequest> random_points(const Settings& settings) {
   return points;
 }
 
-Results solve(const ModelParameters& model, const std::vector<solver::PointRequest>& points) {
-  Results results(points.size());
-  std::size_t next = 0;
-  solver::Finger(model).solve_points(
-      [&]() -> std::optional<solver::PointRequest> {
-        return next < points.size() ? std::optional(points[next++]) : std::nullopt;
-      },
-      [&](solver::PointOutcome&& outcome) { results[outcome.number] = std::move(outcome.result); });
+Results solve(const ModelParameters& model, const std::vector<solver::Point>& points) {
+  Results results;
+  for (solver::Outcome& outcome : solver::solve_points(solver::Finger(model), points)) {
+    results.push_back(std::move(outcome.result));
+  }
   return results;
 }
 
@@ -184,7 +177,7 @@ void tell_modes(const Results& results, const Results& truth,
   }
 }
 
-void check_mesh(const ModelParameters& model, const std::vector<solver::PointRequest>& points,
+void check_mesh(const ModelParameters& model, const std::vector<solver::Point>& points,
                 const Results& truth) {
   const Results results = solve(model, points);
   const Results companions = solve(solver::companion_model(model), points);
@@ -211,68 +204,7 @@ void check_mesh(const ModelParameters& model, const std::vector<solver::PointReq
   tell_modes(results, truth, errors);
 }
 
-double cpu_s() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
-
-/// 10 drops, 10 frictions and 10 restitutions.
-std::vector<solver::PointRequest> sweep() {
-  constexpr std::uint64_t kSide = 10;
-  std::vector<solver::PointRequest> points;
-  for (std::uint64_t i = 0; i < kSide * kSide * kSide; ++i) {
-    const auto part = [](std::uint64_t of) { return static_cast<double>(of % 10) / 9.0; };
-    points.push_back({i, 0.1 + 1.05 * part(i / (kSide * kSide)), 0.05 + 0.9 * part(i / kSide),
-                      0.2 + 0.8 * part(i)});
-  }
-  return points;
-}
-
-/// CPU time of the points, falls aside.
-double cost_s(const solver::Finger& finger, const std::vector<solver::PointRequest>& points,
-              const solver::FallSource* companion_falls) {
-  std::size_t next = 0;
-  const auto source = [&] {
-    return next < points.size() ? std::optional(solver::FingerPoint{finger, points[next++]})
-                                : std::nullopt;
-  };
-  const auto sink = [](solver::PointOutcome&&) {};
-  const double begun_s = cpu_s();
-  if (companion_falls == nullptr) {
-    solver::solve_points(source, sink);
-  } else {
-    solver::solve_points_with_errors(source, *companion_falls, sink);
-  }
-  return cpu_s() - begun_s;
-}
-
-/// With and without errors in turn, the best of three each.
-void tell_cost(const ModelParameters& model, std::string_view name,
-               const std::vector<solver::PointRequest>& points) {
-  const std::array models{model, solver::companion_model(model)};
-  const auto falls = solver::solve_falls(models);
-  const solver::FallSource companion_falls = [&](std::span<const ModelParameters>) {
-    return std::vector<solver::FallOutcome>{falls[1]};
-  };
-  const solver::Finger finger(model, falls[0].fallen);
-  double without_s = HUGE_VAL;
-  double with_s = HUGE_VAL;
-  for (int turn = 0; turn < 3; ++turn) {
-    without_s = std::min(without_s, cost_s(finger, points, nullptr));
-    with_s = std::min(with_s, cost_s(finger, points, &companion_falls));
-  }
-  const auto count = static_cast<double>(points.size());
-  fmt::print("n = {}, {}: {:.0f} cases/s without errors, {:.0f} with, {:.2f} times the cost\n",
-             model.elements_per_link, name, count / without_s, count / with_s, with_s / without_s);
-}
-
 void check(const Settings& settings) {
-  if (settings.cost) {
-    for (const int mesh : settings.meshes) {
-      tell_cost(model_of(settings, mesh), "sweep", sweep());
-      tell_cost(model_of(settings, mesh), "random", random_points(settings));
-    }
-    return;
-  }
   const auto points = random_points(settings);
   ModelParameters finest = model_of(settings, settings.truth);
   finest.step_factor = 0.5;
@@ -297,7 +229,6 @@ void add_flags(CLI::App& app, Settings& settings) {
   app.add_option("--e-from", settings.least_e, "least restitution");
   app.add_option("--e-to", settings.largest_e, "largest restitution");
   app.add_option("--integrator", settings.integrator, "explicit or generalized-alpha");
-  app.add_flag("--cost", settings.cost, "CPU time of a sweep with and without errors instead");
 }
 
 }  // namespace

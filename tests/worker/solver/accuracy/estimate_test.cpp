@@ -13,9 +13,10 @@
 
 #include "tests/worker/solver/cases/same_bits.h"
 #include "tests/worker/solver/cases/shared_fingers.h"
-#include "worker/solver/chain/chain.h"
+#include "worker/solver/falls.h"
 #include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/result_fields.h"
+#include "worker/solver/reference/chain.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
 
@@ -160,23 +161,19 @@ TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
   EXPECT_GE(held, judged * 9 / 10) << "of " << judged;
 }
 
-using Outcomes = std::map<std::uint64_t, PointOutcome>;
+using Outcomes = std::map<std::uint64_t, Outcome>;
 
 /// What became of the points, each asked for and answered once.
-Outcomes solved_with_errors(const std::vector<FingerPoint>& points, const FallSource& falls) {
+Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& falls) {
   Outcomes outcomes;
   std::size_t next = 0;
   solve_points_with_errors(
       [&] { return next < points.size() ? std::optional(points[next++]) : std::nullopt; }, falls,
-      [&](PointOutcome&& outcome) {
+      [&](Outcome&& outcome) {
         EXPECT_TRUE(outcomes.emplace(outcome.number, std::move(outcome)).second);
       });
   EXPECT_EQ(outcomes.size(), points.size());
   return outcomes;
-}
-
-std::vector<FallOutcome> solved_falls(std::span<const ModelParameters> models) {
-  return solve_falls(models);
 }
 
 /// Points of several models of two elements a link, more than are solved in one go; H = 1.1999 is
@@ -191,7 +188,7 @@ std::vector<FingerPoint> solvable_and_other_points() {
     const Finger finger(models[i], falls[i].fallen);
     for (const double H_m : {0.5, 1.0, 1.1999}) {
       for (int j = 0; j < 30; ++j) {
-        points.push_back({finger, {1000 + points.size(), H_m, 0.05 * j, 0.8}});
+        points.push_back({finger, 1000 + points.size(), {H_m, 0.05 * j, 0.8}});
       }
     }
   }
@@ -204,7 +201,8 @@ const std::vector<FingerPoint>& mixed_points() {
 }
 
 const Outcomes& mixed_outcomes() {
-  static const Outcomes outcomes = solved_with_errors(mixed_points(), solved_falls);
+  FallCache falls;
+  static const Outcomes outcomes = solved_with_errors(mixed_points(), falls);
   return outcomes;
 }
 
@@ -213,8 +211,8 @@ TEST(SolvedWithErrors, EveryOtherNumberHasTheBitsOfThePointWithoutErrors) {
   int estimated = 0;
   std::size_t next = 0;
   solve_points([&] { return next < points.size() ? std::optional(points[next++]) : std::nullopt; },
-               [&](PointOutcome&& without) {
-                 PointOutcome with = mixed_outcomes().at(without.number);
+               [&](Outcome&& without) {
+                 Outcome with = mixed_outcomes().at(without.number);
                  EXPECT_EQ(with.error, without.error);
                  ASSERT_EQ(with.result.has_value(), without.result.has_value());
                  if (with.result) {
@@ -228,18 +226,19 @@ TEST(SolvedWithErrors, EveryOtherNumberHasTheBitsOfThePointWithoutErrors) {
 
 TEST(SolvedWithErrors, AreTheEstimatesOfThePointAlone) {
   for (const std::size_t i : {0U, 95U, 239U}) {
-    const auto& [finger, request] = mixed_points()[i];
+    const auto& [finger, number, request] = mixed_points()[i];
     const Finger companion(companion_model(finger.model()));
-    EXPECT_EQ(mixed_outcomes().at(request.number).result->errors,
+    EXPECT_EQ(mixed_outcomes().at(number).result->errors,
               estimated_errors(finger.model(), finger.solve(request.H_m, request.mu, 0.8),
                                companion.solve(request.H_m, request.mu, 0.8)));
   }
 }
 
 TEST(SolvedWithErrors, ACompanionWithoutAnAnswerLeavesThePointAndNoErrors) {
-  const Outcomes outcomes = solved_with_errors({mixed_points().front()}, [](auto models) {
+  FallCache falls({}, [](auto models) {
     return std::vector<FallOutcome>(models.size(), FallOutcome{nullptr, "no fall today"});
   });
+  const Outcomes outcomes = solved_with_errors({mixed_points().front()}, falls);
   EXPECT_TRUE(outcomes.at(1000).result);
   EXPECT_EQ(outcomes.at(1000).result->errors, ErrorEstimate{});
 }
@@ -250,8 +249,9 @@ TEST(SolvedWithErrors, FrictionlessAndInelasticContactsHaveErrorsToo) {
     model.integrator = integrator;
     model.dt_fall_s = integrator == Integrator::kExplicit ? 0.0 : 1e-4;
     const Finger finger(model);
-    const Outcomes outcomes = solved_with_errors(
-        {{finger, {0, 0.9, 0.0, 0.05}}, {finger, {1, 0.9, 3.0, 0.01}}}, solved_falls);
+    FallCache falls;
+    const Outcomes outcomes =
+        solved_with_errors({{finger, 0, {0.9, 0.0, 0.05}}, {finger, 1, {0.9, 3.0, 0.01}}}, falls);
     EXPECT_EQ(outcomes.at(0).result->errors.ft_peak, 0.0);
     EXPECT_EQ(outcomes.at(0).result->errors.stick_total, 0.0);
     for (const auto& [number, outcome] : outcomes) {

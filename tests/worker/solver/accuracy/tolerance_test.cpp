@@ -104,21 +104,5 @@ TEST(Tolerance, ChosenStepsKeepItOnAHardSpringAndWithAHeavyTip) {
   expect_within(Steps(model).left_by(1.0), 1e-5);
 }
 
-TEST(Tolerance, ErrorsFallByTheFourthOrder) {
-  const Steps steps{preset("paper")};
-  const Errors whole = steps.left_by(1.0);
-  const Errors half = steps.left_by(0.5);
-  EXPECT_LT(half.relative, whole.relative / 10.0);
-  EXPECT_LT(half.exit_m_s, whole.exit_m_s / 10.0);
-}
-
-TEST(Tolerance, ATighterOneTakesStepsShorterByItsFourthRoot) {
-  ModelParameters model = preset("paper");
-  model.lengths_m = {0.4};
-  const double usual_s = Finger(model).solve(0.3, 0.4, 1.0).solver.dt_s;
-  model.tolerance = 1e-9;
-  EXPECT_NEAR(Finger(model).solve(0.3, 0.4, 1.0).solver.dt_s, 0.1 * usual_s, 1e-9 * usual_s);
-}
-
 }  // namespace
 }  // namespace oblique::solver

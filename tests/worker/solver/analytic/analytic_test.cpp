@@ -71,43 +71,5 @@ TEST(RigidImpact, BallThatSlidesThroughoutIsABilinearOscillator) {
   EXPECT_NEAR(ball.velocity_out_m_s()[0], 2.0 - 0.3 * 1.7, 1e-12);
 }
 
-TEST(RigidImpact, SlidingBodyWithCouplingHasItsNormalMotionFromTheSlidingInertia) {
-  const RigidImpact::Parameters p = impact(1.5, 0.4, 1.0);
-  const RigidImpact body(p);
-  ASSERT_EQ(body.mode(), "sC sR");
-  const double omega = std::sqrt(p.k_N_m * (1.0 - p.mu * 0.4));
-  EXPECT_NEAR(body.duration_s(), 0.5 * M_PI / omega * (1.0 + 0.7), 1e-15);
-  EXPECT_NEAR(body.velocity_out_m_s()[1], 0.7, 1e-12);
-  const double impulse = 1.7 / (1.0 - p.mu * 0.4);
-  EXPECT_NEAR(body.velocity_out_m_s()[0], 2.0 + (0.4 - p.mu * 1.5) * impulse, 1e-12);
-}
-
-TEST(RigidImpact, StickingBodyKeepsItsEnergy) {
-  RigidImpact::Parameters p = impact(1.0, 0.3, 1.0);
-  p.mu = 50.0;
-  p.e_star = 1.0;
-  p.V0_m_s = {0.4, -1.0};
-  const RigidImpact body(p);
-  const Eigen::Matrix2d mass = p.W_per_kg.inverse();
-  for (int i = 0; i <= 20; ++i) {
-    const double t = body.duration_s() * 0.9 * i / 20.0;
-    const Eigen::Vector2d V = body.velocity_m_s(t);
-    const Eigen::Vector2d F = body.force_N(t);
-    const double springs = 0.5 * (F[0] * F[0] * p.eta2 + F[1] * F[1]) / p.k_N_m;
-    EXPECT_NEAR(0.5 * V.dot(mass * V) + springs, 0.5 * p.V0_m_s.dot(mass * p.V0_m_s), 1e-9);
-  }
-  EXPECT_EQ(body.mode().substr(0, 5), "SC SR");
-}
-
-TEST(RigidImpact, WorkOfRestitutionIsThatOfCompressionTimesMinusTheSquareOfTheRestitution) {
-  for (const double e_star : {0.2, 0.7, 1.0}) {
-    RigidImpact::Parameters p = impact(1.5, -0.4, 1.0);
-    p.e_star = e_star;
-    const RigidImpact body(p);
-    ASSERT_EQ(body.fn_peaks_N().size(), 1U);
-    EXPECT_NEAR(body.restitution_work_J() / body.compression_work_J(), -e_star * e_star, 1e-12);
-  }
-}
-
 }  // namespace
 }  // namespace oblique::solver

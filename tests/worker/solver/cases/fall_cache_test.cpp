@@ -13,7 +13,8 @@
 #include <vector>
 
 #include "tests/worker/solver/cases/shared_fingers.h"
-#include "worker/solver/lanes/lane_stepper.h"
+#include "worker/solver/falls.h"
+#include "worker/solver/fast/kernels.h"
 
 namespace oblique::solver {
 namespace {
@@ -207,15 +208,6 @@ TEST(FallCacheTest, MemoryBoundsWhatIsKeptButForTheFallInUse) {
   EXPECT_TRUE(none.cache.fall(models[0], models).fallen);
   EXPECT_TRUE(none.cache.kept_fall(models[0]));
   EXPECT_EQ(none.solved.front().size(), 1U) << "nothing ahead without room for it";
-}
-
-TEST(FallCacheTest, FallsAheadTakeHalfOfTheMemory) {
-  const auto models = models_with_E(lanes() + 1);
-  const std::size_t bytes = solve_falls({models.data(), 1}).front().fallen->fall().bytes();
-  CountedFalls falls({.bytes = 6 * bytes});
-  falls.cache.fall(models[0]);
-  falls.cache.fall(models[1], models);
-  EXPECT_EQ(falls.solved.back().size(), 3U);
 }
 
 TEST(FallCacheTest, FallsSolvedAheadStayUntilTheyAreUsed) {

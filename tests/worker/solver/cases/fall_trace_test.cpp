@@ -92,37 +92,6 @@ TEST(FallOfATrace, NothingActsAtTheTipAndNothingIsDeformedThere) {
   }
 }
 
-TEST(FallOfATrace, KeepsItsEnergy) {
-  for (const TraceWithFall& t : falls()) {
-    for (const TraceRow& row : t.fall) {
-      EXPECT_NEAR(row.kinetic_J + row.strain_J + row.gravity_J, 0.0,
-                  1e-6 * t.result.energy.kinetic_in_J)
-          << row.t_s;
-    }
-    EXPECT_EQ(t.fall.back().kinetic_J, t.result.energy.kinetic_in_J);
-  }
-}
-
-TEST(FallOfATrace, MomentumChangesByThePinsForceAndTheWeight) {
-  for (const TraceWithFall& t : falls()) {
-    const ModelParameters model = preset("paper");
-    const double weight_N = 1.2 * model.rho_kg_m3 * model.A_m2 * model.g_m_s2;
-    double x_Ns = 0.0;
-    double y_Ns = 0.0;
-    for (std::size_t i = 1; i < t.fall.size(); ++i) {
-      const TraceRow& a = t.fall[i - 1];
-      const TraceRow& b = t.fall[i];
-      const double h_s = b.t_s - a.t_s;
-      x_Ns += 0.5 * h_s * (a.reactions_N[0] + b.reactions_N[0]);
-      y_Ns += h_s * (0.5 * (a.reactions_N[1] + b.reactions_N[1]) - weight_N);
-    }
-    // The trapezoidal rule does not see the links' vibrations.
-    const double all_Ns = std::hypot(t.fall.back().momentum_x_Ns, t.fall.back().momentum_y_Ns);
-    EXPECT_NEAR(t.fall.back().momentum_x_Ns, x_Ns, 2e-2 * all_Ns);
-    EXPECT_NEAR(t.fall.back().momentum_y_Ns, y_Ns, 2e-2 * all_Ns);
-  }
-}
-
 TEST(FallOfATrace, LeavesRowsOfTheContactAndResultAsTheyAreWithoutIt) {
   for (std::size_t i = 0; i < fingers().size(); ++i) {
     const TraceWithFall without = traced_with_fall(fingers()[i], false);

@@ -59,18 +59,16 @@ TEST(Falls, SayHowFarTheyAre) {
   other.E_Pa *= 2.0;
   ModelParameters implicit = coarse_model();
   implicit.integrator = Integrator::kGeneralizedAlpha;
-  std::vector<std::shared_ptr<const PreparedChain>> chains;
+  std::vector<std::shared_ptr<FallenChain>> chains;
   for (const ModelParameters& model : {coarse_model(), other, implicit}) {
-    chains.push_back(std::make_shared<const PreparedChain>(model));
-    EXPECT_EQ(chains.back()->fall_progress().time_s(), 0.0);
+    chains.push_back(std::make_shared<FallenChain>(model));
+    EXPECT_EQ(chains.back()->fall_progress(), 0.0);
   }
   const auto outcomes = solve_falls(chains);
   for (std::size_t i = 0; i < chains.size(); ++i) {
-    const Fall& fall = outcomes[i].fallen->fall();
-    const double turn_m = fall.largest_drop_m();
+    const double turn_m = outcomes[i].fallen->fall().largest_drop_m();
     // Told now and then, so the end is not told to the last digit.
-    EXPECT_NEAR(chains[i]->fall_progress().drop_m(), turn_m, 0.02 * turn_m) << i;
-    EXPECT_NEAR(chains[i]->fall_progress().time_s(), fall.state_at(turn_m).t_s, 0.02) << i;
+    EXPECT_NEAR(chains[i]->fall_progress(), turn_m, 0.02 * turn_m) << i;
   }
 }
 
@@ -99,11 +97,11 @@ TEST(Falls, OfDifferentShapesAndWaysAreThoseThatEachHasAlone) {
 
 TEST(Falls, AFingerSaysHowFarItsFallIsAndWhatASharedOneCameTo) {
   const Finger finger(coarse_model());
-  EXPECT_EQ(finger.fall_progress().drop_m(), 0.0);
+  EXPECT_EQ(finger.drop_so_far_m(), 0.0);
   const double turn_m = finger.largest_drop_m();
-  EXPECT_NEAR(finger.fall_progress().drop_m(), turn_m, 0.02 * turn_m);
+  EXPECT_NEAR(finger.drop_so_far_m(), turn_m, 0.02 * turn_m);
   const auto fallen = solve_falls(std::vector{coarse_model()}).front().fallen;
-  EXPECT_NEAR(Finger(coarse_model(), fallen).fall_progress().drop_m(), turn_m, 0.02 * turn_m);
+  EXPECT_NEAR(Finger(coarse_model(), fallen).drop_so_far_m(), turn_m, 0.02 * turn_m);
 }
 
 TEST(Falls, ASharedFallGivesEachModelTheBitsOfItsOwn) {
@@ -122,28 +120,6 @@ TEST(Falls, ThatOfAnotherModelIsRefused) {
   ModelParameters wrong = other;
   wrong.k_N_m = -1.0;
   EXPECT_THROW(Finger(wrong, fallen), InputError);
-}
-
-TEST(Falls, SolvedTogetherTheyAreThoseSolvedAlone) {
-  std::vector<ModelParameters> models(11, coarse_model());
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    models[i].E_Pa *= 1.0 + 0.1 * static_cast<double>(i);
-    models[i].lengths_m[i % 3] *= 1.0 + 0.02 * static_cast<double>(i);
-  }
-  const std::vector<FallOutcome> together = solve_falls(models);
-  ASSERT_EQ(together.size(), models.size());
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    SCOPED_TRACE(i);
-    ASSERT_TRUE(together[i].fallen) << together[i].error;
-    const Fall& fall = together[i].fallen->fall();
-    const auto alone = solve_falls({&models[i], 1}).front().fallen;
-    EXPECT_EQ(fall.largest_drop_m(), alone->fall().largest_drop_m());
-    const ChainState touch = fall.state_at(0.7);
-    const ChainState touch_alone = alone->fall().state_at(0.7);
-    EXPECT_EQ(touch.t_s, touch_alone.t_s);
-    EXPECT_EQ(touch.q, touch_alone.q);
-    EXPECT_EQ(touch.v, touch_alone.v);
-  }
 }
 
 TEST(Falls, OneThatFailsLeavesTheOthersAlone) {

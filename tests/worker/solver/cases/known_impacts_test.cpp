@@ -115,26 +115,5 @@ TEST(KnownImpacts, EnergyBalanceClosesToAMillionthOfTheWorkExchanged) {
       [](const KnownImpact&, const CaseResult& result) { EXPECT_LT(result.energy.closure, 1e-6); });
 }
 
-TEST(KnownImpacts, ExitVelocitiesAreThoseOfAFourTimesShorterStep) {
-  ModelParameters model = preset("paper");
-  model.dt_s = results()[0].solver.dt_s / 4.0;
-  const Finger fine{model};
-  for_each_impact([&fine](const KnownImpact& known, const CaseResult& result) {
-    const CaseResult exact = fine.solve(known.H_m, known.mu, known.e_star);
-    EXPECT_NEAR(result.vt_out_m_s, exact.vt_out_m_s, 1e-3);
-    EXPECT_NEAR(result.vn_out_m_s, exact.vn_out_m_s, 1e-3);
-  });
-}
-
-TEST(KnownImpacts, FirstPeakDependsOnRestitutionNotAtAll) {
-  EXPECT_EQ(results()[0].peaks[0].fn_N, results()[1].peaks[0].fn_N);
-  EXPECT_EQ(results()[0].peaks[0].fn_N, results()[2].peaks[0].fn_N);
-}
-
-TEST(KnownImpacts, FirstPeakInStickDependsOnFrictionNotAtAll) {
-  EXPECT_EQ(results()[7].peaks[0].fn_N, results()[8].peaks[0].fn_N);
-  EXPECT_EQ(results()[7].peaks[0].fn_N, results()[9].peaks[0].fn_N);
-}
-
 }  // namespace
 }  // namespace oblique::solver

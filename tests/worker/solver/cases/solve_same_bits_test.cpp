@@ -6,26 +6,32 @@
 #include <optional>
 #include <random>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tests/worker/solver/cases/same_bits.h"
 #include "tests/worker/solver/cases/shared_fingers.h"
-#include "worker/solver/contact/solve_contact.h"
 #include "worker/solver/falls.h"
-#include "worker/solver/lanes/lane_batch.h"
-#include "worker/solver/motion/fall.h"
+#include "worker/solver/fast/lane_batch.h"
+#include "worker/solver/reference/fall.h"
+#include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
 namespace {
 
+struct NumberedPoint {
+  std::uint64_t number;
+  Point point;
+};
+
 /// Points of all kinds of impact, short and long, numbered from 0.
-std::vector<PointRequest> points() {
-  std::vector<PointRequest> list;
+std::vector<NumberedPoint> points() {
+  std::vector<NumberedPoint> list;
   for (const double H_m : {0.3, 0.9, 1.0, 1.04}) {
     for (const double mu : {0.0, 0.4, 0.9, 1.4}) {
       for (const double e_star : {1.0, 0.7, 0.15}) {
-        list.push_back({list.size(), H_m, mu, e_star});
+        list.push_back({list.size(), {H_m, mu, e_star}});
       }
     }
   }
@@ -34,25 +40,23 @@ std::vector<PointRequest> points() {
 
 using Results = std::map<std::uint64_t, CaseResult>;
 
-Results solved_together(const Finger& finger, const std::vector<PointRequest>& list) {
+Results solved_together(const Finger& finger, const std::vector<NumberedPoint>& list) {
+  std::vector<Point> bare;
+  for (const auto& [number, point] : list) {
+    bare.push_back(point);
+  }
   Results results;
-  std::size_t next = 0;
-  finger.solve_points(
-      [&]() -> std::optional<PointRequest> {
-        return next < list.size() ? std::optional(list[next++]) : std::nullopt;
-      },
-      [&results](PointOutcome&& outcome) {
-        EXPECT_TRUE(outcome.result) << outcome.error;
-        const bool is_new = results.emplace(outcome.number, std::move(*outcome.result)).second;
-        EXPECT_TRUE(is_new) << "point " << outcome.number << " came twice";
-      });
+  for (Outcome& outcome : solve_points(finger, bare)) {
+    EXPECT_TRUE(outcome.result) << outcome.error;
+    results.emplace(list[outcome.number].number, std::move(*outcome.result));
+  }
   return results;
 }
 
-Results solved_one_by_one(const Finger& finger, const std::vector<PointRequest>& list) {
+Results solved_one_by_one(const Finger& finger, const std::vector<NumberedPoint>& list) {
   Results results;
-  for (const PointRequest& point : list) {
-    results.emplace(point.number, finger.solve(point.H_m, point.mu, point.e_star));
+  for (const auto& [number, point] : list) {
+    results.emplace(number, finger.solve(point.H_m, point.mu, point.e_star));
   }
   return results;
 }
@@ -123,8 +127,8 @@ std::vector<FingerPoint> crowd() {
     const Finger finger(models[i], falls[i].fallen);
     for (const double mu : {0.4, 1.2}) {
       for (const double e_star : {1.0, 0.6}) {
-        crowd.push_back({finger, {crowd.size(), 0.9, mu, e_star}});
-        crowd.push_back({finger, {crowd.size(), 0.5, mu, e_star}});
+        crowd.push_back({finger, crowd.size(), {0.9, mu, e_star}});
+        crowd.push_back({finger, crowd.size(), {0.5, mu, e_star}});
       }
     }
   }
@@ -138,7 +142,7 @@ Results solved_as_crowd(const std::vector<FingerPoint>& list) {
       [&]() -> std::optional<FingerPoint> {
         return next < list.size() ? std::optional(list[next++]) : std::nullopt;
       },
-      [&results](PointOutcome&& outcome) {
+      [&results](Outcome&& outcome) {
         EXPECT_TRUE(outcome.result) << outcome.error;
         EXPECT_TRUE(results.emplace(outcome.number, std::move(*outcome.result)).second);
       });
@@ -148,8 +152,8 @@ Results solved_as_crowd(const std::vector<FingerPoint>& list) {
 TEST(SameBits, InAMixedCrowdOfModels) {
   auto list = crowd();
   Results alone;
-  for (const auto& [finger, point] : list) {
-    alone.emplace(point.number, finger.solve(point.H_m, point.mu, point.e_star));
+  for (const auto& [finger, number, point] : list) {
+    alone.emplace(number, finger.solve(point.H_m, point.mu, point.e_star));
   }
   expect_same(solved_as_crowd(list), alone);
   std::mt19937_64 generator(2);
@@ -159,19 +163,6 @@ TEST(SameBits, InAMixedCrowdOfModels) {
   }
 }
 
-TEST(SameBits, InCrowdsOnSeveralThreadsThatShareTheFingers) {
-  const auto list = crowd();
-  std::vector<Results> by_thread(3);
-  {
-    std::vector<std::jthread> threads;
-    for (Results& results : by_thread) {
-      threads.emplace_back([&] { results = solved_as_crowd(list); });
-    }
-  }
-  expect_same(by_thread[1], by_thread[0]);
-  expect_same(by_thread[2], by_thread[0]);
-}
-
 TEST(SameBits, WithATraceOrWithout) {
   int rows = 0;
   Tracing tracing;
@@ -179,47 +170,6 @@ TEST(SameBits, WithATraceOrWithout) {
   const CaseResult traced = coarse_finger().solve(1.0, 0.9, 0.7, tracing);
   EXPECT_GT(rows, 10);
   expect_same_bits(traced, coarse_finger().solve(1.0, 0.9, 0.7));
-}
-
-TEST(Lanes, EveryInstructionSetGivesTheSameAnswersButForRounding) {
-  const ModelParameters model = coarse_model();
-  const Chain chain(model);
-  const StepChoice steps(chain, model);
-  const Fall fall(chain, steps.fall_s());
-  const ChainState touch = fall.state_at(1.0);
-  const ExplicitMotion motion(chain);
-  for (const double mu : {0.4, 1.4}) {
-    const ContactParameters parameters{model.k_N_m, model.eta2, mu, 0.8};
-    const CaseResult by_motion =
-        solve_contact(motion, parameters, steps.contact(0.8), touch, Tracing{});
-    for (const LaneKernel& kernel : runnable_lane_kernels()) {
-      SCOPED_TRACE(kernel.name);
-      LaneBatch batch(chain, kernel);
-      std::size_t given = 0;
-      // More cases than lanes, so that lanes are taken again.
-      const std::size_t cases = 2 * kernel.lanes + 1;
-      std::size_t done = 0;
-      batch.solve(
-          [&]() -> std::optional<ContactCase> {
-            return given < cases ? std::optional(ContactCase{given++, 0, &chain, parameters,
-                                                             steps.contact(0.8), &touch})
-                                 : std::nullopt;
-          },
-          [&](ContactOutcome&& outcome) {
-            ++done;
-            ASSERT_TRUE(outcome.result) << outcome.error;
-            const CaseResult& result = *outcome.result;
-            EXPECT_EQ(result.mode, by_motion.mode);
-            EXPECT_NEAR(result.duration_s, by_motion.duration_s, 1e-10 * by_motion.duration_s);
-            EXPECT_NEAR(result.fn_peak_N, by_motion.fn_peak_N, 1e-10 * by_motion.fn_peak_N);
-            EXPECT_NEAR(result.ft_peak_N, by_motion.ft_peak_N, 1e-10 * by_motion.ft_peak_N);
-            EXPECT_NEAR(result.slide_m, by_motion.slide_m, 1e-10 * by_motion.slide_m);
-            EXPECT_NEAR(result.vn_out_m_s, by_motion.vn_out_m_s, 1e-9);
-            EXPECT_NEAR(result.energy.friction_J, by_motion.energy.friction_J, 1e-9);
-          });
-      EXPECT_EQ(done, cases);
-    }
-  }
 }
 
 }  // namespace

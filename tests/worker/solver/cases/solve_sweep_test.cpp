@@ -84,7 +84,7 @@ void expect_in_order(const CaseResult& r) {
 }
 
 /// A random point, one in six of them at an extreme. Never at the very top, where the tip stands.
-PointRequest random_point(const Finger& finger, std::mt19937_64& generator) {
+Point random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);
   };
@@ -96,7 +96,7 @@ PointRequest random_point(const Finger& finger, std::mt19937_64& generator) {
         }
         return length_m;
       }());
-  PointRequest point{0, top_m * uniform(0.05, 0.98), uniform(0.0, 2.0), uniform(0.05, 1.0)};
+  Point point{top_m * uniform(0.05, 0.98), uniform(0.0, 2.0), uniform(0.05, 1.0)};
   switch (std::uniform_int_distribution<int>(0, 17)(generator)) {
     case 0:
       point.mu = 0.0;
@@ -126,7 +126,7 @@ void sweep(const ModelParameters& model, int points, unsigned seed, double worst
   const Finger finger{model};
   std::mt19937_64 generator(seed);
   for (int i = 0; i < points; ++i) {
-    const PointRequest point = random_point(finger, generator);
+    const Point point = random_point(finger, generator);
     SCOPED_TRACE("H = " + std::to_string(point.H_m) + ", mu = " + std::to_string(point.mu) +
                  ", e* = " + std::to_string(point.e_star));
     const CaseResult result = finger.solve(point.H_m, point.mu, point.e_star);

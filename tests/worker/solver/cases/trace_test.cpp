@@ -57,13 +57,6 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
   }
 }
 
-TEST(Trace, TimeNeverGoesBack) {
-  for (const Traced& t : traces()) {
-    EXPECT_TRUE(std::is_sorted(t.rows.begin(), t.rows.end(),
-                               [](const TraceRow& a, const TraceRow& b) { return a.t_s < b.t_s; }));
-  }
-}
-
 TEST(Trace, ForcesStayInsideTheConeAndOnItInSlip) {
   for (const Traced& t : traces()) {
     for (const TraceRow& row : t.rows) {
@@ -117,21 +110,6 @@ TEST(Trace, PRestsInStickAndMovesWithItsVelocityInSlip) {
   }
 }
 
-TEST(Trace, StatesAreThoseOfTheMode) {
-  for (const Traced& t : traces()) {
-    std::string mode;
-    std::string last;
-    // The last row repeats the state that ended.
-    for (const TraceRow& row : t.rows) {
-      if (row.state != last) {
-        mode += (mode.empty() ? "" : " ") + row.state;
-      }
-      last = row.state;
-    }
-    EXPECT_EQ(mode, t.result.mode);
-  }
-}
-
 TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
   for (const Traced& t : traces()) {
     double impulse_n_Ns = 0.0;
@@ -144,36 +122,6 @@ TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
     // The trapezoidal rule errs by (omega h)^2/12 of the fastest motion seen.
     EXPECT_NEAR(impulse_n_Ns, t.result.impulse_n_Ns, 5e-3 * t.result.impulse_n_Ns);
     EXPECT_NEAR(impulse_t_Ns, t.result.impulse_t_Ns, 5e-3 * t.result.impulse_n_Ns);
-  }
-}
-
-TEST(Trace, NoRowExceedsThePeaksAndEachPeakIsARow) {
-  for (const Traced& t : traces()) {
-    for (const TraceRow& row : t.rows) {
-      EXPECT_LE(row.fn_N, t.result.fn_peak_N);
-      EXPECT_LE(std::abs(row.ft_N), t.result.ft_peak_N);
-    }
-    for (const Peak& peak : t.result.peaks) {
-      EXPECT_TRUE(std::any_of(t.rows.begin(), t.rows.end(), [&peak](const TraceRow& row) {
-        return row.t_s == peak.t_s && row.fn_N == peak.fn_N;
-      }));
-    }
-  }
-}
-
-TEST(Trace, TangentialForceOfAPeakIsTheLargestBetweenTheValleysBesideIt) {
-  for (const Traced& t : traces()) {
-    for (std::size_t i = 0; i < t.result.peaks.size(); ++i) {
-      const double from_s = t.result.phases[2 * i].t0_s;
-      const double to_s = t.result.phases[2 * i + 1].t1_s;
-      double largest_N = 0.0;
-      for (const TraceRow& row : t.rows) {
-        if (row.t_s >= from_s && row.t_s <= to_s) {
-          largest_N = std::max(largest_N, std::abs(row.ft_N));
-        }
-      }
-      EXPECT_NEAR(t.result.peaks[i].ft_N, largest_N, 1e-6);
-    }
   }
 }
 
@@ -204,19 +152,6 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
     for (std::size_t i = 0; i < maxima_N.size(); ++i) {
       EXPECT_NEAR(t.result.ft_peaks[i].ft_N, maxima_N[i], 1e-4);
     }
-  }
-}
-
-TEST(Trace, WorkExchangedIsTheSumOverTheRows) {
-  for (const Traced& t : traces()) {
-    double exchanged_J = 0.0;
-    for (std::size_t i = 1; i < t.rows.size(); ++i) {
-      const TraceRow& a = t.rows[i - 1];
-      const TraceRow& b = t.rows[i];
-      exchanged_J += std::abs(0.5 * (a.fn_N + b.fn_N) * (b.y_m - a.y_m)) +
-                     std::abs(0.5 * (a.ft_N + b.ft_N) * (b.x_m - a.x_m));
-    }
-    EXPECT_NEAR(t.result.energy.exchanged_J, exchanged_J, 1e-3 * exchanged_J);
   }
 }
 
@@ -295,25 +230,6 @@ TEST(Trace, ShapeIsThatOfAChainFromThePinToTheTip) {
     }
   }
   EXPECT_TRUE(traces()[0].rows[0].nodes_m.empty()) << "unless it is asked for";
-}
-
-TEST(Trace, BothIntegratorsTellTheSameEnergiesMomentaAndShapes) {
-  ModelParameters model = coarse_model();
-  const TraceRow by_default = with_shape(model).rows.front();
-  model.integrator = Integrator::kGeneralizedAlpha;
-  model.dt_fall_s = 20e-6;
-  model.dt_s = 1e-6;
-  const TraceRow reference = with_shape(model).rows.front();
-  EXPECT_NEAR(reference.kinetic_J, by_default.kinetic_J, 1e-2 * by_default.kinetic_J);
-  EXPECT_NEAR(reference.gravity_J, by_default.gravity_J, 1e-3 * std::abs(by_default.gravity_J));
-  EXPECT_NEAR(reference.momentum_x_Ns, by_default.momentum_x_Ns,
-              1e-2 * std::abs(by_default.momentum_x_Ns));
-  EXPECT_NEAR(reference.momentum_y_Ns, by_default.momentum_y_Ns,
-              1e-2 * std::abs(by_default.momentum_y_Ns));
-  ASSERT_EQ(reference.nodes_m.size(), by_default.nodes_m.size());
-  for (std::size_t i = 0; i < reference.nodes_m.size(); ++i) {
-    EXPECT_NEAR(reference.nodes_m[i], by_default.nodes_m[i], 1e-3);
-  }
 }
 
 TEST(Trace, PeaksOfTheReactionsAreThoseOfTheRows) {

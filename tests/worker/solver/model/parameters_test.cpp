@@ -41,21 +41,6 @@ TEST(Parameters, TheDefaultIsThePaperOnAMeshThatPredicts) {
   EXPECT_EQ(paper, preset("standard"));
 }
 
-TEST(Parameters, TheAccuracyOfEveryPresetsMeshIsKnownAndRisesWithTheMesh) {
-  const auto meshes = mesh_accuracies();
-  for (const std::string_view name : {"standard", "paper", "printed"}) {
-    EXPECT_TRUE(std::any_of(meshes.begin(), meshes.end(), [&](const MeshAccuracy& mesh) {
-      return mesh.elements_per_link == preset(name).elements_per_link;
-    })) << name;
-  }
-  for (std::size_t i = 1; i < meshes.size(); ++i) {
-    EXPECT_LT(meshes[i - 1].elements_per_link, meshes[i].elements_per_link);
-    EXPECT_GT(meshes[i - 1].forces_off, meshes[i].forces_off);
-    EXPECT_GT(meshes[i - 1].duration_off, meshes[i].duration_off);
-    EXPECT_LT(meshes[i - 1].same_mode, meshes[i].same_mode);
-  }
-}
-
 TEST(Parameters, EveryKeyHasANameOfItsOwnAndReadsWhatItWrote) {
   std::set<std::string_view> names;
   for (const ParameterKey& key : model_keys()) {

@@ -1,0 +1,305 @@
+#include "worker/solver/fast/lane_falls.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "worker/solver/model/errors.h"
+#include "worker/solver/reference/fall.h"
+
+namespace oblique::solver {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kAccuracy = 1e-5;
+
+ModelParameters model_of(int elements_per_link) {
+  ModelParameters model = preset("paper");
+  model.elements_per_link = elements_per_link;
+  return model;
+}
+
+FallRequest request_for(const Chain& chain, double accuracy = kAccuracy,
+                        FallProgress* progress = nullptr) {
+  return {&chain, nullptr, 0.0, accuracy, progress};
+}
+
+/// A chain with its fall, at one address.
+struct Fallen {
+  explicit Fallen(const ModelParameters& model, double accuracy = kAccuracy)
+      : chain(model), solved(solve(accuracy)), fall(*solved) {}
+  Fallen(const Fallen&) = delete;
+  Fallen& operator=(const Fallen&) = delete;
+  ~Fallen() = default;
+
+  std::shared_ptr<const Fall> solve(double accuracy) const {
+    const FallRequest request = request_for(chain, accuracy);
+    const FallSolution solution = solve_by_collocation({&request, 1}).front();
+    if (!solution.fall) {
+      throw SolveError(solution.error);
+    }
+    return solution.fall;
+  }
+  TipState tip_at(double H_m) const { return chain.tip(fall.state_at(H_m)); }
+  double energy_J(const ChainState& state) const {
+    return chain.kinetic_energy_J(state.v) + chain.strain_energy_J(state.q) +
+           chain.gravity_energy_J(state.q);
+  }
+  Chain chain;
+  std::shared_ptr<const Fall> solved;
+  const Fall& fall;
+};
+
+const Fallen& paper() {
+  static const Fallen fallen{preset("paper")};
+  return fallen;
+}
+
+struct Known {
+  double H_m;
+  double t_s;
+  double x_m;
+  double vx_m_s;
+  double vy_m_s;
+};
+
+TEST(CollocationFall, StateAtATimeIsTheOneThatTheTipPassesThenAndIsKeptNowhere) {
+  const Fallen fallen{model_of(1)};
+  const std::size_t bytes = fallen.fall.bytes();
+  EXPECT_EQ(fallen.fall.state_at_time(0.0).q, fallen.chain.at_rest().q);
+  std::vector<ChainState> at_times;
+  for (int i = 0; i < 40; ++i) {
+    at_times.push_back(fallen.fall.state_at_time(0.01 * i));
+  }
+  EXPECT_EQ(fallen.fall.bytes(), bytes);
+  for (const ChainState& state : at_times) {
+    const double H_m = -fallen.chain.tip(state).y_m;
+    if (H_m > 0.0) {
+      EXPECT_NEAR(fallen.fall.state_at(H_m).t_s, state.t_s, 1e-12) << H_m;
+    }
+  }
+}
+
+TEST(CollocationFall, TipHasTheKnownStateAtTheDropsOfThePaper) {
+  // An independent explicit solution, converged to nine digits.
+  for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
+                             Known{1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
+                             Known{1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}) {
+    const TipState tip = paper().tip_at(known.H_m);
+    EXPECT_NEAR(paper().fall.state_at(known.H_m).t_s, known.t_s, 1e-8);
+    EXPECT_NEAR(tip.x_m, known.x_m, 1e-7);
+    EXPECT_NEAR(tip.vx_m_s, known.vx_m_s, 5e-5);
+    EXPECT_NEAR(tip.vy_m_s, known.vy_m_s, 5e-5);
+  }
+}
+
+/// Largest difference of time [s] and of velocity [m/s] to small explicit steps.
+struct Difference {
+  double time_s = 0.0;
+  double velocity_m_s = 0.0;
+};
+
+Difference difference(const Fallen& fallen, const Fall& explicit_fall) {
+  Difference largest;
+  for (const double part : {0.02, 0.3, 0.7, 0.95, 0.999}) {
+    const double H_m = part * explicit_fall.largest_drop_m();
+    const ChainState one = fallen.fall.state_at(H_m);
+    const ChainState other = explicit_fall.state_at(H_m);
+    const TipState a = fallen.chain.tip(one);
+    const TipState b = fallen.chain.tip(other);
+    largest.time_s = std::max(largest.time_s, std::abs(one.t_s - other.t_s));
+    largest.velocity_m_s =
+        std::max(largest.velocity_m_s, std::hypot(a.vx_m_s - b.vx_m_s, a.vy_m_s - b.vy_m_s));
+  }
+  return largest;
+}
+
+TEST(CollocationFall, IsTheFallThatSmallExplicitStepsGive) {
+  for (const int n : {1, 4}) {
+    SCOPED_TRACE(n);
+    const Fallen fallen(model_of(n));
+    const auto solved = solve_stepped_fall(fallen.chain, 2e-6);
+    const Fall& steps = *solved;
+    const Difference apart = difference(fallen, steps);
+    EXPECT_LT(apart.time_s, 1e-9);
+    EXPECT_LT(apart.velocity_m_s, 1e-4);
+    EXPECT_NEAR(fallen.fall.largest_drop_m(), steps.largest_drop_m(), 1e-9);
+  }
+}
+
+TEST(CollocationFall, IsRightForSoftAndStiffAndLoadedAndSingleLinks) {
+  ModelParameters soft = model_of(2);
+  soft.E_Pa *= 1e-4;
+  ModelParameters softest = model_of(2);
+  softest.E_Pa *= 1e-5;  // each link hangs through and swings
+  ModelParameters stiff = model_of(2);
+  stiff.E_Pa *= 100.0;
+  ModelParameters loaded = model_of(2);
+  loaded.tip_mass_kg = 5.0;
+  ModelParameters single = model_of(3);
+  single.lengths_m = {1.0};
+  ModelParameters uneven = model_of(2);
+  uneven.lengths_m = {0.7, 0.05, 0.3};
+  for (const ModelParameters& model : {soft, softest, stiff, loaded, single, uneven}) {
+    SCOPED_TRACE("E = " + std::to_string(model.E_Pa) + ", links " +
+                 std::to_string(model.lengths_m.size()) + ", tip " +
+                 std::to_string(model.tip_mass_kg));
+    const Fallen fallen(model);
+    const double limit_s = 2.9894 / fallen.chain.highest_frequency_rad_s(0.0);
+    const auto solved = solve_stepped_fall(fallen.chain, 0.4 * limit_s);
+    const Fall& steps = *solved;
+    const Difference apart = difference(fallen, steps);
+    EXPECT_LT(apart.time_s, 1e-7);
+    EXPECT_LT(apart.velocity_m_s, 1e-3);
+    EXPECT_NEAR(fallen.fall.largest_drop_m(), steps.largest_drop_m(), 1e-6);
+  }
+}
+
+TEST(CollocationFall, ErrorFollowsTheAccuracyAskedFor) {
+  const auto solved = solve_stepped_fall(paper().chain, 2e-6);
+  const Fall& steps = *solved;
+  const Fallen tight(preset("paper"), kAccuracy / 100.0);
+  const Fallen loose(preset("paper"), kAccuracy * 10.0);
+  EXPECT_LT(difference(tight, steps).velocity_m_s, 5e-6);
+  EXPECT_GT(difference(loose, steps).velocity_m_s, 5e-6);
+  EXPECT_LT(difference(loose, steps).velocity_m_s, 2e-3);
+}
+
+TEST(CollocationFall, EnergyOfTheFallIsKept) {
+  for (const int n : {2, 8}) {
+    const Fallen fallen(model_of(n));
+    const double start_J = fallen.energy_J(fallen.chain.at_rest());
+    for (const double H_m : {0.3, 0.6, 0.9, 1.0, 1.1}) {
+      EXPECT_NEAR(fallen.energy_J(fallen.fall.state_at(H_m)), start_J, 1e-8)
+          << n << ", H = " << H_m << ": a billionth of the 10 J of the fall";
+    }
+  }
+}
+
+TEST(CollocationFall, DropIsLocatedToRounding) {
+  for (const double H_m : {1e-9, 1e-3, 0.1, 0.5, 1.0, 1.17, 1.179}) {
+    EXPECT_NEAR(paper().tip_at(H_m).y_m, -H_m, 1e-15 + 4e-16 * H_m) << H_m;
+  }
+}
+
+TEST(CollocationFall, TipStandsStillAtTheLargestDrop) {
+  const double largest_m = paper().fall.largest_drop_m();
+  const TipState tip = paper().tip_at(largest_m);
+  EXPECT_NEAR(-tip.y_m, largest_m, 1e-15);
+  EXPECT_NEAR(tip.vy_m_s, 0.0, 1e-3) << "the drop fixes the instant only to the root of rounding";
+  const ChainState below = paper().fall.state_at(largest_m - 1e-9);
+  EXPECT_LT(below.t_s, paper().fall.state_at(largest_m).t_s);
+  EXPECT_LT(paper().chain.tip(below).vy_m_s, 0.0);
+}
+
+/// Models of one shape and of another, none like the next.
+std::deque<ModelParameters> different_models(int elements_per_link) {
+  std::deque<ModelParameters> models;
+  for (int i = 0; i < 11; ++i) {
+    const double more = 1.0 + 0.13 * i;
+    ModelParameters model = model_of(elements_per_link);
+    model.E_Pa *= more * (i % 3 == 0 ? 1e-3 : 1.0);
+    model.I_m4 *= i % 2 == 0 ? more : 1.0;
+    model.lengths_m = {0.3 * more, 0.4, 0.35};
+    model.tip_mass_kg = i % 4 == 1 ? 0.2 * more : 0.0;
+    models.push_back(model);
+  }
+  return models;
+}
+
+void expect_same_bits(const Fall& one, const Fall& other) {
+  ASSERT_EQ(one.largest_drop_m(), other.largest_drop_m());
+  for (const double part : {1e-6, 0.2, 0.51, 0.9, 1.0}) {
+    const ChainState a = one.state_at(part * one.largest_drop_m());
+    const ChainState b = other.state_at(part * one.largest_drop_m());
+    EXPECT_EQ(a.t_s, b.t_s);
+    EXPECT_EQ(a.q, b.q);
+    EXPECT_EQ(a.v, b.v);
+  }
+}
+
+TEST(CollocationFall, HasTheSameBitsAloneAndBesideOthers) {
+  const std::deque<ModelParameters> models = different_models(1);
+  std::deque<Chain> chains;
+  std::vector<FallRequest> requests;
+  for (const ModelParameters& model : models) {
+    requests.push_back(request_for(chains.emplace_back(model)));
+  }
+  for (const LaneKernel& kernel : runnable_lane_kernels()) {
+    SCOPED_TRACE(kernel.name);
+    const std::vector<FallSolution> together = solve_by_collocation(requests, kernel);
+    std::vector<FallRequest> reversed(requests.rbegin(), requests.rend());
+    const std::vector<FallSolution> backwards = solve_by_collocation(reversed, kernel);
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      SCOPED_TRACE(i);
+      ASSERT_EQ(together[i].error, "");
+      const FallSolution alone = solve_by_collocation({&requests[i], 1}, kernel).front();
+      expect_same_bits(*alone.fall, *together[i].fall);
+      expect_same_bits(*alone.fall, *backwards[requests.size() - 1 - i].fall);
+    }
+  }
+}
+
+TEST(CollocationFall, RefusesChainsOfDifferentShapes) {
+  const Chain chain(model_of(1));
+  const Chain longer(model_of(2));
+  const std::vector<FallRequest> requests{request_for(chain), request_for(longer)};
+  EXPECT_THROW(solve_by_collocation(requests), std::invalid_argument);
+}
+
+TEST(CollocationFall, StateAtADropHasTheSameBitsWhateverWasAskedBeforeAndInWhichThread) {
+  const Fallen one(model_of(2));
+  const Fallen other(model_of(2));
+  const std::vector<double> drops{1e-6, 0.01, 0.1, 0.33, 0.5, 0.77, 0.99, 1.0, 1.0001, 1.17};
+  std::vector<ChainState> forwards;
+  for (const double H_m : drops) {
+    forwards.push_back(one.fall.state_at(H_m));
+  }
+  const auto backwards = [&] {
+    for (std::size_t i = drops.size(); i-- > 0;) {
+      const ChainState state = other.fall.state_at(drops[i]);
+      EXPECT_EQ(state.q, forwards[i].q);
+      EXPECT_EQ(state.v, forwards[i].v);
+      EXPECT_EQ(state.t_s, forwards[i].t_s);
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < 3; ++i) {
+    threads.emplace_back(backwards);
+  }
+}
+
+TEST(CollocationFall, InstructionSetsDifferByRoundingOnly) {
+  const Chain chain(model_of(2));
+  const FallRequest request = request_for(chain);
+  std::vector<double> times_s;
+  for (const LaneKernel& kernel : runnable_lane_kernels()) {
+    times_s.push_back(solve_by_collocation({&request, 1}, kernel).front().fall->state_at(1.0).t_s);
+    EXPECT_NEAR(times_s.back(), times_s.front(), 1e-10) << kernel.name;
+  }
+}
+
+TEST(CollocationFall, OneThatFailsLeavesTheOthersAlone) {
+  // No step keeps an accuracy of 0.
+  const Chain chain(model_of(1));
+  const std::vector<FallRequest> requests{request_for(chain), request_for(chain, 0.0),
+                                          request_for(chain)};
+  const std::vector<FallSolution> solutions = solve_by_collocation(requests);
+  EXPECT_THAT(solutions[1].error, HasSubstr("still do not converge"));
+  EXPECT_EQ(solutions[1].fall, nullptr);
+  ASSERT_NE(solutions[0].fall, nullptr);
+  ASSERT_NE(solutions[2].fall, nullptr);
+  expect_same_bits(*solutions[0].fall, *solutions[2].fall);
+}
+
+}  // namespace
+}  // namespace oblique::solver

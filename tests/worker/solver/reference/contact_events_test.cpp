@@ -1,0 +1,248 @@
+#include "worker/solver/reference/contact_events.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+namespace oblique::solver {
+namespace {
+
+using testing::ElementsAre;
+
+constexpr ContactParameters kParameters{1e6, 1.2, 0.5, 0.8};
+constexpr double kStep_s = 1e-4;
+
+/// A motion of the tip as functions of time from 0 to one step.
+struct TipMotion {
+  std::function<double(double)> x;
+  std::function<double(double)> y;
+  std::function<double(double)> vx;
+  std::function<double(double)> vy;
+
+  TipState at(double fraction) const {
+    const double t = fraction * kStep_s;
+    return {x(t), y(t), vx(t), vy(t)};
+  }
+};
+
+/// V_n = a + b z + c z^2 and V_t = 1 throughout, z in [0, 1] over the step.
+TipMotion with_normal_velocity(double a, double b, double c) {
+  const double h = kStep_s;
+  return {[](double t) { return t; },
+          [=](double t) {
+            const double z = t / h;
+            return -1e-5 + h * (a * z + b * z * z / 2.0 + c * z * z * z / 3.0);
+          },
+          [](double) { return 1.0; },
+          [=](double t) {
+            const double z = t / h;
+            return a + b * z + c * z * z;
+          }};
+}
+
+std::optional<EventGuess> guess(const ContactLaw& law, ContactEvent event, const TipMotion& motion,
+                                bool fresh = false) {
+  return guess_event(law, event, motion.at(0.0), motion.at(1.0), kStep_s, 1.0, fresh);
+}
+
+ContactLaw slipping() {
+  return ContactLaw(kParameters, {0.0, 0.0, 1.0, -1.0});
+}
+ContactLaw sticking() {
+  return ContactLaw(kParameters, {0.0, 0.0, 0.1, -1.0});
+}
+
+/// In restitution with F_n = 10 N at y = -1e-5.
+ContactLaw restitution(bool stick) {
+  ContactLaw law = stick ? sticking() : slipping();
+  law.turn({0.0, -1e-5, 1.0, 0.0});
+  return law;
+}
+
+std::vector<ContactEvent> possible(const ContactLaw& law) {
+  const PossibleEvents events = possible_events(law);
+  return {events.events.begin(), events.events.begin() + static_cast<std::ptrdiff_t>(events.count)};
+}
+
+TEST(ContactEvents, EachRegimeHasItsOwnEventsInTheOrderInWhichTheyAreTaken) {
+  using enum ContactEvent;
+  EXPECT_THAT(possible(slipping()), ElementsAre(kTurn, kStick));
+  EXPECT_THAT(possible(restitution(false)), ElementsAre(kSeparation, kTurn, kStick));
+  EXPECT_THAT(possible(sticking()),
+              ElementsAre(kTurn, kSlipForward, kSlipBackward, kTangentialExtremum));
+  EXPECT_THAT(possible(restitution(true)),
+              ElementsAre(kSeparation, kTurn, kSlipForward, kSlipBackward, kTangentialExtremum));
+}
+
+TEST(ContactEvents, RatesAreTheDerivativesOfTheFunctionsDefinedByForces) {
+  const TipMotion motion{[](double t) { return 2.0 * t; }, [](double t) { return -1e-5 - t; },
+                         [](double) { return 2.0; }, [](double) { return -1.0; }};
+  for (const ContactLaw& law : {slipping(), sticking(), restitution(false), restitution(true)}) {
+    for (const ContactEvent event :
+         {ContactEvent::kSeparation, ContactEvent::kSlipForward, ContactEvent::kSlipBackward}) {
+      ASSERT_TRUE(is_force_event(event));
+      const auto value = [&](double z) {
+        return event_function(law, event, motion.at(z), 1.0).value;
+      };
+      // Forces are affine in time here: the difference quotient errs by rounding alone.
+      EXPECT_NEAR(event_function(law, event, motion.at(0.5), 1.0).rate,
+                  (value(1.0) - value(0.0)) / kStep_s, 1e-3);
+    }
+  }
+}
+
+TEST(ContactEvents, SignsAreThoseOfTheirDefinitions) {
+  const ContactLaw compression = slipping();
+  const TipState pressed{0.0, -1e-5, 1.0, -1.0};
+  using enum ContactEvent;
+  const auto value = [&](const ContactLaw& law, ContactEvent event, const TipState& tip) {
+    return event_function(law, event, tip, 1.0).value;
+  };
+  EXPECT_LT(value(compression, kTurn, pressed), 0.0) << "still going down";
+  EXPECT_GT(value(compression, kTurn, {0.0, -1e-5, 1.0, 1.0}), 0.0);
+  EXPECT_GT(value(restitution(false), kTurn, pressed), 0.0) << "going down again";
+  EXPECT_LT(value(compression, kSeparation, pressed), 0.0) << "F_n > 0";
+  EXPECT_LT(value(compression, kStick, {0.0, 0.0, 1.0, 0.0}), 0.0) << "P slides on";
+  EXPECT_GT(value(compression, kStick, {0.0, 0.0, -1.0, 0.0}), 0.0);
+  EXPECT_LT(value(sticking(), kSlipForward, pressed), 0.0) << "inside the cone";
+  EXPECT_LT(value(sticking(), kSlipBackward, pressed), 0.0);
+  EXPECT_GT(value(sticking(), kSlipForward, {1e-3, -1e-5, 1.0, 0.0}), 0.0) << "dragged forwards";
+  EXPECT_GT(value(sticking(), kSlipBackward, {-1e-3, -1e-5, -1.0, 0.0}), 0.0);
+}
+
+TEST(GuessEvent, CrossingInsideTheStepIsFoundExactlyForAQuadraticVelocity) {
+  // V_n = (z - 0.3)(z + 2).
+  const auto found = guess(slipping(), ContactEvent::kTurn, with_normal_velocity(-0.6, 1.7, 1.0));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->fraction, 0.3, 1e-12);
+  EXPECT_NEAR(found->slope, 2.3, 1e-10);
+  EXPECT_FALSE(found->inside_only);
+}
+
+TEST(GuessEvent, ForceThatFallsToZeroAlongACubicIsFoundExactly) {
+  // In restitution F_n = 10 N - k_n (y + 1e-5), k_n = 1e6/0.64; zero at y = -3.6e-6.
+  const ContactLaw law = restitution(false);
+  const TipMotion motion = with_normal_velocity(0.03, 0.04, 0.03);
+  const auto found = guess(law, ContactEvent::kSeparation, motion);
+  // It does not get there within this step ...
+  EXPECT_FALSE(found);
+  const TipMotion faster = with_normal_velocity(0.1, 0.04, 0.03);
+  const auto separation = guess(law, ContactEvent::kSeparation, faster);
+  ASSERT_TRUE(separation) << "... but does within this one";
+  EXPECT_NEAR(faster.at(separation->fraction).y_m, -3.6e-6, 1e-17);
+}
+
+TEST(GuessEvent, MotionThatDoesNotCrossGivesNothing) {
+  EXPECT_FALSE(guess(slipping(), ContactEvent::kTurn, with_normal_velocity(-1.0, 0.5, 0.2)));
+  // Falling through zero is not an event.
+  EXPECT_FALSE(
+      guess(restitution(false), ContactEvent::kTurn, with_normal_velocity(0.5, -0.2, 0.0)));
+}
+
+TEST(GuessEvent, DoubleCrossingInsideAStepIsSeenFromThePolynomialAlone) {
+  // V_n = -(z - 0.4)(z - 0.6): above zero only between.
+  const auto found = guess(slipping(), ContactEvent::kTurn, with_normal_velocity(-0.24, 1.0, -1.0));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->fraction, 0.4, 1e-12);
+  EXPECT_TRUE(found->inside_only);
+  EXPECT_NEAR(found->peak_fraction, 0.5, 1e-12);
+  EXPECT_FALSE(guess(slipping(), ContactEvent::kTurn, with_normal_velocity(-0.26, 1.0, -1.0)))
+      << "a bump that stays below zero";
+}
+
+TEST(GuessEvent, ReachingZeroAtTheEndOfTheStepCounts) {
+  const auto found = guess(slipping(), ContactEvent::kTurn, with_normal_velocity(-1.0, 1.0, 0.0));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->fraction, 1.0, 1e-12);
+}
+
+TEST(GuessEvent, StartAtOrAboveZeroCountsAtOnceUnlessItFalls) {
+  const auto at_once = guess(slipping(), ContactEvent::kTurn, with_normal_velocity(0.0, 1.0, 0.0));
+  ASSERT_TRUE(at_once);
+  EXPECT_EQ(at_once->fraction, 0.0);
+  const auto above = guess(slipping(), ContactEvent::kTurn, with_normal_velocity(0.1, 0.0, 0.0));
+  ASSERT_TRUE(above);
+  EXPECT_EQ(above->fraction, 0.0);
+  EXPECT_FALSE(guess(slipping(), ContactEvent::kTurn, with_normal_velocity(0.0, -1.0, 0.0)));
+}
+
+TEST(GuessEvent, FreshStartFromZeroDoesNotCountButALaterRiseDoes) {
+  constexpr bool kFresh = true;
+  EXPECT_FALSE(
+      guess(slipping(), ContactEvent::kTurn, with_normal_velocity(0.0, -1.0, 0.0), kFresh));
+  // Rounding may leave a fresh function just above zero.
+  EXPECT_FALSE(
+      guess(slipping(), ContactEvent::kTurn, with_normal_velocity(1e-16, -1.0, 0.0), kFresh));
+  // V_n = z (z - 0.7): falls first, rises through zero later.
+  const auto later =
+      guess(slipping(), ContactEvent::kTurn, with_normal_velocity(0.0, -0.7, 1.0), kFresh);
+  ASSERT_TRUE(later);
+  EXPECT_NEAR(later->fraction, 0.7, 1e-12);
+  // Rises all the way from a fresh start: the regime just entered is left at once.
+  const auto at_once =
+      guess(slipping(), ContactEvent::kTurn, with_normal_velocity(0.0, 1.0, 0.0), kFresh);
+  ASSERT_TRUE(at_once);
+  EXPECT_EQ(at_once->fraction, 0.0);
+}
+
+TEST(GuessEvent, FunctionThatIsZeroThroughoutIsNoEvent) {
+  // A tip that never moves along the ground.
+  const TipMotion straight_down{[](double) { return 0.0; }, [](double t) { return -1e-5 - t; },
+                                [](double) { return 0.0; }, [](double) { return -1.0; }};
+  ContactParameters smooth = kParameters;
+  smooth.mu = 0.0;
+  const ContactLaw slip(smooth, {0.0, 0.0, 0.0, -1.0});
+  const ContactLaw stick(kParameters, {0.0, 0.0, 0.0, -1.0});
+  for (const bool fresh : {false, true}) {
+    EXPECT_FALSE(guess(slip, ContactEvent::kStick, straight_down, fresh));
+    EXPECT_FALSE(guess(stick, ContactEvent::kTangentialExtremum, straight_down, fresh));
+  }
+}
+
+TEST(FarFromEvents, OnlyWhereNoEventIsGuessedAndNearlyAlwaysThere) {
+  std::mt19937_64 generator(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  int far = 0;
+  int without_guess = 0;
+  constexpr double h_s = 1e-6;
+  const auto random_start = [&](double vx_m_s, double vy_m_s) {
+    return TipState{1.5e-5 * uniform(generator), -2e-5 + 1e-5 * uniform(generator),
+                    vx_m_s + uniform(generator), vy_m_s + 1.1 * uniform(generator)};
+  };
+  const auto random_end = [&](const TipState& start) {
+    TipState end = start;
+    end.vx_m_s += 0.2 * uniform(generator);
+    end.vy_m_s += 0.2 * uniform(generator);
+    end.x_m += h_s * (0.5 * (start.vx_m_s + end.vx_m_s) + 0.02 * uniform(generator));
+    end.y_m += h_s * (0.5 * (start.vy_m_s + end.vy_m_s) + 0.02 * uniform(generator));
+    return end;
+  };
+  for (const bool compression : {true, false}) {
+    for (const bool stick : {true, false}) {
+      for (int trial = 0; trial < 20'000; ++trial) {
+        SCOPED_TRACE(trial);
+        const ContactLaw law = compression ? (stick ? sticking() : slipping()) : restitution(stick);
+        const double normal_m_s = compression ? -1.0 : 1.0;
+        const TipState start = random_start(stick ? 0.5 : 1.0, normal_m_s);
+        const TipState end = random_end(start);
+        bool is_guessed = false;
+        for (const ContactEvent event : possible(law)) {
+          is_guessed = is_guessed || guess_event(law, event, start, end, h_s, 1.0, false);
+        }
+        const bool is_far = is_far_from_events(law, start, end, h_s, 1.0);
+        EXPECT_FALSE(is_far && is_guessed);
+        far += is_far ? 1 : 0;
+        without_guess += is_guessed ? 0 : 1;
+      }
+    }
+  }
+  EXPECT_GT(far, 1000);
+  EXPECT_GT(far, 0.8 * without_guess);
+}
+
+}  // namespace
+}  // namespace oblique::solver

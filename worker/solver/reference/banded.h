@@ -1,0 +1,197 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "worker/solver/reference/chain_kernel.h"
+
+/// Banded matrices and their factors. By hand: Eigen has no banded factorisation.
+namespace oblique::solver {
+
+/// Symmetric matrix of half-bandwidth 3, lower part by rows: at(i, d) is entry (i, i - d).
+class BandedMatrix {
+ public:
+  explicit BandedMatrix(std::size_t rows) : bands_(rows) {}
+
+  std::size_t rows() const { return bands_.size(); }
+  double& at(std::size_t row, std::size_t distance) { return bands_[row][distance]; }
+  double at(std::size_t row, std::size_t distance) const { return bands_[row][distance]; }
+
+  /// Adds to the entry (row, column) and, by symmetry, (column, row).
+  /// Needs |row - column| <= kHalfBandwidth.
+  void add(std::size_t row, std::size_t column, double value) {
+    if (row >= column) {
+      bands_[row][row - column] += value;
+    }
+  }
+
+  /// Sum over entries of left_i A_ij right_j for vectors of stride `stride`.
+  double bilinear(const double* left, const double* right, std::size_t stride) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < rows(); ++i) {
+      sum += bands_[i][0] * left[i * stride] * right[i * stride];
+      for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
+        const std::size_t j = i - d;
+        sum += bands_[i][d] *
+               (left[i * stride] * right[j * stride] + left[j * stride] * right[i * stride]);
+      }
+    }
+    return sum;
+  }
+
+ private:
+  std::vector<std::array<double, kHalfBandwidth + 1>> bands_;
+};
+
+/// A = L D Lᵀ of a symmetric positive definite banded matrix, L with unit diagonal.
+class BandedCholesky {
+ public:
+  /// Factors `matrix`; `positive_definite()` tells whether that succeeded.
+  explicit BandedCholesky(const BandedMatrix& matrix) : rows_(matrix.rows() + kHalfBandwidth) {
+    std::vector<double> pivots(rows_.size());
+    for (std::size_t i = 0; i < matrix.rows(); ++i) {
+      for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
+        if (d > i) {
+          continue;
+        }
+        const std::size_t j = i - d;
+        double entry = matrix.at(i, d);
+        for (std::size_t m = 1; m + d <= kHalfBandwidth && m <= j; ++m) {
+          entry -= rows_[i].left[d + m - 1] * rows_[j].left[m - 1] * pivots[j - m];
+        }
+        rows_[i].left[d - 1] = entry / pivots[j];
+      }
+      pivots[i] = matrix.at(i, 0);
+      for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
+        pivots[i] -= rows_[i].left[d - 1] * rows_[i].left[d - 1] * pivots[i - d];
+      }
+      if (!(pivots[i] > 0.0)) {
+        positive_definite_ = false;
+        return;
+      }
+      rows_[i].inverse_pivot = 1.0 / pivots[i];
+    }
+  }
+
+  bool positive_definite() const { return positive_definite_; }
+
+  /// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c].
+  /// `Real` is a number or a pack of lanes. Needs positive_definite().
+  template <class Real>
+  void solve_pairs(Real* f) const {
+    ForwardSubstitution<Real> forward;
+    const std::size_t rows = rows_.size() - kHalfBandwidth;
+    for (std::size_t i = 0; i < rows; ++i) {
+      put_pair(f, i, forward.next(rows_[i], f[2 * i], f[2 * i + 1]));
+    }
+    substitute_back(rows_.data(), rows, 0, f, [&](std::size_t i, const Real& x, const Real& y) {
+      put_pair(f, i, PlanarVector<Real>{x, y});
+    });
+  }
+
+  /// Its rows, and kHalfBandwidth more of zeros.
+  const FactorRow<double>* data() const { return rows_.data(); }
+
+ private:
+  std::vector<FactorRow<double>> rows_;
+  bool positive_definite_ = true;
+};
+
+/// A square banded matrix, of no rows to begin with, `bandwidth` diagonals on either side, and its
+/// LU factors with partial pivoting inside the band: work and memory are linear in the number of
+/// rows, and a zero on the diagonal (a multiplier's row) does no harm.
+template <std::size_t bandwidth>
+class BandedLu {
+ public:
+  /// A matrix of zeros of that size. Allocates when the size grows.
+  void set_zero(std::size_t rows) {
+    rows_.resize(rows);
+    pivots_.resize(rows);
+    for (auto& row : rows_) {
+      row.fill(0.0);
+    }
+  }
+  /// Needs |row - column| <= bandwidth.
+  void add(std::size_t row, std::size_t column, double value) {
+    rows_[row][column + bandwidth - row] += value;
+  }
+
+  /// Adds a dense block whose first entry is (row, column).
+  template <class Block>
+  void add_block(std::size_t row, std::size_t column, const Block& block) {
+    for (int i = 0; i < block.rows(); ++i) {
+      double* target = &entry(row + static_cast<std::size_t>(i), column);
+      for (int j = 0; j < block.cols(); ++j) {
+        target[j] += block(i, j);
+      }
+    }
+  }
+
+  /// Factors in place; false when the matrix is singular to working precision.
+  bool factor() {
+    const std::size_t n = rows_.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t last_row = std::min(n - 1, k + bandwidth);
+      std::size_t pivot = k;
+      for (std::size_t i = k + 1; i <= last_row; ++i) {
+        if (std::abs(entry(i, k)) > std::abs(entry(pivot, k))) {
+          pivot = i;
+        }
+      }
+      pivots_[k] = pivot;
+      if (!(std::abs(entry(pivot, k)) > 0.0)) {
+        return false;
+      }
+      if (pivot != k) {
+        std::swap_ranges(&entry(k, k), &entry(k, k) + kReach + 1, &entry(pivot, k));
+      }
+      for (std::size_t i = k + 1; i <= last_row; ++i) {
+        const double factor = entry(i, k) / entry(k, k);
+        entry(i, k) = factor;
+        double* target = &entry(i, k);
+        const double* source = &entry(k, k);
+        for (std::size_t j = 1; j <= kReach; ++j) {
+          target[j] -= factor * source[j];
+        }
+      }
+    }
+    return true;
+  }
+
+  /// Solves in place. Needs a successful factor().
+  void solve(std::span<double> x) const {
+    const std::size_t n = rows_.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      std::swap(x[k], x[pivots_[k]]);
+      const std::size_t last_row = std::min(n - 1, k + bandwidth);
+      for (std::size_t i = k + 1; i <= last_row; ++i) {
+        x[i] -= entry(i, k) * x[k];
+      }
+    }
+    for (std::size_t k = n; k-- > 0;) {
+      const std::size_t last_column = std::min(n - 1, k + kReach);
+      for (std::size_t j = k + 1; j <= last_column; ++j) {
+        x[k] -= entry(k, j) * x[j];
+      }
+      x[k] /= entry(k, k);
+    }
+  }
+
+ private:
+  /// Columns right of the diagonal after row exchanges.
+  static constexpr std::size_t kReach = 2 * bandwidth;
+
+  // Row i holds columns i - bandwidth .. i + 2 bandwidth, and room for one exchange.
+  double& entry(std::size_t i, std::size_t j) { return rows_[i][j + bandwidth - i]; }
+  double entry(std::size_t i, std::size_t j) const { return rows_[i][j + bandwidth - i]; }
+
+  std::vector<std::array<double, 3 * bandwidth + 1>> rows_;
+  std::vector<std::size_t> pivots_;
+};
+
+}  // namespace oblique::solver

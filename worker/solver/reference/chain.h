@@ -1,0 +1,157 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "worker/solver/model/parameters.h"
+#include "worker/solver/reference/banded.h"
+#include "worker/solver/reference/beam_element.h"
+#include "worker/solver/reference/tip.h"
+
+namespace oblique::solver {
+
+/// Positions and slopes of a chain, or their rates: one a column, x above y.
+using Coordinates = Eigen::Matrix2Xd;
+
+/// Scratch memory, so that steps allocate nothing. No part of a state: a copy is empty, and
+/// assignment leaves it alone.
+struct StepRoom {
+  StepRoom() = default;
+  StepRoom(const StepRoom&) {}
+  StepRoom(StepRoom&&) noexcept = default;
+  StepRoom& operator=(const StepRoom&) { return *this; }
+  StepRoom& operator=(StepRoom&&) noexcept = default;
+  ~StepRoom() = default;
+
+  Coordinates vectors;
+  BandedLu<7> matrix;  ///< of ConstrainedChain
+};
+
+struct ChainState {
+  double t_s = 0.0;  ///< since release
+  Coordinates q;     ///< [m] and [-]
+  Coordinates v;     ///< [m/s] and [1/s]
+  // Of generalized-alpha; empty otherwise.
+  Coordinates acceleration;  ///< q'' at t_s
+  /// (a - q'')/h: a_n is q'' a fixed part of a step away, so it is kept per second and serves a
+  /// next step of any length.
+  Coordinates algorithmic_offset_rate;
+  Coordinates multipliers_N;     ///< a column a link
+  bool has_offset_rate = false;  ///< false after a restart: the next step finds it
+  StepRoom room = {};
+};
+
+/// The elements of all links, and what follows from them however the links are joined: the columns
+/// of an element are given by the chain that derives from this. Immutable.
+class ElementChain {
+ public:
+  virtual ~ElementChain() = default;
+
+  /// Columns of Coordinates; those of this chain's matrices are as many.
+  Eigen::Index rows() const { return rows_; }
+  Eigen::Index tip_row() const { return rows_ - 2; }
+  std::size_t links() const { return constants_.size(); }
+  double gravity_m_s2() const { return gravity_m_s2_; }
+  double length_m() const;
+  /// Of all links and the tip.
+  double mass_kg() const { return mass_kg_; }
+
+  /// Straight, horizontal, unstressed, at rest (paper, section 2).
+  ChainState at_rest() const;
+  TipState tip(const ChainState& state) const;
+  /// Eq. 5, with the tip's mass.
+  virtual double kinetic_energy_J(const Coordinates& v) const = 0;
+  /// Eq. 7, of all elements.
+  double strain_energy_J(const Coordinates& q) const;
+  double gravity_energy_J(const Coordinates& q) const { return -q.row(1).dot(weight_N_); }
+  Eigen::Vector2d momentum_Ns(const Coordinates& v) const { return v * momentum_kg_; }
+  /// O first, then the outer end of each element.
+  Coordinates node_positions_m(const Coordinates& q) const;
+
+ protected:
+  struct Element {
+    std::array<Eigen::Index, 4> row;  ///< of p_i, s_i, p_j, s_j
+    std::size_t link;
+  };
+
+  /// Throws InputError when `model` is outside its domain. The elements are left to add.
+  explicit ElementChain(const ModelParameters& model);
+  ElementChain(const ElementChain&) = default;
+  ElementChain(ElementChain&&) = default;
+  ElementChain& operator=(const ElementChain&) = default;
+  ElementChain& operator=(ElementChain&&) = default;
+
+  /// Once all elements are there: gravity (eq. 12) and momentum.
+  void add_loads(Eigen::Index rows, double tip_mass_kg);
+
+  ElementCoordinates coordinates_of(const Element& element, const Coordinates& q) const {
+    return q(Eigen::all, element.row);
+  }
+  const ElementConstants<double>& constants_of(const Element& element) const {
+    return constants_[element.link];
+  }
+  double length_of(const Element& element) const {
+    return 1.0 / constants_of(element).inverse_length;
+  }
+
+  Eigen::Index rows_ = 0;
+  double gravity_m_s2_;
+  double mass_per_length_;
+  double mass_kg_;
+  std::vector<ElementConstants<double>> constants_;  ///< of an element of each link
+  std::vector<Element> elements_;
+  Eigen::VectorXd weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
+  Eigen::VectorXd momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
+};
+
+/// The chain with joints eliminated (eq. 13): links share the position of a joint and keep slopes
+/// of their own. Immutable; what changes is ChainState.
+///
+/// Rows run along the chain so that each element owns four consecutive ones: the pin's position
+/// (row 0, held at zero), its slope, then position and slope of each node; at a joint the slope of
+/// the inner link, the position, the slope of the outer link. All matrices then have half-bandwidth
+/// 3. Both directions share one scalar matrix.
+class Chain : public ElementChain {
+ public:
+  /// Throws InputError when `model` is outside its domain.
+  explicit Chain(const ModelParameters& model);
+
+  /// The tables that the kernels of chain_kernel.h read.
+  ChainTables<double> tables() const;
+  /// As in chain_kernel.h.
+  template <class Real>
+  void accelerations(const Real* q, const Real& ft_N, const Real& fn_N, Real* acceleration) const {
+    chain_accelerations(tables(), q, ft_N, fn_N, acceleration);
+  }
+
+  double kinetic_energy_J(const Coordinates& v) const override;
+  /// Force on a link at its inner end (the pin or a joint), from the balance of its first node:
+  /// M q'' + dU/dq - Q there.
+  Eigen::Vector2d inner_end_force(std::size_t link, const Coordinates& q,
+                                  const Coordinates& acceleration) const;
+
+  /// Highest angular frequency [rad/s] of the straight chain, the tip held by springs of
+  /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
+  double highest_frequency_rad_s(double tip_stiffness_N_m) const;
+
+  /// Mass that the tip shows to a sudden force across or along the chain [kg]: 1/(M^-1) at the tip,
+  /// tip_mass and about a sixteenth of the last element.
+  double tip_inertia_kg() const;
+
+ private:
+  std::size_t elements_per_link() const { return elements_.size() / links(); }
+  void number_rows(std::size_t elements_per_link);
+  void balance_links();
+  double risen_eigenvalue(double tip_stiffness_N_m) const;
+
+  double tip_mass_kg_;
+  std::vector<LinkBalance<double>> balance_;
+  BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
+  BandedCholesky mass_factor_;
+  BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
+  double free_eigenvalue_ = 0.0;  ///< square of the highest frequency without springs
+};
+
+}  // namespace oblique::solver

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+#include "worker/solver/model/parameters.h"
+#include "worker/solver/reference/banded.h"
+#include "worker/solver/reference/chain.h"
+
+namespace oblique::solver {
+
+/// The chain as the paper has it: every link with nodes of its own, the pin and the joints as
+/// constraints Phi(q) = 0, multipliers lambda as unknowns:
+///
+///   M q'' + Phi_qᵀ lambda + dU/dq = Q + F_c,   Phi(q) = 0        (paper, eqs. 14 to 16)
+///
+/// Unknowns are interleaved along the chain, so that every matrix is banded: for each link the
+/// multiplier of its inner end, then position and slope of each node, each x before y. Coordinates
+/// of this chain have a column for each of these, with zeros at the multipliers' places.
+class ConstrainedChain : public ElementChain {
+ public:
+  /// An element spans eight unknowns; a multiplier reaches five back, over the last node before it.
+  static constexpr std::size_t kBandwidth = 7;
+  using Matrix = BandedLu<kBandwidth>;
+  static_assert(std::is_same_v<Matrix, decltype(StepRoom::matrix)>);
+
+  /// Throws InputError when `model` is outside its domain.
+  explicit ConstrainedChain(const ModelParameters& model);
+
+  Eigen::Index multiplier_row(std::size_t link) const { return joints_[link].multiplier; }
+
+  /// The state of the eliminated chain `eliminated`, read in these coordinates.
+  ChainState from_eliminated(const ChainState& eliminated) const;
+
+  /// residual += M q''.
+  void add_inertia(const Coordinates& acceleration, Coordinates& residual) const;
+  /// residual += dU/dq - Q (eqs. 11 and 12).
+  void add_elastic_and_gravity(const Coordinates& q, Coordinates& residual) const;
+  /// Eq. 14: residual += Phi_qᵀ lambda in the rows of coordinates.
+  void add_constraint_forces(const Coordinates& multipliers_N, Coordinates& residual) const;
+  /// residual = factor Phi(q) in the rows of multipliers.
+  void set_constraints(const Coordinates& q, double factor, Coordinates& residual) const;
+  /// Takes the multipliers out of a vector of unknowns, a column a link, and leaves zeros.
+  void take_multipliers(Coordinates& unknowns, Coordinates& multipliers) const;
+
+  /// matrix += mass_factor M + stiffness_factor d2U/dq2(q) + Phi_q and its transpose.
+  void add_tangent(const Coordinates& q, double mass_factor, double stiffness_factor,
+                   Matrix& matrix) const;
+  /// product += d2U/dq2(q) direction.
+  void add_stiffness_product(const Coordinates& q, const Coordinates& direction,
+                             Coordinates& product) const;
+
+  double kinetic_energy_J(const Coordinates& v) const override;
+
+ private:
+  /// The inner end of a link.
+  struct Joint {
+    Eigen::Index multiplier;
+    Eigen::Index position;  ///< of the link's first node
+    Eigen::Index before;    ///< of the last node of the link before; -1 at the pin
+  };
+  Eigen::Matrix4d mass_of(const Element& element) const {
+    return mass_matrix(mass_per_length_, length_of(element));
+  }
+
+  double tip_mass_kg_;
+  std::vector<Joint> joints_;  ///< the pin first
+};
+
+}  // namespace oblique::solver

@@ -1,0 +1,234 @@
+#include "worker/solver/reference/contact.h"
+
+#include <cmath>
+#include <string>
+
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::solver {
+namespace {
+
+/// An event counts as located when the next correction of its instant would be smaller [s].
+constexpr double kLocated_s = 1e-13;
+
+constexpr unsigned bit(ContactEvent event) {
+  return 1U << static_cast<unsigned>(event);
+}
+
+double sign_of(double value) {
+  return value < 0.0 ? -1.0 : 1.0;
+}
+
+}  // namespace
+
+Contact::Contact(const ContactParameters& parameters, const TipState& touch,
+                 const ContactSteps& steps)
+    : law_(parameters, touch),
+      steps_s_(steps),
+      tip_(touch),
+      vt_sign_(sign_of(touch.vx_m_s)),
+      trial_s_(steps.compression_s),
+      // Both forces are zero at touch, so both sides of the cone are.
+      fresh_(bit(ContactEvent::kSlipForward) | bit(ContactEvent::kSlipBackward)),
+      record_(law_, touch),
+      margin_(law_, touch) {}
+
+double Contact::phi(ContactEvent event, const TipState& tip) const {
+  return event_function(law_, event, tip, vt_sign_).value;
+}
+
+std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, double h_s) const {
+  std::optional<Candidate> earliest;
+  if (is_far_from_events(law_, tip_, end, h_s, vt_sign_)) {
+    return earliest;
+  }
+  const PossibleEvents possible = possible_events(law_);
+  for (std::size_t i = 0; i < possible.count; ++i) {
+    const ContactEvent event = possible.events[i];
+    const auto guess =
+        guess_event(law_, event, tip_, end, h_s, vt_sign_, (fresh_ & bit(event)) != 0);
+    if (!guess || (guess->inside_only && (refuted_ & bit(event)) != 0)) {
+      continue;
+    }
+    if (!earliest || guess->fraction * h_s < earliest->guess.fraction * h_s - kSimultaneous_s) {
+      earliest = Candidate{event, *guess};
+    }
+  }
+  return earliest;
+}
+
+bool Contact::judge(const TipState& end, const ContactIntegrals<double>& integrals) {
+  if (!std::isfinite(end.x_m + end.y_m + end.vx_m_s + end.vy_m_s)) {
+    throw SolveError("the contact diverged after " + readable_number(t_s_) +
+                     " s with dt = " + readable_number(full_step_s()) + " s");
+  }
+  switch (search_.seeking) {
+    case Seeking::kNothing:
+      return judge_advance(end, integrals);
+    case Seeking::kPeak:
+      return judge_peak(end);
+    case Seeking::kCrossing:
+      return judge_crossing(end, integrals);
+  }
+  return false;
+}
+
+bool Contact::judge_advance(const TipState& end, const ContactIntegrals<double>& integrals) {
+  if (const auto candidate = earliest_event(end, trial_s_)) {
+    start_search(*candidate, trial_s_);
+    return false;
+  }
+  accept(end, integrals);
+  return true;
+}
+
+void Contact::start_search(const Candidate& candidate, double h_s) {
+  const EventGuess& guess = candidate.guess;
+  search_ = Search{};
+  search_.event = candidate.event;
+  search_.slope = guess.slope / h_s;
+  search_.full_s = h_s;
+  search_.guess_s = guess.fraction * h_s;
+  if (guess.inside_only) {
+    search_.seeking = Seeking::kPeak;
+    search_.high_s = guess.peak_fraction * h_s;
+    trial_s_ = search_.high_s;
+  } else {
+    search_.seeking = Seeking::kCrossing;
+    search_.high_s = h_s;
+    trial_s_ = search_.guess_s;
+  }
+}
+
+bool Contact::judge_peak(const TipState& end) {
+  if (phi(search_.event, end) >= 0.0) {
+    search_.seeking = Seeking::kCrossing;
+    trial_s_ = search_.guess_s;
+  } else {
+    refuted_ |= bit(search_.event);
+    search_.seeking = Seeking::kNothing;
+    trial_s_ = search_.full_s;
+  }
+  return false;
+}
+
+bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals) {
+  const double t = trial_s_;
+  // Over a shorter time the mean of a velocity is rounding alone, and what follows from it would
+  // take what has just happened for an event again.
+  if (t > kSimultaneous_s) {
+    const auto first = earliest_event(end, t);
+    if (first && first->event != search_.event &&
+        (first->guess.fraction * t < t - kSimultaneous_s || first->event < search_.event)) {
+      start_search(*first, t);
+      return false;
+    }
+  }
+  const EventFunction function = event_function(law_, search_.event, end, vt_sign_);
+  (function.value < 0.0 ? search_.low_s : search_.high_s) = t;
+  if (is_force_event(search_.event)) {
+    search_.slope = function.rate;
+  } else if (search_.last_s >= 0.0 && t != search_.last_s) {
+    search_.slope = (function.value - search_.last_value) / (t - search_.last_s);
+  }
+  search_.last_s = t;
+  search_.last_value = function.value;
+  const double correction_s = -function.value / search_.slope;
+  const bool is_located = std::abs(correction_s) <= kLocated_s;
+  const bool is_cornered = search_.high_s - search_.low_s <= kLocated_s;
+  if (is_located || is_cornered) {
+    const ContactEvent event = search_.event;
+    accept(end, integrals);
+    happen(event);
+    return true;
+  }
+  const double next = t + correction_s;
+  trial_s_ =
+      next > search_.low_s && next < search_.high_s ? next : 0.5 * (search_.low_s + search_.high_s);
+  return false;
+}
+
+Contact Contact::branched(double e_star, const ContactSteps& steps) const {
+  Contact branch = *this;
+  branch.law_.set_restitution(e_star);
+  branch.steps_s_ = steps;
+  branch.trial_s_ = branch.full_step_s();
+  return branch;
+}
+
+double Contact::full_step_s() const {
+  return law_.is_compression() ? steps_s_.compression_s : steps_s_.restitution_s;
+}
+
+void Contact::accept(const TipState& end, const ContactIntegrals<double>& integrals) {
+  record_.add_step(law_, tip_, end, integrals);
+  margin_.add_step(law_, tip_, end, trial_s_);
+  tip_ = end;
+  t_s_ += trial_s_;
+  ++steps_;
+  if (trial_s_ > 0.0) {
+    fresh_ = 0;
+  }
+  refuted_ = 0;
+  search_.seeking = Seeking::kNothing;
+  trial_s_ = full_step_s();
+  if (t_s_ > kLongest_s) {
+    throw SolveError("the contact did not end within " + exact_number(kLongest_s) + " s");
+  }
+  if (steps_ > kMostSteps) {
+    throw SolveError("the contact takes more than " + std::to_string(kMostSteps) + " steps of " +
+                     readable_number(full_step_s()) +
+                     " s: a longer dt, a looser tolerance or a smaller k takes fewer");
+  }
+}
+
+void Contact::happen(ContactEvent event) {
+  if (++events_ > kMostEvents) {
+    throw SolveError("the contact has more than " + std::to_string(kMostEvents) +
+                     " events within " + readable_number(t_s_) + " s");
+  }
+  margin_.add_event(law_, event, tip_);
+  const double ft = law_.ft_N(tip_);
+  const double ft_rate_before = sign_of(ft) * law_.ft_rate_N_s(tip_);
+  switch (event) {
+    case ContactEvent::kSeparation:
+      record_.finish(law_, tip_, t_s_);
+      finished_ = true;
+      return;
+    case ContactEvent::kTurn:
+      if (!law_.is_stick() && law_.is_compression() && law_.mu() > 0.0) {
+        record_.add_tangential_peak(ft, t_s_);
+      }
+      record_.add_turn(law_, tip_, t_s_);
+      law_.turn(tip_);
+      fresh_ |= bit(ContactEvent::kTurn);
+      break;
+    case ContactEvent::kSlipForward:
+    case ContactEvent::kSlipBackward:
+      law_.start_slip(tip_, event == ContactEvent::kSlipForward ? 1.0 : -1.0);
+      if (ft_rate_before > 0.0 && sign_of(ft) * law_.ft_rate_N_s(tip_) < 0.0) {
+        record_.add_tangential_peak(ft, t_s_);
+      }
+      fresh_ |= bit(ContactEvent::kStick);
+      break;
+    case ContactEvent::kStick:
+      fresh_ |= bit(ContactEvent::kStick) |
+                bit(law_.slip_direction() > 0.0 ? ContactEvent::kSlipForward
+                                                : ContactEvent::kSlipBackward);
+      law_.stop_slip(tip_);
+      vt_sign_ = sign_of(tip_.vx_m_s);
+      break;
+    case ContactEvent::kTangentialExtremum:
+      if (-vt_sign_ * ft > 0.0) {
+        record_.add_tangential_peak(ft, t_s_);
+      }
+      vt_sign_ = -vt_sign_;
+      fresh_ |= bit(ContactEvent::kTangentialExtremum);
+      return;
+  }
+  trial_s_ = full_step_s();
+  record_.add_state(law_, tip_, t_s_);
+}
+
+}  // namespace oblique::solver

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "worker/solver/reference/contact_events.h"
+#include "worker/solver/reference/contact_law.h"
+#include "worker/solver/reference/contact_margin.h"
+#include "worker/solver/reference/contact_record.h"
+
+namespace oblique::solver {
+
+/// One contact from touch to separation as a machine that any integrator drives. The integrator
+/// keeps the state at the last accepted instant; the machine says how far to step from there and
+/// under which forces, then judges the end of the step:
+///
+///   while (!contact.finished()) {
+///     step a copy of the accepted state by contact.trial_step_s() under contact.force();
+///     if (contact.judge(tip, integrals)) make the copy the accepted state;
+///   }
+///
+/// A step that passes an event is refused and a shorter one asked for until the event falls on the
+/// step's end. The machine sees nothing but the tip.
+class Contact {
+ public:
+  /// Stated time within which a contact must end [s].
+  static constexpr double kLongest_s = 20e-3;
+  /// Most events of one contact; more means that states follow each other without time passing.
+  static constexpr int kMostEvents = 10'000;
+  /// Most steps of one contact, ten thousand times what the default step takes.
+  static constexpr std::int64_t kMostSteps = 5'000'000;
+
+  Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
+
+  bool finished() const { return finished_; }
+  double trial_step_s() const { return trial_s_; }
+  AffineContactForce<double> force() const { return law_.affine(); }
+  const ContactLaw& law() const { return law_; }
+
+  /// True when the step is accepted. Throws SolveError when the tip's state is not finite, the
+  /// contact outlasts kLongest_s, or has more than kMostEvents events or kMostSteps steps.
+  bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
+
+  /// Whether the last accepted step ended at the first turn. Up to there e* has no say.
+  bool is_at_first_turn() const { return record_.turned_once_at(t_s_); }
+  /// This contact with another e* and its steps: the same as one that had them from touch on. Only
+  /// at the first turn; the step in compression must be the same.
+  Contact branched(double e_star, const ContactSteps& steps) const;
+
+  /// What has been gathered so far; whole once finished.
+  const ContactRecord& record() const { return record_; }
+  const ContactMargin& margin() const { return margin_; }
+  double time_s() const { return t_s_; }
+  std::int64_t steps() const { return steps_; }
+  /// Number of events so far; when it grows, force() has changed.
+  int events() const { return events_; }
+  const TipState& tip() const { return tip_; }
+
+ private:
+  enum class Seeking { kNothing, kCrossing, kPeak };
+  struct Search {
+    Seeking seeking = Seeking::kNothing;
+    ContactEvent event = ContactEvent::kTurn;
+    double low_s = 0.0;    ///< phi is negative here
+    double high_s = 0.0;   ///< phi is not negative here
+    double slope = 0.0;    ///< d phi / dt near the crossing
+    double last_s = -1.0;  ///< the last trial, < 0 before the first
+    double last_value = 0.0;
+    double full_s = 0.0;   ///< the step in which the event was seen
+    double guess_s = 0.0;  ///< where the polynomial crosses
+  };
+  struct Candidate {
+    ContactEvent event;
+    EventGuess guess;
+  };
+
+  std::optional<Candidate> earliest_event(const TipState& end, double h_s) const;
+  bool judge_advance(const TipState& end, const ContactIntegrals<double>& integrals);
+  bool judge_peak(const TipState& end);
+  bool judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals);
+  void start_search(const Candidate& candidate, double h_s);
+  double full_step_s() const;
+  void accept(const TipState& end, const ContactIntegrals<double>& integrals);
+  void happen(ContactEvent event);
+  double phi(ContactEvent event, const TipState& tip) const;
+
+  ContactLaw law_;
+  ContactSteps steps_s_;
+  double t_s_ = 0.0;
+  TipState tip_;
+  double vt_sign_;
+  bool finished_ = false;
+  double trial_s_;
+  std::int64_t steps_ = 0;
+  int events_ = 0;
+  unsigned fresh_ = 0;    ///< bit a ContactEvent
+  unsigned refuted_ = 0;  ///< events seen inside the present step that turned out not to happen
+  Search search_;
+  ContactRecord record_;
+  ContactMargin margin_;
+};
+
+}  // namespace oblique::solver

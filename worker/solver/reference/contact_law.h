@@ -1,0 +1,100 @@
+#pragma once
+
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/reference/tip.h"
+
+/// The local compliant contact model: the tip R hangs on a bilinear normal and a linear tangential
+/// element from a massless particle P, which sticks to the ground or slides under Coulomb friction.
+/// Forces here act on the tip: F_n >= 0 upwards, F_t along x.
+namespace oblique::solver {
+
+/// What is fixed during a contact.
+struct ContactParameters {
+  double k_N_m;   ///< normal stiffness in compression
+  double eta2;    ///< k over the tangential stiffness
+  double mu;      ///< Coulomb friction
+  double e_star;  ///< Stronge's energetic restitution; stiffness in restitution is k / e*^2
+};
+
+/// Step lengths of one contact. The stiffer spring of restitution asks for shorter steps.
+struct ContactSteps {
+  double compression_s;
+  double restitution_s;
+};
+
+/// Regime of the contact and the anchors of its piecewise linear laws. Between two events:
+///   F_n = fn_anchor - k_n (y - y_anchor),  k_n = k or k / e*^2       (paper, eqs. 17 and 22)
+///   stick: F_t = ft_anchor - (k/eta2) (x - x_anchor)                 (paper, eq. 19)
+///   slip:  F_t = -s mu F_n                                           (paper, eq. 18)
+class ContactLaw {
+ public:
+  /// At touch: compression, all forces zero; stick iff |V_t| < mu eta2 |V_n| (paper, eq. 21).
+  ContactLaw(const ContactParameters& parameters, const TipState& touch);
+
+  bool is_compression() const { return phase_ == PhaseKind::kCompression; }
+  bool is_stick() const { return stick_; }
+  /// Direction in which P slides; in stick, the direction of the last slip.
+  double slip_direction() const { return s_; }
+  double mu() const { return parameters_.mu; }
+  /// Slope of the normal element in the present phase [N/m].
+  double normal_stiffness_N_m() const { return normal_stiffness_N_m_; }
+  double tangential_stiffness_N_m() const { return tangential_stiffness_N_m_; }
+
+  /// Eq. 17.
+  double fn_N(const TipState& tip) const {
+    return fn_anchor_N_ - normal_stiffness_N_m_ * (tip.y_m - y_anchor_m_);
+  }
+  /// Eq. 19 in stick, eq. 18 in slip.
+  double ft_N(const TipState& tip) const {
+    return stick_ ? ft_anchor_N_ - tangential_stiffness_N_m_ * (tip.x_m - x_anchor_m_)
+                  : -s_ * parameters_.mu * fn_N(tip);
+  }
+  double fn_rate_N_s(const TipState& tip) const { return -normal_stiffness_N_m_ * tip.vy_m_s; }
+  double ft_rate_N_s(const TipState& tip) const {
+    return stick_ ? -tangential_stiffness_N_m_ * tip.vx_m_s
+                  : -s_ * parameters_.mu * fn_rate_N_s(tip);
+  }
+  /// mu eta2 k_n/k in the present phase: P's velocity in slip per normal velocity of the tip.
+  double slip_coupling() const { return slip_coupling_; }
+  /// Tangential deformation u_x = -F_t eta2 / k [m].
+  double ux_m(const TipState& tip) const { return -ft_N(tip) / tangential_stiffness_N_m(); }
+  /// Position of P along the ground [m].
+  double xP_m(const TipState& tip) const { return tip.x_m - ux_m(tip); }
+  /// Eq. 24, the velocity that P has in slip: V_t + s mu eta2 (k_n/k) V_n.
+  double slip_velocity_m_s(const TipState& tip) const {
+    return tip.vx_m_s + s_ * slip_coupling_ * tip.vy_m_s;
+  }
+
+  /// The laws as the integrators take them.
+  AffineContactForce<double> affine() const;
+
+  /// Makes e* another one, from here on.
+  void set_restitution(double e_star) {
+    parameters_.e_star = e_star;
+    enter(phase_);
+  }
+  /// Eq. 22: compression becomes restitution, or the other way; forces are continuous.
+  void turn(const TipState& tip);
+  /// P starts to slide in `direction`, 1 or -1 along x; the friction force is against it.
+  void start_slip(const TipState& tip, double direction);
+  /// P comes to rest. Without friction there is no cone to stick in: P reverses instead.
+  void stop_slip(const TipState& tip);
+
+ private:
+  void anchor(const TipState& tip);
+  void enter(PhaseKind phase);
+
+  ContactParameters parameters_;
+  double tangential_stiffness_N_m_;
+  PhaseKind phase_{};
+  double normal_stiffness_N_m_{};  ///< in the present phase
+  double slip_coupling_{};         ///< in the present phase
+  bool stick_;
+  double s_;
+  double x_anchor_m_;
+  double y_anchor_m_;
+  double fn_anchor_N_ = 0.0;
+  double ft_anchor_N_ = 0.0;
+};
+
+}  // namespace oblique::solver

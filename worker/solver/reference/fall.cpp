@@ -1,0 +1,195 @@
+#include "worker/solver/reference/fall.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::solver {
+namespace {
+
+/// Most states kept. A state costs 32 bytes a row; when there are more, every other one goes.
+constexpr std::size_t kMostKept = 4096;
+/// Steps in sqrt(2 length / g) beyond which a fall is not begun: it would take hours.
+constexpr double kMostSteps = 1e9;
+
+constexpr AffineContactForce<double> kNoContact{};
+
+}  // namespace
+
+double longest_fall_s(const Chain& chain) {
+  return kLongestFall * std::sqrt(2.0 * chain.length_m() / chain.gravity_m_s2());
+}
+
+ChainState Fall::state_at(double H_m) const {
+  if (!(H_m > 0.0 && H_m <= largest_drop_m())) {
+    throw InputError("H = " + exact_number(H_m) +
+                     " m is not allowed: the tip of this model drops at most " +
+                     readable_number(largest_drop_m(), 7) + " m before it turns back");
+  }
+  return state_at_drop(H_m);
+}
+
+SteppedFall::SteppedFall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
+                         FallProgress* progress)
+    : motion_(std::move(motion)), dt_s_(dt_s), longest_s_(longest_s), progress_(progress) {
+  if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
+    throw SolveError("the fall would take more than " + exact_number(kMostSteps) +
+                     " steps of dt_fall = " + exact_number(dt_s) + " s");
+  }
+  kept_.push_back(motion_->at_rest());
+  length_m_ = motion_->tip(kept_.front()).x_m;
+}
+
+bool SteppedFall::is_over_after_next(const TipState& tip) {
+  // Times are products, not sums: a long fall would otherwise gather rounding.
+  const double t_s = time_s(++step_);
+  if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m_) {
+    throw SolveError("the fall diverged at t = " + readable_number(t_s) +
+                     " s with dt_fall = " + exact_number(dt_s_) + " s");
+  }
+  if (tip.vy_m_s >= 0.0) {
+    return true;
+  }
+  if (t_s > longest_s_) {
+    throw SolveError("the tip did not turn back within " + readable_number(longest_s_) +
+                     " s of falling");
+  }
+  if (progress_ != nullptr && keeps_last()) {
+    progress_->store(-tip.y_m, std::memory_order_relaxed);
+  }
+  return false;
+}
+
+void SteppedFall::end(const ChainState& before) {
+  progress_ = nullptr;
+  ChainState state;
+  const auto tip_after = [&](double h_s) {
+    motion_->step(before, kNoContact, h_s, state);
+    return motion_->tip(state);
+  };
+  double low = 0.0;
+  double high = dt_s_;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (tip_after(middle).vy_m_s < 0.0 ? low : high) = middle;
+  }
+  largest_drop_m_ = -tip_after(low).y_m;
+}
+
+void SteppedFall::keep(ChainState state) {
+  state.t_s = time_s(step_);
+  kept_.push_back(std::move(state));
+  next_kept_ += steps_kept_;
+  if (kept_.size() < kMostKept) {
+    return;
+  }
+  for (std::size_t i = 1; 2 * i < kept_.size(); ++i) {
+    kept_[i] = std::move(kept_[2 * i]);
+  }
+  kept_.resize((kept_.size() + 1) / 2);
+  steps_kept_ *= 2;
+  next_kept_ = (step_ / steps_kept_ + 1) * steps_kept_;
+}
+
+ChainState SteppedFall::state_at_drop(double H_m) const {
+  const auto drop = [this](const ChainState& state) { return -motion_->tip(state).y_m; };
+  auto after = std::upper_bound(kept_.begin(), kept_.end(), H_m,
+                                [&](double H, const ChainState& state) { return H < drop(state); });
+  ChainState before = *(after - 1);
+  ChainState state = before;
+  const auto first_step = static_cast<std::int64_t>(after - kept_.begin() - 1) * steps_kept_;
+  for (std::int64_t step = 1; step <= steps_kept_; ++step) {
+    std::swap(before, state);
+    motion_->step(before, kNoContact, dt_s_, state);
+    state.t_s = time_s(first_step + step);
+    if (drop(state) >= H_m || motion_->tip(state).vy_m_s >= 0.0) {
+      break;
+    }
+  }
+  return locate(H_m, before);
+}
+
+ChainState SteppedFall::state_at_time(double t_s) const {
+  auto last_step = static_cast<std::int64_t>(t_s / dt_s_);
+  last_step -= time_s(last_step) > t_s ? 1 : 0;  // the quotient was rounded up
+  const auto number =
+      std::min<std::int64_t>(last_step / steps_kept_, static_cast<std::int64_t>(kept_.size()) - 1);
+  ChainState state = kept_[static_cast<std::size_t>(number)];
+  ChainState before;
+  for (std::int64_t step = number * steps_kept_; step < last_step; ++step) {
+    std::swap(before, state);
+    motion_->step(before, kNoContact, dt_s_, state);
+  }
+  state.t_s = time_s(last_step);
+  const double h_s = t_s - state.t_s;
+  // Shorter implicit steps would divide rounding by their square.
+  if (h_s > 1e-3 * dt_s_) {
+    std::swap(before, state);
+    motion_->step(before, kNoContact, h_s, state);
+  }
+  return state;
+}
+
+std::size_t SteppedFall::bytes() const {
+  const auto numbers = [](const ChainState& state) {
+    return state.q.size() + state.v.size() + state.acceleration.size() +
+           state.algorithmic_offset_rate.size() + state.multipliers_N.size();
+  };
+  const auto a_state = static_cast<std::size_t>(numbers(kept_.front())) * sizeof(double);
+  return kept_.size() * (sizeof(ChainState) + a_state);
+}
+
+ChainState SteppedFall::locate(double H_m, const ChainState& before) const {
+  // Newton on the drop, kept inside the step; near the largest drop, where the speed vanishes, it
+  // falls back on bisection.
+  double low = 0.0;
+  double high = dt_s_;
+  double h = 0.5 * dt_s_;
+  ChainState state = before;
+  for (int i = 0; i < 80 && high - low > 0.0; ++i) {
+    motion_->step(before, kNoContact, h, state);
+    const TipState tip = motion_->tip(state);
+    const double missing_m = H_m + tip.y_m;
+    if (missing_m == 0.0) {
+      break;
+    }
+    const bool is_before = missing_m > 0.0 && tip.vy_m_s < 0.0;
+    (is_before ? low : high) = h;
+    const double newton = h - missing_m / tip.vy_m_s;
+    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
+    if (next == h || std::abs(next - h) < 1e-18) {
+      break;
+    }
+    h = next;
+  }
+  return state;
+}
+
+std::shared_ptr<const Fall> solve_stepped_fall(const std::shared_ptr<const Motion>& motion,
+                                               double dt_s, double longest_s,
+                                               FallProgress* progress) {
+  auto fall = std::make_shared<SteppedFall>(motion, dt_s, longest_s, progress);
+  ChainState before = motion->at_rest();
+  ChainState state = before;
+  for (;;) {
+    motion->step(before, {}, dt_s, state);
+    if (fall->is_over_after_next(motion->tip(state))) {
+      fall->end(before);
+      return fall;
+    }
+    if (fall->keeps_last()) {
+      fall->keep(state);
+    }
+    std::swap(before, state);
+  }
+}
+
+std::shared_ptr<const Fall> solve_stepped_fall(const Chain& chain, double dt_s) {
+  return solve_stepped_fall(std::make_shared<ExplicitMotion>(chain), dt_s, longest_fall_s(chain));
+}
+
+}  // namespace oblique::solver

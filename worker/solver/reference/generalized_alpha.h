@@ -1,0 +1,100 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "worker/solver/reference/constrained_chain.h"
+#include "worker/solver/reference/motion.h"
+
+namespace oblique::solver {
+
+/// Parameters of generalized-alpha from the spectral radius xi at infinite frequency (paper, after
+/// eq. 28): second order, unconditionally stable for linear problems.
+struct GeneralizedAlphaParameters {
+  explicit GeneralizedAlphaParameters(double xi)
+      : alpha_m((2.0 * xi - 1.0) / (xi + 1.0)),
+        alpha_f(xi / (xi + 1.0)),
+        beta(0.25 * (1.0 - alpha_m + alpha_f) * (1.0 - alpha_m + alpha_f)),
+        gamma(0.5 - alpha_m + alpha_f) {}
+
+  double alpha_m;
+  double alpha_f;
+  double beta;
+  double gamma;
+};
+
+/// The index-3 system of ConstrainedChain under generalized-alpha (Arnold and Bruels, Multibody
+/// System Dynamics 18, 2007, 185):
+///
+///   q_{n+1} = q_n + h v_n + h^2 ((1/2 - beta) a_n + beta a_{n+1})          (eq. 26)
+///   v_{n+1} = v_n + h ((1 - gamma) a_n + gamma a_{n+1})                    (eq. 27)
+///   (1 - alpha_m) a_{n+1} + alpha_m a_n = (1 - alpha_f) q''_{n+1} + alpha_f q''_n   (eq. 28)
+///
+/// with the equations of motion and Phi = 0 holding at t_{n+1}. Newton's unknowns are a_{n+1} and
+/// lambda_{n+1} with the constraints divided by beta h^2: the matrix
+/// [c M + beta h^2 K, Phi_qᵀ; Phi_q, 0], c = (1 - alpha_m)/(1 - alpha_f), tends to a regular one as
+/// h -> 0.
+class GeneralizedAlphaMotion : public Motion {
+ public:
+  /// Newton stops when a correction moves no position by more than this fraction of an element's
+  /// length and no slope by more than this. Convergence is quadratic: what remains is about the
+  /// square, far below the step's own error. Steps in contact are done after one iteration on any
+  /// mesh.
+  static constexpr double kNewtonTolerance = 1e-6;
+  static constexpr int kMostIterations = 20;
+
+  explicit GeneralizedAlphaMotion(const ModelParameters& model);
+
+  const ConstrainedChain& chain() const { return chain_; }
+
+  ChainState at_rest() const override;
+  TipState tip(const ChainState& state) const override { return chain_.tip(state); }
+  Energies energies(const ChainState& state) const override;
+  /// Throws SolveError when Newton does not converge.
+  ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
+                                double h_s, ChainState& to) const override;
+  void restart(const AffineContactForce<double>& force, ChainState& state) const override;
+  Eigen::Vector2d momentum_Ns(const ChainState& state) const override {
+    return chain_.momentum_Ns(state.v);
+  }
+  Coordinates node_positions_m(const ChainState& state) const override {
+    return chain_.node_positions_m(state.q);
+  }
+  void reactions(const AffineContactForce<double>&, const ChainState& state,
+                 Eigen::Matrix2Xd& reactions_N) const override {
+    reactions_N = -state.multipliers_N;
+  }
+
+ private:
+  /// (1 - alpha_m)/(1 - alpha_f), by which q'' follows a.
+  double mass_factor() const;
+  /// Factors [mass_factor M + beta h^2 K, Phi_qᵀ; Phi_q, 0].
+  void factor_newton_matrix(const Coordinates& q, const AffineContactForce<double>& force,
+                            double h_s, ConstrainedChain::Matrix& matrix) const;
+  /// (a_0 - q''_0)/h of the first step after a restart, (alpha_m - alpha_f) q''' with
+  ///
+  ///   (M + beta h^2/mass_factor K) q''' + Phi_qᵀ lambda' = -K v,   Phi_q q''' = 0.
+  ///
+  /// The term in K changes q''' by order h^2 where the step resolves the motion. Where it does not,
+  /// it keeps the offset as small as the velocity allows; -M^-1 K v would multiply rounding.
+  void find_offset_rate(const AffineContactForce<double>& force, double h_s,
+                        ChainState& state) const;
+  /// Eqs. 26 to 28 as if q''_{n+1} were q''_n. What is a_{n+1} stands in `algorithmic_offset_rate`
+  /// until the step is done.
+  void predict(const ChainState& from, const AffineContactForce<double>& force, double h_s,
+               ChainState& to) const;
+  /// Eq. 15: M q'' + Phi_qᵀ lambda + dU/dq - Q - F_c and Phi/(beta h^2).
+  void evaluate(const AffineContactForce<double>& force, double h_s, const ChainState& state,
+                Coordinates& residual) const;
+  /// One correction by Newton's method, in the parts of eqs. 26 to 28. How far it moves the chain,
+  /// as kNewtonTolerance counts.
+  double correct(const AffineContactForce<double>& force, double h_s, ChainState& state) const;
+  ContactIntegrals<double> integrals(const AffineContactForce<double>& force, double h_s,
+                                     const ChainState& from, const ChainState& to) const;
+
+  ConstrainedChain chain_;
+  GeneralizedAlphaParameters alpha_;
+  /// A row each: 1 over the shortest element's length for positions, 1 for slopes.
+  Eigen::RowVectorXd inverse_scale_;
+};
+
+}  // namespace oblique::solver

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "worker/solver/reference/chain.h"
+#include "worker/solver/reference/tip.h"
+
+namespace oblique::solver {
+
+struct Energies {
+  double kinetic_J;
+  double strain_J;
+  double gravity_J;
+};
+
+/// An integrator with the system of equations it solves. Fixed during a solve; what changes is the
+/// ChainState, whose coordinates belong to the Motion that made it. Const members may be called
+/// from several threads at once.
+class Motion {
+ public:
+  virtual ~Motion() = default;
+
+  virtual ChainState at_rest() const = 0;
+  virtual TipState tip(const ChainState& state) const = 0;
+  virtual Energies energies(const ChainState& state) const = 0;
+
+  /// Advances `from` by h_s >= 0 seconds under `force` into `to` (whose vectors and room are
+  /// reused, so that a second step allocates nothing), and gives the integrals of the contact
+  /// forces over the step.
+  virtual ContactIntegrals<double> step(const ChainState& from,
+                                        const AffineContactForce<double>& force, double h_s,
+                                        ChainState& to) const = 0;
+
+  /// Makes what the integrator remembers consistent with `force`, after an event changed the law.
+  virtual void restart(const AffineContactForce<double>& force, ChainState& state) const = 0;
+
+  /// Linear momentum of the whole chain [N s].
+  virtual Eigen::Vector2d momentum_Ns(const ChainState& state) const = 0;
+  /// Positions of the nodes along the chain, one a column: O first, the tip last.
+  virtual Coordinates node_positions_m(const ChainState& state) const = 0;
+
+  /// Forces on the outer link at O and at each joint from what holds it, one a column, from O
+  /// outwards. Allocates when the number of columns is another.
+  virtual void reactions(const AffineContactForce<double>& force, const ChainState& state,
+                         Eigen::Matrix2Xd& reactions_N) const = 0;
+};
+
+/// The chain with joints eliminated, stepped by PEFRL.
+class ExplicitMotion : public Motion {
+ public:
+  /// `chain` must outlive this.
+  explicit ExplicitMotion(const Chain& chain) : chain_(chain) {}
+
+  ChainState at_rest() const override { return chain_.at_rest(); }
+  TipState tip(const ChainState& state) const override { return chain_.tip(state); }
+  Energies energies(const ChainState& state) const override;
+  ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
+                                double h_s, ChainState& to) const override;
+  void restart(const AffineContactForce<double>&, ChainState&) const override {}
+  Eigen::Vector2d momentum_Ns(const ChainState& state) const override {
+    return chain_.momentum_Ns(state.v);
+  }
+  Coordinates node_positions_m(const ChainState& state) const override {
+    return chain_.node_positions_m(state.q);
+  }
+  void reactions(const AffineContactForce<double>& force, const ChainState& state,
+                 Eigen::Matrix2Xd& reactions_N) const override;
+
+ private:
+  const Chain& chain_;
+};
+
+}  // namespace oblique::solver

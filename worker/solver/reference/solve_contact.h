@@ -1,0 +1,44 @@
+#pragma once
+
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/model/trace.h"
+#include "worker/solver/reference/contact.h"
+#include "worker/solver/reference/fall.h"
+#include "worker/solver/reference/motion.h"
+
+namespace oblique::solver {
+
+/// Solves one contact by any integrator, from `touch` (a state of `motion`, the tip on the ground)
+/// to separation. Fills everything of the result but H, the fall time and the solver's name and
+/// version. Throws SolveError when there is no answer.
+CaseResult solve_contact(const Motion& motion, const ContactParameters& parameters,
+                         const ContactSteps& steps, ChainState touch, const Tracing& tracing);
+
+/// Result of a finished contact, all but H, the fall time and the solver's report. `in` and `out`
+/// are the energies at touch and separation. Throws SolveError when the energy balance misses so
+/// much of the exchanged work that the step resolves nothing.
+CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
+                          const TipState& touch, const Energies& in, const Energies& out);
+
+/// Gives the rows of a contact's trace to tracing.sink, which must be set.
+class ContactTracer {
+ public:
+  /// `motion` and `tracing` must outlive this.
+  ContactTracer(const Motion& motion, const Tracing& tracing, const TipState& touch)
+      : motion_(motion), tracing_(tracing), touch_y_m_(touch.y_m) {}
+
+  /// At each accepted instant.
+  void accepted(const Contact& contact, const ChainState& state) const;
+
+ private:
+  const Motion& motion_;
+  const Tracing& tracing_;
+  double touch_y_m_;
+};
+
+/// Gives kFallRows instants of the fall to tracing.sink, from release to the drop H_m. The last one
+/// is the touch itself, as the contact's first row, but for the state and the velocity of P. Times
+/// in between are met to a thousandth of a step. Throws what Fall::state_at throws.
+void trace_fall(const Motion& motion, const Fall& fall, double H_m, const Tracing& tracing);
+
+}  // namespace oblique::solver
