@@ -248,7 +248,7 @@ class Crowd::Parts {
         [](const worker::SolveTrace&) {},
         [](const worker::CancelTrace&) {},
         [](const worker::DropTraces&) {},
-        [](const worker::TellSilence&) {},
+        [](const worker::ReportUnreachable&) {},
         [](const worker::Note&) {},
         [](const worker::Finish& finish) {
           std::fprintf(stderr, "a worker ended: %s\n", finish.reason.c_str());
