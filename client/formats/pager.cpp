@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <spawn.h>
-#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,38 +9,18 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
 #include <iostream>
 #include <utility>
 
+#include "client/io/console.h"
 #include "proto/text.h"
 
 namespace oblique::client {
-namespace {
-
-const char* variable(const char* name) {
-  // Nobody sets variables while this reads them.
-  return std::getenv(name);  // NOLINT(concurrency-mt-unsafe)
-}
-
-}  // namespace
-
-TerminalSize terminal_size() {
-  constexpr TerminalSize kUsual{80, 24};
-  if (isatty(STDOUT_FILENO) != 1) {
-    return {};
-  }
-  struct winsize size {};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) {
-    return kUsual;
-  }
-  return {size.ws_col, size.ws_row};
-}
 
 std::string pager_command() {
   for (const char* name : {"OBLIQUE_PAGER", "PAGER"}) {
-    if (const char* command = variable(name); command != nullptr) {
-      return std::string(command) == "cat" ? std::string() : std::string(command);
+    if (const auto command = environment_variable(name)) {
+      return *command == "cat" ? std::string() : *command;
     }
   }
   return "less -FRSX";

@@ -9,13 +9,6 @@
 
 namespace oblique::client {
 
-/// Columns and lines of the terminal that standard output is; 0 where it is none.
-struct TerminalSize {
-  std::size_t columns = 0;
-  std::size_t lines = 0;
-};
-TerminalSize terminal_size();
-
 /// The command line of the pager that people want: $OBLIQUE_PAGER, else $PAGER, else `less -FRSX`.
 /// Empty where the first of these that is set is empty or `cat`.
 std::string pager_command();

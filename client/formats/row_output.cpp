@@ -1,9 +1,12 @@
 #include "client/formats/row_output.h"
 
+#include <unistd.h>
+
 #include <utility>
 
 #include "client/formats/new_file.h"
 #include "client/formats/pager.h"
+#include "client/io/console.h"
 
 namespace oblique::client {
 namespace {
@@ -36,7 +39,7 @@ PrinterSettings printer_settings(const OutputSettings& settings, const TerminalS
 }  // namespace
 
 RowOutput::RowOutput(OutputSettings settings) {
-  const TerminalSize terminal = terminal_size();
+  const TerminalSize terminal = terminal_size(STDOUT_FILENO);
   sink_ = sink_for(settings, terminal);
   printer_ = made_printer(settings.format, *sink_, printer_settings(settings, terminal));
 }

@@ -10,7 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 #include "worker/solver/contact/contact_record.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"

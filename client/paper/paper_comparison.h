@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 #include "client/paper/published_table.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"

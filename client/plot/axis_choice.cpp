@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/figure.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
@@ -31,7 +31,7 @@ std::string values_in_words(const StudyAxis& axis) {
   const auto& values = axis.all_values;
   constexpr std::size_t kFew = 8;
   if (values.size() > kFew) {
-    return fmt::format("{} values from {} to {}", shown_count(values.size()),
+    return fmt::format("{} values from {} to {}", format_count(values.size()),
                        readable_number(values.front()), readable_number(values.back()));
   }
   std::string text = values.size() == 1 ? "the value" : "the values";

@@ -5,7 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/study_shape.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
@@ -77,7 +77,7 @@ ChosenAxis FigureBuilder::chosen_or(const std::string& flag, const std::string& 
 void FigureBuilder::add_titles(Figure& figure, const std::string& what,
                                std::uint64_t points) const {
   const auto counted_points = [](std::uint64_t count) {
-    return count == 1 ? "1 point" : shown_count(count) + " points";
+    return count == 1 ? "1 point" : format_count(count) + " points";
   };
   figure.title = fmt::format("{}: {}", request_.study, what);
   for (const auto& shown : condition_.shown) {

@@ -11,7 +11,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "proto/wire/chunk.h"
 
 namespace oblique::client::plot {
@@ -235,7 +235,7 @@ std::vector<AnswerColumn> read_columns(RowStream& stream) {
       throw std::runtime_error(
           fmt::format("a picture is made of at most {} points, and these are more: take fewer by "
                       "--where or --at",
-                      shown_count(kMostRows)));
+                      format_count(kMostRows)));
     }
     ends = chunk.ends();
   }

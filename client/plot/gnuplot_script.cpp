@@ -10,7 +10,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/cell_areas.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
@@ -673,7 +673,7 @@ class ScriptWriter {
     for (const Gap& gap : kGaps) {
       if (const auto count = cells.count(gap.state); count > 0) {
         entries.push_back({gap.fill, is_text_ ? std::string(gap.letter) : "",
-                           fmt::format("{} ({})", gap.words, shown_count(count))});
+                           fmt::format("{} ({})", gap.words, format_count(count))});
       }
     }
     return entries;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
@@ -13,8 +12,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/formats/new_file.h"
-#include "client/formats/pager.h"
 #include "client/formats/sink.h"
+#include "client/io/console.h"
 #include "client/plot/figure_table.h"
 #include "client/plot/gnuplot_script.h"
 #include "client/service/child_process.h"
@@ -137,10 +136,9 @@ std::string picture_of(const Figure& figure, PictureFormat format,
 }
 
 std::string text_of(const Figure& figure) {
-  const TerminalSize terminal = terminal_size();
+  const TerminalSize terminal = terminal_size(STDOUT_FILENO);
   const bool is_terminal = terminal.lines > 0;
-  const char* no_colour = std::getenv("NO_COLOR");
-  const bool has_colours = is_terminal && (no_colour == nullptr || *no_colour == '\0');
+  const bool has_colours = may_colour(STDOUT_FILENO);
   constexpr std::size_t kLinesOfPanel = 20;
   const std::size_t rows = figure.panels.size();
   const std::size_t columns = is_terminal ? std::clamp<std::size_t>(terminal.columns, 40, 200) : 80;

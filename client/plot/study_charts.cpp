@@ -5,7 +5,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/figure_builder.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
@@ -29,11 +29,11 @@ void add_notes(Figure& figure, const GatheredLines& gathered) {
   if (gathered.gaps > 0) {
     figure.notes.push_back(fmt::format(
         "Gaps in the lines: {} without a value.",
-        gathered.gaps == 1 ? "1 point is" : shown_count(gathered.gaps) + " points are"));
+        gathered.gaps == 1 ? "1 point is" : format_count(gathered.gaps) + " points are"));
   }
   if (gathered.most_at_a_place > 1) {
     figure.notes.push_back(fmt::format("Where up to {} points share a place, their mean is drawn.",
-                                       shown_count(gathered.most_at_a_place)));
+                                       format_count(gathered.most_at_a_place)));
   }
 }
 
@@ -246,7 +246,7 @@ Figure FigureBuilder::scatter() {
       count_missing(answer, x_scale, y_scale, request_.is_colour_logarithmic);
   if (missing > 0) {
     figure.notes.push_back(fmt::format("{} of {} points lack a value that can be drawn.",
-                                       shown_count(missing), shown_count(points)));
+                                       format_count(missing), format_count(points)));
   }
   if (missing == points) {
     note_empty(figure, "no point has both values");
@@ -264,7 +264,7 @@ Figure FigureBuilder::scatter() {
         cells_for(answer[0].numbers, 160), y_scale, cells_for(answer[1].numbers, 110));
     Cells& cells = gathered.cells;
     figure.notes.push_back(
-        fmt::format("{} points, gathered in {} x {} cells; colours are {}.", shown_count(points),
+        fmt::format("{} points, gathered in {} x {} cells; colours are {}.", format_count(points),
                     cells.columns(), cells.rows(),
                     has_colour ? "means of their points" : "the number of their points"));
     for (std::size_t i = 0; !has_colour && i < cells.values.size(); ++i) {
@@ -366,7 +366,7 @@ Figure FigureBuilder::histogram() {
   figure.panels.push_back(std::move(panel));
   if (counted_points < points) {
     figure.notes.push_back(fmt::format("{} of {} points have no value, or one outside the axis.",
-                                       shown_count(points - counted_points), shown_count(points)));
+                                       format_count(points - counted_points), format_count(points)));
   }
   if (counted_points == 0) {
     note_empty(figure, "no point has a value");

@@ -5,7 +5,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/formats/table_printer.h"
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/figure_builder.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -28,11 +28,11 @@ void note_gathered(Figure& figure, const Gathered& gathered) {
     return;
   }
   std::string note =
-      fmt::format("Cells hold up to {} points and show ", shown_count(gathered.most_in_a_cell));
+      fmt::format("Cells hold up to {} points and show ", format_count(gathered.most_in_a_cell));
   note += gathered.cells.names.empty() ? "their mean"
                                        : "what most of these have; percentages count points";
   if (gathered.mixed_cells > 0) {
-    note += fmt::format("; {} {} others too", shown_count(gathered.mixed_cells),
+    note += fmt::format("; {} {} others too", format_count(gathered.mixed_cells),
                         gathered.mixed_cells == 1 ? "cell has" : "cells have");
   }
   figure.notes.push_back(note + ".");
@@ -75,7 +75,7 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   if (kept + 1 >= categories.size()) {  // a single one has its own name
     return categories;
   }
-  Category other{.name = fmt::format("{} other {}", shown_count(categories.size() - kept), plural),
+  Category other{.name = fmt::format("{} other {}", format_count(categories.size() - kept), plural),
                  .points = 0,
                  .is_other = true};
   for (std::size_t i = kept; i < categories.size(); ++i) {
@@ -100,7 +100,7 @@ void blank_undrawable(Figure& figure, Cells& cells, bool is_logarithmic) {
   if (const auto blank = cells.count(CellState::kNoValue); blank > 0) {
     figure.notes.push_back(
         fmt::format("{} {} blank: solved, but without a value that can be drawn.",
-                    shown_count(blank), blank == 1 ? "cell is" : "cells are"));
+                    format_count(blank), blank == 1 ? "cell is" : "cells are"));
   }
 }
 
@@ -126,7 +126,7 @@ void add_categories(Figure& figure, Cells& cells,
   if (!cells.categories.empty() && cells.categories.back().is_other) {
     figure.notes.push_back(
         fmt::format("The {} {} with the most points are named; --format csv has all {}.",
-                    cells.categories.size() - 1, plural, shown_count(points.size())));
+                    cells.categories.size() - 1, plural, format_count(points.size())));
   }
 }
 

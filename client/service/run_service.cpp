@@ -1,15 +1,14 @@
 #include "client/service/run_service.h"
 
 #include <filesystem>
-#include <iostream>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
-#include "client/output/mesh_note.h"
+#include "client/io/format_units.h"
+#include "client/io/study_notes.h"
 #include "client/service/connection.h"
 #include "client/service/result_query.h"
 #include "client/service/watching.h"
@@ -21,19 +20,19 @@
 namespace oblique::client {
 namespace {
 
-void tell_how_to_continue(const Study& study, const RunSettings& settings) {
-  std::cerr << fmt::format(
+void tell_how_to_continue(Console& console, const Study& study, const RunSettings& settings) {
+  console.notes() << fmt::format(
       "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
       study.name, settings.service.database.string());
 }
 
 /// Rows that were not merged into the file are missing in a copy of it.
-void tell_of_log(const std::filesystem::path& database) {
+void tell_of_log(Console& console, const std::filesystem::path& database) {
   std::error_code ignored;
   const std::string log = database.string() + "-wal";
   const auto size = std::filesystem::file_size(log, ignored);
   if (!ignored && size > 0) {
-    std::cerr << fmt::format(
+    console.notes() << fmt::format(
         "Another program reads {0}, so {1} holds some of its rows: a copy needs both files. "
         "`oblique backup COPY.db --db {0}` makes one that is whole.\n",
         database.string(), log);
@@ -55,11 +54,11 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
       "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
       "solve its other {3} points. Go on with workers of {1}, or under another name, as --name "
       "{0}-{2}",
-      status.name(), status.solver_version(), own, shown_count(protocol::open_points(status)));
+      status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
 }
 
 /// Names the other studies of the database that are not finished. They wait during this run.
-void tell_of_other_studies(Connection& connection, const Study& study,
+void tell_of_other_studies(Console& console, Connection& connection, const Study& study,
                            const std::filesystem::path& database) {
   constexpr std::size_t kMostNamed = 3;
   std::vector<std::string> others;
@@ -67,7 +66,7 @@ void tell_of_other_studies(Connection& connection, const Study& study,
   for (const auto& other : all.studies()) {
     if (other.name() != study.name && other.state() == "running") {
       others.push_back(fmt::format("{} ({} points open)", other.name(),
-                                   shown_count(protocol::open_points(other))));
+                                   format_count(protocol::open_points(other))));
     }
   }
   if (others.empty()) {
@@ -75,21 +74,21 @@ void tell_of_other_studies(Connection& connection, const Study& study,
   }
   std::string more;
   if (others.size() > kMostNamed) {
-    more = fmt::format(" and {} more", shown_count(others.size() - kMostNamed));
+    more = fmt::format(" and {} more", format_count(others.size() - kMostNamed));
     others.resize(kMostNamed);
   }
-  tell_line(fmt::format(
+  console.note(fmt::format(
       "Also unfinished in {0}: {1}{2}. To go on with one, repeat the `oblique run` that "
       "began it; `oblique view {0}` goes on with all.",
       database.string(), fmt::join(others, ", "), more));
 }
 
-RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
-                       protocol::StopSignals& stop) {
+RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& settings,
+                       EmbeddedService& service, protocol::StopSignals& stop) {
   const auto look_after = [&] {
     service.check();
     if (const auto news = service.news(); !news.empty()) {
-      std::cerr << protocol::visible_lines(news) << '\n';
+      console.notes() << protocol::visible_lines(news) << '\n';
     }
     return !stop.requested();
   };
@@ -100,15 +99,16 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   Connection connection(where, look_after);
   const auto submitted = connection.submit(study, {.no_reuse = settings.no_reuse});
   if (submitted.created()) {
-    tell_mesh(std::cerr, study.recipe);
+    note_coarse_mesh(console.notes(), study.recipe);
   } else {
-    std::cerr << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
-                             shown_count(submitted.settled()), shown_count(submitted.points()));
+    console.notes() << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
+                                   format_count(submitted.settled()),
+                                   format_count(submitted.points()));
   }
   if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
-    std::cerr << fmt::format("\"{}\": {}\n", study.name, taken);
+    console.notes() << fmt::format("\"{}\": {}\n", study.name, taken);
   }
-  tell_of_other_studies(connection, study, settings.service.database);
+  tell_of_other_studies(console, connection, study, settings.service.database);
   const auto ask = [&](const Tell& tell) {
     look_after();
     const auto reply = connection.status(study.name, tell);
@@ -121,13 +121,14 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
     return reply.studies(0);
   };
   RunEnd end;
-  end.status = watch_study(ask, stop);
+  end.status = watch_study(console, ask, stop);
   if (stop.requested()) {
     throw Interrupted("stopped");
   }
-  const auto query = [&](const std::string& sql) { return connection.query(sql, tell_line); };
-  end.rows = connection.chunks(first_results(study.name, settings.rows), tell_line);
-  end.exit_code = tell_end(end.status, query);
+  const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
+  const auto query = [&](const std::string& sql) { return connection.query(sql, tell); };
+  end.rows = connection.chunks(first_results(study.name, settings.rows), tell);
+  end.exit_code = tell_end(console, end.status, query);
   return end;
 }
 
@@ -141,7 +142,7 @@ void check_settings(const RunSettings& settings) {
   }
   if (settings.rows < 0) {
     throw solver::InputError(
-        fmt::format("--rows {} is not allowed: it must be >= 0", settings.rows));
+        fmt::format("--limit {} is not allowed: it must be >= 0", settings.rows));
   }
 }
 
@@ -159,19 +160,19 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
+std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop) {
   check_settings(settings);
   try {
     ServiceSettings how = settings.service;
     how.only_study = study.name;
     EmbeddedService service(how, stop);
-    auto end = submit_and_wait(study, settings, service, stop);
+    auto end = submit_and_wait(console, study, settings, service, stop);
     service.stop();
-    tell_of_log(settings.service.database);
+    tell_of_log(console, settings.service.database);
     return end;
   } catch (const Interrupted&) {
-    tell_how_to_continue(study, settings);
+    tell_how_to_continue(console, study, settings);
     return std::nullopt;
   }
 }

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "client/io/console.h"
 #include "client/service/connection.h"
 #include "client/service/embedded_service.h"
 #include "client/service/source.h"
@@ -39,7 +40,7 @@ struct RunEnd {
 /// Starts server and workers here, submits the study, shows its progress and waits for its end;
 /// nothing is left running. Nothing when `stop` is requested; what to do next is told then. Throws
 /// ProcessError when server or workers end too soon, ServerError when the study is refused.
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
+std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop);
 
 }  // namespace oblique::client

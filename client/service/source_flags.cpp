@@ -1,14 +1,11 @@
 #include "client/service/source_flags.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <iostream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/speech.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -17,15 +14,6 @@ namespace {
 
 constexpr const char* kServerVariable = "OBLIQUE_SERVER";
 constexpr const char* kKeysVariable = "OBLIQUE_KEYS";
-
-std::string of_environment(const char* variable) {
-  const char* value = std::getenv(variable);
-  return value == nullptr ? std::string() : std::string(value);
-}
-
-std::string server_of_environment() {
-  return of_environment(kServerVariable);
-}
 
 std::string seconds(std::int64_t milliseconds) {
   return solver::exact_number(static_cast<double>(milliseconds) / 1000.0);
@@ -67,6 +55,7 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
                                                "server is named: {} when it is in this folder",
                                                DatabaseSettings().file));
   database->type_name("FILE");
+  flags.may_be_file = true;
   add_server_flags(verb, flags);
   verb.get_option("--timeout")
       ->description(fmt::format(
@@ -82,18 +71,24 @@ void add_database_argument(CLI::App& verb, std::filesystem::path& file) {
       ->capture_default_str();
 }
 
-ConnectionSettings connection_settings(const SourceFlags& flags) {
+ConnectionSettings connection_settings(Console& console, const SourceFlags& flags) {
   ConnectionSettings settings;
   settings.timeout_ms = timeout_of(flags, settings.timeout_ms);
   if (!flags.server.empty()) {
     settings.server_url = flags.server;
-  } else if (const auto from_environment = server_of_environment(); !from_environment.empty()) {
+  } else if (const auto from_environment = environment_variable(kServerVariable).value_or("");
+             !from_environment.empty()) {
     settings.server_url = from_environment;
+  } else if (flags.may_be_file) {
+    settings.if_silent = fmt::format(
+        "there is no database {} in this folder, and no server at that address. Name a database "
+        "with --db FILE, or a server with --server URL",
+        DatabaseSettings().file);
   }
-  const std::string keys = flags.keys.empty() ? of_environment(kKeysVariable) : flags.keys;
-  tell_detail(std::cerr,
-              fmt::format("asks the server at {}{}", settings.server_url,
-                          keys.empty() ? std::string() : fmt::format(" with the key {}", keys)));
+  const std::string keys =
+      flags.keys.empty() ? environment_variable(kKeysVariable).value_or("") : flags.keys;
+  console.detail(fmt::format("asks the server at {}{}", settings.server_url,
+                             keys.empty() ? "" : fmt::format(" with the key {}", keys)));
   if (!keys.empty()) {
     settings.key = protocol::read_key_file(keys);
   }
@@ -104,19 +99,20 @@ std::string database_meant(const SourceFlags& flags) {
   if (!flags.database.empty()) {
     return flags.database;
   }
-  const bool server_named = !flags.server.empty() || !server_of_environment().empty();
+  const bool server_named =
+      !flags.server.empty() || !environment_variable(kServerVariable).value_or("").empty();
   return !server_named && std::filesystem::exists(DatabaseSettings().file) ? DatabaseSettings().file
                                                                            : std::string();
 }
 
-std::unique_ptr<Source> open_source(const SourceFlags& flags,
+std::unique_ptr<Source> open_source(Console& console, const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting) {
   const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
   if (const std::string database = database_meant(flags); !database.empty()) {
-    tell_detail(std::cerr, fmt::format("reads the database {} itself", database));
+    console.detail(fmt::format("reads the database {} itself", database));
     return open_database(database, database_timeout_ms);
   }
-  return open_server(connection_settings(flags), std::move(keep_waiting));
+  return open_server(connection_settings(console, flags), std::move(keep_waiting));
 }
 
 }  // namespace oblique::client

@@ -2,7 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/progress.h"
+#include "client/io/progress.h"
 #include "proto/study_counts.h"
 
 namespace oblique::client {
@@ -31,7 +31,7 @@ std::string WatchTeller::update(const protocol::StudyStatus& status, Seconds ela
     said_without_ = true;
     sentence =
         fmt::format("Nothing was solved for {}: is a server at work on this study, with workers?",
-                    shown_duration(kLongWithout.count()));
+                    format_duration(kLongWithout.count()));
   }
   return sentence;
 }

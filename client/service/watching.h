@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/io/console.h"
 #include "client/service/source.h"
 #include "proto/oblique.pb.h"
 #include "proto/program/process.h"
@@ -19,10 +20,8 @@ using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
 /// Asks where one study is, over and over, and shows it on standard error, with what it waits for,
 /// until it no longer runs or `stop` is requested. Asks often at first, then ever less. Throws what
 /// `ask` throws. Returns the last status.
-protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop);
-
-/// Writes one line to standard error, whatever is in it.
-void tell_line(const std::string& sentence);
+protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
+                                  protocol::StopSignals& stop);
 
 /// The one study of that name in an answer to a status question; std::runtime_error where there is
 /// none. Given a `tell`, waits for a server that is away.
@@ -44,12 +43,12 @@ class WatchedStudy {
 
 /// Tells on standard error how a watched study stands: failed points with their reasons, or that
 /// it was cancelled. Gives the exit code: kDone when every point is solved.
-int tell_end(const protocol::StudyStatus& status,
+int tell_end(Console& console, const protocol::StudyStatus& status,
              const std::function<protocol::Table(const std::string&)>& query);
 
 /// Tells on standard error when anybody may come to the server at `place`, as StatusReply.access
 /// says.
-void tell_if_insecure(const std::string& access, const std::string& place);
+void tell_if_insecure(Console& console, const std::string& access, const std::string& place);
 
 /// "12 points are taken over: 7 of a, 5 of b", or an empty text when none are.
 std::string taken_over(const protocol::TakenOver& taken);

@@ -6,14 +6,15 @@
 #include <filesystem>
 #include <string_view>
 #include <utility>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
+#include "client/formats/cell_text.h"
 #include "client/formats/new_file.h"
 #include "client/formats/row_printer.h"
-#include "client/output/case_report.h"
-#include "client/output/trace_table.h"
+#include "client/io/case_report.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
@@ -26,6 +27,28 @@ std::optional<TraceFormat> format_called(std::string_view name) {
   return name == kFormats[0]   ? std::optional(TraceFormat::kCsv)
          : name == kFormats[1] ? std::optional(TraceFormat::kJson)
                                : std::nullopt;
+}
+
+/// One line of CSV for each instant.
+void append_csv_row(std::string& text, const solver::TraceRow& row) {
+  std::string_view separator;
+  const auto put = [&](double value) {
+    text.append(separator);
+    append_number(text, value);
+    separator = ",";
+  };
+  for (const auto& column : solver::trace_columns()) {
+    if (const auto* number = std::get_if<double solver::TraceRow::*>(&column.value)) {
+      put(row.*(*number));
+    } else if (const auto* vectors = std::get_if<solver::TraceVectors>(&column.value)) {
+      for (const double value : row.*(vectors->values)) {
+        put(value);
+      }
+    } else {
+      text.append(separator).append(row.*std::get<std::string solver::TraceRow::*>(column.value));
+    }
+  }
+  text += '\n';
 }
 
 }  // namespace
@@ -74,13 +97,13 @@ bool TraceOutput::fills_terminal() const {
 void TraceOutput::begin(const solver::TraceShape& shape) {
   shape_ = shape;
   if (format_ == TraceFormat::kCsv) {
-    append_trace_header(sink_->held(), shape);
+    sink_->append(fmt::format("{}\n", fmt::join(solver::trace_headings(shape), ",")));
   }
 }
 
 void TraceOutput::add(const solver::TraceRow& row) {
   if (format_ == TraceFormat::kCsv) {
-    append_trace_row(sink_->held(), row);
+    append_csv_row(sink_->held(), row);
     sink_->flush_if_long();
   } else {
     ++rows_;

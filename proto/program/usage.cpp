@@ -128,7 +128,7 @@ std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::P
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_verb = has_verbs(verb) && !first.starts_with("-");
-    return std::string(is_verb ? "unknown verb" : "unexpected") + " `" + excerpt(first) + "`" +
+    return std::string(is_verb ? "unknown command" : "unexpected") + " `" + excerpt(first) + "`" +
            did_you_mean(first.substr(0, first.find('=')), candidates);
   }
   const std::string message = error.what();
@@ -136,7 +136,7 @@ std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::P
     std::vector<std::string_view> verbs;
     std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(verbs),
                  [](std::string_view word) { return !word.starts_with("-"); });
-    return "a verb is required; there are " + joined(verbs);
+    return "a command is required; there are " + joined(verbs);
   }
   if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {
     return message.substr(0, at) + " is given more than once: give it once";

@@ -19,8 +19,8 @@
 
 #include "client/convergence/convergence.h"
 #include "client/convergence/levels.h"
-#include "client/output/columns.h"
-#include "client/output/printer.h"
+#include "client/io/tables.h"
+#include "client/io/tables.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 
 namespace oblique::client {
 namespace {

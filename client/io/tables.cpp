@@ -1,0 +1,57 @@
+#include "client/io/tables.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/formats/row_output.h"
+#include "client/formats/sink.h"
+#include "worker/solver/model/result_fields.h"
+
+namespace oblique::client {
+namespace {
+
+/// Whether a name ends in its unit, as vt_in_m_s and impulse_n_Ns do.
+bool ends_in_unit(const std::string& name, const std::string& unit) {
+  std::string suffix = "_";
+  for (const char letter : unit) {
+    if (letter != ' ' && letter != '^') {
+      suffix += letter == '/' ? '_' : letter;
+    }
+  }
+  return name.ends_with(suffix);
+}
+
+}  // namespace
+
+ShownColumn shown_column(const std::string& name, const std::string& unit) {
+  const auto* field = solver::find_result_column(name);
+  if (field != nullptr && field->shown_per_unit != 1.0) {
+    return {fmt::format("{} [{}]", name, field->shown_unit), field->shown_per_unit};
+  }
+  return {unit.empty() || ends_in_unit(name, unit) ? name : fmt::format("{} [{}]", name, unit)};
+}
+
+std::vector<ShownColumn> shown_columns(const protocol::QueryReply& chunk) {
+  std::vector<ShownColumn> shown;
+  for (int i = 0; i < chunk.columns_size(); ++i) {
+    shown.push_back(
+        shown_column(chunk.columns(i), i < chunk.units_size() ? chunk.units(i) : std::string()));
+  }
+  return shown;
+}
+
+void print(std::ostream& out, const protocol::Table& rows, Format format) {
+  TextSink text;
+  const auto printer = made_printer(format, text);
+  printer->print(protocol::chunk_of(rows));
+  printer->end();
+  text.finish();
+  out << text.text();
+}
+
+void print_out(const protocol::Table& rows, Format format) {
+  RowOutput out({.format = format, .may_page = false, .may_leave_out = false});
+  out.print(protocol::chunk_of(rows));
+  out.finish();
+}
+
+}  // namespace oblique::client
