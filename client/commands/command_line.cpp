@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <exception>
 #include <map>
+#include <optional>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -17,7 +18,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/commands/commands.h"
-#include "client/commands/help_text.h"
 #include "client/formats/sink.h"
 #include "client/io/format_units.h"
 #include "proto/program/origin/origin.h"
@@ -38,6 +38,22 @@ constexpr const char* kExamples = R"(Examples:
   oblique COMMAND --help                           flags and examples of a command
 
 Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its number, 130 for Ctrl-C.)";
+
+/// How far the rest of a line that is too long is indented; empty: the line stays whole.
+std::optional<std::size_t> indent_of_rest(std::string_view line, std::size_t column) {
+  if (!line.starts_with(' ')) {
+    return 0;
+  }
+  const bool has_meaning = line.size() > column && line[column - 1] == ' ' && line[column] != ' ';
+  // In examples a remark beside a command looks the same.
+  return has_meaning && !line.starts_with("  oblique ") ? std::optional(column) : std::nullopt;
+}
+
+/// Where a line of at most `width` characters ends: at a space behind `from`, or at the end.
+std::size_t break_of(std::string_view line, std::size_t from, std::size_t width) {
+  const std::size_t space = line.rfind(' ', width);
+  return space != std::string_view::npos && space > from ? space : line.find(' ', width);
+}
 
 void add_commands(CLI::App& app, Action& parsed) {
   for (const auto add :
@@ -177,6 +193,32 @@ protocol::ValueWords columns_of_values() {
 }
 
 }  // namespace
+
+std::string fitted_help(const std::string& help, std::size_t width, std::size_t column) {
+  std::istringstream lines(help);
+  std::string text;
+  std::string rest;  // of a sentence, which the next line may go on with
+  for (std::string line; std::getline(lines, line);) {
+    const bool goes_on = !rest.empty() && !line.empty() && !line.starts_with(' ');
+    if (!rest.empty() && !goes_on) {
+      text += rest + '\n';
+    }
+    line = goes_on ? rest + ' ' + line : line;
+    rest.clear();
+    const auto indent = indent_of_rest(line, column);
+    while (indent && *indent < width && line.size() > width) {
+      const std::size_t end = break_of(line, *indent, width);
+      if (end == std::string::npos) {
+        break;
+      }
+      text += line.substr(0, end) + '\n';
+      line = std::string(*indent, ' ') + line.substr(end + 1);
+      rest = *indent == 0 ? line : "";
+    }
+    text += rest.empty() ? line + '\n' : "";
+  }
+  return rest.empty() ? text : text + rest + '\n';
+}
 
 int run_command_line(Console& console, int argc, const char* const* argv) {
   CLI::App app("Studies of the oblique impact of a flexible robotic finger.", "oblique");

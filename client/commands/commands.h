@@ -26,14 +26,17 @@ struct NewCommand {
   Flags& flags;
 };
 
-/// Adds a command. When it is parsed, `parsed` becomes a call of `run`.
+/// Adds a command. When it is parsed, `parsed` becomes a call of `run`. Without `examples` the help
+/// has those of `app`.
 template <class Flags>
 NewCommand<Flags> new_command(CLI::App& app, Action& parsed, const std::string& name,
                               const std::string& summary, const std::string& examples,
                               int (*run)(const Flags& flags, Console& console)) {
   auto* command = app.add_subcommand(name, summary);
   auto flags = std::make_shared<Flags>();
-  command->footer(examples);
+  if (!examples.empty()) {
+    command->footer(examples);
+  }
   command->callback([&parsed, flags, run] {
     parsed = [flags, run](Console& console) { return run(*flags, console); };
   });

@@ -1,4 +1,6 @@
+#include <cstdint>
 #include <filesystem>
+#include <ostream>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -85,27 +87,21 @@ std::vector<std::string> checked_sources(const MergeFlags& flags, Console& conso
 
 void note_merged(Console& console, const std::string& source, const std::string& target,
                  const server::Merged& merged) {
-  console.notes() << fmt::format("{}: {} new in {} and {} united with those there; {} added",
-                                 source, counted(merged.studies_added, "study", "studies"), target,
-                                 format_count(merged.studies_united),
-                                 counted(merged.results_added, "result", "results"));
-  if (merged.studies_grown > 0) {
-    console.notes() << fmt::format("; studies that grew: {}", format_count(merged.studies_grown));
-  }
-  if (merged.failures_replaced > 0) {
-    console.notes() << fmt::format(", {} of them for points that had failed",
-                                   format_count(merged.failures_replaced));
-  }
-  if (merged.results_known > 0) {
-    console.notes() << fmt::format("; {} were there already", format_count(merged.results_known));
-  }
-  if (merged.results_differing > 0) {
-    console.notes() << fmt::format(", {} of these with other numbers: those of {} stay",
-                                   format_count(merged.results_differing), target);
-  }
-  console.notes() << ".\n";
+  auto& out = console.notes();
+  out << fmt::format("{}: {} new in {} and {} united with those there; {} added", source,
+                     counted(merged.studies_added, "study", "studies"), target,
+                     format_count(merged.studies_united),
+                     counted(merged.results_added, "result", "results"));
+  const auto add = [&out](std::uint64_t count, const char* text) {
+    out << (count > 0 ? fmt::format(fmt::runtime(text), format_count(count)) : "");
+  };
+  add(merged.studies_grown, "; studies that grew: {}");
+  add(merged.failures_replaced, ", {} of them for points that had failed");
+  add(merged.results_known, "; {} were there already");
+  add(merged.results_differing, ", {} of these with other numbers: those of --db stay");
+  out << ".\n";
   for (const std::string& remark : merged.remarks) {
-    console.notes() << "  " << protocol::visible(remark) << '\n';
+    out << "  " << protocol::visible(remark) << '\n';
   }
 }
 

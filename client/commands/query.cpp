@@ -1,8 +1,5 @@
-#include <cstddef>
 #include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -12,7 +9,6 @@
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "proto/program/usage.h"
-#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
@@ -56,47 +52,20 @@ struct SqlFlags {
   SourceFlags source;
 };
 
-/// The comparisons with a mode in a condition, as "major_mode = 'SC SR'".
-std::vector<std::string> comparisons_with_modes(std::string_view where) {
-  const auto tokens = server::sql_tokens(where);
-  std::vector<std::string> found;
-  for (std::size_t i = 0; i + 2 < tokens.size(); ++i) {
-    const std::string column = tokens[i].is_name() ? server::name_of(tokens[i]) : "";
-    const bool is_equal = tokens[i + 1].is_sign("=") || tokens[i + 1].is_sign("==");
-    if ((column == "mode" || column == "major_mode") && is_equal &&
-        tokens[i + 2].text.starts_with('\'')) {
-      found.push_back(fmt::format("{} = {}", column, tokens[i + 2].text));
-    }
-  }
-  return found;
-}
-
-/// Notes which modes of the condition no point has: for SQL a misspelt one is a text as any other.
-void note_unknown_modes(Console& console, Source& source, const ResultQuery& asked) {
-  for (const std::string& comparison : comparisons_with_modes(asked.where)) {
-    ResultQuery query;
-    query.study = asked.study;
-    query.where = comparison;
-    query.select = "point";
-    query.limit = 1;
-    if (source.rows(request_for(query))->next().chunk_rows() == 0) {
-      console.note(fmt::format(
-          "Note: no point of {0} has {1}. A mode names the states in their order, as in "
-          "'SC SR sR sC sR'; `oblique query {0} --group major_mode` lists those of the study.",
-          asked.study, comparison));
-    }
-  }
-}
-
 int query(const QueryFlags& flags, Console& console) {
   (void)format_of(flags.output);
   check(flags.query);
   const auto source = open_source(console, flags.source);
   try {
     const auto answer = source->rows(request_for(flags.query));
-    print_stream(console, *answer, flags.output, true,
-                 "--select names columns, csv and json have all");
-    note_unknown_modes(console, *source, flags.query);
+    const auto rows = print_stream(console, *answer, flags.output, true,
+                                   "--select names columns, csv and json have all");
+    if (rows == 0 && flags.query.where.find("mode") != std::string::npos) {
+      console.note(fmt::format(
+          "Note: no point of {0} meets the condition. A mode names the states in their order, as "
+          "in 'SC SR sR sC sR'; `oblique query {0} --group major_mode` lists those of the study.",
+          flags.query.study));
+    }
     return kDone;
   } catch (const solver::InputError&) {
     // A study that does not exist fails with 1 instead: it is no wrong usage.

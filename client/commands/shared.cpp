@@ -1,5 +1,6 @@
 #include "client/commands/shared.h"
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <iterator>
@@ -48,29 +49,30 @@ std::vector<std::string> words_of_process(const std::string& pid) {
 }
 
 /// The oblique-server that has the file open, or the `oblique` that started it, as "`oblique view`
-/// (process 4711)"; empty if it is not found, as one of another user.
-std::string user_of(const fs::path& database) {
-  std::error_code error;
-  for (const auto& process : fs::directory_iterator("/proc", error)) {
+/// (process 4711)"; "another server" if it is not found, as one of another user.
+std::string user_of(const fs::path& database) try {
+  for (const auto& process : fs::directory_iterator("/proc")) {
     const std::string pid = process.path().filename().string();
     const auto words = words_of_process(pid);
     if (words.empty() || fs::path(words[0]).filename() != "oblique-server") {
       continue;
     }
-    for (const auto& open : fs::directory_iterator(process.path() / "fd", error)) {
-      if (!fs::equivalent(open.path(), database, error)) {
-        continue;
-      }
-      for (std::size_t i = 0; i + 1 < words.size(); ++i) {
-        const auto parent = words_of_process(words[i + 1]);
-        if (words[i] == "--stop-with-parent" && parent.size() > 1) {
-          return fmt::format("`oblique {}` (process {})", parent[1], words[i + 1]);
-        }
-      }
-      return fmt::format("oblique-server (process {})", pid);
+    const fs::directory_iterator open_files(process.path() / "fd");
+    if (std::none_of(begin(open_files), end(open_files), [&](const fs::directory_entry& file) {
+          std::error_code no_file;
+          return fs::equivalent(file.path(), database, no_file);
+        })) {
+      continue;
     }
+    const auto flag = std::find(words.begin(), words.end() - 1, "--stop-with-parent");
+    const auto parent = flag == words.end() - 1 ? words : words_of_process(flag[1]);
+    return flag == words.end() - 1 || parent.size() < 2
+               ? fmt::format("oblique-server (process {})", pid)
+               : fmt::format("`oblique {}` (process {})", parent[1], flag[1]);
   }
-  return {};
+  return "another server";
+} catch (const fs::filesystem_error&) {  // a process has ended meanwhile
+  return "another server";
 }
 
 }  // namespace
@@ -123,11 +125,10 @@ void refuse_used_database(const fs::path& database) {
   if (!server::is_in_use(database.string())) {
     return;
   }
-  const std::string user = user_of(database);
   throw std::runtime_error(fmt::format(
       "{} is in use by {}: end that first (Ctrl-C loses nothing), start the study on the page of "
       "`oblique view`, submit it to an oblique-server with `oblique submit`, or name another --db",
-      database.string(), user.empty() ? "another server" : user));
+      database.string(), user_of(database)));
 }
 
 void add_output_flags(CLI::App& command, OutputFlags& flags) {
@@ -146,8 +147,8 @@ Format format_of(const OutputFlags& flags) {
   return format_of_output(flags.format, flags.file);
 }
 
-void print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
-                  bool in_shown_units, const std::string& way_to_all) {
+std::uint64_t print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
+                           bool in_shown_units, const std::string& way_to_all) {
   const Format format = format_of(flags);
   // No output is begun before there is a first answer.
   protocol::QueryReply chunk = stream.next();
@@ -156,9 +157,9 @@ void print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
                  .may_page = !flags.no_pager,
                  .way_to_all = way_to_all,
                  .shown = in_shown_units ? shown_columns(chunk) : std::vector<ShownColumn>()});
+  std::uint64_t rows = chunk.chunk_rows();
   try {
     out.print(chunk);
-    std::uint64_t rows = chunk.chunk_rows();
     while (!chunk.ends()) {
       chunk = stream.next();
       out.print(chunk);
@@ -173,6 +174,7 @@ void print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
       throw;
     }
   }
+  return rows;
 }
 
 void print_first(Console& console, const std::vector<protocol::QueryReply>& chunks,

@@ -50,9 +50,10 @@ void add_output_flags(CLI::App& command, OutputFlags& flags);
 Format format_of(const OutputFlags& flags);
 
 /// Prints an answer as it comes, in tables with shown_columns() if `in_shown_units`; `way_to_all`
-/// as in PrinterSettings. Throws what the source and RowOutput throw.
-void print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
-                  bool in_shown_units, const std::string& way_to_all = "csv and json have all");
+/// as in PrinterSettings. Returns the number of rows. Throws what the source and RowOutput throw.
+std::uint64_t print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
+                           bool in_shown_units,
+                           const std::string& way_to_all = "csv and json have all");
 
 /// Prints the first rows of a study, given in chunks, as a table, and a note if the study has more
 /// `points`.

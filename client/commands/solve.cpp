@@ -39,9 +39,6 @@ struct SolveFlags {
 /// Where the trace goes. Throws InputError when `where` is not a file that can be written, or
 /// standard output that `json` has already.
 TraceOutput trace_output(const std::string& where, bool json) {
-  if (where.empty()) {
-    throw solver::InputError("--trace is empty: name a file, or - for standard output");
-  }
   if (where == kStandardOutput && json) {
     throw solver::InputError(
         "--trace - and --json both write to standard output: give the trace a file");

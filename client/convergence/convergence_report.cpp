@@ -7,7 +7,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/io/tables.h"
-#include "client/io/tables.h"
 #include "proto/wire/chunk.h"
 #include "worker/solver/model/number.h"
 

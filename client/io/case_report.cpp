@@ -51,8 +51,7 @@ ordered_json json_of(const solver::ResultList& list, std::span<const solver::Cel
 ordered_json json_of(const CaseResult& result, const solver::ListPart& part) {
   const auto number_of = [&](std::string_view member) {
     const auto& members = part.list->members;
-    return static_cast<std::size_t>(std::find(members.begin(), members.end(), member) -
-                                    members.begin());
+    return static_cast<std::size_t>(std::ranges::find(members, member) - members.begin());
   };
   ordered_json list = ordered_json::array();
   part.list->each(result, [&](std::span<const solver::Cell> element) {
@@ -71,7 +70,6 @@ ordered_json json_of(const CaseResult& result, const solver::Member<T>& member) 
   return value == nullptr ? ordered_json(nullptr) : ordered_json(*value);
 }
 
-/// A time in the unit of the report.
 std::string microseconds(double time_s) {
   return fixed_number(time_s * kMicro, 2);
 }
@@ -154,11 +152,11 @@ void print_summary(std::ostream& out, const CaseResult& result) {
       << fmt::format("contact     {} us, leaving with V_t = {}, V_n = {} m/s\n",
                      microseconds(result.duration_s), fixed_number(result.vt_out_m_s, 4),
                      fixed_number(result.vn_out_m_s, 4))
-      << fmt::format("mode        {}", result.major_mode);
-  if (result.mode != result.major_mode) {
-    out << fmt::format("  (with ripples: {})", result.mode);
-  }
-  out << fmt::format("\n            ({})\n", kModeLetters);
+      << fmt::format("mode        {}{}\n            ({})\n", result.major_mode,
+                     result.mode == result.major_mode
+                         ? ""
+                         : fmt::format("  (with ripples: {})", result.mode),
+                     kModeLetters);
   if (result.margin && result.margin_event) {
     out << fmt::format("margin      {} (0 fragile, 1 safe), closest event: {}{}\n",
                        readable_number(*result.margin, 2), *result.margin_event,

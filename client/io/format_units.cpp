@@ -10,38 +10,28 @@
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
-namespace {
-
-std::string two_units(std::int64_t large, const char* large_unit, std::int64_t small,
-                      const char* small_unit) {
-  return fmt::format("{} {} {:02} {}", large, large_unit, small, small_unit);
-}
-
-}  // namespace
 
 std::string format_duration(double seconds) {
   if (seconds < 9.95) {
     return fmt::format("{} s", solver::fixed_number(std::max(seconds, 0.0), 1));
   }
-  constexpr double kLongest_s = 1e12;
-  const auto whole = static_cast<std::int64_t>(std::llround(std::min(seconds, kLongest_s)));
+  const auto whole = static_cast<std::int64_t>(std::llround(std::min(seconds, 1e12)));
   if (whole < 60) {
     return fmt::format("{} s", whole);
   }
   if (whole < 3600) {
-    return two_units(whole / 60, "min", whole % 60, "s");
+    return fmt::format("{} min {:02} s", whole / 60, whole % 60);
   }
   if (whole < 86400) {
-    return two_units(whole / 3600, "h", whole % 3600 / 60, "min");
+    return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
   }
-  return two_units(whole / 86400, "d", whole % 86400 / 3600, "h");
+  return fmt::format("{} d {:02} h", whole / 86400, whole % 86400 / 3600);
 }
 
 std::string format_count(std::uint64_t count) {
   std::string text = std::to_string(count);
-  for (std::size_t place = text.size(); place > 3;) {
-    place -= 3;
-    text.insert(place, 1, ',');
+  for (std::size_t place = text.size(); place > 3; place -= 3) {
+    text.insert(place - 3, 1, ',');
   }
   return text;
 }
@@ -51,20 +41,17 @@ std::string counted(std::uint64_t count, std::string_view one, std::string_view 
 }
 
 std::string format_rate(double per_s) {
-  constexpr double kWholeFrom = 99.95;
-  if (!(per_s >= kWholeFrom)) {
+  if (!(per_s >= 99.95)) {
     return solver::readable_number(per_s, 3);
   }
-  constexpr double kLargest = 1e15;
-  const double capped = std::min(per_s, kLargest);
+  const double capped = std::min(per_s, 1e15);
   const double unit = std::pow(10.0, std::floor(std::log10(capped)) - 2.0);
   return format_count(static_cast<std::uint64_t>(std::llround(std::round(capped / unit) * unit)));
 }
 
 std::string format_bytes(std::uint64_t bytes) {
   constexpr std::array kUnits{"kB", "MB", "GB", "TB", "PB", "EB"};
-  constexpr std::uint64_t kThousand = 1000;
-  if (bytes < kThousand) {
+  if (bytes < 1000) {
     return fmt::format("{} bytes", bytes);
   }
   double size = static_cast<double>(bytes) / 1000.0;

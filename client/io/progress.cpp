@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ostream>
 #include <string_view>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -37,14 +38,6 @@ std::string rate_and_time_left(const ProgressState& state) {
   return text;
 }
 
-std::string first_characters(std::string_view text, std::size_t count) {
-  std::size_t bytes = 0;
-  for (; count > 0 && bytes < text.size(); --count) {
-    bytes += protocol::first_character(text.substr(bytes)).bytes;
-  }
-  return std::string(text.substr(0, bytes));
-}
-
 }  // namespace
 
 std::string progress_bar(const ProgressState& state, std::size_t columns) {
@@ -58,8 +51,8 @@ std::string progress_bar(const ProgressState& state, std::size_t columns) {
   constexpr std::size_t kNarrowest = 4;
   const std::size_t around = width_of(name) + std::string_view(" []").size() + end.size();
   if (columns < around + kNarrowest) {
-    return first_characters(name, columns > end.size() ? columns - end.size() : 0) +
-           first_characters(end, columns);
+    return protocol::shortened(name, columns > end.size() ? columns - end.size() : 0) +
+           protocol::shortened(end, columns);
   }
   const std::size_t width = std::min(kWidest, columns - around);
   const auto filled = static_cast<std::size_t>(completed_part(state) * static_cast<double>(width));
@@ -80,45 +73,33 @@ std::string progress_line(const ProgressState& state) {
   return text;
 }
 
-void Progress::measure(const ProgressState& state) {
+void Progress::update(ProgressState state) {
   // The rate of the last seconds: long enough to be steady, short enough to follow workers that
   // come and go.
   constexpr double kWindow_s = 10.0;
-  // A longer gap, after shorter ones, means that the server was unreachable.
-  constexpr double kLongGap_s = 5.0;
-  if (!window_.empty()) {
-    const double gap_s = state.elapsed_s - window_.back().first;
-    if (gap_s > kLongGap_s && gap_s_ <= kLongGap_s) {
-      window_.clear();
-    }
-    gap_s_ = gap_s;
-  }
-  window_.emplace_back(state.elapsed_s, state.completed);
-  while (window_.size() > 2 && state.elapsed_s - window_[1].first > kWindow_s) {
+  const double now_s = state.elapsed_s;
+  window_.emplace_back(now_s, state.completed);
+  while (window_.size() > 2 && now_s - window_[1].first > kWindow_s) {
     window_.pop_front();
   }
-}
-
-void Progress::update(ProgressState state) {
-  measure(state);
   const auto& [since_s, completed] = window_.front();
-  if (state.completed > completed && state.elapsed_s > since_s) {
-    state.points_per_s =
-        static_cast<double>(state.completed - completed) / (state.elapsed_s - since_s);
+  if (state.completed > completed && now_s > since_s) {
+    state.points_per_s = static_cast<double>(state.completed - completed) / (now_s - since_s);
   }
-  const double now_s = state.elapsed_s;
   last_ = std::move(state);
-  if (console_.can_redraw() && now_s >= next_bar_s_) {
+  if (now_s < next_s_) {
+    return;
+  }
+  if (console_.can_redraw()) {
     // The last column stays free: some terminals wrap the line there.
     const std::size_t columns = std::max<std::size_t>(console_.columns(), 2) - 1;
     console_.notes() << '\r' << progress_bar(*last_, columns) << "\x1b[K" << std::flush;
-    constexpr double kBetweenBars_s = 0.1;
-    next_bar_s_ = now_s + kBetweenBars_s;
-  } else if (!console_.can_redraw() && now_s >= next_line_s_) {
+  } else {
     console_.notes() << progress_line(*last_) << std::endl;
-    constexpr double kBetweenLines_s = 10.0;
-    next_line_s_ = now_s + kBetweenLines_s;
   }
+  constexpr double kBetweenBars_s = 0.1;
+  constexpr double kBetweenLines_s = 10.0;
+  next_s_ = now_s + (console_.can_redraw() ? kBetweenBars_s : kBetweenLines_s);
 }
 
 void Progress::finish() {

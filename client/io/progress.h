@@ -33,24 +33,21 @@ std::string progress_line(const ProgressState& state);
 /// line every ten seconds. The caller gives the time.
 class Progress {
  public:
-  explicit Progress(Console& console) : console_(console) {}
+  explicit Progress(Console& console)
+      : console_(console), next_s_(console.can_redraw() ? 0.0 : 2.0) {}
 
   /// Draws the state if it is time to, ten times a second at most. `elapsed_s` must not fall; the
-  /// rate is filled in here, without the time in which the server was unreachable.
+  /// rate of the last seconds is filled in here.
   void update(ProgressState state);
 
   /// Draws the last state, if there is one, a last time and ends the line.
   void finish();
 
  private:
-  void measure(const ProgressState& state);
-
   Console& console_;
   std::optional<ProgressState> last_;
   std::deque<std::pair<double, std::uint64_t>> window_;  ///< recent (elapsed_s, completed)
-  double gap_s_ = 0.0;                                   ///< between the last two updates
-  double next_line_s_ = 2.0;
-  double next_bar_s_ = 0.0;
+  double next_s_;                                        ///< when the next drawing is due
 };
 
 }  // namespace oblique::client

@@ -21,21 +21,22 @@ StatusLine::~StatusLine() {
   erase();
 }
 
-StatusLine::Part::Part(StatusLine& line, Describe describe) : line_(line) {
-  const std::lock_guard lock(line_.mutex_);
-  place_ = line_.parts_.insert(line_.parts_.end(), std::move(describe));
-}
-
-StatusLine::Part::~Part() {
-  const std::lock_guard lock(line_.mutex_);
-  line_.parts_.erase(place_);
-  if (line_.parts_.empty()) {
-    line_.erase();  // the next output starts on an empty line
-  }
+StatusLine::Part StatusLine::begin(Describe describe) {
+  const std::lock_guard lock(mutex_);
+  const auto part = parts_.insert(parts_.end(), std::move(describe));
+  return {this, [part](StatusLine* line) { line->end(part); }};
 }
 
 StatusLine::Part StatusLine::begin(std::string what) {
   return begin(Describe([what = std::move(what)] { return what; }));
+}
+
+void StatusLine::end(std::list<Describe>::iterator part) {
+  const std::lock_guard lock(mutex_);
+  parts_.erase(part);
+  if (parts_.empty()) {
+    erase();  // the next output starts on an empty line
+  }
 }
 
 void StatusLine::print(const std::string& line) {

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <functional>
 #include <list>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -32,21 +33,10 @@ class StatusLine {
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;
 
-  /// A part of the computation, under way while this exists.
-  class Part {
-   public:
-    ~Part();
-    Part(const Part&) = delete;
-    Part& operator=(const Part&) = delete;
-
-   private:
-    friend class StatusLine;
-    Part(StatusLine& line, Describe describe);
-    StatusLine& line_;
-    std::list<Describe>::iterator place_;
-  };
+  /// A part of the computation, under way until the last copy of this is destroyed.
+  using Part = std::shared_ptr<void>;
   /// Begins a part. Parts are shown in the order in which they began. From any thread.
-  [[nodiscard]] Part begin(Describe describe) { return {*this, std::move(describe)}; }
+  [[nodiscard]] Part begin(Describe describe);
   [[nodiscard]] Part begin(std::string what);
 
   /// Writes a line that stays. From any thread.
@@ -56,6 +46,7 @@ class StatusLine {
   void draw_until(const std::stop_token& stop);
   void draw();
   void erase();
+  void end(std::list<Describe>::iterator part);
 
   Console& console_;
   Settings settings_;

@@ -19,10 +19,9 @@
 namespace oblique::client {
 namespace {
 
-constexpr int kUnknown = std::numeric_limits<int>::max();
-
-/// Elements a link on the coarsest mesh of the study; kUnknown where an expression gives them.
+/// Elements a link on the coarsest mesh of the study, where no expression gives them.
 int coarsest_mesh(const protocol::Recipe& recipe) {
+  constexpr int kUnknown = std::numeric_limits<int>::max();
   int coarsest = kUnknown;
   for (const auto& block : recipe.blocks()) {
     int elements = protocol::from_message(recipe.model()).elements_per_link;

@@ -366,7 +366,8 @@ Figure FigureBuilder::histogram() {
   figure.panels.push_back(std::move(panel));
   if (counted_points < points) {
     figure.notes.push_back(fmt::format("{} of {} points have no value, or one outside the axis.",
-                                       format_count(points - counted_points), format_count(points)));
+                                       format_count(points - counted_points),
+                                       format_count(points)));
   }
   if (counted_points == 0) {
     note_empty(figure, "no point has a value");

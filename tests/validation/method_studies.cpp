@@ -20,7 +20,6 @@
 #include "client/convergence/convergence.h"
 #include "client/convergence/levels.h"
 #include "client/io/tables.h"
-#include "client/io/tables.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"

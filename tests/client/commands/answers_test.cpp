@@ -1,10 +1,8 @@
 // What the program makes of a server's answers, honest ones and others.
 #include <cstdint>
-#include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -13,7 +11,6 @@
 #include "proto/wire/chunk.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/programs.h"
-#include "tests/support/temporary_folder.h"
 
 namespace oblique::client {
 namespace {
@@ -66,16 +63,6 @@ ScriptedServer::Answer has_study(const std::string& state) {
   };
 }
 
-std::string contents_of(const std::string& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-std::size_t files_in(const std::filesystem::path& folder) {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder),
-                                                std::filesystem::directory_iterator()));
-}
-
 test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) {
   words.insert(words.end(), {"--server", server.url()});
   return test::run_oblique(words);
@@ -93,19 +80,13 @@ TEST(Answers, OfSeveralPartsArePutTogether) {
   }
 }
 
-TEST(Answers, ThatEndWithAnErrorInTheMiddleSaySoAndEndWithOne) {
-  const ScriptedServer server(gives([](std::uint64_t id, std::uint64_t) {
+TEST(Answers, ThatBreakOffSaySoAndEndWithOne) {
+  const auto error = [](std::uint64_t id, std::uint64_t) {
     protocol::ClientReply reply;
     reply.set_request_id(id);
     reply.mutable_error()->set_message("the disk is \x1b[2J gone");
     return std::vector{protocol::encode(reply)};
-  }));
-  const auto csv = ask(server, {"query", "s", "--format", "csv"});
-  EXPECT_EQ(csv.exit_code, 1);
-  EXPECT_THAT(csv.err, testing::HasSubstr("the disk is \\x1b[2J gone"));
-}
-
-TEST(Answers, ThatLackAPartOrAreNotSoundSaySoAndEndWithOne) {
+  };
   const auto lacking = [](std::uint64_t id, std::uint64_t) {
     return std::vector{frame_of(id, chunk_of(3, {4, 5}, true))};
   };
@@ -120,11 +101,15 @@ TEST(Answers, ThatLackAPartOrAreNotSoundSaySoAndEndWithOne) {
     wider.set_ends(true);
     return std::vector{frame_of(id, wider)};
   };
-  for (const auto& answer : {gives(lacking), gives(unsound), gives(of_more_columns)}) {
+  const std::string broke_off = "the answer broke off after 2 rows";
+  for (const auto& [answer, says] : {std::pair{gives(error), std::string("disk is \\x1b[2J gone")},
+                                     {gives(lacking), broke_off},
+                                     {gives(unsound), broke_off},
+                                     {gives(of_more_columns), broke_off}}) {
     const ScriptedServer server(answer);
     const auto csv = ask(server, {"query", "s", "--format", "csv"});
     EXPECT_EQ(csv.exit_code, 1);
-    EXPECT_THAT(csv.err, testing::HasSubstr("the answer broke off after 2 rows"));
+    EXPECT_THAT(csv.err, testing::HasSubstr(says));
   }
 }
 
@@ -139,38 +124,11 @@ TEST(Answers, ThatComeNoFurtherEndWithOne) {
   EXPECT_THAT(csv.err, testing::HasSubstr("broke off after 2 rows: nothing came from"));
 }
 
-TEST(Answers, MakeAFileOnlyWhenTheyAreWhole) {
-  const test::TemporaryFolder folder;
-  const std::string file = folder.file("points.csv");
-  std::ofstream(file) << "of before\n";
-  const ScriptedServer breaks(gives([](std::uint64_t id, std::uint64_t) {
-    return std::vector{frame_of(id, chunk_of(9, {}, true))};
-  }));
-  const std::vector<std::string> words{"query", "s", "--format", "csv", "--out", file};
-  EXPECT_EQ(ask(breaks, words).exit_code, 1);
-  EXPECT_EQ(contents_of(file), "of before\n");
-  EXPECT_EQ(files_in(folder.path()), 1U) << "no draft is left";
-  const ScriptedServer gives_all(gives([](std::uint64_t id, std::uint64_t taken) {
-    return std::vector{frame_of(id, chunk_of(taken + 1, {}, true))};
-  }));
-  const auto whole = ask(gives_all, words);
-  EXPECT_EQ(whole.exit_code, 0) << whole.err;
-  EXPECT_EQ(whole.out, "");
-  EXPECT_EQ(contents_of(file), "point\n0\n1\n");
-  EXPECT_EQ(files_in(folder.path()), 1U);
-}
-
-TEST(Watch, OfACancelledStudySaysSoAndEndsWithOne) {
-  const ScriptedServer server(has_study("cancelled"));
-  const auto watch = ask(server, {"watch", "s"});
+TEST(Watch, EndsWithZeroForADoneStudyAndWithOneForACancelledOne) {
+  EXPECT_EQ(ask(ScriptedServer(has_study("done")), {"watch", "s"}).exit_code, 0);
+  const auto watch = ask(ScriptedServer(has_study("cancelled")), {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
-  EXPECT_NE(watch.err.find("The study is cancelled; oblique resume goes on"), std::string::npos)
-      << watch.err;
-}
-
-TEST(Watch, OfAStudyThatIsDoneEndsWithZero) {
-  const ScriptedServer server(has_study("done"));
-  EXPECT_EQ(ask(server, {"watch", "s"}).exit_code, 0);
+  EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; oblique resume goes on"));
 }
 
 TEST(Watch, TellsHowManyPointsFailedAndWhyAndEndsWithOne) {
@@ -235,7 +193,7 @@ std::vector<std::string> steering(const protocol::ClientRequest& request) {
   return {protocol::encode(reply)};
 }
 
-TEST(TextsOfAServer, DoNotSteerTheTerminalWhateverTheVerb) {
+TEST(TextsOfAServer, DoNotSteerTheTerminalWhateverTheCommand) {
   const ScriptedServer server(steering);
   const std::vector<std::vector<std::string>> all{{"status"},
                                                   {"status", "--format", "json"},

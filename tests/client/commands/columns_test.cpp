@@ -1,7 +1,6 @@
 #include "server/query/columns.h"
 
 #include <cmath>
-#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -112,34 +111,9 @@ TEST_F(TwoWays, ColumnsAndMembersOfOneNameAreTheSameToTheDigitsThatRowsKeep) {
   }
 }
 
-TEST_F(TwoWays, ListsOfTheDatabaseAreArraysToo) {
-  for (const char* name :
-       {"peaks", "ft_peaks", "phases", "stick_intervals", "reaction_peaks", "lengths_m"}) {
-    EXPECT_TRUE(row[name].is_array()) << name << row[name];
-  }
-  expect_same(row["peaks"][0]["fn_N"], solved["fn_peaks_N"][0], "fn_peaks_N", true);
-  EXPECT_EQ(row["lengths_m"], nlohmann::ordered_json::parse("[0.4,0.4,0.4]"));
-}
-
-TEST(Columns, SayTheUnitThatTheirNameEndsIn) {
-  const std::map<std::string, std::string> units{
-      {"_m_s", "m/s"}, {"_Ns", "N s"}, {"_N", "N"}, {"_J", "J"}, {"_Pa", "Pa"}};
-  for (const auto& column : server::all_columns()) {
-    EXPECT_FALSE(column.meaning.empty()) << column.name;
-    for (const auto& [end, unit] : units) {
-      if (column.name.ends_with(end)) {
-        EXPECT_EQ(column.unit, unit) << column.name;
-      }
-    }
-  }
-}
-
 TEST(Columns, OfShortTimesAreShownInTheUnitsOfTheReport) {
   protocol::Table rows{.columns = {"duration_s", "slide_m", "wall_s", "H", "max(duration_s)"}};
-  auto& row = rows.rows.emplace_back();
-  for (const double value : {0.000543704, 0.00114159, 0.001, 1.0, 0.000543704}) {
-    add_value(row, value);
-  }
+  rows.rows.push_back({0.000543704, 0.00114159, 0.001, 1.0, 0.000543704});
   TextSink out;
   const auto chunk = protocol::chunk_of(rows);
   const auto printer = made_printer(Format::kTable, out, {.shown = shown_columns(chunk)});

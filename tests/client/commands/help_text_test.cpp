@@ -1,4 +1,4 @@
-#include "client/commands/help_text.h"
+#include "client/commands/command_line.h"
 
 #include <gtest/gtest.h>
 

@@ -4,18 +4,26 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "client/study/study_file.h"
 #include "server/query/reader.h"
+#include "server/store/store.h"
+#include "tests/client/study/pretended_fall.h"
+#include "tests/support/points.h"
 #include "tests/support/programs.h"
 
 namespace oblique::client {
 namespace {
+
+using testing::HasSubstr;
 
 // So long that a signal meets it at work.
 void write_study(const test::TemporaryFolder& folder, int points) {
@@ -58,7 +66,7 @@ std::vector<std::string> run_arguments() {
   return {"run", "study.toml", "--workers", "2"};
 }
 
-TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryVerbThatReads) {
+TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryCommandThatReads) {
   const test::TemporaryFolder folder;
   const auto paper = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
   const auto run = test::run_oblique(folder, {"run", paper});
@@ -91,85 +99,29 @@ TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryVerbThatReads) {
 
 TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
   const test::TemporaryFolder folder;
-  std::vector<std::string> arguments{"run",  "--preset", "paper", "--H", "0.9,1",
-                                     "--mu", "0.4",      "--e",   "1"};
-  for (const char* one : {"--elements-per-link", "2", "--name", "without"}) {
-    arguments.emplace_back(one);
-  }
-  EXPECT_EQ(test::run_oblique(folder, arguments).exit_code, 0);
-  arguments.back() = "with";
-  arguments.emplace_back("--errors");
-  EXPECT_EQ(test::run_oblique(folder, arguments).exit_code, 0);
+  const auto run = [&folder](const std::vector<std::string>& more) {
+    std::vector<std::string> words{"run", "--preset", "paper", "--elements-per-link",
+                                   "2",   "--H",      "0.9,1", "--mu",
+                                   "0.4", "--e",      "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return test::run_oblique(folder, words);
+  };
+  EXPECT_EQ(run({"--name", "without"}).exit_code, 0);
+  EXPECT_EQ(run({"--name", "with", "--errors"}).exit_code, 0);
   const auto sql = test::run_oblique(
       folder, {"sql",
                "SELECT study, count(*), count(mode_same), count(fn_peak_error), count(v_out_error)"
                " FROM runs GROUP BY study ORDER BY study",
                "--format", "csv"});
-  EXPECT_NE(sql.out.find("with,2,2,2,2\nwithout,2,0,0,0\n"), std::string::npos) << sql.out;
-  EXPECT_EQ(test::run_oblique(folder, {"check"}).exit_code, 0);
+  EXPECT_THAT(sql.out, HasSubstr("with,2,2,2,2\nwithout,2,0,0,0\n"));
   // The same name with another choice is another study.
-  arguments.pop_back();
-  const auto refused = test::run_oblique(folder, arguments);
+  const auto refused = run({"--name", "with"});
   EXPECT_EQ(refused.exit_code, 1);
-  EXPECT_NE(refused.err.find("errors: stored true, given false"), std::string::npos) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("errors: stored true, given false"));
 }
 
-TEST(Run, OfAStudyThatIsDoneShowsItsResultsAgain) {
+TEST(Run, OfAStudyThatIsPausedElsewhereSaysHowToGoOnAndEndsWithOne) {
   const test::TemporaryFolder folder;
-  const std::vector<std::string> arguments{"run",  "--preset", "paper", "--H", "1",
-                                           "--mu", "0.4",      "--e",   "1"};
-  const auto first = test::run_oblique(folder, arguments);
-  const auto second = test::run_oblique(folder, arguments);
-  EXPECT_EQ(second.exit_code, 0) << second.err;
-  EXPECT_EQ(first.out, second.out);
-  EXPECT_NE(second.err.find("1 of 1 points are done"), std::string::npos) << second.err;
-}
-
-TEST(Queries, ThatAreWrongSayWhatIsWrong) {
-  const test::TemporaryFolder folder;
-  ASSERT_EQ(test::run_oblique(folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e",
-                                       "1", "--name", "one"})
-                .exit_code,
-            0);
-  const auto column = test::run_oblique(folder, {"query", "one", "--where", "fn_peak > 1"});
-  EXPECT_EQ(column.exit_code, 2);
-  EXPECT_NE(column.err.find("did you mean `fn_peak_N`"), std::string::npos) << column.err;
-  const auto study = test::run_oblique(folder, {"query", "two"});
-  EXPECT_EQ(study.exit_code, 1);
-  EXPECT_NE(study.err.find("two"), std::string::npos) << study.err;
-  const auto writes = test::run_oblique(folder, {"sql", "DELETE FROM results"});
-  EXPECT_EQ(writes.exit_code, 2);
-  EXPECT_EQ(solved(folder), 1U);
-}
-
-TEST(Run, OfAnotherStudyUnderATakenNameIsRefused) {
-  const test::TemporaryFolder folder;
-  ASSERT_EQ(test::run_oblique(folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e",
-                                       "1", "--name", "one"})
-                .exit_code,
-            0);
-  const auto other = test::run_oblique(
-      folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.5", "--e", "1", "--name", "one"});
-  EXPECT_EQ(other.exit_code, 1);
-  EXPECT_NE(other.err.find("one"), std::string::npos) << other.err;
-}
-
-TEST(Run, NoticesThatTheServerDied) {
-  const test::TemporaryFolder folder;
-  write_study(folder, 10'000'000);
-  test::Process program(folder, test::client_program(), run_arguments());
-  wait_until_at_work(folder, program);
-  const auto processes = test::children_of(program.pid());
-  kill(processes.front(), SIGKILL);
-  const auto outcome = program.outcome();
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.err.find("the server was killed by signal 9"), std::string::npos)
-      << outcome.err;
-  expect_gone(processes);
-}
-
-/// What a run of a long study says to which its user gives that order from another shell.
-test::Outcome ordered_run(const test::TemporaryFolder& folder, const std::string& order) {
   write_study(folder, 10'000'000);
   auto arguments = run_arguments();
   arguments.push_back("--verbose");
@@ -182,57 +134,21 @@ test::Outcome ordered_run(const test::TemporaryFolder& folder, const std::string
     return rest.substr(0, rest.find_first_of(",;\n"));
   };
   const std::filesystem::path keys = word_after("admits the 3 keys of ");
-  const std::string url = word_after("clients at ");
-  EXPECT_EQ(test::run_oblique(folder, {order, "many", "--server", url}).exit_code, 1)
-      << "others on this machine have no key";
-  const auto ordered = test::run_oblique(folder, {order, "many", "--server", url, "--keys",
-                                                  (keys.parent_path() / "client.key").string()});
-  EXPECT_EQ(ordered.exit_code, 0) << ordered.err;
-  auto outcome = program.outcome();
+  const std::vector<std::string> pause{"pause", "many", "--server", word_after("clients at ")};
+  EXPECT_EQ(test::run_oblique(folder, pause).exit_code, 1) << "others on this machine have no key";
+  auto with_key = pause;
+  with_key.insert(with_key.end(), {"--keys", (keys.parent_path() / "client.key").string()});
+  const auto paused = test::run_oblique(folder, with_key);
+  EXPECT_EQ(paused.exit_code, 0) << paused.err;
+  const auto outcome = program.outcome();
   EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
-  return outcome;
-}
-
-TEST(Run, OfAStudyThatSomebodyCancelsSaysSoAndEndsWithOne) {
-  const test::TemporaryFolder folder;
-  const auto outcome = ordered_run(folder, "cancel");
-  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
-  EXPECT_NE(outcome.err.find("The study is cancelled"), std::string::npos) << outcome.err;
-}
-
-TEST(Run, OfAStudyThatSomebodyPausesSaysHowToGoOnAndEndsWithOne) {
-  const test::TemporaryFolder folder;
-  const auto outcome = ordered_run(folder, "pause");
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(outcome.out, "");
-  EXPECT_NE(
-      outcome.err.find("somebody has paused \"many\": the same command again goes on with it"),
-      std::string::npos)
-      << outcome.err;
-  EXPECT_NE(test::run_oblique(folder, {"status"}).out.find("paused"), std::string::npos);
+  EXPECT_THAT(outcome.err,
+              HasSubstr("somebody has paused \"many\": the same command again goes on with it"));
   const auto before = solved(folder);
   test::Process again(folder, test::client_program(), run_arguments());
   wait_for([&] { return solved(folder) > before; });
-}
-
-TEST(Watch, OfAFileOnWhichNobodyWorksSaysSo) {
-  const test::TemporaryFolder folder;
-  write_study(folder, 10'000'000);
-  {
-    test::Process program(folder, test::client_program(), run_arguments());
-    wait_until_at_work(folder, program);
-    kill(program.pid(), SIGINT);
-    EXPECT_EQ(program.outcome().exit_code, 128 + SIGINT);
-  }
-  const auto status = test::run_oblique(folder, {"status"});
-  EXPECT_NE(status.out.find("nobody is at work on oblique.db"), std::string::npos) << status.out;
-  test::Process watch(folder, test::client_program(), {"watch", "many"});
-  wait_for([&] {
-    return watch.err().find("waits for a server: nobody is at work on oblique.db") !=
-           std::string::npos;
-  });
-  kill(watch.pid(), SIGINT);
-  EXPECT_EQ(watch.outcome().exit_code, 128 + SIGINT);
 }
 
 TEST(Run, SolvesItsStudyAloneAndNamesTheOthersThatAreUnfinished) {
@@ -255,39 +171,23 @@ TEST(Run, SolvesItsStudyAloneAndNamesTheOthersThatAreUnfinished) {
       << "nothing is paused in the database";
 }
 
-TEST(Run, GoesOnWithTheWorkersThatAreLeftAndStopsWhenNoneIs) {
-  const test::TemporaryFolder folder;
-  write_study(folder, 10'000'000);
-  test::Process program(folder, test::client_program(), run_arguments());
-  wait_until_at_work(folder, program);
-  const auto processes = test::children_of(program.pid());
-  kill(processes.at(1), SIGKILL);
-  wait_for([&] { return program.err().find("a worker (process ") != std::string::npos; });
-  EXPECT_EQ(kill(program.pid(), 0), 0);
-  kill(processes.at(2), SIGKILL);
-  const auto outcome = program.outcome();
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.err.find("no worker is left"), std::string::npos) << outcome.err;
-  expect_gone(processes);
-}
-
-TEST(Run, SharesTheMemoryForFallsAmongItsWorkers) {
-  const test::TemporaryFolder folder;
-  write_study(folder, 10'000'000);
-  auto arguments = run_arguments();
-  arguments.insert(arguments.end(), {"--fall-memory", "100000000"});
-  test::Process program(folder, test::client_program(), arguments);
-  wait_until_at_work(folder, program);
-  const pid_t worker = test::children_of(program.pid()).at(1);
-  std::ifstream words("/proc/" + std::to_string(worker) + "/cmdline");
-  for (std::string word; word != "--fall-memory";) {
-    ASSERT_TRUE(std::getline(words, word, '\0'));
+TEST(Run, GoesOnWithTheWorkersThatAreLeftAndEndsWithoutWorkersOrServer) {
+  for (const bool ends_server : {false, true}) {
+    const test::TemporaryFolder folder;
+    write_study(folder, 10'000'000);
+    test::Process program(folder, test::client_program(), run_arguments());
+    wait_until_at_work(folder, program);
+    const auto processes = test::children_of(program.pid());
+    kill(processes.at(1), SIGKILL);
+    wait_for([&] { return program.err().find("a worker (process ") != std::string::npos; });
+    EXPECT_EQ(kill(program.pid(), 0), 0);
+    kill(processes.at(ends_server ? 0 : 2), SIGKILL);
+    const auto outcome = program.outcome();
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.err,
+                HasSubstr(ends_server ? "the server was killed by signal 9" : "no worker is left"));
+    expect_gone(processes);
   }
-  std::string bytes;
-  std::getline(words, bytes, '\0');
-  EXPECT_EQ(bytes, "50000000");
-  kill(program.pid(), SIGINT);
-  program.outcome();
 }
 
 TEST(Run, SaysWhatTheServerSaidWhenItDoesNotStart) {
@@ -298,6 +198,38 @@ TEST(Run, SaysWhatTheServerSaidWhenItDoesNotStart) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("the server did not start"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("oblique.db"), std::string::npos) << outcome.err;
+}
+
+constexpr const char* kBegun = R"(name = "begun"
+[model]
+elements_per_link = 1
+[[block]]
+H = 0.9
+mu = [0.2, 0.4, 0.6]
+e = 0.8
+)";
+
+TEST(Run, OfAStudyThatAnotherSolverBeganIsNotWaitedForAndTheWaysOutAreNamed) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.path() / "begun.toml") << kBegun;
+  {
+    const Study study = parse_study(kBegun, "begun.toml", pretended_reach());
+    const auto table = std::make_shared<const protocol::PointTable>(study.recipe);
+    constexpr const char* kThen = "2024-01-01T00:00:00.000Z";
+    server::Store((folder.path() / "oblique.db").string())
+        .commit(std::vector<server::Change>{
+            server::AddStudy{1, study.name, table, kThen},
+            server::AddWorker{1, "ann", 1, "0.1", "avx2", kThen},
+            server::AddResults{1, table, 1, "0.1", "avx2", 1, kThen, {server::solved_point(0)}}});
+  }
+  const auto outcome = test::run_oblique(folder, {"run", "begun.toml"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err, HasSubstr("are of solver 0.1, and the workers here have "));
+  EXPECT_THAT(outcome.err, HasSubstr("its other 2 points"));
+  EXPECT_THAT(outcome.err, HasSubstr("--name begun-"));
+  EXPECT_THAT(test::run_oblique(folder, {"status"}).out, HasSubstr("0.1\n"))
+      << "a file says it as a server does";
 }
 
 }  // namespace

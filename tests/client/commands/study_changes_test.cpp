@@ -26,7 +26,7 @@ std::string study_text(int blocks) {
   return text;
 }
 
-class StudyCareVerbs : public testing::Test {
+class StudyChanges : public testing::Test {
  protected:
   test::Outcome ask(const std::vector<std::string>& words) {
     return test::run_oblique(folder_, words);
@@ -39,7 +39,7 @@ class StudyCareVerbs : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(StudyCareVerbs, AStudyThatIsRunAgainWithMoreBlocksIsSolvedForTheRestAlone) {
+TEST_F(StudyChanges, AStudyThatIsRunAgainWithMoreBlocksIsSolvedForTheRestAlone) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto grown = run_study(2);
   EXPECT_EQ(grown.exit_code, 0) << grown.err;
@@ -50,7 +50,7 @@ TEST_F(StudyCareVerbs, AStudyThatIsRunAgainWithMoreBlocksIsSolvedForTheRestAlone
   EXPECT_THAT(shorter.err, HasSubstr("stored 2 blocks, given 1"));
 }
 
-TEST_F(StudyCareVerbs, OfAnotherStudyUnderItsNameTheDifferenceIsShownInLines) {
+TEST_F(StudyChanges, OfAnotherStudyUnderItsNameTheDifferenceIsShownInLines) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto other = ask({"run", "--H", "1", "--mu", "0.1,0.3", "--e", "1", "--preset", "printed",
                           "--name", "friction"});
@@ -59,7 +59,7 @@ TEST_F(StudyCareVerbs, OfAnotherStudyUnderItsNameTheDifferenceIsShownInLines) {
   EXPECT_THAT(other.err, HasSubstr("\nblock 1 differs\n"));
 }
 
-TEST_F(StudyCareVerbs, AStudyGetsAnotherName) {
+TEST_F(StudyChanges, AStudyGetsAnotherName) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   EXPECT_EQ(ask({"rename", "friction", "slip"}).out, "friction is called slip now\n");
   EXPECT_EQ(ask({"query", "slip", "--select", "point", "--format", "csv"}).out, "point\n0\n1\n");
@@ -69,7 +69,7 @@ TEST_F(StudyCareVerbs, AStudyGetsAnotherName) {
   EXPECT_EQ(ask({"rename", "slip", std::string(500, 'x')}).exit_code, 2);
 }
 
-TEST_F(StudyCareVerbs, AStudyIsDescribedAsTheFileThatGivesItAgain) {
+TEST_F(StudyChanges, AStudyIsDescribedAsTheFileThatGivesItAgain) {
   ASSERT_EQ(run_study(2).exit_code, 0);
   const auto described = ask({"describe", "friction"});
   EXPECT_EQ(described.exit_code, 0) << described.err;
@@ -79,7 +79,7 @@ TEST_F(StudyCareVerbs, AStudyIsDescribedAsTheFileThatGivesItAgain) {
   EXPECT_EQ(ask({"describe", "frictoin"}).exit_code, 1);
 }
 
-TEST_F(StudyCareVerbs, AStudyIsDeletedWhenSomebodySaysYes) {
+TEST_F(StudyChanges, AStudyIsDeletedWhenSomebodySaysYes) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto asked = ask({"delete", "friction"});
   EXPECT_EQ(asked.exit_code, 2) << "nobody is there to be asked";
@@ -91,7 +91,7 @@ TEST_F(StudyCareVerbs, AStudyIsDeletedWhenSomebodySaysYes) {
   EXPECT_EQ(run_study(2).exit_code, 0) << "the name is free";
 }
 
-TEST_F(StudyCareVerbs, OfAServerThatDoesNotKnowTheStudyFailAndSayWhichIsNotThere) {
+TEST_F(StudyChanges, OfAServerThatDoesNotKnowTheStudyFailAndSayWhichIsNotThere) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     EXPECT_TRUE(request.has_status()) << "nothing is changed";
     auto reply = reply_to(request);

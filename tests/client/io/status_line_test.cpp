@@ -3,7 +3,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
-#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -127,19 +126,6 @@ TEST_F(StatusLineTest, LinesThatArePrintedStayAndAnEndedPartIsErasedAtOnce) {
   }
   line.print("result");
   EXPECT_EQ(on_screen(err_.str()), "n = 16 solved in 1.2 s\nresult\n");
-}
-
-TEST_F(StatusLineTest, DescribesNoPartThatHasEnded) {
-  StatusLine line(terminal_, kAtOnce);
-  auto ended = std::make_unique<Description>("first");
-  {
-    const auto part = line.begin(ended->describe());
-    ended->wait_until_drawn();
-  }
-  ended.reset();
-  Description second("second");
-  const auto part = line.begin(second.describe());
-  second.wait_until_drawn();
 }
 
 }  // namespace

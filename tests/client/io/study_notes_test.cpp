@@ -35,27 +35,26 @@ TEST(MeshNote, SaysInOneLineWhatThePublishedMeshCostsAndWhatPredicts) {
             "\"standard\"\n");
 }
 
-TEST(MeshNote, SaysNothingOfAMeshOfEightElementsOrMore) {
-  for (const char* model : {"", "preset = 'converged'", "elements_per_link = 8"}) {
-    EXPECT_EQ(mesh_note(model), "") << model;
+TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNotMeasured) {
+  const struct {
+    const char* model;
+    const char* axis;
+    const char* says;  // empty: nothing
+  } cases[] = {
+      {"", "", ""},
+      {"preset = 'converged'", "", ""},
+      {"elements_per_link = 8", "", ""},
+      {"preset = 'paper'", "elements_per_link = [8, 16]\n", ""},
+      {"elements_per_link = 7", "", "on 7 elements a link forces are off by up to 3"},
+      {"elements_per_link = 2", "", "durations by more than 12"},
+      {"", "elements_per_link = [16, 4]\n", "on 4 elements"},
+      {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "on 2 elements"},
+  };
+  for (const auto& [model, axis, says] : cases) {
+    const auto note = mesh_note(model, axis);
+    EXPECT_EQ(note.empty(), *says == '\0') << note;
+    EXPECT_NE(note.find(says), std::string::npos) << note;
   }
-  EXPECT_EQ(mesh_note("preset = 'paper'", "elements_per_link = [8, 16]\n"), "");
-}
-
-TEST(MeshNote, BoundsTheErrorsOfMeshesThatWereNotMeasured) {
-  EXPECT_NE(
-      mesh_note("elements_per_link = 7").find("on 7 elements a link forces are off by up to 3"),
-      std::string::npos);
-  EXPECT_NE(mesh_note("elements_per_link = 2").find("durations by more than 12"),
-            std::string::npos);
-}
-
-TEST(MeshNote, LooksAtTheCoarsestMeshOfAStudy) {
-  EXPECT_NE(mesh_note("", "elements_per_link = [16, 4]\n").find("on 4 elements"),
-            std::string::npos);
-  EXPECT_NE(
-      mesh_note("", "elements_per_link = {from = 2, to = 16, step = 2}\n").find("on 2 elements"),
-      std::string::npos);
 }
 
 const std::string kSample = "sample = { kind = 'lhs', count = 100 }\n";
