@@ -23,10 +23,5 @@ TEST(HelpText, LeavesCommandsAndLongWordsWhole) {
   EXPECT_EQ(fitted_help(help, 12, 20), help);
 }
 
-TEST(HelpText, ThatFitsIsLeftAsItIs) {
-  const std::string help = "a b\nc d\n\n  --x   y\n";
-  EXPECT_EQ(fitted_help(help, 80, 28), help);
-}
-
 }  // namespace
 }  // namespace oblique::client
