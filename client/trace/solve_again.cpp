@@ -11,6 +11,7 @@
 #include "client/service/watching.h"
 #include "client/trace/stored_row.h"
 #include "worker/solver/estimate.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
