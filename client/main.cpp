@@ -1,7 +1,12 @@
-#include "client/verbs/command_line.h"
+#include <ios>
+
+#include "client/commands/command_line.h"
+#include "client/io/console.h"
 #include "proto/frames.h"
 
 int main(int argc, char** argv) {
+  std::ios::sync_with_stdio(false);
   oblique::protocol::silence_protobuf();
-  return oblique::client::run_command_line(argc, argv);
+  auto console = oblique::client::Console::of_process();
+  return oblique::client::run_command_line(console, argc, argv);
 }

@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/output/work_line.h"
+#include "client/io/status_line.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
 
@@ -53,7 +53,7 @@ struct SolvedLevel {
 /// one. `line` shows what is under way; `after_each` is called as each level ends, from its thread,
 /// one call at a time. Throws InputError and SolveError as the solver does.
 std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels, const ContactPoint& point,
-                                      WorkLine& line,
+                                      StatusLine& line,
                                       const std::function<void(const SolvedLevel&)>& after_each);
 
 /// How values behave whose mesh or step is halved from one to the next.

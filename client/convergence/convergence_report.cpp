@@ -7,8 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/columns.h"
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 #include "proto/wire/chunk.h"
 #include "worker/solver/model/number.h"
 

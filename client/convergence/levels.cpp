@@ -25,7 +25,7 @@ bool falls_by_accuracy(const solver::ModelParameters& model) {
 }
 
 SolvedLevel solved_level(const Level& level, const ContactPoint& point, solver::FallCache& falls,
-                         WorkLine& line) {
+                         StatusLine& line) {
   const auto started = Clock::now();
   solver::FallOutcome fall;
   {
@@ -95,7 +95,7 @@ std::optional<Level> exact_fall_level(const Level& level) {
 }
 
 std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels, const ContactPoint& point,
-                                      WorkLine& line,
+                                      StatusLine& line,
                                       const std::function<void(const SolvedLevel&)>& after_each) {
   solver::FallCache falls;
   std::mutex reporting;

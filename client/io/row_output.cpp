@@ -1,11 +1,15 @@
 #include "client/io/row_output.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
+
+#include "client/io/console.h"
 
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
@@ -72,7 +76,7 @@ std::string text_of(const std::vector<protocol::QueryReply>& chunks,
 
 RowOutput::RowOutput(OutputSettings settings) {
   if (settings.file.empty()) {
-    const TerminalSize terminal = terminal_size();
+    const TerminalSize terminal = terminal_size(STDOUT_FILENO);
     if (terminal.lines > 0) {
       settings.width = terminal.columns;
       settings.first_rows = terminal.lines;

@@ -69,6 +69,9 @@ class RowPrinter {
 std::unique_ptr<RowPrinter> make_printer(const OutputSettings& settings);
 std::unique_ptr<RowPrinter> make_table_printer(const OutputSettings& settings);
 
+/// Number of characters of a UTF-8 text.
+std::size_t width_of(std::string_view text);
+
 /// A whole answer as text; of the settings those for `make_printer` matter.
 std::string text_of(const std::vector<protocol::QueryReply>& chunks,
                     const OutputSettings& settings);

@@ -1,7 +1,6 @@
 #include "client/io/sink.h"
 
 #include <fcntl.h>
-#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -18,6 +17,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/io/console.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -32,8 +32,8 @@ constexpr const char* kName = "standard output";
 /// Empty: no pager is wanted.
 std::string pager_command() {
   for (const char* name : {"OBLIQUE_PAGER", "PAGER"}) {
-    if (const char* command = std::getenv(name); command != nullptr) {
-      return std::string_view(command) == "cat" ? std::string() : std::string(command);
+    if (const auto command = environment_variable(name)) {
+      return *command == "cat" ? std::string() : *command;
     }
   }
   return "less -FRSX";
@@ -104,18 +104,6 @@ void write_all(int descriptor, std::string_view bytes, const std::string& name) 
   }
 }
 
-TerminalSize terminal_size() {
-  constexpr TerminalSize kUsual{80, 24};
-  if (isatty(STDOUT_FILENO) != 1) {
-    return {};
-  }
-  struct winsize size {};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) {
-    return kUsual;
-  }
-  return {size.ws_col, size.ws_row};
-}
-
 StandardOutput::StandardOutput(bool may_page)
     : is_terminal_(isatty(STDOUT_FILENO) == 1),
       pager_command_(may_page && is_terminal_ ? pager_command() : std::string()) {
@@ -138,7 +126,7 @@ void StandardOutput::append(std::string_view bytes) {
   }
   first_screen_ += text;
   const auto lines = std::count(first_screen_.begin(), first_screen_.end(), '\n');
-  if (static_cast<std::size_t>(lines) + 1 >= terminal_size().lines) {
+  if (static_cast<std::size_t>(lines) + 1 >= terminal_size(STDOUT_FILENO).lines) {
     start_pager();
     write_all(to_pager_.number(), std::exchange(first_screen_, {}), kName);
   }

@@ -33,13 +33,6 @@ class Sink {
 /// Writes all bytes to a descriptor, called `name` in errors. Throws as Sink::append.
 void write_all(int descriptor, std::string_view bytes, const std::string& name);
 
-/// Columns and lines of the terminal that is standard output; 0 where it is none.
-struct TerminalSize {
-  std::size_t columns = 0;
-  std::size_t lines = 0;
-};
-TerminalSize terminal_size();
-
 /// Standard output, after what std::cout was given. On a terminal control characters are made
 /// visible (proto/text.h) and, with `may_page`, text longer than the screen goes through a pager:
 /// $OBLIQUE_PAGER, else $PAGER, else `less -FRSX`; none where that is empty or `cat`. `finish` and

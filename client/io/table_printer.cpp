@@ -27,12 +27,6 @@ constexpr std::size_t kShortestText = 12;
 /// Nor are sentences wrapped into less.
 constexpr std::size_t kNarrowestSentence = 16;
 
-std::size_t width_of(std::string_view text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char byte) {
-    return (static_cast<unsigned char>(byte) & 0xc0U) != 0x80U;  // the first of a character
-  }));
-}
-
 /// A value on one line: six digits, NULL as a dash.
 std::string table_cell(const Cell& cell, double per_unit) {
   switch (cell.kind) {
@@ -322,6 +316,12 @@ void TablePrinter::end(std::string& out) {
 
 std::unique_ptr<RowPrinter> make_table_printer(const OutputSettings& settings) {
   return std::make_unique<TablePrinter>(settings);
+}
+
+std::size_t width_of(std::string_view text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char byte) {
+    return (static_cast<unsigned char>(byte) & 0xc0U) != 0x80U;  // the first of a character
+  }));
 }
 
 }  // namespace oblique::client

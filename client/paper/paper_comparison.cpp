@@ -11,7 +11,7 @@
 #include <toml++/toml.h>
 #include <nlohmann/json.hpp>
 
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 #include "client/paper/published_toml.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/reference/contact_record.h"

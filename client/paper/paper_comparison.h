@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 #include "proto/oblique.pb.h"
 #include "proto/wire/chunk.h"
 #include "worker/solver/model/case_result.h"

@@ -8,7 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "proto/wire/chunk.h"
 
 namespace oblique::client::plot {
@@ -91,7 +91,7 @@ Answer read_columns(RowStream& stream) {
       throw std::runtime_error(
           fmt::format("a picture is made of at most {} points, and these are more: take fewer by "
                       "--where or --at",
-                      shown_count(kMostRows)));
+                      format_count(kMostRows)));
     }
     ends = chunk.ends();
   }

@@ -12,7 +12,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/figure.h"
 #include "client/plot/picture_file.h"
 #include "proto/text.h"
@@ -115,7 +115,7 @@ std::vector<Kind> kinds_of(const Cells& cells) {
   }
   const auto add_gap = [&](CellState state, Kind kind) {
     kind.count = cells.count(state);
-    kind.text += fmt::format(" ({})", shown_count(kind.count));
+    kind.text += fmt::format(" ({})", format_count(kind.count));
     kinds.push_back(std::move(kind));
   };
   add_gap(CellState::kNoResult, {0xffffff, 5, "#9aa3ad", '/', "no result", 0});

@@ -15,6 +15,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/io/child_process.h"
+#include "client/io/console.h"
 #include "client/io/row_output.h"
 #include "client/io/sink.h"
 #include "proto/text.h"
@@ -195,10 +196,9 @@ std::string csv_of(const Figure& figure) {
 }
 
 std::string text_of(const Figure& figure) {
-  const TerminalSize terminal = terminal_size();
+  const TerminalSize terminal = terminal_size(STDOUT_FILENO);
   const bool is_terminal = terminal.lines > 0;
-  const char* no_colour = std::getenv("NO_COLOR");
-  const bool has_colours = is_terminal && (no_colour == nullptr || *no_colour == '\0');
+  const bool has_colours = may_colour(STDOUT_FILENO);
   const std::size_t columns = is_terminal ? std::clamp<std::size_t>(terminal.columns, 40, 200) : 80;
   std::size_t lines = is_terminal ? std::clamp<std::size_t>(terminal.lines - 1, 20, 60) : 30;
   if (figure.panels.size() > 1) {

@@ -8,8 +8,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/io/format_units.h"
 #include "client/io/row_output.h"
-#include "client/output/human_units.h"
 #include "client/plot/figure.h"
 #include "client/plot/gathered.h"
 #include "client/plot/plot_request.h"
@@ -37,7 +37,7 @@ bool is_drawable(double value, bool is_logarithmic) {
 }
 
 std::string counted(std::uint64_t count, const std::string& noun) {
-  return count == 1 ? "1 " + noun : shown_count(count) + " " + noun + "s";
+  return count == 1 ? "1 " + noun : format_count(count) + " " + noun + "s";
 }
 
 /// The categories by their points, largest first, with those that have next to none as one.
@@ -61,7 +61,7 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   if (kept + 1 >= categories.size()) {  // a single one has its own name
     return categories;
   }
-  Category other{.name = fmt::format("{} other {}", shown_count(categories.size() - kept), plural),
+  Category other{.name = fmt::format("{} other {}", format_count(categories.size() - kept), plural),
                  .is_other = true};
   for (std::size_t i = kept; i < categories.size(); ++i) {
     other.points += categories[i].points;
@@ -343,7 +343,7 @@ class FigureBuilder {
     }
     if (!cells.categories.empty() && cells.categories.back().is_other) {
       note(fmt::format("The {} {} with the most points are named; --format csv has all {}.",
-                       cells.categories.size() - 1, plural, shown_count(points.size())));
+                       cells.categories.size() - 1, plural, format_count(points.size())));
     }
   }
 
@@ -389,7 +389,7 @@ class FigureBuilder {
     }
     if (gathered.most_in_a_cell > 1) {
       note(fmt::format("Cells hold up to {} points and show {}.",
-                       shown_count(gathered.most_in_a_cell),
+                       format_count(gathered.most_in_a_cell),
                        cells.names.empty() ? "their mean"
                                            : "what most of these have; percentages count points"));
     }
@@ -472,7 +472,7 @@ class FigureBuilder {
     }
     if (gathered.most_at_a_place > 1) {
       note(fmt::format("Where up to {} points share a place, their mean is drawn.",
-                       shown_count(gathered.most_at_a_place)));
+                       format_count(gathered.most_at_a_place)));
     }
     add_titles(answer[1].name, answer[0].numbers.size());
   }
@@ -509,8 +509,8 @@ class FigureBuilder {
       missing += is_drawn ? 0U : 1U;
     }
     if (missing > 0) {
-      note(fmt::format("{} of {} points lack a value that can be drawn.", shown_count(missing),
-                       shown_count(points)));
+      note(fmt::format("{} of {} points lack a value that can be drawn.", format_count(missing),
+                       format_count(points)));
     }
     if (missing == points) {
       note_empty("no point has both values");
@@ -529,8 +529,8 @@ class FigureBuilder {
       answer.resize(3, answer[0]);
       auto gathered = gather_scattered(answer, 130);
       Cells& cells = gathered.cells;
-      note(fmt::format("{} points, gathered in {} x {} cells; colours are {}.", shown_count(points),
-                       cells.columns(), cells.rows(),
+      note(fmt::format("{} points, gathered in {} x {} cells; colours are {}.",
+                       format_count(points), cells.columns(), cells.rows(),
                        has_colour ? "means of their points" : "the number of their points"));
       for (std::size_t i = 0; !has_colour && i < cells.values.size(); ++i) {
         cells.values[i] = static_cast<double>(gathered.counts[i]);
@@ -580,7 +580,7 @@ class FigureBuilder {
     (answer[0].has_texts() ? panel_.x : panel_.y) = points_axis;
     if (const auto counted_points = static_cast<std::size_t>(drawn); counted_points < points) {
       note(fmt::format("{} of {} points have no value, or one outside the axis.",
-                       shown_count(points - counted_points), shown_count(points)));
+                       format_count(points - counted_points), format_count(points)));
     }
     if (drawn == 0.0) {
       note_empty("no point has a value");

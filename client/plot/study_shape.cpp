@@ -8,7 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/human_units.h"
+#include "client/io/format_units.h"
 #include "client/plot/figure.h"
 #include "proto/recipe/blocks.h"
 #include "proto/text.h"
@@ -144,7 +144,7 @@ std::optional<std::size_t> block_named(const std::string& text, std::size_t bloc
 std::string values_in_words(const StudyAxis& axis) {
   const auto& values = axis.values;
   if (values.size() > 8) {
-    return fmt::format("{} values from {} to {}", shown_count(values.size()),
+    return fmt::format("{} values from {} to {}", format_count(values.size()),
                        readable_number(values.front()), readable_number(values.back()));
   }
   std::vector<std::string> texts;

@@ -3,15 +3,16 @@
 #include <poll.h>
 #include <stdlib.h>
 #include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <iostream>
 #include <stdexcept>
+#include <string>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -19,8 +20,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "client/output/human_units.h"
-#include "client/output/mesh_note.h"
+#include "client/io/format_units.h"
+#include "client/io/study_notes.h"
 #include "client/service/connection.h"
 #include "client/service/watching.h"
 #include "proto/study_counts.h"
@@ -106,15 +107,15 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
       "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
       "solve its other {3} points. Go on with workers of {1}, or under another name, as --name "
       "{0}-{2}",
-      status.name(), status.solver_version(), own, shown_count(protocol::open_points(status)));
+      status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
 }
 
-RunEnd submit_and_wait(const Study& study, const RunSettings& settings, EmbeddedService& service,
-                       protocol::StopSignals& stop) {
+RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& settings,
+                       EmbeddedService& service, protocol::StopSignals& stop) {
   const auto keep_waiting = [&] {
     service.check();
     if (const auto news = service.news(); !news.empty()) {
-      std::cerr << protocol::visible_lines(news) << '\n';
+      console.notes() << protocol::visible_lines(news) << '\n';
     }
     return !stop.requested();
   };
@@ -125,13 +126,14 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
   Connection connection(where, keep_waiting);
   const auto submitted = connection.submit(study, {.no_reuse = settings.no_reuse});
   if (submitted.created()) {
-    tell_mesh(std::cerr, study.recipe);
+    note_coarse_mesh(console.notes(), study.recipe);
   } else {
-    std::cerr << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
-                             shown_count(submitted.settled()), shown_count(submitted.points()));
+    console.notes() << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
+                                   format_count(submitted.settled()),
+                                   format_count(submitted.points()));
   }
   if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
-    std::cerr << fmt::format("\"{}\": {}\n", study.name, taken);
+    console.notes() << fmt::format("\"{}\": {}\n", study.name, taken);
   }
   const auto ask = [&](const Tell& tell) {
     keep_waiting();
@@ -142,13 +144,14 @@ RunEnd submit_and_wait(const Study& study, const RunSettings& settings, Embedded
     return status;
   };
   RunEnd end;
-  end.status = watch_study(ask, stop);
+  end.status = watch_study(console, ask, stop);
   if (stop.requested()) {
     throw Interrupted("stopped");
   }
-  const auto query = [&](const std::string& sql) { return connection.query(sql, tell_line); };
-  end.rows = connection.chunks(first_results(study.name, settings.rows), tell_line);
-  end.exit_code = tell_end(end.status, query);
+  const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
+  const auto query = [&](const std::string& sql) { return connection.query(sql, tell); };
+  end.rows = connection.chunks(first_results(study.name, settings.rows), tell);
+  end.exit_code = tell_end(console, end.status, query);
   return end;
 }
 
@@ -285,7 +288,7 @@ void check_settings(const RunSettings& settings) {
   }
   if (settings.rows < 0) {
     throw solver::InputError(
-        fmt::format("--rows {} is not allowed: it must be >= 0", settings.rows));
+        fmt::format("--limit {} is not allowed: it must be >= 0", settings.rows));
   }
 }
 
@@ -303,18 +306,18 @@ void add_worker_flags(CLI::App& verb, RunSettings& settings) {
   verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
+std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop) {
   check_settings(settings);
   try {
     ServiceSettings how = settings.service;
     how.only_study = study.name;
     EmbeddedService service(how, stop);
-    auto end = submit_and_wait(study, settings, service, stop);
+    auto end = submit_and_wait(console, study, settings, service, stop);
     service.stop();
     return end;
   } catch (const Interrupted&) {
-    std::cerr << fmt::format(
+    console.notes() << fmt::format(
         "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
         study.name, settings.service.database.string());
     return std::nullopt;

@@ -11,6 +11,9 @@
 #include <CLI/CLI.hpp>
 
 #include "client/io/child_process.h"
+#include "client/io/console.h"
+#include "client/service/connection.h"
+#include "client/service/run_service.h"
 #include "client/service/source.h"
 #include "client/study/study.h"
 #include "proto/keys/key_file.h"
@@ -114,7 +117,7 @@ struct RunEnd {
 /// Starts server and workers here, submits the study, shows its progress and waits for its end;
 /// nothing is left running. When `stop` is requested, prints how to continue and returns nothing.
 /// Throws ProcessError when server or workers end too soon, ServerError when the study is refused.
-std::optional<RunEnd> run_study(const Study& study, const RunSettings& settings,
+std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop);
 
 }  // namespace oblique::client

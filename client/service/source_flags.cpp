@@ -4,12 +4,10 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
-#include <iostream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/output/speech.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -19,14 +17,9 @@ namespace {
 constexpr const char* kServerVariable = "OBLIQUE_SERVER";
 constexpr const char* kKeysVariable = "OBLIQUE_KEYS";
 
-std::string from_environment(const char* variable) {
-  const char* value = std::getenv(variable);
-  return value == nullptr ? std::string() : std::string(value);
-}
-
 /// The server that a flag or the environment names; empty: none.
 std::string server_named(const SourceFlags& flags) {
-  return flags.server.empty() ? from_environment(kServerVariable) : flags.server;
+  return flags.server.empty() ? environment_variable(kServerVariable).value_or("") : flags.server;
 }
 
 std::string seconds(std::int64_t milliseconds) {
@@ -69,6 +62,7 @@ void add_source_flags(CLI::App& verb, SourceFlags& flags) {
                                                "server is named: {} when it is in this folder",
                                                DatabaseSettings().file));
   database->type_name("FILE");
+  flags.may_be_file = true;
   add_server_flags(verb, flags);
   verb.get_option("--timeout")
       ->description(fmt::format(
@@ -84,16 +78,21 @@ void add_database_argument(CLI::App& verb, std::filesystem::path& file) {
       ->capture_default_str();
 }
 
-ConnectionSettings connection_settings(const SourceFlags& flags) {
+ConnectionSettings connection_settings(Console& console, const SourceFlags& flags) {
   ConnectionSettings settings;
   settings.timeout_ms = timeout_of(flags, settings.timeout_ms);
   if (const std::string server = server_named(flags); !server.empty()) {
     settings.server_url = server;
+  } else if (flags.may_be_file) {
+    settings.if_silent = fmt::format(
+        "there is no database {} in this folder, and no server at that address. Name a database "
+        "with --db FILE, or a server with --server URL",
+        DatabaseSettings().file);
   }
-  const std::string keys = flags.keys.empty() ? from_environment(kKeysVariable) : flags.keys;
-  tell_detail(std::cerr,
-              fmt::format("asks the server at {}{}", settings.server_url,
-                          keys.empty() ? std::string() : fmt::format(" with the key {}", keys)));
+  const std::string keys =
+      flags.keys.empty() ? environment_variable(kKeysVariable).value_or("") : flags.keys;
+  console.detail(fmt::format("asks the server at {}{}", settings.server_url,
+                             keys.empty() ? "" : fmt::format(" with the key {}", keys)));
   if (!keys.empty()) {
     settings.key = protocol::read_key_file(keys);
   }
@@ -106,14 +105,14 @@ std::string database_meant(const SourceFlags& flags) {
   return flags.database.empty() && is_default ? file : flags.database;
 }
 
-std::unique_ptr<Source> open_source(const SourceFlags& flags,
+std::unique_ptr<Source> open_source(Console& console, const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting) {
   const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
   if (const std::string database = database_meant(flags); !database.empty()) {
-    tell_detail(std::cerr, fmt::format("reads the database {} itself", database));
+    console.detail(fmt::format("reads the database {} itself", database));
     return open_database(database, database_timeout_ms);
   }
-  return std::make_unique<Connection>(connection_settings(flags), std::move(keep_waiting));
+  return std::make_unique<Connection>(connection_settings(console, flags), std::move(keep_waiting));
 }
 
 }  // namespace oblique::client

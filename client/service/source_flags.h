@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "client/io/console.h"
 #include "client/service/connection.h"
 #include "client/service/source.h"
 
@@ -18,6 +19,7 @@ struct SourceFlags {
   std::string server;               ///< empty: not given
   std::optional<double> timeout_s;  ///< none: the default of what answers
   std::string keys = {};            ///< file; empty: not given
+  bool may_be_file = false;         ///< the command has --db
 };
 
 /// Adds --server, --keys and --timeout. `flags` must live as long as `verb`.
@@ -31,7 +33,7 @@ void add_database_argument(CLI::App& verb, std::filesystem::path& file);
 /// The server that the flags name, else OBLIQUE_SERVER, else the default; and the key of the file
 /// that they name, else OBLIQUE_KEYS, else none. Throws solver::InputError for a timeout that is
 /// not positive and a key file that cannot be used.
-ConnectionSettings connection_settings(const SourceFlags& flags);
+ConnectionSettings connection_settings(Console& console, const SourceFlags& flags);
 
 /// The database that the flags name: --db, or oblique.db when it is in this folder and no server is
 /// named; empty: a server is meant.
@@ -39,7 +41,7 @@ std::string database_meant(const SourceFlags& flags);
 
 /// Opens the database of `database_meant`, else the server of `connection_settings`, whose answers
 /// `keep_waiting` may end the wait for; see Connection.
-std::unique_ptr<Source> open_source(const SourceFlags& flags,
+std::unique_ptr<Source> open_source(Console& console, const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting = {});
 
 }  // namespace oblique::client

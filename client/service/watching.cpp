@@ -1,18 +1,15 @@
 #include "client/service/watching.h"
 
+#include <spdlog/fmt/fmt.h>
 #include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <stdexcept>
 #include <variant>
-
-#include <spdlog/fmt/fmt.h>
-
-#include "client/output/human_units.h"
-#include "client/output/printer.h"
-#include "client/output/progress.h"
-#include "client/output/speech.h"
-#include "client/output/terminal.h"
+#include "client/io/console.h"
+#include "client/io/format_units.h"
+#include "client/io/progress.h"
+#include "client/io/tables.h"
 #include "proto/program/usage.h"
 #include "proto/study_counts.h"
 #include "proto/text.h"
@@ -31,18 +28,19 @@ Seconds pause_after(Seconds elapsed) {
   return std::clamp(elapsed / 40, kShortest, kLongest);
 }
 
-void tell_failures(const protocol::StudyStatus& status,
+void tell_failures(Console& console, const protocol::StudyStatus& status,
                    const std::function<protocol::Table(const std::string&)>& query) {
-  std::cerr << fmt::format("{} of {} points failed:\n", shown_count(status.failed()),
-                           shown_count(status.points()));
+  console.errors() << fmt::format("{} of {} points failed:\n", format_count(status.failed()),
+                                  format_count(status.points()));
   const auto reasons = query(fmt::format(
       "SELECT error, count(*), min(point) FROM runs WHERE study = {} AND status = 'failed' "
       "GROUP BY error ORDER BY count(*) DESC LIMIT 10",
       server::sql_text(status.name())));
   for (const auto& row : reasons.rows) {
-    tell_line(fmt::format("  {} x {} (first at point {})",
-                          shown_count(static_cast<std::uint64_t>(std::get<std::int64_t>(row[1]))),
-                          std::get<std::string>(row[0]), std::get<std::int64_t>(row[2])));
+    console.errors() << fmt::format(
+        "  {} x {} (first at point {})\n",
+        format_count(static_cast<std::uint64_t>(std::get<std::int64_t>(row[1]))),
+        protocol::visible(std::get<std::string>(row[0])), std::get<std::int64_t>(row[2]));
   }
 }
 
@@ -60,15 +58,12 @@ std::string WaitMessages::update(const protocol::StudyStatus& status, Seconds el
   return reason_.empty() ? "The study goes on." : fmt::format("The study waits for {}.", reason_);
 }
 
-void tell_line(const std::string& sentence) {
-  std::cerr << protocol::visible(sentence) << '\n';
-}
-
-protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop) {
-  Progress progress(std::cerr, draws_on_terminal(), terminal_columns);
-  const Tell tell = [&progress](const std::string& sentence) {
+protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
+                                  protocol::StopSignals& stop) {
+  Progress progress(console);
+  const Tell tell = [&progress, &console](const std::string& sentence) {
     progress.finish();
-    tell_line(sentence);
+    console.note(sentence);
   };
   const auto start = Clock::now();
   WaitMessages messages;
@@ -78,7 +73,7 @@ protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& s
     const std::uint64_t completed = protocol::completed_points(status);
     progress.update({.study = status.name(),
                      .points = status.points(),
-                     .settled = completed,
+                     .completed = completed,
                      .failed = status.failed(),
                      .left_out = status.left_out(),
                      .elapsed_s = elapsed.count()});
@@ -104,22 +99,21 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
   return found.front();
 }
 
-int tell_end(const protocol::StudyStatus& status,
+int tell_end(Console& console, const protocol::StudyStatus& status,
              const std::function<protocol::Table(const std::string&)>& query) {
-  const ErrorOn error(std::cerr);
   if (status.failed() > 0) {
-    tell_failures(status, query);
+    tell_failures(console, status, query);
   }
   if (status.state() == "cancelled") {
-    std::cerr << "The study is cancelled; oblique resume goes on with it.\n";
+    console.errors() << "The study is cancelled; oblique resume goes on with it.\n";
   }
   return status.solved() + status.left_out() == status.points() ? protocol::kDone
                                                                 : protocol::kFailed;
 }
 
-void tell_if_insecure(const std::string& access, const std::string& place) {
+void tell_if_insecure(Console& console, const std::string& access, const std::string& place) {
   if (access == "insecure") {
-    tell_line(fmt::format(
+    console.note(fmt::format(
         "INSECURE: {} runs with --insecure: whoever reaches it can use it, and nothing is "
         "encrypted.",
         place));
@@ -130,17 +124,17 @@ std::string taken_over(const protocol::TakenOver& taken) {
   if (taken.points() == 0 && !taken.cut_short()) {
     return {};
   }
-  std::string text = fmt::format("{} {} taken over{}", shown_count(taken.points()),
+  std::string text = fmt::format("{} {} taken over{}", format_count(taken.points()),
                                  taken.points() == 1 ? "point is" : "points are",
                                  taken.under_way() ? " so far" : "");
   std::uint64_t named = 0;
   for (int i = 0; i < taken.from_size(); ++i) {
     named += taken.from(i).points();
-    text += fmt::format("{} {} of {}", i == 0 ? ":" : ",", shown_count(taken.from(i).points()),
+    text += fmt::format("{} {} of {}", i == 0 ? ":" : ",", format_count(taken.from(i).points()),
                         protocol::visible(taken.from(i).study()));
   }
   if (named < taken.points()) {
-    text += fmt::format(", {} of others", shown_count(taken.points() - named));
+    text += fmt::format(", {} of others", format_count(taken.points() - named));
   }
   if (taken.cut_short()) {
     text += "; to look for more would have taken too long";

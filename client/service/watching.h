@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "client/io/console.h"
 #include "client/service/source.h"
 #include "proto/oblique.pb.h"
 #include "proto/program/process.h"
@@ -36,10 +37,8 @@ using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
 
 /// Shows the status of a study on standard error, with what it waits for, until it no longer runs
 /// or `stop` is requested. Throws what `ask` throws. Returns the last status.
-protocol::StudyStatus watch_study(const AskStatus& ask, protocol::StopSignals& stop);
-
-/// Writes one line to standard error, with control characters made visible.
-void tell_line(const std::string& sentence);
+protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
+                                  protocol::StopSignals& stop);
 
 /// The study of that name. Throws std::runtime_error where there is none. Given a `tell`, waits for
 /// a server that is away.
@@ -47,11 +46,11 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
 
 /// Prints failed points with their reasons, or that the study was cancelled, to standard error.
 /// Returns the exit code: kDone when every point is solved.
-int tell_end(const protocol::StudyStatus& status,
+int tell_end(Console& console, const protocol::StudyStatus& status,
              const std::function<protocol::Table(const std::string&)>& query);
 
 /// Warns on standard error when the server at `place` is insecure, as StatusReply.access says.
-void tell_if_insecure(const std::string& access, const std::string& place);
+void tell_if_insecure(Console& console, const std::string& access, const std::string& place);
 
 /// "12 points are taken over: 7 of a, 5 of b", or an empty text.
 std::string taken_over(const protocol::TakenOver& taken);

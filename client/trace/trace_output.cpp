@@ -3,13 +3,43 @@
 #include <unistd.h>
 
 #include <utility>
+#include <variant>
 
 #include <nlohmann/json.hpp>
 
-#include "client/output/case_report.h"
-#include "client/output/trace_table.h"
+#include "client/io/case_report.h"
+#include "client/io/row_output.h"
+#include "client/io/sink.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
+
+namespace {
+
+/// One line of CSV for each instant.
+void append_csv_row(std::string& text, const solver::TraceRow& row) {
+  std::string_view separator;
+  const auto put = [&](double value) {
+    text.append(separator);
+    append_number(text, value);
+    separator = ",";
+  };
+  for (const auto& column : solver::trace_columns()) {
+    if (const auto* number = std::get_if<double solver::TraceRow::*>(&column.value)) {
+      put(row.*(*number));
+    } else if (const auto* vectors = std::get_if<solver::TraceVectors>(&column.value)) {
+      for (const double value : row.*(vectors->values)) {
+        put(value);
+      }
+    } else {
+      text.append(separator).append(row.*std::get<std::string solver::TraceRow::*>(column.value));
+    }
+  }
+  text += '\n';
+}
+
+}  // namespace
 
 TraceOutput::TraceOutput(const std::string& file, Format format, std::string_view flag)
     : format_(format), fills_terminal_(file.empty() && isatty(STDOUT_FILENO) == 1) {
@@ -23,14 +53,14 @@ TraceOutput::TraceOutput(const std::string& file, Format format, std::string_vie
 void TraceOutput::begin(const solver::TraceShape& shape) {
   shape_ = shape;
   if (format_ == Format::kCsv) {
-    append_trace_header(text_, shape);
+    text_ += fmt::format("{}\n", fmt::join(solver::trace_headings(shape), ","));
   }
 }
 
 void TraceOutput::add(const solver::TraceRow& row) {
   constexpr std::size_t kLong = std::size_t{64} << 10U;
   if (format_ == Format::kCsv) {
-    append_trace_row(text_, row);
+    append_csv_row(text_, row);
     if (text_.size() >= kLong) {
       sink_->append(std::exchange(text_, {}));
     }

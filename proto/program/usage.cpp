@@ -128,14 +128,14 @@ std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::P
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_verb = has_verbs(verb) && !first.starts_with("-");
-    return std::string(is_verb ? "unknown verb" : "unexpected") + " `" + excerpt(first) + "`" +
+    return std::string(is_verb ? "unknown command" : "unexpected") + " `" + excerpt(first) + "`" +
            did_you_mean(first.substr(0, first.find('=')), candidates);
   }
   if (has_verbs(verb) && verb.get_subcommands().empty() && error.get_name() == "RequiredError") {
     std::vector<std::string_view> verbs;
     std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(verbs),
                  [](std::string_view word) { return !word.starts_with("-"); });
-    return "a verb is required; there are " + joined(verbs);
+    return "a command is required; there are " + joined(verbs);
   }
   const std::string message = error.what();
   if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {

@@ -31,7 +31,7 @@ def run_s(program, points, falls, workers):
                          f'sample = {{ kind = "lhs", count = {points}, seed = 1 }}\n{axes}')
         began = time.monotonic()
         subprocess.run([program, "run", study, "--db", pathlib.Path(folder, "sample.db"), "--workers", str(workers),
-                        "--rows", "0"], check=True, capture_output=True)
+                        "--limit", "0"], check=True, capture_output=True)
         return time.monotonic() - began
 
 

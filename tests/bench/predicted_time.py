@@ -30,7 +30,7 @@ def main(programs, names):
             check = subprocess.run([oblique, "study", "check", "--json", *CASES[name]],
                                    check=True, capture_output=True, text=True, cwd=folder)
             begun = time.perf_counter()
-            subprocess.run([oblique, "run", "--rows", "0", *CASES[name]],
+            subprocess.run([oblique, "run", "--limit", "0", *CASES[name]],
                            check=True, capture_output=True, cwd=folder)
             measured = time.perf_counter() - begun
         said = json.loads(check.stdout)

@@ -18,8 +18,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/convergence/convergence.h"
-#include "client/output/columns.h"
-#include "client/output/printer.h"
+#include "client/io/tables.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"

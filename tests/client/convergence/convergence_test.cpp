@@ -326,7 +326,8 @@ TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
   solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 2;
   std::ostringstream shown;
-  WorkLine line(shown);
+  Console console(shown, shown);
+  StatusLine line(console);
   const auto refinement = refinement_of(
       "step",
       solve_levels(step_levels(model, 1.0, 2), {1.0, 0.4, 1.0}, line, [](const SolvedLevel&) {}));

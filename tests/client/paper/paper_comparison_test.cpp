@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "client/io/tables.h"
 #include "client/study/study_file.h"
-#include "client/verbs/tip_reach.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/parameters.h"
 

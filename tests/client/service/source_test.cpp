@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -51,11 +52,12 @@ class SourceTest : public ::testing::Test {
     store.commit(changes);
   }
 
+  std::unique_ptr<Source> open(const SourceFlags& flags) { return open_source(console_, flags); }
   /// Where the one study comes from that a source names: a file's is called after it.
-  static std::string study_of(const SourceFlags& flags) {
-    return open_source(flags)->status({}).at(0).name();
-  }
+  std::string study_of(const SourceFlags& flags) { return open(flags)->status({}).at(0).name(); }
 
+  std::ostringstream err_;
+  Console console_{err_, err_};
   oblique::test::TemporaryFolder folder_;
   std::filesystem::path before_ = std::filesystem::current_path();
   ScriptedServer named_{answer("named")};
@@ -84,15 +86,15 @@ TEST_F(SourceTest, IsWhatIsNamedThenTheServerOfTheEnvironmentThenTheFileInThisFo
 }
 
 TEST_F(SourceTest, IsTheServerAtItsDefaultAddressWhenThereIsNoFileEither) {
-  EXPECT_EQ(open_source({})->place(), ConnectionSettings().server_url);
+  EXPECT_EQ(open({})->place(), ConnectionSettings().server_url);
 }
 
 TEST_F(SourceTest, SaysOfAFileThatNobodyWorksOnItUnlessAServerHasIt) {
   make_database("oblique.db", "default");
-  EXPECT_EQ(open_source({})->status("default").at(0).waits_for(),
+  EXPECT_EQ(open({})->status("default").at(0).waits_for(),
             "a server: nobody is at work on oblique.db");
   const server::Store at_work("oblique.db");
-  EXPECT_EQ(open_source({})->status("default").at(0).waits_for(), "");
+  EXPECT_EQ(open({})->status("default").at(0).waits_for(), "");
 }
 
 TEST_F(SourceTest, KeepsNoServerFromItsFileByLookingAtIt) {
@@ -112,15 +114,15 @@ TEST_F(SourceTest, KeepsNoServerFromItsFileByLookingAtIt) {
 
 TEST_F(SourceTest, CallsAWrongStatementWrongUsageWhereverItIsAsked) {
   make_database("oblique.db", "default");
-  EXPECT_THROW(open_source({})->query("SELEC 1"), solver::InputError);
-  EXPECT_THROW(open_source({})->query("DELETE FROM results"), solver::InputError);
+  EXPECT_THROW(open({})->query("SELEC 1"), solver::InputError);
+  EXPECT_THROW(open({})->query("DELETE FROM results"), solver::InputError);
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     reply.mutable_error()->set_message("the statement is wrong");
     reply.mutable_error()->set_wrong_request(request.query().sql() == "SELEC 1");
     return std::vector{protocol::encode(reply)};
   });
-  const auto source = open_source({.database = {}, .server = server.url(), .timeout_s = {}});
+  const auto source = open({.database = {}, .server = server.url(), .timeout_s = {}});
   EXPECT_THROW(source->query("SELEC 1"), solver::InputError);
   EXPECT_THROW(source->query("SELECT 1"), ServerError);
 }

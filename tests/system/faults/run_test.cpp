@@ -103,7 +103,8 @@ TEST_F(RunTest, ASecondRunOnADatabaseInUseIsRefusedAndTheFirstGoesOn) {
   started_by(first);
   Process second(folder_, client_program(), arguments());
   EXPECT_EQ(second.wait(), 1);
-  EXPECT_NE(second.err().find("already uses the database"), std::string::npos) << second.err();
+  EXPECT_NE(second.err().find("is in use by `oblique run` (process "), std::string::npos)
+      << second.err();
   EXPECT_EQ(first.wait(), 0) << first.err();
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);
 }

@@ -226,7 +226,7 @@ TEST_F(KeysTest, WhoSubmitsAgainIsToldTheNewPriorityAndHowToSeeMore) {
   const auto worker = worker_with(key("worker"));
   EXPECT_THAT(ask(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
   auto again = kFewPoints;
-  again.insert(again.end(), {"--priority", "5", "--rows", "2"});
+  again.insert(again.end(), {"--priority", "5", "--limit", "2"});
   const Outcome outcome = ask(again, key("client"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("its priority is now 5"));

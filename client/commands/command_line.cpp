@@ -1,0 +1,244 @@
+#include "client/commands/command_line.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <exception>
+#include <map>
+#include <optional>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/commands/commands.h"
+#include "client/io/format_units.h"
+#include "client/io/sink.h"
+#include "proto/program/origin/origin.h"
+#include "proto/program/usage.h"
+#include "server/query/columns.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+/// Column of the descriptions of flags and commands.
+constexpr std::size_t kHelpColumn = 28;
+
+constexpr const char* kExamples = R"(Examples:
+  oblique solve --H 1 --mu 0.4 --e 1               one impact, here and now
+  oblique run deploy/studies/paper.toml            a study, solved here
+  oblique query paper --where "mu > 0.5"           its results
+  oblique COMMAND --help                           flags and examples of a command
+
+Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its number, 130 for Ctrl-C.)";
+
+/// How far the rest of a line that is too long is indented; empty: the line stays whole.
+std::optional<std::size_t> indent_of_rest(std::string_view line, std::size_t column) {
+  if (!line.starts_with(' ')) {
+    return 0;
+  }
+  const bool has_meaning = line.size() > column && line[column - 1] == ' ' && line[column] != ' ';
+  // In examples a remark beside a command looks the same.
+  return has_meaning && !line.starts_with("  oblique ") ? std::optional(column) : std::nullopt;
+}
+
+/// Where a line of at most `width` characters ends: at a space behind `from`, or at the end.
+std::size_t break_of(std::string_view line, std::size_t from, std::size_t width) {
+  const std::size_t space = line.rfind(' ', width);
+  return space != std::string_view::npos && space > from ? space : line.find(' ', width);
+}
+
+void add_commands(CLI::App& app, Action& parsed) {
+  for (const auto add :
+       {add_solve, add_run, add_study, add_submit, add_status, add_workers, add_study_changes,
+        add_query, add_trace, add_plot, add_view, add_columns, add_paper, add_converge, add_fit,
+        add_database_files, add_autoscale, add_keys, add_doctor}) {
+    add(app, parsed);
+  }
+}
+
+/// How much is printed beside the data; flags of every command.
+struct VerbosityFlags {
+  bool quiet = false;
+  bool verbose = false;
+};
+
+void add_verbosity_flags(CLI::App& command, VerbosityFlags& flags) {
+  command.add_flag("--quiet", flags.quiet, "print data and errors only");
+  if (command.get_option_no_throw("--verbose") == nullptr) {
+    command.add_flag("--verbose", flags.verbose,
+                     "also print what is done, where, and how long it took");
+  }
+  for (auto* each : command.get_subcommands({})) {
+    add_verbosity_flags(*each, flags);
+  }
+}
+
+/// The command that was parsed; of a command with commands the inner one; or the program itself.
+CLI::App& parsed_command(CLI::App& app) {
+  const auto commands = app.get_subcommands();
+  return commands.empty() ? app : parsed_command(*commands.front());
+}
+
+/// As it is typed: "oblique keys list".
+std::string words_of(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent == nullptr ? command.get_name() : words_of(*parent) + ' ' + command.get_name();
+}
+
+int wrong_usage(Console& console, const CLI::App& command, const std::string& message) {
+  const auto words = words_of(command);
+  console.error(words, message);
+  console.errors() << fmt::format("Try `{} --help`.\n", words);
+  return kWrongUsage;
+}
+
+/// What is called otherwise here, where the nearest name does not help; empty for other names.
+std::string other_name_of(const std::string& command) {
+  const std::map<std::string_view, const char*> names{
+      {"server", "oblique-server"}, {"worker", "oblique-worker"}, {"list", "oblique studies"}};
+  const auto found = names.find(command);
+  return found == names.end() ? "" : found->second;
+}
+
+int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
+  try {
+    app.parse(argc, argv);
+    return kDone;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
+      std::ostringstream help;
+      const int exit_code = app.exit(error, help, console.errors());
+      const std::size_t width = terminal_size(STDOUT_FILENO).columns;
+      console.out() << (width > 0 ? fitted_help(help.str(), width, kHelpColumn) : help.str());
+      return exit_code;
+    }
+    auto& command = parsed_command(app);
+    const auto unexpected = app.remaining(true);
+    const auto other = unexpected.empty() ? "" : other_name_of(unexpected.front());
+    return wrong_usage(
+        console, command,
+        &command == &app && !other.empty()
+            ? fmt::format("unknown command `{}` (did you mean `{}`?)", unexpected.front(), other)
+            : protocol::objection_of(app, command, error));
+  }
+}
+
+/// Exit code of a program that a broken pipe ended (SIGPIPE).
+constexpr int kReaderGone = 128 + SIGPIPE;
+
+int carry_out(Console& console, const std::string& words, const Action& action) {
+  try {
+    const int code = action(console);
+    errno = 0;
+    if (console.out().flush()) {
+      return code;
+    }
+    if (errno == EPIPE) {
+      return kReaderGone;
+    }
+    console.error(words, "standard output could not be written");
+    return kFailed;
+  } catch (const ClosedPipe&) {
+    return kReaderGone;
+  } catch (const solver::InputError& error) {
+    console.error(words, error.what());
+    return kWrongUsage;
+  } catch (const std::exception& error) {
+    console.out().flush();
+    console.error(words, error.what());
+    return kFailed;
+  }
+}
+
+int execute(Console& console, CLI::App& app, const Action& action, const VerbosityFlags& flags) {
+  const auto& command = parsed_command(app);
+  const auto words = words_of(command);
+  const bool verbose = flags.verbose || command.count("--verbose") > 0;
+  if (flags.quiet && verbose) {
+    return wrong_usage(console, command,
+                       "--quiet and --verbose contradict each other: give one of them");
+  }
+  console.set_verbosity(flags.quiet ? Verbosity::kQuiet
+                        : verbose   ? Verbosity::kVerbose
+                                    : Verbosity::kNormal);
+  const auto start = std::chrono::steady_clock::now();
+  console.detail(fmt::format("{}, version {}", words, protocol::version_and_commit()));
+  const int code = carry_out(console, words, action);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  console.detail(fmt::format("{} {} after {}", words, code == kDone ? "is done" : "has failed",
+                             format_duration(elapsed.count())));
+  return code;
+}
+
+/// Columns complete the values that hold names of columns.
+protocol::ValueWords columns_of_values() {
+  std::vector<std::string> names;
+  for (const auto& column : server::all_columns()) {
+    names.push_back(column.name);
+  }
+  protocol::ValueWords words;
+  for (const char* const value : {"COLUMNS", "COLUMN", "COL", "CONDITION", "EXPR", "OUTPUT", "X,Y",
+                                  "STATEMENT", "--x", "--y", "--by"}) {
+    words[value] = names;
+  }
+  return words;
+}
+
+}  // namespace
+
+std::string fitted_help(const std::string& help, std::size_t width, std::size_t column) {
+  std::istringstream lines(help);
+  std::string text;
+  std::string rest;  // of a sentence, which the next line may go on with
+  for (std::string line; std::getline(lines, line);) {
+    const bool goes_on = !rest.empty() && !line.empty() && !line.starts_with(' ');
+    if (!rest.empty() && !goes_on) {
+      text += rest + '\n';
+    }
+    line = goes_on ? rest + ' ' + line : line;
+    rest.clear();
+    const auto indent = indent_of_rest(line, column);
+    while (indent && *indent < width && line.size() > width) {
+      const std::size_t end = break_of(line, *indent, width);
+      if (end == std::string::npos) {
+        break;
+      }
+      text += line.substr(0, end) + '\n';
+      line = std::string(*indent, ' ') + line.substr(end + 1);
+      rest = *indent == 0 ? line : "";
+    }
+    text += rest.empty() ? line + '\n' : "";
+  }
+  return rest.empty() ? text : text + rest + '\n';
+}
+
+int run_command_line(Console& console, int argc, const char* const* argv) {
+  CLI::App app("Studies of the oblique impact of a flexible robotic finger.", "oblique");
+  app.set_version_flag("--version", "oblique " + protocol::version_and_commit());
+  app.footer(kExamples);
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(kHelpColumn);
+  Action action;
+  add_commands(app, action);
+  VerbosityFlags verbosity;
+  add_verbosity_flags(app, verbosity);
+  protocol::refuse_empty_values(app);
+  if (const auto exit_code = protocol::print_completion(app, argc, argv, columns_of_values())) {
+    return *exit_code;
+  }
+  if (argc == 1) {
+    return wrong_usage(console, app, "no command given, as in `oblique run STUDY.toml`");
+  }
+  const int code = parse(console, app, argc, argv);
+  return action ? execute(console, app, action, verbosity) : code;
+}
+
+}  // namespace oblique::client

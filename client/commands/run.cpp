@@ -1,0 +1,66 @@
+#include <string>
+
+#include "client/commands/commands.h"
+#include "client/commands/shared.h"
+#include "client/io/study_notes.h"
+#include "client/service/run_service.h"
+#include "client/study/study_flags.h"
+#include "proto/program/process.h"
+#include "proto/program/usage.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kRunExamples = R"(Examples:
+  oblique run deploy/studies/paper.toml
+  oblique run --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
+  oblique run sweep.toml --db sweep.db --workers 4
+
+Ctrl-C stops it and loses nothing: the same command again goes on where it stopped. Other studies of
+the database that are not finished wait meanwhile.
+The exit code is 1 when a point failed, too.)";
+
+struct RunFlags {
+  StudyFlags study;
+  RunSettings settings;
+};
+
+int run(const RunFlags& flags, Console& console) {
+  check_settings(flags.settings);
+  const auto study = checked_study(console, flags.study);
+  refuse_used_database(flags.settings.service.database);
+  note_unusual_values(console.notes(), study.recipe);
+  // Before any thread is started; see StopSignals.
+  protocol::StopSignals stop;
+  const auto end = run_study(console, study, flags.settings, stop);
+  if (!end) {
+    return stop.exit_code();
+  }
+  print_first(console, end->rows, end->status.points());
+  console.notes() << "More: oblique query " << shell_word(study.name) << " --db "
+                  << shell_word(flags.settings.service.database.string()) << "\n";
+  return end->exit_code;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Action& parsed) {
+  auto [command, flags] =
+      new_command(app, parsed, "run",
+                  "Run a study on this machine: server, workers and database in one command",
+                  kRunExamples, run);
+  auto& settings = flags.settings;
+  command.add_option("--db", settings.service.database, "database, made when it is not there")
+      ->type_name("FILE")
+      ->capture_default_str();
+  add_network_disk_flag(command, settings.service.allow_network_disk);
+  add_no_reuse_flag(command, settings.no_reuse);
+  add_worker_flags(command, settings);
+  command.add_option("--limit", settings.rows, "most rows of the table shown at the end")
+      ->check(protocol::whole_number_from(0))
+      ->type_name("N")
+      ->capture_default_str();
+  add_study_flags(command, flags.study, true);
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,133 @@
+#include <cstdint>
+#include <optional>
+#include <ostream>
+#include <string>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/commands/commands.h"
+#include "client/commands/shared.h"
+#include "client/io/format_units.h"
+#include "client/io/study_notes.h"
+#include "client/service/connection.h"
+#include "client/service/source.h"
+#include "client/service/source_flags.h"
+#include "client/service/watching.h"
+#include "client/study/study_flags.h"
+#include "proto/program/process.h"
+#include "proto/program/usage.h"
+#include "proto/recipe/written.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kSubmitExamples = R"(Examples:
+  oblique submit deploy/studies/paper.toml
+  oblique submit sweep.toml --server tcp://127.0.0.1:7600 --watch
+  oblique submit sweep.toml --limit 20     watch it, then show 20 points
+  oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
+
+A study is safe in the server's database once this returns. Submitting the same study again
+goes on with it. One whose blocks begin with those that the server has grows by the rest, and runs
+again, whether it was done, paused or cancelled; so does one whose last block is a random or Sobol
+sample with a larger count. Any other study under a taken name is refused, with what differs.)";
+
+struct SubmitFlags {
+  StudyFlags study;
+  SourceFlags source;
+  bool watch = false;
+  std::optional<std::int64_t> limit;  ///< of the table shown at the end; watches too
+  SubmitSettings settings;
+};
+
+void print_submitted(Console& console, const Study& study, const protocol::SubmitReply& reply,
+                     const SubmitSettings& settings) {
+  std::string known;
+  if (!reply.created()) {
+    known = reply.appended() > 0
+                ? fmt::format("; {} points are appended to it, which was {}",
+                              format_count(reply.appended()), protocol::visible(reply.was()))
+                : "; the server had it already";
+    if (settings.priority) {
+      known += fmt::format("; its priority is now {}", *settings.priority);
+    }
+  }
+  if (const std::string taken = taken_over(reply.taken()); !taken.empty()) {
+    known += "; " + taken;
+  }
+  console.out() << fmt::format("{}: {} points, {} done{}", study.name, format_count(reply.points()),
+                               format_count(reply.settled()), known)
+                << std::endl;
+}
+
+int watch(Console& console, const SubmitFlags& flags, const Study& study, Connection& connection,
+          protocol::StopSignals& stop) {
+  const auto ask = [&](const Tell& tell) { return study_named(connection, study.name, tell); };
+  const auto status = watch_study(console, ask, stop);
+  if (stop.requested()) {
+    throw Interrupted("no longer watching");
+  }
+  const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
+  if (const auto rows = flags.limit.value_or(0); rows > 0) {
+    print_first(console, connection.chunks(first_results(study.name, rows), tell), status.points());
+    const auto server = connection_settings(console, flags.source);
+    console.notes() << fmt::format("More: oblique query {} --server {}{}\n", shell_word(study.name),
+                                   shell_word(server.server_url),
+                                   server.key ? " --keys " + shell_word(server.key->path) : "");
+  }
+  return tell_end(console, status,
+                  [&](const std::string& sql) { return connection.query(sql, tell); });
+}
+
+int submit(const SubmitFlags& flags, Console& console) {
+  if (const std::string objection =
+          protocol::objection_to_priority(flags.settings.priority.value_or(0));
+      !objection.empty()) {
+    throw solver::InputError("--priority: " + objection);
+  }
+  const auto study = checked_study(console, flags.study);
+  protocol::StopSignals stop;
+  Connection connection(connection_settings(console, flags.source),
+                        [&stop] { return !stop.requested(); });
+  bool submitted = false;
+  try {
+    const auto reply = connection.submit(study, flags.settings);
+    print_submitted(console, study, reply, flags.settings);
+    if (reply.created()) {
+      note_coarse_mesh(console.notes(), study.recipe);
+    }
+    note_unusual_values(console.notes(), study.recipe);
+    submitted = true;
+    return flags.watch || flags.limit ? watch(console, flags, study, connection, stop) : kDone;
+  } catch (const Interrupted&) {
+    console.notes() << (submitted ? "No longer watching; the study goes on at "
+                                  : "Stopped before the server answered; it may have the study: ")
+                    << connection.url() << ".\n";
+    return stop.exit_code();
+  }
+}
+
+}  // namespace
+
+void add_submit(CLI::App& app, Action& parsed) {
+  auto [command, flags] =
+      new_command(app, parsed, "submit", "Submit a study to a server", kSubmitExamples, submit);
+  add_server_flags(command, flags.source);
+  command.add_flag("--watch", flags.watch, "show the progress until the study is done");
+  command
+      .add_option("--limit", flags.limit,
+                  "watch, and show a table with so many rows at most when the study is done")
+      ->check(protocol::whole_number_from(0))
+      ->type_name("N");
+  command
+      .add_option("--priority", flags.settings.priority,
+                  fmt::format("studies of a higher priority come first, {}; default: 0",
+                              protocol::allowed_priorities()))
+      ->type_name("N");
+  add_no_reuse_flag(command, flags.settings.no_reuse);
+  add_study_flags(command, flags.study, true);
+}
+
+}  // namespace oblique::client

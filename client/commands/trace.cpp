@@ -1,0 +1,83 @@
+#include <cstdint>
+#include <string>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/commands/commands.h"
+#include "client/commands/shared.h"
+#include "client/trace/solve_again.h"
+#include "client/trace/trace_output.h"
+#include "proto/program/usage.h"
+#include "worker/solver/model/number.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kTraceExamples = R"(Examples:
+  oblique trace paper 3 > point3.csv
+  oblique trace paper 3 --out point3.csv --shape --fall
+  oblique trace paper 3 --format json > point3.json
+  oblique trace paper 3 --server tcp://127.0.0.1:7600 --on-worker --out point3.csv
+
+The point is solved again with the model of its study, here when the database is a file and by a
+worker of the server otherwise, and held against the stored row: standard error says whether they
+are the same. `oblique columns --trace` says what the columns of a trace mean.)";
+
+struct TraceFlags {
+  std::string study;
+  std::int64_t point = 0;
+  std::string out;     // empty: standard output
+  std::string format;  // empty: as the file's name ends, or CSV
+  TraceOptions options;
+  PointSource source;
+};
+
+int trace(const TraceFlags& flags, Console& console) {
+  using solver::readable_number;
+  TraceOutput output(flags.out,
+                     format_of_output(flags.format, flags.out, kTraceFormats, Format::kCsv));
+  const auto solved = solve_again(
+      console, flags.source, flags.study, static_cast<std::uint64_t>(flags.point), flags.options,
+      [&](const solver::TraceShape& shape) { output.begin(shape); },
+      [&](const solver::TraceRow& row) { output.add(row); }, !output.fills_terminal());
+  const auto& point = solved.point;
+  output.finish(point, solved.result);
+  console.note(fmt::format("Point {} of {}: H = {} m, mu = {}, e* = {}; solved {}, {}.",
+                           point.point, point.study, readable_number(point.H_m),
+                           readable_number(point.mu), readable_number(point.e_star), solved.solver,
+                           solved.comparison));
+  return kDone;
+}
+
+}  // namespace
+
+void add_trace(CLI::App& app, Action& parsed) {
+  auto [command, flags] =
+      new_command(app, parsed, "trace", "Time histories of one point of a study, solved again",
+                  kTraceExamples, trace);
+  add_study_argument(command, flags.study);
+  command.add_option("POINT", flags.point, "number of the point, from 0")
+      ->required()
+      ->check(protocol::whole_number_from(0))
+      ->type_name("");
+  command.add_option("--out", flags.out, "file that is written; standard output when left out")
+      ->type_name("FILE");
+  auto* format = command
+                     .add_option("--format", flags.format,
+                                 "csv or json; as the file's name ends when left out, else "
+                                 "csv; the Python module returns NumPy arrays")
+                     ->type_name("FORMAT");
+  protocol::note_choices(format, kTraceFormats);
+  command.add_flag("--shape", flags.options.with_shape, "add the positions of the chain's nodes");
+  command.add_flag("--fall", flags.options.with_fall,
+                   "begin with 121 rows of the fall, from release to touch: times are negative "
+                   "there, the state is falling");
+  command
+      .add_option("--every", flags.options.every,
+                  "give each K-th instant of the contact and all ends of phases")
+      ->check(protocol::whole_number_from(1))
+      ->type_name("K");
+  add_point_source(command, flags.source);
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,122 @@
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <filesystem>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/commands/commands.h"
+#include "client/commands/shared.h"
+#include "client/service/connection.h"
+#include "client/service/run_service.h"
+#include "client/service/source_flags.h"
+#include "proto/program/process.h"
+#include "proto/program/usage.h"
+#include "proto/text.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+constexpr const char* kViewExamples = R"(Examples:
+  oblique view
+  oblique view friction.db
+  oblique view big.db --port 8000
+
+Open the address that it prints in a browser on this machine; Ctrl-C ends it. Over ssh, forward the
+port: ssh -L 8000:127.0.0.1:8000 HOST. Studies that are not done go on meanwhile, as with a server.
+Others are started on the page: what changes the file, as `oblique run`, is refused until it ends.
+Links to views hold as long as the port is the same: give one that is kept.)";
+
+struct ViewFlags {
+  RunSettings settings;
+  int port = 0;
+  std::string server;  // refused with what to do instead
+};
+
+/// Until it is told to stop. Throws ProcessError when server or workers end.
+void wait_for_the_end(Console& console, EmbeddedService& service, protocol::StopSignals& stop) {
+  constexpr std::chrono::milliseconds kLook{500};
+  while (!stop.wait(kLook)) {
+    service.check();
+    if (const auto news = service.news(); !news.empty()) {
+      console.notes() << protocol::visible_lines(news) << '\n';
+    }
+  }
+}
+
+/// Whether the server ended because that port is taken; it says so in terms of its own flag.
+bool is_taken(int port, const ProcessError& error) {
+  const auto taken = std::generic_category().message(EADDRINUSE);
+  return port != 0 && std::string_view(error.what()).find(taken) != std::string_view::npos;
+}
+
+int view(const ViewFlags& flags, Console& console) {
+  if (!flags.server.empty()) {
+    throw solver::InputError(
+        "--server is not allowed: view shows a database file. A server has a page of its own: it "
+        "prints its address when it starts, and `oblique-server --http ADDRESS:PORT` sets it");
+  }
+  check_settings(flags.settings);
+  ServiceSettings how = flags.settings.service;
+  const std::string file = protocol::visible(how.database.string());
+  if (!std::filesystem::exists(how.database)) {
+    throw std::runtime_error(
+        fmt::format("there is no file {}: `oblique run` makes a database", file));
+  }
+  if (::access(how.database.c_str(), W_OK) != 0) {
+    throw std::runtime_error(
+        fmt::format("{0} may not be written to, and the page's server has to: show a copy, which "
+                    "`oblique backup copy.db --db {0}` makes",
+                    file));
+  }
+  refuse_used_database(how.database);
+  how.http = fmt::format("127.0.0.1:{}", flags.port);
+  // Before any thread is started; see StopSignals.
+  protocol::StopSignals stop;
+  try {
+    EmbeddedService service(how, stop);
+    // Whoever has this address may change studies: it is data, for the user alone.
+    console.out() << service.page_url() << std::endl;
+    console.note("Open this address in a browser; Ctrl-C ends it.");
+    wait_for_the_end(console, service, stop);
+    service.stop();
+  } catch (const Interrupted&) {
+    return stop.exit_code();
+  } catch (const ProcessError& error) {
+    if (is_taken(flags.port, error)) {
+      throw std::runtime_error(fmt::format(
+          "port {} is taken by another program: name another with --port, or none, and the system "
+          "picks one",
+          flags.port));
+    }
+    throw;
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_view(CLI::App& app, Action& parsed) {
+  auto [command, flags] = new_command(
+      app, parsed, "view",
+      "Show a database as a page in a browser: a server and a worker for as long as it is open",
+      kViewExamples, view);
+  add_database_argument(command, flags.settings.service.database);
+  constexpr double kLargestPort = 65535;
+  command.add_option("--port", flags.port, "port of the page; 0: the system picks one")
+      ->check(protocol::number_between(0, kLargestPort))
+      ->type_name("N")
+      ->capture_default_str();
+  command.add_option("--server", flags.server)->group("");  // hidden
+  add_network_disk_flag(command, flags.settings.service.allow_network_disk);
+  add_worker_flags(command, flags.settings);
+}
+
+}  // namespace oblique::client

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "client/io/console.h"
+#include "client/io/status_line.h"
+#include "client/service/source_flags.h"
+#include "client/study/reach.h"
+#include "client/trace/worker_trace.h"
+#include "worker/solver/model/case_result.h"
+#include "worker/solver/model/trace.h"
+#include "worker/solver/solve.h"
+
+namespace oblique::client {
+
+/// Checks by falls that are solved in this process whether the tip reaches an H. The console must
+/// outlive it.
+ReachCheck tip_reach(Console& console);
+
+/// Largest drop of the tip; solves the fall if it is not solved yet and shows it on `line`.
+double largest_drop_m(const solver::Finger& finger, StatusLine& line);
+
+/// A point to solve in this process.
+struct PointToSolve {
+  double H_m = 0.0;
+  double mu = 0.0;
+  double e_star = 0.0;
+  bool errors = false;  ///< estimate errors too
+};
+
+/// Solves the point in this process and passes its instants to `tracing`. `shows_status`: the
+/// terminal is free for a status line. Errors that cannot be estimated are absent, with a note.
+/// Throws as Finger::solve does.
+solver::CaseResult solve_here(Console& console, const solver::Finger& finger,
+                              const PointToSolve& point, const solver::Tracing& tracing,
+                              bool shows_status = true);
+
+/// Where a point of a study comes from and who solves it again.
+struct PointSource {
+  SourceFlags source;
+  bool is_local = false;      ///< --local
+  bool is_on_worker = false;  ///< --on-worker
+};
+/// Adds --local, --on-worker and the flags of add_source_flags.
+void add_point_source(CLI::App& command, PointSource& flags);
+
+/// A stored point, solved again.
+struct SolvedAgain {
+  PointSpec point;
+  std::optional<solver::CaseResult> result;  ///< none: a worker sent outputs unknown here
+  std::string solver;                        ///< "here" or "by worker ann (avx2)"
+  std::uint64_t every = 1;                   ///< rows have one in so many instants of the contact
+  std::string comparison = {};               ///< with the stored row: "same as stored"
+  bool is_confirmed = true;                  ///< false: there is a row, and not with this result
+};
+
+/// Solves a point of a study again, here if the study is in a database file or --local is given,
+/// else by a worker of the server, and compares it with the stored row. Throws std::runtime_error
+/// for a point that failed, has no answer or does not exist, InputError for flags that contradict
+/// each other, and what the source throws.
+SolvedAgain solve_again(Console& console, const PointSource& from, const std::string& study,
+                        std::uint64_t point, const TraceOptions& options,
+                        const std::function<void(const solver::TraceShape&)>& begin,
+                        const solver::Tracing::Sink& row, bool shows_status = true);
+
+}  // namespace oblique::client

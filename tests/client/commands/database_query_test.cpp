@@ -1,0 +1,100 @@
+// Questions to a database file, by the program itself.
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/store/store.h"
+#include "tests/support/points.h"
+#include "tests/support/programs.h"
+#include "tests/support/stored_study.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+
+/// A folder with oblique.db, which has four results of the study `a`.
+class DatabaseQuery : public testing::Test {
+ protected:
+  DatabaseQuery() {
+    server::Store store((folder_.path() / "oblique.db").string());
+    test::add_study(store, "a", 4, 4);
+  }
+  test::Outcome ask(const std::vector<std::string>& arguments) {
+    return test::run_oblique(folder_, arguments);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(DatabaseQuery, AStatementHasItsTime) {
+  const auto outcome =
+      ask({"sql",
+           "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n",
+           "--timeout", "0.2"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err, HasSubstr("took too long (more than 0.2 s)"));
+}
+
+TEST_F(DatabaseQuery, AStatementThatNeedsMuchMemoryFailsAndSaysSo) {
+  EXPECT_THAT(ask({"sql", "SELECT hex(zeroblob(450000000))"}).err,
+              HasSubstr("more than the 64 MiB allowed"));
+  const auto outcome =
+      ask({"sql",
+           "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000) "
+           "SELECT b FROM (SELECT hex(zeroblob(500000)) || i AS b FROM n) ORDER BY b"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("more memory than the 1024 MiB allowed"));
+}
+
+TEST_F(DatabaseQuery, AWrongStatementIsWrongUsage) {
+  const struct {
+    std::vector<std::string> words;
+    const char* says;
+  } wrong[] = {
+      {{"query", "a", "--where", "E > 1e10"}, "write e, or E_Pa"},
+      {{"query", "a", "--where", "fn_peak > 1"}, "did you mean `fn_peak_N`"},
+      {{"query", "a", "--where", "point >= 0 --", "--limit", "1"}, "it has a comment (--)"},
+      {{"sql", "DELETE FROM runs"}, "this only reads"},
+      {{"sql", "SELECT * FROM runs WHERE mu > @mu"}, "parameter"},
+  };
+  for (const auto& [words, says] : wrong) {
+    const auto outcome = ask(words);
+    EXPECT_EQ(outcome.exit_code, 2) << says;
+    EXPECT_EQ(outcome.out, "") << says;
+    EXPECT_THAT(outcome.err, HasSubstr(says));
+  }
+}
+
+TEST_F(DatabaseQuery, AModeThatNoPointHasIsSaid) {
+  const auto unknown = ask({"query", "a", "--where", "mu < 2 AND major_mode = 'SC SR SR'"});
+  EXPECT_EQ(unknown.exit_code, 0) << unknown.err;
+  EXPECT_THAT(unknown.err, testing::AllOf(HasSubstr("no point of a meets the condition"),
+                                          HasSubstr("'SC SR sR sC sR'")));
+  const auto known = ask({"sql", "SELECT mode FROM runs LIMIT 1", "--format", "csv"}).out;
+  const auto mode = known.substr(5, known.find('\n', 5) - 5);
+  EXPECT_EQ(ask({"query", "a", "--where", "mode == '" + mode + "'", "--format", "csv"}).err, "");
+}
+
+TEST_F(DatabaseQuery, AFileIsOfTheFormatThatItsNameSays) {
+  EXPECT_EQ(ask({"query", "a", "--select", "point", "--limit", "1", "--out", "x.csv"}).exit_code,
+            0);
+  std::ifstream file(folder_.path() / "x.csv");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "point\n0\n");
+  for (const char* verb : {"query", "sql"}) {
+    const auto wrong = ask({verb, "a", "--out", "x.json", "--format", "csv"});
+    EXPECT_EQ(wrong.exit_code, 2);
+    EXPECT_THAT(wrong.err, HasSubstr("contradict each other"));
+    EXPECT_THAT(ask({verb, "a", "--out", "x.txt"}).err, HasSubstr("end its name in .csv"));
+  }
+  EXPECT_THAT(ask({"query", "a", "--select", "point", "--out", "/dev/stdout"}).out,
+              testing::StartsWith("point\n"));
+}
+
+}  // namespace
+}  // namespace oblique::client

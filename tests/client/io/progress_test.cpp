@@ -1,0 +1,133 @@
+#include "client/io/progress.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <sstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace oblique::client {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(Progress, ShowsRateAndTimeLeftInTheBar) {
+  EXPECT_EQ(progress_bar({.study = "paper",
+                          .points = 10,
+                          .completed = 5,
+                          .failed = 1,
+                          .elapsed_s = 1.0,
+                          .points_per_s = 2.0}),
+            "paper [###############---------------] 5/10 50 %, 1 failed, 2 points/s, 2.5 s left");
+}
+
+TEST(Progress, HasNoUnknownRateAndCallsNoUnfinishedStudyFinished) {
+  EXPECT_THAT(progress_line({.study = "s", .points = 100000, .completed = 99999}),
+              HasSubstr("(99 %)"));
+  EXPECT_EQ(progress_line({.study = "paper", .points = 10}), "paper: 0 of 10 points (0 %)");
+}
+
+TEST(Progress, DrawsPlainLinesNowAndThenWhereThereIsNoTerminal) {
+  std::ostringstream out;
+  Console console(out, out);
+  Progress progress(console);
+  for (int i = 0; i <= 300; ++i) {
+    progress.update({.study = "s",
+                     .points = 1000,
+                     .completed = static_cast<std::uint64_t>(i),
+                     .elapsed_s = 0.1 * i});
+  }
+  progress.finish();
+  const auto text = out.str();
+  EXPECT_EQ(text.find('\r'), std::string::npos);
+  EXPECT_EQ(text.find('\x1b'), std::string::npos);
+  const auto lines = std::count(text.begin(), text.end(), '\n');
+  EXPECT_GE(lines, 3);
+  EXPECT_LE(lines, 5);
+  EXPECT_NE(text.find("10 points/s, 1 min 10 s left"), std::string::npos) << text;
+}
+
+/// A study of 5000 points on a terminal.
+class Drawn {
+ public:
+  /// The bar after an update.
+  std::string at(double elapsed_s, std::uint64_t completed) {
+    progress_.update(
+        {.study = "s", .points = 5000, .completed = completed, .elapsed_s = elapsed_s});
+    const auto text = out_.str();
+    return text.substr(text.rfind('\r'));
+  }
+
+ private:
+  std::ostringstream out_;
+  Console console_{out_, out_, {.is_terminal = true}};
+  Progress progress_{console_};
+};
+
+TEST(Progress, FollowsTheRateOfTheLastSeconds) {
+  Drawn bar;
+  for (std::uint64_t second = 0; second <= 10; ++second) {
+    bar.at(static_cast<double>(second), 100 * second);
+  }
+  for (std::uint64_t second = 11; second < 70; ++second) {
+    bar.at(static_cast<double>(second), 990 + second);
+  }
+  EXPECT_THAT(bar.at(70.0, 1060), HasSubstr(" 1 points/s"));
+  bar.at(600.0, 1061);  // the server was unreachable
+  bar.at(605.0, 1561);
+  EXPECT_THAT(bar.at(611.0, 2161), HasSubstr(" 100 points/s, 28 s left"));
+}
+
+TEST(Progress, WeighsSamplesByTheTimeBetweenThem) {
+  Drawn bar;
+  // A burst of samples, then one 4 s later: 400 points in 5 s, however many samples there were.
+  for (int i = 0; i <= 100; ++i) {
+    bar.at(0.01 * i, static_cast<std::uint64_t>(i));
+  }
+  EXPECT_THAT(bar.at(5.0, 400), HasSubstr(" 80 points/s"));
+  Drawn slow;
+  EXPECT_THAT(slow.at(0.0, 0), Not(HasSubstr("points/s")));
+  EXPECT_THAT(slow.at(20.0, 200), HasSubstr(" 10 points/s"));
+}
+
+TEST(Progress, KeepsToTheWidthOfTheTerminalTheBarFirst) {
+  const ProgressState state{.study = "abc\u00e9",
+                            .points = 1'000'000,
+                            .completed = 500'000,
+                            .failed = 12,
+                            .points_per_s = 1234.5};
+  const std::string end = " 500,000/1,000,000 50 %, 12 failed, 1,230 points/s, 6 min 45 s left";
+  EXPECT_EQ(progress_bar(state, 79), "abc\u00e9 [##---]" + end);
+  EXPECT_EQ(progress_bar(state, end.size() + 10), "abc\u00e9" + end) << "a bar too short to read";
+  EXPECT_EQ(progress_bar(state, end.size() + 3), "abc" + end);
+  EXPECT_EQ(progress_bar(state, 10), end.substr(0, 10));
+  EXPECT_EQ(progress_bar(state, 0), "");
+}
+
+TEST(Progress, IsDrawnTenTimesASecondAtMostAndAsWideAsTheTerminalIsThen) {
+  std::ostringstream out;
+  std::size_t columns = 80;
+  Console console(out, out, {.is_terminal = true, .columns = [&columns] { return columns; }});
+  Progress progress(console);
+  for (int i = 0; i < 1000; ++i) {
+    columns = i < 500 ? 80 : 20;
+    progress.update({.study = "s", .points = 10, .completed = 5, .elapsed_s = 0.001 * i});
+  }
+  const auto text = out.str();
+  const auto drawn = std::count(text.begin(), text.end(), '\r');
+  EXPECT_GE(drawn, 9);
+  EXPECT_LE(drawn, 11);
+  EXPECT_LE(text.size() - text.rfind('\r'), 19U + std::string("\r\x1b[K").size());
+}
+
+TEST(Progress, ShowsTheNameOfAStudyWithoutSteeringTheTerminal) {
+  EXPECT_TRUE(progress_line({.study = "a\x1b[2J", .points = 1}).starts_with("a\\x1b[2J: "));
+  EXPECT_TRUE(progress_bar({.study = "a\u202e", .points = 1}).starts_with("a\\u202e ["));
+}
+
+}  // namespace
+}  // namespace oblique::client

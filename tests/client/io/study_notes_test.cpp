@@ -1,0 +1,100 @@
+#include "client/io/study_notes.h"
+
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "client/study/study_file.h"
+
+namespace oblique::client {
+namespace {
+
+using Notes = void(std::ostream&, const protocol::Recipe&);
+
+std::string notes_of(Notes* write, const std::string& model, const std::string& block) {
+  std::ostringstream out;
+  const auto any_reach = [](const protocol::PointTable&) {};
+  const std::string text = "[model]\n" + model + "\n[[block]]\n" + block;
+  write(out, parse_study(text, "a.toml", any_reach).recipe);
+  return out.str();
+}
+
+std::string mesh_note(const std::string& model, const std::string& axis = {}) {
+  return notes_of(note_coarse_mesh, model, "H = 0.6\nmu = [0.4, 0.6]\ne = 1\n" + axis);
+}
+
+std::string value_notes(const std::string& model, const std::string& block) {
+  return notes_of(note_unusual_values, model, block);
+}
+
+TEST(MeshNote, SaysInOneLineWhatThePublishedMeshCostsAndWhatPredicts) {
+  EXPECT_EQ(mesh_note("preset = 'paper'"),
+            "Note: on 4 elements a link forces are off by 3 %, durations by 12 %, and 4 in 10 "
+            "points get another sequence of states than on 48; to predict: preset = "
+            "\"standard\"\n");
+}
+
+TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNotMeasured) {
+  const struct {
+    const char* model;
+    const char* axis;
+    const char* says;  // empty: nothing
+  } cases[] = {
+      {"", "", ""},
+      {"preset = 'converged'", "", ""},
+      {"elements_per_link = 8", "", ""},
+      {"preset = 'paper'", "elements_per_link = [8, 16]\n", ""},
+      {"elements_per_link = 7", "", "on 7 elements a link forces are off by up to 3"},
+      {"elements_per_link = 2", "", "durations by more than 12"},
+      {"", "elements_per_link = [16, 4]\n", "on 4 elements"},
+      {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "on 2 elements"},
+  };
+  for (const auto& [model, axis, says] : cases) {
+    const auto note = mesh_note(model, axis);
+    EXPECT_EQ(note.empty(), *says == '\0') << note;
+    EXPECT_NE(note.find(says), std::string::npos) << note;
+  }
+}
+
+const std::string kSample = "sample = { kind = 'lhs', count = 100 }\n";
+
+TEST(ValueNotes, NamesOnceEachKeyThatIsLikelyToBeInAnotherUnit) {
+  EXPECT_EQ(value_notes("E = 7e4\nrho = 2.7\nlengths = [0.4, 400, 300]",
+                        "H = 100\nmu = 0.4\ne = 1\nk = [27, 2.7e7, 3e11]\n"),
+            "Note: E = 70000 Pa is softer than rubber; 7e10?\n"
+            "Note: H = 100 m is outside the usual 0.0001 to 10 m; 0.1?\n"
+            "Note: k = 27 N/m is outside the usual 10000 to 1e10 N/m; 2.7e7?\n"
+            "Note: length = 400 m is outside the usual 0.001 to 100 m; 0.4?\n"
+            "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
+}
+
+TEST(ValueNotes, LooksAtTheEndsOfRangesAndAtWhatIsDrawn) {
+  EXPECT_EQ(value_notes("", "H = 0.9\nmu = 0.4\ne = 1\nE = { from = 60, to = 80, count = 3 }\n"),
+            "Note: E = 60 Pa is softer than rubber; 6e10?\n");
+  EXPECT_EQ(
+      value_notes("", kSample +
+                          "H = 0.9\nmu = { from = 0, to = 1 }\ne = 1\n"
+                          "rho = { distribution = 'normal', mean = 2.7, sd = 0.1, from = 1 }\n"),
+      "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
+}
+
+TEST(ValueNotes, SaysThatARangeOfASampleIsAListOfValues) {
+  EXPECT_EQ(value_notes("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
+                                      "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
+            "Note: mu: 5 values; 0.1:1 draws between them.\n")
+      << "numbers of elements are drawn from a list alone";
+  EXPECT_EQ(value_notes("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
+}
+
+TEST(ValueNotes, SaysNothingOfUsualValues) {
+  for (const char* preset : {"paper", "printed", "converged"}) {
+    EXPECT_EQ(value_notes(std::string("preset = '") + preset + "'",
+                          kSample + "H = { from = 0.3, to = 1.1 }\nmu = [0, 2]\ne = 1\n"
+                                    "tip_mass = [0, 0.02]\nI = \"A^2 / (4 * pi)\"\n"),
+              "");
+  }
+}
+
+}  // namespace
+}  // namespace oblique::client
