@@ -17,9 +17,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/commands/commands.h"
 #include "client/io/child_process.h"
 #include "client/io/format_units.h"
-#include "client/commands/commands.h"
 #include "client/service/connection.h"
 #include "client/service/source_flags.h"
 #include "proto/program/process.h"

@@ -8,11 +8,11 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/commands/commands.h"
 #include "client/convergence/convergence.h"
 #include "client/io/format_units.h"
-#include "client/io/tables.h"
 #include "client/io/status_line.h"
-#include "client/commands/commands.h"
+#include "client/io/tables.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
 #include "proto/program/usage.h"

@@ -18,9 +18,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/commands/commands.h"
 #include "client/io/child_process.h"
 #include "client/io/format_units.h"
-#include "client/commands/commands.h"
 #include "client/service/source.h"
 #include "client/service/source_flags.h"
 #include "proto/keys/key_file.h"

@@ -4,12 +4,12 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/tables.h"
-#include "client/io/status_line.h"
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/paper/paper_figures.h"
+#include "client/io/status_line.h"
+#include "client/io/tables.h"
 #include "client/paper/paper_comparison.h"
+#include "client/paper/paper_figures.h"
 #include "client/plot/picture_file.h"
 #include "client/service/source.h"
 #include "client/service/watching.h"

@@ -161,7 +161,7 @@ plot::PointHistory history_of_study(Console& console, const PlotFlags& flags) {
 }
 
 plot::PointHistory history_of_values(Console& console, const PlotFlags& flags) {
-  const protocol::PointTable table(recipe_of_flags(flags.values, tip_reach(console)));
+  const auto table = points_of_flags(flags.values, tip_reach(console));
   if (table.size() != 1) {
     throw solver::InputError(fmt::format(
         "the flags make {} points, and the time histories of one are drawn: give one value each",

@@ -4,9 +4,9 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/commands/commands.h"
 #include "client/io/case_report.h"
 #include "client/io/study_notes.h"
-#include "client/commands/commands.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
 #include "client/trace/trace_output.h"

@@ -7,8 +7,10 @@
 
 #include <gtest/gtest.h>
 
+#include "client/io/console.h"
 #include "client/io/tables.h"
 #include "client/study/study_file.h"
+#include "client/trace/solve_again.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/parameters.h"
 
@@ -144,8 +146,11 @@ TEST(PublishedTable, HoldsTheSixtyThreeTrustworthyNumbers) {
 
 TEST(PublishedTable, HasTheCasesOfTheExampleStudyInItsOrder) {
   const auto published = published_table().cases;
+  std::ostringstream dropped;
+  Console console(dropped, dropped);
   const protocol::PointTable study(
-      read_study_file(std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml", tip_reach())
+      read_study_file(std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml",
+                      tip_reach(console))
           .recipe);
   ASSERT_EQ(published.size(), study.size());
   for (std::uint64_t i = 0; i < study.size(); ++i) {
