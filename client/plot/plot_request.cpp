@@ -52,6 +52,12 @@ void check(const PlotRequest& request) {
     static_cast<void>(scatter_columns(request));
   }
   static_cast<void>(range_given(request));
+  const bool is_block = request.block == "all" || solver::number_of(request.block).value_or(0) >= 1;
+  if (!request.block.empty() && !is_block) {
+    throw solver::InputError(
+        fmt::format("--block {} is not allowed: it must be the number of a block, from 1, or `all`",
+                    request.block));
+  }
 }
 
 std::optional<Range> range_given(const PlotRequest& request) {
