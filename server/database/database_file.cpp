@@ -124,15 +124,20 @@ std::string file_system_of(const std::string& path) {
   return type;
 }
 
+bool is_network_file_system(std::string_view type) {
+  constexpr std::array<std::string_view, 8> kNetwork{"nfs",    "cifs", "smb",  "ceph",
+                                                     "lustre", "afs",  "gpfs", "beegfs"};
+  // With FUSE the name of the program follows; most of them reach other machines.
+  constexpr std::array<std::string_view, 6> kLocalFuse{
+      "fuse.mergerfs", "fuse.ntfs", "fuse.exfat", "fuse.overlay", "fuse.fuse-", "fuse.gocrypt"};
+  const auto begins_type = [type](std::string_view name) { return type.starts_with(name); };
+  return std::ranges::any_of(kNetwork, begins_type) ||
+         (type.starts_with("fuse.") && std::ranges::none_of(kLocalFuse, begins_type));
+}
+
 std::string objection_to_shared_disk(const std::string& path) {
-  // In FUSE, which has local file systems too, the name of the program follows.
-  constexpr std::array<std::string_view, 12> kShared{"nfs",     "cifs",  "smb",    "ceph",
-                                                     "lustre",  "afs",   "gpfs",   "beegfs",
-                                                     "gluster", "sshfs", "rclone", "s3fs"};
   const std::string type = file_system_of(path);
-  const std::string_view name =
-      std::string_view(type).substr(type.starts_with("fuse.") ? sizeof "fuse." - 1 : 0);
-  if (std::ranges::none_of(kShared, [&](auto shared) { return name.starts_with(shared); })) {
+  if (!is_network_file_system(type)) {
     return {};
   }
   return fmt::format(

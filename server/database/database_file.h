@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include <sys/stat.h>
 
@@ -28,6 +29,9 @@ std::string file_system_of(const std::string& path);
 
 /// Why a database at `path` (which need not exist) is not safe on its file system, or an empty
 /// text. A network file system has neither the locks nor the shared memory that SQLite's
+/// Whether other machines may write to files of this type of file system, as "nfs4".
+bool is_network_file_system(std::string_view type);
+
 /// write-ahead log needs: two machines could write at once and damage the file.
 std::string objection_to_shared_disk(const std::string& path);
 

@@ -215,14 +215,14 @@ void EventLoop::note_disconnects() {
   for (const Disconnect& disconnect : network_.take_disconnects()) {
     service_->client_left(disconnect.identity);
     if (disconnect.refused) {
-      service_->log_peer(fmt::format("{} was refused: {}", disconnect.address, disconnect.reason));
+      service_->log_stranger(fmt::format("{} was refused: {}", disconnect.address, disconnect.reason));
     } else if (!disconnect.reason.empty()) {
-      service_->log_peer(fmt::format("a connection was ended: {}", disconnect.reason));
+      service_->log_stranger(fmt::format("a connection was ended: {}", disconnect.reason));
     }
   }
 }
 
-/// Reads the list of authorized keys again when it has changed.
+/// Reads the list of authorized keys again.
 void EventLoop::check_access() {
   if (access_.refresh(now().steady_ms)) {
     network_.admission_changed();

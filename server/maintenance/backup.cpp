@@ -169,6 +169,21 @@ void mend(sqlite3* database) {
   }
 }
 
+/// Throws StorageError unless the list of tables can be read.
+void check_is_salvageable(sqlite3* database, const std::string& path) {
+  try {
+    if (identify(database, path) != DatabaseKind::kEmpty) {
+      return;
+    }
+  } catch (const StorageError&) {
+    if ((static_cast<unsigned>(sqlite3_errcode(database)) & 0xffU) != SQLITE_CORRUPT) {
+      throw;
+    }
+    throw StorageError(path + " has a damaged list of tables: nothing can be salvaged");
+  }
+  throw StorageError(path + " is empty: no study was ever stored in it");
+}
+
 }  // namespace
 
 void copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
@@ -195,9 +210,7 @@ Salvaged salvage(const std::string& from, const std::string& to) {
   const DatabaseHandle source = open_for_reading(from);
   // So that SQLite reads a file that is shorter than its first page says.
   execute(source.get(), "PRAGMA writable_schema = ON");
-  if (identify(source.get(), from) == DatabaseKind::kEmpty) {
-    throw StorageError(from + " is empty: no study was ever stored in it");
-  }
+  check_is_salvageable(source.get(), from);
   const DraftFile draft(to + ".part");
   Salvaged saved;
   {

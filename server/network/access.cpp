@@ -1,7 +1,9 @@
 #include "server/network/access.h"
 
 #include <array>
+#include <cstddef>
 #include <map>
+#include <string>
 #include <utility>
 
 #include <netinet/in.h>
@@ -11,6 +13,7 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/keys/key_file.h"
+#include "proto/small_file.h"
 #include "proto/system/descriptor.h"
 #include "proto/text.h"
 #include "server/network/listener.h"
@@ -123,13 +126,20 @@ class KeyList {
 
   std::string path_;
   Keys keys_;
+  std::string file_;     // as it was read the last time
   int empty_reads_ = 0;  // in a row
   std::string fault_;    // why the list could not be read the last time; empty if it could
 };
 
 bool KeyList::reload() {
   constexpr int kEmptyReads = 4;
+  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   try {
+    // Thousands of keys take long to parse.
+    std::string file = protocol::read_small_file(path_, "the list of keys", kMostBytes);
+    if (std::exchange(file_, std::move(file)) == file_ && empty_reads_ == 0 && fault_.empty()) {
+      return false;
+    }
     Keys keys = read();
     empty_reads_ = keys.empty() ? empty_reads_ + 1 : 0;
     if (keys.empty() && empty_reads_ < kEmptyReads) {

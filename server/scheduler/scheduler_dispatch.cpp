@@ -90,12 +90,16 @@ void Scheduler::duplicate_stragglers() {
     return;
   }
   std::vector<WorkerId> helpers;
+  std::vector<WorkerId> set_aside;
   for (const auto* workers : {&ready_workers_.active(), &ready_workers_.parked()}) {
     for (const auto& [place, id] : *workers) {
-      if (may_hold_more(workers_.at(id)) && !is_set_aside(workers_.at(id))) {
-        helpers.push_back(id);
+      if (may_hold_more(workers_.at(id))) {
+        (is_set_aside(workers_.at(id)) ? set_aside : helpers).push_back(id);
       }
     }
+  }
+  for (const WorkerId id : set_aside) {  // once they solve a probe, they may help too
+    probe(id, workers_.at(id));
   }
   FastestPaces paces;
   // Leases are numbered as they are granted: the oldest comes first.

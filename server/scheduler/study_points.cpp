@@ -49,7 +49,8 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
     *set = order_.places(*set);
   }
   for (Returned& intervals : returned_) {
-    for (const auto& [first, history] : std::exchange(intervals, {})) {
+    for (const auto& [first, returned] : std::exchange(intervals, {})) {
+      const History& history = returned;  // a lambda cannot capture a structured binding
       order_.places(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
         History& part = intervals.emplace(interval.begin, history).first->second;
         part.end = interval.end;

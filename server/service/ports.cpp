@@ -48,10 +48,16 @@ void PeerLog::write(Severity severity, const std::string& text) {
   }
 }
 
+void PeerLog::write_of_stranger(const std::string& text) {
+  if (++stranger_lines_ <= kMostLines) {
+    ports_.log(Severity::kWarning, text);
+  }
+}
+
 void PeerLog::bad_frame(std::string_view sender) {
   ++bad_frames_;
-  write(Severity::kWarning,
-        fmt::format("{} sent a frame that is no message ({} of them so far)", sender, bad_frames_));
+  write_of_stranger(
+      fmt::format("{} sent a frame that is no message ({} of them so far)", sender, bad_frames_));
 }
 
 void PeerLog::tick(std::int64_t now_ms) {
@@ -59,11 +65,14 @@ void PeerLog::tick(std::int64_t now_ms) {
   if (now_ms - span_began_ms_ < kSpan_ms) {
     return;
   }
-  if (lines_ > kMostLines) {
-    ports_.log(Severity::kInfo, fmt::format("and {} more lines about peers", lines_ - kMostLines));
+  for (std::uint64_t* lines : {&lines_, &stranger_lines_}) {
+    if (*lines > kMostLines) {
+      ports_.log(Severity::kInfo,
+                 fmt::format("and {} more lines about peers", *lines - kMostLines));
+    }
+    *lines = 0;
   }
   span_began_ms_ = now_ms;
-  lines_ = 0;
 }
 
 }  // namespace oblique::server

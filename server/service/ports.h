@@ -91,7 +91,11 @@ class PeerLog {
  public:
   explicit PeerLog(Ports& ports) : ports_(ports) {}
 
+  /// A line about a worker that was admitted.
   void write(Severity severity, const std::string& text);
+  /// A line about a stranger, as a refused connection. Counted apart, so that strangers cannot
+  /// suppress lines about workers.
+  void write_of_stranger(const std::string& text);
   /// No sound peer sends such a frame.
   void bad_frame(std::string_view sender);
   /// To be called several times a second.
@@ -104,7 +108,9 @@ class PeerLog {
   Ports& ports_;
   std::uint64_t bad_frames_ = 0;
   std::int64_t span_began_ms_ = 0;
-  std::uint64_t lines_ = 0;  // since then, written or left out
+  // Lines since then, written or left out.
+  std::uint64_t lines_ = 0;
+  std::uint64_t stranger_lines_ = 0;
 };
 
 }  // namespace oblique::server

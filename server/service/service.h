@@ -55,7 +55,7 @@ class Service {
   /// The connection of that client is gone.
   void client_left(std::string_view identity) { clients_.client_left(identity); }
   /// At most 20 such lines in 10 s.
-  void log_peer(const std::string& text) { peer_log_.write(Severity::kWarning, text); }
+  void log_stranger(const std::string& text) { peer_log_.write_of_stranger(text); }
   void written(const WriteReport& report, Instant now);
   void query_report(QueryReport report) { clients_.query_report(std::move(report)); }
   /// To be called several times a second.

@@ -110,6 +110,12 @@ TEST_F(ReadOnlyFolderTest, ADatabaseThatMayNotBeReadIsSaidToBeItsOwnersAlone) {
 TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
   EXPECT_EQ(file_system_of("/dev/shm/none/oblique.db"), "tmpfs");
   EXPECT_EQ(file_system_of("/proc/self/oblique.db"), "proc");
+  for (const char* type : {"nfs4", "cifs", "lustre", "fuse.sshfs", "fuse.gcsfuse"}) {
+    EXPECT_TRUE(is_network_file_system(type)) << type;
+  }
+  for (const char* type : {"ext4", "tmpfs", "overlay", "fuseblk", "fuse.mergerfs"}) {
+    EXPECT_FALSE(is_network_file_system(type)) << type;
+  }
   EXPECT_EQ(objection_to_shared_disk("/dev/shm/oblique.db"), "") << "it is local";
 }
 

@@ -192,6 +192,32 @@ TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U) << "points count once";
 }
 
+TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
+  SchedulerBench bench(settings());
+  bench.feed(StudyAdded{1, table_of(4), {}});
+  bench.join(1, 1);
+  for (const WorkerId id : {11U, 12U, 13U}) {  // newcomers that vanish set aside those that follow
+    bench.feed(StudyAdded{id, table_of(1), {}});
+    bench.join_as("vanishes " + std::to_string(id), id, 1);
+    bench.feed(WorkerUnreachable{id});
+    bench.feed(StudyRemoved{id});
+  }
+  EXPECT_TRUE(only<SendProbe>(bench.join_as("sound", 2, 2)).empty()) << "nothing is left";
+  std::vector<SendProbe> probes;
+  std::vector<SendBatch> batches;
+  for (int i = 0; i < 8 && batches.empty(); ++i) {
+    const auto effects = bench.pass(500, {1, 2});
+    for (const SendProbe& probe : only<SendProbe>(effects)) {
+      probes.push_back(probe);
+      bench.solve_probe(probe);
+    }
+    batches = only<SendBatch>(effects);
+  }
+  EXPECT_EQ(probes.size(), 1U);
+  ASSERT_EQ(batches.size(), 1U);
+  EXPECT_EQ(batches[0].worker, 2U);
+}
+
 TEST_F(StragglerTest, OnlyWhatIsLeftOfTheBatchGoesToTheSecondWorker) {
   answer(first_, {0, 1}, false);
   const SendBatch batch = second();

@@ -96,7 +96,9 @@ TEST_F(StoreTest, TheStateOfAStudyIsKept) {
     commit({study_of(3, id, state_name(state)), SetStudyState{id, state, "later"}});
   }
   close();
-  for (const auto& study : store().studies()) {
+  const auto studies = store().studies();
+  EXPECT_EQ(studies.size(), 3U);
+  for (const auto& study : studies) {
     EXPECT_EQ(study.name, state_name(study.state));
   }
   EXPECT_THAT(rows("SELECT DISTINCT changed_at FROM studies"), ElementsAre("later"));
