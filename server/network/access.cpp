@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -126,9 +127,9 @@ class KeyList {
 
   std::string path_;
   Keys keys_;
-  std::string file_;     // as it was read the last time
-  int empty_reads_ = 0;  // in a row
-  std::string fault_;    // why the list could not be read the last time; empty if it could
+  std::optional<std::string> file_;  // as it was read the last time
+  int empty_reads_ = 0;              // in a row
+  std::string fault_;  // why the list could not be read the last time; empty if it could
 };
 
 bool KeyList::reload() {
@@ -136,10 +137,11 @@ bool KeyList::reload() {
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   try {
     // Thousands of keys take long to parse.
-    std::string file = protocol::read_small_file(path_, "the list of keys", kMostBytes);
-    if (std::exchange(file_, std::move(file)) == file_ && empty_reads_ == 0 && fault_.empty()) {
+    std::optional file = protocol::read_small_file(path_, "the list of keys", kMostBytes);
+    if (file == file_ && empty_reads_ == 0 && fault_.empty()) {
       return false;
     }
+    file_ = std::move(file);
     Keys keys = read();
     empty_reads_ = keys.empty() ? empty_reads_ + 1 : 0;
     if (keys.empty() && empty_reads_ < kEmptyReads) {
