@@ -182,8 +182,7 @@ int run_program(int argc, char** argv, LogSettings& log) {
       "Solves points of parameter studies for an oblique-server.\n"
       "Example: oblique-worker --server tcp://127.0.0.1:7601",
       kProgram);
-  Configuration configuration(
-      app, {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml")});
+  Configuration configuration(app, "OBLIQUE_WORKER_", "worker.toml");
   StopWithParent parent;
   double idle_exit_s = 0.0;
   std::uint64_t fall_memory_bytes = 0;

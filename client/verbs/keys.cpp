@@ -78,7 +78,7 @@ std::optional<protocol::KeyFile> key_in(const std::string& path) {
 void check_not_revoked(const std::string& folder, const std::string& name) {
   const std::string path = protocol::key_file_in(folder, name);
   const std::string list = protocol::authorized_keys_in(folder);
-  if (!protocol::objection_to_key_name(name).empty() || !is_there(path) || !is_there(list)) {
+  if (!protocol::is_key_name(name) || !is_there(path) || !is_there(list)) {
     return;
   }
   const auto listed = protocol::read_authorized_keys(list);
@@ -127,9 +127,6 @@ int list(const KeysFlags& flags) {
 int revoke(const KeysFlags& flags) {
   const std::string folder = protocol::key_folder_meant(flags.folder);
   const std::string path = protocol::authorized_keys_in(folder);
-  if (!std::filesystem::exists(path)) {
-    throw solver::InputError(fmt::format("there is no {}: say where it is with --dir", path));
-  }
   protocol::change_authorized_keys(
       path, [&](protocol::AuthorizedKeys& keys) { keys.remove(flags.name); });
   std::cerr << fmt::format("{} is revoked: its key is worth nothing from now on.\n", flags.name);

@@ -1,6 +1,7 @@
 #include "server/network/access.h"
 
 #include <array>
+#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -155,7 +156,8 @@ AccessControl::AccessControl(const AccessSettings& settings)
     : address_(address_to_bind(settings)), mode_(mode_of(settings)) {
   if (mode_ == AccessMode::kKeys) {
     server_ = read_server_key(settings.keys);
-    list_ = std::make_shared<KeyList>(protocol::authorized_keys_beside(settings.keys));
+    list_ = std::make_shared<KeyList>(
+        protocol::authorized_keys_in(std::filesystem::path(settings.keys).parent_path()));
     spdlog::info("{}; its own public key is {}", list_->text(), protocol::z85(server_.public_key));
   }
 }

@@ -251,8 +251,7 @@ int main(int argc, char** argv) {
       kProgram};
   Options options;
   options.loop.database = "oblique.db";
-  Configuration configuration(
-      app, {"OBLIQUE_SERVER_", oblique::protocol::default_configuration_file("server.toml")});
+  Configuration configuration(app, "OBLIQUE_SERVER_", "server.toml");
   try {
     add_options(app, configuration, parent, options);
     if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {
