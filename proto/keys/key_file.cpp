@@ -37,7 +37,7 @@ constexpr std::size_t kBytesOfGroup = 4;
 constexpr std::size_t kDigitsOfGroup = 5;
 
 /// False unless `text` stands for a key.
-bool decode_z85(std::string_view text, SecretKey::Bytes key) {
+bool decode_z85(std::string_view text, CurveKey& key) {
   if (text.size() != kKeyCharacters) {
     return false;
   }
@@ -78,12 +78,12 @@ std::optional<Role> role_named(std::string_view name) {
 
 SecretKey::SecretKey() {
   if (sodium_init() >= 0) {
-    bytes_.reset(static_cast<std::uint8_t*>(sodium_malloc(Bytes::extent)), sodium_free);
+    bytes_.reset(static_cast<CurveKey*>(sodium_malloc(sizeof(CurveKey))), sodium_free);
   }
   if (!bytes_) {
     throw std::runtime_error("no keys can be used: the system gives no memory or random numbers");
   }
-  std::fill_n(bytes_.get(), Bytes::extent, std::uint8_t{0});
+  bytes_->fill(0);
 }
 
 KeyPair made_key_pair() {
@@ -101,20 +101,17 @@ CurveKey public_half_of(const SecretKey& secret_key) {
 }
 
 // Four bytes are one number, the first byte its highest, and so are five digits.
-std::string z85(SecretKey::ConstBytes key) {
-  std::string text;
-  text.reserve(kKeyCharacters);  // growing would leave parts of a secret key behind
-  for (std::size_t at = 0; at < key.size(); at += kBytesOfGroup) {
+std::string z85(const CurveKey& key) {
+  std::string text(kKeyCharacters, '0');
+  for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
     std::uint32_t number = 0;
     for (std::size_t i = 0; i < kBytesOfGroup; ++i) {
-      number = number << 8U | key[at + i];
+      number = number << 8U | key[group * kBytesOfGroup + i];
     }
-    std::string group(kDigitsOfGroup, '0');
     for (std::size_t i = kDigitsOfGroup; i > 0; --i) {
-      group[i - 1] = kDigits[number % kDigits.size()];
+      text[group * kDigitsOfGroup + i - 1] = kDigits[number % kDigits.size()];
       number /= static_cast<std::uint32_t>(kDigits.size());
     }
-    text += group;
   }
   return text;
 }

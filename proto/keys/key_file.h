@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,18 +24,15 @@ inline constexpr std::size_t kKeyCharacters = 40;
 /// at the end. Copies share that memory.
 class SecretKey {
  public:
-  using Bytes = std::span<std::uint8_t, std::tuple_size_v<CurveKey>>;
-  using ConstBytes = std::span<const std::uint8_t, Bytes::extent>;
-
   /// All zero. Throws std::runtime_error when the system gives no such memory.
   SecretKey();
 
-  const std::uint8_t* data() const { return bytes_.get(); }
-  ConstBytes bytes() const { return ConstBytes(bytes_.get(), Bytes::extent); }
-  Bytes bytes() { return Bytes(bytes_.get(), Bytes::extent); }
+  const CurveKey& bytes() const { return *bytes_; }
+  CurveKey& bytes() { return *bytes_; }
+  const std::uint8_t* data() const { return bytes_->data(); }
 
  private:
-  std::shared_ptr<std::uint8_t> bytes_;
+  std::shared_ptr<CurveKey> bytes_;
 };
 
 enum class Role {
@@ -60,7 +56,7 @@ KeyPair made_key_pair();
 CurveKey public_half_of(const SecretKey& secret_key);
 
 /// A key as 40 printable characters, none of which is a quote, a backslash or a space.
-std::string z85(SecretKey::ConstBytes key);
+std::string z85(const CurveKey& key);
 /// None for a text that is no key.
 std::optional<CurveKey> key_of_z85(std::string_view text);
 
