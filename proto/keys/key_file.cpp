@@ -7,6 +7,7 @@
 #include <ctime>
 #include <filesystem>
 #include <limits>
+#include <regex>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -307,12 +308,8 @@ void write_key_file(const std::string& path, const KeyFile& key) {
 }
 
 bool is_key_name(std::string_view name) {
-  constexpr std::size_t kLongest = 64;
-  constexpr std::string_view kAllowed =
-      "._-@0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
-  return !name.empty() && name.size() <= kLongest &&
-         name.find_first_not_of(kAllowed) == std::string_view::npos &&
-         std::string_view("._-@").find(name.front()) == std::string_view::npos;
+  static const std::regex kName("[A-Za-z0-9][A-Za-z0-9._@-]{0,63}");
+  return std::regex_match(name.begin(), name.end(), kName);
 }
 
 const AuthorizedKey* AuthorizedKeys::find(const CurveKey& public_key) const {
@@ -349,8 +346,8 @@ void AuthorizedKeys::remove(std::string_view name) {
   for (const AuthorizedKey& key : keys_) {
     names.emplace_back(key.name);
   }
-  throw solver::InputError(fmt::format("there is no key called {}{}; `oblique keys list` shows all",
-                                       excerpt(name), did_you_mean(name, names)));
+  throw solver::InputError(fmt::format("there is no key called {}{}; there are: {}", excerpt(name),
+                                       did_you_mean(name, names), joined(names)));
 }
 
 AuthorizedKeys read_authorized_keys(const std::string& path) {
