@@ -83,7 +83,7 @@ std::filesystem::path configuration_folder() {
   std::error_code unknown;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
   const auto prefix = program.parent_path().parent_path();
-  return (prefix == "/usr" ? "/etc" : prefix / "etc") / "oblique";
+  return (unknown || prefix == "/usr" ? "/etc" : prefix / "etc") / "oblique";
 }
 
 }  // namespace

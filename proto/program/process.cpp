@@ -85,7 +85,7 @@ void survive_failed_writes() {
 void add_stop_with_parent(CLI::App& app, pid_t& parent) {
   app.add_option("--stop-with-parent", parent,
                  "Stop when the parent process, which has this id, is gone")
-      ->check(CLI::Range(pid_t{1}, std::numeric_limits<pid_t>::max()))
+      ->check(CLI::Range(pid_t{1}, std::numeric_limits<pid_t>::max()).description(""))
       ->type_name("PID")
       ->default_str("")
       ->configurable(false);
