@@ -7,9 +7,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <ctime>
 #include <exception>
 #include <iostream>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include <spdlog/fmt/fmt.h>
@@ -32,7 +35,6 @@ namespace {
 
 using oblique::protocol::Configuration;
 using oblique::protocol::LogSettings;
-using oblique::protocol::StopWithParent;
 using oblique::worker::SessionSettings;
 
 constexpr const char* kProgram = "oblique-worker";
@@ -59,9 +61,35 @@ std::size_t cores() {
   return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
 }
 
+/// The time from now to `text`, negative for the past: a time in UTC, as 2026-11-22T05:00:00Z, or a
+/// duration, as 90m. Nothing for other text.
+std::optional<std::chrono::milliseconds> time_until(const std::string& text) {
+  using std::chrono::milliseconds;
+  std::tm parts{};
+  const char* const end = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  if (end != nullptr && *end == '\0') {
+    const int day = parts.tm_mday;
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    const milliseconds left =
+        std::chrono::floor<milliseconds>(std::chrono::seconds(timegm(&parts)) - now);
+    // A day that the month does not have has become one of the next month.
+    return parts.tm_mday == day ? std::optional(left) : std::nullopt;
+  }
+  constexpr double kLongest_s = 1e9;
+  constexpr std::array kUnits_s{1.0, 60.0, 3600.0};
+  const std::size_t unit = std::string_view("smh").find(text.empty() ? ' ' : text.back());
+  double value = 0.0;
+  if (unit >= kUnits_s.size() ||
+      !CLI::detail::lexical_cast(text.substr(0, text.size() - 1), value) || !(value >= 0.0) ||
+      value * kUnits_s[unit] > kLongest_s) {
+    return std::nullopt;
+  }
+  return milliseconds(std::llround(value * kUnits_s[unit] * 1000.0));
+}
+
 /// Empty for a time or duration, else what is wrong with it.
 std::string objection_to_until(const std::string& text) {
-  return oblique::protocol::time_until(text, std::chrono::system_clock::now())
+  return time_until(text)
              ? ""
              : "\"" + text +
                    "\" is neither a time, as 2026-11-22T05:00:00Z, nor a duration, as 90m";
@@ -75,7 +103,7 @@ std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
   if (idle_exit_s > 0.0) {
     exit.idle_exit_ms = std::max<std::int64_t>(std::llround(idle_exit_s * 1000.0), 1);
   }
-  const auto left = oblique::protocol::time_until(exit.until, std::chrono::system_clock::now());
+  const auto left = time_until(exit.until);
   if (!left) {
     return {};
   }
@@ -91,12 +119,11 @@ std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
                            exit.until, exit.shutdown_grace_ms / kSecond_ms);
 }
 
-int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes,
-               const StopWithParent& parent) {
+int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t parent) {
   oblique::protocol::Notifier notifier;
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
-  if (!parent.begin()) {
+  if (!oblique::protocol::stop_with_parent(parent)) {
     spdlog::warn("the parent process was gone before this one began");
     return oblique::protocol::kDone;
   }
@@ -134,7 +161,7 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes,
   return exit_code;
 }
 
-void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
+void add_options(CLI::App& app, Configuration& configuration, pid_t& parent,
                  SessionSettings& settings, std::uint64_t& fall_memory_bytes, double& idle_exit_s,
                  std::string& keys, LogSettings& log) {
   app.set_version_flag("--version", "oblique-worker " + oblique::protocol::version_and_commit());
@@ -167,24 +194,24 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
       ->type_name("SECONDS")
       ->capture_default_str()
       ->check(oblique::protocol::number_between(0.0, kLongestIdle_s));
-  parent.add_to(app);
+  oblique::protocol::add_stop_with_parent(app, parent);
   configuration.add_log_options(log);
 }
 
 /// Everything but errors that nobody foresaw.
-int run_program(int argc, char** argv, LogSettings& log) {
+int run_program(int argc, char** argv) {
   oblique::protocol::set_up_log(kProgram);
   oblique::protocol::silence_protobuf();
   SessionSettings settings;
+  LogSettings log;
   std::string keys;
   settings.threads = cores();
   CLI::App app(
       "Solves points of parameter studies for an oblique-server.\n"
       "Example: oblique-worker --server tcp://127.0.0.1:7601",
       kProgram);
-  Configuration configuration(
-      app, {"OBLIQUE_WORKER_", oblique::protocol::default_configuration_file("worker.toml")});
-  StopWithParent parent;
+  Configuration configuration(app, "OBLIQUE_WORKER_", "worker.toml");
+  pid_t parent = 0;
   double idle_exit_s = 0.0;
   std::uint64_t fall_memory_bytes = 0;
   add_options(app, configuration, parent, settings, fall_memory_bytes, idle_exit_s, keys, log);
@@ -220,10 +247,10 @@ int run_program(int argc, char** argv, LogSettings& log) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  LogSettings log;
   try {
-    return run_program(argc, argv, log);
+    return run_program(argc, argv);
   } catch (const std::exception& error) {
-    return oblique::protocol::tell_failure(kProgram, error.what(), log);
+    spdlog::error("{}", error.what());
+    return oblique::protocol::kFailed;
   }
 }

@@ -88,7 +88,7 @@ std::optional<protocol::KeyFile> key_in(const std::string& path) {
 void check_not_revoked(const std::string& folder, const std::string& name) {
   const std::string path = protocol::key_file_in(folder, name);
   const std::string list = protocol::authorized_keys_in(folder);
-  if (!protocol::objection_to_key_name(name).empty() || !is_there(path) || !is_there(list)) {
+  if (!protocol::is_key_name(name) || !is_there(path) || !is_there(list)) {
     return;
   }
   const auto listed = protocol::read_authorized_keys(list);
@@ -157,9 +157,6 @@ int list(const KeysFlags& flags, Console&) {
 int revoke(const KeysFlags& flags, Console& console) {
   const std::string folder = protocol::key_folder_meant(flags.folder);
   const std::string path = protocol::authorized_keys_in(folder);
-  if (!is_there(path)) {
-    throw solver::InputError(fmt::format("there is no {}: say where it is with --dir", path));
-  }
   protocol::change_authorized_keys(
       path, [&](protocol::AuthorizedKeys& keys) { keys.remove(flags.name); });
   console.notes() << fmt::format("{} is revoked: its key is worth nothing from now on.\n",

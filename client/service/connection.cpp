@@ -99,7 +99,8 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
   }
   connections_before_ = monitor_.connections();
   connecting_since_ = now;
-  protocol::connect_again(socket_, dealer_settings(settings_), attempt_);
+  socket_.disconnect(settings_.server_url);
+  protocol::connect(socket_, dealer_settings(settings_), attempt_);
 }
 
 void Connection::wait_a_slice(bool to_send) {

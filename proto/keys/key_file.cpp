@@ -5,15 +5,11 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <exception>
 #include <filesystem>
-#include <iterator>
 #include <limits>
-#include <memory>
-#include <new>
+#include <regex>
 #include <span>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
 #include <fcntl.h>
@@ -42,7 +38,7 @@ constexpr std::size_t kBytesOfGroup = 4;
 constexpr std::size_t kDigitsOfGroup = 5;
 
 /// False unless `text` stands for a key.
-bool decode_z85(std::string_view text, SecretKey::Bytes key) {
+bool decode_z85(std::string_view text, CurveKey& key) {
   if (text.size() != kKeyCharacters) {
     return false;
   }
@@ -82,18 +78,13 @@ std::optional<Role> role_named(std::string_view name) {
 }
 
 SecretKey::SecretKey() {
-  if (sodium_init() < 0) {
-    throw std::runtime_error("no keys can be used: the system gives no random numbers");
+  if (sodium_init() >= 0) {
+    bytes_.reset(static_cast<CurveKey*>(sodium_malloc(sizeof(CurveKey))), sodium_free);
   }
-  bytes_.reset(static_cast<std::uint8_t*>(sodium_malloc(Bytes::extent)), sodium_free);
   if (!bytes_) {
-    throw std::bad_alloc();
+    throw std::runtime_error("no keys can be used: the system gives no memory or random numbers");
   }
-  std::fill_n(bytes_.get(), Bytes::extent, std::uint8_t{0});
-}
-
-bool SecretKey::operator==(const SecretKey& other) const {
-  return sodium_memcmp(data(), other.data(), Bytes::extent) == 0;
+  bytes_->fill(0);
 }
 
 KeyPair made_key_pair() {
@@ -111,20 +102,17 @@ CurveKey public_half_of(const SecretKey& secret_key) {
 }
 
 // Four bytes are one number, the first byte its highest, and so are five digits.
-std::string z85(SecretKey::ConstBytes key) {
-  std::string text;
-  text.reserve(kKeyCharacters);  // growing would leave parts of a secret key behind
-  for (std::size_t at = 0; at < key.size(); at += kBytesOfGroup) {
+std::string z85(const CurveKey& key) {
+  std::string text(kKeyCharacters, '0');
+  for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
     std::uint32_t number = 0;
     for (std::size_t i = 0; i < kBytesOfGroup; ++i) {
-      number = number << 8U | key[at + i];
+      number = number << 8U | key[group * kBytesOfGroup + i];
     }
-    std::string group(kDigitsOfGroup, '0');
     for (std::size_t i = kDigitsOfGroup; i > 0; --i) {
-      group[i - 1] = kDigits[number % kDigits.size()];
+      text[group * kDigitsOfGroup + i - 1] = kDigits[number % kDigits.size()];
       number /= static_cast<std::uint32_t>(kDigits.size());
     }
-    text += group;
   }
   return text;
 }
@@ -132,11 +120,6 @@ std::string z85(SecretKey::ConstBytes key) {
 std::optional<CurveKey> key_of_z85(std::string_view text) {
   CurveKey key{};
   return decode_z85(text, key) ? std::optional(key) : std::nullopt;
-}
-
-std::optional<SecretKey> secret_key_of_z85(std::string_view text) {
-  SecretKey key;
-  return decode_z85(text, key.bytes()) ? std::optional(key) : std::nullopt;
 }
 
 namespace {
@@ -147,49 +130,47 @@ using Fields = std::span<const std::string_view>;
 constexpr std::array<std::string_view, 5> kFileFields{"role", "name", "public", "secret", "server"};
 constexpr std::array<std::string_view, 4> kEntryFields{"name", "role", "public", "added_at"};
 constexpr std::array<std::string_view, 1> kListFields{"key"};
+constexpr std::string_view kNameRule =
+    "has 1 to 64 letters, digits or . _ - @, and begins with a letter or digit";
 
 /// The fields of one table of a file. Errors never show a value, which may be a secret.
 class KeyFields {
  public:
-  KeyFields(const TomlReader& file, const toml::table& table) : file_(file), table_(table) {}
+  /// Refuses fields other than the `known` ones.
+  KeyFields(const TomlReader& file, const toml::table& table, Fields known)
+      : file_(file), table_(table) {
+    file.refuse_unknown(table, known, "", "allowed are " + joined(known));
+  }
 
+  [[noreturn]] void fail(std::string_view field, std::string_view rule) const {
+    const toml::node* node = table_.get(field);
+    file_.fail(node == nullptr ? table_ : *node, fmt::format("`{}` {}", field, rule));
+  }
   std::string text(std::string_view field) const {
     const toml::node* node = table_.get(field);
-    if (node == nullptr) {
-      file_.fail(table_, fmt::format("`{}` is missing", field));
-    }
-    if (!node->is_string()) {
-      file_.fail(*node, fmt::format("`{}` must be a text in quotes", field));
+    if (node == nullptr || !node->is_string()) {
+      fail(field, node == nullptr ? "is missing" : "must be a text in quotes");
     }
     return *node->value<std::string>();
   }
   Role role() const {
-    const auto role = role_named(text("role"));
-    require("role", role.has_value(),
-            "`role` must be \"server\", \"client\", \"worker\" or \"reader\"");
-    return *role;
+    if (const auto role = role_named(text("role"))) {
+      return *role;
+    }
+    fail("role", R"(must be "server", "client", "worker" or "reader")");
   }
   CurveKey key(std::string_view field) const {
-    const auto key = key_of_z85(text(field));
-    require(field, key.has_value(),
-            fmt::format("`{}` is no key: one has {} characters, as `oblique keygen` writes them",
-                        field, kKeyCharacters));
-    return *key;
+    if (const auto key = key_of_z85(text(field))) {
+      return *key;
+    }
+    fail(field, "is no key: one has 40 characters, as `oblique keygen` writes them");
   }
   std::string name() const {
     std::string name = text("name");
-    const std::string objection = objection_to_key_name(name);
-    require("name", objection.empty(), "`name`: " + objection);
-    return name;
-  }
-  void refuse_unknown(Fields known, std::string_view what) const {
-    file_.refuse_unknown(table_, known, "", fmt::format("{} has {}", what, joined(known)));
-  }
-  /// Throws an error about a field that exists, unless `is_met`.
-  void require(std::string_view field, bool is_met, const std::string& message) const {
-    if (!is_met) {
-      file_.fail(*table_.get(field), message);
+    if (!is_key_name(name)) {
+      fail("name", kNameRule);
     }
+    return name;
   }
 
  private:
@@ -208,93 +189,43 @@ struct stat status_of(const std::string& path) {
   return file;
 }
 
-std::string folder_of(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  return folder.empty() ? "." : folder.string();
+bool exists(const std::string& path) {
+  return std::filesystem::exists(std::filesystem::symlink_status(path));
 }
 
-/// Flushes the names in a file's folder to the disk. Not every file system does that.
-void flush_folder_of(const std::string& path) {
-  const Descriptor opened(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  static_cast<void>(::fsync(opened.number()));
-}
-
-/// Writes a new file with `text` and flushes it to the disk with its name; removes it if that
-/// fails. It gets owner and mode of the file `like`, if that exists.
-void write_new_file(const std::string& path, std::string_view text, const std::string& like = "") {
-  const Descriptor file(
-      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, kOwnersAlone));
-  if (!file.is_open() && errno == EEXIST) {
-    throw std::runtime_error(path + " is there already, and is never overwritten");
+/// Opens the folder of a file.
+Descriptor opened_folder_of(const std::string& path) {
+  const std::string folder = std::filesystem::absolute(path).parent_path();
+  Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!opened.is_open()) {
+    fail_to("cannot open the folder", folder);
   }
+  return opened;
+}
+
+/// Writes a new file of mode 0600 and flushes it to the disk with its name; removes it if that
+/// fails.
+void write_new_file(const std::string& path, std::string_view text) {
+  const Descriptor file(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnersAlone));
   if (!file.is_open()) {
     fail_to("cannot make", path);
   }
-  try {
-    const struct stat other = status_of(like);
-    if (other.st_mode != 0 && (::fchown(file.number(), other.st_uid, other.st_gid) != 0 ||
-                               ::fchmod(file.number(), other.st_mode & 07777U) != 0)) {
-      fail_to("cannot keep owner and mode of", like);
-    }
-    while (!text.empty()) {
-      const ssize_t written = ::write(file.number(), text.data(), text.size());
-      if (written < 0 && errno != EINTR) {
-        fail_to("cannot write", path);
-      }
-      text.remove_prefix(written < 0 ? 0 : static_cast<std::size_t>(written));
-    }
-    if (::fsync(file.number()) != 0) {
-      fail_to("cannot write", path);
-    }
-  } catch (const std::runtime_error&) {
+  const ssize_t written = ::write(file.number(), text.data(), text.size());
+  if (written != static_cast<ssize_t>(text.size()) || ::fsync(file.number()) != 0) {
     ::unlink(path.c_str());
-    throw;
+    fail_to("cannot write", path);
   }
-  flush_folder_of(path);
+  static_cast<void>(::fsync(opened_folder_of(path).number()));  // not every file system does that
 }
 
-/// Locks the folder of a list against other processes that change the list.
-Descriptor locked_folder_of(const std::string& path) {
-  Descriptor folder(::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!folder.is_open()) {
-    fail_to("cannot open the folder", folder_of(path));
-  }
-  while (::flock(folder.number(), LOCK_EX) != 0) {
-    if (errno != EINTR) {
-      fail_to("cannot lock the folder of", path);
-    }
-  }
-  return folder;
-}
-
-/// Refuses a file or folder that has one of the mode bits `refused`. Reading reports why a file
-/// cannot be read.
-void refuse_mode(std::string_view what, const std::string& path, mode_t refused,
-                 std::string_view risk, std::string_view remedy) {
+/// Refuses a file or folder whose mode has one of the bits `refused`.
+void refuse_mode(const std::string& path, mode_t refused, std::string_view risk,
+                 std::string_view remedy) {
   if (const mode_t mode = status_of(path).st_mode; (mode & refused) != 0) {
     throw solver::InputError(
-        fmt::format("{} {} has mode {:04o}: {}, so it is not used. Mend it with: chmod {} '{}'",
-                    what, path, mode & 07777U, risk, remedy, path));
-  }
-}
-
-/// A reader of a secret key can pass for its owner.
-void check_readers(const std::string& path) {
-  const struct stat file = status_of(path);
-  const bool is_ours = file.st_uid == ::geteuid();
-  if (S_ISREG(file.st_mode)) {
-    refuse_mode("the key file", path, is_ours ? S_IRWXG | S_IRWXO : S_IRWXO,
-                "others than its owner can use the secret key in it", is_ours ? "600" : "o=");
-  }
-}
-
-/// Anyone who can write or replace the list can add a key.
-void check_writers(const std::string& path) {
-  constexpr std::string_view kRisk = "everybody could add a key";
-  refuse_mode("the list of keys", path, S_IWOTH, kRisk, "o-w");
-  const std::string folder = folder_of(path);
-  if ((status_of(folder).st_mode & S_ISVTX) == 0) {
-    refuse_mode("the folder of the list of keys,", folder, S_IWOTH, kRisk, "o-w");
+        fmt::format("{} has mode {:04o}: {}, so it is not used. Mend it with: chmod {} '{}'", path,
+                    mode & 07777U, risk, remedy, path));
   }
 }
 
@@ -303,27 +234,12 @@ void check_writers(const std::string& path) {
 std::optional<SecretKey> take_secret(std::string& text) {
   const std::size_t line = text.starts_with("secret") ? 0 : text.find("\nsecret");
   const std::size_t quote = text.find_first_of("\"'", line);
-  if (line == std::string::npos || quote == std::string::npos) {
+  SecretKey key;
+  if (quote == std::string::npos ||
+      !decode_z85(std::string_view(text).substr(quote + 1, kKeyCharacters), key.bytes())) {
     return std::nullopt;
   }
-  std::optional<SecretKey> key =
-      secret_key_of_z85(std::string_view(text).substr(quote + 1, kKeyCharacters));
-  if (key) {
-    text.replace(quote + 1, kKeyCharacters, kKeyCharacters, '0');
-  }
-  return key;
-}
-
-AuthorizedKey entry_of(const TomlReader& file, const toml::node& node) {
-  const auto* table = node.as_table();
-  if (table == nullptr) {
-    file.fail(node, "`key` must be tables, as [[key]]");
-  }
-  const KeyFields fields(file, *table);
-  fields.refuse_unknown(kEntryFields, "an entry");
-  AuthorizedKey key{fields.name(), fields.role(), fields.key("public"), fields.text("added_at")};
-  fields.require("role", key.role != Role::kServer,
-                 "`role` must be \"client\", \"worker\" or \"reader\": a server is no peer");
+  text.replace(quote + 1, kKeyCharacters, kKeyCharacters, '0');
   return key;
 }
 
@@ -339,68 +255,61 @@ std::string text_of(const AuthorizedKeys& keys) {
   return text;
 }
 
-bool exists(const std::string& path) {
-  return std::filesystem::exists(std::filesystem::symlink_status(path));
-}
-
 }  // namespace
 
 KeyFile read_key_file(const std::string& path) {
-  check_readers(path);
+  const struct stat about = status_of(path);
+  const bool is_ours = about.st_uid == ::geteuid();
+  if (S_ISREG(about.st_mode)) {
+    refuse_mode(path, is_ours ? S_IRWXG | S_IRWXO : S_IRWXO,
+                "others than its owner can use the secret key in it", is_ours ? "600" : "o=");
+  }
   std::string text = read_small_file(path, "the key file", kMostBytes);
   const std::optional<SecretKey> secret = take_secret(text);
   const TomlReader file(path);
   const toml::table top = file.parse(text);
-  const KeyFields fields(file, top);
+  const KeyFields fields(file, top, kFileFields);
   KeyFile key;
   key.path = path;
   key.role = fields.role();
-  const bool is_server = key.role == Role::kServer;
-  fields.refuse_unknown(Fields(kFileFields).first(is_server ? 4 : 5),
-                        is_server ? "the server's key file" : "a key file");
   key.name = fields.name();
   key.pair.public_key = fields.key("public");
-  fields.require("secret", fields.key("secret") == CurveKey{} && secret,
-                 "`secret` must begin its line, as secret = \"KEY\"");
+  if (fields.key("secret") != CurveKey{} || !secret) {
+    fields.fail("secret", "must begin its line, as secret = \"KEY\"");
+  }
   key.pair.secret_key = *secret;
-  fields.require("secret", public_half_of(key.pair.secret_key) == key.pair.public_key,
-                 "`secret` is not the other half of `public`");
-  if (!is_server) {
+  if (public_half_of(*secret) != key.pair.public_key) {
+    fields.fail("secret", "is not the other half of `public`");
+  }
+  if (key.role != Role::kServer) {
     key.server = fields.key("server");
   }
   return key;
 }
 
 void write_key_file(const std::string& path, const KeyFile& key) {
+  struct Wiped {
+    std::string text = {};
+    ~Wiped() { sodium_memzero(text.data(), text.size()); }
+  };
   constexpr std::size_t kLongest = 1024;  // growing would leave parts of the secret key behind
-  std::string secret = z85(key.pair.secret_key.bytes());
-  std::string text;
-  text.reserve(kLongest);
-  fmt::format_to(std::back_inserter(text),
-                 "# A key of oblique: whoever can read this file can pass for its owner.\n"
-                 "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\nsecret = \"",
-                 name_of(key.role), key.name, z85(key.pair.public_key));
-  (text += secret) += "\"\n";
+  const Wiped secret{z85(key.pair.secret_key.bytes())};
+  Wiped file;
+  file.text.reserve(kLongest);
+  file.text += fmt::format(
+      "# A key of oblique: whoever can read this file can pass for its owner.\n"
+      "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\nsecret = \"",
+      name_of(key.role), key.name, z85(key.pair.public_key));
+  (file.text += secret.text) += "\"\n";
   if (key.server) {
-    text += fmt::format("server = \"{}\"  # public key\n", z85(*key.server));
+    file.text += fmt::format("server = \"{}\"  # public key\n", z85(*key.server));
   }
-  const auto wiped = [](std::string* bytes) { sodium_memzero(bytes->data(), bytes->size()); };
-  const std::unique_ptr<std::string, decltype(wiped)> wipes_secret(&secret, wiped);
-  const std::unique_ptr<std::string, decltype(wiped)> wipes_text(&text, wiped);
-  write_new_file(path, text);
+  write_new_file(path, file.text);
 }
 
-std::string objection_to_key_name(std::string_view name) {
-  constexpr std::size_t kLongest = 64;
-  constexpr std::string_view kAllowed =
-      "._-@0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
-  const bool is_allowed = !name.empty() && name.size() <= kLongest &&
-                          name.find_first_not_of(kAllowed) == std::string_view::npos &&
-                          kAllowed.find(name.front()) >= std::string_view("._-@").size();
-  return is_allowed
-             ? ""
-             : "the name of a key has 1 to 64 letters, digits or . _ - @, and begins with a letter "
-               "or digit";
+bool is_key_name(std::string_view name) {
+  static const std::regex kName("[A-Za-z0-9][A-Za-z0-9._@-]{0,63}");
+  return std::regex_match(name.begin(), name.end(), kName);
 }
 
 const AuthorizedKey* AuthorizedKeys::find(const CurveKey& public_key) const {
@@ -416,8 +325,8 @@ const AuthorizedKey* AuthorizedKeys::find(std::string_view name) const {
 }
 
 void AuthorizedKeys::add(AuthorizedKey key) {
-  if (const std::string objection = objection_to_key_name(key.name); !objection.empty()) {
-    throw solver::InputError(objection);
+  if (!is_key_name(key.name)) {
+    throw solver::InputError(fmt::format("the name of a key {}", kNameRule));
   }
   if (find(key.name) != nullptr) {
     throw solver::InputError(fmt::format("there is a key called {} already", key.name));
@@ -437,30 +346,35 @@ void AuthorizedKeys::remove(std::string_view name) {
   for (const AuthorizedKey& key : keys_) {
     names.emplace_back(key.name);
   }
-  throw solver::InputError(fmt::format("there is no key called {}{}; there {}", excerpt(name),
-                                       did_you_mean(name, names),
-                                       names.empty() ? "is none" : "are: " + joined(names)));
-}
-
-std::string authorized_keys_beside(const std::string& server_key_file) {
-  return (std::filesystem::path(server_key_file).parent_path() / "authorized_keys.toml").string();
+  throw solver::InputError(fmt::format("there is no key called {}{}; there are: {}", excerpt(name),
+                                       did_you_mean(name, names), joined(names)));
 }
 
 AuthorizedKeys read_authorized_keys(const std::string& path) {
-  check_writers(path);
+  constexpr std::string_view kRisk = "everybody could add a key";
+  const std::string folder = std::filesystem::absolute(path).parent_path();
+  refuse_mode(path, S_IWOTH, kRisk, "o-w");
+  if ((status_of(folder).st_mode & S_ISVTX) == 0) {
+    refuse_mode(folder, S_IWOTH, kRisk, "o-w");
+  }
   const TomlReader file(path);
   const toml::table top = file.parse(read_small_file(path, "the list of keys", kMostBytes));
-  KeyFields(file, top).refuse_unknown(kListFields, "a list of keys");
+  const KeyFields fields(file, top, kListFields);
   AuthorizedKeys keys;
-  const toml::node* list = top.get("key");
-  if (list == nullptr) {
+  if (top.empty()) {
     return keys;
   }
-  if (!list->is_array()) {
-    file.fail(*list, "`key` must be tables, as [[key]]");
+  const toml::array* list = top["key"].as_array();
+  if (list == nullptr || !list->is_homogeneous<toml::table>()) {
+    fields.fail("key", "must be tables, as [[key]]");
   }
-  for (const toml::node& node : *list->as_array()) {
-    file.located(node, [&, key = entry_of(file, node)] { keys.add(key); });
+  for (const toml::node& node : *list) {
+    const KeyFields entry(file, *node.as_table(), kEntryFields);
+    AuthorizedKey key{entry.name(), entry.role(), entry.key("public"), entry.text("added_at")};
+    if (key.role == Role::kServer) {
+      entry.fail("role", R"(must be "client", "worker" or "reader": a server is no peer)");
+    }
+    file.located(node, [&] { keys.add(std::move(key)); });
   }
   return keys;
 }
@@ -468,31 +382,25 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change) {
   // Of a link the file that it leads to is replaced: another one may lead there too.
-  std::error_code is_new;
-  const auto real = std::filesystem::canonical(path, is_new);
-  const std::string target = is_new ? path : real.string();
-  const Descriptor lock = locked_folder_of(target);
+  const std::string target = std::filesystem::weakly_canonical(path);
+  const Descriptor folder = opened_folder_of(target);
+  if (::flock(folder.number(), LOCK_EX) != 0) {
+    fail_to("cannot lock the folder of", path);
+  }
+  const struct stat before = status_of(target);
   AuthorizedKeys keys = exists(target) ? read_authorized_keys(path) : AuthorizedKeys();
   change(keys);
-  const std::string text = text_of(keys);
-  if (text.size() > kMostBytes) {
-    throw solver::InputError(
-        fmt::format("the list of keys {} would have {} bytes, and one of more than {} is not read: "
-                    "revoke keys that nobody uses",
-                    path, text.size(), kMostBytes));
-  }
   const std::string draft = target + ".new";
   ::unlink(draft.c_str());  // left by a process that was killed
-  write_new_file(draft, text, target);
-  if (::rename(draft.c_str(), target.c_str()) != 0) {
-    ::unlink(draft.c_str());
+  write_new_file(draft, text_of(keys));
+  // A server of another user must still be able to read it.
+  const bool has_owner_and_mode =
+      before.st_mode == 0 || (::chown(draft.c_str(), before.st_uid, before.st_gid) == 0 &&
+                              ::chmod(draft.c_str(), before.st_mode & 07777U) == 0);
+  if (!has_owner_and_mode || ::rename(draft.c_str(), target.c_str()) != 0) {
     fail_to("cannot replace", path);
   }
-  flush_folder_of(target);
-}
-
-std::string utc_now() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  static_cast<void>(::fsync(folder.number()));
 }
 
 std::string key_file_in(const std::string& folder, const std::string& name) {
@@ -500,81 +408,57 @@ std::string key_file_in(const std::string& folder, const std::string& name) {
 }
 
 std::string authorized_keys_in(const std::string& folder) {
-  return authorized_keys_beside(key_file_in(folder, "server"));
+  return (std::filesystem::path(folder) / "authorized_keys.toml").string();
 }
 
 std::string key_folder_meant(const std::string& named) {
   const auto has_keys = [](const std::string& folder) {
-    return exists(authorized_keys_in(folder)) || exists(key_file_in(folder, "server"));
+    return exists(key_file_in(folder, "server"));
   };
-  std::string folder = named;
-  if (folder.empty()) {
-    folder = !has_keys(".") && has_keys("keys") ? "keys" : ".";
-  }
+  const std::string found = !has_keys(".") && has_keys("keys") ? "keys" : ".";
+  const std::string& folder = named.empty() ? found : named;
   if (!has_keys(folder)) {
     throw solver::InputError(
         fmt::format("there is no {}: name the folder of the server's keys with --dir DIR",
-                    authorized_keys_in(folder)));
+                    key_file_in(folder, "server")));
   }
   return folder;
 }
 
 CurveKey make_key_folder(const std::string& folder) {
   constexpr mode_t kFolderMode = 0700;
-  std::vector<std::string> made;
-  if (::mkdir(folder.c_str(), kFolderMode) == 0) {
-    made.push_back(folder);
-  } else if (errno != EEXIST) {
+  if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
     fail_to("cannot make the folder", folder);
   }
-  const std::string list = authorized_keys_in(folder);
-  if (exists(list)) {
-    throw std::runtime_error(list + " is there already, and is never overwritten");
+  std::vector<std::string> paths{authorized_keys_in(folder)};
+  for (const std::string_view role : kRoles) {
+    paths.push_back(key_file_in(folder, std::string(role)));
+  }
+  for (const std::string& path : paths) {
+    if (exists(path)) {
+      throw std::runtime_error(path + " is there already, and is never overwritten");
+    }
   }
   const KeyPair server = made_key_pair();
-  try {
-    write_key_file(key_file_in(folder, "server"), {Role::kServer, "server", server});
-    made.insert(made.end(), {key_file_in(folder, "server"), list});
-    for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
-      const std::string name(name_of(role));
-      add_key(folder, name, role, std::nullopt);
-      made.push_back(key_file_in(folder, name));
-    }
-  } catch (const std::exception&) {
-    for (auto path = made.rbegin(); path != made.rend(); ++path) {
-      ::remove(path->c_str());
-    }
-    throw;
+  write_key_file(key_file_in(folder, "server"), {Role::kServer, "server", server});
+  for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
+    add_key(folder, std::string(name_of(role)), role, std::nullopt);
   }
   return server.public_key;
 }
 
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key) {
-  const std::string server_file = key_file_in(folder, "server");
-  const KeyFile server = read_key_file(server_file);
-  if (server.role != Role::kServer) {
-    throw solver::InputError(fmt::format("{} is the key of a {}, and not of a server", server_file,
-                                         name_of(server.role)));
-  }
+  const KeyFile server = read_key_file(key_file_in(folder, "server"));
   const KeyPair pair = public_key ? KeyPair{*public_key, {}} : made_key_pair();
-  const AuthorizedKey added{name, role, pair.public_key, utc_now()};
-  const std::string file = key_file_in(folder, name);
-  bool has_file = false;
-  try {
-    change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
-      keys.add(added);
-      if (!public_key) {
-        write_key_file(file, {role, name, pair, server.pair.public_key});
-        has_file = true;
-      }
-    });
-  } catch (...) {
-    if (has_file) {
-      ::unlink(file.c_str());
+  AuthorizedKey added{name, role, pair.public_key,
+                      fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))};
+  change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
+    keys.add(added);
+    if (!public_key) {
+      write_key_file(key_file_in(folder, name), {role, name, pair, server.pair.public_key});
     }
-    throw;
-  }
+  });
   return added;
 }
 

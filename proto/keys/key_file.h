@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,21 +24,15 @@ inline constexpr std::size_t kKeyCharacters = 40;
 /// at the end. Copies share that memory.
 class SecretKey {
  public:
-  using Bytes = std::span<std::uint8_t, std::tuple_size_v<CurveKey>>;
-  using ConstBytes = std::span<const std::uint8_t, Bytes::extent>;
-
-  /// All zero. Throws std::runtime_error when the system gives no random numbers, else
-  /// std::bad_alloc.
+  /// All zero. Throws std::runtime_error when the system gives no such memory.
   SecretKey();
 
-  const std::uint8_t* data() const { return bytes_.get(); }
-  ConstBytes bytes() const { return ConstBytes(bytes_.get(), Bytes::extent); }
-  /// To fill in a new key, before it is copied.
-  Bytes bytes() { return Bytes(bytes_.get(), Bytes::extent); }
-  bool operator==(const SecretKey& other) const;
+  const CurveKey& bytes() const { return *bytes_; }
+  CurveKey& bytes() { return *bytes_; }
+  const std::uint8_t* data() const { return bytes_->data(); }
 
  private:
-  std::shared_ptr<std::uint8_t> bytes_;
+  std::shared_ptr<CurveKey> bytes_;
 };
 
 enum class Role {
@@ -63,10 +56,9 @@ KeyPair made_key_pair();
 CurveKey public_half_of(const SecretKey& secret_key);
 
 /// A key as 40 printable characters, none of which is a quote, a backslash or a space.
-std::string z85(SecretKey::ConstBytes key);
+std::string z85(const CurveKey& key);
 /// None for a text that is no key.
 std::optional<CurveKey> key_of_z85(std::string_view text);
-std::optional<SecretKey> secret_key_of_z85(std::string_view text);
 
 /// The content of the key file of a program.
 struct KeyFile {
@@ -77,16 +69,15 @@ struct KeyFile {
   std::string path = {};                ///< of the file that it was read from
 };
 
-/// Throws solver::InputError unless the file is complete and private. As with ssh, a file of ours
-/// that the group may read is refused, and any that others may read, with the chmod as the remedy.
+/// Throws solver::InputError unless the file is complete and private (README.md).
 KeyFile read_key_file(const std::string& path);
 
 /// Writes a new file of mode 0600 and flushes it to the disk. Throws std::runtime_error, also when
 /// the file exists: it is never overwritten.
 void write_key_file(const std::string& path, const KeyFile& key);
 
-/// Why a key cannot have this name, or an empty text. A file can have an allowed name too.
-std::string objection_to_key_name(std::string_view name);
+/// Whether a key, and its file, can have this name.
+bool is_key_name(std::string_view name);
 
 /// A key that the server admits.
 struct AuthorizedKey {
@@ -107,7 +98,7 @@ class AuthorizedKeys {
 
   /// Throws solver::InputError when the name or the key exists or the name is not allowed.
   void add(AuthorizedKey key);
-  /// Throws solver::InputError, with the known names, for an unknown name.
+  /// Throws solver::InputError for an unknown name.
   void remove(std::string_view name);
 
  private:
@@ -124,24 +115,20 @@ AuthorizedKeys read_authorized_keys(const std::string& path);
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change);
 
-/// The time now, as in `added_at`.
-std::string utc_now();
-
 // Paths of the files in a folder with the keys of a server.
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
-std::string authorized_keys_beside(const std::string& server_key_file);
 
 /// `named` or, if that is empty, the current folder or the `keys` in it. Throws solver::InputError
-/// for a folder without a server's key or list.
+/// for a folder without a server's key.
 std::string key_folder_meant(const std::string& named);
 
 /// Makes server.key, client.key, worker.key, reader.key and the list with the last three, and a
 /// missing folder with mode 0700. Returns the server's public key. Throws std::runtime_error when
-/// one of them exists or cannot be made; then what was made is removed.
+/// one of them exists, before it makes any, or cannot be made.
 CurveKey make_key_folder(const std::string& folder);
 
-/// Lists `public_key`, or the key of a new pair, which is written to NAME.key. Throws
+/// Lists `public_key`, or the key of a new pair, which is written to NAME.key first. Throws
 /// solver::InputError when name or key are listed already or the server's key cannot be read, and
 /// std::runtime_error when a file cannot be written or exists; then nothing is listed.
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,

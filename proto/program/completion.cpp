@@ -1,8 +1,12 @@
+#include "proto/program/usage.h"
 
 #include <iostream>
+#include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
-#include "proto/program/usage.h"
+#include <spdlog/fmt/fmt.h>
 
 namespace oblique::protocol {
 namespace {
@@ -85,65 +89,63 @@ std::string quoted(const std::string& text) {
   return "'" + replaced(text, "'", R"('\'')") + "'";
 }
 
-/// The cases of a script.
-class Cases {
- public:
-  explicit Cases(const ValueWords& words) : words_(words) {}
+/// The name of a check that is never active and that help does not show: CLI11 keeps no other notes
+/// with options.
+constexpr const char* kChoices = "choices";
 
-  /// Adds those of a verb, which is reached by the words `path`, and of its verbs.
-  void add(CLI::App& verb, const std::string& path) {
-    const std::string before = path.empty() ? "" : path + ' ';
-    std::string offers;
-    std::string without_words;
-    for (auto* each : verb.get_subcommands({})) {
-      offers += ' ' + quoted(each->get_name());
-      add(*each, before + each->get_name());
+/// The words that complete a value, each in quotes and after a space.
+std::string values_of(CLI::Option& option, const ValueWords& words) {
+  std::vector<std::string> values;
+  for (const std::string& key : {option.get_name(), option.get_type_name()}) {
+    if (const auto known = words.find(key); known != words.end()) {
+      values = known->second;
     }
-    for (auto* option : verb.get_options()) {
-      const std::string values = values_of(*option);
-      offers += option->get_positional() ? values : "";
-      for (const std::string& name : option->get_lnames()) {
-        const std::string flag = "--" + name;
-        offers += ' ' + quoted(flag);
-        if (!values.empty()) {
-          add_case(quoted(before + flag), values);
-        } else if (option->get_items_expected_min() > 0) {
-          without_words += (without_words.empty() ? "" : "|") + quoted(before + flag);
-        }
+  }
+  try {
+    // The description of an inactive check is empty.
+    values = CLI::detail::split(option.get_validator(kChoices)->active().get_description(), ' ');
+    option.get_validator(kChoices)->active(false);
+  } catch (const CLI::OptionNotFound&) {  // no choices are noted
+  }
+  std::string offers;
+  for (const std::string& value : values) {
+    offers += ' ' + quoted(value);
+  }
+  return offers;
+}
+
+/// The cases of a verb, which is reached by the words `path`, and of its verbs.
+std::string cases_of(CLI::App& verb, const std::string& path, const ValueWords& words) {
+  std::string cases;
+  std::string offers;
+  const auto add_case = [&cases](const std::string& key, const std::string& values) {
+    cases += "    " + quoted(key) + ") offers=(" + values + ") ;;\n";
+  };
+  const std::string before = path.empty() ? "" : path + ' ';
+  for (auto* each : verb.get_subcommands({})) {
+    offers += ' ' + quoted(each->get_name());
+    cases += cases_of(*each, before + each->get_name(), words);
+  }
+  for (auto* option : verb.get_options()) {
+    const std::string values = values_of(*option, words);
+    offers += option->get_positional() ? values : "";
+    for (const std::string& name : option->get_lnames()) {
+      offers += ' ' + quoted("--" + name);
+      if (option->get_items_expected_max() > 0) {
+        add_case(before + "--" + name, values);
       }
     }
-    if (!without_words.empty()) {
-      add_case(without_words, "");
-    }
-    add_case(quoted(path), offers);
   }
-
-  const std::string& text() const { return text_; }
-
- private:
-  void add_case(const std::string& keys, const std::string& offers) {
-    text_ += "    " + keys + ") offers=(" + offers + ") ;;\n";
-  }
-
-  std::string values_of(CLI::Option& option) const {
-    std::vector<std::string> values = choices_of(option);
-    for (const std::string& key : {option.get_type_name(), option.get_name()}) {
-      if (const auto known = words_.find(key); values.empty() && known != words_.end()) {
-        values = known->second;
-      }
-    }
-    std::string offers;
-    for (const std::string& value : values) {
-      offers += ' ' + quoted(value);
-    }
-    return offers;
-  }
-
-  const ValueWords& words_;
-  std::string text_;
-};
+  add_case(path, offers);
+  return cases;
+}
 
 }  // namespace
+
+CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices) {
+  return option->check(
+      CLI::Validator(fmt::format("{}", fmt::join(choices, " "))).name(kChoices).active(false));
+}
 
 std::optional<int> print_completion(CLI::App& app, int argc, const char* const* argv,
                                     const ValueWords& words) {
@@ -154,11 +156,10 @@ std::optional<int> print_completion(CLI::App& app, int argc, const char* const* 
   if (shell != "bash" && shell != "zsh") {
     return tell_wrong_usage(app.get_name(), "write `completion bash` or `completion zsh`");
   }
-  Cases cases(words);
-  cases.add(app, "");
   const std::string script =
       replaced(std::string(shell == "zsh" ? kZsh : kBash), "BOTH_SHELLS", kBothShells);
-  std::cout << replaced(replaced(script, "NAME", app.get_name()), "CASES", cases.text());
+  std::cout << replaced(replaced(script, "NAME", app.get_name()), "CASES",
+                        cases_of(app, "", words));
   return std::cout.flush() ? kDone : kFailed;
 }
 

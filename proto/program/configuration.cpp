@@ -5,8 +5,11 @@
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
+#include <regex>
 #include <span>
 #include <string_view>
+#include <system_error>
+#include <utility>
 
 #include <toml++/toml.h>
 
@@ -17,7 +20,6 @@
 #include "proto/text.h"
 #include "proto/toml_reader.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
 namespace {
@@ -38,100 +40,60 @@ std::string key_of(const CLI::Option& option) {
   return key;
 }
 
-bool is_switch(const CLI::Option& option) {
-  return option.get_items_expected_max() == 0;
-}
-bool takes_list(const CLI::Option& option) {
-  return option.get_items_expected_max() > 1;
-}
-
-/// Whether a flag gave the option a value, or another flag excludes values of weaker places.
-bool is_typed(const CLI::Option& option) {
-  const auto excluding = option.get_excludes();
-  return option.count() > 0 || std::any_of(excluding.begin(), excluding.end(),
-                                           [](const auto* other) { return other->count() > 0; });
+/// Gives an option its values from a weaker place than the command line. Throws CLI::ParseError.
+void set(CLI::Option& option, const std::vector<std::string>& values) {
+  option.clear();
+  option.add_result(values);
+  option.run_callback();
 }
 
 /// The values of a key as they would be typed.
 std::vector<std::string> typed_values(const TomlReader& file, std::string_view key,
                                       const toml::node& node) {
-  if (const auto* list = node.as_array(); list != nullptr && !list->empty()) {
-    std::vector<std::string> values;
-    for (const toml::node& item : *list) {
-      const auto value = typed_values(file, key, item);
-      values.insert(values.end(), value.begin(), value.end());
+  std::vector<std::string> values;
+  const auto take = [&](const toml::node& item) {
+    values.push_back(item.is_string()                        ? *item.value<std::string>()
+                     : item.is_number() || item.is_boolean() ? shown(item)
+                                                             : "");
+    if (values.back().empty()) {
+      file.fail(item, fmt::format("{} = {} is not allowed: it must be a number, true, false, a "
+                                  "text that is not empty, or a list of these",
+                                  excerpt(key), shown(item)));
     }
-    return values;
+  };
+  if (const auto* list = node.as_array(); list != nullptr && !list->empty()) {
+    for (const toml::node& item : *list) {
+      take(item);
+    }
+  } else {
+    take(node);
   }
-  const std::string value = node.is_string()                        ? *node.value<std::string>()
-                            : node.is_number() || node.is_boolean() ? shown(node)
-                                                                    : "";
-  if (value.empty()) {
-    file.fail(node, fmt::format("{} = {} is not allowed: it must be a number, true, false, a text "
-                                "that is not empty, or a list of these",
-                                excerpt(key), shown(node)));
-  }
-  return {value};
+  return values;
 }
 
-/// The value of an option, or its default; none when it has neither.
-std::vector<std::string> effective_values(const CLI::Option& option) {
-  if (option.count() > 0) {
-    return option.results();
-  }
-  const std::string& by_default = option.get_default_str();
-  if (is_switch(option)) {
-    return {"false"};
-  }
-  if (takes_list(option) && by_default.starts_with('[')) {
-    const std::string listed = by_default.substr(1, by_default.size() - 2);
-    return listed.empty() ? std::vector<std::string>() : CLI::detail::split(listed, ',');
-  }
-  return by_default.empty() || by_default == "\"\"" ? std::vector<std::string>()
-                                                    : std::vector{by_default};
+/// A value as TOML. Text in quotes is right for all options.
+std::string toml_value(const std::string& value) {
+  static const std::regex kWithoutQuotes(R"(true|false|(0|[1-9]\d{0,17})(\.\d+)?)");
+  return std::regex_match(value, kWithoutQuotes) ? value : toml_string(value);
 }
 
-/// A value as TOML. Numbers that would not read back as the same text are in quotes, which all
-/// options take.
-std::string toml_value(const CLI::Option& option, const std::string& value) {
-  if (is_switch(option)) {
-    return CLI::detail::to_flag_value(value) > 0 ? "true" : "false";
-  }
-  const auto number = solver::number_of(value);
-  const bool is_whole = value.find_first_not_of("0123456789") == std::string::npos &&
-                        value.size() < 19 && (value == "0" || !value.starts_with('0'));
-  if (number && (is_whole || solver::exact_number(*number) == value)) {
-    return value;
-  }
-  return toml_string(value);
-}
-
-CLI::Option* add_choice(CLI::App& app, const std::string& flag, std::string& value,
-                        std::span<const std::string_view> choices, const std::string& meaning) {
-  auto* option = app.add_option(flag, value, meaning)->capture_default_str();
-  option->check(
-      CLI::IsMember(std::vector<std::string>(choices.begin(), choices.end())).description(""));
-  return note_choices(option, choices);
+/// The folder of settings of this installation: /etc/oblique of programs in /usr/bin,
+/// PREFIX/etc/oblique of those in PREFIX/bin.
+std::filesystem::path configuration_folder() {
+  std::error_code unknown;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
+  const auto prefix = program.parent_path().parent_path();
+  return (unknown || prefix == "/usr" ? "/etc" : prefix / "etc") / "oblique";
 }
 
 }  // namespace
 
-std::string default_configuration_file(const std::string& name) {
-  std::error_code unknown;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
-  if (unknown) {
-    return {};
-  }
-  const auto prefix = program.parent_path().parent_path();
-  return (prefix == "/usr" ? "/etc" : prefix / "etc") / "oblique" / name;
-}
-
-Configuration::Configuration(CLI::App& app, ConfigurationPlaces places)
-    : app_(app), places_(std::move(places)) {
+Configuration::Configuration(CLI::App& app, std::string prefix, const std::string& name)
+    : app_(app), prefix_(std::move(prefix)), default_file_(configuration_folder() / name) {
   auto* file = app.add_option("--config", file_,
                               fmt::format("TOML file with settings; without this, the environment "
                                           "variable {}CONFIG, or else {} when it exists",
-                                          places_.environment_prefix, places_.default_file));
+                                          prefix_, default_file_));
   file->type_name("FILE")->default_str("")->configurable(false);
   app.add_flag("--no-config", without_places_, "Use neither a file nor environment variables")
       ->configurable(false)
@@ -141,11 +103,17 @@ Configuration::Configuration(CLI::App& app, ConfigurationPlaces places)
 }
 
 void Configuration::add_log_options(LogSettings& settings) {
-  auto* level = add_choice(app_, "--log-level", settings.level, kLevels,
-                           "Lines of this level and above: debug, info, warning, error");
+  const auto add = [this](const std::string& flag, std::string& value,
+                          std::span<const std::string_view> choices, const std::string& meaning) {
+    const std::vector<std::string> names(choices.begin(), choices.end());
+    auto* option = app_.add_option(flag, value, meaning)->capture_default_str();
+    return note_choices(option->check(CLI::IsMember(names).description("")), choices);
+  };
+  auto* level = add("--log-level", settings.level, kLevels,
+                    "Lines of this level and above: debug, info, warning, error");
   level->type_name("LEVEL");
-  add_choice(app_, "--log-format", settings.format, kFormats,
-             "text, or json: one object a line with time, level, program and message")
+  add("--log-format", settings.format, kFormats,
+      "text, or json: one object a line with time, level, program and message")
       ->type_name("FORMAT");
   const std::string meaning = "Log warnings and errors only: --log-level warning";
   quiet_ = app_.add_flag("--quiet", meaning);
@@ -153,26 +121,24 @@ void Configuration::add_log_options(LogSettings& settings) {
 }
 
 std::optional<int> Configuration::parse(int argc, const char* const* argv) {
-  find_settings();
+  for (CLI::Option* option : app_.get_options()) {
+    if (option->get_configurable()) {
+      settings_.push_back({option, key_of(*option), option->get_envname()});
+      option->envname("");  // CLI11 would give it precedence over the program's own variable
+    }
+  }
+  app_.footer(fmt::format(
+      "Every option may also be an environment variable (--log-level: {}LOG_LEVEL) or a key of\n"
+      "the file (log_level); --print-config shows the effective settings.",
+      prefix_));
   if (const auto exit_code = parse_command_line(app_, argc, argv)) {
     return exit_code;
   }
-  std::string place;  // of the values that are set
-  const auto set = [](CLI::Option& option, const std::vector<std::string>& values) {
-    option.clear();
-    for (const std::string& value : values) {
-      option.add_result(value);
-    }
-    option.run_callback();
-  };
+  std::string place;
   try {
-    const Given given = without_places_ ? Given() : values_of_places();
-    for (const Setting& setting : settings_) {
-      const auto found = given.find(setting.key);
-      if (found != given.end() && !is_typed(*setting.option)) {
-        place = found->second.place;
-        set(*setting.option, found->second.values);
-      }
+    if (!without_places_) {
+      set_from_environment(place);
+      set_from_file(place);
     }
     if (quiet_ != nullptr && quiet_->count() > 0) {
       set(*app_.get_option("--log-level"), {"warning"});
@@ -185,49 +151,36 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
   }
 }
 
-void Configuration::find_settings() {
-  for (CLI::Option* option : app_.get_options()) {
-    if (option->get_configurable()) {
-      settings_.push_back({option, key_of(*option), option->get_envname()});
-      option->envname("");  // CLI11 would give it precedence over the program's own variable
-    }
-  }
-  app_.footer(fmt::format(
-      "Every option may also be an environment variable (--log-level: {}LOG_LEVEL) or a key of\n"
-      "the file (log_level); --print-config shows the effective settings.",
-      places_.environment_prefix));
-}
-
 /// The file to read; empty: none.
 std::string Configuration::file_to_read() const {
-  std::string path = file_.empty() ? variable(places_.environment_prefix + "CONFIG") : file_;
+  const std::string path = file_.empty() ? variable(prefix_ + "CONFIG") : file_;
   std::error_code unknown;
   const bool takes_default =
-      path.empty() && (std::filesystem::exists(places_.default_file, unknown) || unknown);
-  return takes_default ? places_.default_file : path;
+      path.empty() && (std::filesystem::exists(default_file_, unknown) || unknown);
+  return without_places_ ? "" : takes_default ? default_file_ : path;
 }
 
-/// The values of the file, and those of variables, which replace them.
-Configuration::Given Configuration::values_of_places() const {
-  Given given;
-  if (const std::string path = file_to_read(); !path.empty()) {
-    read_file(path, given);
-  }
+void Configuration::set_from_environment(std::string& place) const {
   for (const Setting& setting : settings_) {
-    std::string own = setting.key;
+    std::string own = prefix_ + setting.key;
     std::transform(own.begin(), own.end(), own.begin(),
                    [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-    for (const std::string& name : {setting.shared_variable, places_.environment_prefix + own}) {
-      if (const std::string value = variable(name); !value.empty()) {
-        given[setting.key] = {{value}, fmt::format("environment variable {}: ", name)};
+    for (const std::string& name : {own, setting.shared_variable}) {
+      const std::string value = variable(name);
+      if (!value.empty() && setting.option->count() == 0) {
+        place = fmt::format("environment variable {}: ", name);
+        set(*setting.option, {value});
       }
     }
   }
-  return given;
 }
 
-void Configuration::read_file(const std::string& path, Given& given) const {
+void Configuration::set_from_file(std::string& place) const {
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+  const std::string path = file_to_read();
+  if (path.empty()) {
+    return;
+  }
   const TomlReader file(path);
   const toml::table top = file.parse(read_small_file(path, "the configuration file", kMostBytes));
   std::vector<std::string_view> known;
@@ -235,14 +188,17 @@ void Configuration::read_file(const std::string& path, Given& given) const {
     known.emplace_back(setting.key);
   }
   const auto take = [&](const std::string& name, const toml::key& key, const toml::node& node) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
+    const auto found = std::find(known.begin(), known.end(), name);
+    if (found == known.end()) {
       file.fail(key,
                 fmt::format("there is no setting {}{}", excerpt(name), did_you_mean(name, known)));
     }
-    if (given.contains(name)) {
-      file.fail(key, fmt::format("{} is given twice", name));
+    const auto values = typed_values(file, name, node);
+    place = file.place(key.source()) + ": ";
+    const auto index = static_cast<std::size_t>(found - known.begin());
+    if (CLI::Option& option = *settings_[index].option; option.count() == 0) {
+      set(option, values);
     }
-    given[name] = {typed_values(file, name, node), file.place(key.source()) + ": "};
   };
   for (const auto& [key, node] : top) {
     const std::string name(key.str());
@@ -257,18 +213,24 @@ void Configuration::read_file(const std::string& path, Given& given) const {
 }
 
 std::string Configuration::printed() const {
-  const std::string path = without_places_ ? "" : file_to_read();
+  const std::string path = file_to_read();
   std::string text = fmt::format("# {}: the effective settings; {}\n", app_.get_name(),
                                  path.empty() ? "no file was read" : "read from " + visible(path));
   for (const Setting& setting : settings_) {
     const CLI::Option& option = *setting.option;
-    std::vector<std::string> values = effective_values(option);
-    for (std::string& value : values) {
-      value = toml_value(option, value);
+    const bool is_list = option.get_items_expected_max() > 1;
+    std::vector<std::string> values = option.results();
+    if (values.empty() && !is_list) {
+      const bool is_switch = option.get_items_expected_max() == 0;
+      values.push_back(is_switch ? "false" : option.get_default_str());
     }
-    text += values.empty()       ? fmt::format("# {} is not set\n", setting.key)
-            : takes_list(option) ? fmt::format("{} = [{}]\n", setting.key, fmt::join(values, ", "))
-                                 : fmt::format("{} = {}\n", setting.key, values.back());
+    if (values.empty() || values.back().empty() || values.back() == "\"\"") {
+      text += fmt::format("# {} is not set\n", setting.key);
+      continue;
+    }
+    std::transform(values.begin(), values.end(), values.begin(), toml_value);
+    text += is_list ? fmt::format("{} = [{}]\n", setting.key, fmt::join(values, ", "))
+                    : fmt::format("{} = {}\n", setting.key, values.back());
   }
   return text;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,25 +10,14 @@
 
 namespace oblique::protocol {
 
-/// What is fixed for a program.
-struct ConfigurationPlaces {
-  std::string environment_prefix;  ///< of variables, as "OBLIQUE_SERVER_"
-  std::string default_file;        ///< read when it exists; empty: none
-};
-
-/// The file NAME in the configuration folder of this installation: /etc/oblique of programs in
-/// /usr/bin, PREFIX/etc/oblique of those in PREFIX/bin. Empty where the system does not give the
-/// path of the program.
-std::string default_configuration_file(const std::string& name);
-
 /// The settings of a program from a TOML file, environment variables and flags, the later being
-/// stronger. The flag --worker-port is the variable OBLIQUE_SERVER_WORKER_PORT and the key
-/// worker_port, or the key port of a table [worker]. Options that are not `configurable` are flags
-/// only.
+/// stronger (README.md). Options that are not `configurable` are flags only.
 class Configuration {
  public:
-  /// Adds --config, --no-config and --print-config to `app`, which must outlive this.
-  Configuration(CLI::App& app, ConfigurationPlaces places);
+  /// Adds --config, --no-config and --print-config to `app`, which must outlive this. Variables
+  /// begin with `prefix`, as "OBLIQUE_SERVER_". Without another one, the file `name` in the
+  /// configuration folder of this installation is read when it exists.
+  Configuration(CLI::App& app, std::string prefix, const std::string& name);
 
   /// Adds --log-level, --log-format and --quiet. `settings` must outlive this.
   void add_log_options(LogSettings& settings);
@@ -49,20 +37,15 @@ class Configuration {
     std::string key;              ///< "limits_connections"
     std::string shared_variable;  ///< of several programs; empty: none
   };
-  /// Values of file or environment, and their place, as "server.toml:3:1: ".
-  struct PlacedValues {
-    std::vector<std::string> values;
-    std::string place;
-  };
-  using Given = std::map<std::string, PlacedValues>;  ///< by key
 
-  void find_settings();
   std::string file_to_read() const;
-  Given values_of_places() const;
-  void read_file(const std::string& path, Given& given) const;
+  // Set options that are not set yet. `place` gets the place of the present value, for errors.
+  void set_from_environment(std::string& place) const;
+  void set_from_file(std::string& place) const;
 
   CLI::App& app_;
-  ConfigurationPlaces places_;
+  std::string prefix_;
+  std::string default_file_;
   std::string file_;
   bool without_places_ = false;
   bool print_ = false;

@@ -2,7 +2,6 @@
 
 #include <cstdlib>
 #include <ctime>
-#include <iostream>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -17,7 +16,6 @@
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
-#include "proto/program/usage.h"
 #include "proto/text.h"
 
 namespace oblique::protocol {
@@ -84,16 +82,6 @@ void set_up_log(const std::string& program, const LogSettings& settings) {
   logger->set_formatter(std::move(formatter));
   logger->set_level(spdlog::level::from_str(settings.level));
   spdlog::set_default_logger(std::move(logger));
-}
-
-int tell_failure(const std::string& program, const std::string& message,
-                 const LogSettings& settings) {
-  if (settings.format == "json" || journal_reads_standard_error()) {
-    spdlog::error("{}", message);
-  } else {
-    std::cerr << program << ": " << visible_lines(message) << '\n';
-  }
-  return kFailed;
 }
 
 }  // namespace oblique::protocol

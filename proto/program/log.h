@@ -20,9 +20,4 @@ struct LogSettings {
 /// `program` and `message`, always valid JSON and UTF-8. May be called again.
 void set_up_log(const std::string& program, const LogSettings& settings = {});
 
-/// Prints why the program fails on standard error: in a log of text as "oblique-server: ...", else
-/// as a line of the log. Returns kFailed.
-int tell_failure(const std::string& program, const std::string& message,
-                 const LogSettings& settings);
-
 }  // namespace oblique::protocol

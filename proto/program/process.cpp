@@ -9,10 +9,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
+#include <string>
 #include <system_error>
 
 #include "proto/text.h"
@@ -20,29 +21,21 @@
 namespace oblique::protocol {
 namespace {
 
-[[noreturn]] void fail(int error, const char* what) {
-  throw std::system_error(error, std::generic_category(), what);
-}
-
 bool is_ignored(int signal) {
   struct sigaction action {};
   return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
 }
 
-/// Empty for the id of a process and for an empty text.
-std::string objection_to_process(const std::string& text) {
-  pid_t process = 0;
-  return text.empty() || (CLI::detail::lexical_cast(text, process) && process > 0)
-             ? ""
-             : "\"" + text + "\" is no process id";
+void check_call(bool is_done, const char* what) {
+  if (!is_done) {
+    throw std::system_error(errno, std::generic_category(), what);
+  }
 }
 
-/// Removes the variable and returns its value; empty when there is none.
-std::string taken(const char* name) {
+/// Empty for a variable that is not set.
+std::string environment_value(const char* name) {
   const char* const value = std::getenv(name);
-  std::string kept = value == nullptr ? "" : value;
-  unsetenv(name);
-  return kept;
+  return value == nullptr ? "" : value;
 }
 
 }  // namespace
@@ -56,12 +49,8 @@ StopSignals::StopSignals() {
     sigaddset(&signals, SIGHUP);
   }
   descriptor_ = Descriptor(signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC));
-  if (!descriptor_.is_open()) {
-    fail(errno, "cannot watch for signals");
-  }
-  if (const int error = pthread_sigmask(SIG_BLOCK, &signals, &before_); error != 0) {
-    fail(error, "cannot block signals");
-  }
+  check_call(descriptor_.is_open(), "cannot watch for signals");
+  pthread_sigmask(SIG_BLOCK, &signals, &before_);
 }
 
 StopSignals::~StopSignals() {
@@ -93,44 +82,29 @@ void survive_failed_writes() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-StopWithParent::StopWithParent() : parent_(getppid()) {}
-
-void StopWithParent::add_to(CLI::App& app) {
-  option_ = app.add_option("--stop-with-parent", named_,
-                           "Stop when the parent process is gone; with its id, also when it was "
-                           "before this one began")
-                ->expected(0, 1)
-                ->check(objection_to_process)
-                ->type_name("[PID]")
-                ->default_str("")  // none: the option may stand alone
-                ->configurable(false);
+void add_stop_with_parent(CLI::App& app, pid_t& parent) {
+  app.add_option("--stop-with-parent", parent,
+                 "Stop when the parent process, which has this id, is gone")
+      ->check(CLI::Range(pid_t{1}, std::numeric_limits<pid_t>::max()).description(""))
+      ->type_name("PID")
+      ->default_str("")
+      ->configurable(false);
 }
 
-bool StopWithParent::is_wanted() const {
-  return option_ != nullptr && option_->count() > 0;
-}
-
-bool StopWithParent::begin() const {
-  if (!is_wanted()) {
+bool stop_with_parent(pid_t parent) {
+  if (parent == 0) {
     return true;
   }
-  if (prctl(PR_SET_PDEATHSIG, SIGTERM) != 0) {
-    throw std::system_error(errno, std::generic_category(), "cannot watch the parent process");
-  }
-  // The system does not report a parent that has ended already.
-  return getppid() == (named_ > 0 ? named_ : parent_);
+  check_call(prctl(PR_SET_PDEATHSIG, SIGTERM) == 0, "cannot watch the parent process");
+  return getppid() == parent;  // the system does not report one that has ended already
 }
 
-Notifier::Notifier() : socket_(taken("NOTIFY_SOCKET")) {
-  const std::int64_t within_us = std::atoll(taken("WATCHDOG_USEC").c_str());
-  const std::string watched = taken("WATCHDOG_PID");
-  if (within_us > 0 && (watched.empty() || watched == std::to_string(getpid()))) {
-    heartbeat_ = std::chrono::microseconds(within_us) / 2;
-  }
-}
+Notifier::Notifier()
+    : socket_(environment_value("NOTIFY_SOCKET")),
+      heartbeat_(std::chrono::microseconds(std::atoll(environment_value("WATCHDOG_USEC").c_str())) /
+                 2) {}
 
-void Notifier::ready(const std::string& sentence) {
-  status_ = sentence;
+void Notifier::ready(const std::string& sentence) const {
   send("READY=1\nSTATUS=" + visible(sentence));
 }
 
@@ -141,15 +115,14 @@ void Notifier::status(const std::string& sentence) {
   }
 }
 
-void Notifier::stopping(const std::string& sentence, std::chrono::milliseconds longest) {
-  status_ = sentence;
+void Notifier::stopping(const std::string& sentence, std::chrono::milliseconds longest) const {
   send("STOPPING=1\nSTATUS=" + visible(sentence) +
        "\nEXTEND_TIMEOUT_USEC=" + std::to_string(std::chrono::microseconds(longest).count()));
 }
 
 void Notifier::turn(Clock::time_point now) {
-  if (heartbeat_ && now >= next_heartbeat_) {
-    next_heartbeat_ = now + *heartbeat_;
+  if (heartbeat_.count() > 0 && now >= next_heartbeat_) {
+    next_heartbeat_ = now + heartbeat_;
     send("WATCHDOG=1");
   }
 }
@@ -157,21 +130,13 @@ void Notifier::turn(Clock::time_point now) {
 void Notifier::send(const std::string& state) const {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  const bool is_abstract = socket_.starts_with('@');
-  if (socket_.size() < 2 || socket_.size() >= sizeof(address.sun_path) ||
-      (!is_abstract && !socket_.starts_with('/'))) {
+  if (socket_.empty() || socket_.size() >= sizeof(address.sun_path)) {
     return;
   }
   std::memcpy(address.sun_path, socket_.data(), socket_.size());
-  if (is_abstract) {
-    address.sun_path[0] = '\0';
-  }
   const Descriptor sender(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  // A path ends with a zero byte, an abstract name with its length.
-  const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size() +
-                                             (is_abstract ? 0 : 1));
   (void)::sendto(sender.number(), state.data(), state.size(), MSG_NOSIGNAL | MSG_DONTWAIT,
-                 reinterpret_cast<const sockaddr*>(&address), length);
+                 reinterpret_cast<const sockaddr*>(&address), sizeof(address));
 }
 
 }  // namespace oblique::protocol

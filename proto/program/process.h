@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <csignal>
-#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -46,51 +45,35 @@ class StopSignals {
 /// instead of ending the program.
 void survive_failed_writes();
 
-/// The option --stop-with-parent [PID]: this process gets SIGTERM when its parent ends.
-class StopWithParent {
- public:
-  /// Construct it as the program begins: it stores the present parent.
-  StopWithParent();
+/// Adds --stop-with-parent PID, which sets `parent`.
+void add_stop_with_parent(CLI::App& app, pid_t& parent);
 
-  /// Adds the option. This must live as long as `app`.
-  void add_to(CLI::App& app);
-  bool is_wanted() const;
-
-  /// Requests the signal if the option was given. Call it when signals are watched. False when the
-  /// parent has ended already; with PID, also when it ended before this process began. Throws
-  /// std::system_error when the system refuses.
-  bool begin() const;
-
- private:
-  CLI::Option* option_ = nullptr;
-  pid_t parent_;
-  pid_t named_ = 0;  ///< 0: none
-};
+/// Requests SIGTERM for the end of the process `parent`, which started this one; nothing for 0.
+/// Call it when signals are watched. False when the parent has ended already.
+bool stop_with_parent(pid_t parent);
 
 /// Sends the state of the program to the service manager (systemd), as datagrams to the socket
-/// NOTIFY_SOCKET, which may be an abstract one. Does nothing without that variable. Ignores errors.
+/// NOTIFY_SOCKET, a path. Does nothing without that variable. Ignores errors.
 class Notifier {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Removes NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID from the environment, so that no child
-  /// uses them. Construct it before any thread starts.
   Notifier();
 
   /// The program is ready; `sentence` becomes the status of the service.
-  void ready(const std::string& sentence);
+  void ready(const std::string& sentence) const;
   /// Changes the status, if it differs.
   void status(const std::string& sentence);
   /// The program ends, which may take up to `longest`.
-  void stopping(const std::string& sentence, std::chrono::milliseconds longest);
-  /// Call it several times a second: feeds the watchdog at half of its interval.
+  void stopping(const std::string& sentence, std::chrono::milliseconds longest) const;
+  /// Call it several times a second: feeds the watchdog at half of WATCHDOG_USEC.
   void turn(Clock::time_point now);
 
  private:
   void send(const std::string& state) const;
 
-  std::string socket_;  ///< empty: none
-  std::optional<Clock::duration> heartbeat_;
+  std::string socket_;         ///< empty: none
+  Clock::duration heartbeat_;  ///< 0: none
   Clock::time_point next_heartbeat_;
   std::string status_;
 };

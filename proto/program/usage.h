@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -30,18 +29,9 @@ CLI::Validator number_between(double least, double largest);
 /// A check for whole numbers of 64 bits that are at least `least`.
 CLI::Validator whole_number_from(std::int64_t least);
 
-/// The time from `now` to `text`, negative for the past. `text` is a time in UTC, as
-/// 2026-11-22T05:00:00Z, or a duration in seconds, minutes or hours, as 90m. Nothing for other
-/// text.
-std::optional<std::chrono::milliseconds> time_until(const std::string& text,
-                                                    std::chrono::system_clock::time_point now);
-
 /// Notes the values that an option may have, for completion; the reader of the value checks it.
 /// Returns `option`.
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
-
-/// The noted choices; empty where there are none.
-std::vector<std::string> choices_of(CLI::Option& option);
 
 /// The sentence for an error of the command line. An unexpected word gets the nearest name that
 /// `verb` (of `app`, or `app` itself) has.

@@ -13,18 +13,7 @@ struct KeepAlive {
   int unacknowledged_ms = 20'000;  ///< what was sent and stays unacknowledged so long ends it too
 };
 
-/// An attempt to connect that is not answered is given up after this and made anew. The system
-/// would wait ever longer between its own, up to a minute after the network is back.
-inline constexpr int kConnectTimeout_ms = 3000;
-
-/// Messages that a worker's or client's socket keeps in either direction.
-inline constexpr int kQueuedMessages = 1000;
-
-/// What keys add to each frame on its way (CURVE's MESSAGE): sockets must take frames so much
-/// longer than the longest.
+/// Bytes that keys add to each frame (CURVE's MESSAGE): sockets must take frames so much longer.
 inline constexpr int kSealBytes = 33;
-
-/// Connections that wait until the server accepts them.
-inline constexpr int kWaitingConnections = 1024;
 
 }  // namespace oblique::protocol

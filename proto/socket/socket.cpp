@@ -20,13 +20,6 @@ namespace {
                            ", as in " + settings.example_url);
 }
 
-/// Whether this attempt to connect is by IPv6, which is an option of libzmq: it looks up addresses
-/// of one family only, and with IPv6 those of IPv4 where a name has no others.
-bool is_by_v6(const std::string& url, unsigned attempt) {
-  const auto [has_v4, has_v6] = families_of(host_of(url));
-  return has_v6 && (!has_v4 || attempt % 2 == 1);
-}
-
 void set_keys(zmq::socket_t& socket, const KeyFile& key) {
   if (!key.server) {
     throw solver::InputError(
@@ -65,6 +58,10 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
     refuse(settings, objection);
   }
   constexpr KeepAlive kKeepAlive;
+  constexpr int kQueuedMessages = 1000;
+  // The system would wait ever longer between its own attempts, up to a minute after the network is
+  // back.
+  constexpr int kConnectTimeout_ms = 3000;
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   if (settings.key) {
     set_keys(socket, *settings.key);
@@ -86,17 +83,14 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
 }
 
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
+  // libzmq looks up addresses of one family only, as this option says.
+  const auto [has_v4, has_v6] = families_of(host_of(settings.url));
   try {
-    socket.set(zmq::sockopt::ipv6, is_by_v6(settings.url, attempt));
+    socket.set(zmq::sockopt::ipv6, has_v6 && (!has_v4 || attempt % 2 == 1));
     socket.connect(settings.url);
   } catch (const zmq::error_t& error) {
     refuse(settings, std::string(error.what()) + ": write tcp://HOST:PORT");
   }
-}
-
-void connect_again(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
-  socket.disconnect(settings.url);
-  connect(socket, settings, attempt);
 }
 
 SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,

@@ -34,10 +34,6 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
 /// on both: each `attempt` tries the other one, IPv4 first. Throws solver::InputError as above.
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt = 0);
 
-/// Ends the connection, with what it has not delivered yet, and connects anew: for a connection
-/// that may be dead without either end knowing.
-void connect_again(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt);
-
 /// The connections of a socket of one peer: how often it was connected, and whether the other end
 /// rejected it. What a socket has handed to a connection is lost with that connection.
 class SocketMonitor {

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 
 namespace oblique::protocol {
@@ -104,9 +103,6 @@ bool ChunkRows::next() {
 }
 
 void ChunkWriter::cell(const Cell& value) {
-  if (column_++ >= columns_.size()) {
-    throw std::logic_error("a row has more values than there are columns");
-  }
   append(cells_, value.kind);
   if (value.kind == CellKind::kInteger) {
     append(cells_, value.integer);
@@ -118,20 +114,11 @@ void ChunkWriter::cell(const Cell& value) {
   }
 }
 
-void ChunkWriter::end_row() {
-  if (column_ != columns_.size()) {
-    throw std::logic_error("a row has fewer values than there are columns");
-  }
-  column_ = 0;
-  ++rows_;
-}
-
 QueryReply ChunkWriter::take() {
   QueryReply chunk;
   chunk.mutable_columns()->Assign(columns_.begin(), columns_.end());
   chunk.set_cells(std::exchange(cells_, {}));
   chunk.set_chunk_rows(std::exchange(rows_, 0));
-  column_ = 0;
   return chunk;
 }
 

@@ -34,7 +34,6 @@ struct Table {
   std::vector<Row> rows = {};
 };
 
-/// The value of a cell, with a text of its own.
 Value value_of(const Cell& cell);
 
 /// Whether a chunk has the cells of as many rows as it says. Chunks from outside must pass this
@@ -67,13 +66,11 @@ class ChunkWriter {
   void integer(std::int64_t value) { cell({.kind = CellKind::kInteger, .integer = value}); }
   void real(double value) { cell({.kind = CellKind::kReal, .real = value}); }
   void text(std::string_view value) { cell({.kind = CellKind::kText, .text = value}); }
-  /// Throws std::logic_error when the row has a value for each column already.
   void cell(const Cell& value);
-  /// Throws std::logic_error unless the row has a value for each column.
-  void end_row();
+  /// Ends a row, which must have a value for each column.
+  void end_row() { ++rows_; }
 
-  /// Complete rows since the last `take`, and bytes including an unfinished row.
-  std::uint64_t rows() const { return rows_; }
+  /// Bytes since the last `take`.
   std::uint64_t bytes() const { return cells_.size(); }
 
   /// The rows since the last call. The caller numbers the chunk and marks the last one.
@@ -82,7 +79,6 @@ class ChunkWriter {
  private:
   std::vector<std::string> columns_;
   std::string cells_;
-  std::size_t column_ = 0;  ///< of the next value
   std::uint64_t rows_ = 0;
 };
 

@@ -1,5 +1,6 @@
 #include "proto/wire/frame_scan.h"
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -27,7 +28,8 @@ struct Found {
   bool is_whole = true;   ///< every message on the path could be read to its end
 };
 
-void find(std::string_view message, std::span<const int> path, Found& found) {
+Found find(std::string_view message, std::span<const int> path) {
+  Found found;
   CodedInputStream in = stream_of(message);
   while (const std::uint32_t tag = in.ReadTag()) {
     const auto begin = static_cast<std::size_t>(in.CurrentPosition());
@@ -44,19 +46,13 @@ void find(std::string_view message, std::span<const int> path, Found& found) {
       stream_of(bytes).ReadVarint32(&length);
       bytes.remove_prefix(bytes.size() - length);
     }
-    if (path.size() > 1) {
-      find(bytes, path.subspan(1), found);
-    } else {
-      ++found.fields;
-      found.bytes += bytes.size();
-    }
+    const Found inner =
+        path.size() > 1 ? find(bytes, path.subspan(1)) : Found{1, bytes.size(), true};
+    found.fields += inner.fields;
+    found.bytes += inner.bytes;
+    found.is_whole = found.is_whole && inner.is_whole;
   }
   found.is_whole = found.is_whole && in.ConsumedEntireMessage();
-}
-
-Found find(std::string_view message, const std::vector<int>& path) {
-  Found found;
-  find(message, path, found);
   return found;
 }
 
@@ -80,10 +76,14 @@ bool is_of_a_workers_size(std::string_view frame) {
     return false;
   }
   using Message = WorkerMessage;
-  const auto rows = find(frame, {Message::kTraceFieldNumber, Trace::kValuesFieldNumber}).bytes +
-                    find(frame, {Message::kTraceFieldNumber, Trace::kStatesFieldNumber}).bytes;
-  const auto results = find(frame, {Message::kResultsFieldNumber, Results::kResultsFieldNumber});
-  return frame.size() - rows <= kMaxWorkerFrameBytes && results.fields <= kMostResultsAMessage;
+  const auto bytes_of = [frame](int field) {
+    return find(frame, std::array{static_cast<int>(Message::kTraceFieldNumber), field}).bytes;
+  };
+  const auto rows = bytes_of(Trace::kValuesFieldNumber) + bytes_of(Trace::kStatesFieldNumber);
+  const std::array results{static_cast<int>(Message::kResultsFieldNumber),
+                           static_cast<int>(Results::kResultsFieldNumber)};
+  return frame.size() - rows <= kMaxWorkerFrameBytes &&
+         find(frame, results).fields <= kMostResultsAMessage;
 }
 
 bool is_of_a_recipes_shape(std::string_view recipe) {
@@ -96,21 +96,16 @@ bool is_of_a_requests_shape(std::string_view frame) {
 }
 
 std::uint64_t request_id_of(std::string_view frame) {
-  // Few fields stand before it in any request, and none after it counts.
-  constexpr int kMostFields = 8;
   CodedInputStream in = stream_of(frame);
-  for (int i = 0; i < kMostFields; ++i) {
-    const std::uint32_t tag = in.ReadTag();
-    std::uint64_t id = 0;
-    if (tag == WireFormatLite::MakeTag(ClientRequest::kRequestIdFieldNumber,
-                                       WireFormatLite::WIRETYPE_VARINT)) {
-      return in.ReadVarint64(&id) ? id : 0;
-    }
-    if (tag == 0 || !WireFormatLite::SkipField(&in, tag)) {
-      return 0;
-    }
-  }
-  return 0;
+  const auto expect = [&in](int field) {
+    return in.ReadTag() == WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_VARINT);
+  };
+  std::uint64_t version = 0;
+  std::uint64_t id = 0;
+  const bool is_there = expect(ClientRequest::kProtocolVersionFieldNumber) &&
+                        in.ReadVarint64(&version) && expect(ClientRequest::kRequestIdFieldNumber) &&
+                        in.ReadVarint64(&id);
+  return is_there ? id : 0;
 }
 
 }  // namespace oblique::protocol

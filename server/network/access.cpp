@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -167,7 +168,8 @@ AccessControl::AccessControl(const AccessSettings& settings)
     : address_(address_to_bind(settings)), mode_(mode_of(settings)) {
   if (mode_ == AccessMode::kKeys) {
     server_ = read_server_key(settings.keys);
-    list_ = std::make_shared<KeyList>(protocol::authorized_keys_beside(settings.keys));
+    list_ = std::make_shared<KeyList>(
+        protocol::authorized_keys_in(std::filesystem::path(settings.keys).parent_path()));
     spdlog::info("{}; its own public key is {}", list_->text(), protocol::z85(server_.public_key));
   }
 }

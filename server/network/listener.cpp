@@ -13,8 +13,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/socket/limits.h"
-
 namespace oblique::server {
 namespace {
 
@@ -70,6 +68,7 @@ Listener::Listener(const std::string& address, const std::string& port) {
   std::memcpy(&own, found->ai_addr, found->ai_addrlen);
   socket_ = protocol::Descriptor(
       ::socket(found->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, IPPROTO_TCP));
+  constexpr int kWaitingConnections = 1024;
   const int yes = 1;
   const int no = 0;
   socklen_t bytes = sizeof own;
@@ -79,7 +78,7 @@ Listener::Listener(const std::string& address, const std::string& port) {
        setsockopt(socket_.number(), IPPROTO_IPV6, IPV6_V6ONLY, &no, sizeof no) == 0) &&
       setsockopt(socket_.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) == 0 &&
       bind(socket_.number(), found->ai_addr, found->ai_addrlen) == 0 &&
-      listen(socket_.number(), protocol::kWaitingConnections) == 0 &&
+      listen(socket_.number(), kWaitingConnections) == 0 &&
       getsockname(socket_.number(), generic(own), &bytes) == 0;
   if (!listens) {
     const int error = errno;

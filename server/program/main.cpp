@@ -37,7 +37,6 @@ namespace {
 
 using oblique::protocol::Configuration;
 using oblique::protocol::Notifier;
-using oblique::protocol::StopWithParent;
 using oblique::server::EventLoop;
 using oblique::server::LoopSettings;
 using oblique::server::LoopState;
@@ -108,11 +107,11 @@ void notify(Notifier& notifier, const LoopState& state, std::chrono::millisecond
   notifier.turn(Notifier::Clock::now());
 }
 
-int run(LoopSettings settings, int ready_fd, const StopWithParent& parent) {
+int run(LoopSettings settings, int ready_fd, pid_t parent) {
   Notifier notifier;
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
-  if (!parent.begin()) {
+  if (!oblique::protocol::stop_with_parent(parent)) {
     spdlog::warn("the parent process was gone before this one began");
     return oblique::protocol::kDone;
   }
@@ -163,8 +162,7 @@ void add_limits(CLI::App& app, LoopSettings& loop) {
       "Batches that a worker may request at a time");
 }
 
-void add_options(CLI::App& app, Configuration& configuration, StopWithParent& parent,
-                 Options& options) {
+void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Options& options) {
   LoopSettings& loop = options.loop;
   app.set_version_flag("--version", "oblique-server " + oblique::protocol::version_and_commit());
   app.option_defaults()->always_capture_default();
@@ -203,7 +201,7 @@ void add_options(CLI::App& app, Configuration& configuration, StopWithParent& pa
                  "Time to wait for running batches on shutdown; 0: stop at once")
       ->type_name("SECONDS")
       ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
-  parent.add_to(app);
+  oblique::protocol::add_stop_with_parent(app, parent);
   configuration.add_log_options(options.log);
   add_limits(app, loop);
 }
@@ -242,7 +240,7 @@ int main(int argc, char** argv) {
   if (argc == 3 && std::string_view(argv[1]) == oblique::server::kReadMode) {
     return oblique::server::run_reader_program(argv[2]);
   }
-  StopWithParent parent;
+  pid_t parent = 0;
   oblique::protocol::silence_protobuf();
   oblique::protocol::set_up_log(kProgram);
   CLI::App app{
@@ -251,8 +249,7 @@ int main(int argc, char** argv) {
       kProgram};
   Options options;
   options.loop.database = "oblique.db";
-  Configuration configuration(
-      app, {"OBLIQUE_SERVER_", oblique::protocol::default_configuration_file("server.toml")});
+  Configuration configuration(app, "OBLIQUE_SERVER_", "server.toml");
   try {
     add_options(app, configuration, parent, options);
     if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {
@@ -265,11 +262,12 @@ int main(int argc, char** argv) {
       return *exit_code;
     }
     if (options.loop.web) {
-      options.loop.web->page.is_of_file = parent.is_wanted();
+      options.loop.web->page.is_of_file = parent != 0;
     }
     oblique::protocol::set_up_log(kProgram, options.log);
     return run(options.loop, options.ready_fd, parent);
   } catch (const std::exception& error) {
-    return oblique::protocol::tell_failure(kProgram, error.what(), options.log);
+    spdlog::error("{}", error.what());
+    return oblique::protocol::kFailed;
   }
 }

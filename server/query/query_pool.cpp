@@ -17,6 +17,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -25,7 +26,6 @@
 
 #include "proto/frames.h"
 #include "proto/system/descriptor.h"
-#include "proto/system/spawn_plan.h"
 #include "proto/text.h"
 #include "server/query/reader.h"
 #include "worker/solver/model/errors.h"
@@ -187,6 +187,35 @@ void QueryQueue::remove(std::uint64_t ticket) {
 
 // ---- The pool -----------------------------------------------------------------------------------
 
+pid_t start_reader(const std::string& program, const std::string& path, int request, int answer) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, answer, STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, request, kReaderRequest);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addclosefrom_np(&actions, kReaderRequest + 1);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t signals;
+  sigemptyset(&signals);
+  posix_spawnattr_setsigmask(&attributes, &signals);
+  sigfillset(&signals);
+  posix_spawnattr_setsigdefault(&attributes, &signals);
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  std::array<std::string, 3> words{"oblique-reader", kReadMode, path};
+  std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t pid = -1;
+  const int error =
+      posix_spawn(&pid, program.c_str(), &actions, &attributes, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  if (error != 0) {
+    throw std::system_error(error, std::generic_category(), program);
+  }
+  return pid;
+}
+
 /// A query and the process that answers it, which is killed when this is destroyed and when the
 /// thread that created this ends.
 struct QueryPool::Running {
@@ -201,11 +230,7 @@ struct QueryPool::Running {
     answer = protocol::Descriptor(ends[0]);
     const protocol::Descriptor theirs(ends[1]);
     check_call(fcntl(answer.number(), F_SETFL, O_NONBLOCK) == 0, "fcntl");
-    protocol::SpawnPlan plan;
-    plan.give(theirs.number(), STDOUT_FILENO);
-    plan.give(request.number(), kReaderRequest);
-    plan.close_from(kReaderRequest + 1);
-    pid = plan.start(program, {"oblique-reader", kReadMode, path}, environ);
+    pid = start_reader(program, path, request.number(), theirs.number());
   }
   ~Running() {
     kill();

@@ -12,6 +12,8 @@
 #include <string>
 #include <thread>
 
+#include <sys/types.h>
+
 #include "proto/oblique.pb.h"
 #include "proto/system/descriptor.h"
 #include "server/study/limits.h"
@@ -141,6 +143,11 @@ void check_call(bool done, const char* what);
 
 /// Encodes a ClientReply with an error.
 std::string encoded_error(const std::string& message, bool wrong_request = false);
+
+/// Starts `program` as a reader process of the database at `path`. It has `request` as
+/// kReaderRequest, `answer` as its standard output, no signal blocked or ignored, and a process
+/// group of its own: a Ctrl-C on the terminal does not reach it. Throws std::system_error.
+pid_t start_reader(const std::string& program, const std::string& path, int request, int answer);
 
 /// Main function of a reader process: answers one query on the database at `path`. First limits its
 /// own memory and files. Is killed when the thread that started it ends. Returns the exit code.

@@ -71,8 +71,8 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   if (pipe2(ready.data(), O_CLOEXEC) != 0) {
     throw std::runtime_error("pipe: " + std::string(std::strerror(errno)));
   }
-  arguments.insert(arguments.end(),
-                   {"--http", "127.0.0.1:0", "--ready-fd", "3", "--stop-with-parent"});
+  arguments.insert(arguments.end(), {"--http", "127.0.0.1:0", "--ready-fd", "3",
+                                     "--stop-with-parent", std::to_string(getpid())});
   // Whoever does not test how it drains has it end at once.
   Environment with_drain{{"OBLIQUE_SERVER_DRAIN", "0"}};
   for (const auto& [name, value] : environment) {
@@ -94,7 +94,8 @@ namespace {
 
 std::vector<std::string> worker_arguments(const std::string& server_url,
                                           const std::vector<std::string>& more) {
-  std::vector<std::string> all{"--server", server_url, "--stop-with-parent"};
+  std::vector<std::string> all{"--server", server_url, "--stop-with-parent",
+                               std::to_string(getpid())};
   all.insert(all.end(), more.begin(), more.end());
   return all;
 }

@@ -24,7 +24,6 @@ class ConfigurationTest : public testing::Test {
     bool loud = false;
     int connections = 10;
     std::vector<std::string> listen;
-    std::vector<std::string> sides{"left", "right"};
     std::string keys;
     int ready_fd = -1;
     LogSettings log;
@@ -51,12 +50,11 @@ class ConfigurationTest : public testing::Test {
     options_ = Options();
     CLI::App app("A program under test", "program");
     app.option_defaults()->always_capture_default();
-    Configuration configuration(app, {"TEST_PROGRAM_", default_file_});
+    Configuration configuration(app, "TEST_PROGRAM_", default_file_);
     app.add_option("--db", options_.db);
     app.add_option("--port", options_.port)->check(CLI::Range(0, 65535));
     app.add_flag("--loud", options_.loud);
     app.add_option("--listen", options_.listen);
-    app.add_option("--sides", options_.sides);
     app.add_option("--keys", options_.keys)->envname("TEST_KEYS");
     app.add_option("--limits-connections", options_.connections)->check(CLI::PositiveNumber);
     app.add_option("--ready-fd", options_.ready_fd)->configurable(false);
@@ -143,7 +141,6 @@ TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
   EXPECT_EQ(parse({"--config", write(printed_)}), std::nullopt) << told_ << printed_;
   EXPECT_EQ(options_.db, "default.db");
   EXPECT_TRUE(options_.listen.empty());
-  EXPECT_EQ(options_.sides, (std::vector<std::string>{"left", "right"}));
   const std::string odd = "a \"b\" \\ 'c' \x1b\xc3\xa4.db";
   EXPECT_EQ(parse({"--db", odd, "--port", "9", "--loud", "--listen", "::1", "--quiet",
                    "--limits-connections", "6"}),
@@ -179,8 +176,6 @@ TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
   refuse("[log]\nlevel = \"shrill\"\n", "a.toml:2:1: --log-level: shrill not in {debug,");
   refuse("[no]\nkey = 1\n", "a.toml:2:1: there is no setting no_key");
   refuse("[limits.deep]\nkey = 1\n", "there is no setting limits_deep");
-  refuse("log_level = \"info\"\n[log]\nlevel = \"debug\"\n",
-         "a.toml:1:1: log_level is given twice");
   refuse("limits = 5\n", "a.toml:1:1: there is no setting limits");
 }
 

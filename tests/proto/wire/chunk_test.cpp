@@ -1,7 +1,6 @@
 // Rows in chunks: what is written is read, and what does not fit together is found out.
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,15 +38,6 @@ TEST(Chunk, IsReadAsItWasWritten) {
   EXPECT_EQ(rows.cell(2).text, "");
   EXPECT_FALSE(rows.next());
   EXPECT_FALSE(rows.next());
-}
-
-TEST(Chunk, ARowHasAValueForEachColumn) {
-  ChunkWriter writer({"a", "b"});
-  EXPECT_EQ(writer.take().columns_size(), 2) << "without rows";
-  writer.integer(1);
-  EXPECT_THROW(writer.end_row(), std::logic_error);
-  writer.integer(2);
-  EXPECT_THROW(writer.integer(3), std::logic_error);
 }
 
 TEST(Chunk, OfATableHasItsRows) {

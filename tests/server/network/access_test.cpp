@@ -88,7 +88,7 @@ class AccessControlTest : public testing::Test {
   protocol::CurveKey add(const std::string& name, Role role = Role::kWorker) {
     const protocol::CurveKey key = protocol::made_key_pair().public_key;
     protocol::change_authorized_keys(list_, [&](AuthorizedKeys& keys) {
-      keys.add({name, role, key, protocol::utc_now()});
+      keys.add({name, role, key, "2026-11-22T03:00:00Z"});
     });
     return key;
   }

@@ -24,7 +24,6 @@
 
 #include "proto/frames.h"
 #include "proto/system/descriptor.h"
-#include "proto/system/spawn_plan.h"
 #include "proto/wire/chunk.h"
 #include "server/query/reader.h"
 #include "server/store/store.h"
@@ -178,11 +177,8 @@ TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledWhileItStartedBeginsNoQuery) {
   query.set_sql(kDeaf);
   ASSERT_TRUE(query.SerializeToFileDescriptor(request.number()));
   ASSERT_EQ(lseek(request.number(), 0, SEEK_SET), 0);
-  protocol::SpawnPlan plan;
-  plan.give(theirs.number(), STDOUT_FILENO);
-  plan.give(request.number(), kReaderRequest);
-  plan.close_from(kReaderRequest + 1);
-  const pid_t pid = plan.start(settings_.reader_program, {"reader", kReadMode, path_}, environ);
+  const pid_t pid =
+      start_reader(settings_.reader_program, path_, request.number(), theirs.number());
   int status = -1;
   EXPECT_EQ(waitpid(pid, &status, 0), pid);
   EXPECT_EQ(status, 0);

@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include <unistd.h>
+
 #include "tests/system/networks/small_study.h"
 
 namespace oblique::test {
@@ -44,8 +46,8 @@ void StudyOnLan::start_server(const std::string& address) {
 std::unique_ptr<Process> StudyOnLan::worker_on(const Host& host) const {
   const Inside inside(host);
   auto arguments = access("worker");
-  arguments.insert(arguments.end(),
-                   {"--threads", "1", "--name", host.name(), "--stop-with-parent"});
+  arguments.insert(arguments.end(), {"--threads", "1", "--name", host.name(), "--stop-with-parent",
+                                     std::to_string(getpid())});
   return std::make_unique<Process>(folder_, worker_program(), arguments);
 }
 

@@ -104,7 +104,7 @@ TEST_F(LeavingProgramTest, AWorkerWithoutWorkLeaves) {
 
 TEST_F(LeavingProgramTest, AWorkerWhoseServerIsNotThereLeavesTooWithOneAndTheServersAddress) {
   for (const std::vector<std::string>& end :
-       {std::vector<std::string>{"--idle-exit", "0.3"}, {"--until", "4s"}}) {
+       {std::vector<std::string>{"--idle-exit", "0.3"}, {"--until", "0.0012h"}}) {
     Worker worker(folder_, "tcp://127.0.0.1:1", end);
     EXPECT_EQ(worker.wait(), 1) << worker.err();
     EXPECT_NE(worker.err().find("leaving: tcp://127.0.0.1:1 was never reached in "),
