@@ -20,17 +20,15 @@ std::string objection_to_address(const std::string& url) {
   if (!url.starts_with(kScheme)) {
     return {};
   }
-  const std::size_t colon = url.rfind(':');
   int port = 0;
-  const auto [end, error] = std::from_chars(url.data() + colon + 1, url.data() + url.size(), port);
-  const bool is_number = error == std::errc() && end == url.data() + url.size();
-  if (!is_number || port < 1 || port > kHighestPort) {
+  const char* const begin = url.data() + url.rfind(':') + 1;
+  const char* const end = url.data() + url.size();
+  const auto [read, error] = std::from_chars(begin, end, port);
+  if (error != std::errc() || read != end || port < 1 || port > kHighestPort) {
     return "its port must be a number from 1 to 65535";
   }
-  const std::string_view host(url.data() + kScheme.size(),
-                              std::max(colon, kScheme.size()) - kScheme.size());
-  const bool has_brackets = host.starts_with('[') && host.ends_with(']');
-  return host.find(':') == std::string_view::npos || has_brackets
+  const bool has_brackets = url[kScheme.size()] == '[' && begin[-2] == ']';
+  return host_of(url).find(':') == std::string::npos || has_brackets
              ? ""
              : "an address of IPv6 stands in brackets, as tcp://[::1]:7601";
 }

@@ -13,6 +13,29 @@
 namespace oblique::protocol {
 namespace {
 
+/// Whether a terminal would act on the character or show nothing.
+bool is_control(char32_t code) {
+  using Range = std::pair<char32_t, char32_t>;
+  constexpr std::array<Range, 13> kControls{{
+      {0x00, 0x1f},        // C0
+      {0x7f, 0x9f},        // DEL, C1
+      {0xad, 0xad},        // soft hyphen
+      {0x034f, 0x034f},    // combining grapheme joiner
+      {0x061c, 0x061c},    // Arabic letter mark
+      {0x180b, 0x180f},    // Mongolian variation selectors and vowel separator
+      {0x200b, 0x200f},    // zero-width space and joiners; left-to-right and right-to-left marks
+      {0x2028, 0x202e},    // line and paragraph separators; embeddings and overrides
+      {0x2060, 0x206f},    // word joiner, invisible operators, isolates
+      {0xfe00, 0xfe0f},    // variation selectors
+      {0xfeff, 0xfeff},    // zero-width no-break space
+      {0xfffe, 0xffff},    // no characters, and not allowed in XML
+      {0xe0000, 0xe0fff},  // tags, variation selectors
+  }};
+  return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
+    return code >= range.first && code <= range.second;
+  });
+}
+
 std::string escape_of(char32_t code) {
   switch (code) {
     case U'\n':
@@ -22,30 +45,46 @@ std::string escape_of(char32_t code) {
     case U'\t':
       return "\\t";
     default:
-      return code < 0x80 ? fmt::format("\\x{:02x}", static_cast<unsigned>(code))
-                         : fmt::format("\\u{:04x}", static_cast<unsigned>(code));
+      return fmt::format(fmt::runtime(code < 0x80 ? "\\x{:02x}" : "\\u{:04x}"),
+                         static_cast<unsigned>(code));
   }
 }
 
 std::string visible_but(std::string_view text, std::string_view kept) {
   std::string shown;
-  shown.reserve(text.size());
   while (!text.empty()) {
     const Character next = first_character(text);
+    const auto bytes = text.substr(0, std::max<std::size_t>(next.bytes, 1));
     if (next.bytes == 0) {
       shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text.front()));
-      text.remove_prefix(1);
-      continue;
-    }
-    const auto bytes = text.substr(0, next.bytes);
-    if (is_control(next.code) && kept.find(bytes) == std::string_view::npos) {
+    } else if (is_control(next.code) && kept.find(bytes) == std::string_view::npos) {
       shown += escape_of(next.code);
     } else {
       shown += bytes;
     }
-    text.remove_prefix(next.bytes);
+    text.remove_prefix(bytes.size());
   }
   return shown;
+}
+
+char lower(char letter) {
+  return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+}
+
+// Levenshtein's distance, one row of its table at a time.
+std::size_t distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (lower(a[i]) == lower(b[j]) ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
 }
 
 }  // namespace
@@ -76,28 +115,6 @@ Character first_character(std::string_view text) {
   const bool is_sound =
       code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;
   return is_sound ? Character{bytes, code} : kNone;
-}
-
-bool is_control(char32_t code) {
-  using Range = std::pair<char32_t, char32_t>;
-  constexpr std::array<Range, 13> kControls{{
-      {0x00, 0x1f},        // C0
-      {0x7f, 0x9f},        // DEL, C1
-      {0xad, 0xad},        // soft hyphen
-      {0x034f, 0x034f},    // combining grapheme joiner
-      {0x061c, 0x061c},    // Arabic letter mark
-      {0x180b, 0x180f},    // Mongolian variation selectors and vowel separator
-      {0x200b, 0x200f},    // zero-width space and joiners; left-to-right and right-to-left marks
-      {0x2028, 0x202e},    // line and paragraph separators; embeddings and overrides
-      {0x2060, 0x206f},    // word joiner, invisible operators, isolates
-      {0xfe00, 0xfe0f},    // variation selectors
-      {0xfeff, 0xfeff},    // zero-width no-break space
-      {0xfffe, 0xffff},    // no characters, and not allowed in XML
-      {0xe0000, 0xe0fff},  // tags, variation selectors
-  }};
-  return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
-    return code >= range.first && code <= range.second;
-  });
 }
 
 std::string visible(std::string_view text) {
@@ -148,30 +165,6 @@ bool is_visible(std::string_view text) {
   return visible(text) == text;
 }
 
-namespace {
-
-char lower(char letter) {
-  return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-}
-
-// Levenshtein's distance, one row of its table at a time.
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (lower(a[i]) == lower(b[j]) ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
-
 std::string_view nearest(std::string_view word, std::span<const std::string_view> candidates) {
   std::string_view best;
   std::size_t best_distance = std::max<std::size_t>(1, word.size() / 2) + 1;
@@ -193,20 +186,15 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
 
 std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates) {
   const auto best = nearest(word, candidates);
-  return best.empty() ? std::string() : " (did you mean `" + std::string(best) + "`?)";
+  return best.empty() ? "" : fmt::format(" (did you mean `{}`?)", best);
 }
 
 std::string unknown_key(std::string_view name, std::span<const std::string_view> known) {
-  return "unknown key `" + excerpt(name) + "`" + did_you_mean(name, known);
+  return fmt::format("unknown key `{}`{}", excerpt(name), did_you_mean(name, known));
 }
 
 std::string joined(std::span<const std::string_view> names) {
-  std::string text;
-  for (const auto name : names) {
-    text += text.empty() ? "" : ", ";
-    text += name;
-  }
-  return text;
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 }  // namespace oblique::protocol

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <sstream>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -15,23 +16,30 @@ namespace {
 
 constexpr std::size_t kMostKeyParts = 100;
 
-/// A value of a list or table as the file has it; nested ones only by their kind.
-std::string element(const toml::node& node) {
+/// A value as the file has it; in a list or table, nested ones only by their kind.
+std::string element(const toml::node& node, bool is_nested) {
+  std::vector<std::string> parts;
+  if (is_nested && (node.is_array() || node.is_table())) {
+    return kind_of(node);
+  }
+  if (const auto* list = node.as_array()) {
+    for (const auto& value : *list) {
+      parts.push_back(element(value, true));
+    }
+    return fmt::format("[{}]", fmt::join(parts, ", "));
+  }
+  if (const auto* table = node.as_table()) {
+    for (const auto& [key, value] : *table) {
+      parts.push_back(fmt::format("{} = {}", key.str(), element(value, true)));
+    }
+    return parts.empty() ? "{}" : fmt::format("{{ {} }}", fmt::join(parts, ", "));
+  }
   if (const auto* number = node.as_floating_point()) {
     return solver::exact_number(number->get());
-  }
-  if (node.is_array() || node.is_table()) {
-    return kind_of(node);
   }
   std::ostringstream text;
   node.visit([&](const auto& value) { text << value; });
   return text.str();
-}
-
-std::string not_as_expected(std::string_view key, const toml::node& node,
-                            std::string_view expected) {
-  return fmt::format("{} = {} is {}: it must be {}", excerpt(key), shown(node), kind_of(node),
-                     expected);
 }
 
 /// Where a key has too many parts: tables nest as deep, and destroying them takes stack for each.
@@ -70,21 +78,8 @@ std::string kind_of(const toml::node& node) {
 
 std::string shown(const toml::node& node) {
   constexpr std::size_t kMost = 60;
-  std::string line;
-  if (const auto* list = node.as_array()) {
-    for (const auto& value : *list) {
-      line += (line.empty() ? "[" : ", ") + element(value);
-    }
-    line = list->empty() ? "[]" : line + "]";
-  } else if (const auto* table = node.as_table()) {
-    for (const auto& [key, value] : *table) {
-      line += (line.empty() ? "{ " : ", ") + std::string(key.str()) + " = " + element(value);
-    }
-    line = table->empty() ? "{}" : line + " }";
-  } else {
-    line = element(node);
-  }
-  line = line.substr(0, line.find('\n'));
+  const std::string all = element(node, false);
+  const std::string line = all.substr(0, all.find('\n'));
   return line.size() > kMost ? line.substr(0, kMost) + "..." : line;
 }
 
@@ -107,7 +102,7 @@ toml::table TomlReader::parse(std::string_view text) const {
   try {
     return toml::parse(text, file_);
   } catch (const toml::parse_error& error) {
-    fail_at(error.source(), excerpt(error.description(), kLongestError));
+    fail(error, excerpt(error.description(), kLongestError));
   }
 }
 
@@ -115,15 +110,17 @@ std::string TomlReader::place(const toml::source_region& at) const {
   return fmt::format("{}:{}:{}", file_, at.begin.line, at.begin.column);
 }
 
-void TomlReader::fail_at(const toml::source_region& at, std::string_view message) const {
-  throw solver::InputError({.text = std::string(message), .place = place(at)});
+void TomlReader::require(bool is_expected, std::string_view key, const toml::node& node,
+                         std::string_view expected) const {
+  if (!is_expected) {
+    fail(node, fmt::format("{} = {} is {}: it must be {}", excerpt(key), shown(node), kind_of(node),
+                           expected));
+  }
 }
 
 double TomlReader::number(std::string_view key, const toml::node& node,
                           std::string_view expected) const {
-  if (!node.is_number()) {
-    fail(node, not_as_expected(key, node, expected));
-  }
+  require(node.is_number(), key, node, expected);
   const auto value = node.value<double>();
   if (!value) {
     fail(node, fmt::format("{} = {} has more digits than a number here keeps: write it with an "
@@ -135,24 +132,18 @@ double TomlReader::number(std::string_view key, const toml::node& node,
 
 std::string TomlReader::text(std::string_view key, const toml::node& node,
                              std::string_view expected) const {
-  if (!node.is_string()) {
-    fail(node, not_as_expected(key, node, expected));
-  }
+  require(node.is_string(), key, node, expected);
   return *node.value<std::string>();
 }
 
 bool TomlReader::yes(std::string_view key, const toml::node& node) const {
-  if (!node.is_boolean()) {
-    fail(node, not_as_expected(key, node, "true or false"));
-  }
+  require(node.is_boolean(), key, node, "true or false");
   return *node.value<bool>();
 }
 
 const toml::table& TomlReader::table(std::string_view key, const toml::node& node,
                                      std::string_view expected) const {
-  if (!node.is_table()) {
-    fail(node, not_as_expected(key, node, expected));
-  }
+  require(node.is_table(), key, node, expected);
   return *node.as_table();
 }
 

@@ -7,7 +7,7 @@
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "client/verbs/verbs.h"
-#include "proto/recipe/written.h"
+#include "proto/recipe/model_message.h"
 #include "proto/text.h"
 #include "server/maintenance/study_changes_offline.h"
 #include "worker/solver/model/errors.h"

@@ -18,7 +18,7 @@
 #include "client/verbs/tip_reach.h"
 #include "client/verbs/verbs.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/written.h"
+#include "proto/recipe/model_message.h"
 #include "proto/text.h"
 
 namespace oblique::client {
@@ -131,7 +131,7 @@ void add_submit(CLI::App& app, Command& command) {
       ->type_name("N");
   verb->add_option("--priority", flags->settings.priority,
                    fmt::format("studies of a higher priority come first, {}; 0 unless told",
-                               protocol::allowed_priorities()))
+                               protocol::kPriorities))
       ->type_name("N");
   verb->add_flag(
       "--no-reuse", flags->settings.no_reuse,

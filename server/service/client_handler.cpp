@@ -232,8 +232,11 @@ void ClientHandler::query_report(QueryReport report) {
     query.runs = true;
     return;
   }
-  const bool is_there = core_.ports.to_client(
-      query.client.identity, protocol::with_request_id(query.client.request_id, report.reply));
+  protocol::ClientReply number;
+  number.set_request_id(query.client.request_id);
+  // Encoded messages one after another are, decoded, one message with all their fields.
+  const bool is_there =
+      core_.ports.to_client(query.client.identity, protocol::encode(number) + report.reply);
   ++query.sent;
   if (report.kind == QueryReport::Kind::kAnswered) {
     pending_.erase(found);
@@ -316,9 +319,14 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
 void ClientHandler::describe(const Client& client, const protocol::DescribeRequest& request) {
   const StudyStates& states = core_.states;
   if (const auto known = states.find_durable(request.study())) {
+    protocol::ClientReply number;
+    number.set_request_id(client.request_id);
     core_.ports.to_client(client.identity,
-                          protocol::description_around(client.request_id,
-                                                       states.record(*known).table.recipe_bytes()));
+                          protocol::encode_around(
+                              number, protocol::ClientReply::kDescribeFieldNumber,
+                              protocol::encode_around(protocol::DescribeReply(),
+                                                      protocol::DescribeReply::kRecipeFieldNumber,
+                                                      states.record(*known).table.recipe_bytes())));
   } else {
     core_.ports.reply_error(client, unknown_study(request.study(), states));
   }

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "proto/recipe/checks.h"
+#include "proto/recipe/model_message.h"
 
 namespace oblique::server {
 namespace {

@@ -7,6 +7,13 @@
 namespace oblique::server {
 namespace {
 
+/// The frame of an answer.
+std::string reply_of(const protocol::QueryReply& query) {
+  protocol::ClientReply reply;
+  *reply.mutable_query() = query;
+  return protocol::encode(reply);
+}
+
 class ServiceQueryTest : public ServiceTest {
  protected:
   void send(const ClientRequest& message, const std::string& identity) {
@@ -33,8 +40,8 @@ class ServiceQueryTest : public ServiceTest {
   void give(std::size_t index) {
     protocol::QueryReply chunk;
     chunk.set_chunk_rows(1);
-    service_->query_report({QueryReport::Kind::kRows, ports_.queries.at(index).ticket,
-                            protocol::reply_around(protocol::encode(chunk))});
+    service_->query_report(
+        {QueryReport::Kind::kRows, ports_.queries.at(index).ticket, reply_of(chunk)});
   }
 };
 
@@ -44,7 +51,7 @@ TEST_F(ServiceQueryTest, AnAnswerGoesToTheOneWhoAskedUnderItsNumber) {
   EXPECT_EQ(ports_.queries[0].client, "client");
   protocol::QueryReply rows;
   rows.add_columns("a");
-  answer_query(0, protocol::reply_around(protocol::encode(rows)));
+  answer_query(0, reply_of(rows));
   EXPECT_EQ(last_reply().request_id(), 7U);
   EXPECT_EQ(last_reply().query().columns(0), "a");
 }
@@ -122,7 +129,7 @@ TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReader
   want_more(7, 1);
   const std::uint64_t ticket = ports_.queries[0].ticket;
   EXPECT_EQ(ports_.more, (Taken{{ticket, 1}, {ticket, 2}}));
-  answer_query(0, protocol::reply_around({}));
+  answer_query(0, reply_of({}));
   EXPECT_EQ(ports_.replies.size(), 3U);
   want_more(7, 3);
   EXPECT_THAT(last_reply().error().message(), testing::HasSubstr("no answer"));
