@@ -3,10 +3,9 @@
 #include <netdb.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <charconv>
-#include <memory>
 #include <string_view>
+#include <system_error>
 
 namespace oblique::protocol {
 namespace {
@@ -50,12 +49,12 @@ Families families_of(const std::string& host) {
   if (getaddrinfo(host.c_str(), nullptr, &wanted, &found) != 0) {
     return {};
   }
-  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, &freeaddrinfo);
   Families families;
   for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
     families.has_v4 = families.has_v4 || address->ai_family == AF_INET;
     families.has_v6 = families.has_v6 || address->ai_family == AF_INET6;
   }
+  freeaddrinfo(found);
   return families;
 }
 

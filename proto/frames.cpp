@@ -9,11 +9,12 @@
 namespace oblique::protocol {
 
 std::string objection_to_version(std::uint32_t version, const std::string& who) {
-  return version == kProtocolVersion ? std::string()
-                                     : fmt::format(
-                                           "the server has protocol version {}, the {} {}: install "
-                                           "the same release on both",
-                                           kProtocolVersion, who, version);
+  return version == kProtocolVersion
+             ? ""
+             : fmt::format(
+                   "the server has protocol version {}, the {} {}: install the same "
+                   "release on both",
+                   kProtocolVersion, who, version);
 }
 
 std::string encode(const google::protobuf::MessageLite& message) {

@@ -72,30 +72,32 @@ struct SentList {
   void (*read)(CaseResult& result, const double* element);
 };
 
-/// In the order of solver::result_lists(). A phase begins where that before it ends.
+template <auto list>
+void read_pair(CaseResult& result, const double* x) {
+  (result.*list).push_back({x[0], x[1]});
+}
+
+void read_peak(CaseResult& result, const double* x) {
+  result.peaks.push_back({x[0], x[1], x[2], false});
+}
+
+/// A phase begins where that before it ends.
+void read_phase(CaseResult& result, const double* end_s) {
+  auto& phases = result.phases;
+  const auto kind = phases.size() % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution;
+  phases.push_back({kind, phases.empty() ? 0.0 : phases.back().t1_s, *end_s});
+}
+
+/// In the order of solver::result_lists().
 constexpr std::array<SentList, 5> kLists{{
-    {&PointResult::peaks, &PointResult::mutable_peaks, 0, 3,
-     [](CaseResult& result, const double* x) {
-       result.peaks.push_back({x[0], x[1], x[2], false});
-     }},
+    {&PointResult::peaks, &PointResult::mutable_peaks, 0, 3, read_peak},
     {&PointResult::ft_peaks, &PointResult::mutable_ft_peaks, 0, 2,
-     [](CaseResult& result, const double* x) {
-       result.ft_peaks.push_back({x[0], x[1]});
-     }},
-    {&PointResult::phase_ends_s, &PointResult::mutable_phase_ends_s, 2, 1,
-     [](CaseResult& result, const double* x) {
-       const auto kind =
-           result.phases.size() % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution;
-       result.phases.push_back({kind, result.phases.empty() ? 0.0 : result.phases.back().t1_s, *x});
-     }},
+     read_pair<&CaseResult::ft_peaks>},
+    {&PointResult::phase_ends_s, &PointResult::mutable_phase_ends_s, 2, 1, read_phase},
     {&PointResult::stick_intervals, &PointResult::mutable_stick_intervals, 0, 2,
-     [](CaseResult& result, const double* x) {
-       result.stick_intervals.push_back({x[0], x[1]});
-     }},
+     read_pair<&CaseResult::stick_intervals>},
     {&PointResult::reaction_peaks, &PointResult::mutable_reaction_peaks, 0, 2,
-     [](CaseResult& result, const double* x) {
-       result.reaction_peaks.push_back({x[0], x[1]});
-     }},
+     read_pair<&CaseResult::reaction_peaks>},
 }};
 
 void add_lists(const CaseResult& result, PointResult& message) {
@@ -238,24 +240,25 @@ std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, 
   if (static_cast<std::size_t>(trace.values_size()) != states.size() * numbers) {
     return "its rows have other columns than a trace of this model";
   }
-  const auto code = [](char state) { return static_cast<unsigned char>(state); };
-  if (std::any_of(states.begin(), states.end(),
-                  [&](char state) { return code(state) >= solver::kTraceStates.size(); })) {
+  if (std::any_of(states.begin(), states.end(), [](char state) {
+        return static_cast<unsigned char>(state) >= solver::kTraceStates.size();
+      })) {
     return "it has a state that no contact has";
   }
-  const auto falls = [&](char state) { return code(state) == solver::kFallingCode; };
-  if (!std::is_partitioned(states.begin(), states.end(), falls)) {
+  const auto touch = states.find_first_not_of(static_cast<char>(solver::kFallingCode));
+  if (touch != std::string::npos &&
+      states.find(static_cast<char>(solver::kFallingCode), touch) != std::string::npos) {
     return "it falls again after the touch";
   }
-  if (!with_fall && !states.empty() && falls(states.front())) {
+  if (!with_fall && touch != 0 && !states.empty()) {
     return "it has rows of the fall that were not requested";
   }
   if (!std::all_of(trace.values().begin(), trace.values().end(),
                    [](double value) { return std::isfinite(value); })) {
     return "it has a value that is not finite";
   }
-  const bool names_every = trace.every() > 1;  // with which it is short enough
-  if (states.empty() && trace.result().error().empty() && !names_every) {
+  // Above 1, `every` says how a trace that is too long gets short enough.
+  if (states.empty() && trace.result().error().empty() && trace.every() <= 1) {
     return "it has no instant";
   }
   return fault_of(trace.result());

@@ -37,17 +37,12 @@ bool is_control(char32_t code) {
 }
 
 std::string escape_of(char32_t code) {
-  switch (code) {
-    case U'\n':
-      return "\\n";
-    case U'\r':
-      return "\\r";
-    case U'\t':
-      return "\\t";
-    default:
-      return fmt::format(fmt::runtime(code < 0x80 ? "\\x{:02x}" : "\\u{:04x}"),
-                         static_cast<unsigned>(code));
+  constexpr std::u32string_view kNamed = U"\n\r\t";
+  if (const auto place = kNamed.find(code); place != std::u32string_view::npos) {
+    return {'\\', "nrt"[place]};
   }
+  return fmt::format(fmt::runtime(code < 0x80 ? "\\x{:02x}" : "\\u{:04x}"),
+                     static_cast<unsigned>(code));
 }
 
 std::string visible_but(std::string_view text, std::string_view kept) {
@@ -67,12 +62,9 @@ std::string visible_but(std::string_view text, std::string_view kept) {
   return shown;
 }
 
-char lower(char letter) {
-  return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-}
-
 // Levenshtein's distance, one row of its table at a time.
 std::size_t distance(std::string_view a, std::string_view b) {
+  const auto lower = [](char letter) { return std::tolower(static_cast<unsigned char>(letter)); };
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -91,10 +83,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
 
 Character first_character(std::string_view text) {
   constexpr Character kNone{0, 0};
-  if (text.empty()) {
-    return kNone;
-  }
-  const auto lead = static_cast<unsigned char>(text.front());
+  const auto lead = static_cast<unsigned char>(text.empty() ? '\xff' : text.front());
   if (lead < 0x80) {
     return {1, lead};
   }

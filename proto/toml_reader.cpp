@@ -1,8 +1,8 @@
 #include "proto/toml_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
-#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -13,8 +13,6 @@
 
 namespace oblique::protocol {
 namespace {
-
-constexpr std::size_t kMostKeyParts = 100;
 
 /// A value as the file has it; in a list or table, nested ones only by their kind.
 std::string element(const toml::node& node, bool is_nested) {
@@ -42,38 +40,15 @@ std::string element(const toml::node& node, bool is_nested) {
   return text.str();
 }
 
-/// Where a key has too many parts: tables nest as deep, and destroying them takes stack for each.
-/// Nothing is parsed: so many dots in a text without a comma or an equals sign count too.
-std::optional<std::size_t> too_deep_key(std::string_view text) {
-  std::size_t parts = 1;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const bool is_end = std::string_view("=,[]{}\n").find(text[at]) != std::string_view::npos;
-    parts = is_end ? 1 : parts + (text[at] == '.' ? 1 : 0);
-    if (parts > kMostKeyParts) {
-      return at;
-    }
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::string kind_of(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "a list";
-    case toml::node_type::string:
-      return "a string";
-    case toml::node_type::boolean:
-      return "a boolean";
-    case toml::node_type::integer:
-    case toml::node_type::floating_point:
-      return "a number";
-    default:
-      return "a date or time";
-  }
+  constexpr std::string_view kDate = "a date or time";
+  // By toml::node_type.
+  constexpr std::array<std::string_view, 10> kKinds{"nothing",  "a table",  "a list",    "a string",
+                                                    "a number", "a number", "a boolean", kDate,
+                                                    kDate,      kDate};
+  return std::string(kKinds.at(static_cast<std::size_t>(node.type())));
 }
 
 std::string shown(const toml::node& node) {
@@ -92,12 +67,20 @@ std::string toml_string(std::string_view text) {
 
 toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
-  if (const auto found = too_deep_key(text)) {
-    const auto line =
-        std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*found), '\n');
-    throw solver::InputError(
-        {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
-         .place = fmt::format("{}:{}", file_, line + 1)});
+  constexpr std::size_t kMostKeyParts = 100;
+  // Tables nest as deep as their keys have parts, and destroying them takes stack for each. Nothing
+  // is parsed: so many dots in a text without a comma or an equals sign count too.
+  std::size_t parts = 1;
+  std::size_t line = 1;
+  for (const char c : text) {
+    line += c == '\n' ? 1 : 0;
+    const bool is_end = std::string_view("=,[]{}\n").find(c) != std::string_view::npos;
+    parts = is_end ? 1 : parts + (c == '.' ? 1 : 0);
+    if (parts > kMostKeyParts) {
+      throw solver::InputError(
+          {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
+           .place = fmt::format("{}:{}", file_, line)});
+    }
   }
   try {
     return toml::parse(text, file_);

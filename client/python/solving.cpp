@@ -350,7 +350,7 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
     const auto point = values.subspan(keyed_axes.size() - protocol::kPointKeyOrder.size());
     all.points.push_back({point[0], point[1], point[2], place->second});
   };
-  protocol::visit_values(base, block, points, add);
+  protocol::PointTable::visit_values(base, block, points, add);
   return all;
 }
 

@@ -14,7 +14,7 @@
 #include "client/output/speech.h"
 #include "client/output/terminal.h"
 #include "proto/program/usage.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "proto/text.h"
 #include "server/query/sql_text.h"
 

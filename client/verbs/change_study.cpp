@@ -8,7 +8,7 @@
 #include "client/service/connection.h"
 #include "client/service/source_flags.h"
 #include "client/verbs/verbs.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "proto/text.h"
 
 namespace oblique::client {

@@ -13,7 +13,7 @@
 #include "client/service/watching.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "proto/text.h"
 
 namespace oblique::client {

@@ -7,7 +7,7 @@
 #include "client/service/source_flags.h"
 #include "client/verbs/printed_rows.h"
 #include "client/verbs/verbs.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 
 namespace oblique::client {
 namespace {

@@ -109,11 +109,10 @@ bool has_own_values(const Axis& axis) {
 }
 
 std::uint64_t axis_size(const Axis& axis) {
-  if (axis.count() > 0) {
-    return axis.count();
-  }
   const bool is_single = axis.has_distribution() || !axis.expression().empty();
-  return is_single ? 1 : static_cast<std::uint64_t>(axis.values_size());
+  return axis.count() > 0 ? axis.count()
+         : is_single      ? 1
+                          : static_cast<std::uint64_t>(axis.values_size());
 }
 
 RangeValues::RangeValues(const Axis& axis)
@@ -163,26 +162,27 @@ double axis_value(const Axis& axis, std::uint64_t i) {
 }
 
 double smallest_value(const Axis& axis) {
-  const Distribution& drawn = axis.distribution();
-  return axis.has_distribution()
-             ? (drawn.has_from() ? drawn.from() : -std::numeric_limits<double>::infinity())
-         : axis.count() > 0 ? axis.from()
-                            : *std::min_element(axis.values().begin(), axis.values().end());
+  if (axis.has_distribution()) {
+    const Distribution& drawn = axis.distribution();
+    return drawn.has_from() ? drawn.from() : -std::numeric_limits<double>::infinity();
+  }
+  const auto& values = axis.values();
+  return axis.count() > 0 ? axis.from() : *std::min_element(values.begin(), values.end());
 }
 
 double largest_value(const Axis& axis) {
-  const Distribution& drawn = axis.distribution();
-  return axis.has_distribution()
-             ? (drawn.has_to() ? drawn.to() : std::numeric_limits<double>::infinity())
-         : axis.count() > 0 ? axis.to()
-                            : *std::max_element(axis.values().begin(), axis.values().end());
+  if (axis.has_distribution()) {
+    const Distribution& drawn = axis.distribution();
+    return drawn.has_to() ? drawn.to() : std::numeric_limits<double>::infinity();
+  }
+  const auto& values = axis.values();
+  return axis.count() > 0 ? axis.to() : *std::max_element(values.begin(), values.end());
 }
 
 BlockKind block_kind(const Block& block) {
-  if (block.has_sample()) {
-    return BlockKind::kSample;
-  }
-  return block.zip() ? BlockKind::kZip : BlockKind::kProduct;
+  return block.has_sample() ? BlockKind::kSample
+         : block.zip()      ? BlockKind::kZip
+                            : BlockKind::kProduct;
 }
 
 std::span<const Axis* const> model_axes(const Block& block) {
@@ -193,9 +193,12 @@ std::span<const Axis* const> point_axes(const Block& block) {
   return {block.axes().data() + block.axes_size() - kPointKeyOrder.size(), kPointKeyOrder.size()};
 }
 
-void throw_too_many_points() {
-  throw InputError(fmt::format(
-      "the study has more than {} points, the most that are allowed: shorten an axis", kMaxPoints));
+void check_points(std::uint64_t points) {
+  if (points > kMaxPoints) {
+    throw InputError(
+        fmt::format("the study has more than {} points, the most that are allowed: shorten an axis",
+                    kMaxPoints));
+  }
 }
 
 std::uint64_t points_of_block(const Block& block) {
@@ -209,9 +212,7 @@ std::uint64_t points_of_block(const Block& block) {
       points = size > kMaxPoints / points ? kMaxPoints + 1 : points * size;
     }
   }
-  if (points > kMaxPoints) {
-    throw_too_many_points();
-  }
+  check_points(points);
   return points;
 }
 
@@ -367,7 +368,7 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
             key.name, drawn.mean());
     require(std::isfinite(drawn.sd()) && drawn.sd() > 0.0,
             "{}: sd = {} is not allowed: sd must be > 0", key.name, drawn.sd());
-    require(sampling::Quantiles(axis).part_left() >= sampling::Quantiles::kLeastPart,
+    require(std::isnormal(sampling::Quantiles(axis).part_left()),
             "{}: from {} to {} nothing is left of a normal distribution of mean {} and sd {}",
             key.name, from, to, drawn.mean(), drawn.sd());
   }

@@ -93,7 +93,8 @@ bool is_drawn(const Axis& axis);
 /// solver::InputError above `kMaxPoints`.
 std::uint64_t points_of_block(const Block& block);
 
-[[noreturn]] void throw_too_many_points();
+/// Throws solver::InputError above `kMaxPoints`.
+void check_points(std::uint64_t points);
 
 /// The place of an axis in its block. Point p of the block, a product or zip, has value number p /
 /// stride % values of the axis.

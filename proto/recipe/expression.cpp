@@ -267,9 +267,10 @@ class Expression::Parser {
 };
 
 std::vector<std::string_view> function_names() {
-  std::vector<std::string_view> names(kFunctions.size());
-  std::transform(kFunctions.begin(), kFunctions.end(), names.begin(),
-                 [](const Function& function) { return function.name; });
+  std::vector<std::string_view> names;
+  for (const Function& function : kFunctions) {
+    names.push_back(function.name);
+  }
   return names;
 }
 

@@ -47,11 +47,6 @@ constexpr std::array<Field, 12> kFields{{
 /// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// The text of a number; both zeros have the same.
-std::string text_of(double value) {
-  return exact_number(value + 0.0);
-}
-
 /// The bytes for comparison.
 std::string comparable_bytes(Block block) {
   block.DiscardUnknownFields();
@@ -112,9 +107,9 @@ solver::ModelParameters from_message(const ModelParameters& message) {
 }
 
 std::string canonical_model(const solver::ModelParameters& model) {
-  std::vector<std::string> lengths;
+  std::vector<std::string> lengths;  // + 0.0: both zeros have the same text
   for (const double length_m : model.lengths_m) {
-    lengths.push_back(text_of(length_m));
+    lengths.push_back(exact_number(length_m + 0.0));
   }
   std::string text = fmt::format("oblique-model-1 lengths={}", fmt::join(lengths, ","));
   for (const solver::ParameterKey& key : solver::model_keys()) {
@@ -123,7 +118,7 @@ std::string canonical_model(const solver::ModelParameters& model) {
       text += fmt::format(" {}={}", key.name,
                           key.name == "integrator"
                               ? std::string(solver::integrator_name(model.integrator))
-                              : text_of(key.get(model)));
+                              : exact_number(key.get(model) + 0.0));
     }
   }
   return text;

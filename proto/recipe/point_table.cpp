@@ -53,6 +53,20 @@ auto in_expression(std::string_view key, std::string_view text, Work work) {
   }
 }
 
+/// Calls `act`. Its error gets the block's number, if the recipe has several.
+template <typename Act>
+void in_block(const Recipe& recipe, std::size_t number, Act act) {
+  try {
+    act();
+  } catch (const InputError& error) {
+    InputError::Fields fields = error.fields();
+    if (recipe.blocks_size() > 1) {
+      fields.block = number;
+    }
+    throw InputError(std::move(fields));
+  }
+}
+
 /// Calls `act` with every number below `points`, or with `tries` random ones if there are more than
 /// `most`. Whether it was every number.
 template <typename Act>
@@ -83,13 +97,12 @@ class PointTable::BlockPoints : public BlockPlace {
         source.quantiles.emplace(*layout.axis);
       }
     }
-    std::vector<Formula> formulas;
     for (std::size_t i = 0; i < sources_.size(); ++i) {
       if (const Axis& axis = *sources_[i].layout.axis; !axis.expression().empty()) {
-        formulas.push_back(read_formula(base, axis.key(), axis.expression(), i));
+        formulas_.push_back(read_formula(base, axis.key(), axis.expression(), i));
       }
     }
-    sort(std::move(formulas));
+    sort();
     if (!block.where().empty()) {
       filter_ = read_formula(base, "where", block.where(), sources_.size());
     }
@@ -236,28 +249,28 @@ class PointTable::BlockPoints : public BlockPlace {
                                               : points;
   }
 
-  void sort(std::vector<Formula> formulas) {
-    while (!formulas.empty()) {
-      // The first formula whose inputs are all computed.
-      const auto next = std::find_if(formulas.begin(), formulas.end(), [&](const Formula& formula) {
-        return std::none_of(formulas.begin(), formulas.end(), [&](const Formula& other) {
+  /// Brings the formulas into an order in which each follows those that compute its inputs.
+  void sort() {
+    for (auto begin = formulas_.begin(); begin != formulas_.end(); ++begin) {
+      const auto next = std::find_if(begin, formulas_.end(), [&](const Formula& formula) {
+        return std::none_of(begin, formulas_.end(), [&](const Formula& other) {
           return std::find(formula.inputs.begin(), formula.inputs.end(), other.axis) !=
                  formula.inputs.end();
         });
       });
-      if (next == formulas.end()) {
+      if (next == formulas_.end()) {
         std::vector<std::string_view> circle;
-        for (const Formula& formula : formulas) {
-          circle.emplace_back(sources_[formula.axis].layout.axis->key());
-        }
+        std::transform(begin, formulas_.end(), std::back_inserter(circle),
+                       [&](const Formula& each) {
+                         return std::string_view(sources_[each.axis].layout.axis->key());
+                       });
         throw InputError(
             circle.front(),
             fmt::format(
                 "{}: the expressions go round in a circle: one must follow from keys that do not",
                 fmt::join(circle, ", ")));
       }
-      formulas_.push_back(std::move(*next));
-      formulas.erase(next);
+      std::rotate(begin, next, next + 1);
     }
   }
 
@@ -293,23 +306,10 @@ class PointTable::BlockPoints : public BlockPlace {
   std::optional<Formula> filter_;
 };
 
-/// Calls `act`. Its error gets the block's number, if there are several blocks.
-template <typename Act>
-void PointTable::in_block(std::size_t number, Act act) const {
-  try {
-    act();
-  } catch (const InputError& error) {
-    InputError::Fields fields = error.fields();
-    if (recipe_->blocks_size() > 1) {
-      fields.block = number;
-    }
-    throw InputError(std::move(fields));
-  }
-}
-
-void visit_values(const solver::ModelParameters& base, const Block& block, std::uint64_t points,
-                  const std::function<void(std::span<const double>)>& visit) {
-  const PointTable::BlockPoints compiled(base, block);
+void PointTable::visit_values(const solver::ModelParameters& base, const Block& block,
+                              std::uint64_t points,
+                              const std::function<void(std::span<const double>)>& visit) {
+  const BlockPoints compiled(base, block);
   for (std::uint64_t i = 0; i < points; ++i) {
     visit(compiled.values_at(i));
   }
@@ -331,7 +331,7 @@ PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::mo
                     recipe_->blocks_size(), kMostBlocks));
   }
   for (const Block& block : recipe_->blocks()) {
-    in_block(blocks_.size(), [&] { add_block(block); });
+    in_block(*recipe_, blocks_.size(), [&] { add_block(block); });
   }
 }
 
@@ -346,19 +346,17 @@ void PointTable::add_block(const Block& block) {
     throw InputError(
         fmt::format("the study has more than {} expressions and filters", kMostExpressions));
   }
-  if (added.points > kMaxPoints - points_) {
-    throw_too_many_points();
-  }
+  check_points(points_ + added.points);
   added.is_judged_by_points = is_judged_by_points(base_model_, block);
   added.first_point = points_;
-  added.first_model = models_;
   const bool has_base_model = model_axes(block).empty();
-  if (!has_base_model || !base_model_number_) {
+  const bool is_known = has_base_model && !base_segments_.empty();
+  added.first_model = is_known ? base_segments_.front().model : models_;
+  if (!is_known) {
     model_blocks_.push_back(blocks_.size() - 1);
     models_ += added.models;
   }
   if (has_base_model) {
-    base_model_number_ = added.first_model = base_model_number_.value_or(added.first_model);
     Segment* last = base_segments_.empty() ? nullptr : &base_segments_.back();
     if (last != nullptr && last->first_point + last->count == points_) {
       last->count += added.points;
@@ -367,6 +365,7 @@ void PointTable::add_block(const Block& block) {
     }
   }
   has_filter_ = has_filter_ || !block.where().empty();
+  judged_blocks_ += added.is_judged_by_points ? 1 : 0;
   points_ += added.points;
 }
 
@@ -439,17 +438,8 @@ std::string PointTable::fault(std::uint64_t index) const {
   return fault ? fault->what() : "";
 }
 
-bool PointTable::needs_judging() const {
-  return std::any_of(blocks_.begin(), blocks_.end(),
-                     [](const BlockPlace& block) { return block.is_judged_by_points; });
-}
-
 void PointTable::judge_points() const {
-  const auto judged = std::count_if(blocks_.begin(), blocks_.end(), [](const BlockPlace& block) {
-    return block.is_judged_by_points;
-  });
-  const std::uint64_t most =
-      kMostJudged / std::max<std::uint64_t>(static_cast<std::uint64_t>(judged), 1);
+  const std::uint64_t most = kMostJudged / std::max<std::uint64_t>(judged_blocks_, 1);
   for (std::size_t number = 0; number < blocks_.size(); ++number) {
     const BlockPoints& block = blocks_[number];
     bool leaves_any_in = false;
@@ -462,7 +452,7 @@ void PointTable::judge_points() const {
       }
       leaves_any_in = leaves_any_in || block.is_left_in(values);
     };
-    in_block(number, [&] {
+    in_block(*recipe_, number, [&] {
       if (block.is_judged_by_points && for_each_or_some(block.points, most, most, number, judge) &&
           !leaves_any_in) {
         in_expression("where", block.definition().where(),

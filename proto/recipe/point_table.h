@@ -69,7 +69,7 @@ class PointTable {
   std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
 
   /// Whether some values or filters can be checked only at points.
-  bool needs_judging() const;
+  bool needs_judging() const { return judged_blocks_ > 0; }
   /// Checks such blocks at all of their points, or at `kMostJudged` random points of all blocks
   /// together (about 0.1 s). Throws solver::InputError with block and point for a value that is not
   /// allowed, and for a filter that leaves out all points of its block. A wrong value that was not
@@ -95,32 +95,27 @@ class PointTable {
   const BlockPlace& block(std::size_t number) const;
   std::size_t block_of_point(std::uint64_t index) const;
 
- private:
-  class BlockPoints;
-  friend void visit_values(const solver::ModelParameters& base, const Block& block,
+  /// Calls `visit` with the values of each of the first `points` points of a block, in the order of
+  /// its axes. They need not be allowed. Throws solver::InputError for a wrong expression.
+  static void visit_values(const solver::ModelParameters& base, const Block& block,
                            std::uint64_t points,
                            const std::function<void(std::span<const double>)>& visit);
 
+ private:
+  class BlockPoints;
   void add_block(const Block& block);
-  template <typename Act>
-  void in_block(std::size_t number, Act act) const;
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
   solver::ModelParameters base_model_;
   std::vector<BlockPoints> blocks_;
-  std::vector<Segment> base_segments_;              ///< of the blocks without model axes, in order
-  std::vector<std::size_t> model_blocks_;           ///< blocks with models of their own, in order
-  std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
+  std::vector<Segment> base_segments_;     ///< of the blocks without model axes, in order
+  std::vector<std::size_t> model_blocks_;  ///< blocks with models of their own, in order
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
+  std::uint64_t judged_blocks_ = 0;  ///< those that are judged by points
   bool has_filter_ = false;
 };
-
-/// Calls `visit` with the values of each of the first `points` points of a block, in the order of
-/// its axes. They need not be allowed. Throws solver::InputError for a wrong expression.
-void visit_values(const solver::ModelParameters& base, const Block& block, std::uint64_t points,
-                  const std::function<void(std::span<const double>)>& visit);
 
 // H, mu, e and the model of a point, as a worker sends them with a result. Two machines may compute
 // them with different last bits.

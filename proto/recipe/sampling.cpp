@@ -186,10 +186,6 @@ Quantiles::Quantiles(const protocol::Axis& axis)
   }
 }
 
-double Quantiles::part_left() const {
-  return below_to_ - below_from_;
-}
-
 double Quantiles::value_at(double fraction) const {
   double value = 0.0;
   if (kind_ == protocol::DISTRIBUTION_NORMAL) {

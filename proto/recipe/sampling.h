@@ -39,10 +39,9 @@ class Quantiles {
   /// The quantile of 0 < fraction < 1. It rises with `fraction` and is between the ends.
   double value_at(double fraction) const;
 
-  /// Part of the whole normal distribution between the ends; 1 for the other kinds. Below
-  /// `kLeastPart` it has too few digits to draw from.
-  double part_left() const;
-  static constexpr double kLeastPart = 1e-290;
+  /// Part of the whole normal distribution between the ends; 1 for the other kinds. One that is not
+  /// a normal number has too few digits to draw from.
+  double part_left() const { return below_to_ - below_from_; }
 
  private:
   protocol::DistributionKind kind_;
