@@ -3,10 +3,9 @@
 #include <netdb.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <charconv>
-#include <memory>
 #include <string_view>
+#include <system_error>
 
 namespace oblique::protocol {
 namespace {
@@ -20,17 +19,15 @@ std::string objection_to_address(const std::string& url) {
   if (!url.starts_with(kScheme)) {
     return {};
   }
-  const std::size_t colon = url.rfind(':');
   int port = 0;
-  const auto [end, error] = std::from_chars(url.data() + colon + 1, url.data() + url.size(), port);
-  const bool is_number = error == std::errc() && end == url.data() + url.size();
-  if (!is_number || port < 1 || port > kHighestPort) {
+  const char* const begin = url.data() + url.rfind(':') + 1;
+  const char* const end = url.data() + url.size();
+  const auto [read, error] = std::from_chars(begin, end, port);
+  if (error != std::errc() || read != end || port < 1 || port > kHighestPort) {
     return "its port must be a number from 1 to 65535";
   }
-  const std::string_view host(url.data() + kScheme.size(),
-                              std::max(colon, kScheme.size()) - kScheme.size());
-  const bool has_brackets = host.starts_with('[') && host.ends_with(']');
-  return host.find(':') == std::string_view::npos || has_brackets
+  const bool has_brackets = url[kScheme.size()] == '[' && begin[-2] == ']';
+  return host_of(url).find(':') == std::string::npos || has_brackets
              ? ""
              : "an address of IPv6 stands in brackets, as tcp://[::1]:7601";
 }
@@ -52,12 +49,12 @@ Families families_of(const std::string& host) {
   if (getaddrinfo(host.c_str(), nullptr, &wanted, &found) != 0) {
     return {};
   }
-  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, &freeaddrinfo);
   Families families;
   for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
     families.has_v4 = families.has_v4 || address->ai_family == AF_INET;
     families.has_v6 = families.has_v6 || address->ai_family == AF_INET6;
   }
+  freeaddrinfo(found);
   return families;
 }
 

@@ -21,17 +21,10 @@ std::string objection_to_version(std::uint32_t version, const std::string& who);
 /// Serialises a message into one frame.
 std::string encode(const google::protobuf::MessageLite& message);
 
-/// The bytes of a ClientReply that holds nothing but a QueryReply, which is encoded already.
-std::string reply_around(std::string_view encoded_query_reply);
-
-/// The frame of a ClientReply with a DescribeReply around a Recipe that is encoded already.
-std::string description_around(std::uint64_t request_id, std::string_view encoded_recipe);
-
-/// The frame of the same ClientReply, whose bytes lack only that number. Nothing is parsed.
-std::string with_request_id(std::uint64_t request_id, std::string_view encoded_reply);
-
-/// The frame of a ServerToWorker that defines a study by a Recipe that is encoded already.
-std::string definition_around(std::uint64_t study_id, std::string_view encoded_recipe);
+/// The frame of `rest` with the field `number`, a message that is encoded already and is not
+/// parsed.
+std::string encode_around(const google::protobuf::MessageLite& rest, int number,
+                          std::string_view encoded);
 
 /// Parses one frame. Every frame is hostile until this says otherwise: false for one that is too
 /// long, truncated or foreign (no known kind set is the caller's to check).

@@ -1,10 +1,13 @@
 #include "proto/result_message.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
 #include <string_view>
+#include <type_traits>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -19,171 +22,159 @@ using solver::Member;
 using solver::PhaseKind;
 using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
-using WholeNumbers = google::protobuf::RepeatedField<std::int64_t>;
-using Texts = google::protobuf::RepeatedPtrField<std::string>;
-
 /// Longest text that a result may have, in bytes.
 constexpr std::size_t kLongestText = 65536;
 
-// Scalars travel by type. What a result lacks has a value that no result has.
+/// Scalars travel by type. What a result lacks has a value that no result has.
+template <class T>
+T absent() {
+  if constexpr (std::is_same_v<T, double>) {
+    return std::numeric_limits<double>::quiet_NaN();
+  } else if constexpr (std::is_same_v<T, std::int64_t>) {
+    return std::numeric_limits<std::int64_t>::min();
+  } else {
+    return {};
+  }
+}
 
-const Numbers& sent(const PointResult& message, double /*type*/) {
-  return message.reals();
-}
-const WholeNumbers& sent(const PointResult& message, std::int64_t /*type*/) {
-  return message.whole_numbers();
-}
-const Texts& sent(const PointResult& message, const std::string& /*type*/) {
-  return message.texts();
-}
-
-constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
-constexpr std::int64_t kNoWholeNumber = std::numeric_limits<std::int64_t>::min();
-
-bool is_absent(double value) {
-  return std::isnan(value);
-}
-bool is_absent(std::int64_t value) {
-  return value == kNoWholeNumber;
-}
-bool is_absent(const std::string& value) {
-  return value.empty();
+template <class T>
+bool is_absent(const Member<T>& member, const T& value) {
+  return member.may_be_absent && (value == absent<T>() || value != value);  // NaN differs from NaN
 }
 
 /// Appends the scalars of type T.
 template <class T, class Values>
-void add_scalars(const CaseResult& result, const T& absent, Values& values) {
+void add_scalars(const CaseResult& result, Values& values) {
   for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
     const T* value = member.of(result);
-    *values.Add() = value != nullptr ? *value : absent;
+    *values.Add() = value != nullptr ? *value : absent<T>();
   });
 }
 
 /// Reads the scalars of type T, as far as there are any.
-template <class T>
-void read_scalars(const PointResult& message, CaseResult& result) {
-  const auto& values = sent(message, T{});
+template <class T, class Values>
+void read_scalars(const Values& values, CaseResult& result) {
   int i = 0;
   for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
-    if (i < values.size() && !(member.may_be_absent && is_absent(values[i]))) {
+    if (i < values.size() && !is_absent(member, values[i])) {
       member.in(result) = values[i];
     }
     ++i;
   });
 }
 
-void add_lists(const CaseResult& result, PointResult& message) {
-  for (std::size_t i = 0; i < result.peaks.size(); ++i) {
-    const solver::Peak& peak = result.peaks[i];
-    for (const double number : {peak.t_s, peak.fn_N, peak.ft_N}) {
-      message.add_peaks(number);
-    }
-    if (peak.major) {
-      message.add_major_peaks(static_cast<std::uint32_t>(i));
-    }
-  }
-  for (const auto& [t_s, ft_N] : result.ft_peaks) {
-    message.add_ft_peaks(t_s);
-    message.add_ft_peaks(ft_N);
-  }
-  for (const solver::Phase& phase : result.phases) {
-    message.add_phase_ends_s(phase.t1_s);
-  }
-  for (const auto& [t0_s, t1_s] : result.stick_intervals) {
-    message.add_stick_intervals(t0_s);
-    message.add_stick_intervals(t1_s);
-  }
-  for (const auto& [t_s, force_N] : result.reaction_peaks) {
-    message.add_reaction_peaks(t_s);
-    message.add_reaction_peaks(force_N);
-  }
+/// How one of solver::result_lists() travels: some members of each element, one after another.
+struct SentList {
+  const Numbers& (PointResult::*numbers)() const;
+  Numbers* (PointResult::*mutable_numbers)();
+  std::size_t first_member;
+  int members;
+  void (*read)(CaseResult& result, const double* element);
+};
+
+template <auto list>
+void read_pair(CaseResult& result, const double* x) {
+  (result.*list).push_back({x[0], x[1]});
 }
 
-/// Appends each pair of a flat list.
-template <class Element>
-void read_pairs(const Numbers& numbers, std::vector<Element>& list) {
-  list.reserve(static_cast<std::size_t>(numbers.size() / 2));
-  for (int i = 0; i + 1 < numbers.size(); i += 2) {
-    list.push_back({numbers[i], numbers[i + 1]});
+void read_peak(CaseResult& result, const double* x) {
+  result.peaks.push_back({x[0], x[1], x[2], false});
+}
+
+/// A phase begins where that before it ends.
+void read_phase(CaseResult& result, const double* end_s) {
+  auto& phases = result.phases;
+  const auto kind = phases.size() % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution;
+  phases.push_back({kind, phases.empty() ? 0.0 : phases.back().t1_s, *end_s});
+}
+
+/// In the order of solver::result_lists().
+constexpr std::array<SentList, 5> kLists{{
+    {&PointResult::peaks, &PointResult::mutable_peaks, 0, 3, read_peak},
+    {&PointResult::ft_peaks, &PointResult::mutable_ft_peaks, 0, 2,
+     read_pair<&CaseResult::ft_peaks>},
+    {&PointResult::phase_ends_s, &PointResult::mutable_phase_ends_s, 2, 1, read_phase},
+    {&PointResult::stick_intervals, &PointResult::mutable_stick_intervals, 0, 2,
+     read_pair<&CaseResult::stick_intervals>},
+    {&PointResult::reaction_peaks, &PointResult::mutable_reaction_peaks, 0, 2,
+     read_pair<&CaseResult::reaction_peaks>},
+}};
+
+void add_lists(const CaseResult& result, PointResult& message) {
+  for (std::size_t i = 0; i < kLists.size(); ++i) {
+    Numbers& numbers = *(message.*kLists[i].mutable_numbers)();
+    const auto members = static_cast<std::size_t>(kLists[i].members);
+    solver::result_lists()[i]->each(result, [&](std::span<const solver::Cell> element) {
+      for (const solver::Cell& cell : element.subspan(kLists[i].first_member, members)) {
+        numbers.Add(std::get<double>(cell));
+      }
+    });
+  }
+  for (std::size_t i = 0; i < result.peaks.size(); ++i) {
+    if (result.peaks[i].major) {
+      message.add_major_peaks(static_cast<std::uint32_t>(i));
+    }
   }
 }
 
 void read_lists(const PointResult& message, CaseResult& result) {
-  result.peaks.reserve(static_cast<std::size_t>(message.peaks_size() / 3));
-  for (int i = 0; i + 2 < message.peaks_size(); i += 3) {
-    result.peaks.push_back({message.peaks(i), message.peaks(i + 1), message.peaks(i + 2), false});
+  for (const SentList& list : kLists) {
+    const Numbers& numbers = (message.*list.numbers)();
+    for (int i = 0; i + list.members <= numbers.size(); i += list.members) {
+      list.read(result, numbers.data() + i);
+    }
   }
   for (const std::uint32_t number : message.major_peaks()) {
     if (number < result.peaks.size()) {
       result.peaks[number].major = true;
     }
   }
-  read_pairs(message.ft_peaks(), result.ft_peaks);
-  read_pairs(message.stick_intervals(), result.stick_intervals);
-  read_pairs(message.reaction_peaks(), result.reaction_peaks);
-  result.phases.reserve(static_cast<std::size_t>(message.phase_ends_s_size()));
-  double begin_s = 0.0;
-  for (const double end_s : message.phase_ends_s()) {
-    const bool compresses = result.phases.size() % 2 == 0;
-    result.phases.push_back(
-        {compresses ? PhaseKind::kCompression : PhaseKind::kRestitution, begin_s, end_s});
-    begin_s = end_s;
-  }
 }
 
-/// What is wrong with a number, as "is not a finite number"; nullptr: nothing.
-const char* fault_of_number(double number) {
-  if (std::abs(number) <= kLargestOutput) {
-    return nullptr;
-  }
-  return std::isfinite(number) ? "is too large to be stored" : "is not a finite number";
+/// What is wrong with a number, or an empty text.
+std::string fault_of_number(std::string_view name, double number) {
+  return std::abs(number) <= kLargestOutput
+             ? ""
+             : fmt::format(
+                   "the worker sent a {} that {}", name,
+                   std::isfinite(number) ? "is too large to be stored" : "is not a finite number");
 }
 
 std::string fault_of_lists(const PointResult& message) {
-  struct List {
-    const char* name;
-    const Numbers* numbers;
-    int per_element;
-  };
-  for (const List& list : {List{"peaks", &message.peaks(), 3},
-                           {"ft_peaks", &message.ft_peaks(), 2},
-                           {"phases", &message.phase_ends_s(), 1},
-                           {"stick_intervals", &message.stick_intervals(), 2},
-                           {"reaction_peaks", &message.reaction_peaks(), 2}}) {
-    if (list.numbers->size() / list.per_element > kMostListElements) {
-      return fmt::format("the worker sent {} {}, and a result has at most {}",
-                         list.numbers->size() / list.per_element, list.name, kMostListElements);
+  for (std::size_t i = 0; i < kLists.size(); ++i) {
+    const std::string_view name = solver::result_lists()[i]->column;
+    const Numbers& numbers = (message.*kLists[i].numbers)();
+    const int elements = numbers.size() / kLists[i].members;
+    if (elements > kMostListElements) {
+      return fmt::format("the worker sent {} {}, and a result has at most {}", elements, name,
+                         kMostListElements);
     }
-    if (list.numbers->size() % list.per_element != 0) {
-      return fmt::format("the worker sent {} of the wrong length", list.name);
+    if (numbers.size() % kLists[i].members != 0) {
+      return fmt::format("the worker sent {} of the wrong length", name);
     }
-    for (const double number : *list.numbers) {
-      if (const char* fault = fault_of_number(number)) {
-        return fmt::format("the worker sent a number in {} that {}", list.name, fault);
+    for (const double number : numbers) {
+      if (std::string fault = fault_of_number(name, number); !fault.empty()) {
+        return fault;
       }
     }
   }
-  const auto peaks = static_cast<std::uint32_t>(message.peaks_size() / 3);
+  const auto peaks = static_cast<std::uint32_t>(message.peaks_size() / kLists.front().members);
   const bool are_peaks = std::all_of(message.major_peaks().begin(), message.major_peaks().end(),
                                      [&](std::uint32_t number) { return number < peaks; });
   return are_peaks ? "" : "the worker sent the number of a major peak that does not exist";
 }
 
 /// The first fault of the scalars of type T, or an empty text.
-template <class T>
-std::string fault_of_scalars(const PointResult& message, const char* what) {
-  const auto& values = sent(message, T{});
+template <class T, class Values>
+std::string fault_of_scalars(const Values& values, const char* what) {
   int number = 0;
   std::string fault;
   for_each_sent<T>([&](const ResultField& field, const Member<T>& member) {
     const int i = number++;
-    if (i >= values.size() || !fault.empty() || (member.may_be_absent && is_absent(values[i]))) {
-      return;
-    }
     if constexpr (std::is_same_v<T, double>) {
-      const char* const found = fault_of_number(values[i]);
-      fault =
-          found == nullptr ? "" : fmt::format("the worker sent a {} that {}", field.column, found);
+      if (fault.empty() && i < values.size() && !is_absent(member, values[i])) {
+        fault = fault_of_number(field.column, values[i]);
+      }
     }
   });
   return values.size() == number ? fault
@@ -191,27 +182,23 @@ std::string fault_of_scalars(const PointResult& message, const char* what) {
                                                values.size(), what, number);
 }
 
-bool is_too_long(const std::string& text) {
-  return text.size() > kLongestText;
-}
-
 }  // namespace
 
 PointResult to_message(std::uint64_t point, const CaseResult& result) {
   PointResult message;
   message.set_point(point);
-  add_scalars(result, kNoNumber, *message.mutable_reals());
-  add_scalars(result, kNoWholeNumber, *message.mutable_whole_numbers());
-  add_scalars(result, std::string(), *message.mutable_texts());
+  add_scalars<double>(result, *message.mutable_reals());
+  add_scalars<std::int64_t>(result, *message.mutable_whole_numbers());
+  add_scalars<std::string>(result, *message.mutable_texts());
   add_lists(result, message);
   return message;
 }
 
 CaseResult from_message(const PointResult& message) {
   CaseResult result{};
-  read_scalars<double>(message, result);
-  read_scalars<std::int64_t>(message, result);
-  read_scalars<std::string>(message, result);
+  read_scalars<double>(message.reals(), result);
+  read_scalars<std::int64_t>(message.whole_numbers(), result);
+  read_scalars<std::string>(message.texts(), result);
   read_lists(message, result);
   return result;
 }
@@ -224,6 +211,7 @@ PointResult failed_point(std::uint64_t point, const std::string& reason) {
 }
 
 std::string fault_of(const PointResult& message) {
+  const auto is_too_long = [](const std::string& text) { return text.size() > kLongestText; };
   if (is_too_long(message.error()) ||
       std::any_of(message.texts().begin(), message.texts().end(), is_too_long)) {
     return "the worker sent a text that is too long";
@@ -235,9 +223,10 @@ std::string fault_of(const PointResult& message) {
   if (!message.error().empty()) {
     return {};
   }
-  for (std::string fault : {fault_of_scalars<double>(message, "real numbers"),
-                            fault_of_scalars<std::int64_t>(message, "whole numbers"),
-                            fault_of_scalars<std::string>(message, "texts")}) {
+  for (std::string fault :
+       {fault_of_scalars<double>(message.reals(), "real numbers"),
+        fault_of_scalars<std::int64_t>(message.whole_numbers(), "whole numbers"),
+        fault_of_scalars<std::string>(message.texts(), "texts")}) {
     if (!fault.empty()) {
       return fault;
     }
@@ -251,24 +240,25 @@ std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, 
   if (static_cast<std::size_t>(trace.values_size()) != states.size() * numbers) {
     return "its rows have other columns than a trace of this model";
   }
-  const auto code = [](char state) { return static_cast<unsigned char>(state); };
-  if (std::any_of(states.begin(), states.end(),
-                  [&](char state) { return code(state) >= solver::kTraceStates.size(); })) {
+  if (std::any_of(states.begin(), states.end(), [](char state) {
+        return static_cast<unsigned char>(state) >= solver::kTraceStates.size();
+      })) {
     return "it has a state that no contact has";
   }
-  const auto falls = [&](char state) { return code(state) == solver::kFallingCode; };
-  if (!std::is_partitioned(states.begin(), states.end(), falls)) {
+  const auto touch = states.find_first_not_of(static_cast<char>(solver::kFallingCode));
+  if (touch != std::string::npos &&
+      states.find(static_cast<char>(solver::kFallingCode), touch) != std::string::npos) {
     return "it falls again after the touch";
   }
-  if (!with_fall && !states.empty() && falls(states.front())) {
+  if (!with_fall && touch != 0 && !states.empty()) {
     return "it has rows of the fall that were not requested";
   }
   if (!std::all_of(trace.values().begin(), trace.values().end(),
                    [](double value) { return std::isfinite(value); })) {
     return "it has a value that is not finite";
   }
-  const bool names_every = trace.every() > 1;  // with which it is short enough
-  if (states.empty() && trace.result().error().empty() && !names_every) {
+  // Above 1, `every` says how a trace that is too long gets short enough.
+  if (states.empty() && trace.result().error().empty() && trace.every() <= 1) {
     return "it has no instant";
   }
   return fault_of(trace.result());

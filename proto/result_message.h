@@ -58,4 +58,14 @@ std::string sent_outputs();
 /// of the protocol, or its results have other outputs, so that numbers would mean something else.
 std::string objection_to_worker(const WorkerHello& hello);
 
+/// Points of a study that are solved, failed or left out by a filter.
+inline std::uint64_t completed_points(const StudyStatus& study) {
+  return study.solved() + study.failed() + study.left_out();
+}
+
+/// The others. The filter may still leave out some of them.
+inline std::uint64_t open_points(const StudyStatus& study) {
+  return study.points() - completed_points(study);
+}
+
 }  // namespace oblique::protocol

@@ -13,71 +13,7 @@
 namespace oblique::protocol {
 namespace {
 
-std::string escape_of(char32_t code) {
-  switch (code) {
-    case U'\n':
-      return "\\n";
-    case U'\r':
-      return "\\r";
-    case U'\t':
-      return "\\t";
-    default:
-      return code < 0x80 ? fmt::format("\\x{:02x}", static_cast<unsigned>(code))
-                         : fmt::format("\\u{:04x}", static_cast<unsigned>(code));
-  }
-}
-
-std::string visible_but(std::string_view text, std::string_view kept) {
-  std::string shown;
-  shown.reserve(text.size());
-  while (!text.empty()) {
-    const Character next = first_character(text);
-    if (next.bytes == 0) {
-      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text.front()));
-      text.remove_prefix(1);
-      continue;
-    }
-    const auto bytes = text.substr(0, next.bytes);
-    if (is_control(next.code) && kept.find(bytes) == std::string_view::npos) {
-      shown += escape_of(next.code);
-    } else {
-      shown += bytes;
-    }
-    text.remove_prefix(next.bytes);
-  }
-  return shown;
-}
-
-}  // namespace
-
-Character first_character(std::string_view text) {
-  constexpr Character kNone{0, 0};
-  if (text.empty()) {
-    return kNone;
-  }
-  const auto lead = static_cast<unsigned char>(text.front());
-  if (lead < 0x80) {
-    return {1, lead};
-  }
-  const std::size_t bytes = lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) {
-    return kNone;
-  }
-  char32_t code = lead & (0x7fU >> bytes);
-  for (std::size_t i = 1; i < bytes; ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    if ((byte & 0xc0U) != 0x80) {
-      return kNone;
-    }
-    code = (code << 6U) | (byte & 0x3fU);
-  }
-  // Longer than need be, half of a pair of UTF-16, or above the last code point.
-  constexpr std::array<char32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
-  const bool is_sound =
-      code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;
-  return is_sound ? Character{bytes, code} : kNone;
-}
-
+/// Whether a terminal would act on the character or show nothing.
 bool is_control(char32_t code) {
   using Range = std::pair<char32_t, char32_t>;
   constexpr std::array<Range, 13> kControls{{
@@ -98,6 +34,76 @@ bool is_control(char32_t code) {
   return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
     return code >= range.first && code <= range.second;
   });
+}
+
+std::string escape_of(char32_t code) {
+  constexpr std::u32string_view kNamed = U"\n\r\t";
+  if (const auto place = kNamed.find(code); place != std::u32string_view::npos) {
+    return {'\\', "nrt"[place]};
+  }
+  return fmt::format(fmt::runtime(code < 0x80 ? "\\x{:02x}" : "\\u{:04x}"),
+                     static_cast<unsigned>(code));
+}
+
+std::string visible_but(std::string_view text, std::string_view kept) {
+  std::string shown;
+  while (!text.empty()) {
+    const Character next = first_character(text);
+    const auto bytes = text.substr(0, std::max<std::size_t>(next.bytes, 1));
+    if (next.bytes == 0) {
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(text.front()));
+    } else if (is_control(next.code) && kept.find(bytes) == std::string_view::npos) {
+      shown += escape_of(next.code);
+    } else {
+      shown += bytes;
+    }
+    text.remove_prefix(bytes.size());
+  }
+  return shown;
+}
+
+// Levenshtein's distance, one row of its table at a time.
+std::size_t distance(std::string_view a, std::string_view b) {
+  const auto lower = [](char letter) { return std::tolower(static_cast<unsigned char>(letter)); };
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (lower(a[i]) == lower(b[j]) ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+Character first_character(std::string_view text) {
+  constexpr Character kNone{0, 0};
+  const auto lead = static_cast<unsigned char>(text.empty() ? '\xff' : text.front());
+  if (lead < 0x80) {
+    return {1, lead};
+  }
+  const std::size_t bytes = lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) {
+    return kNone;
+  }
+  char32_t code = lead & (0x7fU >> bytes);
+  for (std::size_t i = 1; i < bytes; ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if ((byte & 0xc0U) != 0x80) {
+      return kNone;
+    }
+    code = (code << 6U) | (byte & 0x3fU);
+  }
+  // Longer than need be, half of a pair of UTF-16, or above the last code point.
+  constexpr std::array<char32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
+  const bool is_sound =
+      code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;
+  return is_sound ? Character{bytes, code} : kNone;
 }
 
 std::string visible(std::string_view text) {
@@ -148,30 +154,6 @@ bool is_visible(std::string_view text) {
   return visible(text) == text;
 }
 
-namespace {
-
-char lower(char letter) {
-  return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
-}
-
-// Levenshtein's distance, one row of its table at a time.
-std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (lower(a[i]) == lower(b[j]) ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
-
 std::string_view nearest(std::string_view word, std::span<const std::string_view> candidates) {
   std::string_view best;
   std::size_t best_distance = std::max<std::size_t>(1, word.size() / 2) + 1;
@@ -193,20 +175,15 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
 
 std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates) {
   const auto best = nearest(word, candidates);
-  return best.empty() ? std::string() : " (did you mean `" + std::string(best) + "`?)";
+  return best.empty() ? "" : fmt::format(" (did you mean `{}`?)", best);
 }
 
 std::string unknown_key(std::string_view name, std::span<const std::string_view> known) {
-  return "unknown key `" + excerpt(name) + "`" + did_you_mean(name, known);
+  return fmt::format("unknown key `{}`{}", excerpt(name), did_you_mean(name, known));
 }
 
 std::string joined(std::span<const std::string_view> names) {
-  std::string text;
-  for (const auto name : names) {
-    text += text.empty() ? "" : ", ";
-    text += name;
-  }
-  return text;
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 }  // namespace oblique::protocol

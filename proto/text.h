@@ -41,9 +41,6 @@ struct Character {
 };
 Character first_character(std::string_view text);
 
-/// Whether a terminal would act on the character or show nothing.
-bool is_control(char32_t code);
-
 /// The candidate that differs least from `word` by insertions, deletions and replacements of
 /// letters, capitals alike; empty when none is near enough to be what was meant.
 std::string_view nearest(std::string_view word, std::span<const std::string_view> candidates);

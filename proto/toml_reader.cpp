@@ -1,9 +1,10 @@
 #include "proto/toml_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
-#include <optional>
 #include <sstream>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -13,78 +14,47 @@
 namespace oblique::protocol {
 namespace {
 
-constexpr std::size_t kMostKeyParts = 100;
-
-/// A value of a list or table as the file has it; nested ones only by their kind.
-std::string element(const toml::node& node) {
+/// A value as the file has it; in a list or table, nested ones only by their kind.
+std::string element(const toml::node& node, bool is_nested) {
+  std::vector<std::string> parts;
+  if (is_nested && (node.is_array() || node.is_table())) {
+    return kind_of(node);
+  }
+  if (const auto* list = node.as_array()) {
+    for (const auto& value : *list) {
+      parts.push_back(element(value, true));
+    }
+    return fmt::format("[{}]", fmt::join(parts, ", "));
+  }
+  if (const auto* table = node.as_table()) {
+    for (const auto& [key, value] : *table) {
+      parts.push_back(fmt::format("{} = {}", key.str(), element(value, true)));
+    }
+    return parts.empty() ? "{}" : fmt::format("{{ {} }}", fmt::join(parts, ", "));
+  }
   if (const auto* number = node.as_floating_point()) {
     return solver::exact_number(number->get());
-  }
-  if (node.is_array() || node.is_table()) {
-    return kind_of(node);
   }
   std::ostringstream text;
   node.visit([&](const auto& value) { text << value; });
   return text.str();
 }
 
-std::string not_as_expected(std::string_view key, const toml::node& node,
-                            std::string_view expected) {
-  return fmt::format("{} = {} is {}: it must be {}", excerpt(key), shown(node), kind_of(node),
-                     expected);
-}
-
-/// Where a key has too many parts: tables nest as deep, and destroying them takes stack for each.
-/// Nothing is parsed: so many dots in a text without a comma or an equals sign count too.
-std::optional<std::size_t> too_deep_key(std::string_view text) {
-  std::size_t parts = 1;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const bool is_end = std::string_view("=,[]{}\n").find(text[at]) != std::string_view::npos;
-    parts = is_end ? 1 : parts + (text[at] == '.' ? 1 : 0);
-    if (parts > kMostKeyParts) {
-      return at;
-    }
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::string kind_of(const toml::node& node) {
-  switch (node.type()) {
-    case toml::node_type::table:
-      return "a table";
-    case toml::node_type::array:
-      return "a list";
-    case toml::node_type::string:
-      return "a string";
-    case toml::node_type::boolean:
-      return "a boolean";
-    case toml::node_type::integer:
-    case toml::node_type::floating_point:
-      return "a number";
-    default:
-      return "a date or time";
-  }
+  constexpr std::string_view kDate = "a date or time";
+  // By toml::node_type.
+  constexpr std::array<std::string_view, 10> kKinds{"nothing",  "a table",  "a list",    "a string",
+                                                    "a number", "a number", "a boolean", kDate,
+                                                    kDate,      kDate};
+  return std::string(kKinds.at(static_cast<std::size_t>(node.type())));
 }
 
 std::string shown(const toml::node& node) {
   constexpr std::size_t kMost = 60;
-  std::string line;
-  if (const auto* list = node.as_array()) {
-    for (const auto& value : *list) {
-      line += (line.empty() ? "[" : ", ") + element(value);
-    }
-    line = list->empty() ? "[]" : line + "]";
-  } else if (const auto* table = node.as_table()) {
-    for (const auto& [key, value] : *table) {
-      line += (line.empty() ? "{ " : ", ") + std::string(key.str()) + " = " + element(value);
-    }
-    line = table->empty() ? "{}" : line + " }";
-  } else {
-    line = element(node);
-  }
-  line = line.substr(0, line.find('\n'));
+  const std::string all = element(node, false);
+  const std::string line = all.substr(0, all.find('\n'));
   return line.size() > kMost ? line.substr(0, kMost) + "..." : line;
 }
 
@@ -97,17 +67,25 @@ std::string toml_string(std::string_view text) {
 
 toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
-  if (const auto found = too_deep_key(text)) {
-    const auto line =
-        std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(*found), '\n');
-    throw solver::InputError(
-        {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
-         .place = fmt::format("{}:{}", file_, line + 1)});
+  constexpr std::size_t kMostKeyParts = 100;
+  // Tables nest as deep as their keys have parts, and destroying them takes stack for each. Nothing
+  // is parsed: so many dots in a text without a comma or an equals sign count too.
+  std::size_t parts = 1;
+  std::size_t line = 1;
+  for (const char c : text) {
+    line += c == '\n' ? 1 : 0;
+    const bool is_end = std::string_view("=,[]{}\n").find(c) != std::string_view::npos;
+    parts = is_end ? 1 : parts + (c == '.' ? 1 : 0);
+    if (parts > kMostKeyParts) {
+      throw solver::InputError(
+          {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
+           .place = fmt::format("{}:{}", file_, line)});
+    }
   }
   try {
     return toml::parse(text, file_);
   } catch (const toml::parse_error& error) {
-    fail_at(error.source(), excerpt(error.description(), kLongestError));
+    fail(error, excerpt(error.description(), kLongestError));
   }
 }
 
@@ -115,15 +93,17 @@ std::string TomlReader::place(const toml::source_region& at) const {
   return fmt::format("{}:{}:{}", file_, at.begin.line, at.begin.column);
 }
 
-void TomlReader::fail_at(const toml::source_region& at, std::string_view message) const {
-  throw solver::InputError({.text = std::string(message), .place = place(at)});
+void TomlReader::require(bool is_expected, std::string_view key, const toml::node& node,
+                         std::string_view expected) const {
+  if (!is_expected) {
+    fail(node, fmt::format("{} = {} is {}: it must be {}", excerpt(key), shown(node), kind_of(node),
+                           expected));
+  }
 }
 
 double TomlReader::number(std::string_view key, const toml::node& node,
                           std::string_view expected) const {
-  if (!node.is_number()) {
-    fail(node, not_as_expected(key, node, expected));
-  }
+  require(node.is_number(), key, node, expected);
   const auto value = node.value<double>();
   if (!value) {
     fail(node, fmt::format("{} = {} has more digits than a number here keeps: write it with an "
@@ -135,24 +115,18 @@ double TomlReader::number(std::string_view key, const toml::node& node,
 
 std::string TomlReader::text(std::string_view key, const toml::node& node,
                              std::string_view expected) const {
-  if (!node.is_string()) {
-    fail(node, not_as_expected(key, node, expected));
-  }
+  require(node.is_string(), key, node, expected);
   return *node.value<std::string>();
 }
 
 bool TomlReader::yes(std::string_view key, const toml::node& node) const {
-  if (!node.is_boolean()) {
-    fail(node, not_as_expected(key, node, "true or false"));
-  }
+  require(node.is_boolean(), key, node, "true or false");
   return *node.value<bool>();
 }
 
 const toml::table& TomlReader::table(std::string_view key, const toml::node& node,
                                      std::string_view expected) const {
-  if (!node.is_table()) {
-    fail(node, not_as_expected(key, node, expected));
-  }
+  require(node.is_table(), key, node, expected);
   return *node.as_table();
 }
 

@@ -35,7 +35,7 @@ class TomlReader {
   /// Throws the error `message` about the node or key `at`.
   template <typename At>
   [[noreturn]] void fail(const At& at, std::string_view message) const {
-    fail_at(at.source(), message);
+    throw solver::InputError({.text = std::string(message), .place = place(at.source())});
   }
 
   /// "study.toml:3:6"
@@ -67,7 +67,8 @@ class TomlReader {
                       std::string_view before, std::string_view rule) const;
 
  private:
-  [[noreturn]] void fail_at(const toml::source_region& at, std::string_view message) const;
+  void require(bool is_expected, std::string_view key, const toml::node& node,
+               std::string_view expected) const;
 
   std::string file_;
 };

@@ -24,8 +24,8 @@
 #include "client/service/source_flags.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
+#include "proto/result_message.h"
 #include "proto/small_file.h"
-#include "proto/study_counts.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 

@@ -14,7 +14,7 @@
 #include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "proto/program/process.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "proto/text.h"
 
 namespace oblique::client {

@@ -18,8 +18,8 @@
 #include "client/io/study_notes.h"
 #include "client/study/study_flags.h"
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"
 
@@ -113,13 +113,14 @@ std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::Bl
   return last;
 }
 
-BlockReport report_of_block(const protocol::PointTable& table, int number) {
+BlockReport report_of_block(const protocol::PointTable& table, int number,
+                            const protocol::PointsLeftIn& left_in) {
   constexpr std::uint64_t kMostLooks = 100'000;
   const protocol::Block& block = table.recipe().blocks(number);
   const auto& place = table.block(static_cast<std::size_t>(number));
   const std::uint64_t end = place.first_point + std::min(kMostLooks, place.points);
   const std::uint64_t first = table.first_left_in(place.first_point, end);
-  return {place, protocol::points_left_in(table, static_cast<std::size_t>(number)), made_of(block),
+  return {place, left_in, made_of(block),
           shown_point(table, block, first < end ? first : place.first_point),
           shown_point(table, block, last_left_in(table, place, kMostLooks))};
 }
@@ -127,7 +128,8 @@ BlockReport report_of_block(const protocol::PointTable& table, int number) {
 Report report_of(const std::string& name, const protocol::PointTable& table) {
   Report report{name, table.size(), protocol::size_of(table), {}, {}};
   for (int i = 0; i < table.recipe().blocks_size(); ++i) {
-    report.blocks.push_back(report_of_block(table, i));
+    report.blocks.push_back(
+        report_of_block(table, i, report.size.blocks[static_cast<std::size_t>(i)]));
   }
   return report;
 }

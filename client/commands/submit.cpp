@@ -16,7 +16,7 @@
 #include "client/study/study_flags.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
-#include "proto/recipe/written.h"
+#include "proto/recipe/model_message.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 
@@ -124,7 +124,7 @@ void add_submit(CLI::App& app, Action& parsed) {
   command
       .add_option("--priority", flags.settings.priority,
                   fmt::format("studies of a higher priority come first, {}; default: 0",
-                              protocol::allowed_priorities()))
+                              protocol::kPriorities))
       ->type_name("N");
   add_no_reuse_flag(command, flags.settings.no_reuse);
   add_study_flags(command, flags.study, true);

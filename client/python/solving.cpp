@@ -21,8 +21,8 @@
 #include "client/python/interpreter.h"
 #include "proto/oblique.pb.h"
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written.h"
 #include "proto/system/available_memory.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/fall_model.h"
@@ -253,7 +253,7 @@ void add_key(protocol::WrittenModel& model, std::map<std::size_t, protocol::Axis
     const double one =
         is_text ? number_of_integrator(value.cast<std::string>()) : value.cast<double>();
     if (!protocol::is_point_key(number) && !protocol::link_of_key(number)) {
-      model.set(name, one);
+      model.values[name] = one;
       return;
     }
     solver::check_value(protocol::key_numbered(number), one);
@@ -309,12 +309,12 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
     throw InputError(fmt::format("preset = {} is not allowed: preset must be a name, as \"paper\"",
                                  py::repr(keys["preset"]).cast<std::string>()));
   }
-  model.set_preset(keys["preset"].cast<std::string>());
+  model.preset = keys["preset"].cast<std::string>();
   const bool has_lengths = keys.contains("lengths");
   for (const auto& [key, value] : keys) {
     const auto name = key.cast<std::string>();
     if (name == "lengths") {
-      model.set_lengths(lengths_of(value));
+      model.lengths_m = lengths_of(value);
     } else if (name != "preset") {
       add_key(model, keyed_axes, name, value);
     }
@@ -351,7 +351,7 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
     const auto point = values.subspan(keyed_axes.size() - protocol::kPointKeyOrder.size());
     all.points.push_back({place->second, {point[0], point[1], point[2]}});
   };
-  protocol::visit_values(base, block, points, add);
+  protocol::PointTable::visit_values(base, block, points, add);
   return all;
 }
 

@@ -24,7 +24,7 @@
 #include "client/io/study_notes.h"
 #include "client/service/connection.h"
 #include "client/service/watching.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "proto/system/available_memory.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"

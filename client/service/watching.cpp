@@ -11,7 +11,7 @@
 #include "client/io/progress.h"
 #include "client/io/tables.h"
 #include "proto/program/usage.h"
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "proto/text.h"
 #include "server/query/sql_text.h"
 

@@ -12,10 +12,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/program/usage.h"
-#include "proto/recipe/checks.h"
 #include "proto/recipe/expression.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/written.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -59,9 +57,10 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
   constexpr std::string_view kStep = "step=";
   const auto parts = protocol::split(text, ':');
   if (kind == BlockKind::kSample && parts.size() == 2) {
-    return protocol::drawn_axis(
-        key,
-        {protocol::DISTRIBUTION_UNIFORM, flag_number(parts[0]), flag_number(parts[1]), {}, {}});
+    protocol::Distribution uniform;
+    uniform.set_from(flag_number(parts[0]));
+    uniform.set_to(flag_number(parts[1]));
+    return protocol::drawn_axis(key, uniform);
   }
   const bool has_spacing = parts.size() == 4;
   const bool has_step = parts.size() == 3 && parts[2].starts_with(kStep);
@@ -101,25 +100,28 @@ protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, Cs
 
 /// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with either end left empty, uniform(FROM,TO) or
 /// log-uniform(FROM,TO).
-protocol::WrittenDistribution distribution_of_flag(std::string_view text) {
+protocol::Distribution distribution_of_flag(std::string_view text) {
   const auto bracket = text.find('(');
-  protocol::WrittenDistribution written;
-  written.kind = protocol::distribution_named(text.substr(0, bracket));
+  protocol::Distribution written;
+  written.set_kind(protocol::distribution_named(text.substr(0, bracket)));
   auto parts = protocol::split(text.substr(bracket + 1, text.size() - bracket - 2), ',');
-  const bool is_normal = written.kind == protocol::DISTRIBUTION_NORMAL;
+  const bool is_normal = written.kind() == protocol::DISTRIBUTION_NORMAL;
   if (is_normal ? parts.size() < 2 || parts.size() > 4 : parts.size() != 2) {
     throw InputError(is_normal ? "write normal(MEAN,SD), or normal(MEAN,SD,FROM,TO) to cut it off"
-                               : fmt::format("write {}(FROM,TO)", name_of(written.kind)));
+                               : fmt::format("write {}(FROM,TO)", name_of(written.kind())));
   }
   if (is_normal) {
-    written.mean = flag_number(parts[0]);
-    written.sd = flag_number(parts[1]);
+    written.set_mean(flag_number(parts[0]));
+    written.set_sd(flag_number(parts[1]));
     parts.erase(parts.begin(), parts.begin() + 2);
     parts.resize(2);
   }
-  written.from =
-      is_normal && parts[0].empty() ? std::nullopt : std::optional(flag_number(parts[0]));
-  written.to = is_normal && parts[1].empty() ? std::nullopt : std::optional(flag_number(parts[1]));
+  if (!is_normal || !parts[0].empty()) {
+    written.set_from(flag_number(parts[0]));
+  }
+  if (!is_normal || !parts[1].empty()) {
+    written.set_to(flag_number(parts[1]));
+  }
   return written;
 }
 
@@ -371,19 +373,19 @@ namespace {
 /// The recipe before its points are checked.
 protocol::Recipe written_recipe(const PointFlags& flags) {
   protocol::WrittenModel model;
-  model.set_preset(flags.preset);
+  model.preset = flags.preset;
   CsvFiles files(".");
   std::vector<protocol::Axis> axes;
   for (const auto& [name, text] : flags.axes) {
     auto axis = axis_of_flag(protocol::axis_key(name), text, kind_of_block(flags), files);
     if (solver::find_model_key(name) != nullptr && axis.values_size() == 1) {
-      model.set(name, axis.values(0));
+      model.values[name] = axis.values(0);
     } else {
       axes.push_back(std::move(axis));
     }
   }
   if (!flags.lengths.empty()) {
-    model.set_lengths(lengths_of_flag(flags.lengths));
+    model.lengths_m = lengths_of_flag(flags.lengths);
   }
   for (const auto& key : solver::point_keys()) {
     if (!flags.axes.contains(std::string(key.name))) {

@@ -17,10 +17,8 @@
 
 #include "client/study/csv_file.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written.h"
 #include "proto/small_file.h"
 #include "proto/text.h"
 #include "proto/toml_reader.h"
@@ -121,16 +119,34 @@ class AxisTable {
                 "a distribution is { distribution = \"uniform\", from, to }, the same with "
                 "\"log-uniform\", or { distribution = \"normal\", mean, sd } with `from` and `to` "
                 "where it is cut off");
-    const auto drawn = protocol::distribution_named(
-        text("distribution", "uniform, log-uniform or normal, in quotes"));
-    return protocol::drawn_axis(key_,
-                                {drawn, value("from"), value("to"), value("mean"), value("sd")});
+    protocol::Distribution drawn;
+    drawn.set_kind(protocol::distribution_named(
+        text("distribution", "uniform, log-uniform or normal, in quotes")));
+    const bool is_normal = drawn.kind() == protocol::DISTRIBUTION_NORMAL;
+    if (is_normal != has("mean") || is_normal != has("sd")) {
+      file_.fail(table_, fmt::format("{}: a normal distribution needs mean and sd, its standard "
+                                     "deviation, and may have from and to, where it is cut off; "
+                                     "the others need from and to, and nothing else",
+                                     key_.name));
+    }
+    drawn.set_mean(value("mean").value_or(0.0));
+    drawn.set_sd(value("sd").value_or(0.0));
+    return with_ends(drawn);
   }
 
   protocol::Axis uniform() const {
     check_parts(kRangeParts, "in a sample an axis is { from, to } or { distribution, ... }");
-    return protocol::drawn_axis(
-        key_, {protocol::DISTRIBUTION_UNIFORM, value("from"), value("to"), {}, {}});
+    return with_ends({});
+  }
+
+  protocol::Axis with_ends(protocol::Distribution drawn) const {
+    if (const auto from = value("from")) {
+      drawn.set_from(*from);
+    }
+    if (const auto to = value("to")) {
+      drawn.set_to(*to);
+    }
+    return protocol::drawn_axis(key_, drawn);
   }
 
   protocol::Axis range() const {
@@ -330,7 +346,7 @@ solver::ModelParameters model_of(const protocol::TomlReader& file, const toml::n
     for (const auto& [written, value] : *table) {
       const std::string_view name = written.str();
       if (name == protocol::WrittenModel::kPreset) {
-        model.set_preset(file.text(name, value, protocol::joined(solver::preset_names())));
+        model.preset = file.text(name, value, protocol::joined(solver::preset_names()));
       } else if (name == protocol::WrittenModel::kLengths) {
         ParameterKey key = protocol::model_key("length");
         key.name = name;
@@ -339,11 +355,11 @@ solver::ModelParameters model_of(const protocol::TomlReader& file, const toml::n
           file.fail(value, fmt::format("lengths = {} is not allowed: it must be {}",
                                        protocol::shown(value), kForm));
         }
-        model.set_lengths(numbers(file, key, *value.as_array(), kForm));
+        model.lengths_m = numbers(file, key, *value.as_array(), kForm);
       } else {
-        model.set(name, number(file, protocol::model_key(name), value,
-                               "a number in [model]; several values and expressions belong in a "
-                               "[[block]]"));
+        model.values[std::string(name)] =
+            number(file, protocol::model_key(name), value,
+                   "a number in [model]; several values and expressions belong in a [[block]]");
       }
     }
     return model.model();

@@ -6,7 +6,6 @@
 
 #include "client/study/study_file.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/written.h"
 
 namespace oblique::client {
 

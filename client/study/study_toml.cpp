@@ -13,7 +13,6 @@
 
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/written.h"
 #include "proto/toml_reader.h"
 #include "worker/solver/model/number.h"
 
@@ -59,8 +58,7 @@ std::string axis_text(const protocol::Axis& axis) {
   if (axis.has_distribution()) {
     return distribution(axis.distribution());
   }
-  constexpr std::uint64_t kFewestOfARange = 3;
-  if (axis.count() < kFewestOfARange || axis.key() == "integrator") {
+  if (axis.count() == 0 || axis.key() == "integrator") {
     return list_of_values(axis.key(), axis);
   }
   return fmt::format("{{ from = {}, to = {}, count = {}{} }}", exact_number(axis.from()),

@@ -26,7 +26,6 @@ const solver::ParameterKey& axis_key(std::string_view name);
 bool is_axis_key(std::string_view name);
 
 const solver::ParameterKey& key_numbered(std::size_t number);
-std::size_t key_count();
 
 /// Whether the key is H, mu or e, and not one of the model.
 bool is_point_key(std::size_t number);
@@ -71,9 +70,6 @@ class RangeValues {
   std::optional<Decimals> decimals_;
 };
 
-/// Index of the first value that is at least `value`, or the number of values. Values must rise.
-std::uint64_t first_value_from(const Axis& axis, double value);
-
 /// Bounds of the values of a list, range or distribution; those of a distribution may be infinite.
 double smallest_value(const Axis& axis);
 double largest_value(const Axis& axis);
@@ -97,11 +93,8 @@ bool is_drawn(const Axis& axis);
 /// solver::InputError above `kMaxPoints`.
 std::uint64_t points_of_block(const Block& block);
 
-/// Number of combinations of the values of axes; each axis has at least one. Throws
-/// solver::InputError above `kMaxPoints`.
-std::uint64_t combinations(std::span<const Axis* const> axes);
-
-[[noreturn]] void throw_too_many_points();
+/// Throws solver::InputError above `kMaxPoints`.
+void check_points(std::uint64_t points);
 
 /// The place of an axis in its block. Point p of the block, a product or zip, has value number p /
 /// stride % values of the axis.
@@ -122,8 +115,22 @@ solver::ModelParameters shortest_model(solver::ModelParameters model, const Bloc
 /// and the whole length, the limit for H, only a computed fall shows whether the tip gets there.
 inline constexpr double kSurelyReached = 0.9;
 
-/// The drop [m] that the tip of every finger of the block reaches; empty if no H is larger.
-std::optional<double> surely_reached_m(const solver::ModelParameters& model, const Block& block);
+// The rules for studies. Parsers of files and flags call these functions, and the server calls them
+// again for a received study. Every InputError has the key.
+
+/// Throws InputError unless the ends of a range are allowed and rise.
+void check_ends(const solver::ParameterKey& key, double from, double to);
+
+/// Throws InputError, which names key, value and what is allowed, unless each axis of a block is a
+/// list, a rising range, an expression or, in a sample, a distribution, and each value is finite
+/// and in the key's domain; unless the axes are in order, each once, and fit the kind of the block,
+/// and no H is larger than the length of the shortest finger of the block. H is not compared with
+/// the length in blocks where this depends on the point (`is_judged_by_points`).
+void check_block(const solver::ModelParameters& model, const Block& block);
+
+/// Whether some values, or whether H is within the finger's length, can be checked only point by
+/// point.
+bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
 
 /// A block of the axes, sorted in the order of recipes: model keys as in listings, then H, mu and
 /// e. Does not check them. Keys must be known.

@@ -110,7 +110,8 @@ std::string_view name_at(std::string_view text) {
 /// Parses by precedence climbing. Each function appends the steps of the text that it reads.
 class Expression::Parser {
  public:
-  Parser(std::string_view text, Expression& to) : rest_(text), to_(to) {}
+  Parser(std::string_view text, Expression& to, const MeaningOf& meaning_of)
+      : rest_(text), to_(to), meaning_of_(meaning_of) {}
 
   void read() {
     if (next() == '\0') {
@@ -240,11 +241,7 @@ class Expression::Parser {
     } else if (name == "pi") {
       to_.steps_.push_back({nullptr, 0, std::numbers::pi});
     } else {
-      const auto found = std::find(to_.names_.begin(), to_.names_.end(), name);
-      to_.steps_.push_back({nullptr, 0, 0.0, static_cast<std::size_t>(found - to_.names_.begin())});
-      if (found == to_.names_.end()) {
-        to_.names_.emplace_back(name);
-      }
+      to_.steps_.push_back({nullptr, 0, meaning_of_(name)});
     }
   }
 
@@ -266,28 +263,22 @@ class Expression::Parser {
 
   std::string_view rest_;
   Expression& to_;
+  const MeaningOf& meaning_of_;
 };
 
 std::vector<std::string_view> function_names() {
-  std::vector<std::string_view> names(kFunctions.size());
-  std::transform(kFunctions.begin(), kFunctions.end(), names.begin(),
-                 [](const Function& function) { return function.name; });
+  std::vector<std::string_view> names;
+  for (const Function& function : kFunctions) {
+    names.push_back(function.name);
+  }
   return names;
 }
 
-Expression::Expression(std::string_view text) {
+Expression::Expression(std::string_view text, const MeaningOf& meaning_of) {
   if (text.size() > kLongestText) {
     throw InputError(fmt::format("it has {} bytes, more than {}", text.size(), kLongestText));
   }
-  Parser(text, *this).read();
-}
-
-void Expression::place_names(std::span<const std::size_t> places) {
-  for (Step& step : steps_) {
-    if (step.index != kNoName) {
-      step.index = places[step.index];
-    }
-  }
+  Parser(text, *this, meaning_of).read();
 }
 
 double Expression::value_at(std::span<const double> values) const {
@@ -298,7 +289,8 @@ double Expression::value_at(std::span<const double> values) const {
       end -= step.arguments;
       *end = step.compute(end);
     } else {
-      *end = step.index == kNoName ? step.number : values[step.index];
+      const auto* number = std::get_if<double>(&step.pushed);
+      *end = number != nullptr ? *number : values[*std::get_if<std::size_t>(&step.pushed)];
     }
     ++end;
   }

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
-#include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 namespace oblique::expressions {
@@ -19,15 +20,11 @@ std::vector<std::string_view> function_names();
 /// brackets and functions.
 class Expression {
  public:
-  /// Throws solver::InputError, which says what is wrong and what is allowed but does not repeat
-  /// the text.
-  explicit Expression(std::string_view text);
-
-  /// The names in the text, each once, in the order of `value_at`'s values.
-  const std::vector<std::string>& names() const { return names_; }
-
-  /// Makes name i the value number `places[i]` of `value_at`.
-  void place_names(std::span<const std::size_t> places);
+  /// `meaning_of` is called for each name, in the order of the text, and returns the number of its
+  /// value in `value_at`, or a constant, or throws. Throws solver::InputError, which says what is
+  /// wrong and what is allowed but does not repeat the text.
+  using MeaningOf = std::function<std::variant<std::size_t, double>(std::string_view name)>;
+  Expression(std::string_view text, const MeaningOf& meaning_of);
 
   /// The value, which may be NaN or infinite. A comparison is 1 or 0, or NaN if a side is NaN.
   double value_at(std::span<const double> values) const;
@@ -35,16 +32,13 @@ class Expression {
  private:
   class Parser;
   /// Replaces the topmost `arguments` values of the stack by the result of `compute`; without
-  /// `compute`, pushes `number`, or the value of name `index`.
+  /// `compute`, pushes a constant, or the value of that number.
   struct Step {
     double (*compute)(const double* x) = nullptr;
     std::size_t arguments = 0;
-    double number = 0.0;
-    std::size_t index = kNoName;
+    std::variant<std::size_t, double> pushed = 0.0;
   };
-  static constexpr std::size_t kNoName = ~std::size_t{0};
 
-  std::vector<std::string> names_;
   std::vector<Step> steps_;  ///< at most one for each byte of the text
 };
 

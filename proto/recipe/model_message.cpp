@@ -1,31 +1,34 @@
 #include "proto/recipe/model_message.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
+#include <tuple>
+#include <utility>
 
 #include <sodium/crypto_hash_sha256.h>
 #include <sodium/utils.h>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frames.h"
+#include "proto/recipe/blocks.h"
 #include "proto/text.h"
+#include "proto/wire/frame_scan.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::protocol {
 namespace {
 
-/// A number of the model and of its message.
-struct Field {
-  double solver::ModelParameters::*in_model;
-  double (ModelParameters::*get)() const;
-  void (ModelParameters::*set)(double);
-};
+using solver::exact_number;
+using solver::InputError;
 
 using Model = solver::ModelParameters;
 using Message = ModelParameters;
+using Field = std::tuple<double Model::*, double (Message::*)() const, void (Message::*)(double)>;
 
+/// Numbers of a model, and their places in its message.
 constexpr std::array<Field, 12> kFields{{
     {&Model::E_Pa, &Message::e_pa, &Message::set_e_pa},
     {&Model::A_m2, &Message::a_m2, &Message::set_a_m2},
@@ -41,77 +44,33 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-constexpr std::string_view kModelHead = "oblique-model-1";
+/// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
+constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// Messages have unsigned numbers, and the struct has `int` and an enumeration: checks the range
-/// before the conversion.
-int checked_whole_number(std::string_view key, std::uint32_t value) {
-  solver::check_value(*solver::find_model_key(key), static_cast<double>(value));
-  return static_cast<int>(value);
-}
-
-/// The text of a number; both zeros have the same.
-std::string text_of(double value) {
-  return solver::exact_number(value + 0.0);
-}
-
-/// Whether a model's text leaves out the key, the value of which is in `lengths` or the default.
-bool is_left_out(const solver::ParameterKey& key, const Model& model) {
-  return key.name == "links" || key.name == "length" ||
-         (key.name == "tolerance" && model.tolerance == Model().tolerance);
-}
-
-[[noreturn]] void throw_not_canonical() {
-  throw solver::InputError("it is not the canonical text of a model");
-}
-
-double read_number(std::string_view text) {
-  const auto value = solver::number_of(text);
-  if (!value) {
-    throw_not_canonical();
-  }
-  return *value;
-}
-
-void read_field(Model& model, std::string_view name, std::string_view value) {
-  if (name == "lengths") {
-    model.lengths_m.clear();
-    for (const auto part : split(value, ',')) {
-      model.lengths_m.push_back(read_number(part));
-    }
-    return;
-  }
-  const auto* key = solver::find_model_key(name);
-  if (key == nullptr || name == "links" || name == "length") {
-    throw_not_canonical();
-  }
-  const double number = name == "integrator" ? static_cast<double>(solver::integrator_named(value))
-                                             : read_number(value);
-  if (name == "elements_per_link") {
-    solver::check_value(*key, number);  // throws if the struct cannot hold the value
-  }
-  key->set(model, number);
-}
-
-/// The bytes for comparison. A range of one or two values becomes a list, and the ends of an axis
-/// that is not a range are left out.
+/// The bytes for comparison.
 std::string comparable_bytes(Block block) {
-  for (Axis& axis : *block.mutable_axes()) {
-    if (axis.count() == 1 || axis.count() == 2) {
-      axis.add_values(axis.from());
-      if (axis.count() == 2) {
-        axis.add_values(axis.to());
-      }
-      axis.clear_count();
-      axis.clear_spacing();
-    }
-    if (axis.count() == 0) {
-      axis.clear_from();
-      axis.clear_to();
-    }
-  }
   block.DiscardUnknownFields();
   return block.SerializeAsString();
+}
+
+Axis axis_of(const solver::ParameterKey& key) {
+  Axis axis;
+  axis.set_key(std::string(key.name));
+  return axis;
+}
+
+constexpr std::array<std::string_view, 3> kDistributions{"uniform", "log-uniform", "normal"};
+constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
+
+/// The index of a name in `names`.
+int number_of_name(std::string_view name, std::span<const std::string_view> names,
+                   std::string_view key) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    throw InputError(key, fmt::format("the {} \"{}\" is not known{}: it must be one of {}", key,
+                                      excerpt(name), did_you_mean(name, names), joined(names)));
+  }
+  return static_cast<int>(found - names.begin());
 }
 
 }  // namespace
@@ -121,21 +80,23 @@ ModelParameters to_message(const solver::ModelParameters& model) {
   message.mutable_lengths_m()->Assign(model.lengths_m.begin(), model.lengths_m.end());
   message.set_elements_per_link(static_cast<std::uint32_t>(model.elements_per_link));
   message.set_integrator(static_cast<std::uint32_t>(model.integrator));
-  for (const Field& field : kFields) {
-    (message.*field.set)(model.*field.in_model);
+  for (const auto& [member, get, set] : kFields) {
+    (message.*set)(model.*member);
   }
   return message;
 }
 
 solver::ModelParameters unjudged_from_message(const ModelParameters& message) {
+  // The struct has `int` and an enumeration, so the ranges are checked before the conversion.
+  solver::check_value(model_key("elements_per_link"), message.elements_per_link());
+  solver::check_value(model_key("integrator"), message.integrator());
   solver::ModelParameters model;
-  for (const Field& field : kFields) {
-    model.*field.in_model = (message.*field.get)();
+  for (const auto& [member, get, set] : kFields) {
+    model.*member = (message.*get)();
   }
   model.lengths_m.assign(message.lengths_m().begin(), message.lengths_m().end());
-  model.elements_per_link = checked_whole_number("elements_per_link", message.elements_per_link());
-  model.integrator =
-      static_cast<solver::Integrator>(checked_whole_number("integrator", message.integrator()));
+  model.elements_per_link = static_cast<int>(message.elements_per_link());
+  model.integrator = static_cast<solver::Integrator>(message.integrator());
   return model;
 }
 
@@ -146,37 +107,21 @@ solver::ModelParameters from_message(const ModelParameters& message) {
 }
 
 std::string canonical_model(const solver::ModelParameters& model) {
-  std::vector<std::string> lengths;
+  std::vector<std::string> lengths;  // + 0.0: both zeros have the same text
   for (const double length_m : model.lengths_m) {
-    lengths.push_back(text_of(length_m));
+    lengths.push_back(exact_number(length_m + 0.0));
   }
-  std::string text = fmt::format("{} lengths={}", kModelHead, fmt::join(lengths, ","));
-  const auto integrators = solver::integrator_names();
+  std::string text = fmt::format("oblique-model-1 lengths={}", fmt::join(lengths, ","));
   for (const solver::ParameterKey& key : solver::model_keys()) {
-    const double value = key.get(model);
-    const bool is_named =
-        key.name == "integrator" && value >= 0.0 && value < static_cast<double>(integrators.size());
-    if (!is_left_out(key, model)) {
-      text += fmt::format(
-          " {}={}", key.name,
-          is_named ? std::string(integrators[static_cast<std::size_t>(value)]) : text_of(value));
+    const bool is_usual = key.name == "tolerance" && model.tolerance == Model().tolerance;
+    if (key.name != "links" && key.name != "length" && !is_usual) {
+      text += fmt::format(" {}={}", key.name,
+                          key.name == "integrator"
+                              ? std::string(solver::integrator_name(model.integrator))
+                              : exact_number(key.get(model) + 0.0));
     }
   }
   return text;
-}
-
-solver::ModelParameters model_of_canonical(std::string_view text) {
-  solver::ModelParameters model;
-  for (const auto field : split(text, ' ')) {
-    if (const auto equals = field.find('='); equals != std::string_view::npos) {
-      read_field(model, field.substr(0, equals), field.substr(equals + 1));
-    }
-  }
-  // A model has one text, so this finds keys that are missing, repeated or in another order.
-  if (canonical_model(model) != text) {
-    throw_not_canonical();
-  }
-  return model;
 }
 
 bool is_same_block(const Block& a, const Block& b) {
@@ -194,6 +139,22 @@ std::string recipe_digest(const Recipe& recipe) {
   return sha256_of(bytes);
 }
 
+void check_size(const Recipe& recipe) {
+  const std::size_t bytes = recipe.ByteSizeLong();
+  if (bytes > kLongestRecipe) {
+    throw InputError(fmt::format(
+        "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
+        "values as ranges, or long columns of a CSV file as several studies; a value that is "
+        "listed takes 8 bytes",
+        bytes, kLongestRecipe));
+  }
+}
+
+bool parse_recipe(std::string_view bytes, Recipe& recipe) {
+  return bytes.size() <= kLongestRecipe && is_of_a_recipes_shape(bytes) &&
+         recipe.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
 std::string sha256_of(std::string_view bytes) {
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
   crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(bytes.data()),
@@ -202,6 +163,160 @@ std::string sha256_of(std::string_view bytes) {
   sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
   text.pop_back();
   return text;
+}
+
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values) {
+  Axis axis = axis_of(key);
+  axis.mutable_values()->Assign(values.begin(), values.end());
+  return axis;
+}
+
+void throw_wrong_count(const solver::ParameterKey& key, std::string_view written) {
+  throw InputError(
+      key.name,
+      fmt::format("{}: count = {} is not allowed: count must be a whole number, at least 1",
+                  key.name, written));
+}
+
+Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,
+                  Spacing spacing) {
+  if (count < 1) {
+    throw_wrong_count(key, std::to_string(count));
+  }
+  Axis axis = axis_of(key);
+  axis.set_from(from);
+  axis.set_to(to);
+  axis.set_count(static_cast<std::uint64_t>(count));
+  axis.set_spacing(spacing);
+  return axis;
+}
+
+Axis stepped_axis(const solver::ParameterKey& key, double from, double to, double step) {
+  check_ends(key, from, to);
+  const double steps = (to - from) / step;
+  if (!(std::isfinite(step) && step > 0.0 && steps <= static_cast<double>(kMaxPoints))) {
+    throw InputError(
+        key.name,
+        fmt::format("{}: step = {} is not allowed: step must be > 0 and make at most {} values",
+                    key.name, exact_number(step), kMaxPoints));
+  }
+  const double whole_steps = std::round(steps);
+  // Decimal steps are not exact in binary. This tolerance, relative to a step, is well above their
+  // rounding.
+  const double tolerance = 1e-9 * std::max(1.0, steps);
+  if (std::abs(steps - whole_steps) > tolerance) {
+    const double below = from + std::floor(steps) * step;
+    throw InputError(
+        key.name,
+        fmt::format("{}: step = {} does not lead from {} to {}: the value after {} would be {}; "
+                    "change `to` or the step, or give `count`",
+                    key.name, exact_number(step), exact_number(from), exact_number(to),
+                    solver::readable_number(below, 10), solver::readable_number(below + step, 10)));
+  }
+  return counted_axis(key, from, to, static_cast<std::int64_t>(whole_steps) + 1);
+}
+
+Axis drawn_axis(const solver::ParameterKey& key, Distribution distribution) {
+  Axis axis = axis_of(key);
+  *axis.mutable_distribution() = std::move(distribution);
+  return axis;
+}
+
+Axis expressed_axis(const solver::ParameterKey& key, std::string_view text) {
+  Axis axis = axis_of(key);
+  axis.set_expression(std::string(text));
+  return axis;
+}
+
+Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t seed) {
+  for (const auto& [name, value, least] : {std::tuple{"count", count, 1}, {"seed", seed, 0}}) {
+    if (value < least) {
+      throw InputError(
+          "sample",
+          fmt::format("sample: {} = {} is not allowed: it must be a whole number, at least {}",
+                      name, value, least));
+    }
+  }
+  Sample sample;
+  sample.set_kind(static_cast<SampleKind>(number_of_name(kind, kSamples, "sample")));
+  sample.set_count(static_cast<std::uint64_t>(count));
+  sample.set_seed(static_cast<std::uint64_t>(seed));
+  return sample;
+}
+
+std::span<const std::string_view> distribution_names() {
+  return kDistributions;
+}
+
+std::string_view name_of(DistributionKind kind) {
+  return kDistributions.at(static_cast<std::size_t>(kind));
+}
+
+std::string_view name_of(SampleKind kind) {
+  return kSamples.at(static_cast<std::size_t>(kind));
+}
+
+DistributionKind distribution_named(std::string_view name) {
+  return static_cast<DistributionKind>(number_of_name(name, kDistributions, "distribution"));
+}
+
+const solver::ParameterKey& model_key(std::string_view name) {
+  if (const auto* key = solver::find_model_key(name)) {
+    return *key;
+  }
+  std::vector<std::string_view> known{WrittenModel::kPreset, WrittenModel::kLengths};
+  for (const auto& key : solver::model_keys()) {
+    known.push_back(key.name);
+  }
+  throw InputError(
+      name, fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
+}
+
+solver::ModelParameters WrittenModel::model() const {
+  solver::ModelParameters model = solver::preset(preset);
+  if (lengths_m) {
+    if (values.contains("links") || values.contains("length")) {
+      throw InputError(kLengths, std::string(kLengthsStandAlone));
+    }
+    if (lengths_m->empty()) {
+      throw InputError(kLengths, "lengths = [] is not allowed: give the lengths in m, one a link");
+    }
+    solver::ParameterKey key = model_key("length");
+    key.name = kLengths;
+    for (const double length_m : *lengths_m) {
+      solver::check_value(key, length_m);
+    }
+    model.lengths_m = *lengths_m;
+  }
+  for (const auto& [name, value] : values) {
+    solver::check_value(model_key(name), value);
+  }
+  // In the order of the listing: `links` must come before `length`.
+  for (const auto& key : solver::model_keys()) {
+    if (const auto value = values.find(key.name); value != values.end()) {
+      key.set(model, value->second);
+    }
+  }
+  solver::validate(model);
+  return model;
+}
+
+std::string objection_to_study_name(const std::string& name) {
+  constexpr std::size_t kMostBytes = 100;
+  if (!name.empty() && name.size() <= kMostBytes && name.front() != '-' && is_visible(name)) {
+    return {};
+  }
+  return fmt::format(
+      "name = \"{}\" is not allowed: a study's name has 1 to {} bytes of UTF-8, no control "
+      "characters, marks of writing direction or zero-width characters, and does not begin with "
+      "'-'",
+      visible(name.substr(0, kMostBytes)), kMostBytes);
+}
+
+std::string objection_to_priority(std::int64_t priority) {
+  return priority >= -1000 && priority <= 1000
+             ? ""
+             : fmt::format("priority = {} is not allowed: {} is", priority, kPriorities);
 }
 
 }  // namespace oblique::protocol

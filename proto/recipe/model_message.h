@@ -1,12 +1,18 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/parameters.h"
 
-// Models and recipes as messages, as texts and as digests.
+// Models and recipes as messages, as texts and as digests, and from what people write.
 namespace oblique::protocol {
 
 /// Every parameter of a model.
@@ -23,10 +29,6 @@ solver::ModelParameters unjudged_from_message(const ModelParameters& message);
 /// README.md defines it byte by byte. The values need not be in their domains.
 std::string canonical_model(const solver::ModelParameters& model);
 
-/// The model of such a text. Throws solver::InputError for any other text; does not validate
-/// values.
-solver::ModelParameters model_of_canonical(std::string_view text);
-
 /// Whether two blocks are the same: axes, zip, sample and filter as they are written.
 bool is_same_block(const Block& a, const Block& b);
 
@@ -34,7 +36,74 @@ bool is_same_block(const Block& a, const Block& b);
 /// Equal for recipes in which all of these are equal.
 std::string recipe_digest(const Recipe& recipe);
 
+/// Throws solver::InputError for a recipe that is too long to be sent to a worker in one frame.
+void check_size(const Recipe& recipe);
+
+/// Parses a recipe from a database file, with the same limits as for one from the network, because
+/// a parsed recipe can take a hundred times the memory of its bytes. False when it is damaged or
+/// exceeds them.
+bool parse_recipe(std::string_view bytes, Recipe& recipe);
+
 /// SHA-256 in hexadecimal digits, as `sha256sum` prints it.
 std::string sha256_of(std::string_view bytes);
+
+// Parts of study files and flags as parts of recipes. Each function throws solver::InputError for
+// what a recipe cannot hold; PointTable checks the values.
+
+Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& values);
+
+/// `count` values including both ends.
+Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,
+                  Spacing spacing = SPACING_LINEAR);
+[[noreturn]] void throw_wrong_count(const solver::ParameterKey& key, std::string_view written);
+
+/// Values `step` apart, the last of which is `to`.
+Axis stepped_axis(const solver::ParameterKey& key, double from, double to, double step);
+
+Axis drawn_axis(const solver::ParameterKey& key, Distribution distribution);
+
+/// An axis computed from others by an expression such as "A^2 / (4 * pi)".
+Axis expressed_axis(const solver::ParameterKey& key, std::string_view text);
+
+/// `kind` is random, lhs or sobol.
+Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t seed);
+inline constexpr std::int64_t kUsualSeed = 1;
+
+/// Names in the order of the kinds' numbers: uniform, log-uniform, normal; random, lhs, sobol.
+std::span<const std::string_view> distribution_names();
+std::string_view name_of(DistributionKind kind);
+std::string_view name_of(SampleKind kind);
+DistributionKind distribution_named(std::string_view name);
+
+/// A model from a study file or flags: a preset, lengths [m], one a link, and single keys that
+/// override it.
+struct WrittenModel {
+  /// The keys of a written model in addition to `solver::model_keys()`.
+  static constexpr std::string_view kPreset = "preset";
+  static constexpr std::string_view kLengths = "lengths";
+  /// The message if `lengths` is used together with the keys that it replaces.
+  static constexpr std::string_view kLengthsStandAlone =
+      "lengths stands beside links or length: give either lengths, one a link, or links and length";
+
+  std::string preset = std::string(solver::preset_names().front());
+  std::optional<std::vector<double>> lengths_m = {};
+  std::map<std::string, double, std::less<>> values = {};
+
+  /// Throws solver::InputError with the key for unknown keys and values that are not allowed, also
+  /// in combination.
+  solver::ModelParameters model() const;
+};
+
+/// The key of a model called `name`. Throws solver::InputError for an unknown one, with the nearest
+/// and the list of all.
+const solver::ParameterKey& model_key(std::string_view name);
+
+/// Why a study cannot have that name, or an empty text. A name has 1 to 100 bytes of UTF-8, has no
+/// control characters (text.h), and does not begin with '-'.
+std::string objection_to_study_name(const std::string& name);
+
+inline constexpr std::string_view kPriorities = "-1000 to 1000";  ///< those that are allowed
+/// Why a study cannot have that priority, or an empty text.
+std::string objection_to_priority(std::int64_t priority);
 
 }  // namespace oblique::protocol

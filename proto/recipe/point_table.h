@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -35,11 +36,11 @@ struct Segment {
 
 /// The points and models of one block.
 struct BlockPlace {
-  std::uint64_t first_point;
-  std::uint64_t points;  ///< including those that the filter leaves out
-  std::uint64_t first_model;
-  std::uint64_t models;
-  bool is_judged_by_points;  ///< see checks.h
+  std::uint64_t first_point = 0;
+  std::uint64_t points = 0;  ///< including those that the filter leaves out
+  std::uint64_t first_model = 0;
+  std::uint64_t models = 0;
+  bool is_judged_by_points = false;  ///< see blocks.h
 };
 
 /// A checked recipe: point i and model j as functions of their numbers, in time and memory that do
@@ -68,7 +69,7 @@ class PointTable {
   std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
 
   /// Whether some values or filters can be checked only at points.
-  bool needs_judging() const;
+  bool needs_judging() const { return judged_blocks_ > 0; }
   /// Checks such blocks at all of their points, or at `kMostJudged` random points of all blocks
   /// together (about 0.1 s). Throws solver::InputError with block and point for a value that is not
   /// allowed, and for a filter that leaves out all points of its block. A wrong value that was not
@@ -91,37 +92,30 @@ class PointTable {
   /// axes are one run.
   Segment segment_at(std::uint64_t index) const;
 
-  const BlockPlace& block(std::size_t number) const { return blocks_.at(number); }
+  const BlockPlace& block(std::size_t number) const;
   std::size_t block_of_point(std::uint64_t index) const;
 
- private:
-  class BlockPoints;
-  friend void visit_values(const solver::ModelParameters& base, const Block& block,
+  /// Calls `visit` with the values of each of the first `points` points of a block, in the order of
+  /// its axes. They need not be allowed. Throws solver::InputError for a wrong expression.
+  static void visit_values(const solver::ModelParameters& base, const Block& block,
                            std::uint64_t points,
                            const std::function<void(std::span<const double>)>& visit);
 
+ private:
+  class BlockPoints;
   void add_block(const Block& block);
-  template <typename Act>
-  void in_block(std::size_t number, Act act) const;
-  void judge_block(std::size_t number, std::uint64_t most) const;
 
   std::unique_ptr<Recipe> recipe_;  ///< stays where it is when the table moves
   solver::ModelParameters base_model_;
-  std::vector<BlockPlace> blocks_;
-  std::vector<BlockPoints> block_points_;
-  std::vector<Segment> base_segments_;              ///< of the blocks without model axes, in order
-  std::vector<std::size_t> model_blocks_;           ///< blocks with models of their own, in order
-  std::optional<std::uint64_t> base_model_number_;  ///< shared by all blocks without model axes
+  std::vector<BlockPoints> blocks_;
+  std::vector<Segment> base_segments_;     ///< of the blocks without model axes, in order
+  std::vector<std::size_t> model_blocks_;  ///< blocks with models of their own, in order
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
+  std::uint64_t judged_blocks_ = 0;  ///< those that are judged by points
   bool has_filter_ = false;
 };
-
-/// Calls `visit` with the values of each of the first `points` points of a block, in the order of
-/// its axes. They need not be allowed. Throws solver::InputError for a wrong expression.
-void visit_values(const solver::ModelParameters& base, const Block& block, std::uint64_t points,
-                  const std::function<void(std::span<const double>)>& visit);
 
 // H, mu, e and the model of a point, as a worker sends them with a result. Two machines may compute
 // them with different last bits.
@@ -131,6 +125,8 @@ void visit_values(const solver::ModelParameters& base, const Block& block, std::
 bool is_close(double value, double own);
 /// Whether every parameter is close. Whole numbers must be equal.
 bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own);
+/// The same for the texts of two models (`canonical_model`), of which only `own` must be one.
+bool is_close(std::string_view model, std::string_view own);
 
 /// Sets the inputs of the result's point; the model only if the study has several.
 void set_inputs(PointResult& result, const PointTable& table);
@@ -142,6 +138,13 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table);
 /// The inputs of a result, or of its point in `table` when it has none.
 Point inputs_of(const PointResult& result, const PointTable& table);
 
+/// Number of points that a filter keeps: counted in blocks of up to 10^5 points, else estimated
+/// from 10^4 random points.
+struct PointsLeftIn {
+  std::uint64_t points;
+  bool estimated;
+};
+
 /// The size of a study.
 struct StudySize {
   std::uint64_t points;   ///< points that filters keep
@@ -150,16 +153,9 @@ struct StudySize {
   std::uint64_t falls;   ///< different falls
   bool falls_estimated;  ///< from 10^4 random points, because the study has more than 10^5
   std::uint64_t bytes;   ///< size in a database
-  std::vector<std::uint64_t> examples;  ///< numbers of up to 64 random points
+  std::vector<std::uint64_t> examples;    ///< numbers of up to 64 random points
+  std::vector<PointsLeftIn> blocks = {};  ///< of each block
 };
 StudySize size_of(const PointTable& table);
-
-/// Number of points that a filter keeps.
-struct PointsLeftIn {
-  std::uint64_t points;
-  bool estimated;
-};
-/// For a block of the recipe: counted up to 10^5 points, else estimated from 10^4 random points.
-PointsLeftIn points_left_in(const PointTable& table, std::size_t block);
 
 }  // namespace oblique::protocol

@@ -38,6 +38,19 @@ std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   return (high << low_bits) | low;
 }
 
+/// Image of `i` < `n` under a permutation of 0 ... n-1 that `key` chooses. Uses no list.
+std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
+  if (n < 2) {
+    return 0;
+  }
+  // Walks along the cycle of `i` among all numbers of as many bits until it is back below n.
+  const auto bits = static_cast<int>(std::bit_width(n - 1));
+  do {
+    i = shuffled_bits(i, bits, key);
+  } while (i >= n);
+  return i;
+}
+
 /// Direction numbers of one dimension, times 2^52.
 using Directions = std::array<std::uint64_t, kSobolBits>;
 
@@ -89,18 +102,6 @@ double stratified_fraction(std::uint64_t count, std::uint64_t key, std::uint64_t
 std::uint64_t hashed(std::uint64_t key, std::uint64_t index) {
   constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio, odd
   return mixed(key + (index + 1) * kGolden);
-}
-
-std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
-  if (n < 2) {
-    return 0;
-  }
-  // Walks along the cycle of `i` among all numbers of as many bits until it is back below n.
-  const auto bits = static_cast<int>(std::bit_width(n - 1));
-  do {
-    i = shuffled_bits(i, bits, key);
-  } while (i >= n);
-  return i;
 }
 
 std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension) {
@@ -183,10 +184,6 @@ Quantiles::Quantiles(const protocol::Axis& axis)
     below_from_ = normal_part_below(is_mirrored_ ? -to_z : from_z);
     below_to_ = normal_part_below(is_mirrored_ ? -from_z : to_z);
   }
-}
-
-double Quantiles::part_left() const {
-  return below_to_ - below_from_;
 }
 
 double Quantiles::value_at(double fraction) const {

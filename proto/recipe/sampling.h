@@ -21,9 +21,6 @@ double fraction(const protocol::Sample& sample, std::uint32_t dimension, std::ui
 /// pseudorandom number generators, 2014), computed without the numbers before it.
 std::uint64_t hashed(std::uint64_t key, std::uint64_t index);
 
-/// Image of `i` < `n` under a permutation of 0 ... n-1 that `key` chooses. Uses no list.
-std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key);
-
 /// Value `index` < 2^52 of Sobol's sequence in one dimension, times 2^52, in the order of the Gray
 /// code. Throws std::out_of_range for a dimension of `kSobolDimensions` or more.
 std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension);
@@ -42,10 +39,9 @@ class Quantiles {
   /// The quantile of 0 < fraction < 1. It rises with `fraction` and is between the ends.
   double value_at(double fraction) const;
 
-  /// Part of the whole normal distribution between the ends; 1 for the other kinds. Below
-  /// `kLeastPart` it has too few digits to draw from.
-  double part_left() const;
-  static constexpr double kLeastPart = 1e-290;
+  /// Part of the whole normal distribution between the ends; 1 for the other kinds. One that is not
+  /// a normal number has too few digits to draw from.
+  double part_left() const { return below_to_ - below_from_; }
 
  private:
   protocol::DistributionKind kind_;

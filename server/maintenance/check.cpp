@@ -10,7 +10,6 @@
 
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written.h"
 #include "server/database/database_file.h"
 #include "server/store/completed_ranges.h"
 #include "server/store/result_rows.h"
@@ -161,12 +160,8 @@ class StudyCheck {
   bool is_model(std::int64_t model_id, const solver::ModelParameters& model) {
     definition_.reset();
     definition_.bind_all(model_id);
-    try {
-      return definition_.step() &&
-             protocol::is_close(protocol::model_of_canonical(definition_.text(0)), model);
-    } catch (const std::runtime_error&) {  // the definition is damaged
-      return false;
-    }
+    return definition_.step() &&
+           protocol::is_close(definition_.text(0), protocol::canonical_model(model));
   }
 
   /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can

@@ -8,7 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/frames.h"
-#include "proto/recipe/written.h"
+#include "proto/recipe/model_message.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/backup.h"

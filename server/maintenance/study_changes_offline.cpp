@@ -2,8 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/checks.h"
-#include "proto/recipe/written.h"
+#include "proto/recipe/model_message.h"
 #include "server/database/database_file.h"
 #include "server/store/store.h"
 

@@ -19,7 +19,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/checks.h"
+#include "proto/recipe/model_message.h"
 #include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
@@ -457,6 +457,20 @@ const Interval* interval_of(const protocol::Axis& axis, const Intervals& interva
   return found == intervals.end() || !is_own ? nullptr : &found->second;
 }
 
+/// Index of the first value of a range that is at least `value`, or the number of values.
+std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
+  std::uint64_t first = 0;
+  for (std::uint64_t end = axis.count(); first < end;) {
+    const std::uint64_t middle = first + (end - first) / 2;
+    if (protocol::axis_value(axis, middle) < value) {
+      first = middle + 1;
+    } else {
+      end = middle;
+    }
+  }
+  return first;
+}
+
 /// Numbers of the first and the last value of an axis in `interval`; for a range of values one more
 /// at each end. None if no value is in the interval.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
@@ -464,8 +478,8 @@ std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval&
     if (interval.low > interval.high) {
       return std::nullopt;
     }
-    const std::uint64_t first = protocol::first_value_from(axis, interval.low);
-    const std::uint64_t last = protocol::first_value_from(axis, interval.high) + 1;
+    const std::uint64_t first = first_value_from(axis, interval.low);
+    const std::uint64_t last = first_value_from(axis, interval.high) + 1;
     return PointRange{first - std::min<std::uint64_t>(first, 1), std::min(last, axis.count() - 1)};
   }
   std::optional<PointRange> found;

@@ -99,7 +99,10 @@ void send_answer(const std::string& path, const protocol::QueryRequest& request)
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();
     ends = chunk.ends();
-    send_frame(protocol::reply_around(protocol::encode(chunk)), ends);
+    send_frame(
+        protocol::encode_around(protocol::ClientReply(), protocol::ClientReply::kQueryFieldNumber,
+                                protocol::encode(chunk)),
+        ends);
   }
 }
 

@@ -219,8 +219,11 @@ void ClientHandler::query_report(QueryReport report) {
     query.runs = true;
     return;
   }
-  const bool is_there = core_.ports.to_client(
-      query.client.identity, protocol::with_request_id(query.client.request_id, report.reply));
+  protocol::ClientReply number;
+  number.set_request_id(query.client.request_id);
+  // Encoded messages one after another are, decoded, one message with all their fields.
+  const bool is_there =
+      core_.ports.to_client(query.client.identity, protocol::encode(number) + report.reply);
   ++query.sent;
   if (report.kind == QueryReport::Kind::kAnswered) {
     pending_.erase(found);
@@ -319,9 +322,15 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
 /// The recipe is sent as it is stored.
 void ClientHandler::describe(const Client& client, const protocol::DescribeRequest& request) {
   if (const auto known = find_study(client, request.study())) {
-    core_.ports.to_client(client.identity,
-                          protocol::description_around(
-                              client.request_id, core_.states.record(*known).table.recipe_bytes()));
+    protocol::ClientReply number;
+    number.set_request_id(client.request_id);
+    core_.ports.to_client(
+        client.identity,
+        protocol::encode_around(
+            number, protocol::ClientReply::kDescribeFieldNumber,
+            protocol::encode_around(protocol::DescribeReply(),
+                                    protocol::DescribeReply::kRecipeFieldNumber,
+                                    core_.states.record(*known).table.recipe_bytes())));
   }
 }
 

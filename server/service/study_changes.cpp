@@ -7,8 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/frames.h"
-#include "proto/recipe/checks.h"
-#include "proto/recipe/written.h"
+#include "proto/recipe/model_message.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"
 

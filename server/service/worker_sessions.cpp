@@ -326,7 +326,13 @@ void WorkerSessions::send(const ReleaseBatch& release) {
 }
 
 void WorkerSessions::define(const DefineStudy& define, const std::string& recipe_bytes) {
-  send_frame(define.worker, protocol::definition_around(define.study, recipe_bytes));
+  protocol::StudyDefinition number;
+  number.set_study_id(define.study);
+  send_frame(define.worker,
+             protocol::encode_around(
+                 protocol::ServerToWorker(), protocol::ServerToWorker::kStudyFieldNumber,
+                 protocol::encode_around(number, protocol::StudyDefinition::kRecipeFieldNumber,
+                                         recipe_bytes)));
 }
 
 void WorkerSessions::notify_all(const std::string& text) {

@@ -7,7 +7,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
 #include "worker/solver/model/number.h"
 

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/recipe/expression.h"
@@ -16,9 +17,16 @@ bool is_same(double a, double b) {
   return a == b || (a != a && b != b);
 }
 
-std::optional<Expression> read(const std::string& text) {
+using Names = std::vector<std::string>;
+
+/// The value with 0.75 for each name; the names in the order of the text go into `names`.
+std::optional<double> value_of(const std::string& text, Names& names) {
   try {
-    return Expression(text);
+    const Expression expression(text, [&](std::string_view name) {
+      names.emplace_back(name);
+      return std::size_t{0};
+    });
+    return expression.value_at(std::vector{0.75});
   } catch (const oblique::solver::InputError&) {
     return std::nullopt;
   }
@@ -30,15 +38,11 @@ std::optional<Expression> read(const std::string& text) {
 /// In brackets it has the same names and value, unless it then is too long or too deep.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
-  std::optional<Expression> expression = read(text);
-  if (!expression) {
-    return 0;
-  }
-  const std::vector<double> values(expression->names().size(), 0.75);
-  const double value = expression->value_at(values);
-  std::optional<Expression> again = read("(" + text + ")");
-  if (again &&
-      (again->names() != expression->names() || !is_same(value, again->value_at(values)))) {
+  Names names;
+  Names names_again;
+  const std::optional<double> value = value_of(text, names);
+  const std::optional<double> again = value_of("(" + text + ")", names_again);
+  if (value && again && (names != names_again || !is_same(*value, *again))) {
     std::abort();
   }
   return 0;

@@ -54,12 +54,14 @@ TEST(FramesTest, TextIsForeign) {
   EXPECT_FALSE(decode("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", received));
 }
 
-TEST(FramesTest, ADefinitionAroundAnEncodedRecipeIsThatOfTheRecipe) {
-  ServerToWorker message;
-  message.mutable_study()->set_study_id(300);
-  *message.mutable_study()->mutable_recipe() =
+TEST(FramesTest, AMessageAroundAnEncodedRecipeIsThatOfTheRecipe) {
+  StudyDefinition message;
+  message.set_study_id(300);
+  const StudyDefinition rest = message;
+  *message.mutable_recipe() =
       recipe_of({{listed("H", {1.0}), range("mu", 0.1, 1.0, 1024), listed("e", {1.0})}});
-  EXPECT_EQ(definition_around(300, encode(message.study().recipe())), encode(message));
+  EXPECT_EQ(encode_around(rest, StudyDefinition::kRecipeFieldNumber, encode(message.recipe())),
+            encode(message));
 }
 
 TEST(FramesTest, TextThatIsNotUtf8IsRefused) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -17,7 +18,6 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "server/web/http/http_message.h"
@@ -152,11 +152,11 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   protocol::WrittenModel model;
   for (const auto& [key, value] : written.items()) {
     if (key == protocol::WrittenModel::kPreset && value.is_string()) {
-      model.set_preset(value.get<std::string>());
+      model.preset = value.get<std::string>();
     } else if (key == "integrator" && value.is_string()) {
-      model.set(key, static_cast<double>(solver::integrator_named(value.get<std::string>())));
+      model.values[key] = static_cast<double>(solver::integrator_named(value.get<std::string>()));
     } else if (value.is_number()) {
-      model.set(key, value.get<double>());
+      model.values[key] = value.get<double>();
     } else {
       throw solver::InputError("model: " + key + " must be a number; preset and integrator a name");
     }
@@ -170,9 +170,12 @@ std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
   for (const auto& block : recipe.blocks()) {
-    const auto drop_m = protocol::surely_reached_m(model, block);
-    if (drop_m && (!least_m || *drop_m < *least_m)) {
-      least_m = drop_m;
+    const auto lengths_m = protocol::shortest_model(model, block).lengths_m;
+    const double drop_m =
+        protocol::kSurelyReached * std::accumulate(lengths_m.begin(), lengths_m.end(), 0.0);
+    const protocol::Axis& H = *protocol::point_axes(block)[0];
+    if (!H.expression().empty() || protocol::largest_value(H) > drop_m) {
+      least_m = std::min(least_m.value_or(drop_m), drop_m);
     }
   }
   return least_m;

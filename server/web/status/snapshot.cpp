@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/study_counts.h"
+#include "proto/result_message.h"
 #include "server/service/service.h"
 #include "server/web/http/http_message.h"
 

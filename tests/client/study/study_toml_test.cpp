@@ -11,7 +11,7 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/recipe/written.h"
+#include "tests/support/recipes.h"
 
 namespace oblique::client {
 namespace {
@@ -75,9 +75,13 @@ class DrawnRecipe {
                                                   static_cast<protocol::Spacing>(below(2)));
     }
     const auto drawn = static_cast<protocol::DistributionKind>(below(3));
-    return drawn == protocol::DISTRIBUTION_NORMAL
-               ? protocol::drawn_axis(key, {drawn, from, to, real(from, to), 0.5})
-               : protocol::drawn_axis(key, {drawn, from, to, {}, {}});
+    auto axis = protocol::uniform(name, from, to);
+    axis.mutable_distribution()->set_kind(drawn);
+    if (drawn == protocol::DISTRIBUTION_NORMAL) {
+      axis.mutable_distribution()->set_mean(real(from, to));
+      axis.mutable_distribution()->set_sd(0.5);
+    }
+    return axis;
   }
 
   std::vector<double> several(double from, double to) {
@@ -93,8 +97,7 @@ class DrawnRecipe {
     std::vector<protocol::Axis> axes{axis("H", kind, 0.2, 0.8), axis("mu", kind, 0.1, 2.0)};
     // At least one that is drawn, and none that asks for itself.
     axes.push_back(kind == BlockKind::kSample
-                       ? protocol::drawn_axis(protocol::axis_key("e"),
-                                              {protocol::DISTRIBUTION_UNIFORM, 0.5, 1.0, {}, {}})
+                       ? protocol::uniform("e", 0.5, 1.0)
                        : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0)));
     if (chance(0.4)) {
       axes.push_back(axis("k", kind, 1e7, 4e7));

@@ -1,11 +1,13 @@
 #include "proto/recipe/model_message.h"
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <set>
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/frames.h"
@@ -40,7 +42,7 @@ TEST(Canonical, TheTextOfAModelIsTheSameForEver) {
             "spectral_radius=0.5 dt=1e-06 dt_fall=2e-06 tolerance=1e-06");
 }
 
-TEST(Canonical, AModelComesBackFromItsTextAndFromAFrame) {
+TEST(ModelMessageTest, AModelComesBackFromAFrame) {
   std::vector<solver::ModelParameters> models{unusual_model()};
   for (const auto name : solver::preset_names()) {
     models.push_back(solver::preset(name));
@@ -52,23 +54,9 @@ TEST(Canonical, AModelComesBackFromItsTextAndFromAFrame) {
   extreme.eta2 = std::nextafter(1.0, 2.0);
   models.push_back(extreme);
   for (const auto& model : models) {
-    EXPECT_EQ(model_of_canonical(canonical_model(model)), model);
     ModelParameters message;
     ASSERT_TRUE(decode(encode(to_message(model)), message));
     EXPECT_EQ(from_message(message), model);
-  }
-}
-
-TEST(Canonical, ATextThatIsNotThatOfAModelIsRefused) {
-  const std::string good = canonical_model(solver::preset("paper"));
-  for (const std::string& text :
-       {std::string(), std::string("oblique-model-1"), good + " ", good + " k=1", "x" + good,
-        good.substr(0, good.size() - 1), good + "e0", good + " wobble=1", good + " links=1e300",
-        std::string(good).replace(good.find("=4 "), 3, "=1e300 "),
-        std::string(good).replace(good.find("rho=2700"), 8, "rho=2700.0"),
-        std::string(good).replace(good.find("explicit"), 8, "euler"),
-        std::string(good).replace(good.find("-1"), 2, "-2")}) {
-    EXPECT_THROW(model_of_canonical(text), solver::InputError) << text;
   }
 }
 
@@ -79,7 +67,6 @@ TEST(Canonical, ZeroHasNoSignAndADefaultToleranceIsNotWritten) {
   EXPECT_EQ(canonical_model(model), text);
   model.tolerance = 1e-6;
   EXPECT_EQ(canonical_model(model), text + " tolerance=1e-06");
-  EXPECT_THROW(model_of_canonical(text + " tolerance=1e-05"), solver::InputError);
 }
 
 TEST(Canonical, TheDigestOfARecipeNamesStudies) {
@@ -111,27 +98,83 @@ TEST(Canonical, ModelErrorsBlocksAndTheOrderOfAxesCount) {
   }
 }
 
-TEST(Canonical, OnlyARangeOfOneOrTwoValuesIsTheSameAsItsList) {
+TEST(Canonical, BlocksAreComparedAsTheyAreWritten) {
+  const Recipe recipe = recipe_of({kPoint});
+  Recipe padded;  // a field that nobody knows
+  ASSERT_TRUE(padded.ParseFromString(recipe.SerializeAsString() + std::string("\x98\x06\x01", 3)));
+  EXPECT_EQ(recipe_digest(padded), recipe_digest(recipe));
   const auto of = [](const Axis& mu) {
     return filtered({listed("H", {1.0}), mu, listed("e", {1.0})}, "");
   };
-  EXPECT_TRUE(is_same_block(of(range("mu", 0.4, 0.4, 1)), of(listed("mu", {0.4}))));
-  EXPECT_TRUE(is_same_block(of(log_range("mu", 0.1, 0.4, 2)), of(listed("mu", {0.1, 0.4}))));
-  EXPECT_FALSE(is_same_block(of(range("mu", 0.1, 0.4, 2)), of(listed("mu", {0.4, 0.1}))));
+  EXPECT_TRUE(is_same_block(of(range("mu", 0.1, 0.3, 3)), of(range("mu", 0.1, 0.3, 3))));
   EXPECT_FALSE(is_same_block(of(range("mu", 0.1, 0.3, 3)), of(listed("mu", {0.1, 0.2, 0.3}))));
+  EXPECT_FALSE(is_same_block(of(listed("mu", {0.1, 0.4})), of(listed("mu", {0.4, 0.1}))));
 }
 
-TEST(Canonical, WhatIsNoPartOfABlockChangesNothing) {
-  const Recipe recipe = recipe_of({kPoint});
-  Recipe padded;
-  // A field that nobody knows, in the recipe; ends that are no range's, and a count of the
-  // server's.
-  ASSERT_TRUE(padded.ParseFromString(recipe.SerializeAsString() + std::string("\x98\x06\x01", 3)));
-  padded.mutable_blocks(0)->mutable_axes(1)->set_from(3.0);
-  EXPECT_EQ(recipe_digest(padded), recipe_digest(recipe));
-  EXPECT_TRUE(is_same_block(padded.blocks(0), recipe.blocks(0)));
-  padded.mutable_blocks(0)->mutable_axes(1)->set_values(0, 0.5);
-  EXPECT_FALSE(is_same_block(padded.blocks(0), recipe.blocks(0)));
+using namespace std::string_literals;
+using testing::AllOf;
+using testing::HasSubstr;
+
+TEST(WrittenModel, IsItsPresetAndTheKeysThatOverrideIt) {
+  const auto model =
+      WrittenModel{.preset = "printed", .values = {{"length", 0.2}, {"k", 1e7}, {"links", 2}}}
+          .model();
+  EXPECT_EQ(model.lengths_m, (std::vector{0.2, 0.2}));
+  EXPECT_EQ(model.k_N_m, 1e7);
+  EXPECT_EQ(model.eta2, solver::preset("printed").eta2);
+  EXPECT_EQ(WrittenModel().model(), solver::preset("standard"));
+}
+
+TEST(WrittenModel, NamesKeyAndValueThatNoModelHas) {
+  const struct {
+    WrittenModel model;
+    const char* key;
+    const char* says;
+  } wrong[] = {
+      {{.values = {{"tip_mas", 1}}}, "tip_mas", "did you mean `tip_mass`"},
+      {{.values = {{"rho", -1}}}, "rho", "rho = -1"},
+      {{.preset = "papre"}, "preset", "papre"},
+      {{.lengths_m = {{0.4, -0.3}}}, "lengths", "lengths = -0.3"},
+      {{.lengths_m = std::vector<double>()}, "lengths", "lengths = []"},
+      {{.lengths_m = std::vector(65, 0.1)}, "lengths", "from 1 to 64"},
+      {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths stands beside"},
+      {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths stands beside"},
+  };
+  for (const auto& [model, key, says] : wrong) {
+    try {
+      (void)model.model();
+      ADD_FAILURE() << says;
+    } catch (const solver::InputError& error) {
+      EXPECT_EQ(error.fields().key, key);
+      EXPECT_THAT(error.what(), HasSubstr(says));
+    }
+  }
+}
+
+TEST(StudyName, MayBeAnyTextThatPeopleCanReadAndShellsTake) {
+  for (const auto& name : {"paper"s, "μ and e, 2nd"s, "a-b"s, "参数"s, std::string(100, 'x')}) {
+    EXPECT_EQ(objection_to_study_name(name), "") << name;
+  }
+  for (const auto& name : {""s, std::string(101, 'x'), "-x"s}) {
+    EXPECT_NE(objection_to_study_name(name), "") << name;
+  }
+}
+
+TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
+  for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
+                           "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
+    const auto objection = objection_to_study_name(name);
+    EXPECT_THAT(objection, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
+                                 testing::Not(HasSubstr(name))));
+  }
+}
+
+TEST(StudyPriority, IsWithinLimitsThatTheObjectionNames) {
+  for (const std::int64_t priority : {-1000, 0, 1000}) {
+    EXPECT_EQ(objection_to_priority(priority), "");
+  }
+  EXPECT_EQ(objection_to_priority(1001), "priority = 1001 is not allowed: -1000 to 1000 is");
+  EXPECT_NE(objection_to_priority(-1001), "");
 }
 
 }  // namespace

@@ -191,6 +191,23 @@ TEST(PointInputs, OfTheModelAreWholeNumbersAndLengthsToo) {
   }
 }
 
+TEST(PointInputs, AreComparedInTextsOfModelsToo) {
+  const std::string own = canonical_model(solver::preset("paper"));
+  const auto with = [&](const std::string& part, const std::string& other) {
+    return std::string(own).replace(own.find(part), part.size(), other);
+  };
+  for (const std::string& close :
+       {own, with("=0.4,0.4,", "=0.4,0.4000000000000001,"), with("rho=2700", "rho=2700.0")}) {
+    EXPECT_TRUE(is_close(close, own)) << close;
+  }
+  for (const std::string& other :
+       {std::string(), std::string("oblique-model-1"), own + " k=1", own.substr(0, own.size() - 1),
+        with("rho=2700", "rho=2701"), with("explicit", "euler"), with("0.4,0.4,", "0.4,"),
+        with("k=2.7e+07", "k=nan")}) {
+    EXPECT_FALSE(is_close(other, own)) << other;
+  }
+}
+
 TEST(PointInputs, OfAStudyThatHasGrownByModelsSinceAreThoseOfItsPoint) {
   const Axis H = listed("H", {0.8});
   const Axis mu = listed("mu", {0.0, 0.4});

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/checks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "tests/support/recipes.h"

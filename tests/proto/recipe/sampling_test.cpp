@@ -203,7 +203,7 @@ TEST(DistributionTest, ValuesRiseWithTheFractionAndStayBetweenTheEnds) {
   const auto tail = normal(0.0, 1.0, 30.0, 31.0);
   EXPECT_GE(tail.value_at(0x1p-53), 30.0);
   EXPECT_LE(tail.value_at(1.0 - 0x1p-53), 31.0);
-  EXPECT_LT(normal(0.0, 1.0, 38.0, 39.0).part_left(), Quantiles::kLeastPart);
+  EXPECT_FALSE(std::isnormal(normal(0.0, 1.0, 38.0, 39.0).part_left()));
 }
 
 // Stored studies have these values, but for the last bits of <cmath>.

@@ -72,6 +72,13 @@ TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
 
 // ---- Queries ----
 
+/// The frame of an answer.
+std::string reply_of(const protocol::QueryReply& query) {
+  protocol::ClientReply reply;
+  *reply.mutable_query() = query;
+  return protocol::encode(reply);
+}
+
 class ServiceQueryTest : public ServiceTest {
  protected:
   void ask(std::uint64_t request_id, const std::string& identity = "client") {
@@ -91,7 +98,7 @@ class ServiceQueryTest : public ServiceTest {
     protocol::QueryReply chunk;
     chunk.set_chunk_rows(1);
     service_->query_report({QueryReport::Kind::kRows, ports_.queries.at(index).ticket,
-                            protocol::reply_around(protocol::encode(chunk))});
+                            reply_of(chunk)});
   }
 };
 
@@ -101,7 +108,7 @@ TEST_F(ServiceQueryTest, AnAnswerGoesToTheOneWhoAskedUnderItsNumber) {
   EXPECT_EQ(ports_.queries[0].client, "client");
   protocol::QueryReply rows;
   rows.add_columns("a");
-  answer_query(0, protocol::reply_around(protocol::encode(rows)));
+  answer_query(0, reply_of(rows));
   EXPECT_EQ(last_reply().request_id(), 7U);
   EXPECT_EQ(last_reply().query().columns(0), "a");
 }
@@ -168,7 +175,7 @@ TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReader
   want_more(7, 1);
   const std::uint64_t ticket = ports_.queries[0].ticket;
   EXPECT_EQ(ports_.more, (Taken{{ticket, 1}, {ticket, 2}}));
-  answer_query(0, protocol::reply_around({}));
+  answer_query(0, reply_of({}));
   EXPECT_EQ(ports_.replies.size(), 3U);
   want_more(7, 3);
   EXPECT_THAT(last_error(), testing::HasSubstr("no answer"));
