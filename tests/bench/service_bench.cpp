@@ -10,7 +10,6 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -19,10 +18,6 @@
 #include <utility>
 #include <vector>
 
-#include <zmq.hpp>
-
-#include "proto/frames.h"
-#include "proto/recipe/model_message.h"
 #include "tests/bench/instant_worker.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
@@ -158,22 +153,6 @@ void bench_merge(std::uint64_t points) {
   }
 }
 
-/// A study of so many points that none of it is ever solved: no worker is there.
-void bench_submission(std::uint64_t points) {
-  const test::TemporaryFolder folder;
-  test::Server server(folder, folder.file("bench.db"));
-  std::vector<std::string> submit{"submit", "--server", server.client_url()};
-  const auto study = study_of(points);
-  submit.insert(submit.end(), study.begin(), study.end());
-  const Usage before = usage_of(server.process().pid());
-  const auto began = Clock::now();
-  Study::check(test::run_oblique(folder, submit));
-  const std::chrono::duration<double> taken = Clock::now() - began;
-  const Usage after = usage_of(server.process().pid());
-  std::printf("| %.0e | %.3f | %.1f | %.1f |\n", static_cast<double>(points), taken.count(),
-              before.peak_MB, after.peak_MB);
-}
-
 void wait_for(const std::function<bool()>& condition) {
   while (!condition()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -228,83 +207,6 @@ void bench_server_killed(std::uint64_t points) {
               full.count());
 }
 
-/// Submits that many small studies over one connection, some at a time.
-void submit_studies(const std::string& client_url, std::uint64_t studies) {
-  constexpr std::uint64_t kAtATime = 64;
-  zmq::context_t context;
-  zmq::socket_t socket(context, zmq::socket_type::dealer);
-  socket.set(zmq::sockopt::linger, 0);
-  socket.connect(client_url);
-  protocol::ClientRequest request;
-  request.set_protocol_version(protocol::kProtocolVersion);
-  *request.mutable_submit()->mutable_recipe()->mutable_model() =
-      protocol::to_message(solver::preset("paper"));
-  auto& block = *request.mutable_submit()->mutable_recipe()->add_blocks();
-  for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
-    auto& axis = *block.add_axes();
-    axis.set_key(key);
-    axis.add_values(value);
-  }
-  zmq::message_t reply;
-  for (std::uint64_t i = 0; i < studies + kAtATime; ++i) {
-    if (i < studies) {
-      request.mutable_submit()->set_name("study " + std::to_string(i));
-      socket.send(zmq::buffer(protocol::encode(request)), zmq::send_flags::none);
-    }
-    if (i >= kAtATime || i >= studies) {
-      static_cast<void>(socket.recv(reply));
-    }
-  }
-}
-
-/// What the server takes of a core when nobody asks it for anything [%].
-double idle_cpu(test::Server& server) {
-  constexpr std::chrono::seconds kLong{2};
-  const double before_s = usage_of(server.process().pid()).cpu_s;
-  std::this_thread::sleep_for(kLong);
-  return 100.0 * (usage_of(server.process().pid()).cpu_s - before_s) /
-         static_cast<double>(kLong.count());
-}
-
-/// Many studies of a point each, open and then finished: what it takes to submit them, to list
-/// them, to keep them, and to start on them again.
-void bench_studies(std::uint64_t count) {
-  const auto studies = std::max<std::uint64_t>(count, 64);
-  const test::TemporaryFolder folder;
-  const std::string file = folder.file("bench.db");
-  const test::Database database(file);
-  auto server = std::make_unique<test::Server>(folder, file);
-  const auto seconds_of = [](const std::function<void()>& work) {
-    const auto began = Clock::now();
-    work();
-    return std::chrono::duration<double>(Clock::now() - began).count();
-  };
-  const auto start_again = [&] {
-    server->process().send(SIGTERM);
-    server->process().wait();
-    return seconds_of([&] { server = std::make_unique<test::Server>(folder, file); });
-  };
-  const double submitted_s = seconds_of([&] { submit_studies(server->client_url(), studies); });
-  const double listed_s = seconds_of([&] {
-    Study::check(test::run_oblique(folder, {"studies", "--server", server->client_url()}));
-  });
-  const double idle_open = idle_cpu(*server);
-  const double peak_MB = usage_of(server->process().pid()).peak_MB;
-  const double started_open_s = start_again();
-  const double finished_s = seconds_of([&] {
-    const InstantWorker worker(server->worker_url());
-    wait_for([&] {
-      return database.number("SELECT count(*) FROM studies WHERE state = 'done'") >=
-             static_cast<double>(studies);
-    });
-  });
-  const double idle_finished = idle_cpu(*server);
-  const double started_finished_s = start_again();
-  std::printf("| %.3g | %.2f | %.2f | %.1f %% | %.2f | %.1f | %.1f %% | %.2f | %.0f |\n",
-              static_cast<double>(studies), submitted_s, listed_s, idle_open, started_open_s,
-              finished_s, idle_finished, started_finished_s, peak_MB);
-}
-
 void run_all(const std::string& what, const std::vector<std::uint64_t>& points) {
   const auto table = [&](const char* header, const std::function<void(std::uint64_t)>& row) {
     std::puts(header);
@@ -330,11 +232,6 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         "|---:|---:|---:|---:|---:|---:|---:|",
         what == "server-alone" ? row_of(study_of, bench_server_alone)
                                : row_of(models_of, bench_server_alone));
-  } else if (what == "submission") {
-    table(
-        "| points | submitted in [s] | server before MB | after MB |\n"
-        "|---:|---:|---:|---:|",
-        bench_submission);
   } else if (what == "merge") {
     table(
         "| rows | which are | wall [s] | rows/s | us a row | MB |\n"
@@ -350,17 +247,10 @@ void run_all(const std::string& what, const std::vector<std::uint64_t>& points) 
         "| points | listens again after [s] | rows of both workers again after [s] |\n"
         "|---:|---:|---:|",
         bench_server_killed);
-  } else if (what == "studies") {
-    table(
-        "| studies | submitted in [s] | listed in [s] | idle CPU, all open | started again in [s] "
-        "| "
-        "solved in [s] | idle CPU, all done | started again in [s] | server MB |\n"
-        "|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
-        bench_studies);
   } else {
     throw std::invalid_argument("`" + what +
                                 "` is none of service, models, server-alone, server-alone-models, "
-                                "submission, studies, merge, worker-killed and server-killed");
+                                "merge, worker-killed and server-killed");
   }
 }
 
@@ -372,7 +262,7 @@ int main(int argc, char** argv) {
     if (argc < 3) {
       throw std::invalid_argument(
           "usage: oblique-service-bench "
-          "service|models|server-alone|server-alone-models|submission|studies|merge|"
+          "service|models|server-alone|server-alone-models|merge|"
           "worker-killed|server-killed POINTS...");
     }
     std::vector<std::uint64_t> points;

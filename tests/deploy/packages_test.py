@@ -3,7 +3,6 @@ them in a root of its own, which it does not change into.
 
   packages_test.py CPACK BUILD-FOLDER
 """
-import json
 import os
 import pathlib
 import re
@@ -16,7 +15,6 @@ import unittest
 import counting
 
 CPACK, BUILD = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
-CONSUMER = pathlib.Path(__file__).parent / "consumer"
 SERVICES = ("oblique-server", "oblique-worker")
 
 
@@ -95,26 +93,6 @@ class Packages(unittest.TestCase):
             self.assertEqual(field(package, "Multi-Arch"), "same")
             # One architecture's differ from another's only where the architecture is in the path.
             self.assertEqual([f for f in files(package) if re.match(r"/usr/lib/(?!%s/)" % triplet, f)], [])
-
-    def test_programs_of_others_are_built_and_run_with_the_library_where_debian_has_it(self):
-        if re.search(r"^OBLIQUE_SANITIZE:STRING=.", (BUILD / "CMakeCache.txt").read_text(), re.MULTILINE):
-            self.skipTest("a library with sanitizers needs programs that have them too")
-        root = pathlib.Path(FOLDER.name) / "installed"
-        for package in PACKAGES:
-            if package.startswith("liboblique"):
-                run("dpkg-deb", "--extract", PACKAGES[package], root)
-        solve = [BUILD / "bin/oblique", *"solve --preset printed --H 1 --mu 0.4 --e 0.9 --json".split()]
-        point = json.loads(subprocess.run(solve, capture_output=True, check=True).stdout)
-        expected = "{fn_peak_N:.17g} {duration_s:.17g} {energy[closure]:.17g} {mode} {solver[version]}\n".format(**point)
-        folder = root.parent / "consumer"
-        run("cmake", "-S", CONSUMER, "-B", folder, f"-DCMAKE_PREFIX_PATH={root}/usr", "-DCMAKE_BUILD_TYPE=Release")
-        run("cmake", "--build", folder)
-        file, = root.glob("usr/lib/*/pkgconfig/oblique.pc")
-        flags = run("pkg-config", "--cflags", "--libs", file).split()
-        run("c++", CONSUMER / "main.cpp", *flags, f"-Wl,-rpath,{file.parent.parent}", "-o", folder / "by-pkg-config")
-        for program in "consumer", "by-pkg-config":
-            self.assertIn(str(root), run("ldd", folder / program), "another library than the package's")
-            self.assertEqual(run(folder / program), expected + "mu = -0.4 is not allowed: mu must be >= 0\n")
 
     def test_the_python_module_asks_for_its_interpreter_and_numpy_and_for_none_of_our_programs(self):
         if "python3-oblique" not in PACKAGES:

@@ -10,7 +10,6 @@
 #include "proto/frames.h"
 #include "server/service/service.h"
 #include "tests/simulation/disk/simulated_disk.h"
-#include "tests/simulation/network.h"
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {

@@ -11,9 +11,8 @@
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "tests/simulation/disk/simulated_disk.h"
-#include "tests/simulation/simulated_client.h"
+#include "tests/simulation/simulated_peers.h"
 #include "tests/simulation/simulated_server.h"
-#include "tests/simulation/simulated_worker.h"
 #include "tests/simulation/world.h"
 
 namespace oblique::simulation {

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <random>
+#include <set>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace oblique::simulation {
@@ -59,6 +63,193 @@ class World {
   std::int64_t utc_at_zero_ms_ = 1'700'000'000'000;
   std::uint64_t next_ = 0;
   std::map<std::pair<std::int64_t, std::uint64_t>, std::function<void()>> to_come_;
+};
+
+/// Connections as sockets with TCP below give them: in order and whole until they break, when
+/// everything on the way is lost, and the peer comes back under another identity. Half-open
+/// connections swallow what is sent before they break. A partition separates several peers from the
+/// server: what is sent waits, as TCP sends it again and again, until the partition ends or the
+/// connections break. Beyond TCP, results may be doubled or overtaken on request of the sender.
+class Network {
+ public:
+  using ToServer = std::function<void(const std::string& identity, const std::string& frame)>;
+  using ToPeer = std::function<void(const std::string& frame)>;
+  using LinkId = std::uint64_t;
+
+  Network(World& world, ToServer to_server) : world_(world), to_server_(std::move(to_server)) {}
+
+  /// A new socket of that peer; what the server sends goes to `to_peer`.
+  LinkId open(std::uint64_t peer, ToPeer to_peer) {
+    const LinkId id = ++last_link_;
+    links_.emplace(id, Link{new_identity(id), peer, std::move(to_peer), 0, 0, false, false, 0});
+    if (world_.faults && world_.chance(0.2)) {
+      const std::int64_t life_ms = world_.between(500, 20'000);
+      world_.after(life_ms, [this, id] { cut(id); });
+    }
+    return id;
+  }
+
+  /// The socket is closed: what comes for it is lost. What it sent still arrives when `linger`.
+  void close(LinkId id, bool linger) {
+    links_.erase(id);
+    if (!linger) {
+      silenced_.insert(id);
+    }
+  }
+
+  /// `loosely`: may be doubled or overtaken.
+  void send(LinkId id, const std::string& frame, bool loosely) {
+    const auto found = links_.find(id);
+    if (found == links_.end() || found->second.cut_up) {
+      return;
+    }
+    Link& link = found->second;
+    wait_for_partition(link);
+    const std::string identity = link.identity;
+    const auto deliver = [this, identity, frame, breaks = link.breaks, id] {
+      const auto there = links_.find(id);
+      const bool closed = there == links_.end();
+      if (closed ? !silenced_.contains(id) : there->second.breaks == breaks) {
+        to_server_(identity, frame);
+      }
+    };
+    if (loosely && world_.faults && world_.chance(0.05)) {
+      world_.after(delay_ms() + world_.between(0, 300), deliver);
+      if (world_.chance(0.5)) {
+        return;  // overtaken only
+      }
+    }
+    link.last_up_ms = std::max(link.last_up_ms, world_.now_ms() + delay_ms());
+    world_.after(link.last_up_ms - world_.now_ms(), deliver);
+  }
+
+  /// False when no connection has that identity.
+  bool send_to(const std::string& identity, const std::string& frame) {
+    const LinkId id = link_of(identity);
+    const auto found = links_.find(id);
+    if (found == links_.end()) {
+      return false;
+    }
+    Link& link = found->second;
+    if (link.cut_down) {
+      return true;  // nobody knows yet
+    }
+    wait_for_partition(link);
+    link.last_down_ms = std::max(link.last_down_ms, world_.now_ms() + delay_ms());
+    world_.after(link.last_down_ms - world_.now_ms(), [this, id, frame, breaks = link.breaks] {
+      const auto there = links_.find(id);
+      if (there != links_.end() && there->second.breaks == breaks) {
+        there->second.to_peer(frame);
+      }
+    });
+    return true;
+  }
+
+  /// Nothing passes between these peers and the server for so long. Connections that stand still
+  /// for too long break.
+  void part(std::set<std::uint64_t> peers, std::int64_t duration_ms) {
+    parted_ = std::move(peers);
+    parted_until_ms_ = world_.now_ms() + duration_ms;
+    world_.after(std::min(duration_ms, kPatience_ms), [this, until_ms = parted_until_ms_] {
+      for (auto& [id, link] : links_) {
+        if (until_ms == parted_until_ms_ && world_.now_ms() < until_ms &&
+            parted_.contains(link.peer)) {
+          break_link(id, link);
+        }
+      }
+    });
+  }
+
+  /// The connections of that peer break, or all, as when the server dies; the sockets connect
+  /// again.
+  void break_links(std::optional<std::uint64_t> peer = std::nullopt) {
+    for (auto& [id, link] : links_) {
+      if (!peer || link.peer == *peer) {
+        break_link(id, link);
+      }
+    }
+  }
+
+  void heal() {
+    parted_until_ms_ = 0;
+    for (auto& [id, link] : links_) {
+      if (link.cut_up || link.cut_down || parted_.contains(link.peer)) {
+        break_link(id, link);
+      }
+    }
+  }
+
+  LinkId link_of(const std::string& identity) const {
+    const auto found = identities_.find(identity);
+    return found == identities_.end() ? 0 : found->second;
+  }
+
+ private:
+  /// A connection on which nothing arrives for so long is given up.
+  static constexpr std::int64_t kPatience_ms = 10'000;
+
+  struct Link {
+    std::string identity;
+    std::uint64_t peer;
+    ToPeer to_peer;
+    std::int64_t last_up_ms;
+    std::int64_t last_down_ms;
+    bool cut_up;
+    bool cut_down;
+    std::uint64_t breaks;  // how often it broke: what was sent before is lost
+  };
+
+  std::string new_identity(LinkId id) {
+    std::string identity = "peer " + std::to_string(++last_identity_);
+    identities_[identity] = id;
+    return identity;
+  }
+
+  std::int64_t delay_ms() {
+    return world_.faults && world_.chance(0.01) ? world_.between(50, 3000) : world_.between(0, 3);
+  }
+
+  void wait_for_partition(Link& link) {
+    if (parted_until_ms_ > world_.now_ms() && parted_.contains(link.peer)) {
+      link.last_up_ms = std::max(link.last_up_ms, parted_until_ms_);
+      link.last_down_ms = std::max(link.last_down_ms, parted_until_ms_);
+    }
+  }
+
+  void cut(LinkId id) {
+    const auto found = links_.find(id);
+    if (found == links_.end()) {
+      return;
+    }
+    found->second.cut_up = world_.chance(0.7);
+    found->second.cut_down = !found->second.cut_up || world_.chance(0.5);
+    world_.after(world_.between(0, 8000), [this, id] {
+      const auto there = links_.find(id);
+      if (there != links_.end()) {
+        break_link(id, there->second);
+      }
+    });
+  }
+
+  void break_link(LinkId id, Link& link) {
+    ++link.breaks;
+    identities_.erase(link.identity);
+    link.identity = new_identity(id);
+    link.cut_up = false;
+    link.cut_down = false;
+    link.last_up_ms = 0;
+    link.last_down_ms = 0;
+  }
+
+  World& world_;
+  ToServer to_server_;
+  std::map<LinkId, Link> links_;
+  std::map<std::string, LinkId> identities_;
+  std::set<LinkId> silenced_;       // closed, and nothing of them arrives
+  std::set<std::uint64_t> parted_;  // peers, until that time
+  std::int64_t parted_until_ms_ = 0;
+  LinkId last_link_ = 0;
+  std::uint64_t last_identity_ = 0;
 };
 
 }  // namespace oblique::simulation

@@ -47,16 +47,11 @@ bool contains(const std::string& text, const std::string& part) {
 class DatabaseFilesTest : public ::testing::Test {
  protected:
   std::vector<std::string> run_arguments() const {
-    std::vector<std::string> words{"run", "--workers", "1", "--db", file_};
-    const auto points = many_points("some");
-    words.insert(words.end(), points.begin(), points.end());
-    return words;
+    return many_points("some", {"run", "--workers", "1", "--db", file_});
   }
   void submit_to(const Server& server) const {
-    std::vector<std::string> words{"submit", "--server", server.client_url()};
-    const auto points = many_points("some");
-    words.insert(words.end(), points.begin(), points.end());
-    const Outcome ran = run_oblique(folder_, words);
+    const Outcome ran =
+        run_oblique(folder_, many_points("some", {"submit", "--server", server.client_url()}));
     ASSERT_EQ(ran.exit_code, 0) << ran.err;
   }
 

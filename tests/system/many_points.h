@@ -11,12 +11,15 @@ constexpr int kSide = 30;  ///< sanitized programs are some twenty times slower
 constexpr int kSide = 140;
 #endif
 
-/// A study that takes seconds, so that there is time to break something in its middle.
+/// The words of a command and, behind them, those of a study that takes seconds, so that there is
+/// time to break something in its middle.
 constexpr double kManyPoints = kSide * kSide;
-inline std::vector<std::string> many_points(const std::string& name) {
+inline std::vector<std::string> many_points(const std::string& name,
+                                            std::vector<std::string> command) {
   const std::string count = std::to_string(kSide);
-  return {"--preset",         "paper",  "--H", "1", "--mu", "0.1:2.0:" + count, "--e",
-          "0.5:1.0:" + count, "--name", name};
+  command.insert(command.end(), {"--preset", "paper", "--H", "1", "--mu", "0.1:2.0:" + count, "--e",
+                                 "0.5:1.0:" + count, "--name", name});
+  return command;
 }
 
 }  // namespace oblique::test

@@ -18,10 +18,7 @@ namespace {
 class ServerAwayTest : public ::testing::Test {
  protected:
   std::vector<std::string> submit_and_watch() const {
-    std::vector<std::string> arguments{"submit", "--server", server_->client_url(), "--watch"};
-    const auto points = many_points("many");
-    arguments.insert(arguments.end(), points.begin(), points.end());
-    return arguments;
+    return many_points("many", {"submit", "--server", server_->client_url(), "--watch"});
   }
 
   std::vector<std::string> watch() const {

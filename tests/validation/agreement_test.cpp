@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "tests/validation/both_ways.h"
-#include "tests/validation/outputs.h"
 #include "tests/validation/validation_table.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/solve.h"
@@ -18,6 +18,145 @@ namespace oblique::validation {
 namespace {
 
 using solver::CaseResult;
+
+/// One output of a case, and what an error in it is measured against.
+struct Output {
+  std::string name;
+  std::string relative_to;
+  std::function<std::vector<double>(const solver::CaseResult&)> values;
+  /// The scale of value i; one for all of an output, or each value's own.
+  std::function<double(const solver::CaseResult&, double value)> scale;
+  /// False where the number of values depends on ripples.
+  bool is_headline;
+};
+
+using Values = std::vector<double>;
+
+double largest_fn(const CaseResult& r, double) {
+  return r.fn_peak_N;
+}
+double largest_ft(const CaseResult& r, double) {
+  return r.ft_peak_N;
+}
+double duration(const CaseResult& r, double) {
+  return r.duration_s;
+}
+double normal_impulse(const CaseResult& r, double) {
+  return r.impulse_n_Ns;
+}
+double speed_at_touch(const CaseResult& r, double) {
+  return std::hypot(r.vt_in_m_s, r.vn_in_m_s);
+}
+double speed_at_exit(const CaseResult& r, double) {
+  return std::hypot(r.vt_out_m_s, r.vn_out_m_s);
+}
+double exchanged_work(const CaseResult& r, double) {
+  return r.energy.exchanged_J;
+}
+double itself(const CaseResult&, double value) {
+  return std::abs(value);
+}
+
+Values normal_peaks(const CaseResult& r) {
+  Values values;
+  for (const auto& peak : r.peaks) {
+    values.push_back(peak.fn_N);
+  }
+  return values;
+}
+
+Values tangential_peaks(const CaseResult& r) {
+  Values values;
+  for (const auto& peak : r.ft_peaks) {
+    values.push_back(peak.ft_N);
+  }
+  return values;
+}
+
+/// All ends of phases but the last, which is the duration.
+Values turns(const CaseResult& r) {
+  Values values;
+  for (const auto& phase : r.phases) {
+    values.push_back(phase.t1_s);
+  }
+  values.pop_back();
+  return values;
+}
+
+Values stick_ends(const CaseResult& r) {
+  Values values;
+  for (const auto& interval : r.stick_intervals) {
+    values.push_back(interval.t0_s);
+    values.push_back(interval.t1_s);
+  }
+  return values;
+}
+
+Values exit_velocity(const CaseResult& r) {
+  return {r.vt_out_m_s, r.vn_out_m_s};
+}
+
+Values reactions(const CaseResult& r) {
+  Values values;
+  for (const auto& peak : r.reaction_peaks) {
+    values.push_back(peak.force_N);
+  }
+  return values;
+}
+
+/// All outputs of a case that are numbers.
+std::vector<Output> outputs() {
+  return {
+      {"largest F_n", "itself", [](const CaseResult& r) { return Values{r.fn_peak_N}; }, itself,
+       true},
+      {"largest F_t", "itself", [](const CaseResult& r) { return Values{r.ft_peak_N}; }, itself,
+       true},
+      {"duration", "itself", [](const CaseResult& r) { return Values{r.duration_s}; }, itself,
+       true},
+      {"slide of P", "itself", [](const CaseResult& r) { return Values{r.slide_m}; }, itself, true},
+      {"stick, total", "duration", [](const CaseResult& r) { return Values{r.stick_total_s}; },
+       duration, true},
+      {"impulses", "normal impulse",
+       [](const CaseResult& r) {
+         return Values{r.impulse_n_Ns, r.impulse_t_Ns};
+       },
+       normal_impulse, true},
+      {"friction and restitution losses", "exchanged work",
+       [](const CaseResult& r) {
+         return Values{r.energy.friction_J, r.energy.restitution_J};
+       },
+       exchanged_work, true},
+      {"exit velocity", "speed at touch", exit_velocity, speed_at_touch, true},
+      {"exit velocity", "exit speed", exit_velocity, speed_at_exit, true},
+      {"reaction peaks", "each itself", reactions, itself, true},
+      {"all peaks of F_n", "largest F_n", normal_peaks, largest_fn, false},
+      {"all peaks of F_n", "each itself", normal_peaks, itself, false},
+      {"all peaks of F_t", "largest F_t", tangential_peaks, largest_ft, false},
+      {"instants of turns", "duration", turns, duration, false},
+      {"ends of stick", "duration", stick_ends, duration, false},
+  };
+}
+
+/// Largest difference of one output between two results, relative to its scale in `right`. The
+/// results must have equally many values.
+double difference(const Output& output, const std::vector<double>& values,
+                  const solver::CaseResult& right) {
+  const Values expected = output.values(right);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const double missing = std::abs(values.at(i) - expected[i]);
+    if (missing != 0.0) {
+      largest = std::max(largest, missing / output.scale(right, expected[i]));
+    }
+  }
+  return largest;
+}
+
+/// The same order of states, so that every output has equally many values.
+bool have_same_turns(const solver::CaseResult& a, const solver::CaseResult& b) {
+  return a.mode == b.mode && a.phases.size() == b.phases.size() &&
+         a.ft_peaks.size() == b.ft_peaks.size();
+}
 
 /// Explicit steps of the reference: PEFRL's own error is below 1e-9 there.
 constexpr double kReferenceStep_s = 2e-7;

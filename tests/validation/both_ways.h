@@ -10,6 +10,7 @@
 #include "worker/solver/reference/fall.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
+#include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::validation {
@@ -32,7 +33,12 @@ inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
 /// explicit fall, so that what differs is the contact's alone.
 class BothWays {
  public:
-  explicit BothWays(const solver::ModelParameters& model);
+  explicit BothWays(const solver::ModelParameters& model)
+      : model_(model),
+        chain_(model),
+        explicit_(chain_),
+        generalized_alpha_(model),
+        fall_(solver::solve_stepped_fall(chain_, kFallStep_s)) {}
 
   const solver::Chain& chain() const { return chain_; }
   const solver::ExplicitMotion& by_explicit() const { return explicit_; }
@@ -48,10 +54,19 @@ class BothWays {
     return {model_.k_N_m, model_.eta2, point.mu, point.e_star};
   }
   /// The contact with reactions, steps of dt_s throughout.
-  solver::CaseResult explicit_case(const Point& point, double dt_s) const;
-  solver::CaseResult generalized_alpha_case(const Point& point, double dt_s) const;
+  solver::CaseResult explicit_case(const Point& point, double dt_s) const {
+    return solver::solve_contact(explicit_, contact(point), {dt_s, dt_s}, explicit_touch(point.H_m),
+                                 {});
+  }
+  solver::CaseResult generalized_alpha_case(const Point& point, double dt_s) const {
+    return solver::solve_contact(generalized_alpha_, contact(point), {dt_s, dt_s},
+                                 generalized_alpha_touch(point.H_m), {});
+  }
 
  private:
+  /// There the fall's own error is 1e-10 of the speed.
+  static constexpr double kFallStep_s = 2e-6;
+
   solver::ModelParameters model_;
   solver::Chain chain_;
   solver::ExplicitMotion explicit_;

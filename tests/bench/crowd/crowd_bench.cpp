@@ -17,7 +17,6 @@
 
 #include "proto/keys/key_file.h"
 #include "tests/bench/crowd/crowd.h"
-#include "tests/bench/crowd/scraper.h"
 #include "tests/bench/crowd/status_probe.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
@@ -36,7 +35,6 @@ struct Flags {
   std::vector<double> point_ms{0.0};
   std::uint64_t most_results = 2'000'000;
   std::string keys = "off";
-  std::vector<int> scrape_ms{0};
 };
 
 void take_all_descriptors() {
@@ -100,8 +98,7 @@ void submit(const Place& place, const test::Server& server) {
 
 /// One row: a fresh server and database, the crowd, then the study, all measured from its first
 /// result on.
-void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_ms,
-           bool with_keys) {
+void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_keys) {
   const Place place(with_keys);
   const test::Database database(place.folder.file("bench.db"));
   test::Server server(place.folder, place.folder.file("bench.db"), place.environment);
@@ -115,7 +112,6 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
   double wall_s = 0.0;
   double rows = 0.0;
   StatusProbe::Seen seen;
-  std::uint64_t scrapes = 0;
   {
     const Crowd crowd({server.worker_url(), workers, point_ms / 1e3, place.key("worker")});
     wait_for("welcomes", [&] { return crowd.counts().welcomed >= workers; });
@@ -128,7 +124,6 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
     const auto start = Clock::now();
     StatusProbe probe(server.client_url(), place.key("client"), "crowd",
                       std::chrono::milliseconds(100));
-    const Scraper scraper(server.http_url(), std::chrono::milliseconds(scrape_ms));
     while (seconds_since(start) < flags.seconds &&
            crowd.counts().results - before.results < flags.most_results) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -139,7 +134,6 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
     after = crowd.counts();
     rows = database.rows() - rows_before;
     seen = probe.stop();
-    scrapes = scraper.scrapes();
   }
   // Workers that vanished are forgotten after some seconds.
   std::this_thread::sleep_for(std::chrono::seconds(4));
@@ -152,14 +146,13 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, int scrape_
       "%.1f "
       "| %zu "
       "| "
-      "%.0f | %.0f | %.0f | %llu | %llu |\n",
+      "%.0f | %.0f | %.0f | %llu |\n",
       workers, with_keys ? "yes" : "no", point_ms, rows / wall_s, batches / wall_s,
       static_cast<double>(after.messages - before.messages) / wall_s, 100.0 * loop_cpu_s / wall_s,
       100.0 * (server_cpu_s - loop_cpu_s) / wall_s, 100.0 * crowd_cpu_s / wall_s,
       1e6 * server_cpu_s / rows, seen.quantile_ms(0.5), seen.quantile_ms(0.99),
       seen.quantile_ms(1.0), seen.latencies_ms.size() + seen.unanswered, at_rest.resident_MB,
-      left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers),
-      static_cast<unsigned long long>(scrapes));
+      left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers));
   std::fflush(stdout);
   if (after.connects > workers) {
     std::fprintf(stderr, "the crowd itself was late by %.1f s at most\n", after.longest_gap_s);
@@ -174,18 +167,15 @@ void run(const Flags& flags) {
       "writer | "
       "crowd | us a "
       "result | status p50 [ms] | p99 | max | asked | server MB: at rest | peak | after | "
-      "reconnects | scrapes |\n"
-      "|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|--"
-      "-:|"
+      "reconnects |\n"
+      "|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
       "\n");
   const std::vector<bool> keys =
       flags.keys == "both" ? std::vector<bool>{false, true} : std::vector<bool>{flags.keys == "on"};
   for (const std::size_t workers : flags.workers) {
     for (const double point_ms : flags.point_ms) {
-      for (const int scrape_ms : flags.scrape_ms) {
-        for (const bool with_keys : keys) {
-          bench(flags, workers, point_ms, scrape_ms, with_keys);
-        }
+      for (const bool with_keys : keys) {
+        bench(flags, workers, point_ms, with_keys);
       }
     }
   }
@@ -205,10 +195,6 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--point-ms", flags.point_ms,
                  "What a point takes a worker, a row each; 0: nothing")
-      ->delimiter(',')
-      ->capture_default_str();
-  app.add_option("--scrape-ms", flags.scrape_ms,
-                 "How often metrics are asked for, a row each; 0: never")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--keys", flags.keys, "Whether all is encrypted: off, on, or a row of each")

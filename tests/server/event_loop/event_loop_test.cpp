@@ -9,7 +9,6 @@
 #include <memory>
 #include <string>
 #include <thread>
-#include <variant>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -46,6 +45,24 @@ TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
   const auto known = client.ask(workers).workers();
   ASSERT_EQ(known.workers_size(), 1);
   EXPECT_EQ(known.workers(0).solved_points(), 30U);
+}
+
+TEST_F(EventLoopTest, PointsThatAnotherStudyHasAreItsRows) {
+  RunningServer server(path_);
+  PretendedClient client(server.client_endpoint());
+  client.submit("a", 20);
+  PretendedWorker worker(server.worker_endpoint());
+  worker.hello();
+  worker.work(20);
+  ClientRequest request;
+  request.mutable_submit()->set_name("b");
+  *request.mutable_submit()->mutable_recipe() = table_of(20)->recipe();
+  const auto reply = client.ask(request).submit();
+  EXPECT_EQ(reply.settled(), 20U);
+  EXPECT_EQ(reply.taken().points(), 20U);
+  EXPECT_EQ(client.status("b").state(), "done");
+  EXPECT_EQ(client.rows("SELECT count(*) FROM runs WHERE reused_from = 'a/' || point").rows.at(0),
+            protocol::Row{std::int64_t{20}});
 }
 
 TEST_F(EventLoopTest, ARestartedServerGoesOnWhereItWas) {
@@ -302,114 +319,6 @@ TEST_F(EventLoopTest, FloodsOfManyWorkersAndClientsKeepNobodyFromBeingServed) {
   for (std::thread& flood : floods) {
     flood.join();
   }
-}
-
-// ---- Results of other studies ----
-
-using protocol::listed;
-using protocol::range;
-using protocol::recipe_of;
-
-protocol::Recipe grid(double first_mu, double last_mu, std::uint64_t count) {
-  return recipe_of(
-      {{listed("H", {0.9, 1.0}), range("mu", first_mu, last_mu, count), listed("e", {0.5, 1.0})}});
-}
-
-class ReuseTest : public EventLoopTest {
- protected:
-  void start() {
-    server_.reset();
-    server_ = std::make_unique<RunningServer>(path_);
-    client_ = std::make_unique<PretendedClient>(server_->client_endpoint());
-  }
-  void stop() {
-    client_.reset();
-    server_.reset();
-  }
-  protocol::SubmitReply submit(const std::string& name, const protocol::Recipe& recipe) {
-    ClientRequest request;
-    request.mutable_submit()->set_name(name);
-    *request.mutable_submit()->mutable_recipe() = recipe;
-    const ClientReply reply = client_->ask(request);
-    EXPECT_TRUE(reply.has_submit()) << reply.error().message();
-    return reply.submit();
-  }
-  void work(std::uint64_t points) {
-    PretendedWorker worker(server_->worker_endpoint());
-    worker.hello();
-    worker.work(points);
-  }
-  std::int64_t number(const std::string& sql) {
-    return std::get<std::int64_t>(Reader(path_).query(sql, kNoLimits).rows.at(0).at(0));
-  }
-  void by_hand(const std::string& sql) {
-    const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READWRITE);
-    execute(database.get(), sql);
-  }
-
-  std::unique_ptr<RunningServer> server_;
-  std::unique_ptr<PretendedClient> client_;
-};
-
-TEST_F(ReuseTest, TheSamePointsUnderAnotherNameAreCopiesOfTheRowsBitByBit) {
-  start();
-  submit("a", grid(0.0, 1.0, 5));
-  work(20);
-  const auto reply = submit("b", grid(0.0, 1.0, 5));
-  EXPECT_EQ(reply.settled(), 20U);
-  EXPECT_EQ(reply.taken().points(), 20U);
-  ASSERT_EQ(reply.taken().from_size(), 1);
-  EXPECT_EQ(reply.taken().from(0).study(), "a");
-  EXPECT_EQ(reply.taken().from(0).points(), 20U);
-  const auto status = client_->status("b");
-  EXPECT_EQ(status.state(), "done");
-  EXPECT_EQ(status.solved(), 20U);
-  EXPECT_EQ(status.taken().points(), 20U);
-  EXPECT_EQ(number("SELECT count(*) FROM runs AS a JOIN runs AS b USING (point, H, mu, e, status,"
-                   " duration_s, fn_peak_N, ft_peak_N, mode, peaks, phases, stick_intervals,"
-                   " reaction_peaks, worker_id, solver_version, attempt, solved_at, model_id)"
-                   " WHERE a.study = 'a' AND b.study = 'b' AND a.reused_from IS NULL"
-                   " AND b.reused_from = 'a/' || point"),
-            20);
-  stop();
-  EXPECT_EQ(Reader(path_).study_status("b").at(0).taken().points(), 20U);
-}
-
-TEST_F(ReuseTest, PointsThatAFilterLeavesOutAreNotReused) {
-  start();
-  submit("a", grid(0.0, 1.0, 5));
-  work(20);
-  auto filtered = grid(0.0, 1.0, 5);
-  filtered.mutable_blocks(0)->set_where("mu > 0.3");
-  const auto reply = submit("b", filtered);
-  EXPECT_EQ(reply.points(), 20U);
-  EXPECT_EQ(reply.taken().points(), 12U);
-  EXPECT_EQ(client_->status("b").state(), "running") << "until a worker has named the others";
-  work(8);
-  EXPECT_EQ(client_->status("b").state(), "done");
-  EXPECT_EQ(client_->status("b").left_out(), 8U);
-  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND mu < 0.3"), 0);
-}
-
-TEST_F(ReuseTest, AServerThatWasKilledDuringALookupContinuesIt) {
-  start();
-  submit("a", grid(0.0, 1.0, 5));
-  work(20);
-  submit("b", grid(0.0, 1.0, 5));
-  stop();
-  // As if it had been killed after some rows.
-  by_hand("DELETE FROM results WHERE study_id = 2 AND point > 3");
-  by_hand("UPDATE studies SET state = 'running', reuses = 1 WHERE study_id = 2");
-  by_hand("UPDATE reused_points SET points = 4");
-  start();
-  protocol::StudyStatus status;
-  do {
-    status = client_->status("b");
-  } while (status.taken().under_way());
-  EXPECT_EQ(status.state(), "done");
-  EXPECT_EQ(status.taken().points(), 20U);
-  EXPECT_EQ(number("SELECT count(*) FROM runs WHERE study = 'b' AND reused_from IS NOT NULL"), 20);
-  EXPECT_EQ(number("SELECT count(*) FROM studies WHERE reuses"), 0);
 }
 
 }  // namespace

@@ -45,8 +45,7 @@ class LeftOutPointsTest : public testing::Test {
 TEST_F(LeftOutPointsTest, AStudyIsDoneWhenEveryPointIsSolvedOrLeftOut) {
   for (const char* where : {kEven, "mu > 50", "mu < 50", "mu == 77", "mu < 0"}) {
     const auto table = filtered_table(100, where);
-    SchedulerBench bench(trusting());
-    bench.feed(StudyAdded{1, table, {}});
+    SchedulerBench bench(table, trusting());
     bench.solve_all(bench.join(1, 2), 1e-3, table.get());
     std::uint64_t left_in = 0;
     for (std::uint64_t point = 0; point < 100; ++point) {
@@ -98,8 +97,7 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingO
   const SendBatch batch = bench_.join(1, 1).at(0);
   const SendBatch other = bench_.join(2, 1).at(0);
   for (const std::uint64_t point : {other.first_point(), std::uint64_t{99}, std::uint64_t{100}}) {
-    SchedulerBench bench(trusting());
-    bench.feed(StudyAdded{1, table_, {}});
+    SchedulerBench bench(table_, trusting());
     bench.join(1, 1);
     bench.join(2, 1);
     ResultsReceived event = bench.answer_to(batch, 1e-3, table_.get());
@@ -112,23 +110,12 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingO
   }
 }
 
-TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfAStudyWithoutAFilterIsLost) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of(100), {}});
-  const SendBatch batch = bench.join(1, 1).at(0);
-  const auto effects = bench.feed(ResultsReceived{
-      1, 1, batch.lease, ++bench.sequence, true, 1e-3, {}, IntervalSet(batch.first_point(), 1)});
-  EXPECT_EQ(only<DropWorker>(effects).size(), 1U);
-  EXPECT_EQ(bench.scheduler.study(1).completed, 0U);
-}
-
 TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfABlockWithoutAFilterIsLost) {
   protocol::Recipe recipe = filtered_table(2, kEven)->recipe();
   *recipe.add_blocks() = table_of(100)->recipe().blocks(0);
   const auto table = std::make_shared<const protocol::PointTable>(recipe);
   for (const Interval named : {Interval{0, 1}, Interval{1, 3}, Interval{2, 3}}) {
-    SchedulerBench bench(trusting());
-    bench.feed(StudyAdded{1, table, {}});
+    SchedulerBench bench(table, trusting());
     const SendBatch batch = bench.join(1, 1).at(0);
     const auto effects = bench.feed(ResultsReceived{
         1, 1, batch.lease, ++bench.sequence, true, 1e-3, {}, IntervalSet(named.begin, named.end)});
@@ -170,8 +157,7 @@ TEST_F(LeftOutPointsTest, PointsThatAStudyGrowsByAreNamedToo) {
 /// The number of points in the batch that a worker gets after `batches` others, which took no time.
 std::uint64_t batch_size_after(int batches, const std::string& where) {
   const auto table = filtered_table(1'000'000, where);
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table, {}});
+  SchedulerBench bench(table, trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < batches; ++i) {
     batch = only<SendBatch>(solve(bench, *table, batch)).at(0);
@@ -179,18 +165,14 @@ std::uint64_t batch_size_after(int batches, const std::string& where) {
   return batch.count();
 }
 
-TEST(LeftOutPoints, BatchesStayShortUntilAPointWasSolved) {
+TEST(LeftOutPoints, BatchesStayShortUntilAPointWasSolvedUnlessTheFilterKeepsNothing) {
   EXPECT_EQ(batch_size_after(20, "mu > 900000"), SchedulerSettings().unsolved_batch_points);
-}
-
-TEST(LeftOutPoints, BatchesStayLongWhileTheFilterKeepsNothing) {
   EXPECT_EQ(batch_size_after(50, "mu < 100"), SchedulerSettings().largest_batch_points);
 }
 
 TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutHasNoSolverVersion) {
   const auto table = filtered_table(100, "mu > 90");
-  SchedulerBench bench(trusting(), "1.0");
-  bench.feed(StudyAdded{1, table, {}});
+  SchedulerBench bench(table, trusting(), "1.0");
   const SendBatch batch = bench.join(1, 1).at(0);
   const ResultsReceived event = bench.answer_to(batch, 1e-3, table.get());
   bench.feed(event);
@@ -203,10 +185,6 @@ TEST_F(LeftOutPointsTest, MoreLeftOutPointsThanAreSettledMakeNoHugeNumbers) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 7});
   EXPECT_EQ(bench.scheduler.study(1).solved(), 0U);
-  Scheduler scheduler{trusting()};
-  scheduler.handle(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 45},
-                   0);
-  EXPECT_EQ(scheduler.study(1).solved(), 0U);
 }
 
 }  // namespace

@@ -30,27 +30,19 @@ SchedulerSettings by_pace_alone() {
   return settings;
 }
 
-TEST(SchedulerPace, ABatchTakesTheTimeAimedAt) {
-  SchedulerBench bench(by_pace_alone());
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  const SendBatch next = bench.next_after(bench.join(1, 1).at(0), 1e-3);
-  EXPECT_EQ(next.count(), 100U) << "0.1 s at 1 ms a point";
-}
-
 TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000), settings);
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 1e-3);
+  EXPECT_EQ(second.count(), 100U) << "0.1 s at 1 ms a point";
   EXPECT_EQ(bench.next_after(second, 3e-3).count(), 50U) << "0.1 s at 2 ms a point";
 }
 
 TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLittleOfOthers) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 1000;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000), settings);
   const SendBatch first = bench.join(1, 1).at(0);
   const auto part = [&](std::uint64_t from, std::uint64_t to, double busy_s, bool is_last) {
     ResultsReceived message{1, 1, first.lease, ++bench.sequence, is_last, busy_s, {}};
@@ -68,14 +60,12 @@ TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLi
 TEST(SchedulerPace, WhoSaysThatPointsTakeDaysIsNotBelieved) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000), settings);
   EXPECT_EQ(bench.next_after(bench.join(1, 1).at(0), 1e9).count(), 100U);
 }
 
 TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
-  SchedulerBench bench(by_pace_alone());
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000), by_pace_alone());
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 0.5);
   EXPECT_EQ(second.count(), 8U) << "0.5 s a point, and eight at a time take little longer than one";
   const SendBatch third = bench.next_after(second, 5.0);
@@ -85,8 +75,7 @@ TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
 TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
   SchedulerSettings settings = trusting();
   settings.shortest_batch_s = 0.01;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1000), {}});
+  SchedulerBench bench(table_of(1000), settings);
   SendBatch batch = bench.join(1, 1).at(0);
   std::vector<std::uint64_t> counts;
   for (std::uint64_t left = 1000 - batch.count(); left > 0; left -= batch.count()) {
@@ -100,8 +89,7 @@ TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
 TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
   SchedulerSettings settings = by_pace_alone();
   settings.growth = 4;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000), settings);
   const SendBatch first = bench.join(1, 1).at(0);
   EXPECT_EQ(bench.next_after(first, 1e-6).count(), 4 * first.count());
 }
@@ -120,18 +108,12 @@ std::uint64_t cut(const Interval& free, const BatchSize& wanted) {
   return end_of_batch(mixed_table(), PointOrder{}, free, wanted);
 }
 
-TEST(BatchCut, ABatchEndsWithTheModelThatEndsNearest) {
+TEST(BatchCut, ABatchEndsWithAModelAndHasSoManyAsItHasRoomFor) {
   EXPECT_EQ(cut({0, 90}, {.points = 12}), 10U);
   EXPECT_EQ(cut({0, 90}, {.points = 18, .most_points = 25}), 10U);
   EXPECT_EQ(cut({8, 90}, {.points = 8, .most_points = 12}), 20U) << "two points would be few";
-}
-
-TEST(BatchCut, AModelOfMorePointsThanABatchMayHaveIsShared) {
-  EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 29}), 32U);
+  EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 29}), 32U) << "too many: it is shared";
   EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 30}), 50U);
-}
-
-TEST(BatchCut, ABatchHasSoManyModelsAsItHasRoomFor) {
   EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 100}), 58U);
   EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 5}), 55U);
   EXPECT_EQ(cut({0, 90}, {.points = 3, .groups = 2, .most_points = 20}), 20U);
@@ -169,8 +151,7 @@ std::uint64_t model_of(const SendBatch& batch) {
 }
 
 TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of_models(10'000, 1), {}});
+  SchedulerBench bench(table_of_models(10'000, 1));
   const auto batches = bench.join(1, 2, 3);
   ASSERT_EQ(batches.size(), 2U);
   EXPECT_EQ(batches[0].count(), 24U);
@@ -178,8 +159,7 @@ TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
 }
 
 TEST(SchedulerModels, BatchesOfAPointAModelFillLanesAlsoWhereAFallTakesLongerThanABatchShould) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of_models(10'000, 1), {}});
+  SchedulerBench bench(table_of_models(10'000, 1), trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < 5; ++i) {
     batch = bench.next_after(batch, 0.5);
@@ -205,8 +185,7 @@ TEST(SchedulerModels, InTheEndEveryWorkerHasItsPart) {
 }
 
 TEST(SchedulerModels, ABatchEndsWithAModelWhereItCan) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of_models(2000, 9), {}});
+  SchedulerBench bench(table_of_models(2000, 9), trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   std::uint64_t whole = 0;
   for (int i = 0; i < 12; ++i) {
@@ -217,8 +196,7 @@ TEST(SchedulerModels, ABatchEndsWithAModelWhereItCan) {
 }
 
 TEST(SchedulerModels, ModelsOfManyPointsFillLanesForAsLongAsABatchMayTakeForIt) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of_models(1000, 1000), {}});
+  SchedulerBench bench(table_of_models(1000, 1000), trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < 20; ++i) {
     batch = bench.next_after(batch, 1e-4);
@@ -231,8 +209,7 @@ TEST(SchedulerModels, ModelsOfManyPointsFillLanesForAsLongAsABatchMayTakeForIt) 
 }
 
 TEST(SchedulerModels, WorkersTakeModelsOfTheirOwnWhileThereAreAny) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of_models(3, kMany), {}});
+  SchedulerBench bench(table_of_models(3, kMany), trusting());
   std::vector<SendBatch> held;
   for (const WorkerId worker : {1U, 2U, 3U}) {
     held.push_back(bench.join(worker, 1).at(0));
@@ -247,8 +224,7 @@ TEST(SchedulerModels, WorkersTakeModelsOfTheirOwnWhileThereAreAny) {
 }
 
 TEST(SchedulerModels, AWorkerFinishesItsModelAlsoWhenAnotherTookPartOfIt) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of_models(2, kMany), {}});
+  SchedulerBench bench(table_of_models(2, kMany), trusting());
   const SendBatch first = bench.join(1, 1).at(0);
   const SendBatch other = bench.join(2, 1).at(0);
   const SendBatch helper = bench.join(3, 1).at(0);
@@ -258,8 +234,7 @@ TEST(SchedulerModels, AWorkerFinishesItsModelAlsoWhenAnotherTookPartOfIt) {
 }
 
 TEST(SchedulerModels, ALongBatchCountsForAsManyAsItTakesInTheShareOfAStudy) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, table_of_models(100'000, 1), {}});
+  SchedulerBench bench(table_of_models(100'000, 1), trusting());
   bench.feed(StudyAdded{2, table_of(1'000'000), {}});
   std::vector<SendBatch> held = bench.join(1, 2);
   double busy_s[3] = {};
@@ -337,8 +312,7 @@ TEST(SchedulerFalls, AServerThatStartsAgainHandsOutTheRest) {
 }
 
 TEST(SchedulerFalls, PointsOfALostWorkerComeBackAndAFailedPointIsNamedByItsNumber) {
-  SchedulerBench bench(trusting());
-  bench.feed(StudyAdded{1, sample(300, 4), {}});
+  SchedulerBench bench(sample(300, 4), trusting());
   const std::uint64_t failed = bench.join(1, 1).at(0).first_point();
   bench.feed(WorkerLeft{1});
   EXPECT_EQ(points_in(bench.solve_all(bench.join(2, 2))).size(), 300U);
@@ -400,18 +374,6 @@ TEST(ScatteredPointsTest, ABatchGoesOnIntoAnotherModelOnlyWhereThatHasRoomInIt) 
   EXPECT_EQ(taken(points, {8}).end(), 10U) << "the other's fall is another worker's";
   StudyPoints both(StudyTable(table), every(2, 20), 0, LossLimits{});
   EXPECT_EQ(taken(both, {18}).end(), 20U);
-}
-
-TEST(ScatteredPointsTest, NothingIsHandedOutTwiceNorWhatIsCompleted) {
-  SchedulerSettings settings = trusting();
-  settings.first_batch_points = 16;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(1000), every(2, 1000)});
-  const auto solved = points_in(bench.solve_all(bench.join(1, 2)));
-  ASSERT_EQ(solved.size(), 500U);
-  for (std::size_t i = 0; i < solved.size(); ++i) {
-    EXPECT_EQ(solved[i], 2 * i + 1);
-  }
 }
 
 TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {

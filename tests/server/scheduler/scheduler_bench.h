@@ -35,6 +35,12 @@ class SchedulerBench {
  public:
   explicit SchedulerBench(const SchedulerSettings& settings = {}, std::string solver_version = {})
       : scheduler(settings, std::move(solver_version)) {}
+  /// With study 1.
+  explicit SchedulerBench(const std::shared_ptr<const protocol::PointTable>& table,
+                          const SchedulerSettings& settings = {}, std::string solver_version = {})
+      : SchedulerBench(settings, std::move(solver_version)) {
+    feed(StudyAdded{1, table, {}});
+  }
 
   std::vector<Effect> feed(const Event& event) {
     auto effects = scheduler.handle(event, now_ms);

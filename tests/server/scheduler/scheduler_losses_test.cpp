@@ -27,8 +27,7 @@ void lose_newcomers(SchedulerBench& bench) {
 }
 
 TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(2000), {}});
+  SchedulerBench bench(table_of(2000));
   WorkerId fake = 100;
   const auto vanish = [&] {
     ++fake;
@@ -62,8 +61,7 @@ TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
 }
 
 TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000));
   for (const WorkerId fake : {1U, 2U, 3U}) {
     EXPECT_FALSE(bench.join(fake, 1).empty());
     bench.feed(WorkerUnreachable{fake});
@@ -81,8 +79,7 @@ TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints)
 }
 
 TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000));
   lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("faulty", 4, 10)).at(0);
   const auto failed =
@@ -93,8 +90,7 @@ TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
 }
 
 TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000));
   lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("sound", 4, 2)).at(0);
   bench.pass(2750, {4});
@@ -105,16 +101,14 @@ TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
 }
 
 TEST(SchedulerLosses, ResultsThatBelongToNoLeaseAreNoAnswerToAProbeThatWasNotGiven) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(100), {}});
+  SchedulerBench bench(table_of(100));
   bench.join(1, 1);
   bench.feed(ResultsReceived{1, 1, 0, 1, false, 1e-3, {{50, false}}});
   EXPECT_FALSE(bench.scheduler.worker(1, bench.now_ms).is_proven);
 }
 
 TEST(SchedulerLosses, AHeartbeatThatNamesLeaseZeroNamesNothing) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1), {}});
+  SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   bench.pass(3000, {1});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {0, batch.lease}}).empty());
@@ -124,8 +118,7 @@ TEST(SchedulerLosses, AHeartbeatThatNamesLeaseZeroNamesNothing) {
 }
 
 TEST(SchedulerLosses, ABatchThatCouldNotBeSentSpeaksNeitherAgainstItsPointsNorAgainstTheWorker) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1), {}});
+  SchedulerBench bench(table_of(1));
   for (WorkerId worker = 1; worker <= 20; ++worker) {
     const auto sent = only<SendBatch>(bench.join_as("process", worker, 1));
     ASSERT_EQ(sent.size(), 1U) << "the point is not suspect and the process not set aside";
@@ -135,8 +128,7 @@ TEST(SchedulerLosses, ABatchThatCouldNotBeSentSpeaksNeitherAgainstItsPointsNorAg
 }
 
 TEST(SchedulerLosses, OnlyWhatWasSentToALostWorkerCountsAsLost) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(100), {}});
+  SchedulerBench bench(table_of(100));
   const auto sent = bench.join(1, 2);
   ASSERT_EQ(sent.size(), 2U);
   bench.feed(WorkerUnreachable{1, "gone", {sent[1].lease, 12'345}});
@@ -147,8 +139,7 @@ TEST(SchedulerLosses, OnlyWhatWasSentToALostWorkerCountsAsLost) {
 }
 
 TEST(SchedulerLosses, AWorkerHoldsAtMostTwoBatchesMoreThanItHasSolved) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000));
   const auto first = bench.join(1, 1000);
   ASSERT_EQ(first.size(), 2U);
   const auto second = only<SendBatch>(bench.solve(first[0]));
@@ -157,8 +148,7 @@ TEST(SchedulerLosses, AWorkerHoldsAtMostTwoBatchesMoreThanItHasSolved) {
 }
 
 TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000));
   bench.solve(only<SendBatch>(bench.join_as("weak", 1, 1)).at(0));
   for (const WorkerId worker : {2U, 3U, 4U}) {
     EXPECT_EQ(only<SendBatch>(bench.join_as("weak", worker, 1)).size(), 1U);
@@ -173,9 +163,8 @@ TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe)
   EXPECT_FALSE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
 }
 
-TEST(SchedulerLosses, ABatchWhosePointsWereAllAnsweredBeforeItEndedIsNone) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+TEST(SchedulerLosses, ABatchThatEndsWithoutAnAnswerIsOneAndOneOfWhichAllPointsWereAnsweredIsNone) {
+  SchedulerBench bench(table_of(1'000'000));
   const SendBatch batch = bench.join(1, 1).at(0);
   ResultsReceived answers{1, 1, batch.lease, 1, false, 1e-3, {}};
   for (std::uint64_t i = 0; i < batch.count(); ++i) {
@@ -184,19 +173,13 @@ TEST(SchedulerLosses, ABatchWhosePointsWereAllAnsweredBeforeItEndedIsNone) {
   bench.feed(answers);
   bench.feed(ResultsReceived{1, 1, batch.lease, 2, true, 0.0, {}});
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
-}
-
-TEST(SchedulerLosses, ABatchThatEndsWithoutAnAnswerIsOne) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
-  const SendBatch batch = bench.join(1, 1).at(0);
-  bench.feed(ResultsReceived{1, 1, batch.lease, 1, true, 0.0, {}});
+  const SendBatch second = only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0);
+  bench.feed(ResultsReceived{1, 1, second.lease, 3, true, 0.0, {}});
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 1U);
 }
 
 TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1), {}});
+  SchedulerBench bench(table_of(1));
   const auto lost = only<SendBatch>(bench.join_as("one", 1, 1)).at(0);
   const auto effects = bench.join_as("one", 2, 1);
   ASSERT_EQ(only<DropWorker>(effects).size(), 1U);
@@ -206,8 +189,7 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
 }
 
 TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1'000'000), {}});
+  SchedulerBench bench(table_of(1'000'000));
   // Each of four processes has an earlier connection, which held a batch, replaced by a new one.
   for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
     const std::string process = "sound " + std::to_string(worker);
@@ -221,8 +203,7 @@ TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {
 TEST(SchedulerLosses, PointsAreSuspectNoMoreWhenTheirWorkersComeBack) {
   SchedulerSettings settings;
   settings.tail_batches_per_thread = 0;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(4), {}});
+  SchedulerBench bench(table_of(4), settings);
   for (const WorkerId worker : {1U, 2U}) {
     EXPECT_EQ(only<SendBatch>(bench.join_as(std::to_string(worker), worker, 1)).size(), 1U);
     bench.feed(WorkerUnreachable{worker});
@@ -345,8 +326,7 @@ TEST(SchedulerSuspects, PointsThatKillAreFoundByFewWorkersWhateverStudyTheyAreOf
         table(protocol::sample_with_falls(1000, 4, protocol::SAMPLE_LATIN_HYPERCUBE))}) {
     SchedulerSettings settings;
     settings.first_batch_points = 64;
-    SchedulerBench bench(settings);
-    bench.feed(StudyAdded{1, points, {}});
+    SchedulerBench bench(points, settings);
     const std::set<std::uint64_t> killers{137, 777};
     Supervised supervised(bench, killers, 3, points.get());
     supervised.run();
@@ -363,8 +343,7 @@ TEST(SchedulerSuspects, PointsThatKillAreFoundByFewWorkersWhateverStudyTheyAreOf
 
 TEST(SchedulerSuspects, AStudyOfNothingButAPointThatKillsEndsToo) {
   // No worker can show that it is fit by any other point: each is given a probe.
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1), {}});
+  SchedulerBench bench(table_of(1));
   Supervised supervised(bench, {0}, 2);
   supervised.run();
   EXPECT_TRUE(supervised.finished);
@@ -454,28 +433,26 @@ TEST_F(SuspectTest, AWorkerThatHeldAnotherPointTooDoesNotAccuseEither) {
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
 }
 
-TEST_F(SuspectTest, AnAccusedPointGoesToTheWorkerThatHasBeenProvenLongest) {
-  prove(3, 1);
-  credit(3);
-  bench_.feed(WorkerUnreachable{3});
-  EXPECT_TRUE(credit(2).empty());
-  EXPECT_EQ(credit(1).size(), 1U);
-}
-
-TEST_F(SuspectTest, AnAccusedPointDoesNotWaitForEverForTheWorkerThatHasBeenProvenLongest) {
-  prove(3, 1);
-  credit(3);
-  bench_.feed(WorkerUnreachable{3});
-  EXPECT_TRUE(credit(2).empty());
-  EXPECT_TRUE(batches(bench_.pass(9750, {1, 2})).empty());
-  const auto given = batches(bench_.pass(250, {1, 2}));
-  ASSERT_EQ(given.size(), 1U);
-  EXPECT_EQ(given[0].worker, 2U);
+TEST_F(SuspectTest, AnAccusedPointWaitsSomeSecondsForTheWorkerThatHasBeenProvenLongest) {
+  for (const bool comes : {true, false}) {
+    bench_ = SchedulerBench(settings());
+    prove(3, 1);
+    credit(3);
+    bench_.feed(WorkerUnreachable{3});
+    EXPECT_TRUE(credit(2).empty());
+    if (comes) {
+      EXPECT_EQ(credit(1).size(), 1U);
+      continue;
+    }
+    EXPECT_TRUE(batches(bench_.pass(9750, {1, 2})).empty());
+    const auto given = batches(bench_.pass(250, {1, 2}));
+    ASSERT_EQ(given.size(), 1U);
+    EXPECT_EQ(given[0].worker, 2U);
+  }
 }
 
 TEST(SchedulerSuspects, SuspectPointsGoToAProvenWorkerThatHoldsNothingElse) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(1000), {}});
+  SchedulerBench bench(table_of(1000));
   for (const WorkerId worker : {1U, 2U}) {  // two losses make the batches suspect
     EXPECT_EQ(bench.join(worker, 2).size(), 2U);
     bench.pass(3250);
@@ -510,8 +487,7 @@ TEST(SchedulerSuspects, ThePartsOfASplitChunkStaySuspect) {
 }
 
 TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(100'000), {}});
+  SchedulerBench bench(table_of(100'000));
   bench.join(1, 1);
   bench.pass(3250);
   const auto second = bench.join(2, 1).at(0);

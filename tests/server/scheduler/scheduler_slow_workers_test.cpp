@@ -13,8 +13,7 @@ namespace {
 constexpr std::int64_t kMinute_ms = 60'000;
 
 TEST(SchedulerStall, AStudyEndsBesideWorkersThatTakeCreditsAndOnlySendHeartbeats) {
-  SchedulerBench bench;
-  bench.feed(StudyAdded{1, table_of(2000), {}});
+  SchedulerBench bench(table_of(2000));
   std::vector<Effect> effects;
   for (const WorkerId idle : {1U, 2U}) {
     for (const SendBatch& batch : bench.join(idle, 2)) {
@@ -44,14 +43,10 @@ TEST(SchedulerStall, AStudyEndsBesideWorkersThatTakeCreditsAndOnlySendHeartbeats
   EXPECT_TRUE(is_finished) << bench.scheduler.study(1).leased << " points are still leased";
 }
 
-/// Worker 1 holds the only four points, and worker 2 waits.
+/// Worker 1 holds the only four points.
 class StallTest : public testing::Test {
  protected:
-  StallTest() : bench_(settings()) {
-    bench_.feed(StudyAdded{1, table_of(4), {}});
-    batch_ = bench_.join(1, 1).at(0);
-    EXPECT_EQ(batch_.count(), 4U);
-  }
+  StallTest() { EXPECT_EQ(batch_.count(), 4U); }
 
   static SchedulerSettings settings() {
     SchedulerSettings settings;
@@ -59,8 +54,8 @@ class StallTest : public testing::Test {
     return settings;
   }
 
-  SchedulerBench bench_;
-  SendBatch batch_{};
+  SchedulerBench bench_{table_of(4), settings()};
+  SendBatch batch_ = bench_.join(1, 1).at(0);
 };
 
 TEST_F(StallTest, AMinuteWithoutAResultEndsTheLeasesOfAWorker) {
@@ -132,8 +127,7 @@ TEST_F(StallTest, AfterThatItGetsAProbeAndThenTwoBatchesAgain) {
 TEST(SchedulerStall, SlowPointsGetAMultipleOfTheTimeThatTheFastestWorkerNeeds) {
   SchedulerSettings settings = trusting();
   settings.first_batch_points = 1;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(100), {}});
+  SchedulerBench bench(table_of(100), settings);
   const SendBatch quick = bench.join(1, 1).at(0);
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
@@ -145,21 +139,10 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheTimeThatTheFastestWorkerNeeds) {
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-/// Workers 1 and 2, of which the first holds all four points in one batch and the second waits.
-class StragglerTest : public testing::Test {
+/// And worker 2 waits.
+class StragglerTest : public StallTest {
  protected:
-  StragglerTest() : bench_(settings()) {
-    bench_.feed(StudyAdded{1, table_of(4), {}});
-    first_ = bench_.join(1, 1).at(0);
-    EXPECT_EQ(first_.count(), 4U);
-    EXPECT_TRUE(bench_.join(2, 1).empty());
-  }
-
-  static SchedulerSettings settings() {
-    SchedulerSettings settings;
-    settings.tail_batches_per_thread = 0;
-    return settings;
-  }
+  StragglerTest() { EXPECT_TRUE(bench_.join(2, 1).empty()); }
 
   /// The batch that worker 2 gets once the first one straggles.
   SendBatch second() {
@@ -177,9 +160,6 @@ class StragglerTest : public testing::Test {
     }
     return bench_.store(event);
   }
-
-  SchedulerBench bench_;
-  SendBatch first_{};
 };
 
 TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
@@ -219,7 +199,7 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
 }
 
 TEST_F(StragglerTest, OnlyWhatIsLeftOfTheBatchGoesToTheSecondWorker) {
-  answer(first_, {0, 1}, false);
+  answer(batch_, {0, 1}, false);
   const SendBatch batch = second();
   EXPECT_EQ(batch.first_point(), 2U);
   EXPECT_EQ(batch.count(), 2U);
@@ -232,15 +212,15 @@ TEST_F(StragglerTest, TheFirstAnswerWinsAndTheOtherWorkerIsReleased) {
   const auto released = only<ReleaseBatch>(effects);
   ASSERT_EQ(released.size(), 1U);
   EXPECT_EQ(released[0].worker, 1U);
-  EXPECT_EQ(released[0].lease, first_.lease);
-  const auto late = only<StoreResults>(answer(first_, {0, 1, 2, 3}, true));
+  EXPECT_EQ(released[0].lease, batch_.lease);
+  const auto late = only<StoreResults>(answer(batch_, {0, 1, 2, 3}, true));
   EXPECT_TRUE(late.at(0).accepted.empty()) << "what comes late is stored once only";
 }
 
 TEST_F(StragglerTest, TheStragglerMayWinToo) {
   const SendBatch batch = second();
   answer(batch, {0}, false);
-  const auto released = only<ReleaseBatch>(answer(first_, {0, 1, 2, 3}, true));
+  const auto released = only<ReleaseBatch>(answer(batch_, {0, 1, 2, 3}, true));
   ASSERT_EQ(released.size(), 1U);
   EXPECT_EQ(released[0].worker, 2U);
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
@@ -267,8 +247,7 @@ TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStraggler) {
   // Worker 2 is known to need 10 s a point.
   SchedulerSettings one = settings();
   one.first_batch_points = 1;
-  SchedulerBench slow(one);
-  slow.feed(StudyAdded{1, table_of(2), {}});
+  SchedulerBench slow(table_of(2), one);
   slow.join(1, 1);
   const auto batch = slow.join(2, 1).at(0);
   slow.pass(10'000, {1, 2});
@@ -281,8 +260,7 @@ TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStraggler) {
 TEST_F(StragglerTest, ABatchThatWaitsBehindAnotherOfItsWorkerIsTakenOver) {
   SchedulerSettings one = settings();
   one.first_batch_points = 1;
-  SchedulerBench bench(one);
-  bench.feed(StudyAdded{1, table_of(3), {}});
+  SchedulerBench bench(table_of(3), one);
   bench.feed(WorkerJoined{1, 1});
   bench.feed(CreditGiven{1, 1});
   const auto batch = bench.join(2, 1).at(0);
@@ -308,10 +286,10 @@ TEST_F(StragglerTest, ABatchThatKillsWorkersIsFoundAlthoughTwoOfThemHadIt) {
 }
 
 TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseEndsThatLease) {
-  bench_.store(ResultsReceived{1, 1, first_.lease, 1, false, 0.0, {{2, true}}});
+  bench_.store(ResultsReceived{1, 1, batch_.lease, 1, false, 0.0, {{2, true}}});
   const auto effects = bench_.feed(FailuresForgotten{1, IntervalSet(2, 3)});
   ASSERT_EQ(only<ReleaseBatch>(effects).size(), 1U);
-  EXPECT_EQ(only<ReleaseBatch>(effects)[0].lease, first_.lease);
+  EXPECT_EQ(only<ReleaseBatch>(effects)[0].lease, batch_.lease);
   const auto again = only<SendBatch>(effects);
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(again[0].worker, 2U);
@@ -319,19 +297,13 @@ TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseEndsThatLease) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, again[0].count());
 }
 
-TEST(SchedulerStraggler, ACancelGivesBackThePointsOfLeasesThatOverlap) {
-  SchedulerSettings settings;
-  settings.tail_batches_per_thread = 0;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(4), {}});
-  const SendBatch first = bench.join(1, 1).at(0);
-  bench.join(2, 1);
-  ASSERT_EQ(only<SendBatch>(bench.pass(1500, {1, 2})).size(), 1U) << "it straggles";
-  ASSERT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, first.count());
-  EXPECT_EQ(only<WithdrawStudy>(bench.feed(StudyCancelled{1})).size(), 2U);
-  EXPECT_EQ(bench.scheduler.study(1).leased, 0U);
-  bench.feed(CreditGiven{1, 1});
-  EXPECT_EQ(only<SendBatch>(bench.feed(StudyReopened{1})).size(), 1U);
+TEST_F(StragglerTest, ACancelGivesBackThePointsOfLeasesThatOverlap) {
+  second();
+  ASSERT_EQ(bench_.scheduler.worker(2, bench_.now_ms).leased_points, batch_.count());
+  EXPECT_EQ(only<WithdrawStudy>(bench_.feed(StudyCancelled{1})).size(), 2U);
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
+  bench_.feed(CreditGiven{1, 1});
+  EXPECT_EQ(only<SendBatch>(bench_.feed(StudyReopened{1})).size(), 1U);
 }
 
 }  // namespace

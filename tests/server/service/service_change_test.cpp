@@ -323,7 +323,7 @@ TEST_F(ServiceGrowthTest, ADeletedStudyIsGoneAndItsNameIsFree) {
   EXPECT_EQ(last_reply().change().study().state(), "deleted") << "it is deleted already";
   EXPECT_TRUE(ports_.jobs.empty()) << "the new study of that name stays";
   remove("a", 77);
-  EXPECT_TRUE(last_reply().has_error()) << "a number that no study ever had";
+  EXPECT_THAT(last_error(), HasSubstr("study name \"a\" and study number do not match"));
 }
 
 TEST_F(ServiceGrowthTest, TheRecipeOfAStudyIsDescribed) {

@@ -102,17 +102,6 @@ class ServiceQueryTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceQueryTest, AnAnswerGoesToTheOneWhoAskedUnderItsNumber) {
-  ask(7);
-  ASSERT_EQ(ports_.queries.size(), 1U);
-  EXPECT_EQ(ports_.queries[0].client, "client");
-  protocol::QueryReply rows;
-  rows.add_columns("a");
-  answer_query(0, reply_of(rows));
-  EXPECT_EQ(last_reply().request_id(), 7U);
-  EXPECT_EQ(last_reply().query().columns(0), "a");
-}
-
 TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
   ask(7);
   pass(900);
@@ -132,34 +121,38 @@ TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
   EXPECT_EQ(ports_.replies.size(), replies);
 }
 
-TEST_F(ServiceQueryTest, TheQueryOfAClientThatIsGoneIsCancelled) {
-  ask(7);
-  ports_.unreachable = "client";
-  pass(1000);
-  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
-  pass(5000);
-  EXPECT_EQ(ports_.cancelled_queries.size(), 1U);
-  answer_query(0, encoded_error("too late"));
-  EXPECT_TRUE(ports_.replies.empty());
+TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesOrIsGoneAreCancelledAndNobodyElses) {
+  for (const bool leaves : {true, false}) {
+    start({});
+    ports_ = {};
+    ask(7);
+    ask(8, "another");
+    if (leaves) {
+      service_->client_left("client");
+    } else {
+      ports_.unreachable = "client";
+      pass(1000);
+    }
+    EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
+    ports_.replies.clear();
+    answer_query(0, encoded_error("too late"));
+    EXPECT_TRUE(ports_.replies.empty());
+    answer_query(1, encoded_error("in time"));
+    EXPECT_EQ(last_reply().request_id(), 8U);
+    EXPECT_EQ(last_error(), "in time");
+  }
 }
 
-TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesAreCancelledAtOnceAndNobodyElses) {
-  ask(7);
-  ask(8, "another");
-  service_->client_left("client");
-  EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
-  answer_query(0, encoded_error("too late"));
-  EXPECT_TRUE(ports_.replies.empty());
-  answer_query(1, encoded_error("in time"));
-  EXPECT_EQ(last_reply().request_id(), 8U);
-}
-
-TEST_F(ServiceQueryTest, AQueryAskedTwiceUnderOneNumberRunsOnce) {
+TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndOneThatIsAskedTwiceUnderItsNumberRunsOnce) {
   ask(7);
   ask(7);
   EXPECT_EQ(ports_.queries.size(), 1U);
   ask(7, "another");
   EXPECT_EQ(ports_.queries.size(), 2U);
+  EXPECT_TRUE(ports_.replies.empty());
+  ask(8);
+  EXPECT_THAT(last_error(), HasSubstr("too many queries"));
+  EXPECT_EQ(last_reply().request_id(), 8U);
 }
 
 TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReaders) {
@@ -173,6 +166,7 @@ TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReader
   want_more(7, 1);
   want_more(7, 2);
   want_more(7, 1);
+  EXPECT_EQ(ports_.queries[0].client, "client");
   const std::uint64_t ticket = ports_.queries[0].ticket;
   EXPECT_EQ(ports_.more, (Taken{{ticket, 1}, {ticket, 2}}));
   answer_query(0, reply_of({}));
@@ -351,7 +345,8 @@ TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainForItMayKill) {
   EXPECT_TRUE(orders().empty());
 }
 
-TEST_F(ServiceTraceTest, APointWithoutAnAnswerIsSolvedEachTimeItIsRequested) {
+TEST_F(ServiceTraceTest,
+       APointWithoutAnAnswerIsSolvedEachTimeItIsRequestedAndALongTraceSaysWhatWouldFit) {
   hello();
   ask(7, 3);
   auto trace = trace_of(orders()[0], "\2");
@@ -359,21 +354,18 @@ TEST_F(ServiceTraceTest, APointWithoutAnAnswerIsSolvedEachTimeItIsRequested) {
   worker_sends(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
-  auto with_shape = trace_request(8, 3);
-  with_shape.mutable_trace()->set_shape(true);
-  send(with_shape, "client");
-  EXPECT_TRUE(orders().at(1).shape());
-}
-
-TEST_F(ServiceTraceTest, ATraceThatIsTooLongIsAnsweredWithWhatWouldFit) {
-  hello();
-  ask(7, 3);
-  auto trace = trace_of(orders()[0], "");
+  // One that is too long is answered with what would fit.
+  ask(9, 3);
+  trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
   trace.set_every(12);
   worker_sends(trace);
   EXPECT_EQ(last_reply().trace().trace().instants(), 1'000'000U);
   EXPECT_EQ(last_reply().trace().trace().every(), 12U);
+  auto with_shape = trace_request(8, 3);
+  with_shape.mutable_trace()->set_shape(true);
+  send(with_shape, "client");
+  EXPECT_TRUE(orders().at(2).shape());
 }
 
 TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
@@ -381,27 +373,24 @@ TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
   EXPECT_THAT(last_error(), HasSubstr("no worker is connected"));
 }
 
-TEST_F(ServiceTraceTest, AWorkerThatIsLostIsReplacedOnce) {
-  hello("one");
-  ask(7, 3);
-  hello("two");
-  goodbye("one");
-  ASSERT_EQ(orders().size(), 2U);
-  EXPECT_TRUE(ports_.replies.empty());
-  hello("three");
-  goodbye("two");
-  EXPECT_THAT(last_error(), HasSubstr("two workers were lost"));
-  EXPECT_EQ(orders().size(), 2U);
-}
-
-TEST_F(ServiceTraceTest, AWorkerThatDoesNotTakeItLeavesItToAnother) {
-  hello("one");
-  ask(7, 3);
-  hello("two");
-  worker_sends(not_taken(orders()[0]), "one");
-  ASSERT_EQ(orders().size(), 2U);
-  worker_sends(not_taken(orders()[1]), "two");
-  EXPECT_THAT(last_error(), HasSubstr("no worker"));
+TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDoesNotTakeItIsReplacedOnce) {
+  for (const bool is_lost : {true, false}) {
+    hello("one");
+    ask(7, 3);
+    hello("two");
+    const auto first = orders().size() - 1;
+    is_lost ? goodbye("one") : worker_sends(not_taken(orders()[first]), "one");
+    ASSERT_EQ(orders().size(), first + 2);
+    EXPECT_TRUE(ports_.replies.empty());
+    if (is_lost) {
+      hello("three");
+    }
+    is_lost ? goodbye("two") : worker_sends(not_taken(orders()[first + 1]), "two");
+    EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no worker"));
+    EXPECT_EQ(orders().size(), first + 2);
+    goodbye("three");
+    ports_.replies.clear();
+  }
 }
 
 TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {

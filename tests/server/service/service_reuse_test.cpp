@@ -35,6 +35,12 @@ class ServiceReuseTest : public ServiceTest {
     message.mutable_submit()->set_no_reuse(false);
     return message;
   }
+  /// With ten points more.
+  ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
+    ClientRequest message = reusing(name, points);
+    *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
+    return message;
+  }
   /// Study 2, "b", is durable and its first part waits for the writer.
   void submit_study() {
     solve_some();
@@ -154,9 +160,7 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
   write_all();
   write_part({});
   write_all();
-  auto longer = reusing("b", 7);
-  *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
-  request(longer);
+  request(longer("b", 7));
   write_all();
   EXPECT_THAT(parts(), ElementsAre(0));
   write_part({});
@@ -166,9 +170,7 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
 
 TEST_F(ServiceReuseTest, AStudyDoesNotGrowDuringItsLookup) {
   submit_study();
-  auto longer = reusing("b");
-  *longer.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
-  request(longer);
+  request(longer("b"));
   EXPECT_THAT(last_error(), HasSubstr("cannot grow while results"));
 }
 
@@ -223,6 +225,11 @@ class FilteredStudyTest : public ServiceTest {
                             where)});
     return message;
   }
+  void submit_filtered() {
+    request(filtered_request("mu > 0.75"));
+    run_checks();
+    write_all();
+  }
 };
 
 TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
@@ -234,12 +241,13 @@ TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
   EXPECT_EQ(last_reply().submit().points(), 11U);
   EXPECT_EQ(status_of("filtered").points(), 11U);
   EXPECT_EQ(status_of("filtered").left_out(), 0U) << "no worker has named any";
+  request(filtered_request("mu >"));
+  EXPECT_THAT(ports_.checks, IsEmpty()) << "refused at once";
+  EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 
 TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
-  request(filtered_request("mu > 0.75"));
-  run_checks();
-  write_all();
+  submit_filtered();
   hello();
   const auto ask = [&](std::uint64_t point) {
     ports_.replies.clear();
@@ -255,18 +263,8 @@ TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
   EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
 }
 
-TEST_F(FilteredStudyTest, AChangeOfTheRightNameAndAWrongNumberSaysWhatIsWrong) {
-  submit("a");
-  ClientRequest message = change_request("a", protocol::STUDY_CHANGE_DELETE);
-  message.mutable_change()->set_study_id(9);
-  request(message);
-  EXPECT_THAT(last_error(), HasSubstr("study name \"a\" and study number do not match"));
-}
-
 TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
-  request(filtered_request("mu > 0.75"));
-  run_checks();
-  write_all();
+  submit_filtered();
   hello_and_credit();
   while (last_message().has_batch()) {
     answer_batch(100);
@@ -279,9 +277,7 @@ TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
 }
 
 TEST_F(FilteredStudyTest, RangesThatAreNoneEndTheConnectionOfTheirWorker) {
-  request(filtered_request("mu > 0.75"));
-  run_checks();
-  write_all();
+  submit_filtered();
   // After three lost workers the next one gets a probe: the first two are of its batch.
   const std::vector<std::vector<std::uint64_t>> wrong{
       {0, 12}, {11, 1}, {0}, {0, 0}, {3, ~std::uint64_t{0}}, {~std::uint64_t{0}, 2}, {0, 1, 5}};
@@ -310,12 +306,6 @@ TEST_F(FilteredStudyTest, AValueThatIsNotAllowedIsAnErrorWithThePoint) {
   request(message);
   run_checks();
   EXPECT_THAT(last_error(), HasSubstr("point 6: k = "));
-}
-
-TEST_F(FilteredStudyTest, AFilterThatIsNoneIsRefusedAtOnce) {
-  request(filtered_request("mu >"));
-  EXPECT_THAT(ports_.checks, IsEmpty());
-  EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 
 }  // namespace

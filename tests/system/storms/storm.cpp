@@ -1,12 +1,15 @@
 #include "tests/system/storms/storm.h"
 
-#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <random>
+#include <sstream>
 #include <vector>
 
-#include "tests/system/storms/pretended_worker.h"
+#include <zmq.hpp>
+
+#include "proto/frames.h"
+#include "proto/result_message.h"
 
 namespace oblique::test {
 namespace {
@@ -20,17 +23,47 @@ constexpr std::uint32_t kGreed = 1000;  ///< batches that a vanishing peer asks 
 
 const std::vector<std::string> kOneThread{"--threads", "1"};
 
-/// Whether it got a batch of a study before it vanished.
+std::string worker_solver_version() {
+  const TemporaryFolder folder;
+  Process process(folder, worker_program(), {"--version"});
+  process.wait();
+  std::istringstream words(process.out());  // "oblique-worker 0.2.0 (commit ...)"
+  std::string program;
+  std::string version;
+  words >> program >> version;
+  return version;
+}
+
+/// A peer that speaks as a worker does, requests batches and vanishes. Whether it got one of a
+/// study.
 bool vanish_with_points(const std::string& server_url, const std::string& solver_version,
                         int number) {
-  PretendedWorker peer(server_url);
-  peer.hello(solver_version, "vanishing " + std::to_string(number));
-  peer.credit(kGreed);
+  zmq::context_t context;
+  zmq::socket_t socket(context, zmq::socket_type::dealer);
+  socket.set(zmq::sockopt::linger, 0);
+  socket.set(zmq::sockopt::rcvtimeo, 200);
+  socket.connect(server_url);
+  protocol::WorkerMessage hello;
+  protocol::say_protocol(*hello.mutable_hello());
+  hello.mutable_hello()->set_solver_version(solver_version);
+  hello.mutable_hello()->set_name("pretended");
+  hello.mutable_hello()->set_threads(1);
+  hello.mutable_hello()->set_process_id("vanishing " + std::to_string(number));
+  protocol::WorkerMessage credit;
+  credit.mutable_credit()->set_batches(kGreed);
+  for (const auto* message : {&hello, &credit}) {
+    static_cast<void>(
+        socket.send(zmq::buffer(protocol::encode(*message)), zmq::send_flags::dontwait));
+  }
   constexpr int kMostMessages = 4;  // welcome, study, two batches
   for (int i = 0; i < kMostMessages; ++i) {
-    const auto message = peer.receive(milliseconds(200));
-    if (!message || (message->has_batch() && message->batch().study_id() != 0)) {
-      return message.has_value();
+    zmq::message_t frame;
+    protocol::ServerToWorker message;
+    if (!socket.recv(frame) || !protocol::decode(frame.to_string_view(), message)) {
+      return false;
+    }
+    if (message.has_batch() && message.batch().study_id() != 0) {
+      return true;
     }
   }
   return false;

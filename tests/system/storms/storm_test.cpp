@@ -48,9 +48,7 @@ class StormTest : public ::testing::Test {
 
  private:
   void submit(const Server& server, const std::string& name, const std::string& filter) const {
-    std::vector<std::string> arguments{"submit", "--no-reuse", "--server", server.client_url()};
-    const auto points = many_points(name);
-    arguments.insert(arguments.end(), points.begin(), points.end());
+    auto arguments = many_points(name, {"submit", "--no-reuse", "--server", server.client_url()});
     if (!filter.empty()) {
       arguments.insert(arguments.end(), {"--where", filter});
     }

