@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/commands/command_line.h"
+#include "client/commands/commands.h"
 #include "client/io/console.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
