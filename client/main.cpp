@@ -1,6 +1,6 @@
 #include <ios>
 
-#include "client/commands/command_line.h"
+#include "client/commands/commands.h"
 #include "client/io/console.h"
 #include "proto/frames.h"
 

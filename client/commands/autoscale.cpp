@@ -19,9 +19,8 @@
 
 #include "client/commands/commands.h"
 #include "client/io/child_process.h"
-#include "client/io/format_units.h"
+#include "client/io/console.h"
 #include "client/service/connection.h"
-#include "client/service/source_flags.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/result_message.h"

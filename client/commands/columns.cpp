@@ -10,7 +10,7 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/tables.h"
+#include "client/io/row_output.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/errors.h"

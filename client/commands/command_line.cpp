@@ -1,14 +1,14 @@
-#include "client/commands/command_line.h"
+#include "client/commands/commands.h"
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstddef>
 #include <exception>
 #include <map>
-#include <optional>
 #include <ostream>
 #include <sstream>
 #include <string>
@@ -17,9 +17,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/commands/commands.h"
-#include "client/io/format_units.h"
-#include "client/io/sink.h"
+#include "client/io/console.h"
+#include "client/io/row_output.h"
 #include "proto/program/origin/origin.h"
 #include "proto/program/usage.h"
 #include "server/query/columns.h"
@@ -39,20 +38,16 @@ constexpr const char* kExamples = R"(Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its number, 130 for Ctrl-C.)";
 
-/// How far the rest of a line that is too long is indented; empty: the line stays whole.
-std::optional<std::size_t> indent_of_rest(std::string_view line, std::size_t column) {
-  if (!line.starts_with(' ')) {
-    return 0;
+/// A line whose meaning stands at `column`, which goes on below itself. In examples a remark beside
+/// a command looks the same; commands are left whole.
+std::string fitted_meaning(const std::string& line, std::size_t width, std::size_t column) {
+  if (line.size() <= width || width <= column || line.size() <= column || line[column - 1] != ' ' ||
+      line[column] == ' ' || line.starts_with("  oblique ")) {
+    return line;
   }
-  const bool has_meaning = line.size() > column && line[column - 1] == ' ' && line[column] != ' ';
-  // In examples a remark beside a command looks the same.
-  return has_meaning && !line.starts_with("  oblique ") ? std::optional(column) : std::nullopt;
-}
-
-/// Where a line of at most `width` characters ends: at a space behind `from`, or at the end.
-std::size_t break_of(std::string_view line, std::size_t from, std::size_t width) {
-  const std::size_t space = line.rfind(' ', width);
-  return space != std::string_view::npos && space > from ? space : line.find(' ', width);
+  const auto meaning = wrapped(line.substr(column), width - column);
+  return line.substr(0, column) +
+         fmt::format("{}", fmt::join(meaning, '\n' + std::string(column, ' ')));
 }
 
 void add_commands(CLI::App& app, Action& parsed) {
@@ -195,29 +190,30 @@ protocol::ValueWords columns_of_values() {
 }  // namespace
 
 std::string fitted_help(const std::string& help, std::size_t width, std::size_t column) {
-  std::istringstream lines(help);
   std::string text;
-  std::string rest;  // of a sentence, which the next line may go on with
+  std::vector<std::string> sentences;  // the lines of a paragraph
+  const auto end_paragraph = [&] {
+    const bool fits = std::ranges::all_of(
+        sentences, [width](const std::string& line) { return line.size() <= width; });
+    if (!fits) {
+      sentences = wrapped(fmt::format("{}", fmt::join(sentences, " ")), width);
+    }
+    for (const std::string& line : sentences) {
+      text += line + '\n';
+    }
+    sentences.clear();
+  };
+  std::istringstream lines(help);
   for (std::string line; std::getline(lines, line);) {
-    const bool goes_on = !rest.empty() && !line.empty() && !line.starts_with(' ');
-    if (!rest.empty() && !goes_on) {
-      text += rest + '\n';
+    if (!line.empty() && !line.starts_with(' ')) {
+      sentences.push_back(line);
+    } else {
+      end_paragraph();
+      text += fitted_meaning(line, width, column) + '\n';
     }
-    line = goes_on ? rest + ' ' + line : line;
-    rest.clear();
-    const auto indent = indent_of_rest(line, column);
-    while (indent && *indent < width && line.size() > width) {
-      const std::size_t end = break_of(line, *indent, width);
-      if (end == std::string::npos) {
-        break;
-      }
-      text += line.substr(0, end) + '\n';
-      line = std::string(*indent, ' ') + line.substr(end + 1);
-      rest = *indent == 0 ? line : "";
-    }
-    text += rest.empty() ? line + '\n' : "";
   }
-  return rest.empty() ? text : text + rest + '\n';
+  end_paragraph();
+  return text;
 }
 
 int run_command_line(Console& console, int argc, const char* const* argv) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
@@ -68,5 +69,13 @@ void add_autoscale(CLI::App& app, Action& parsed);
 /// `keygen` and `keys`.
 void add_keys(CLI::App& app, Action& parsed);
 void add_doctor(CLI::App& app, Action& parsed);
+
+/// Parses the command line and carries it out. Returns the exit code: 0 done, 1 failed, 2 wrong
+/// usage, 128 and its number for a signal that stopped a command which ends in order.
+int run_command_line(Console& console, int argc, const char* const* argv);
+
+/// Help as CLI11 makes it, in lines of at most `width` characters where words allow it: meanings go
+/// on below themselves, at `column`, and sentences in the next line. Commands are left whole.
+std::string fitted_help(const std::string& help, std::size_t width, std::size_t column);
 
 }  // namespace oblique::client

@@ -10,9 +10,9 @@
 
 #include "client/commands/commands.h"
 #include "client/convergence/convergence.h"
-#include "client/io/format_units.h"
-#include "client/io/status_line.h"
-#include "client/io/tables.h"
+#include "client/io/console.h"
+#include "client/io/progress.h"
+#include "client/io/row_output.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
 #include "proto/program/usage.h"

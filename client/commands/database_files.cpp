@@ -9,9 +9,9 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/format_units.h"
+#include "client/io/console.h"
+#include "client/service/connection.h"
 #include "client/service/source.h"
-#include "client/service/source_flags.h"
 #include "proto/text.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"

@@ -20,9 +20,9 @@
 
 #include "client/commands/commands.h"
 #include "client/io/child_process.h"
-#include "client/io/format_units.h"
+#include "client/io/console.h"
+#include "client/service/connection.h"
 #include "client/service/source.h"
-#include "client/service/source_flags.h"
 #include "proto/keys/key_file.h"
 #include "proto/program/origin/origin.h"
 #include "proto/text.h"

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "client/commands/commands.h"
-#include "client/io/status_line.h"
-#include "client/io/tables.h"
-#include "client/paper/parameter_fit.h"
+#include "client/io/progress.h"
+#include "client/io/row_output.h"
+#include "client/paper/paper_comparison.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"
 #include "worker/solver/model/number.h"

@@ -9,7 +9,7 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/tables.h"
+#include "client/io/row_output.h"
 #include "proto/keys/key_file.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"

@@ -6,8 +6,8 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/status_line.h"
-#include "client/io/tables.h"
+#include "client/io/progress.h"
+#include "client/io/row_output.h"
 #include "client/paper/paper_comparison.h"
 #include "client/paper/paper_figures.h"
 #include "client/plot/picture_file.h"

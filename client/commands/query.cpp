@@ -5,8 +5,8 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
+#include "client/service/connection.h"
 #include "client/service/source.h"
-#include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "proto/program/usage.h"
 #include "worker/solver/model/errors.h"

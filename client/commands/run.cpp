@@ -2,9 +2,9 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/study_notes.h"
 #include "client/service/run_service.h"
-#include "client/study/study_flags.h"
+#include "client/study/point_flags.h"
+#include "client/study/study.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 

@@ -9,10 +9,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/format_units.h"
+#include "client/io/console.h"
 #include "client/io/row_output.h"
-#include "client/io/sink.h"
-#include "client/io/tables.h"
 #include "client/service/connection.h"
 #include "client/service/watching.h"
 #include "client/trace/solve_again.h"
@@ -107,7 +105,7 @@ Study checked_study(Console& console, const StudyFlags& flags) {
         flags.file.string()));
   }
   Study study = study_of_flags(flags, tip_reach(console));
-  judge_points(study);
+  check_points(study);
   return study;
 }
 

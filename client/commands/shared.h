@@ -10,11 +10,11 @@
 
 #include "client/io/console.h"
 #include "client/io/row_output.h"
+#include "client/service/connection.h"
 #include "client/service/run_service.h"
 #include "client/service/source.h"
-#include "client/service/source_flags.h"
+#include "client/study/point_flags.h"
 #include "client/study/study.h"
-#include "client/study/study_flags.h"
 #include "proto/oblique.pb.h"
 
 // What several commands share.

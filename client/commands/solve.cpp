@@ -6,10 +6,9 @@
 
 #include "client/commands/commands.h"
 #include "client/io/case_report.h"
-#include "client/io/study_notes.h"
 #include "client/study/point_flags.h"
+#include "client/study/study.h"
 #include "client/trace/solve_again.h"
-#include "client/trace/trace_output.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/solve.h"

@@ -9,9 +9,9 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/format_units.h"
-#include "client/io/tables.h"
-#include "client/service/source_flags.h"
+#include "client/io/console.h"
+#include "client/io/row_output.h"
+#include "client/service/connection.h"
 #include "client/service/watching.h"
 #include "proto/program/process.h"
 #include "proto/result_message.h"
@@ -130,7 +130,7 @@ int status(const StatusFlags& flags, Console& console) {
   const auto format = format_named(flags.format);
   const auto source = open_source(console, flags.source);
   const auto studies = source->status(flags.study);
-  tell_if_insecure(console, source->access(), source->place());
+  warn_if_insecure(console, source->access(), source->place());
   if (format != Format::kTable) {
     print_out(full_table(studies, source->access()), format);
     return kDone;
@@ -172,14 +172,14 @@ int watch(const StatusFlags& flags, Console& console) {
     // Before the first answer the address may be wrong: waiting for ever would hide that.
     auto status = study_named(*source, flags.study, answered ? tell : Tell());
     if (!std::exchange(answered, true)) {
-      tell_if_insecure(console, source->access(), source->place());
+      warn_if_insecure(console, source->access(), source->place());
     }
     return status;
   };
   try {
     const auto status = watch_study(console, ask, stop);
     if (!stop.requested()) {
-      return tell_end(console, status, [&](const std::string& sql) { return source->query(sql); });
+      return print_end(console, status, [&](const std::string& sql) { return source->query(sql); });
     }
   } catch (const Interrupted&) {
     // Reported below.

@@ -8,11 +8,10 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/format_units.h"
+#include "client/io/console.h"
 #include "client/service/connection.h"
-#include "client/service/source_flags.h"
 #include "client/service/watching.h"
-#include "client/study/study_toml.h"
+#include "client/study/study_file.h"
 #include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "proto/text.h"

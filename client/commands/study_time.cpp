@@ -13,7 +13,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/format_units.h"
+#include "client/io/console.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "worker/solver/estimate.h"

@@ -7,13 +7,12 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/format_units.h"
-#include "client/io/study_notes.h"
+#include "client/io/console.h"
 #include "client/service/connection.h"
 #include "client/service/source.h"
-#include "client/service/source_flags.h"
 #include "client/service/watching.h"
-#include "client/study/study_flags.h"
+#include "client/study/point_flags.h"
+#include "client/study/study.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/model_message.h"
@@ -71,14 +70,15 @@ int watch(Console& console, const SubmitFlags& flags, const Study& study, Connec
   }
   const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
   if (const auto rows = flags.limit.value_or(0); rows > 0) {
-    print_first(console, connection.chunks(first_results(study.name, rows), tell), status.points());
+    print_first(console, connection.chunks(request_for({.study = study.name, .limit = rows}), tell),
+                status.points());
     const auto server = connection_settings(console, flags.source);
     console.notes() << fmt::format("More: oblique query {} --server {}{}\n", shell_word(study.name),
                                    shell_word(server.server_url),
                                    server.key ? " --keys " + shell_word(server.key->path) : "");
   }
-  return tell_end(console, status,
-                  [&](const std::string& sql) { return connection.query(sql, tell); });
+  return print_end(console, status,
+                   [&](const std::string& sql) { return connection.query(sql, tell); });
 }
 
 int submit(const SubmitFlags& flags, Console& console) {

@@ -6,7 +6,6 @@
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
 #include "client/trace/solve_again.h"
-#include "client/trace/trace_output.h"
 #include "proto/program/usage.h"
 #include "worker/solver/model/number.h"
 

@@ -15,7 +15,6 @@
 #include "client/commands/shared.h"
 #include "client/service/connection.h"
 #include "client/service/run_service.h"
-#include "client/service/source_flags.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/text.h"

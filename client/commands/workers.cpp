@@ -7,11 +7,10 @@
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
-#include "client/io/format_units.h"
-#include "client/io/tables.h"
+#include "client/io/console.h"
+#include "client/io/row_output.h"
 #include "client/service/connection.h"
 #include "client/service/source.h"
-#include "client/service/source_flags.h"
 #include "client/service/watching.h"
 #include "proto/text.h"
 
@@ -118,7 +117,7 @@ int workers(const WorkersFlags& flags, Console& console) {
   }
   const auto settings = connection_settings(console, flags.source);
   const auto reply = Connection(settings).workers();
-  tell_if_insecure(console, reply.access(), settings.server_url);
+  warn_if_insecure(console, reply.access(), settings.server_url);
   print_out(format == Format::kTable ? table_for_people(reply) : full_table(reply), format);
   note_access(console, reply);
   return kDone;

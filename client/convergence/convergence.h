@@ -10,7 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "client/io/status_line.h"
+#include "client/io/progress.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/model/parameters.h"
 

@@ -7,7 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/tables.h"
+#include "client/io/row_output.h"
 #include "proto/wire/chunk.h"
 #include "worker/solver/model/number.h"
 
@@ -55,7 +55,7 @@ std::optional<double> times(const std::optional<double>& value, double factor) {
 
 // Two digits are all that an estimate has.
 void add_rough(protocol::Row& row, const std::optional<double>& value) {
-  add_value(row, value ? readable_number(*value, 2) : std::string("-"));
+  row.emplace_back(value ? readable_number(*value, 2) : std::string("-"));
 }
 
 std::optional<double> relative(const OutputConvergence& output) {
@@ -75,16 +75,16 @@ void print_outputs(std::ostream& out, const Refinement& refinement) {
   for (const auto& output : refinement.convergence.outputs) {
     auto& row = table.rows.emplace_back();
     const auto shown = shown_column(output.name);
-    add_value(row, shown.heading);
+    row.emplace_back(shown.heading);
     for (const auto& value : output.values) {
       row.push_back(value ? protocol::Value(*value * shown.per_unit) : protocol::Value());
     }
     const auto& extrapolation = output.extrapolation;
-    add_value(row, extrapolation.limit * shown.per_unit);
+    row.emplace_back(extrapolation.limit * shown.per_unit);
     add_rough(row, extrapolation.order);
     add_rough(row, times(extrapolation.error, shown.per_unit));
     add_rough(row, times(relative(output), kPercent));
-    add_value(row, std::string(names_of(output).remark));
+    row.emplace_back(std::string(names_of(output).remark));
   }
   print(out, table, Format::kTable);
 }

@@ -14,7 +14,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/io/row_output.h"
-#include "client/io/tables.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"
 

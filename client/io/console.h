@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace oblique::client {
 
@@ -24,6 +26,28 @@ TerminalSize terminal_size(int descriptor);
 /// Whether colours may be written to a descriptor: it is a terminal, TERM names one that has
 /// colours, and NO_COLOR is not set.
 bool may_colour(int descriptor);
+
+/// Number of characters of a UTF-8 text.
+std::size_t width_of(std::string_view text);
+/// The words of a text in lines of at most `width` characters; a longer word has a line of its own.
+/// At least one line.
+std::vector<std::string> wrapped(std::string_view text, std::size_t width);
+
+// Numbers as people read them. Output for programs has all digits and SI units.
+
+/// A length of time: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 04 h".
+std::string format_duration(double seconds);
+
+/// A number of things: "950", "14,300".
+std::string format_count(std::uint64_t count);
+/// With its noun: "1 point", "14,300 points".
+std::string counted(std::uint64_t count, std::string_view one, std::string_view many);
+
+/// A rate to three digits, whole from a hundred on: "0.31", "84.4", "14,300".
+std::string format_rate(double per_s);
+
+/// A size: "120 bytes", "1.3 MB", "24 GB"; a kB has 1000 bytes.
+std::string format_bytes(std::uint64_t bytes);
 
 enum class Verbosity {
   kQuiet,   ///< data and errors
@@ -67,8 +91,12 @@ class Console {
 
   /// Whether a line of `notes` can be drawn over itself.
   bool can_redraw() const { return terminal_.is_terminal; }
-  /// Characters a line of the error stream's terminal has; 80 where it has none.
-  std::size_t columns() const { return terminal_.columns(); }
+  /// Writes `line` to `notes` over the one that was drawn before; an empty one erases that. Nothing
+  /// without a terminal.
+  void redraw(std::string_view line);
+  /// Most characters of a line to redraw: the last column of the terminal stays free, because some
+  /// terminals wrap the line there.
+  std::size_t columns() const;
 
  private:
   std::ostream& out_;

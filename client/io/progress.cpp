@@ -7,8 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/format_units.h"
-#include "client/io/row_output.h"
+#include "client/io/console.h"
 #include "proto/text.h"
 
 namespace oblique::client {
@@ -91,21 +90,83 @@ void Progress::update(ProgressState state) {
     return;
   }
   if (console_.can_redraw()) {
-    // The last column stays free: some terminals wrap the line there.
-    const std::size_t columns = std::max<std::size_t>(console_.columns(), 2) - 1;
-    console_.notes() << '\r' << progress_bar(*last_, columns) << "\x1b[K" << std::flush;
+    console_.redraw(progress_bar(*last_, console_.columns()));
   } else {
     console_.notes() << progress_line(*last_) << std::endl;
   }
-  constexpr double kBetweenBars_s = 0.1;
-  constexpr double kBetweenLines_s = 10.0;
-  next_s_ = now_s + (console_.can_redraw() ? kBetweenBars_s : kBetweenLines_s);
+  next_s_ = now_s + (console_.can_redraw() ? 0.1 : 10.0);  // between bars, and between lines
 }
 
 void Progress::finish() {
   if (last_) {
-    console_.notes() << (console_.can_redraw() ? "\r\x1b[K" : "") << progress_line(*last_)
-                     << std::endl;
+    console_.redraw("");
+    console_.notes() << progress_line(*last_) << std::endl;
+  }
+}
+
+StatusLine::StatusLine(Console& console, Settings settings)
+    : console_(console), settings_(settings) {
+  if (settings_.is_shown && console_.can_redraw()) {
+    drawer_ = std::jthread([this](const std::stop_token& stop) { draw_until(stop); });
+  }
+}
+
+StatusLine::~StatusLine() {
+  drawer_ = std::jthread();  // stops and joins
+  erase();
+}
+
+StatusLine::Part StatusLine::begin(Describe describe) {
+  const std::lock_guard lock(mutex_);
+  const auto part = parts_.insert(parts_.end(), std::move(describe));
+  return {this, [part](StatusLine* line) { line->end(part); }};
+}
+
+StatusLine::Part StatusLine::begin(std::string what) {
+  return begin(Describe([what = std::move(what)] { return what; }));
+}
+
+void StatusLine::end(std::list<Describe>::iterator part) {
+  const std::lock_guard lock(mutex_);
+  parts_.erase(part);
+  if (parts_.empty()) {
+    erase();  // the next output starts on an empty line
+  }
+}
+
+void StatusLine::print(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  erase();
+  console_.notes() << line << std::endl;
+}
+
+void StatusLine::draw_until(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  auto next = start_ + settings_.first;
+  while (!stopped_.wait_until(lock, stop, next, [&stop] { return stop.stop_requested(); })) {
+    draw();
+    next = std::chrono::steady_clock::now() + settings_.between;
+  }
+}
+
+void StatusLine::draw() {
+  if (parts_.empty()) {
+    erase();
+    return;
+  }
+  std::string text;
+  for (const auto& describe : parts_) {
+    text += (text.empty() ? "" : "; ") + describe();
+  }
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+  text += ", " + format_duration(elapsed.count());
+  console_.redraw(protocol::shortened(text, console_.columns()));
+  is_drawn_ = true;
+}
+
+void StatusLine::erase() {
+  if (std::exchange(is_drawn_, false)) {
+    console_.redraw("");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -19,8 +20,8 @@ using plot::Figure;
 using plot::Panel;
 using solver::TraceRow;
 
-constexpr double kKilo = 1e3;
-constexpr double kMilli = 1e-3;
+constexpr double kFromKilo = 1e3;
+constexpr double kFromMilli = 1e-3;
 
 PaperCase solved_case(const PublishedCase& published, const solver::Finger& finger) {
   PaperCase one{.published = published,
@@ -50,10 +51,10 @@ double value_at(const PaperCase& one, double t_s, plot::Column value) {
 }
 
 /// Adds the published numbers of a case to a curve of diamonds.
-using AddPublished = void (*)(const PaperCase& one, Curve& diamonds);
+using AddPublished = std::function<void(const PaperCase& one, Curve& diamonds)>;
 
 /// Peaks of F_n at the instants of ours, or of F_t when |F_t| is largest around these.
-void add_peaks(const PaperCase& one, Curve& diamonds, bool of_ft) {
+void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   const auto& published = of_ft ? one.published.ft_kN : one.published.fn_kN;
   std::size_t next = 0;
   for (const solver::Peak& peak : one.history.result->peaks) {
@@ -66,16 +67,8 @@ void add_peaks(const PaperCase& one, Curve& diamonds, bool of_ft) {
       t_s = of_ft && is_around ? tangential.t_s : t_s;
     }
     diamonds.x.push_back(t_s);
-    diamonds.y.push_back(published[next++] * kKilo);
+    diamonds.y.push_back(published[next++] * kFromKilo);
   }
-}
-
-void add_fn(const PaperCase& one, Curve& diamonds) {
-  add_peaks(one, diamonds, false);
-}
-
-void add_ft(const PaperCase& one, Curve& diamonds) {
-  add_peaks(one, diamonds, true);
 }
 
 /// Where phases end, on our curve at the end of our phase of the same number.
@@ -84,8 +77,8 @@ void add_phase_ends(const PaperCase& one, Curve& diamonds) {
   double published_s = 0.0;
   double own_s = 0.0;
   for (std::size_t i = 0; i < std::min(own.phases_ms.size(), one.published.phases_ms.size()); ++i) {
-    published_s += one.published.phases_ms[i] * kMilli;
-    own_s += own.phases_ms[i] * kMilli;
+    published_s += one.published.phases_ms[i] * kFromMilli;
+    own_s += own.phases_ms[i] * kFromMilli;
     diamonds.x.push_back(published_s);
     diamonds.y.push_back(value_at(one, own_s, &TraceRow::uy_m));
   }
@@ -93,7 +86,7 @@ void add_phase_ends(const PaperCase& one, Curve& diamonds) {
 
 void add_stick_end(const PaperCase& one, Curve& diamonds) {
   if (one.published.stick_ms) {
-    diamonds.x.push_back(*one.published.stick_ms * kMilli);
+    diamonds.x.push_back(*one.published.stick_ms * kFromMilli);
     diamonds.y.push_back(0.0);
   }
 }
@@ -174,7 +167,7 @@ Figure hysteresis(const PaperGroup& over_e) {
     const auto letter = static_cast<char>('a' + figure.panels.size());
     panel.title = fmt::format("({}) {}", letter, one->name);
     Curve published = diamonds();
-    add_fn(*one, published);
+    add_peaks(false, *one, published);
     for (double& at : published.x) {
       at = -value_at(*one, at, &TraceRow::uy_m);
     }
@@ -203,7 +196,7 @@ Figure trajectory(const PaperGroups& groups) {
       panel.curves.push_back(
           curve_of(one.history, one.name, panel.curves.size(), &TraceRow::uy_m, &TraceRow::x_m));
     }
-    panel.x = {.label = "position x [mm]", .name = "x_m", .per_unit = kKilo};
+    panel.x = {.label = "position x [mm]", .name = "x_m", .per_unit = 1e3};
     panel.y = {
         .label = "height above the ground [\u00b5m]", .name = "height_m", .per_unit = plot::kMicro};
     plot::fit(panel.x, panel.curves, &Curve::x);
@@ -252,8 +245,10 @@ std::vector<PaperFigure> paper_figures(const PaperGroups& groups) {
       {"fig4_forces",
        over_time(groups, "Fig. 4: normal and tangential contact forces",
                  "Diamonds: published peaks (Tab. 2), at the instants of ours", 250.0,
-                 {{"normal force F_n [N]", "fn_N", 1.0, &TraceRow::fn_N, add_fn},
-                  {"tangential force F_t [N]", "ft_N", 1.0, &TraceRow::ft_N, add_ft}})},
+                 {{"normal force F_n [N]", "fn_N", 1.0, &TraceRow::fn_N,
+                   std::bind_front(add_peaks, false)},
+                  {"tangential force F_t [N]", "ft_N", 1.0, &TraceRow::ft_N,
+                   std::bind_front(add_peaks, true)}})},
       {"fig5_deformation",
        over_time(groups, "Fig. 5: deformation of the normal element",
                  "Diamonds: published ends of compression and restitution (section 4.2), at our "

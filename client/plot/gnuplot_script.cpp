@@ -12,7 +12,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/format_units.h"
+#include "client/io/console.h"
 #include "client/plot/figure.h"
 #include "client/plot/picture_file.h"
 #include "proto/text.h"
@@ -204,17 +204,8 @@ std::string number(double value) {
 }
 
 /// Lines of at most that many letters, broken at spaces.
-std::vector<std::string> wrapped(const std::string& text, double letters) {
-  const auto most = static_cast<std::size_t>(std::max(letters, 8.0));
-  std::vector<std::string> lines;
-  for (const auto word : protocol::split(text, ' ')) {
-    if (lines.empty() || lines.back().size() + 1 + word.size() > most) {
-      lines.emplace_back(word);
-    } else {
-      lines.back().append(" ").append(word);
-    }
-  }
-  return lines;
+std::vector<std::string> lines_of(const std::string& text, double letters) {
+  return wrapped(text, static_cast<std::size_t>(std::max(letters, 8.0)));
 }
 
 /// `text` with `mark` before each of the letters.
@@ -238,10 +229,10 @@ class Script {
       : figure_(figure), size_(size), is_text_(is_text) {
     const double letters = (size.width - 2.0 * kMargin) / kLetter;
     if (!figure.subtitle.empty()) {
-      subtitle_ = wrapped(figure.subtitle, letters);
+      subtitle_ = lines_of(figure.subtitle, letters);
     }
     for (const auto& note : figure.notes) {
-      const auto lines = wrapped(note, letters);
+      const auto lines = lines_of(note, letters);
       notes_.insert(notes_.end(), lines.begin(), lines.end());
     }
   }
@@ -592,7 +583,8 @@ class Script {
         add("set label '{{/:Bold*0.9 {}}}' at {} center front boxed\n", kind.letter,
             screen(x + 0.5 * sample, y));
       }
-      y = label(wrapped(kind.text, width / kLetter - 5.5), x + 1.25 * sample, y, "") + 0.15 * kLine;
+      y = label(lines_of(kind.text, width / kLetter - 5.5), x + 1.25 * sample, y, "") +
+          0.15 * kLine;
     }
   }
 
@@ -671,13 +663,13 @@ class Script {
   int blocks_ = 0;
 };
 
-std::string terminal_command(Terminal terminal, const Size& size) {
-  const double scale = terminal == Terminal::kPng   ? 2.0
-                       : terminal == Terminal::kPdf ? 1.0 / 72.0
-                                                    : 1.0;
+std::string terminal_command(PictureFormat format, const Size& size) {
+  const double scale = format == PictureFormat::kPng   ? 2.0
+                       : format == PictureFormat::kPdf ? 1.0 / 72.0
+                                                       : 1.0;
   const std::string_view form =
-      terminal == Terminal::kSvg ? "svg size {},{} font 'DejaVu Sans,12' background '#ffffff'"
-      : terminal == Terminal::kPng
+      format == PictureFormat::kSvg ? "svg size {},{} font 'DejaVu Sans,12' background '#ffffff'"
+      : format == PictureFormat::kPng
           ? "pngcairo size {},{} font 'DejaVu Sans,18' linewidth 2 pointscale 2 dashlength 2"
           : "pdfcairo size {:.3f}in,{:.3f}in font 'DejaVu Sans,12' linewidth 2 pointscale 0.6 "
             "dashlength 2";
@@ -695,13 +687,13 @@ Size own_size(const Figure& figure) {
   return size;
 }
 
-std::string script_of(const Figure& figure, Terminal terminal, const Size& size,
+std::string script_of(const Figure& figure, PictureFormat format, const Size& size,
                       const std::string& file) {
   std::string out = "# A picture by `oblique plot`, for gnuplot 5.4 or later.\n";
   if (!file.empty()) {
     out += "# Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.\n";
   }
-  out += fmt::format("set terminal {}\n", terminal_command(terminal, size));
+  out += fmt::format("set terminal {}\n", terminal_command(format, size));
   if (!file.empty()) {
     out += fmt::format("set output {}\n", gnuplot_text(file));
   }

@@ -10,15 +10,15 @@
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
-#include <variant>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "client/io/child_process.h"
 #include "client/io/console.h"
 #include "client/io/row_output.h"
-#include "client/io/sink.h"
 #include "proto/text.h"
+#include "proto/wire/chunk.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -27,81 +27,73 @@ namespace {
 
 /// Names and endings, in the order of PictureFormat.
 constexpr std::array<std::string_view, 5> kFormats{"svg", "pdf", "png", "gp", "csv"};
-constexpr std::string_view kAllowed = "svg, pdf, png, gp or csv";
 constexpr double kSmallestSide = 240.0;
 constexpr double kLargestSide = 10'000.0;
 constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
 constexpr std::chrono::seconds kTimeLimit{120};  // a map of 10^5 cells takes about 2 s
 
-std::optional<PictureFormat> format_named(std::string_view name) {
-  const auto* found = std::find(kFormats.begin(), kFormats.end(), name);
-  return found == kFormats.end()
-             ? std::nullopt
-             : std::optional(static_cast<PictureFormat>(found - kFormats.begin()));
+/// NaN is NULL, an empty field.
+protocol::Value value_of(double number) {
+  return std::isnan(number) ? protocol::Value() : protocol::Value(number);
 }
 
-using Field = std::variant<std::string, double>;
-
-/// Appends a row; NaN is an empty field.
-void append_row(std::string& out, const std::vector<Field>& fields) {
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    out += i == 0 ? "" : ",";
-    if (const auto* text = std::get_if<std::string>(&fields[i])) {
-      append_csv_field(out, *text);
-    } else if (const double value = std::get<double>(fields[i]); !std::isnan(value)) {
-      append_number(out, value);
-    }
-  }
-  out += '\n';
-}
-
-void append_cells(std::string& out, const Panel& panel, const Cells& cells) {
+protocol::Table cells_table(const Panel& panel, const Cells& cells) {
   // In the order of CellState.
-  static const std::array<std::string, 6> kStates{"solved", "no result", "filtered",
-                                                  "failed", "no value",  "no point"};
-  append_row(out, {panel.x.name, panel.y.name, cells.name, "state"});
+  constexpr std::array<const char*, 6> kStates{"solved", "no result", "filtered",
+                                               "failed", "no value",  "no point"};
+  protocol::Table table{.columns = {panel.x.name, panel.y.name, cells.name, "state"}};
   for (std::size_t i = 0; i < cells.values.size(); ++i) {
-    Field value = std::nan("");
+    protocol::Value value;
     if (cells.states[i] == CellState::kSolved) {
-      value = cells.names.empty() ? Field(cells.values[i]) : Field(cells.names[i]);
+      value = cells.names.empty() ? value_of(cells.values[i]) : protocol::Value(cells.names[i]);
     }
-    append_row(out, {cells.x.values[i % cells.columns()], cells.y.values[i / cells.columns()],
-                     value, kStates[static_cast<std::size_t>(cells.states[i])]});
+    table.rows.push_back({cells.x.values[i % cells.columns()], cells.y.values[i / cells.columns()],
+                          std::move(value), kStates[static_cast<std::size_t>(cells.states[i])]});
   }
+  return table;
 }
 
-void append_bars(std::string& out, const Panel& panel, const Bars& bars) {
-  const bool has_names = !bars.names.empty();
-  append_row(out, has_names
-                      ? std::vector<Field>{panel.y.name, "points"}
-                      : std::vector<Field>{panel.x.name + "_from", panel.x.name + "_to", "points"});
+protocol::Table bars_table(const Panel& panel, const Bars& bars) {
+  protocol::Table table;
+  if (bars.names.empty()) {
+    table.columns = {panel.x.name + "_from", panel.x.name + "_to", "points"};
+  } else {
+    table.columns = {panel.y.name, "points"};
+  }
   for (std::size_t i = 0; i < bars.heights.size(); ++i) {
-    append_row(out, has_names
-                        ? std::vector<Field>{bars.names[i], bars.heights[i]}
-                        : std::vector<Field>{bars.edges[i], bars.edges[i + 1], bars.heights[i]});
+    auto& row = table.rows.emplace_back();
+    if (bars.names.empty()) {
+      row.assign({bars.edges[i], bars.edges[i + 1]});
+    } else {
+      row.emplace_back(bars.names[i]);
+    }
+    row.emplace_back(bars.heights[i]);
   }
+  return table;
 }
 
-void append_curves(std::string& out, const Panel& panel, const Figure& figure) {
+protocol::Table curves_table(const Panel& panel, const Figure& figure) {
   const bool has_names = panel.curves.size() > 1 || !panel.by_name.empty();
-  std::vector<Field> heading{panel.x.name, panel.y.name};
+  protocol::Table table{.columns = {panel.x.name, panel.y.name}};
   if (has_names) {
-    heading.insert(heading.begin(), panel.by_name.empty() ? "line" : panel.by_name);
+    table.columns.insert(table.columns.begin(), panel.by_name.empty() ? "line" : panel.by_name);
   } else if (figure.colours) {
-    heading.emplace_back(figure.colours->name);
+    table.columns.push_back(figure.colours->name);
   }
-  append_row(out, heading);
   for (const Curve& curve : panel.curves) {
     for (std::size_t i = 0; i < curve.x.size(); ++i) {
-      std::vector<Field> row{curve.x[i], curve.y[i]};
+      auto& row = table.rows.emplace_back();
       if (has_names) {
-        row.insert(row.begin(), curve.by ? Field(*curve.by) : Field(curve.name));
-      } else if (figure.colours) {
-        row.emplace_back(curve.colours[i]);
+        row.push_back(curve.by ? protocol::Value(*curve.by) : protocol::Value(curve.name));
       }
-      append_row(out, row);
+      row.push_back(value_of(curve.x[i]));
+      row.push_back(value_of(curve.y[i]));
+      if (!has_names && figure.colours) {
+        row.push_back(value_of(curve.colours[i]));
+      }
     }
   }
+  return table;
 }
 
 }  // namespace
@@ -111,25 +103,20 @@ std::vector<std::string_view> picture_format_names() {
 }
 
 PictureFormat picture_format(const std::string& name, const std::string& file) {
-  if (!name.empty()) {
-    if (const auto format = format_named(name)) {
-      return *format;
-    }
-    throw solver::InputError(fmt::format("--format {} is not known{}: it must be {}", name,
-                                         protocol::did_you_mean(name, picture_format_names()),
-                                         kAllowed));
-  }
-  if (file.empty()) {
-    return PictureFormat::kSvg;
-  }
   const std::string ending = std::filesystem::path(file).extension().string();
-  if (const auto format = format_named(ending.empty() ? ending : ending.substr(1))) {
-    return *format;
+  if (name.empty() && !file.empty() &&
+      std::find(kFormats.begin(), kFormats.end(), ending.substr(ending.empty() ? 0 : 1)) ==
+          kFormats.end()) {
+    throw solver::InputError(
+        fmt::format("--out {}: its ending is not a format; it must be .svg, .pdf, .png, .gp or "
+                    ".csv, or --format one of {}",
+                    file, protocol::joined(kFormats)));
   }
-  throw solver::InputError(fmt::format(
-      "--out {}: its ending is not a format; it must be .svg, .pdf, .png, .gp or .csv, or --format "
-      "{}",
-      file, kAllowed));
+  return static_cast<PictureFormat>(choice_of("--format",
+                                              !name.empty()   ? name
+                                              : !file.empty() ? ending.substr(1)
+                                                              : std::string(kFormats.front()),
+                                              kFormats));
 }
 
 std::string output_of_gnuplot(const std::string& script) {
@@ -164,33 +151,23 @@ std::string output_of_gnuplot(const std::string& script) {
 
 std::string picture_of(const Figure& figure, PictureFormat format,
                        const std::optional<Size>& size) {
-  const Size in_pixels = size.value_or(own_size(figure));
-  switch (format) {
-    case PictureFormat::kScript:
-      return script_of(figure, Terminal::kSvg, in_pixels, "picture.svg");
-    case PictureFormat::kCsv:
-      return csv_of(figure);
-    case PictureFormat::kPdf:
-      return output_of_gnuplot(script_of(figure, Terminal::kPdf, in_pixels));
-    case PictureFormat::kPng:
-      return output_of_gnuplot(script_of(figure, Terminal::kPng, in_pixels));
-    case PictureFormat::kSvg:
-      break;
+  if (format == PictureFormat::kCsv) {
+    return csv_of(figure);
   }
-  return output_of_gnuplot(script_of(figure, Terminal::kSvg, in_pixels));
+  const Size in_pixels = size.value_or(own_size(figure));
+  return format == PictureFormat::kScript
+             ? script_of(figure, PictureFormat::kSvg, in_pixels, "picture.svg")
+             : output_of_gnuplot(script_of(figure, format, in_pixels));
 }
 
 std::string csv_of(const Figure& figure) {
   std::string out;
   for (const Panel& panel : figure.panels) {
+    const auto table = panel.cells  ? cells_table(panel, *panel.cells)
+                       : panel.bars ? bars_table(panel, *panel.bars)
+                                    : curves_table(panel, figure);
     out += out.empty() ? "" : "\n";
-    if (panel.cells) {
-      append_cells(out, panel, *panel.cells);
-    } else if (panel.bars) {
-      append_bars(out, panel, *panel.bars);
-    } else {
-      append_curves(out, panel, figure);
-    }
+    out += client::text_of({protocol::chunk_of(table)}, {.format = Format::kCsv});
   }
   return out;
 }

@@ -44,15 +44,12 @@ Size size_of(const std::string& text);
 
 // ---- Scripts (gnuplot_script.cpp) ----
 
-/// What gnuplot makes of a script.
-enum class Terminal { kSvg, kPdf, kPng };
-
 /// The size without one that is asked for: that of the panels together, with the texts.
 Size own_size(const Figure& figure);
 
-/// A script for gnuplot 5.4 or later, with its data in it, that draws the figure to standard
+/// A script for gnuplot 5.4 or later, with its data in it, that draws SVG, PDF or PNG to standard
 /// output or, with a file name, to that file. PNG has two pixels each way for one of `size`.
-std::string script_of(const Figure& figure, Terminal terminal, const Size& size,
+std::string script_of(const Figure& figure, PictureFormat format, const Size& size,
                       const std::string& file = {});
 
 /// The same for a terminal of that many characters.

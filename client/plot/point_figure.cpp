@@ -9,8 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/text.h"
-#include "worker/solver/model/errors.h"
+#include "client/io/row_output.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client::plot {
@@ -213,13 +212,7 @@ std::optional<PointPanel> point_panel_named(const std::string& name) {
   if (name.empty()) {
     return std::nullopt;
   }
-  const auto* found = std::find(kPointPanels.begin(), kPointPanels.end(), name);
-  if (found == kPointPanels.end()) {
-    throw solver::InputError(fmt::format("--panel {} is not known{}: it must be one of {}", name,
-                                         protocol::did_you_mean(name, kPointPanels),
-                                         protocol::joined(kPointPanels)));
-  }
-  return static_cast<PointPanel>(found - kPointPanels.begin());
+  return static_cast<PointPanel>(choice_of("--panel", name, kPointPanels));
 }
 
 Panel panel_of(const PointHistory& history, PointPanel panel) {

@@ -8,12 +8,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "client/io/format_units.h"
+#include "client/io/console.h"
 #include "client/io/row_output.h"
 #include "client/plot/figure.h"
-#include "client/plot/gathered.h"
 #include "client/plot/plot_request.h"
-#include "client/plot/study_shape.h"
 #include "client/service/source.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
@@ -37,7 +35,7 @@ bool is_drawable(double value, bool is_logarithmic) {
 }
 
 std::string counted(std::uint64_t count, const std::string& noun) {
-  return count == 1 ? "1 " + noun : format_count(count) + " " + noun + "s";
+  return client::counted(count, noun, noun + "s");
 }
 
 /// The categories by their points, largest first, with those that have next to none as one.

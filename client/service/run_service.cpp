@@ -20,10 +20,10 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "client/io/format_units.h"
-#include "client/io/study_notes.h"
+#include "client/io/console.h"
 #include "client/service/connection.h"
 #include "client/service/watching.h"
+#include "client/study/study.h"
 #include "proto/result_message.h"
 #include "proto/system/available_memory.h"
 #include "proto/text.h"
@@ -150,8 +150,8 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
   }
   const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
   const auto query = [&](const std::string& sql) { return connection.query(sql, tell); };
-  end.rows = connection.chunks(first_results(study.name, settings.rows), tell);
-  end.exit_code = tell_end(console, end.status, query);
+  end.rows = connection.chunks(request_for({.study = study.name, .limit = settings.rows}), tell);
+  end.exit_code = print_end(console, end.status, query);
   return end;
 }
 
@@ -292,18 +292,20 @@ void check_settings(const RunSettings& settings) {
   }
 }
 
-void add_worker_flags(CLI::App& verb, RunSettings& settings) {
-  verb.add_option("--workers", settings.service.workers,
+void add_worker_flags(CLI::App& command, RunSettings& settings) {
+  command
+      .add_option("--workers", settings.service.workers,
                   "worker processes, which share the cores of this machine")
       ->type_name("N")
       ->capture_default_str();
-  verb.add_option(
+  command
+      .add_option(
           "--fall-memory", settings.service.fall_memory_bytes,
           "memory of all workers for solved falls, as 2GB; the default is an eighth of what "
           "is free")
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false).description(""));
-  verb.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
+  command.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
 }
 
 std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,

@@ -100,8 +100,8 @@ struct RunSettings {
   std::int64_t rows = 30;  ///< most rows of results fetched at the end
 };
 
-/// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `verb`.
-void add_worker_flags(CLI::App& verb, RunSettings& settings);
+/// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `command`.
+void add_worker_flags(CLI::App& command, RunSettings& settings);
 
 /// Throws solver::InputError, naming the flag and what is allowed, for a number of workers or rows
 /// that cannot be.

@@ -100,10 +100,6 @@ protocol::QueryRequest request_for(const ResultQuery& query) {
   return request;
 }
 
-protocol::QueryRequest first_results(const std::string& study, std::int64_t rows) {
-  return request_for({.study = study, .limit = rows});
-}
-
 protocol::Table Source::query(const std::string& sql) {
   protocol::QueryRequest request;
   request.set_sql(sql);

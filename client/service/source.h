@@ -35,9 +35,6 @@ void check(const ResultQuery& query);
 
 protocol::QueryRequest request_for(const ResultQuery& query);
 
-/// The request for the first `rows` points of a study.
-protocol::QueryRequest first_results(const std::string& study, std::int64_t rows);
-
 /// The rows of an answer as they come, in chunks (proto/wire). Its source must outlive it and
 /// answers nothing else until it has ended. Destroying it earlier ends the work at the source.
 class RowStream {

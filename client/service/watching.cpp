@@ -7,9 +7,8 @@
 #include <stdexcept>
 #include <variant>
 #include "client/io/console.h"
-#include "client/io/format_units.h"
 #include "client/io/progress.h"
-#include "client/io/tables.h"
+#include "client/io/row_output.h"
 #include "proto/program/usage.h"
 #include "proto/result_message.h"
 #include "proto/text.h"
@@ -28,8 +27,8 @@ Seconds pause_after(Seconds elapsed) {
   return std::clamp(elapsed / 40, kShortest, kLongest);
 }
 
-void tell_failures(Console& console, const protocol::StudyStatus& status,
-                   const std::function<protocol::Table(const std::string&)>& query) {
+void print_failures(Console& console, const protocol::StudyStatus& status,
+                    const std::function<protocol::Table(const std::string&)>& query) {
   console.errors() << fmt::format("{} of {} points failed:\n", format_count(status.failed()),
                                   format_count(status.points()));
   const auto reasons = query(fmt::format(
@@ -99,10 +98,10 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
   return found.front();
 }
 
-int tell_end(Console& console, const protocol::StudyStatus& status,
-             const std::function<protocol::Table(const std::string&)>& query) {
+int print_end(Console& console, const protocol::StudyStatus& status,
+              const std::function<protocol::Table(const std::string&)>& query) {
   if (status.failed() > 0) {
-    tell_failures(console, status, query);
+    print_failures(console, status, query);
   }
   if (status.state() == "cancelled") {
     console.errors() << "The study is cancelled; oblique resume goes on with it.\n";
@@ -111,7 +110,7 @@ int tell_end(Console& console, const protocol::StudyStatus& status,
                                                                 : protocol::kFailed;
 }
 
-void tell_if_insecure(Console& console, const std::string& access, const std::string& place) {
+void warn_if_insecure(Console& console, const std::string& access, const std::string& place) {
   if (access == "insecure") {
     console.note(fmt::format(
         "INSECURE: {} runs with --insecure: whoever reaches it can use it, and nothing is "
@@ -153,18 +152,18 @@ protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies) {
   }
   for (const auto& study : studies) {
     auto& row = table.rows.emplace_back();
-    add_value(row, study.name());
-    add_value(row, study.state());
+    row.emplace_back(study.name());
+    row.emplace_back(study.state());
     for (const auto count : {study.points(), study.solved(), study.failed(), study.leased()}) {
-      add_value(row, static_cast<std::int64_t>(count));
+      row.emplace_back(static_cast<std::int64_t>(count));
     }
-    add_value(row, study.points_per_s());
-    add_value(row, study.created_at());
-    add_value(row, static_cast<std::int64_t>(study.priority()));
-    add_value(row, study.waits_for());
-    add_value(row, static_cast<std::int64_t>(study.left_out()));
+    row.emplace_back(study.points_per_s());
+    row.emplace_back(study.created_at());
+    row.emplace_back(static_cast<std::int64_t>(study.priority()));
+    row.emplace_back(study.waits_for());
+    row.emplace_back(static_cast<std::int64_t>(study.left_out()));
     if (any_taken) {
-      add_value(row, static_cast<std::int64_t>(study.taken().points()));
+      row.emplace_back(static_cast<std::int64_t>(study.taken().points()));
     }
   }
   return table;

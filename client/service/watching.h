@@ -46,11 +46,11 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
 
 /// Prints failed points with their reasons, or that the study was cancelled, to standard error.
 /// Returns the exit code: kDone when every point is solved.
-int tell_end(Console& console, const protocol::StudyStatus& status,
-             const std::function<protocol::Table(const std::string&)>& query);
+int print_end(Console& console, const protocol::StudyStatus& status,
+              const std::function<protocol::Table(const std::string&)>& query);
 
 /// Warns on standard error when the server at `place` is insecure, as StatusReply.access says.
-void tell_if_insecure(Console& console, const std::string& access, const std::string& place);
+void warn_if_insecure(Console& console, const std::string& access, const std::string& place);
 
 /// "12 points are taken over: 7 of a, 5 of b", or an empty text.
 std::string taken_over(const protocol::TakenOver& taken);

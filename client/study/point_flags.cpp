@@ -11,6 +11,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "client/study/study_file.h"
 #include "proto/program/usage.h"
 #include "proto/recipe/expression.h"
 #include "proto/recipe/model_message.h"
@@ -245,19 +246,22 @@ std::string table_of_presets() {
 }
 
 /// How the axes of the flags are put together.
-void add_block_flags(CLI::App& verb, PointFlags& flags) {
-  verb.add_flag("--zip", flags.zip,
+void add_block_flags(CLI::App& command, PointFlags& flags) {
+  command
+      .add_flag("--zip", flags.zip,
                 "take the axes side by side, the first value of each, the second of each, ..., "
                 "instead of multiplying them; single values serve all")
       ->group("Points");
-  verb.add_option(
+  command
+      .add_option(
           "--sample", flags.sample,
           "draw points: KIND:COUNT:SEED with the kind random, lhs (Latin hypercube) or sobol; "
           "axes are then FROM:TO, normal(MEAN,SD), normal(MEAN,SD,FROM,TO), "
           "uniform(FROM,TO), log-uniform(FROM,TO) or one value")
       ->type_name("SAMPLE")
       ->group("Points");
-  verb.add_option("--where", flags.where,
+  command
+      .add_option("--where", flags.where,
                   "leave out the points for which this is not true, as \"mu > 0.5 * e\"")
       ->type_name("CONDITION")
       ->group("Points");
@@ -278,16 +282,17 @@ class BriefHelp : public CLI::Formatter {
 
 }  // namespace
 
-void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
+void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values,
                      bool with_single_lengths) {
   const auto help = std::make_shared<BriefHelp>();
-  help->column_width(verb.get_formatter()->get_column_width());
-  verb.formatter(help);
+  help->column_width(command.get_formatter()->get_column_width());
+  command.formatter(help);
   const std::string type = values == FlagValues::kOne ? "VALUE" : "VALUES";
   const auto add = [&](const ParameterKey& key, const std::string& group) {
     const std::string name(key.name);
     const bool is_integrator = key.name == "integrator";
-    auto* option = verb.add_option_function<std::string>(
+    auto* option = command
+                       .add_option_function<std::string>(
                            flag_of_key(key.name),
                            [&flags, name](const std::string& text) { flags.axes[name] = text; },
                            described(key))
@@ -299,18 +304,20 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
     add(key, "Points");
   }
   if (values == FlagValues::kMany) {
-    add_block_flags(verb, flags);
+    add_block_flags(command, flags);
   }
   const std::string group = "Model (defaults: the preset `" + flags.preset + "`)";
   auto* preset =
-      verb.add_option("--preset", flags.preset,
+      command
+          .add_option("--preset", flags.preset,
                       "model to start from: " + protocol::joined(solver::preset_names()) +
                           "; single flags override it")
           ->type_name("NAME")
           ->group(group)
           ->capture_default_str();
   protocol::note_choices(preset, solver::preset_names());
-  verb.add_option(
+  command
+      .add_option(
           "--lengths", flags.lengths,
           "length of each link, from the pin outwards [m]; > 0; --length1, --length2, ... set that "
           "of one link")
@@ -319,7 +326,7 @@ void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
   for (const auto& key : solver::model_keys()) {
     add(key, group)->default_str(default_of(key));
   }
-  verb.footer(fmt::format("{}\n\n{}", verb.get_footer(), table_of_presets()));
+  command.footer(fmt::format("{}\n\n{}", command.get_footer(), table_of_presets()));
   for (std::size_t link = 1; with_single_lengths && link <= protocol::kMostLinks; ++link) {
     add(protocol::axis_key(fmt::format("length{}", link)), std::string(kSingleLengths));
   }
@@ -420,8 +427,63 @@ protocol::Recipe recipe_of_flags(const PointFlags& flags, const ReachCheck& chec
 
 protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& check_reach) {
   protocol::PointTable table(recipe_of_flags(flags, check_reach));
-  judge_points(table, places_of(flags));
+  check_points(table, places_of(flags));
   return table;
+}
+
+std::string name_of_recipe(const protocol::Recipe& recipe) {
+  constexpr std::size_t kDigits = 8;
+  return fmt::format("sweep-{}", protocol::recipe_digest(recipe).substr(0, kDigits));
+}
+
+void add_study_flags(CLI::App& command, StudyFlags& flags, bool with_single_lengths) {
+  command
+      .add_option(
+          "STUDY.toml", flags.file,
+          "study file; or say the points by the flags below, whose VALUES are 0.4, 0.4,0.6, "
+          "FROM:TO:COUNT, FROM:TO:COUNT:log, FROM:TO:step=STEP, @FILE.csv:COLUMN or an "
+          "expression of other keys, as \"A^2/(4*pi)\"")
+      ->type_name("");
+  command
+      .add_option("--name", flags.name,
+                  "name of the study; by default the file's, or `sweep-` and a hash of the flags")
+      ->type_name("NAME");
+  command
+      .add_flag("--errors", flags.errors,
+                "estimate errors: solve each point also on half the mesh and at twice the step, at "
+                "a quarter more cost")
+      ->group("Points");
+  add_point_flags(command, flags.points, FlagValues::kMany, with_single_lengths);
+}
+
+Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
+  const bool by_flags = flags.points != PointFlags();
+  if (flags.file.empty() && !by_flags) {
+    throw InputError("no points: give a study file, or --H, --mu and --e");
+  }
+  if (!flags.file.empty() && by_flags) {
+    throw InputError("both the study file " + flags.file.string() +
+                     " and flags for points or model are given: use one of them (the file has a "
+                     "[model] of its own)");
+  }
+  Study study;
+  if (flags.file.empty()) {
+    study.recipe = recipe_of_flags(flags.points, check_reach);
+    study.places = places_of(flags.points);
+  } else {
+    study = read_study_file(flags.file, check_reach);
+  }
+  study.recipe.set_errors(study.recipe.errors() || flags.errors);
+  if (flags.file.empty()) {
+    study.name = name_of_recipe(study.recipe);
+  }
+  if (!flags.name.empty()) {
+    if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {
+      throw InputError({.text = objection, .key = "name", .place = "--name"});
+    }
+    study.name = flags.name;
+  }
+  return study;
 }
 
 }  // namespace oblique::client

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
@@ -33,8 +34,8 @@ enum class FlagValues { kOne, kMany };
 
 /// Adds --H, --mu, --e, --preset, --lengths and a flag for every model key, and those of single
 /// lengths (--length1 ...) if wanted, and a table of presets to the footer of help. `flags` must
-/// live as long as `verb`.
-void add_point_flags(CLI::App& verb, PointFlags& flags, FlagValues values,
+/// live as long as `command`.
+void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values,
                      bool with_single_lengths);
 
 /// How a key is written as a flag: `tip_mass` is --tip-mass.
@@ -57,5 +58,25 @@ protocol::PointTable points_of_flags(const PointFlags& flags, const ReachCheck& 
 
 /// The flags as they were typed.
 Places places_of(const PointFlags& flags);
+
+/// Where a study comes from: a file, or the point flags.
+struct StudyFlags {
+  std::filesystem::path file;  ///< empty: by the point flags
+  std::string name;            ///< empty: the file's name, or one made from the recipe
+  PointFlags points;
+  bool errors = false;  ///< estimated errors, also where the file does not ask for them
+};
+
+/// Adds the STUDY.toml argument, --name, --errors and the point flags. `flags` must live as long as
+/// `command`.
+void add_study_flags(CLI::App& command, StudyFlags& flags, bool with_single_lengths);
+
+/// Throws InputError when both a file and flags say what the points are, or none, and for what
+/// either says wrong, `check_reach` included. What only its points tell is left to `check_points`.
+Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach);
+
+/// "sweep-" and the first eight digits of the recipe's digest (proto/recipe/model_message.h), so
+/// that the same points name the same study again.
+std::string name_of_recipe(const protocol::Recipe& recipe);
 
 }  // namespace oblique::client

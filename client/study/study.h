@@ -2,10 +2,12 @@
 
 #include <functional>
 #include <map>
+#include <ostream>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
 #include "worker/solver/model/errors.h"
 
@@ -30,7 +32,15 @@ struct Study {
 
 /// Checks the values that only single points show (PointTable::judge_points). Throws
 /// solver::InputError with the place.
-void judge_points(const protocol::PointTable& table, const Places& places);
-void judge_points(const Study& study);
+void check_points(const protocol::PointTable& table, const Places& places);
+void check_points(const Study& study);
+
+/// Writes a note where contacts are computed on fewer than eight elements a link, with what that
+/// costs in accuracy.
+void note_coarse_mesh(std::ostream& out, const protocol::Recipe& recipe);
+
+/// Writes a note for each key with a value outside its usual range, which is likely to be in
+/// another unit, and for each range of a sample whose count makes it a list of values.
+void note_unusual_values(std::ostream& out, const protocol::Recipe& recipe);
 
 }  // namespace oblique::client

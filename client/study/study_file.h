@@ -6,6 +6,7 @@
 
 #include "client/study/reach.h"
 #include "client/study/study.h"
+#include "proto/oblique.pb.h"
 
 namespace oblique::client {
 
@@ -16,5 +17,9 @@ Study read_study_file(const std::filesystem::path& path, const ReachCheck& check
 
 /// The same for the text of a study file; `file` is what errors call it.
 Study parse_study(std::string_view text, const std::string& file, const ReachCheck& check_reach);
+
+/// A study file of that name and recipe: read again it gives a recipe of the same digest.
+/// The recipe is one that was judged. What came from CSV files stands in it as lists.
+std::string study_toml(const std::string& name, const protocol::Recipe& recipe);
 
 }  // namespace oblique::client

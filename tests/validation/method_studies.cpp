@@ -18,7 +18,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "client/convergence/convergence.h"
-#include "client/io/tables.h"
+#include "client/io/row_output.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/solve.h"
@@ -157,9 +157,9 @@ void print_cells(const std::vector<Level>& levels, const std::vector<OutputStudy
   }
   for (const auto& output : outputs) {
     auto& row = table.rows.emplace_back();
-    add_value(row, output.name);
+    row.emplace_back(output.name);
     for (std::size_t level = 0; level < levels.size(); ++level) {
-      add_value(row, cell(output, level));
+      row.emplace_back(cell(output, level));
     }
   }
   print(std::cout, table, Format::kTable);
@@ -388,17 +388,18 @@ void study_steps() {
       const double factor = cases[i].factors[j];
       const auto& errors = all[j];
       auto& row = table.rows.emplace_back();
-      add_value(row, factor == 1.0 ? cases[i].name
-                                   : fmt::format("{}, {} h", cases[i].name, exact_number(factor)));
-      add_value(row, static_cast<std::int64_t>(cases[i].points));
-      add_value(row, solver::readable_number(1e6 * errors.step_s, 3));
-      add_value(row, fixed_number(errors.of_limit, 2));
+      row.emplace_back(factor == 1.0
+                           ? cases[i].name
+                           : fmt::format("{}, {} h", cases[i].name, exact_number(factor)));
+      row.emplace_back(static_cast<std::int64_t>(cases[i].points));
+      row.emplace_back(solver::readable_number(1e6 * errors.step_s, 3));
+      row.emplace_back(fixed_number(errors.of_limit, 2));
       for (const double error : {errors.peaks, errors.each_peak, errors.duration, errors.slide,
                                  errors.stick_s, errors.exit_m_s}) {
-        add_value(row, fmt::format("{:.1e}", error));
+        row.emplace_back(fmt::format("{:.1e}", error));
       }
-      add_value(row, errors.late_sticks);
-      add_value(row, errors.grazing);
+      row.emplace_back(errors.late_sticks);
+      row.emplace_back(errors.grazing);
     }
   }
   print(std::cout, table, Format::kTable);

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include "client/io/row_output.h"
-#include "client/io/tables.h"
 #include "proto/wire/chunk.h"
 #include "tests/support/programs.h"
 
@@ -115,7 +114,7 @@ TEST(Columns, OfShortTimesAreShownInTheUnitsOfTheReport) {
   protocol::Table rows{.columns = {"duration_s", "slide_m", "wall_s", "H", "max(duration_s)"}};
   auto& row = rows.rows.emplace_back();
   for (const double value : {0.000543704, 0.00114159, 0.001, 1.0, 0.000543704}) {
-    add_value(row, value);
+    row.emplace_back(value);
   }
   const auto chunk = protocol::chunk_of(rows);
   EXPECT_EQ(text_of({chunk}, {.shown = shown_columns(chunk)}),

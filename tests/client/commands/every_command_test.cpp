@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/commands/command_line.h"
+#include "client/commands/commands.h"
 #include "client/io/console.h"
 #include "server/store/store.h"
 #include "tests/support/points.h"
@@ -132,7 +132,7 @@ Words needed_words(const Listed& command) {
 /// The flags with a value, by the name that the help gives the value.
 std::vector<std::pair<std::string, std::string>> flags_with_values(const Listed& command) {
   std::vector<std::pair<std::string, std::string>> flags;
-  const std::regex line("\n  (--[A-Za-z0-9-]+) ([A-Z]+)(?![a-z])");
+  const std::regex line("\n  (--[A-Za-z0-9-]+) ([A-Z]+)(?![a-z|])");
   for (std::sregex_iterator found(command.help.begin(), command.help.end(), line), end;
        found != end; ++found) {
     flags.emplace_back((*found)[1], (*found)[2]);

@@ -128,8 +128,6 @@ TEST_F(TraceCommand, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   says({"models"}, 2, "POINT");
   says({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
   says({"models", "0", "--out", "x.jsn"}, 2, "end its name in .csv");
-  says({"models", "0", "--format", "csv", "--out", "x.json"}, 2, "contradict each other");
-  says({"models", "0", "--format", "jsn"}, 2, "did you mean `json`?");
   says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
   says({"models", "0", "--local", "--on-worker"}, 2, "--local");
   says({"models", "0", "--every", "0"}, 2, "--every");

@@ -5,8 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "client/io/format_units.h"
-
 namespace oblique::client {
 namespace {
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "client/io/console.h"
-#include "client/io/tables.h"
+#include "client/io/row_output.h"
 #include "client/study/study_file.h"
 #include "client/trace/solve_again.h"
 #include "proto/recipe/point_table.h"

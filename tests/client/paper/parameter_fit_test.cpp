@@ -1,4 +1,4 @@
-#include "client/paper/parameter_fit.h"
+#include "client/paper/paper_comparison.h"
 
 #include <cmath>
 #include <string>

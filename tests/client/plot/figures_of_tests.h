@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "client/plot/figure.h"
-#include "client/plot/gathered.h"
 
 namespace oblique::client::plot::test {
 

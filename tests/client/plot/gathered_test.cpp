@@ -1,5 +1,5 @@
 // Rows of answers gathered in cells and lines.
-#include "client/plot/gathered.h"
+#include "client/plot/figure.h"
 
 #include <cmath>
 #include <cstdint>

@@ -26,7 +26,7 @@ using testing::Not;
 using testing::StartsWith;
 
 std::string script(const Figure& figure) {
-  return script_of(figure, Terminal::kSvg, {});
+  return script_of(figure, PictureFormat::kSvg, {});
 }
 
 std::vector<std::pair<std::string, Figure>> all_figures() {
@@ -50,7 +50,7 @@ std::vector<std::pair<std::string, Figure>> all_figures() {
 }
 
 TEST(GnuplotScript, OfALineIsShortAndReadable) {
-  const auto text = script_of(test::lines_of(1, 2), Terminal::kSvg, {400, 300}, "picture.svg");
+  const auto text = script_of(test::lines_of(1, 2), PictureFormat::kSvg, {400, 300}, "picture.svg");
   EXPECT_THAT(text, StartsWith(R"(# A picture by `oblique plot`, for gnuplot 5.4 or later.
 # Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.
 set terminal svg size 400,300 font 'DejaVu Sans,12' background '#ffffff'
@@ -236,12 +236,6 @@ TEST(FigureTable, OfAMapHasTheValuesOfTheStudyWhereItHasAny) {
   cells.y.values = {0.7};
   EXPECT_EQ(csv_of(test::map_of(cells)),
             "mu,H,duration_s,state\n0.03,0.7,0,solved\n0.1,0.7,1,solved\n");
-}
-
-TEST(FigureTable, OfCategoriesHasAllTheirNames) {
-  const auto csv = csv_of(test::category_map());
-  EXPECT_THAT(csv, HasSubstr("mu,H,major_mode,state\n"));
-  EXPECT_THAT(csv, HasSubstr(",rare,solved\n"));
 }
 
 TEST(FigureTable, OfLinesHasWhatTellsThemApart) {

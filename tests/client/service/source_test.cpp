@@ -1,8 +1,9 @@
-#include "client/service/source_flags.h"
+#include "client/service/connection.h"
 
 #include <atomic>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -10,14 +11,18 @@
 #include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/service/source.h"
+#include "client/service/watching.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "server/database/database_file.h"
 #include "server/store/store.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/temporary_folder.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -125,6 +130,70 @@ TEST_F(SourceTest, CallsAWrongStatementWrongUsageWhereverItIsAsked) {
   const auto source = open({.database = {}, .server = server.url(), .timeout_s = {}});
   EXPECT_THROW(source->query("SELEC 1"), solver::InputError);
   EXPECT_THROW(source->query("SELECT 1"), ServerError);
+}
+
+TEST(ResultQuery, IsARequestOfTheSameParts) {
+  const auto plain = request_for({.study = "a"}).question();
+  EXPECT_FALSE(plain.has_limit());
+  EXPECT_TRUE(plain.select().empty());
+  const auto full = request_for({"a", "mu > 1 OR 1", "e, avg(mu)", "e", "avg(mu)", 5}).question();
+  EXPECT_EQ(full.study(), "a");
+  EXPECT_EQ(full.where(), "mu > 1 OR 1");
+  EXPECT_EQ(full.select(0), "e, avg(mu)");
+  EXPECT_EQ(full.group(), "e");
+  EXPECT_EQ(full.order(), "avg(mu)");
+  EXPECT_EQ(full.limit(), 5U);
+}
+
+TEST(ResultQuery, EachFlagIsCheckedAndNamed) {
+  const auto refusal = [](const ResultQuery& query) -> std::string {
+    try {
+      check(query);
+    } catch (const solver::InputError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  using testing::HasSubstr;
+  EXPECT_EQ(refusal({.study = "a"}), "");
+  EXPECT_THAT(refusal({.where = "mu > 0.5 --"}), HasSubstr("--where"));
+  EXPECT_THAT(refusal({.select = "mu FROM runs --"}), HasSubstr("--select"));
+  EXPECT_THAT(refusal({.order = "mu LIMIT 1"}), HasSubstr("--order"));
+  EXPECT_THAT(refusal({.group = "mu ORDER BY 1"}), HasSubstr("--group"));
+  EXPECT_THAT(refusal({.limit = -1}), HasSubstr("--limit -1"));
+}
+
+std::string update(WaitMessages& messages, double elapsed_s, const std::string& waits_for) {
+  protocol::StudyStatus status;
+  status.set_waits_for(waits_for);
+  return messages.update(status, WaitMessages::Seconds{elapsed_s});
+}
+
+TEST(WaitMessages, NameOnceWhatAStudyWaitsForAndThatItGoesOn) {
+  WaitMessages messages;
+  EXPECT_EQ(update(messages, 0, "a worker"), "");
+  EXPECT_EQ(update(messages, 1.9, "a worker"), "");
+  EXPECT_EQ(update(messages, 2, "a worker"), "The study waits for a worker.");
+  EXPECT_EQ(update(messages, 100, "a worker"), "");
+  EXPECT_EQ(update(messages, 101, ""), "The study goes on.");
+  EXPECT_EQ(update(messages, 102, ""), "");
+}
+
+TEST(WaitMessages, PassOverAWaitThatIsSoonOver) {
+  WaitMessages messages;
+  EXPECT_EQ(update(messages, 0, "a worker"), "");
+  EXPECT_EQ(update(messages, 1, ""), "");
+  EXPECT_EQ(update(messages, 2, "a worker"), "");
+  EXPECT_EQ(update(messages, 3.9, "a worker"), "");
+  EXPECT_EQ(update(messages, 4, ""), "");
+}
+
+TEST(WaitMessages, NameAReasonThatChanged) {
+  WaitMessages messages;
+  update(messages, 0, "a worker");
+  EXPECT_NE(update(messages, 3, "a worker"), "");
+  EXPECT_EQ(update(messages, 4, "the database"), "");
+  EXPECT_EQ(update(messages, 6, "the database"), "The study waits for the database.");
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/study/study_flags.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/point_table.h"
 #include "tests/client/study/pretended_fall.h"

@@ -228,14 +228,14 @@ TEST(StudyFile, NamesThePlaceOfValuesThatOnlyPointsShow) {
   };
   for (const auto& [text, key, says] : wrong) {
     try {
-      judge_points(parsed(text, "study.toml"));
+      check_points(parsed(text, "study.toml"));
       ADD_FAILURE() << text;
     } catch (const solver::InputError& error) {
       EXPECT_EQ(error.fields().key, key);
       EXPECT_THAT(error.what(), testing::StartsWith(says));
     }
   }
-  EXPECT_NO_THROW(judge_points(parsed(kPoint)));
+  EXPECT_NO_THROW(check_points(parsed(kPoint)));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "client/study/study_toml.h"
+#include "client/study/study_file.h"
 
 #include <cstdint>
 #include <random>
@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "client/study/study_file.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"

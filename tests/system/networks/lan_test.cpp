@@ -88,7 +88,8 @@ class StudyOnLan : public ::testing::Test {
     const Inside inside(host);
     auto arguments = access("worker");
     arguments.insert(arguments.end(),
-                     {"--threads", "1", "--name", host.name(), "--stop-with-parent"});
+                     {"--threads", "1", "--name", host.name(), "--stop-with-parent",
+                      std::to_string(getpid())});
     return std::make_unique<Process>(folder_, worker_program(), arguments);
   }
   /// `oblique` with these arguments, and how the server is reached, on the client's machine.

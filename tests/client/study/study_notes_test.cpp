@@ -1,4 +1,4 @@
-#include "client/io/study_notes.h"
+#include "client/study/study.h"
 
 #include <sstream>
 #include <string>
