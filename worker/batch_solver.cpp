@@ -29,13 +29,13 @@ class BatchSolver::Task : public solver::PointSource {
     } while (take_more());
     return std::nullopt;
   }
-  solver::Point point(std::uint64_t position) override {
+  solver::ModelPoint point(std::uint64_t position) override {
     const std::uint64_t number = batch_.point_at(position);
     if (const std::string fault = batch_.points().fault(number); !fault.empty()) {
       throw solver::InputError(fault);
     }
     const protocol::Point point = batch_.points().point(number);
-    return {point.H_m, point.mu, point.e_star};
+    return {point.model, {point.H_m, point.mu, point.e_star}};
   }
   std::size_t model_of(std::uint64_t position) override {
     return batch_.points().segment_at(batch_.point_at(position)).model;

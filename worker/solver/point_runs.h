@@ -7,6 +7,7 @@
 #include "worker/solver/fall_cache.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/solve.h"
+#include "worker/solver/solve_many.h"
 
 namespace oblique::solver {
 
@@ -18,8 +19,8 @@ class PointSource {
   /// The number of the next point; nothing when there is none, or when no more are wanted.
   virtual std::optional<std::uint64_t> next() = 0;
   /// That point. What it throws is the reason why the point has no answer.
-  virtual Point point(std::uint64_t number) = 0;
-  /// The number of its model.
+  virtual ModelPoint point(std::uint64_t number) = 0;
+  /// The number of its model, also where the point is not allowed.
   virtual std::size_t model_of(std::uint64_t number) = 0;
   virtual ModelParameters model(std::size_t model_number) = 0;
   /// The next point behind that one, given or not, that may be of another model; nothing when there

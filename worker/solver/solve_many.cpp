@@ -76,11 +76,10 @@ class PointRuns {
   template <class FallOf>
   std::optional<FingerPoint> point_of(std::uint64_t number, const FallOf& fall_of) {
     try {
-      const Point point = source_.point(number);
-      const std::size_t model_number = source_.model_of(number);
-      if (!finger_ || model_number != model_) {
+      const ModelPoint point = source_.point(number);
+      if (!finger_ || point.model != model_) {
         finger_.reset();
-        const ModelParameters model = source_.model(model_number);
+        const ModelParameters model = source_.model(point.model);
         const std::optional<FallOutcome> fall = fall_of(model);
         if (!fall) {
           return std::nullopt;
@@ -89,9 +88,9 @@ class PointRuns {
           throw SolveError(fall->error);
         }
         finger_.emplace(model, fall->fallen);
-        model_ = model_number;
+        model_ = point.model;
       }
-      return FingerPoint{*finger_, number, point};
+      return FingerPoint{*finger_, number, point.point};
     } catch (const std::exception& error) {
       sink_({number, std::nullopt, error.what()});
       return std::nullopt;
@@ -280,11 +279,11 @@ class Work {
       }
       return next_++;
     }
-    Point point(std::uint64_t number) override {
+    ModelPoint point(std::uint64_t number) override {
       if (work_.stopped_) {  // one that was kept for a fall of its own
         throw SolveError("nobody waits for it any more");
       }
-      return work_.points_[number].point.point;
+      return work_.points_[number].point;
     }
     std::size_t model_of(std::uint64_t number) override {
       return work_.points_[number].point.model;
