@@ -87,12 +87,4 @@ std::optional<std::vector<Batch::Range>> ranges_of(const protocol::Batch& messag
                                                           : std::optional(std::move(ranges));
 }
 
-std::uint64_t size_of(const std::vector<Batch::Range>& ranges) {
-  std::uint64_t points = 0;
-  for (const Batch::Range& range : ranges) {
-    points += range.end - range.begin;
-  }
-  return points;
-}
-
 }  // namespace oblique::worker

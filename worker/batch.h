@@ -67,7 +67,4 @@ struct Progress {
   std::vector<Batch::Range> left_out{};  ///< points that a filter leaves out
 };
 
-/// How many points these ranges have.
-std::uint64_t size_of(const std::vector<Batch::Range>& ranges);
-
 }  // namespace oblique::worker

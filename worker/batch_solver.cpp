@@ -1,12 +1,114 @@
 #include "worker/batch_solver.h"
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
-#include <utility>
+#include <optional>
+#include <string>
 
-#include "worker/solver/point_runs.h"
+#include "proto/recipe/point_table.h"
+#include "proto/result_message.h"
+#include "worker/solver/model/errors.h"
 
 namespace oblique::worker {
+
+class BatchSolver::Task : public solver::PointSource {
+ public:
+  Task(BatchSolver& solver, OpenBatches::iterator open, const std::stop_token& stop)
+      : solver_(solver), open_(*open), batch_(open->batch), stop_(stop) {}
+
+  std::optional<std::uint64_t> next() override {
+    do {
+      const std::uint64_t found = batch_.first_to_solve(next_, end_);
+      batch_.append_points(next_, found, left_out_);
+      next_ = found;
+      if (next_ < end_) {
+        // Points may be slow: the rest of a task that is dropped is not waited for.
+        return open_.dropped ? std::nullopt : std::optional(next_++);
+      }
+    } while (take_more());
+    return std::nullopt;
+  }
+  solver::ModelPoint point(std::uint64_t position) override {
+    const std::uint64_t number = batch_.point_at(position);
+    if (const std::string fault = batch_.points().fault(number); !fault.empty()) {
+      throw solver::InputError(fault);
+    }
+    const protocol::Point point = batch_.points().point(number);
+    return {point.model, {point.H_m, point.mu, point.e_star}};
+  }
+  std::size_t model_of(std::uint64_t position) override {
+    return batch_.points().segment_at(batch_.point_at(position)).model;
+  }
+  solver::ModelParameters model(std::size_t number) override {
+    return batch_.points().model(number);
+  }
+  std::optional<std::uint64_t> behind_model(std::uint64_t position) override {
+    const auto behind = batch_.first_to_solve(batch_.end_of_model(position), batch_.size());
+    return behind < batch_.size() ? std::optional(behind) : std::nullopt;
+  }
+
+  void take(solver::Outcome&& outcome) {
+    constexpr std::chrono::milliseconds kLongestWait{20};  // of a result in its thread
+    const std::uint64_t number = batch_.point_at(outcome.number);
+    results_.push_back(outcome.result ? protocol::to_message(number, *outcome.result)
+                                      : protocol::failed_point(number, outcome.error));
+    protocol::set_inputs(results_.back(), batch_.points());
+    if (Clock::now() - busy_since_ > kLongestWait) {
+      const std::lock_guard lock(solver_.mutex_);
+      hand_on();
+    }
+  }
+
+  /// Needs the lock.
+  void hand_on() {
+    if (results_.empty() && left_out_.empty()) {
+      return;  // the time since is that of results to come
+    }
+    const Clock::time_point now = Clock::now();
+    if (!open_.unwanted) {
+      Progress& progress = solver_.progress_of(batch_);
+      progress.results.insert(progress.results.end(), std::move_iterator(results_.begin()),
+                              std::move_iterator(results_.end()));
+      progress.left_out.insert(progress.left_out.end(), left_out_.begin(), left_out_.end());
+      progress.busy_s += std::chrono::duration<double>(now - busy_since_).count();
+    }
+    results_.clear();
+    left_out_.clear();
+    busy_since_ = now;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// Takes the next part of the batch, of which a filter may keep nothing. False when none is left.
+  bool take_more() {
+    std::unique_lock lock(solver_.mutex_);
+    hand_on();
+    if (solver_.paused_) {
+      solver_.changed_.wait(lock, stop_, [&] { return !solver_.paused_ || open_.dropped; });
+      busy_since_ = Clock::now();
+    }
+    const std::uint64_t left = batch_.size() - open_.given;
+    if (open_.dropped || stop_.stop_requested() || left == 0) {
+      return false;
+    }
+    next_ = open_.given;
+    open_.given += solver::points_of_task(left, solver_.thread_count_);
+    end_ = open_.given;
+    return true;
+  }
+
+  BatchSolver& solver_;
+  OpenBatch& open_;  // stays while a thread is at work on it
+  const Batch& batch_;
+  const std::stop_token& stop_;
+  std::uint64_t next_ = 0;                       // position
+  std::uint64_t end_ = 0;                        // past the last position
+  std::vector<protocol::PointResult> results_;   // not handed on yet
+  std::vector<Batch::Range> left_out_;           // the same, of points that a filter leaves out
+  Clock::time_point busy_since_ = Clock::now();  // work before this is handed on
+};
 
 BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)
     : solve_(std::move(solve)),
@@ -34,41 +136,30 @@ void BatchSolver::add(Batch batch) {
 void BatchSolver::drop_study(std::uint64_t study_id) {
   const std::lock_guard lock(mutex_);
   std::erase_if(progress_, [&](const auto& entry) { return entry.second.study_id == study_id; });
-  for (auto batch = open_.begin(); batch != open_.end();) {
-    const auto dropped = batch++;
-    if (dropped->batch.study_id() == study_id) {
-      dropped->unwanted = true;
-      drop(dropped);
-    }
-  }
-  changed_.notify_all();
+  drop([&](OpenBatch& open) {
+    const bool is_of_study = open.batch.study_id() == study_id;
+    open.unwanted = open.unwanted || is_of_study;
+    return is_of_study;
+  });
 }
 
 void BatchSolver::drop_batch(std::uint64_t number) {
   const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(open_.begin(), open_.end(), [&](const OpenBatch& batch) {
-    return batch.batch.number() == number;
-  });
-  if (found != open_.end()) {
-    drop(found);
-  }
-  changed_.notify_all();
+  drop([&](const OpenBatch& open) { return open.batch.number() == number; });
 }
 
 void BatchSolver::drop_all() {
   const std::lock_guard lock(mutex_);
-  for (auto batch = open_.begin(); batch != open_.end();) {
-    drop(batch++);
-  }
-  changed_.notify_all();
+  drop([](const OpenBatch&) { return true; });
 }
 
-/// A batch that is worked on stays, marked, until the last thread leaves it.
-void BatchSolver::drop(OpenBatches::iterator batch) {
-  batch->dropped = true;
-  if (batch->solvers == 0) {
-    open_.erase(batch);
-  }
+/// A batch that is worked on stays, marked, until the last thread leaves it. Needs the lock.
+void BatchSolver::drop(const std::function<bool(OpenBatch&)>& is_to_drop) {
+  open_.remove_if([&](OpenBatch& open) {
+    open.dropped = is_to_drop(open) || open.dropped;
+    return open.dropped && open.solvers == 0;
+  });
+  changed_.notify_all();
 }
 
 void BatchSolver::set_paused(bool paused) {
@@ -110,25 +201,22 @@ BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
 void BatchSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !paused_ && next_batch() != open_.end(); })) {
-    Task task{next_batch(), 0, 0, {}, {}, Clock::now()};
-    ++task.batch->solvers;
-    const Batch& batch = task.batch->batch;  // stays while a thread is at work on it
+    const auto open = next_batch();
+    Task task(*this, open, stop);
+    ++open->solvers;
     lock.unlock();
-    solve_(
-        batch, [&] { return next_point(task, stop); },
-        [&](protocol::PointResult&& result) { take(task, std::move(result)); });
+    solve_(open->batch, task, [&](solver::Outcome&& outcome) { task.take(std::move(outcome)); });
     lock.lock();
-    hand_on(task);
-    OpenBatch& done = *task.batch;
-    if (--done.solvers > 0) {
+    task.hand_on();
+    if (--open->solvers > 0) {
       continue;
     }
-    const bool ended = !done.dropped && done.given == batch.size();
+    const bool ended = !open->dropped && open->given == open->batch.size();
     if (ended) {
-      progress_of(batch).batch_done = true;
+      progress_of(open->batch).batch_done = true;
     }
-    if (done.dropped || ended) {
-      open_.erase(task.batch);
+    if (open->dropped || ended) {
+      open_.erase(open);
     }
     if (ended) {
       lock.unlock();
@@ -136,68 +224,6 @@ void BatchSolver::work(const std::stop_token& stop) {
       lock.lock();
     }
   }
-}
-
-std::optional<std::uint64_t> BatchSolver::next_point(Task& task, const std::stop_token& stop) {
-  do {
-    const Batch& batch = task.batch->batch;
-    const std::uint64_t found = batch.first_to_solve(task.next, task.end);
-    batch.append_points(task.next, found, task.left_out);
-    task.next = found;
-    if (task.next < task.end) {
-      if (task.batch->dropped) {  // points may be slow: the rest of the task is not waited for
-        return std::nullopt;
-      }
-      return task.next++;
-    }
-  } while (take_more(task, stop));
-  return std::nullopt;
-}
-
-/// Takes the next part of the batch, of which a filter may keep nothing. False when none is left.
-bool BatchSolver::take_more(Task& task, const std::stop_token& stop) {
-  std::unique_lock lock(mutex_);
-  hand_on(task);
-  OpenBatch& open = *task.batch;
-  if (paused_) {
-    changed_.wait(lock, stop, [&] { return !paused_ || open.dropped; });
-    task.busy_since = Clock::now();
-  }
-  const std::uint64_t left = open.batch.size() - open.given;
-  if (open.dropped || stop.stop_requested() || left == 0) {
-    return false;
-  }
-  const std::uint64_t count = solver::points_of_task(left, thread_count_);
-  task.next = open.given;
-  task.end = task.next + count;
-  open.given += count;
-  return true;
-}
-
-void BatchSolver::take(Task& task, protocol::PointResult&& result) {
-  task.results.push_back(std::move(result));
-  if (Clock::now() - task.busy_since > kLongestWait) {
-    const std::lock_guard lock(mutex_);
-    hand_on(task);
-  }
-}
-
-/// Needs the lock.
-void BatchSolver::hand_on(Task& task) {
-  if (task.results.empty() && task.left_out.empty()) {
-    return;  // the time since is that of results to come
-  }
-  const Clock::time_point now = Clock::now();
-  if (!task.batch->unwanted) {
-    Progress& progress = progress_of(task.batch->batch);
-    progress.results.insert(progress.results.end(), std::move_iterator(task.results.begin()),
-                            std::move_iterator(task.results.end()));
-    progress.left_out.insert(progress.left_out.end(), task.left_out.begin(), task.left_out.end());
-    progress.busy_s += std::chrono::duration<double>(now - task.busy_since).count();
-  }
-  task.results.clear();
-  task.left_out.clear();
-  task.busy_since = now;
 }
 
 }  // namespace oblique::worker

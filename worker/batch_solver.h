@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -9,12 +8,14 @@
 #include <list>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <stop_token>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "worker/batch.h"
+#include "worker/solver/point_runs.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::worker {
 
@@ -23,12 +24,11 @@ namespace oblique::worker {
 /// split each batch into tasks of one point or a few and take a lock once a task.
 class BatchSolver {
  public:
-  /// Gives the position in the batch of the next point to solve; nothing when there is none.
-  using NextPoint = std::function<std::optional<std::uint64_t>()>;
-  using TakeResult = std::function<void(protocol::PointResult&&)>;
-  /// Solves the points of a batch that the second gives, some of them at a time, and hands each
-  /// result to the third in any order. Called from several threads at once.
-  using SolvePoints = std::function<void(const Batch&, const NextPoint&, const TakeResult&)>;
+  /// Solves the points of a batch that the source gives, some of them at a time, and hands each
+  /// outcome to the last in any order. Numbers of points are positions in the batch. Called from
+  /// several threads at once.
+  using SolvePoints =
+      std::function<void(const Batch&, solver::PointSource&, const solver::TakeOutcome&)>;
 
   /// `solve` must not throw. `batch_ended` is called from a solving thread after the last point of
   /// a batch; it must not call back. `threads` is at least 1.
@@ -62,10 +62,6 @@ class BatchSolver {
   std::vector<Progress> collect();
 
  private:
-  using Clock = std::chrono::steady_clock;
-  /// A result waits no longer in its thread.
-  static constexpr std::chrono::milliseconds kLongestWait{20};
-
   struct OpenBatch {
     explicit OpenBatch(Batch&& opened) : batch(std::move(opened)) {}
 
@@ -77,23 +73,11 @@ class BatchSolver {
     bool unwanted = false;  ///< nor are results kept
   };
   using OpenBatches = std::list<OpenBatch>;
-  /// The part of a batch that one thread solves at a time, and then the next.
-  struct Task {
-    OpenBatches::iterator batch;
-    std::uint64_t next = 0;                      ///< position
-    std::uint64_t end = 0;                       ///< past the last position
-    std::vector<protocol::PointResult> results;  ///< not handed on yet
-    std::vector<Batch::Range> left_out;          ///< the same, of points that a filter leaves out
-    Clock::time_point busy_since;                ///< work before this is handed on
-  };
+  class Task;  ///< the part of a batch that one thread solves at a time, and then the next
 
   void work(const std::stop_token& stop);
   OpenBatches::iterator next_batch();
-  std::optional<std::uint64_t> next_point(Task& task, const std::stop_token& stop);
-  bool take_more(Task& task, const std::stop_token& stop);
-  void take(Task& task, protocol::PointResult&& result);
-  void hand_on(Task& task);
-  void drop(OpenBatches::iterator batch);
+  void drop(const std::function<bool(OpenBatch&)>& is_to_drop);
   Progress& progress_of(const Batch& batch);
 
   const SolvePoints solve_;

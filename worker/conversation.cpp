@@ -18,17 +18,93 @@ constexpr std::int64_t kLongestInterval_ms = 600'000;
 
 /// To a tenth of a second.
 std::string seconds_of(std::int64_t duration_ms) {
-  constexpr double kTenth_ms = 100.0;
-  constexpr double kTenths = 10.0;
-  return fmt::format("{:.12g} s",
-                     std::round(static_cast<double>(duration_ms) / kTenth_ms) / kTenths);
+  return fmt::format("{:.12g} s", std::round(static_cast<double>(duration_ms) / 100.0) / 10.0);
 }
 
 }  // namespace
 
-Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings)
+// ---- Outbox
+// ---------------------------------------------------------------------------------------
+
+void Outbox::add(protocol::Results results) {
+  results.set_sequence(next_sequence_++);
+  const std::size_t bytes = results.ByteSizeLong();
+  results_ += static_cast<std::size_t>(results.results_size());
+  bytes_ += bytes;
+  unacknowledged_.push_back({std::move(results), bytes, false});
+}
+
+const protocol::Results* Outbox::next_to_send() {
+  if (!has_waiting()) {
+    return nullptr;
+  }
+  Message& next = unacknowledged_[on_their_way_];
+  if (on_their_way_ > 0 && (on_their_way_ >= limits_.messages_on_their_way ||
+                            bytes_on_their_way_ + next.bytes > limits_.bytes_on_their_way)) {
+    return nullptr;
+  }
+  next.on_its_way = true;
+  ++on_their_way_;
+  bytes_on_their_way_ += next.bytes;
+  return &next.results;
+}
+
+void Outbox::acknowledged(std::uint64_t sequence) {
+  const auto found = std::lower_bound(unacknowledged_.begin(), unacknowledged_.end(), sequence,
+                                      [](const Message& message, std::uint64_t sought) {
+                                        return message.results.sequence() < sought;
+                                      });
+  if (found != unacknowledged_.end() && found->results.sequence() == sequence) {
+    forget(*found);
+    unacknowledged_.erase(found);
+  }
+}
+
+void Outbox::drop_study(std::uint64_t study_id) {
+  std::erase_if(unacknowledged_, [&](const Message& message) {
+    const bool is_of_study = message.results.study_id() == study_id;
+    if (is_of_study) {
+      forget(message);
+    }
+    return is_of_study;
+  });
+}
+
+void Outbox::drop_all() {
+  unacknowledged_.clear();
+  results_ = 0;
+  bytes_ = 0;
+  on_their_way_ = 0;
+  bytes_on_their_way_ = 0;
+}
+
+void Outbox::start_over() {
+  for (Message& message : unacknowledged_) {
+    message.results.set_lease_id(0);
+    message.results.set_batch_done(false);
+    message.on_its_way = false;
+  }
+  on_their_way_ = 0;
+  bytes_on_their_way_ = 0;
+}
+
+void Outbox::forget(const Message& message) {
+  results_ -= static_cast<std::size_t>(message.results.results_size());
+  bytes_ -= message.bytes;
+  if (message.on_its_way) {
+    --on_their_way_;
+    bytes_on_their_way_ -= message.bytes;
+  }
+}
+
+// ---- The conversation
+// -----------------------------------------------------------------------------
+
+Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings settings,
+                           std::string server)
     : hello_(std::move(hello)),
       settings_(std::move(settings)),
+      server_(std::move(server)),
       hello_timeout_ms_(settings_.hello_timeout_ms),
       outbox_(settings_.outbox) {}
 
@@ -163,62 +239,62 @@ void Conversation::send(protocol::WorkerMessage message) {
 // ---- Messages ---------------------------------------------------------------------------------
 
 Effects Conversation::on_message(const protocol::ServerToWorker& message, std::int64_t now_ms) {
+  using Kind = protocol::ServerToWorker;
   now_ms_ = now_ms;
   const auto kind = message.kind_case();
-  if (state_ == State::kGreeting) {
-    // Before the welcome only the answers to a hello mean anything.
-    if (kind == protocol::ServerToWorker::kWelcome) {
-      on(message.welcome());
-    } else if (kind == protocol::ServerToWorker::kRefused) {
-      on(message.refused());
-    } else if (kind == protocol::ServerToWorker::kHelloAgain) {
-      on(message.hello_again());
-    }
-    return take_effects();
-  }
-  if (state_ != State::kWelcomed) {
+  // Before the welcome only the answers to a hello mean anything.
+  const bool answers_hello =
+      kind == Kind::kWelcome || kind == Kind::kRefused || kind == Kind::kHelloAgain;
+  if (state_ != State::kWelcomed && !(state_ == State::kGreeting && answers_hello)) {
     return take_effects();
   }
   deadline_ms_ = now_ms_ + lost_after_ms_;
   switch (kind) {
-    case protocol::ServerToWorker::kRefused:
-      on(message.refused());
+    case Kind::kWelcome:
+      if (state_ == State::kGreeting) {  // said twice: the first one counts
+        on(message.welcome());
+      }
       break;
-    case protocol::ServerToWorker::kStudy:
+    case Kind::kRefused:
+      finish(1, "the server refuses this worker: " + message.refused().reason());
+      break;
+    case Kind::kStudy:
       on(message.study());
       break;
-    case protocol::ServerToWorker::kBatch:
+    case Kind::kBatch:
       on(message.batch());
       break;
-    case protocol::ServerToWorker::kResultsStored:
+    case Kind::kResultsStored:
       on(message.results_stored());
       break;
-    case protocol::ServerToWorker::kWithdraw:
+    case Kind::kWithdraw:
       on(message.withdraw());
       break;
-    case protocol::ServerToWorker::kHelloAgain:
-      on(message.hello_again());
-      break;
-    case protocol::ServerToWorker::kHeartbeatReply:
-      on(message.heartbeat_reply());
-      break;
-    case protocol::ServerToWorker::kStopping:
-      on(message.stopping());
-      break;
-    case protocol::ServerToWorker::kRelease:
+    case Kind::kRelease:
       on(message.release());
       break;
-    case protocol::ServerToWorker::kNotice:
+    case Kind::kHelloAgain:
+      connect_after_backoff("the server does not know this worker");
+      break;
+    case Kind::kHeartbeatReply:
+      backoff_ms_ = 0;
+      break;
+    case Kind::kStopping:
+      // Batches at hand are solved and their results kept. The socket finds the server when it is
+      // back, which then says HelloAgain.
+      server_stopping_ = true;
+      effects_.emplace_back(Note{"the server stops"});
+      break;
+    case Kind::kNotice:
       effects_.emplace_back(Note{message.notice().text()});
       break;
-    case protocol::ServerToWorker::kTraceOrder:
+    case Kind::kTraceOrder:
       on(message.trace_order());
       break;
-    case protocol::ServerToWorker::kTraceCancel:
+    case Kind::kTraceCancel:
       effects_.emplace_back(CancelTrace{message.trace_cancel().trace_id()});
       break;
-    case protocol::ServerToWorker::kWelcome:  // said twice: the first one counts
-    case protocol::ServerToWorker::KIND_NOT_SET:
+    case Kind::KIND_NOT_SET:
       break;
   }
   return take_effects();
@@ -241,7 +317,6 @@ void Conversation::on(const protocol::Welcome& welcome) {
 
   // The server has given up what this worker held and hands it out anew.
   effects_.emplace_back(DropAll{});
-  effects_.emplace_back(DropTraces{});
   held_.clear();
   studies_.clear();
   open_credit_ = 0;
@@ -259,10 +334,6 @@ void Conversation::on(const protocol::Welcome& welcome) {
   deliver();
   give_credit();
   finish_if_delivered();
-}
-
-void Conversation::on(const protocol::Refused& refused) {
-  finish(1, "the server refuses this worker: " + refused.reason());
 }
 
 void Conversation::on(const protocol::StudyDefinition& definition) {
@@ -324,21 +395,6 @@ void Conversation::on(const protocol::Release& release) {
     held_.erase(found);
     give_credit();
   }
-}
-
-void Conversation::on(const protocol::HelloAgain&) {
-  connect_after_backoff("the server does not know this worker");
-}
-
-void Conversation::on(const protocol::HeartbeatReply&) {
-  backoff_ms_ = 0;
-}
-
-void Conversation::on(const protocol::ServerStopping&) {
-  // Batches at hand are solved and their results kept. The socket finds the server when it is back,
-  // which then says HelloAgain.
-  server_stopping_ = true;
-  effects_.emplace_back(Note{"the server stops"});
 }
 
 // ---- Solved points ------------------------------------------------------------------------------
@@ -490,11 +546,14 @@ void Conversation::begin_stop(const std::string& reason, bool points_are_solved,
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
   last_points_until_ms_ = now_ms_ + (points_are_solved ? settings_.last_points_ms : 0);
   // Points of results that still wait here must not be handed out again.
-  if (!outbox_.has_waiting()) {
-    give_back_batches();
+  if (!outbox_.has_waiting() && !held_.empty()) {
+    protocol::WorkerMessage message;
+    for (const auto& [number, held] : held_) {
+      message.mutable_give_back()->add_lease_ids(held.lease_id);
+    }
+    send(std::move(message));
   }
   effects_.emplace_back(DropAll{});
-  effects_.emplace_back(DropTraces{});
   held_.clear();
   finish_if_delivered();
 }
@@ -521,16 +580,6 @@ void Conversation::finish(int exit_code, const std::string& reason) {
                                : "; " + std::to_string(outbox_.results()) +
                                      " results could not be delivered and will be solved again";
   effects_.emplace_back(Finish{exit_code, reason + lost});
-}
-
-void Conversation::give_back_batches() {
-  protocol::WorkerMessage message;
-  for (const auto& [number, held] : held_) {
-    message.mutable_give_back()->add_lease_ids(held.lease_id);
-  }
-  if (message.has_give_back()) {
-    send(std::move(message));
-  }
 }
 
 // ---- Ending by itself ---------------------------------------------------------------------------
@@ -568,7 +617,7 @@ void Conversation::exit_by_itself(const std::string& reason) {
     begin_stop(reason, !held_.empty());
     return;
   }
-  begin_stop(fmt::format("leaving: {} {} in {}", settings_.server,
+  begin_stop(fmt::format("leaving: {} {} in {}", server_,
                          rejection_.empty() ? "was never reached" : "never let this worker in",
                          seconds_of(now_ms_ - start_ms_)),
              false, 1);

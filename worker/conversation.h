@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <map>
 #include <memory>
@@ -12,7 +13,6 @@
 #include "proto/oblique.pb.h"
 #include "proto/recipe/point_table.h"
 #include "worker/batch.h"
-#include "worker/outbox.h"
 
 namespace oblique::worker {
 
@@ -36,7 +36,7 @@ struct DropStudy {
 struct DropBatch {
   std::uint64_t number;
 };
-/// Drop all batches; the server leases their points anew.
+/// Drop all batches and traces; the server leases their points anew.
 struct DropAll {};
 /// Solve that point for a trace, beside the batches.
 struct SolveTrace {
@@ -46,8 +46,6 @@ struct SolveTrace {
 struct CancelTrace {
   std::uint64_t trace_id;
 };
-/// The server has forgotten all traces.
-struct DropTraces {};
 /// The hello had no answer: log why, as far as the socket shows the cause.
 struct ReportUnreachable {};
 /// A line for the log.
@@ -62,8 +60,72 @@ struct Finish {
 };
 
 using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, SolveTrace,
-                            CancelTrace, DropTraces, ReportUnreachable, Note, Finish>;
+                            CancelTrace, ReportUnreachable, Note, Finish>;
 using Effects = std::vector<Effect>;
+
+// ---- Results on their way
+// -------------------------------------------------------------------------
+
+/// How much of what is solved is kept and sent.
+struct OutboxLimits {
+  /// With so many results not acknowledged, or so many bytes of them, no more are solved.
+  std::size_t unacknowledged_results = 50'000;
+  std::size_t unacknowledged_bytes = std::size_t{64} << 20U;
+  /// Of those, so many messages and bytes are on their way at a time; the others wait here, so that
+  /// what was solved while the server was away does not come upon it all at once.
+  std::size_t messages_on_their_way = 256;
+  std::size_t bytes_on_their_way = std::size_t{8} << 20U;
+};
+
+/// Results that the server has not acknowledged, in the order of their sequence numbers: those on
+/// their way, then those that wait.
+class Outbox {
+ public:
+  explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}
+
+  /// Gives the results the next sequence number and keeps them.
+  void add(protocol::Results results);
+  /// The next results to send, which are on their way from now on; nothing while none waits or
+  /// enough are on their way.
+  const protocol::Results* next_to_send();
+  /// The server has them. A number that is not kept is passed over.
+  void acknowledged(std::uint64_t sequence);
+  void drop_study(std::uint64_t study_id);
+  void drop_all();
+  /// Nothing is on its way any more, nor does any lease end with these results.
+  void start_over();
+
+  bool is_empty() const { return unacknowledged_.empty(); }
+  /// Whether any results are not even on their way.
+  bool has_waiting() const { return on_their_way_ < unacknowledged_.size(); }
+  bool is_full() const {
+    return results_ >= limits_.unacknowledged_results || bytes_ >= limits_.unacknowledged_bytes;
+  }
+  std::size_t results() const { return results_; }
+  /// Calls `see` with all that are kept.
+  template <class See>
+  void for_each(const See& see) const {
+    for (const Message& message : unacknowledged_) {
+      see(message.results);
+    }
+  }
+
+ private:
+  struct Message {
+    protocol::Results results;
+    std::size_t bytes;
+    bool on_its_way;  ///< sent in this session
+  };
+  void forget(const Message& message);
+
+  const OutboxLimits limits_;
+  std::deque<Message> unacknowledged_;
+  std::size_t results_ = 0;
+  std::size_t bytes_ = 0;
+  std::size_t on_their_way_ = 0;        // messages
+  std::size_t bytes_on_their_way_ = 0;  // of those
+  std::uint64_t next_sequence_ = 1;
+};
 
 // ---- The conversation ---------------------------------------------------------------------------
 
@@ -78,9 +140,8 @@ struct ExitSettings {
 };
 
 struct ConversationSettings {
-  std::string server = "the server";  ///< its address, for messages
-  std::uint32_t batches_held = 2;     ///< one is solved, the next waits ready
-  OutboxLimits outbox;
+  std::uint32_t batches_held = 2;  ///< one is solved, the next waits ready
+  OutboxLimits outbox = {};
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< then another one begins
   std::size_t most_bytes_a_result = std::size_t{1} << 20U;
@@ -95,7 +156,7 @@ struct ConversationSettings {
   /// A request to stop that follows so soon is part of the one before: Slurm sends SIGTERM twice
   /// within milliseconds to jobs that it preempts.
   std::int64_t stop_repeats_ms = 1000;
-  ExitSettings exit;
+  ExitSettings exit = {};
 };
 
 /// The worker's side of the conversation with the server (proto/protocol.md): decides what follows
@@ -104,7 +165,9 @@ struct ConversationSettings {
 /// events.
 class Conversation {
  public:
-  Conversation(protocol::WorkerHello hello, ConversationSettings settings);
+  /// `server` is its address, for messages.
+  Conversation(protocol::WorkerHello hello, ConversationSettings settings,
+               std::string server = "the server");
 
   /// To be called once, first.
   Effects start(std::int64_t now_ms);
@@ -149,23 +212,18 @@ class Conversation {
   void connect(const std::string& reason);
   void connect_after_backoff(const std::string& reason);
   void on(const protocol::Welcome& welcome);
-  void on(const protocol::Refused& refused);
   void on(const protocol::StudyDefinition& definition);
   void on(const protocol::Batch& batch);
   void on(const protocol::ResultsStored& stored);
   void on(const protocol::Withdraw& withdraw);
   void on(const protocol::Release& release);
   void on(const protocol::TraceOrder& order);
-  void on(const protocol::HelloAgain& again);
-  void on(const protocol::HeartbeatReply& reply);
-  void on(const protocol::ServerStopping& stopping);
 
   void report(Progress& progress);
   void deliver();
   void send(protocol::WorkerMessage message);
   void send_heartbeat();
   void give_credit();
-  void give_back_batches();
   std::int64_t exit_ms() const;
   std::int64_t idle_exit_ms() const;
   void exit_if_due();
@@ -177,6 +235,7 @@ class Conversation {
 
   const protocol::WorkerHello hello_;
   const ConversationSettings settings_;
+  const std::string server_;
 
   State state_ = State::kWaiting;
   std::int64_t now_ms_ = 0;

@@ -26,10 +26,12 @@
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/system/available_memory.h"
-#include "worker/point_solver.h"
 #include "worker/session.h"
+#include "worker/solver/fall_cache.h"
 #include "worker/solver/model/fall_model.h"
+#include "worker/solver/point_runs.h"
 #include "worker/solver/solve.h"
+#include "worker/trace_solver.h"
 
 namespace {
 
@@ -131,7 +133,7 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t 
     fall_memory_bytes =
         oblique::protocol::available_memory_bytes() / oblique::solver::kFallsPartOfMemory;
   }
-  oblique::worker::PointSolver points(fall_memory_bytes);
+  oblique::solver::FallCache falls(fall_memory_bytes);
   const oblique::worker::Session* running = nullptr;
   settings.on_turn = [&] {
     notifier.status(running->status());
@@ -139,10 +141,12 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t 
   };
   oblique::worker::Session session(
       settings,
-      [&](const auto& batch, const auto& next, const auto& take) {
-        points.solve(batch, next, take);
+      [&](const auto& batch, auto& points, const auto& take) {
+        oblique::solver::solve_points_of_models(points, falls, batch.points().wants_errors(), take);
       },
-      [&](const auto& order, const auto& sink) { return points.trace(order, sink); });
+      [&](const auto& order, const auto& sink) {
+        return oblique::worker::solve_trace(order, sink, falls);
+      });
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
                settings.threads, settings.server);

@@ -53,12 +53,6 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   return hello;
 }
 
-ConversationSettings conversation_settings(const SessionSettings& settings) {
-  ConversationSettings conversation = settings.conversation;
-  conversation.server = settings.server;
-  return conversation;
-}
-
 template <class... Handlers>
 struct Overloaded : Handlers... {
   using Handlers::operator()...;
@@ -70,25 +64,22 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace)
     : settings_(std::move(settings)),
-      conversation_(hello_of(settings_), conversation_settings(settings_)),
+      conversation_(hello_of(settings_), settings_.conversation, settings_.server),
       solver_(
           std::move(solve), [this] { news_.wake(); }, settings_.threads),
       tracer_(std::move(trace), [this] { news_.wake(); }) {}
 
 Session::~Session() = default;
 
-protocol::DealerSettings Session::dealer_settings() const {
-  return {.url = settings_.server,
-          .example_url = SessionSettings().server,
-          .linger_ms = kLinger_ms,
-          .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
-          .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms),
-          .is_worker = true,
-          .key = settings_.key};
-}
-
 void Session::open_socket() {
-  const protocol::DealerSettings settings = dealer_settings();
+  const protocol::DealerSettings settings{
+      .url = settings_.server,
+      .example_url = SessionSettings().server,
+      .linger_ms = kLinger_ms,
+      .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
+      .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms),
+      .is_worker = true,
+      .key = settings_.key};
   link_.reset();
   link_.emplace(context_, settings);
   if (!std::exchange(was_heard_, false)) {
@@ -97,32 +88,21 @@ void Session::open_socket() {
   protocol::connect(link_->socket, settings, attempt_);
 }
 
-void Session::note_rejection() {
-  if (const auto rejection = link_->monitor.rejection()) {
-    apply(conversation_.on_rejected(*rejection, now_ms()));
-  }
-}
-
-std::string Session::cause_of_silence() {
+void Session::report_unreachable() {
   // In the time that a hello is waited for, attempts that are refused are more, those that nothing
   // answers fewer.
   constexpr unsigned kManyAttempts = 4;
   const auto attempts = link_->monitor.attempts();
-  if (attempts.was_accepted) {
-    return "connections are accepted, but no worker is welcomed: is this its port for workers?";
-  }
   const std::string host = protocol::host_of(settings_.server);
   const auto [has_v4, has_v6] = protocol::families_of(host);
-  if (!host.empty() && !has_v4 && !has_v6) {
-    return fmt::format("no address is known here for the name {}", host);
-  }
-  return attempts.failed >= kManyAttempts
-             ? "connections fail at once: is it running there?"
-             : "attempts to connect get no answer: does a firewall drop them?";
-}
-
-void Session::report_unreachable() {
-  const std::string cause = cause_of_silence();
+  const std::string cause =
+      attempts.was_accepted
+          ? "connections are accepted, but no worker is welcomed: is this its port for workers?"
+      : !host.empty() && !has_v4 && !has_v6
+          ? fmt::format("no address is known here for the name {}", host)
+      : attempts.failed >= kManyAttempts
+          ? "connections fail at once: is it running there?"
+          : "attempts to connect get no answer: does a firewall drop them?";
   if (reported_causes_.insert(cause).second) {
     spdlog::warn("no server answers at {} ({}); trying again", settings_.server, cause);
   }
@@ -135,8 +115,10 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
                                {nullptr, news_.descriptor(), ZMQ_POLLIN, 0},
                                {nullptr, stop_descriptor, ZMQ_POLLIN, 0},
                                {link_->monitor.handle(), 0, ZMQ_POLLIN, 0}};
+    const std::int64_t due_ms = std::min(conversation_.next_deadline_ms(), report_due_ms_);
     try {
-      zmq::poll(items, std::size(items), std::chrono::milliseconds(poll_timeout_ms()));
+      zmq::poll(items, std::size(items),
+                std::chrono::milliseconds(std::max<std::int64_t>(due_ms - now_ms(), 0)));
     } catch (const zmq::error_t& error) {
       if (error.num() != EINTR) {
         throw;
@@ -147,7 +129,9 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
       settings_.on_turn();
     }
     receive_all();
-    note_rejection();
+    if (const auto rejection = link_->monitor.rejection()) {
+      apply(conversation_.on_rejected(*rejection, now_ms()));
+    }
     if ((items[1].revents & ZMQ_POLLIN) != 0 || now_ms() >= report_due_ms_) {
       news_.clear();
       report_progress();
@@ -167,11 +151,6 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
   link_.reset();
   context_.close();  // waits for the goodbye, no longer than the socket lingers
   return *exit_code_;
-}
-
-std::int64_t Session::poll_timeout_ms() const {
-  return std::max<std::int64_t>(
-      std::min(conversation_.next_deadline_ms(), report_due_ms_) - now_ms(), 0);
 }
 
 void Session::report_progress() {
@@ -234,10 +213,12 @@ void Session::apply(Effects effects) {
       [&](Solve& effect) { solver_.add(std::move(effect.batch)); },
       [&](const DropStudy& effect) { solver_.drop_study(effect.study_id); },
       [&](const DropBatch& effect) { solver_.drop_batch(effect.number); },
-      [&](const DropAll&) { solver_.drop_all(); },
+      [&](const DropAll&) {
+        solver_.drop_all();
+        tracer_.drop_all();
+      },
       [&](SolveTrace& effect) { tracer_.take(std::move(effect.order)); },
       [&](const CancelTrace& effect) { tracer_.cancel(effect.trace_id); },
-      [&](const DropTraces&) { tracer_.drop_all(); },
       [&](const ReportUnreachable&) { report_unreachable(); },
       [&](const Note& note) {
         spdlog::log(note.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", note.text);

@@ -62,17 +62,13 @@ class Session {
     protocol::SocketMonitor monitor;
   };
 
-  protocol::DealerSettings dealer_settings() const;
   void open_socket();
-  void note_rejection();
   void report_unreachable();
-  std::string cause_of_silence();
   void apply(Effects effects);
   /// False when the message could not be handed to the socket.
   bool send(const protocol::WorkerMessage& message);
   void receive_all();
   void report_progress();
-  std::int64_t poll_timeout_ms() const;
 
   const SessionSettings settings_;
   zmq::context_t context_;

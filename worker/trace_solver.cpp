@@ -1,9 +1,13 @@
 #include "worker/trace_solver.h"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
+#include "proto/recipe/model_message.h"
+#include "worker/solver/estimate.h"
 #include "worker/solver/model/trace_columns.h"
+#include "worker/solver/solve.h"
 
 namespace oblique::worker {
 namespace {
@@ -23,55 +27,31 @@ TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
       most_bytes_(most_bytes) {}
 
 std::size_t TraceRows::most_rows() const {
-  return most_bytes_ / (row_numbers_ * sizeof(double) + 1);
+  return most_bytes_ / row_bytes_;
 }
 
 void TraceRows::add(const solver::TraceRow& row) {
-  if (!kept_.empty() && !stays(kept_.back())) {
-    remove_last();  // it was kept as the last one
+  if (!rows_.empty() && !stays(rows_.back())) {
+    rows_.pop_back();  // it was kept as the last one
   }
   const bool falls = row.state == solver::kFalling;
   const bool is_always_kept = falls || solver::ends_phase(last_state_, row.state);
-  kept_.push_back({instants_, is_always_kept});
-  states_.push_back(static_cast<char>(solver::code_of_state(row.state)));
-  const std::size_t before = values_.size();
-  solver::append_numbers(row, values_);
-  row_numbers_ = values_.size() - before;
+  rows_.push_back(
+      {instants_, is_always_kept, static_cast<char>(solver::code_of_state(row.state)), {}});
+  solver::append_numbers(row, rows_.back().numbers);
+  row_bytes_ = rows_.back().numbers.size() * sizeof(double) + 1;
   instants_ += falls ? 0U : 1U;
   always_kept_ += is_always_kept ? 1U : 0U;
   last_state_ = row.state;
-  while (chooses_every_ && kept_.size() > most_rows() && every_ < instants_) {
+  while (chooses_every_ && rows_.size() > most_rows() && every_ < instants_) {
     every_ *= 2;
-    thin();
+    std::erase_if(rows_,
+                  [this](const Row& kept) { return !stays(kept) && &kept != &rows_.back(); });
   }
-  if (kept_.size() > most_rows()) {  // the rest is only counted
+  if (rows_.size() > most_rows()) {  // the rest is only counted
     is_too_long_ = true;
-    remove_last();
+    rows_.pop_back();
   }
-}
-
-void TraceRows::remove_last() {
-  kept_.pop_back();
-  states_.pop_back();
-  values_.resize(values_.size() - row_numbers_);
-}
-
-void TraceRows::thin() {
-  std::size_t to = 0;
-  for (std::size_t from = 0; from < kept_.size(); ++from) {
-    if (!stays(kept_[from]) && from + 1 < kept_.size()) {
-      continue;
-    }
-    kept_[to] = kept_[from];
-    states_[to] = states_[from];
-    const auto row = values_.begin() + static_cast<std::ptrdiff_t>(from * row_numbers_);
-    std::copy(row, row + static_cast<std::ptrdiff_t>(row_numbers_),
-              values_.begin() + static_cast<std::ptrdiff_t>(to * row_numbers_));
-    ++to;
-  }
-  kept_.resize(to);
-  states_.resize(to);
-  values_.resize(to * row_numbers_);
 }
 
 void TraceRows::move_to(protocol::Trace& trace) {
@@ -84,8 +64,31 @@ void TraceRows::move_to(protocol::Trace& trace) {
     trace.set_every(room == 0 ? instants_ + 1 : (instants_ + room - 1) / room);
     return;
   }
-  trace.mutable_values()->Add(values_.begin(), values_.end());
-  trace.set_states(std::move(states_));
+  for (const Row& row : rows_) {
+    trace.mutable_values()->Add(row.numbers.begin(), row.numbers.end());
+    trace.mutable_states()->push_back(row.state);
+  }
+}
+
+protocol::PointResult solve_trace(const protocol::TraceOrder& order,
+                                  const solver::Tracing::Sink& sink, solver::FallCache& falls) {
+  constexpr std::uint64_t kNumber = 0;
+  try {
+    const solver::ModelParameters model = protocol::from_message(order.model());
+    const solver::FallOutcome fall = falls.fall(model);
+    if (!fall.fallen) {
+      return protocol::failed_point(kNumber, fall.error);
+    }
+    solver::CaseResult result =
+        solver::Finger(model, fall.fallen)
+            .solve(order.h_m(), order.mu(), order.e_star(), {sink, order.shape(), order.fall()});
+    if (order.errors()) {
+      result.errors = solver::errors_by_companion(model, result, falls);
+    }
+    return protocol::to_message(kNumber, result);
+  } catch (const std::exception& error) {
+    return protocol::failed_point(kNumber, error.what());
+  }
 }
 
 TraceSolver::TraceSolver(Solve solve, std::function<void()> has_trace, std::size_t most_bytes)

@@ -13,6 +13,7 @@
 
 #include "proto/oblique.pb.h"
 #include "proto/result_message.h"
+#include "worker/solver/fall_cache.h"
 #include "worker/solver/model/trace.h"
 
 namespace oblique::worker {
@@ -30,28 +31,32 @@ class TraceRows {
   void move_to(protocol::Trace& trace);
 
  private:
-  struct Kept {
+  struct Row {
     std::uint64_t instant;  ///< of the contact
     bool is_always_kept;
+    char state;
+    std::vector<double> numbers;
   };
 
-  bool stays(const Kept& row) const { return row.is_always_kept || row.instant % every_ == 0; }
+  bool stays(const Row& row) const { return row.is_always_kept || row.instant % every_ == 0; }
   std::size_t most_rows() const;
-  void remove_last();
-  void thin();
 
   std::uint64_t every_;
   const bool chooses_every_;
   const std::size_t most_bytes_;
-  std::size_t row_numbers_ = 0;
+  std::size_t row_bytes_ = 1;
   std::uint64_t instants_ = 0;
   std::uint64_t always_kept_ = 0;  ///< rows
   std::string last_state_;
   bool is_too_long_ = false;
-  std::vector<Kept> kept_;
-  std::string states_;
-  std::vector<double> values_;
+  std::vector<Row> rows_;
 };
+
+/// Solves the point of an order over a fall of `falls` and gives its instants to `sink`: the same
+/// bits as in a batch. The result's number is 0. Nothing is thrown for a point without an answer,
+/// nor for an order that makes no sense: it fails.
+protocol::PointResult solve_trace(const protocol::TraceOrder& order,
+                                  const solver::Tracing::Sink& sink, solver::FallCache& falls);
 
 /// Solves points for traces, one at a time, on a thread of its own beside those of the batches.
 class TraceSolver {

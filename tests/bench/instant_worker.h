@@ -6,10 +6,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
-#include <utility>
 
-#include "proto/recipe/point_table.h"
-#include "proto/result_message.h"
 #include "worker/session.h"
 #include "worker/solver/solve.h"
 
@@ -24,15 +21,11 @@ class InstantWorker {
     settings.name = "instant";
     settings.report_interval_ms = 10;
     thread_ = std::thread([this, settings] {
-      worker::Session session(settings,
-                              [this](const auto& batch, const auto& next, const auto& take) {
-                                while (const auto position = next()) {
-                                  protocol::PointResult result = result_;
-                                  result.set_point(batch.point_at(*position));
-                                  protocol::set_inputs(result, batch.points());
-                                  take(std::move(result));
-                                }
-                              });
+      worker::Session session(settings, [this](const auto&, auto& points, const auto& take) {
+        while (const auto position = points.next()) {
+          take({*position, result_, {}});
+        }
+      });
       session.run(stop_, [] {});
     });
   }
@@ -46,8 +39,7 @@ class InstantWorker {
   InstantWorker& operator=(const InstantWorker&) = delete;
 
  private:
-  const protocol::PointResult result_ =
-      protocol::to_message(0, solver::Finger(solver::preset("paper")).solve(1.0, 0.4, 0.8));
+  const solver::CaseResult result_ = solver::Finger(solver::preset("paper")).solve(1.0, 0.4, 0.8);
   int stop_;
   std::thread thread_;
 };

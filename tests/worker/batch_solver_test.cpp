@@ -5,15 +5,16 @@
 #include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "proto/result_message.h"
 #include "tests/support/points.h"
 #include "worker/solver/point_runs.h"
 
@@ -33,19 +34,6 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
                            protocol::listed("e", {1.0})},
                           where)}));
   return {1, 7, ranges, points};
-}
-
-/// What was solved of the one batch of which there is progress, and which has ended.
-std::set<std::uint64_t> points_of_one_batch(const std::vector<Progress>& progress) {
-  EXPECT_EQ(progress.size(), 1U);
-  std::set<std::uint64_t> solved;
-  for (const Progress& batch : progress) {
-    EXPECT_TRUE(batch.batch_done);
-    for (const auto& result : batch.results) {
-      solved.insert(result.point());
-    }
-  }
-  return solved;
 }
 
 /// Lets the test decide when each point ends.
@@ -80,6 +68,16 @@ class Gate {
   int open_ = 0;
 };
 
+/// Fails all points of a source, and calls `before` before each.
+void fail_all(
+    solver::PointSource& points, const solver::TakeOutcome& take,
+    const std::function<void()>& before = [] {}) {
+  while (const auto point = points.next()) {
+    before();
+    take({*point, std::nullopt, "for the test"});
+  }
+}
+
 /// A batch solver whose points are solved when the test says so.
 class BatchSolverTest : public ::testing::Test {
  protected:
@@ -94,11 +92,8 @@ class BatchSolverTest : public ::testing::Test {
   std::mutex mutex_;
   std::condition_variable changed_;
   int batches_ended_ = 0;
-  BatchSolver solver_{[this](const Batch& of, const auto& next, const auto& take) {
-                        while (const auto point = next()) {
-                          gate_.pass();
-                          take(protocol::failed_point(of.point_at(*point), "for the test"));
-                        }
+  BatchSolver solver_{[this](const Batch&, auto& points, const auto& take) {
+                        fail_all(points, take, [this] { gate_.pass(); });
                       },
                       [this] {
                         const std::lock_guard lock(mutex_);
@@ -122,61 +117,40 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
   EXPECT_TRUE(solver_.collect().empty());
 }
 
-TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutArePassedOver) {
+TEST_F(BatchSolverTest, PointsOfItsRangesAreSolvedInOrderAndThoseThatAFilterLeavesOutAreNamed) {
+  struct Case {
+    std::vector<Batch::Range> ranges;
+    const char* where;
+    std::vector<std::uint64_t> solved;
+    std::vector<std::uint64_t> left_out;
+  };
+  const Case cases[] = {
+      {{{30, 32}, {7, 8}, {10, 12}}, "mu >= 0", {30, 31, 7, 10, 11}, {}},
+      {{{8, 13}, {5, 6}, {20, 22}}, "floor(mu / 10) == mu / 10", {10, 20}, {8, 9, 11, 12, 5, 21}},
+      {{{99, 102}, {119, 120}, {200, 201}}, "mu < 120", {99, 100, 101, 119}, {200}},
+      {{{3, 5}}, "mu > 900", {}, {3, 4}},
+  };
   gate_.open(1000);
-  solver_.add(filtered_batch({{100, 400}}, "floor(mu / 10) == mu / 10 && mu < 200"));
-  wait_batches_ended(1);
-  EXPECT_EQ(points_of_one_batch(solver_.collect()),
-            (std::set<std::uint64_t>{100, 110, 120, 130, 140, 150, 160, 170, 180, 190}));
-}
-
-TEST_F(BatchSolverTest, OfTheRangesOfABatchThatIsSolvedWhichAFilterLeavesIn) {
-  gate_.open(1000);
-  const Batch scattered =
-      filtered_batch({{339, 400}, {100, 101}, {105, 131}}, "floor(mu / 10) == mu / 10");
-  solver_.add(scattered);
-  wait_batches_ended(1);
-  EXPECT_EQ(points_of_one_batch(solver_.collect()),
-            (std::set<std::uint64_t>{100, 110, 120, 130, 340, 350, 360, 370, 380, 390}));
-}
-
-TEST_F(BatchSolverTest, PointsThatAFilterLeavesOutAreNamed) {
-  gate_.open(1000);
-  solver_.add(filtered_batch({{8, 13}, {5, 6}, {20, 22}}, "floor(mu / 10) == mu / 10"));
-  wait_batches_ended(1);
-  const auto progress = solver_.collect();
-  ASSERT_EQ(progress.size(), 1U);
-  std::vector<std::uint64_t> left_out;
-  for (const Batch::Range& range : progress[0].left_out) {
-    for (std::uint64_t point = range.begin; point < range.end; ++point) {
-      left_out.push_back(point);
+  int batches = 0;
+  for (const Case& c : cases) {
+    solver_.add(filtered_batch(c.ranges, c.where));
+    wait_batches_ended(++batches);
+    const auto progress = solver_.collect();
+    ASSERT_EQ(progress.size(), 1U);
+    EXPECT_TRUE(progress[0].batch_done);
+    std::vector<std::uint64_t> solved;
+    for (const auto& result : progress[0].results) {
+      solved.push_back(result.point());
     }
+    EXPECT_EQ(solved, c.solved) << c.where;
+    std::vector<std::uint64_t> left_out;
+    for (const Batch::Range& range : progress[0].left_out) {
+      for (std::uint64_t point = range.begin; point < range.end; ++point) {
+        left_out.push_back(point);
+      }
+    }
+    EXPECT_EQ(left_out, c.left_out) << c.where;
   }
-  EXPECT_EQ(left_out, (std::vector<std::uint64_t>{8, 9, 11, 12, 5, 21}));
-  EXPECT_EQ(size_of(progress[0].left_out), 6U);
-  EXPECT_EQ(progress[0].results.size(), 2U);
-}
-
-TEST_F(BatchSolverTest, RangesAreSolvedInTheOrderInWhichTheyAreGiven) {
-  gate_.open(1000);
-  solver_.add({1, 7, {{30, 32}, {7, 8}, {10, 12}}, server::table_of(100)});
-  wait_batches_ended(1);
-  const auto progress = solver_.collect();
-  ASSERT_EQ(progress.size(), 1U);
-  std::vector<std::uint64_t> solved;
-  for (const auto& result : progress[0].results) {
-    solved.push_back(result.point());
-  }
-  EXPECT_EQ(solved, (std::vector<std::uint64_t>{30, 31, 7, 10, 11}));
-}
-
-TEST_F(BatchSolverTest, ABatchOfWhichNothingIsLeftInEndsWithoutAResult) {
-  solver_.add(filtered_batch({{0, 500}}, "mu > 900"));
-  wait_batches_ended(1);
-  const auto progress = solver_.collect();
-  ASSERT_EQ(progress.size(), 1U);
-  EXPECT_TRUE(progress[0].batch_done);
-  EXPECT_TRUE(progress[0].results.empty());
 }
 
 TEST_F(BatchSolverTest, PartOfABatchCanBeCollectedWhileItIsSolved) {
@@ -265,11 +239,8 @@ TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
   std::atomic<int> begun{0};
   {
     BatchSolver paused(
-        [&begun](const Batch& of, const auto& next, const auto& take) {
-          while (const auto point = next()) {
-            ++begun;
-            take(protocol::failed_point(of.point_at(*point), "for the test"));
-          }
+        [&begun](const Batch&, auto& points, const auto& take) {
+          fail_all(points, take, [&begun] { ++begun; });
         },
         [] {});
     paused.set_paused(true);
@@ -279,14 +250,9 @@ TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
 }
 
 TEST_F(BatchSolverTest, SeveralThreadsShareABatch) {
-  BatchSolver shared(
-      [this](const Batch& of, const auto& next, const auto& take) {
-        while (const auto point = next()) {
-          gate_.pass();
-          take(protocol::failed_point(of.point_at(*point), "for the test"));
-        }
-      },
-      [] {}, 3);
+  BatchSolver shared([this](const Batch&, auto& points,
+                            const auto& take) { fail_all(points, take, [this] { gate_.pass(); }); },
+                     [] {}, 3);
   shared.add(batch(1, 0, 3));
   gate_.wait_begun(3);
   EXPECT_TRUE(shared.collect().empty()) << "none has ended, and all three are begun";
@@ -307,17 +273,16 @@ TEST_F(BatchSolverTest, AThreadThatIsFreePassesOverADroppedBatchThatAnotherStill
   std::atomic<int> taken_up{0};
   std::atomic<bool> next_is_solved{false};
   BatchSolver shared(
-      [&](const Batch& at_hand, const auto& next, const auto& take) {
+      [&](const Batch& at_hand, auto& points, const auto& take) {
         if (at_hand.number() == 1 && ++taken_up > 2) {
           ADD_FAILURE() << "a dropped batch is taken up";
           std::abort();  // and would be without end
         }
-        while (const auto point = next()) {
+        fail_all(points, take, [&] {
           if (at_hand.number() == 1) {
             dropped_batch.pass();
           }
-          take(protocol::failed_point(at_hand.point_at(*point), "for the test"));
-        }
+        });
         if (at_hand.number() == 2) {
           next_is_solved = true;
           next_is_solved.notify_all();
@@ -338,18 +303,13 @@ TEST(BatchSolver, EveryPointOfManyBatchesIsSolvedOnceHoweverManyThreads) {
   std::mutex mutex;
   std::condition_variable changed;
   std::uint64_t ended = 0;
-  BatchSolver solver(
-      [](const Batch& of, const auto& next, const auto& take) {
-        while (const auto point = next()) {
-          take(protocol::failed_point(of.point_at(*point), "for the test"));
-        }
-      },
-      [&] {
-        const std::lock_guard lock(mutex);
-        ++ended;
-        changed.notify_all();
-      },
-      4);
+  BatchSolver solver([](const Batch&, auto& points, const auto& take) { fail_all(points, take); },
+                     [&] {
+                       const std::lock_guard lock(mutex);
+                       ++ended;
+                       changed.notify_all();
+                     },
+                     4);
   std::uint64_t first = 0;
   for (std::uint64_t number = 1; number <= kBatches; ++number) {
     solver.add(batch(number, first, 13 * number));

@@ -106,6 +106,21 @@ class ConversationTest : public ::testing::Test {
     receive(study_message(7));
   }
 
+  /// The same by these settings, and holds lease 31, points 0 to 9 of that study.
+  void join_with_batch(const ConversationSettings& settings = {}) {
+    use(settings);
+    join();
+    receive(batch_message(7, 31));
+  }
+
+  /// The server asks for a hello and welcomes the worker once more.
+  void rejoin(const std::string& database_id = "db") {
+    receive(hello_again_message());
+    receive(welcome_message(database_id));
+  }
+
+  void stop() { take(conversation_->stop(now_ms_)); }
+
   void pass(std::int64_t duration_ms) {
     now_ms_ += duration_ms;
     take(conversation_->on_time(now_ms_));
@@ -165,6 +180,11 @@ class ConversationTest : public ::testing::Test {
       batches += message.credit().batches();
     }
     return batches;
+  }
+
+  /// Nothing before the conversation is over.
+  std::optional<int> exit_code() const {
+    return finish() ? std::optional(finish()->exit_code) : std::nullopt;
   }
 
   std::optional<Finish> finish() const {

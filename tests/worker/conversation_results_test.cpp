@@ -22,8 +22,7 @@ protocol::Trace trace_of(std::uint64_t id) {
 }
 
 TEST_F(ConversationTest, ResultsAreNumberedFromOneAndTheLastOfABatchSaysSo) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 4, false);
   ASSERT_EQ(sent_results().size(), 1U);
   protocol::Results results = sent_results()[0];
@@ -42,8 +41,7 @@ TEST_F(ConversationTest, ResultsAreNumberedFromOneAndTheLastOfABatchSaysSo) {
 }
 
 TEST_F(ConversationTest, ABatchThatEndsWithNothingNewIsStillSaidToBeDone) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 10, false);
   solve(1, 10, 0, true);
   ASSERT_EQ(sent_results().size(), 1U);
@@ -52,11 +50,7 @@ TEST_F(ConversationTest, ABatchThatEndsWithNothingNewIsStillSaidToBeDone) {
 }
 
 TEST_F(ConversationTest, ManyResultsAreSplitAndOnlyTheLastMessageEndsTheBatch) {
-  ConversationSettings settings;
-  settings.results_a_message = 4;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch({.results_a_message = 4});
   solve(1, 0, 10, true);
   const auto results = sent_results();
   ASSERT_EQ(results.size(), 3U);
@@ -74,41 +68,25 @@ TEST_F(ConversationTest, ManyResultsAreSplitAndOnlyTheLastMessageEndsTheBatch) {
   EXPECT_NEAR(busy_s, 0.5, 1e-12);
 }
 
-TEST_F(ConversationTest, AMessageStaysBelowItsSizeInBytes) {
-  ConversationSettings settings;
-  settings.bytes_a_message = 100;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
+TEST_F(ConversationTest, AMessageStaysBelowItsSizeInBytesAndALargeResultGoesAlone) {
+  join_with_batch({.bytes_a_message = 100});
   solve(1, 0, 10, true);
   EXPECT_GT(sent_results().size(), 1U);
   for (const auto& results : sent_results()) {
     EXPECT_LT(results.ByteSizeLong(), 200U);
   }
-}
-
-TEST_F(ConversationTest, AResultOfMoreThanAMessageUsuallyHasGoesAlone) {
-  ConversationSettings settings;
-  settings.bytes_a_message = 10;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch({.bytes_a_message = 10});
   solve(1, 0, 10, true);
   ASSERT_EQ(sent_results().size(), 10U);
   EXPECT_EQ(sent_results()[0].results(0).error(), "for the test") << "as it was solved";
 }
 
 TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
-  ConversationSettings settings;
-  settings.most_bytes_a_result = 100;
-  use(settings);
+  use({.most_bytes_a_result = 100});
   join();
   receive(batch_message(7, 31, 0, 1));
-  Progress progress{1, 7, {}, 0.1, true};
-  progress.results.push_back(protocol::failed_point(0, std::string(1000, 'x')));
-  std::vector<Progress> all;
-  all.push_back(std::move(progress));
-  take(conversation_->on_progress(std::move(all), now_ms_));
+  take(conversation_->on_progress(
+      {{1, 7, {protocol::failed_point(0, std::string(1000, 'x'))}, 0.1, true}}, now_ms_));
   ASSERT_EQ(sent_results().size(), 1U);
   EXPECT_EQ(sent_results()[0].results(0).error(), "its result is too large to send");
 }
@@ -116,9 +94,9 @@ TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
 TEST_F(ConversationTest, PointsThatAFilterLeavesOutAreNamedAsRangesOfTheirBatch) {
   join();
   receive(batch_message(7, 31, 0, 10));
-  std::vector<Progress> all;
-  all.push_back({1, 7, {protocol::failed_point(3, "for the test")}, 0.1, true, {{0, 3}, {4, 10}}});
-  take(conversation_->on_progress(std::move(all), now_ms_));
+  take(conversation_->on_progress(
+      {{1, 7, {protocol::failed_point(3, "for the test")}, 0.1, true, {{0, 3}, {4, 10}}}},
+      now_ms_));
   ASSERT_EQ(sent_results().size(), 1U);
   const protocol::Results results = sent_results()[0];
   EXPECT_EQ(results.lease_id(), 31U);
@@ -135,9 +113,7 @@ TEST_F(ConversationTest, ManyRangesGoInSeveralMessagesOfWhichTheLastEndsTheBatch
   for (std::uint64_t point = 0; point < 100'000; point += 4) {
     ranges.push_back({point, point + 1});
   }
-  std::vector<Progress> all;
-  all.push_back({1, 7, {}, 0.1, true, ranges});
-  take(conversation_->on_progress(std::move(all), now_ms_));
+  take(conversation_->on_progress({{1, 7, {}, 0.1, true, ranges}}, now_ms_));
   int numbers = 0;
   ASSERT_GT(sent_results().size(), 1U);
   for (const protocol::Results& results : sent_results()) {
@@ -150,13 +126,11 @@ TEST_F(ConversationTest, ManyRangesGoInSeveralMessagesOfWhichTheLastEndsTheBatch
 }
 
 TEST_F(ConversationTest, UnacknowledgedResultsAreDeliveredAgainBeforeCreditIsGiven) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 4, false);
   solve(1, 4, 3, false);
   receive(stored_message(1));
-  receive(hello_again_message());
-  receive(welcome_message());
+  rejoin();
   const auto sends = effects_of<Send>();
   ASSERT_EQ(sends.size(), 2U);
   EXPECT_EQ(sends[0].message.results().sequence(), 2U);
@@ -165,19 +139,16 @@ TEST_F(ConversationTest, UnacknowledgedResultsAreDeliveredAgainBeforeCreditIsGiv
 }
 
 TEST_F(ConversationTest, ResultsOfAnEarlierSessionBelongToNoLease) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 10, true);
-  receive(hello_again_message());
-  receive(welcome_message());
+  rejoin();
   ASSERT_EQ(sent_results().size(), 1U);
   EXPECT_EQ(sent_results()[0].lease_id(), 0U);
   EXPECT_FALSE(sent_results()[0].batch_done());
 }
 
 TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBefore) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   receive(hello_again_message());
   EXPECT_FALSE(has<DropAll>());
   receive(welcome_message());
@@ -186,10 +157,8 @@ TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBe
 }
 
 TEST_F(ConversationTest, PointsOfADroppedBatchThatWereSolvedAreDeliveredWithoutALease) {
-  join();
-  receive(batch_message(7, 31));
-  receive(hello_again_message());
-  receive(welcome_message());
+  join_with_batch();
+  rejoin();
   receive(study_message(7));
   receive(batch_message(7, 31));  // the server counts its leases anew
   solve(1, 0, 3, false);
@@ -204,8 +173,7 @@ TEST_F(ConversationTest, PointsOfADroppedBatchThatWereSolvedAreDeliveredWithoutA
 }
 
 TEST_F(ConversationTest, PointsSolvedWhileTheServerIsAwayAreKeptAndDeliveredAtTheWelcome) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   receive(hello_again_message());
   solve(1, 0, 10, true);
   EXPECT_TRUE(sent_results().empty());
@@ -216,20 +184,16 @@ TEST_F(ConversationTest, PointsSolvedWhileTheServerIsAwayAreKeptAndDeliveredAtTh
 }
 
 TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverDeliveredToAnother) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 10, true);
-  receive(hello_again_message());
-  receive(welcome_message("another"));
+  rejoin("another");
   EXPECT_TRUE(sent_results().empty());
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
 TEST_F(ConversationTest, APointThatEndsAfterTheDatabaseChangedIsNotDeliveredEither) {
-  join();
-  receive(batch_message(7, 31));
-  receive(hello_again_message());
-  receive(welcome_message("another"));
+  join_with_batch();
+  rejoin("another");
   receive(study_message(7));
   receive(batch_message(7, 31));
   solve(1, 0, 10, false);
@@ -238,41 +202,24 @@ TEST_F(ConversationTest, APointThatEndsAfterTheDatabaseChangedIsNotDeliveredEith
   EXPECT_EQ(sent_results().size(), 1U);
 }
 
-TEST_F(ConversationTest, TooManyUnacknowledgedResultsStopCreditAndSolvingUntilTheyAreStored) {
-  ConversationSettings settings;
-  settings.outbox.unacknowledged_results = 10;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
-  solve(1, 0, 9, false);
-  EXPECT_TRUE(conversation_->may_solve());
-  solve(1, 9, 1, true);
-  EXPECT_FALSE(conversation_->may_solve());
-  EXPECT_EQ(credit_given(), 0U);
-  receive(stored_message(1));
-  EXPECT_TRUE(conversation_->may_solve());
-  EXPECT_EQ(credit_given(), 1U);
-}
-
-TEST_F(ConversationTest, TooManyUnacknowledgedBytesStopSolvingToo) {
-  ConversationSettings settings;
-  settings.outbox.unacknowledged_bytes = 1;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
-  EXPECT_TRUE(conversation_->may_solve());
-  solve(1, 0, 1, false);
-  EXPECT_FALSE(conversation_->may_solve());
-  receive(stored_message(1));
-  EXPECT_TRUE(conversation_->may_solve());
+TEST_F(ConversationTest,
+       TooManyUnacknowledgedResultsOrBytesStopCreditAndSolvingUntilTheyAreStored) {
+  for (const OutboxLimits limits :
+       {OutboxLimits{.unacknowledged_results = 10}, OutboxLimits{.unacknowledged_bytes = 150}}) {
+    join_with_batch({.outbox = limits});
+    solve(1, 0, 1, false);
+    EXPECT_TRUE(conversation_->may_solve());
+    solve(1, 1, 9, true);
+    EXPECT_FALSE(conversation_->may_solve());
+    EXPECT_EQ(credit_given(), 0U);
+    receive(stored_message(2));
+    EXPECT_TRUE(conversation_->may_solve());
+    EXPECT_EQ(credit_given(), 1U);
+  }
 }
 
 TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessagesAtATime) {
-  ConversationSettings settings;
-  settings.outbox.messages_on_their_way = 2;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch({.outbox = {.messages_on_their_way = 2}});
   receive(hello_again_message());
   for (std::uint64_t point = 0; point < 5; ++point) {
     solve(1, point, 1, false);
@@ -293,11 +240,7 @@ TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessag
 }
 
 TEST_F(ConversationTest, BytesOnTheirWayAreBoundedTooAndALargeMessageGoesAlone) {
-  ConversationSettings settings;
-  settings.outbox.bytes_on_their_way = 1;
-  use(settings);
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch({.outbox = {.bytes_on_their_way = 1}});
   solve(1, 0, 1, false);
   EXPECT_EQ(sent_results().size(), 1U);
   solve(1, 1, 1, false);
@@ -307,9 +250,7 @@ TEST_F(ConversationTest, BytesOnTheirWayAreBoundedTooAndALargeMessageGoesAlone) 
 }
 
 TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
-  ConversationSettings settings;
-  settings.outbox.messages_on_their_way = 1;
-  use(settings);
+  use({.outbox = {.messages_on_their_way = 1}});
   join();
   receive(study_message(8));
   receive(batch_message(7, 31));
@@ -323,8 +264,7 @@ TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
 }
 
 TEST_F(ConversationTest, AnAcknowledgementThatComesTwiceOrForNothingChangesNothing) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 4, false);
   solve(1, 4, 4, false);
   receive(stored_message(2));
@@ -358,15 +298,14 @@ TEST_F(ConversationTest, TracesOfAnEarlierSessionAreForgotten) {
   EXPECT_TRUE(sent(WorkerMessage::kTrace).empty()) << "nobody is there to take it";
   pass(1000);  // it connects again
   receive(welcome_message());
-  EXPECT_TRUE(has<DropTraces>());
+  EXPECT_TRUE(has<DropAll>());
 }
 
 TEST_F(ConversationTest, AStoppingWorkerTakesNoTrace) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 1, false);  // it waits for this to be stored
-  take(conversation_->stop(now_ms_));
-  EXPECT_TRUE(has<DropTraces>());
+  stop();
+  EXPECT_TRUE(has<DropAll>());
   receive(trace_order(5));
   EXPECT_FALSE(has<SolveTrace>());
   ASSERT_EQ(sent(WorkerMessage::kTrace).size(), 1U);

@@ -13,15 +13,11 @@ namespace {
 
 using protocol::WorkerMessage;
 
-TEST_F(ConversationTest, TheFirstThingSaidIsHelloOnANewSocket) {
+TEST_F(ConversationTest, TheFirstThingSaidIsHelloAndAWelcomedWorkerAsksForTwoBatches) {
   start();
   ASSERT_EQ(effects_.size(), 2U);
   EXPECT_TRUE(std::holds_alternative<Connect>(effects_[0]));
   EXPECT_EQ(std::get<Send>(effects_[1]).message.hello().name(), "test");
-}
-
-TEST_F(ConversationTest, AWelcomedWorkerAsksForTwoBatches) {
-  start();
   receive(welcome_message());
   EXPECT_EQ(credit_given(), 2U);
 }
@@ -64,48 +60,33 @@ TEST_F(ConversationTest, HeartbeatsGoOnEachIntervalAndNameWhatIsHeld) {
   EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + 1000);
 }
 
-TEST_F(ConversationTest, AHeartbeatNamesALeaseUntilItsLastResultsAreStored) {
-  join();
-  receive(batch_message(7, 31, 0));
+TEST_F(ConversationTest, AHeartbeatNamesALeaseUntilItsLastResultsAreStoredOrBelongToNone) {
+  const auto leases = [this] {
+    pass(1000);
+    const auto beats = sent(WorkerMessage::kHeartbeat);
+    return beats.size() == 1 ? beats[0].heartbeat().lease_ids_size() : -1;
+  };
+  join_with_batch();
   solve(1, 0, 10, true);
-  pass(1000);
-  ASSERT_EQ(sent(WorkerMessage::kHeartbeat).size(), 1U);
-  EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 1);
+  EXPECT_EQ(leases(), 1);
   receive(stored_message(1));
-  pass(1000);
-  ASSERT_EQ(sent(WorkerMessage::kHeartbeat).size(), 1U);
-  EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 0);
-}
-
-TEST_F(ConversationTest, AHeartbeatNamesNoLeaseForResultsThatBelongToNone) {
-  join();
-  receive(batch_message(7, 31));
+  EXPECT_EQ(leases(), 0);
+  join_with_batch();
   solve(1, 0, 10, true);
-  receive(hello_again_message());
-  receive(welcome_message());
-  pass(1000);
-  ASSERT_EQ(sent(WorkerMessage::kHeartbeat).size(), 1U);
-  EXPECT_EQ(sent(WorkerMessage::kHeartbeat)[0].heartbeat().lease_ids_size(), 0);
+  rejoin();
+  EXPECT_EQ(leases(), 0);
 }
 
-TEST_F(ConversationTest, ASilentServerIsMetOnANewSocket) {
+TEST_F(ConversationTest, ASilentServerIsMetOnANewSocketAndAnyMessageShowsThatItLives) {
   join();
-  receive(heartbeat_reply_message());
-  pass(2999);
-  EXPECT_FALSE(has<Connect>());
+  for (int i = 0; i < 10; ++i) {
+    receive(heartbeat_reply_message());
+    pass(2999);
+    EXPECT_FALSE(has<Connect>());
+  }
   pass(1);
   EXPECT_TRUE(has<Connect>());
   EXPECT_EQ(sent(WorkerMessage::kHello).size(), 1U);
-}
-
-TEST_F(ConversationTest, AnyMessageShowsThatTheServerLives) {
-  join();
-  receive(heartbeat_reply_message());
-  for (int i = 0; i < 10; ++i) {
-    pass(1000);
-    EXPECT_FALSE(has<Connect>());
-    receive(heartbeat_reply_message());
-  }
 }
 
 TEST_F(ConversationTest, AHelloWithoutAnswerIsSaidAgainAfterAPauseThatDoublesToTwoSeconds) {
@@ -117,6 +98,7 @@ TEST_F(ConversationTest, AHelloWithoutAnswerIsSaidAgainAfterAPauseThatDoublesToT
     pass(1);
     patience_ms = std::min<std::int64_t>(2 * patience_ms, 12'000);
     EXPECT_FALSE(has<Connect>());
+    EXPECT_TRUE(has<ReportUnreachable>());
     EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + backoff_ms);
     pass(backoff_ms);
     EXPECT_TRUE(has<Connect>());
@@ -139,13 +121,6 @@ TEST_F(ConversationTest, ARejectionThatRepeatsIsToldInFullOnceUntilTheWorkerWasW
   receive(welcome_message());
   take(conversation_->on_rejected("no room", now_ms_));
   EXPECT_EQ(told(), "no room: trying again in 2 s");
-}
-
-TEST_F(ConversationTest, OfAHelloWithoutAnswerTheCauseIsTold) {
-  start();
-  pass(3000);
-  EXPECT_TRUE(has<ReportUnreachable>());
-  EXPECT_FALSE(has<Note>());
 }
 
 TEST_F(ConversationTest, AfterAWelcomeAnAnswerIsAwaitedForThreeSecondsAgain) {
@@ -192,28 +167,37 @@ TEST_F(ConversationTest, ARefusedWorkerEndsWithOneAndTheReason) {
   protocol::ServerToWorker message;
   message.mutable_refused()->set_reason("protocol 2 is spoken here");
   receive(message);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_EQ(exit_code(), 1);
   EXPECT_NE(finish()->reason.find("protocol 2 is spoken here"), std::string::npos);
 }
 
-TEST_F(ConversationTest, ABatchOfAStudyNeverDefinedBeginsTheConversationAnew) {
-  join();
-  receive(heartbeat_reply_message());
-  receive(batch_message(8, 31));
-  EXPECT_FALSE(has<Solve>());
-  EXPECT_TRUE(has<Connect>());
-}
-
-TEST_F(ConversationTest, ABatchBeyondItsStudyBeginsTheConversationAnew) {
-  const auto max = std::numeric_limits<std::uint64_t>::max();
-  for (const auto& batch :
-       {batch_message(7, 31, 95, 6), batch_message(7, 31, 100, 1), batch_message(7, 31, 0, 0),
-        batch_message(7, 31, 50, max), batch_message(7, 31, max, 2)}) {
-    use(ConversationSettings{});
+TEST_F(ConversationTest, ABatchThatIsNoneOfAKnownStudyBeginsTheConversationAnew) {
+  constexpr auto kMax = std::numeric_limits<std::int64_t>::max();
+  struct Case {
+    std::uint64_t study_id;
+    std::vector<std::int64_t> ranges;
+  };
+  const Case cases[] = {{8, {0, 10}},
+                        {7, {95, 6}},
+                        {7, {100, 1}},
+                        {7, {0, 0}},
+                        {7, {50, -1}},
+                        {7, {kMax, 2}},
+                        {7, {-1, 2}},
+                        {7, {20, 10, 0}},
+                        {7, {20, 10, -31, 2}},
+                        {7, {20, 10, 0, 0}},
+                        {7, {20, 10, 60, 11}},
+                        {7, {20, 10, kMax, 2}},
+                        {7, {20, 10, -30, 90, 0, 10}},
+                        {7, {20, 10, 0, 5, 0}}};
+  for (const Case& c : cases) {
+    use({});
     join();
     receive(heartbeat_reply_message());
-    receive(batch);
+    auto message = batch_message(c.study_id, 31);
+    message.mutable_batch()->mutable_ranges()->Assign(c.ranges.begin(), c.ranges.end());
+    receive(message);
     EXPECT_FALSE(has<Solve>());
     EXPECT_TRUE(has<Connect>());
   }
@@ -236,38 +220,24 @@ TEST_F(ConversationTest, ABatchMayBeSeveralRangesInAnyOrder) {
   EXPECT_EQ(batch.point_at(14), 99U);
 }
 
-TEST_F(ConversationTest, ABatchWhoseRangesAreNoneOfItsStudyBeginsTheConversationAnew) {
-  const auto max = std::numeric_limits<std::int64_t>::max();
-  for (const std::vector<std::int64_t>& ranges : std::vector<std::vector<std::int64_t>>{
-           {0}, {-31, 2}, {0, 0}, {0, -1}, {60, 11}, {max, 2}, {-30, 90, 0, 10}, {0, 5, 0}}) {
-    use(ConversationSettings{});
-    join();
-    receive(heartbeat_reply_message());
-    auto message = batch_message(7, 31, 20, 10);
-    for (const std::int64_t number : ranges) {
-      message.mutable_batch()->add_ranges(number);
-    }
-    receive(message);
-    EXPECT_FALSE(has<Solve>());
-    EXPECT_TRUE(has<Connect>());
-  }
-}
-
 TEST_F(ConversationTest, AStudyThatCannotBeReadEndsTheWorkerRatherThanFailingItsPoints) {
   start();
   receive(welcome_message());
   protocol::ServerToWorker message = study_message(7);
   message.mutable_study()->mutable_recipe()->mutable_blocks(0)->mutable_axes(0)->set_key("wobble");
   receive(message);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_EQ(exit_code(), 1);
   EXPECT_NE(finish()->reason.find("wobble"), std::string::npos);
 }
 
-TEST_F(ConversationTest, MessagesWithoutAKnownKindAreIgnored) {
+TEST_F(ConversationTest, ANoticeGoesToTheLogAndAMessageWithoutAKnownKindNowhere) {
   join();
   receive(protocol::ServerToWorker());
   EXPECT_TRUE(effects_.empty());
+  protocol::ServerToWorker message;
+  message.mutable_notice()->set_text("mind the step");
+  receive(message);
+  EXPECT_TRUE(has<Note>());
 }
 
 TEST_F(ConversationTest, AWithdrawnStudyIsDroppedAndItsPlaceGivenAgain) {
@@ -283,8 +253,7 @@ TEST_F(ConversationTest, AWithdrawnStudyIsDroppedAndItsPlaceGivenAgain) {
 }
 
 TEST_F(ConversationTest, ABatchThatOthersAnsweredIsDroppedAndItsPlaceGivenAgain) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   receive(batch_message(7, 32));
   protocol::ServerToWorker release;
   release.mutable_release()->set_lease_id(31);
@@ -296,17 +265,8 @@ TEST_F(ConversationTest, ABatchThatOthersAnsweredIsDroppedAndItsPlaceGivenAgain)
   EXPECT_FALSE(has<DropBatch>()) << "a lease that it does not have";
 }
 
-TEST_F(ConversationTest, WhatTheServerHasToSayToPeopleGoesToTheLog) {
-  join();
-  protocol::ServerToWorker message;
-  message.mutable_notice()->set_text("mind the step");
-  receive(message);
-  EXPECT_TRUE(has<Note>());
-}
-
-TEST_F(ConversationTest, AStoppingServerGetsResultsButIsAskedForNothing) {
-  join();
-  receive(batch_message(7, 31));
+TEST_F(ConversationTest, AStoppingServerGetsResultsAndIsAskedForNothingBeforeItIsStartedAgain) {
+  join_with_batch();
   protocol::ServerToWorker stopping;
   stopping.mutable_stopping();
   receive(stopping);
@@ -314,89 +274,55 @@ TEST_F(ConversationTest, AStoppingServerGetsResultsButIsAskedForNothing) {
   solve(1, 0, 10, true);
   EXPECT_EQ(sent_results().size(), 1U);
   EXPECT_EQ(credit_given(), 0U);
-}
-
-TEST_F(ConversationTest, AWorkerIsWelcomedBackAfterAStoppingServerIsStartedAgain) {
-  join();
-  protocol::ServerToWorker stopping;
-  stopping.mutable_stopping();
-  receive(stopping);
   receive(hello_again_message());
   pass(2000);
   receive(welcome_message());
   EXPECT_EQ(credit_given(), 2U);
 }
 
-TEST_F(ConversationTest, AnIdleWorkerThatIsStoppedSaysGoodbyeAtOnce) {
-  join();
-  take(conversation_->stop(now_ms_));
-  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 0);
+TEST_F(ConversationTest, AnIdleWorkerThatIsStoppedLeavesAtOnceAndSaysGoodbyeIfItWasWelcomed) {
+  for (const bool is_welcomed : {false, true}) {
+    use({});
+    is_welcomed ? join() : start();
+    stop();
+    EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), is_welcomed ? 1U : 0U);
+    EXPECT_EQ(exit_code(), 0);
+  }
 }
 
-TEST_F(ConversationTest, AStoppedWorkerSaysGoodbyeOnceItsResultsAreStored) {
-  join();
-  receive(batch_message(7, 31));
+TEST_F(ConversationTest, AStoppedWorkerTakesNoBatchAndSaysGoodbyeOnceItsResultsAreStored) {
+  join_with_batch();
   solve(1, 0, 5, false);
-  take(conversation_->stop(now_ms_));
+  stop();
   EXPECT_TRUE(has<DropAll>());
   EXPECT_FALSE(finish());
+  receive(batch_message(7, 32));
+  EXPECT_FALSE(has<Solve>());
   receive(stored_message(1));
   EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
   EXPECT_TRUE(finish());
-}
-
-TEST_F(ConversationTest, AStoppedWorkerTakesNoFurtherBatch) {
-  join();
-  receive(batch_message(7, 31));
-  solve(1, 0, 5, false);
-  take(conversation_->stop(now_ms_));
-  receive(batch_message(7, 32));
-  EXPECT_FALSE(has<Solve>());
 }
 
 TEST_F(ConversationTest, AStoppedWorkerWaitsTwoSecondsForItsResultsAndThenLeaves) {
-  join();
-  receive(batch_message(7, 31));
+  join_with_batch();
   solve(1, 0, 5, false);
-  take(conversation_->stop(now_ms_));
+  stop();
   pass(1999);
   EXPECT_FALSE(finish());
   pass(1);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_EQ(exit_code(), 0);
   EXPECT_NE(finish()->reason.find("5 results"), std::string::npos);
 }
 
-TEST_F(ConversationTest, AWorkerThatIsStoppedOnceMoreASecondLaterLeavesAtOnce) {
-  join();
-  receive(batch_message(7, 31));
-  solve(1, 0, 5, false);
-  take(conversation_->stop(now_ms_));
-  pass(1000);
-  take(conversation_->stop(now_ms_));
-  EXPECT_TRUE(finish());
-}
-
-TEST_F(ConversationTest, SignalsToStopThatFollowEachOtherCloselyAreOneAndTheResultsAreDelivered) {
-  join();
-  receive(batch_message(7, 31));
-  solve(1, 0, 5, false);
-  take(conversation_->stop(now_ms_));
-  pass(999);
-  take(conversation_->stop(now_ms_));
-  EXPECT_FALSE(finish());
-  receive(stored_message(1));
-  EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
-  EXPECT_TRUE(finish());
-}
-
-TEST_F(ConversationTest, AWorkerWithoutServerLeavesAtOnceWhenItHasNothingToDeliver) {
-  start();
-  take(conversation_->stop(now_ms_));
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 0);
+TEST_F(ConversationTest, AWorkerThatIsStoppedOnceMoreLeavesAtOnceButWithinASecondItIsOneRequest) {
+  for (const std::int64_t later_ms : {999, 1000}) {
+    join_with_batch();
+    solve(1, 0, 5, false);
+    stop();
+    pass(later_ms);
+    stop();
+    EXPECT_EQ(finish().has_value(), later_ms == 1000);
+  }
 }
 
 // ---- Ending by itself ---------------------------------------------------------------------------
@@ -440,15 +366,13 @@ TEST_F(ExitTest, AWorkerWhoseTimeIsOverGivesBackWhatIsLeftAndLeaves) {
   receive(stored_message(1));
   take(conversation_->on_solver_idle(now_ms_));
   EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_EQ(exit_code(), 0);
 }
 
 TEST_F(ExitTest, AWorkerWhoseTimeIsOverFromTheStartLeavesAtOnce) {
   leave_within(-1000);
   pass(0);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_EQ(exit_code(), 0);
 }
 
 TEST_F(ExitTest, ABatchThatTakesLongIsNoIdleness) {
@@ -469,25 +393,21 @@ TEST_F(ExitTest, ABatchThatTakesLongIsNoIdleness) {
 }
 
 TEST_F(ExitTest, AWorkerThatNoServerAnswersIsIdleToo) {
-  ConversationSettings settings;
-  settings.exit.idle_exit_ms = 5000;
-  use(settings);
+  use({.exit = {.idle_exit_ms = 5000}});
   start();
   for (int i = 0; i < 49; ++i) {
     pass(100);
     ASSERT_FALSE(finish());
   }
   pass(100);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 1);
+  EXPECT_EQ(exit_code(), 1);
   EXPECT_EQ(finish()->reason, "leaving: the server was never reached in 5 s");
 }
 
 TEST_F(ExitTest, AWorkerThatWasWelcomedOnceLeavesWithZeroThoughItsServerIsGone) {
   leave_within(kNever_ms, 5000);
   pass(5000);
-  ASSERT_TRUE(finish());
-  EXPECT_EQ(finish()->exit_code, 0);
+  EXPECT_EQ(exit_code(), 0);
   EXPECT_EQ(finish()->reason, "no work for 5 s: leaving (--idle-exit)");
 }
 

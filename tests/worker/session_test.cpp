@@ -2,6 +2,7 @@
 
 #include <future>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -114,10 +115,9 @@ class RunningWorker {
   std::future<int> exit_code_;
 };
 
-void solved_at_once(const Batch&, const BatchSolver::NextPoint& next,
-                    const BatchSolver::TakeResult& take) {
-  while (const auto point = next()) {
-    take(protocol::failed_point(*point, "for the test"));
+void solved_at_once(const Batch&, solver::PointSource& points, const solver::TakeOutcome& take) {
+  while (const auto point = points.next()) {
+    take({*point, std::nullopt, "for the test"});
   }
 }
 
@@ -143,11 +143,10 @@ TEST(SessionTest, ATraceIsSolvedBesideABatchThatTakesLong) {
   ScriptedServer server;
   std::promise<void> release;
   const std::shared_future<void> released(release.get_future());
-  RunningWorker worker(server.endpoint(),
-                       [&](const Batch& batch, const auto& next, const auto& take) {
-                         released.wait();
-                         solved_at_once(batch, next, take);
-                       });
+  RunningWorker worker(server.endpoint(), [&](const Batch& batch, auto& points, const auto& take) {
+    released.wait();
+    solved_at_once(batch, points, take);
+  });
   server.welcome_and_hand_out(1);
   protocol::ServerToWorker order;
   order.mutable_trace_order()->set_trace_id(5);
@@ -165,11 +164,10 @@ TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
   ScriptedServer server;
   std::promise<void> release;
   const std::shared_future<void> released(release.get_future());
-  RunningWorker worker(server.endpoint(),
-                       [&](const Batch& batch, const auto& next, const auto& take) {
-                         released.wait();
-                         solved_at_once(batch, next, take);
-                       });
+  RunningWorker worker(server.endpoint(), [&](const Batch& batch, auto& points, const auto& take) {
+    released.wait();
+    solved_at_once(batch, points, take);
+  });
   server.welcome_and_hand_out(1);
   for (int i = 0; i < 5; ++i) {
     EXPECT_LE(server.wait_for(WorkerMessage::kHeartbeat).heartbeat().lease_ids_size(), 1);

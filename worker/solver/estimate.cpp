@@ -48,112 +48,6 @@ double factor(const ModelParameters& model, int order) {
   return (1.0 + unresolved_waves(companion)) / (std::pow(ratio, order) - 1.0);
 }
 
-/// Points that are solved by their own models first and then by the companions of these: chains of
-/// two shapes share no lanes.
-class EstimatedGroup {
- public:
-  EstimatedGroup(const FingerPoints& source, const TakeOutcome& sink)
-      : source_(source), sink_(sink) {}
-
-  /// Solves the next points of the source, as many as a group has. Hands those that fail on.
-  void solve() {
-    solve_points([this] { return next(); },
-                 [this](Outcome&& outcome) {
-                   Waiting& waiting = points_[outcome.number];
-                   waiting.result = std::move(outcome.result);
-                   if (!waiting.result) {
-                     outcome.number = waiting.number;
-                     sink_(std::move(outcome));
-                   }
-                 });
-  }
-  /// Solves their companions, and hands all results on.
-  void estimate(FallCache& falls) {
-    const auto companions = fingers_of(falls);
-    std::size_t last = 0;
-    solve_points([&] { return next_companion(companions, last); },
-                 [this](Outcome&& companion) {
-                   Waiting& waiting = points_[companion.number];
-                   if (companion.result) {
-                     waiting.result->errors = estimated_errors(models_[waiting.model],
-                                                               *waiting.result, *companion.result);
-                   }
-                   hand_on(waiting);
-                 });
-  }
-  bool source_has_ended() const { return source_has_ended_; }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  static constexpr std::size_t kMostPoints = 256;
-  static constexpr std::chrono::seconds kLongest{1};
-
-  struct Waiting {
-    std::size_t model;
-    std::uint64_t number;
-    Point point;
-    std::optional<CaseResult> result;
-  };
-
-  std::optional<FingerPoint> next() {
-    if (points_.size() >= kMostPoints || Clock::now() - begun_ > kLongest) {
-      return std::nullopt;
-    }
-    auto point = source_();
-    if (!point) {
-      source_has_ended_ = true;
-      return std::nullopt;
-    }
-    if (models_.empty() || !(models_.back() == point->finger.model())) {
-      models_.push_back(point->finger.model());
-    }
-    points_.push_back({models_.size() - 1, point->number, point->point, std::nullopt});
-    point->number = points_.size() - 1;
-    return point;
-  }
-
-  /// Nothing for a companion without a fall, nor where there is no coarser mesh.
-  std::vector<std::optional<Finger>> fingers_of(FallCache& falls) const {
-    std::vector<ModelParameters> companions;
-    for (const ModelParameters& model : models_) {
-      companions.push_back(companion_model(model));
-    }
-    const std::vector<FallOutcome> fallen = falls.falls(companions);
-    std::vector<std::optional<Finger>> fingers;
-    for (std::size_t i = 0; i < companions.size(); ++i) {
-      const bool is_coarser = companions[i].elements_per_link < models_[i].elements_per_link;
-      fingers.push_back(fallen[i].fallen && is_coarser
-                            ? std::optional(Finger(companions[i], fallen[i].fallen))
-                            : std::nullopt);
-    }
-    return fingers;
-  }
-
-  std::optional<FingerPoint> next_companion(const std::vector<std::optional<Finger>>& companions,
-                                            std::size_t& last) {
-    for (; last < points_.size(); ++last) {
-      Waiting& waiting = points_[last];
-      if (!waiting.result) {
-        continue;
-      }
-      if (const auto& finger = companions[waiting.model]) {
-        return FingerPoint{*finger, last++, waiting.point};
-      }
-      hand_on(waiting);
-    }
-    return std::nullopt;
-  }
-
-  void hand_on(Waiting& waiting) { sink_({waiting.number, std::move(waiting.result), {}}); }
-
-  const FingerPoints& source_;
-  const TakeOutcome& sink_;
-  const Clock::time_point begun_ = Clock::now();
-  bool source_has_ended_ = false;
-  std::vector<ModelParameters> models_;  ///< those of points that follow each other once
-  std::vector<Waiting> points_;
-};
-
 /// Nothing where the scale is 0, or the quotient is no number.
 std::optional<double> relative(double difference, double scale) {
   const double quotient = std::abs(difference) / std::abs(scale);
@@ -209,27 +103,118 @@ ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult
     return {};
   }
   const FallOutcome fall = falls.falls({&companion, 1}).front();
-  try {
-    return fall.fallen
-               ? estimated_errors(
-                     model, result,
-                     Finger(companion, fall.fallen).solve(result.H_m, result.mu, result.e_star))
-               : ErrorEstimate{};
-  } catch (const SolveError&) {
+  if (!fall.fallen) {
     return {};
-  } catch (const InputError&) {  // beyond the drop of the companion's fall
-    return {};
+  }
+  const Point point{result.H_m, result.mu, result.e_star};
+  const Outcome outcome = solve_points(Finger(companion, fall.fallen), {&point, 1}).front();
+  return outcome.result ? estimated_errors(model, result, *outcome.result) : ErrorEstimate{};
+}
+
+namespace {
+
+/// A point that waits for the points beside it or for its companion.
+struct WaitingPoint {
+  FingerPoint point;
+  std::optional<CaseResult> result = {};
+  std::optional<Finger> companion = {};  ///< none where there is no coarser mesh or no fall on it
+};
+
+/// Solves the next points of the source, some hundred or for about a second. True when it may have
+/// more.
+bool solve_next(const FingerPoints& source, std::vector<WaitingPoint>& points,
+                const TakeOutcome& sink) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::size_t kMostPoints = 256;
+  constexpr std::chrono::seconds kLongest{1};
+  const Clock::time_point begun = Clock::now();
+  bool may_have_more = true;
+  const auto next = [&]() -> std::optional<FingerPoint> {
+    if (points.size() >= kMostPoints || Clock::now() - begun > kLongest) {
+      return std::nullopt;
+    }
+    auto point = source();
+    may_have_more = point.has_value();
+    if (point) {
+      points.push_back({*point});
+      point->number = points.size() - 1;
+    }
+    return point;
+  };
+  solve_points(next, [&](Outcome&& outcome) {
+    WaitingPoint& waiting = points[outcome.number];
+    waiting.result = std::move(outcome.result);
+    if (!waiting.result) {
+      sink({waiting.point.number, std::nullopt, std::move(outcome.error)});
+    }
+  });
+  return may_have_more;
+}
+
+/// Gives the points their companions, one for those of a model that follow each other.
+void find_companions(std::vector<WaitingPoint>& points, FallCache& falls) {
+  std::vector<ModelParameters> companions;
+  std::vector<std::size_t> first;  // the first point of each
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ModelParameters& model = points[i].point.finger.model();
+    if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
+      companions.push_back(companion_model(model));
+      first.push_back(i);
+    }
+  }
+  const std::vector<FallOutcome> fallen = falls.falls(companions);
+  first.push_back(points.size());
+  for (std::size_t m = 0; m < companions.size(); ++m) {
+    const int elements = points[first[m]].point.finger.model().elements_per_link;
+    if (fallen[m].fallen && companions[m].elements_per_link < elements) {
+      const Finger finger(companions[m], fallen[m].fallen);
+      for (std::size_t i = first[m]; i < first[m + 1]; ++i) {
+        points[i].companion = finger;
+      }
+    }
   }
 }
 
+/// Hands all results on, with their errors where there is a companion.
+void estimate(std::vector<WaitingPoint>& points, const TakeOutcome& sink) {
+  const auto hand_on = [&sink](WaitingPoint& waiting) {
+    sink({waiting.point.number, std::move(waiting.result), {}});
+  };
+  std::size_t last = 0;
+  const auto next = [&]() -> std::optional<FingerPoint> {
+    while (last < points.size()) {
+      const std::size_t i = last++;
+      WaitingPoint& waiting = points[i];
+      if (waiting.result && waiting.companion) {
+        return FingerPoint{*waiting.companion, i, waiting.point.point};
+      }
+      if (waiting.result) {
+        hand_on(waiting);
+      }
+    }
+    return std::nullopt;
+  };
+  solve_points(next, [&](Outcome&& companion) {
+    WaitingPoint& waiting = points[companion.number];
+    if (companion.result) {
+      waiting.result->errors =
+          estimated_errors(waiting.point.finger.model(), *waiting.result, *companion.result);
+    }
+    hand_on(waiting);
+  });
+}
+
+}  // namespace
+
+// Chains of two shapes share no lanes: points are solved by their own models first and then by the
+// companions of these.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink) {
-  bool has_ended = false;
-  while (!has_ended) {
-    EstimatedGroup group(source, sink);
-    group.solve();
-    group.estimate(falls);
-    has_ended = group.source_has_ended();
+  for (bool may_have_more = true; may_have_more;) {
+    std::vector<WaitingPoint> points;
+    may_have_more = solve_next(source, points, sink);
+    find_companions(points, falls);
+    estimate(points, sink);
   }
 }
 

@@ -24,11 +24,10 @@ struct FallOutcome {
   std::string error;
 };
 
-/// Falls that models share, the longest part of a first point: until the tip touches, nothing
-/// depends on k, eta2, mu, e* or the step in contact, and one fall passes every H. Keeps those used
-/// last; one that fails is kept as its error, so it fails once. What the solution throws, as where
-/// memory is short, is not kept: it leaves `fall`, and the next call solves it anew. May be used by
-/// several threads at once; falls are solved by the threads that call.
+/// Falls that models share. Keeps those used last; one that fails is kept as its error,
+/// so it fails once. What the solution throws, as where memory is short, is not kept: it leaves
+/// `fall`, and the next call solves it anew. May be used by several threads at once; falls are
+/// solved by the threads that call.
 class FallCache {
  public:
   struct Bounds {
@@ -38,9 +37,8 @@ class FallCache {
 
   using Solve = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
 
-  /// Solves missing falls by `solve`.
-  FallCache(const Bounds& bounds, Solve solve) : bounds_(bounds), solve_(std::move(solve)) {}
-  explicit FallCache(const Bounds& bounds);
+  /// Solves missing falls by `solve`, or by solve_falls().
+  explicit FallCache(const Bounds& bounds, Solve solve = {});
   /// Keeps at most so many bytes of falls, the last one aside.
   explicit FallCache(std::size_t most_bytes = std::size_t{1} << 30)
       : FallCache(Bounds{.bytes = most_bytes}) {}
@@ -76,7 +74,7 @@ class FallCache {
   void make_room();
 
   const Bounds bounds_;
-  const Solve solve_;
+  Solve solve_;
   std::mutex mutex_;
   std::condition_variable solved_;
   Entries entries_;              ///< the one used last comes first

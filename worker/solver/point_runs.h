@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "worker/solver/fall_cache.h"
 #include "worker/solver/model/parameters.h"
@@ -21,19 +20,13 @@ class PointSource {
   virtual std::optional<std::uint64_t> next() = 0;
   /// That point. What it throws is the reason why the point has no answer.
   virtual ModelPoint point(std::uint64_t number) = 0;
-  virtual ModelParameters model(std::uint64_t number) = 0;
-  /// Models of the point that `next` gave last and of those behind it, in order, those of one fall
-  /// that follow each other once: their falls are solved beside its own.
-  virtual std::vector<ModelParameters> models_ahead() = 0;
+  /// The number of its model, also where the point is not allowed.
+  virtual std::size_t model_of(std::uint64_t number) = 0;
+  virtual ModelParameters model(std::size_t model_number) = 0;
+  /// The next point behind that one, given or not, that may be of another model; nothing when there
+  /// is none.
+  virtual std::optional<std::uint64_t> behind_model(std::uint64_t number) = 0;
 };
-
-/// Runs of points of one model that `models_ahead` should look at, and models that it should give,
-/// at most.
-inline constexpr int kRunsAhead = 4096;
-inline constexpr std::size_t kFallsAhead = 64;
-
-/// Adds a model to those ahead unless it shares the fall of the last one.
-void add_ahead(std::vector<ModelParameters>& models, const ModelParameters& model);
 
 /// Solves the points of `source`, each of its own model, side by side, and hands each outcome to
 /// `sink`. A fall that a point misses is solved beside those that later points miss. A result with

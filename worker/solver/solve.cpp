@@ -23,20 +23,20 @@ namespace oblique::solver {
 /// What copies of a Finger share: the model, its steps in contact, and the fall, solved or not yet.
 class Finger::Parts {
  public:
-  /// Its fall comes from `falls`, or without these is solved here.
-  explicit Parts(const ModelParameters& model, std::shared_ptr<FallCache> falls = nullptr)
+  /// Its fall is `fallen`, or comes from `falls`, or without both is solved here.
+  Parts(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen,
+        std::shared_ptr<FallCache> falls)
       : model_(validated(model)),
-        falling_(std::make_shared<FallenChain>(model)),
+        falling_(fallen ? nullptr : std::make_shared<FallenChain>(model)),
         falls_(std::move(falls)),
-        steps_(falling_->chain(), model) {}
-  Parts(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen)
-      : model_(validated(model)),
         fall_{std::move(fallen), {}},
-        steps_(fall_.fallen->chain(), model) {
-    if (!(fall_model(model) == fall_.fallen->model())) {
-      throw std::invalid_argument("the fall is of another model");
+        steps_(prepared().chain(), model) {
+    if (fall_.fallen) {
+      if (!(fall_model(model) == fall_.fallen->model())) {
+        throw std::invalid_argument("the fall is of another model");
+      }
+      std::call_once(fall_once_, [] {});
     }
-    std::call_once(fall_once_, [] {});
   }
 
   const ModelParameters& model() const { return model_; }
@@ -98,45 +98,6 @@ class Finger::Parts {
 };
 
 namespace {
-
-/// States at touch and steps for points that come in order: neighbours share a fall and H, and
-/// cycle through the same e*.
-class TouchCache {
- public:
-  /// Valid until the next call.
-  const ChainState& touch(const Finger::Parts& finger, double H_m) {
-    if (fallen_ != finger.fallen() || touches_.size() >= kMostTouches) {
-      fallen_ = finger.fallen();
-      touches_.clear();
-    }
-    auto found = touches_.find(H_m);
-    if (found == touches_.end()) {
-      found = touches_.emplace(H_m, fallen_->fall().state_at(H_m)).first;
-    }
-    return found->second;
-  }
-
-  ContactSteps steps(const std::shared_ptr<const Finger::Parts>& finger, double e_star) {
-    if (finger_ != finger || steps_.size() >= kMostSteps) {
-      finger_ = finger;
-      steps_.clear();
-    }
-    auto found = steps_.find(e_star);
-    if (found == steps_.end()) {
-      found = steps_.emplace(e_star, finger->steps().contact(e_star)).first;
-    }
-    return found->second;
-  }
-
- private:
-  static constexpr std::size_t kMostTouches = 16;
-  static constexpr std::size_t kMostSteps = 4096;
-
-  std::shared_ptr<const FallenChain> fallen_;  // also keeps its address from being another's
-  std::map<double, ChainState> touches_;
-  std::shared_ptr<const Finger::Parts> finger_;
-  std::map<double, ContactSteps> steps_;
-};
 
 /// Points of any fingers, from a source to a sink.
 class Crowd {
@@ -213,8 +174,8 @@ class Crowd {
     const auto& finger = point.finger.parts();
     try {
       validate_point(finger->model(), request.H_m, request.mu, request.e_star);
-      const ContactSteps steps = touches_.steps(finger, request.e_star);
-      const ChainState& touch = touches_.touch(*finger, request.H_m);
+      const ContactSteps steps = finger->steps().contact(request.e_star);
+      const ChainState& touch = touch_of(*finger, request.H_m);
       group_ += continues_group(point, steps) ? 0U : 1U;
       last_ = point;
       last_compression_s_ = steps.compression_s;
@@ -226,6 +187,20 @@ class Crowd {
       sink_({point.number, std::nullopt, error.what()});
       return std::nullopt;
     }
+  }
+
+  /// The state at touch, found once for neighbours. Valid until the next call.
+  const ChainState& touch_of(const Finger::Parts& finger, double H_m) {
+    constexpr std::size_t kMostTouches = 16;
+    if (fallen_ != finger.fallen() || touches_.size() >= kMostTouches) {
+      fallen_ = finger.fallen();
+      touches_.clear();
+    }
+    auto found = touches_.find(H_m);
+    if (found == touches_.end()) {
+      found = touches_.emplace(H_m, fallen_->fall().state_at(H_m)).first;
+    }
+    return found->second;
   }
 
   /// Whether the contact comes the same way as that begun last up to its first turn.
@@ -251,8 +226,9 @@ class Crowd {
   const FingerPoints& source_;
   const TakeOutcome& sink_;
   const Tracing& tracing_;
-  TouchCache touches_;
-  std::optional<FingerPoint> upcoming_;  ///< taken from the source, not begun
+  std::shared_ptr<const FallenChain> fallen_;  ///< of the touches; keeps its address its own
+  std::map<double, ChainState> touches_;       ///< by H
+  std::optional<FingerPoint> upcoming_;        ///< taken from the source, not begun
   bool has_ended_ = false;
   std::optional<FingerPoint> last_;  ///< begun last in lanes
   double last_compression_s_ = 0.0;  ///< its step
@@ -286,11 +262,10 @@ std::vector<Outcome> solve_points(const Finger& finger, std::span<const Point> p
   return outcomes;
 }
 
-Finger::Finger(const ModelParameters& model) : parts_(std::make_shared<const Parts>(model)) {}
 Finger::Finger(const ModelParameters& model, std::shared_ptr<FallCache> falls)
-    : parts_(std::make_shared<const Parts>(model, std::move(falls))) {}
+    : parts_(std::make_shared<const Parts>(model, nullptr, std::move(falls))) {}
 Finger::Finger(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen)
-    : parts_(std::make_shared<const Parts>(model, std::move(fallen))) {}
+    : parts_(std::make_shared<const Parts>(model, std::move(fallen), nullptr)) {}
 
 const ModelParameters& Finger::model() const {
   return parts_->model();
@@ -300,10 +275,6 @@ double Finger::largest_drop_m() const {
 }
 double Finger::drop_so_far_m() const {
   return parts_->prepared().fall_progress();
-}
-
-CaseResult Finger::solve(double H_m, double mu, double e_star) const {
-  return solve(H_m, mu, e_star, Tracing{});
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tracing) const {

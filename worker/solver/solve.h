@@ -41,11 +41,9 @@ class Finger {
  public:
   class Parts;  ///< of the implementation
 
-  /// The fall is solved once, when first needed. Throws InputError when `model` is outside its
-  /// domain.
-  explicit Finger(const ModelParameters& model = {});
-  /// The same; its fall comes from `falls`.
-  Finger(const ModelParameters& model, std::shared_ptr<FallCache> falls);
+  /// The fall is solved once, when first needed, or comes from `falls`. Throws InputError when
+  /// `model` is outside its domain.
+  explicit Finger(const ModelParameters& model = {}, std::shared_ptr<FallCache> falls = {});
   /// Over a fall that is solved. Throws InputError when `model` is outside its domain,
   /// std::invalid_argument when its fall is another one.
   Finger(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen);
@@ -59,12 +57,10 @@ class Finger {
   /// Drop of the tip so far [m] while another thread solves the fall.
   double drop_so_far_m() const;
 
-  /// Solves one point. Throws InputError for a value outside its range, SolveError when there is
-  /// no answer.
-  CaseResult solve(double H_m, double mu, double e_star) const;
-  /// The same; `tracing.sink` is called with each instant, by the calling thread. What it throws
-  /// ends the solution and comes out here.
-  CaseResult solve(double H_m, double mu, double e_star, const Tracing& tracing) const;
+  /// Solves one point. `tracing.sink` is called with each instant, by the calling thread; what it
+  /// throws ends the solution and comes out here. Throws InputError for a value outside its range,
+  /// SolveError when there is no answer.
+  CaseResult solve(double H_m, double mu, double e_star, const Tracing& tracing = {}) const;
 
   /// For the implementation.
   const std::shared_ptr<const Parts>& parts() const { return parts_; }

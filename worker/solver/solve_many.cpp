@@ -9,17 +9,149 @@
 #include <exception>
 #include <memory>
 #include <mutex>
-#include <numeric>
+#include <optional>
+#include <string>
 #include <system_error>
 #include <thread>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "worker/solver/estimate.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/result_fields.h"
 #include "worker/solver/point_runs.h"
 
 namespace oblique::solver {
+namespace {
+
+/// Gives the points of a source with their fingers. A point whose fall is missing ends a run of
+/// points: those under way are solved first, since a fall may take long, and then it begins the
+/// next run.
+class PointRuns {
+ public:
+  PointRuns(FallCache& falls, PointSource& source, const TakeOutcome& sink)
+      : falls_(falls), source_(source), sink_(sink) {}
+
+  /// Waits for the fall of the first point of a run. False when no point is left.
+  bool begin_run() {
+    while (!first_) {
+      if (!held_ && !(held_ = source_.next())) {
+        return false;
+      }
+      const std::uint64_t number = *std::exchange(held_, std::nullopt);
+      first_ = point_of(number, [&](const ModelParameters& model) {
+        return std::optional(falls_.fall(model, models_ahead(number)));
+      });
+    }
+    return true;
+  }
+
+  /// The next point of the run.
+  std::optional<FingerPoint> next() {
+    if (first_) {
+      return std::exchange(first_, std::nullopt);
+    }
+    while (!held_ && (held_ = source_.next())) {
+      bool is_missing = false;
+      auto point = point_of(*held_, [&](const ModelParameters& model) {
+        auto fall = falls_.kept_fall(model);
+        is_missing = !fall;
+        return fall;
+      });
+      if (is_missing) {
+        break;  // it stays held
+      }
+      held_.reset();
+      if (point) {
+        return point;
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  /// Nothing when `fall_of` gives no fall, and when the point has failed, which is handed on.
+  template <class FallOf>
+  std::optional<FingerPoint> point_of(std::uint64_t number, const FallOf& fall_of) {
+    try {
+      const ModelPoint point = source_.point(number);
+      if (!finger_ || point.model != model_) {
+        finger_.reset();
+        const ModelParameters model = source_.model(point.model);
+        const std::optional<FallOutcome> fall = fall_of(model);
+        if (!fall) {
+          return std::nullopt;
+        }
+        if (!fall->fallen) {
+          throw SolveError(fall->error);
+        }
+        finger_.emplace(model, fall->fallen);
+        model_ = point.model;
+      }
+      return FingerPoint{*finger_, number, point.point};
+    } catch (const std::exception& error) {
+      sink_({number, std::nullopt, error.what()});
+      return std::nullopt;
+    }
+  }
+
+  /// Models of that point and of those behind it, in order, those of one fall that follow each
+  /// other once: their falls are solved beside its own.
+  std::vector<ModelParameters> models_ahead(std::uint64_t number) {
+    constexpr int kMostRuns = 4096;  // of points of one model
+    constexpr std::size_t kMostFalls = 64;
+    std::vector<ModelParameters> models;
+    std::optional<std::uint64_t> at = number;
+    for (int run = 0; at && run < kMostRuns && models.size() < kMostFalls; ++run) {
+      ModelParameters falling = fall_model(source_.model(source_.model_of(*at)));
+      if (models.empty() || !(models.back() == falling)) {
+        models.push_back(std::move(falling));
+      }
+      at = source_.behind_model(*at);
+    }
+    return models;
+  }
+
+  FallCache& falls_;
+  PointSource& source_;
+  const TakeOutcome& sink_;
+  std::optional<std::uint64_t> held_;  ///< a point taken whose fall was missing
+  std::optional<FingerPoint> first_;   ///< of the run that has begun
+  std::optional<Finger> finger_;       ///< of the point given last
+  std::size_t model_ = 0;              ///< its model's number
+};
+
+}  // namespace
+
+void solve_points_of_models(PointSource& source, FallCache& falls, bool with_errors,
+                            const TakeOutcome& sink) {
+  PointRuns runs(falls, source, sink);
+  const auto next_of_run = [&runs] { return runs.next(); };
+  const auto take = [&sink](Outcome&& outcome) {
+    if (outcome.result && !is_finite(*outcome.result)) {
+      outcome.result.reset();
+      outcome.error = "the solver gave a value that is not finite";
+    }
+    sink(std::move(outcome));
+  };
+  while (runs.begin_run()) {
+    if (with_errors) {
+      solve_points_with_errors(next_of_run, falls, take);
+    } else {
+      solve_points(next_of_run, take);
+    }
+  }
+}
+
+std::uint64_t points_of_task(std::uint64_t left, std::size_t threads) {
+  constexpr std::uint64_t kLargestTask = 32;
+  return std::clamp<std::uint64_t>(left / (4 * threads), 1, kLargestTask);
+}
+
+// ---- On many threads ----------------------------------------------------------------------------
+
 namespace {
 
 using namespace std::chrono_literals;
@@ -27,19 +159,43 @@ constexpr auto kBetweenQuestions = 50ms;
 /// Threads that take longer to end, as in the middle of a long fall, are left to end by themselves.
 constexpr auto kLongestFarewell = 150ms;
 
-/// Whether the point `a`, given as number `i`, is solved before `b`, number `j`. NaN has a place
-/// too.
-bool is_before(const ModelPoint& a, std::size_t i, const ModelPoint& b, std::size_t j) {
-  if (a.model != b.model) {
-    return a.model < b.model;
-  }
+/// A point under its place in the caller's list.
+struct Entry {
+  ModelPoint point;
+  std::size_t number;
+};
+
+/// Neighbours share a model, a fall, the state at touch, and all until the first turn. NaN has a
+/// place too.
+bool is_before(const Entry& a, const Entry& b) {
+  std::strong_ordering order = a.point.model <=> b.point.model;
   for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e_star}) {
-    if (const auto order = std::strong_order(a.point.*value, b.point.*value); std::is_neq(order)) {
-      return std::is_lt(order);
+    if (order == 0) {
+      order = std::strong_order(a.point.point.*value, b.point.point.*value);
     }
   }
-  return i < j;
+  return order == 0 ? a.number < b.number : order < 0;
 }
+
+/// Models so that those of one fall follow each other, falls in the order of their first models.
+struct OrderedModels {
+  explicit OrderedModels(std::span<const ModelParameters> given) : places(given.size()) {
+    std::unordered_map<std::uint64_t, std::size_t> falls;  // numbers by hash
+    std::vector<std::pair<std::size_t, std::size_t>> by_fall;
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      const auto fall = falls.try_emplace(fall_hash(given[i]), falls.size()).first;
+      by_fall.emplace_back(fall->second, i);
+    }
+    std::sort(by_fall.begin(), by_fall.end());
+    for (const auto& [fall, number] : by_fall) {
+      places[number] = models.size();
+      models.push_back(given[number]);
+    }
+  }
+
+  std::vector<ModelParameters> models;
+  std::vector<std::size_t> places;  ///< of the given models among these
+};
 
 /// Points to solve and who solves them. Held by each thread, so that one that is left behind has
 /// all that it needs.
@@ -47,39 +203,41 @@ class Work {
  public:
   Work(std::span<const ModelParameters> models, std::span<const ModelPoint> points,
        const TakeOutcome& take, const ManyOptions& options, std::size_t threads)
-      : points_(points.begin(), points.end()),
-        order_(points.size()),
-        take_(&take),
+      : take_(&take),
         errors_(options.errors),
         falls_(options.falls ? options.falls : std::make_shared<FallCache>()),
         threads_(threads) {
-    const std::vector<std::size_t> places = take_models(models);
-    for (ModelPoint& point : points_) {
+    OrderedModels ordered(models);
+    models_ = std::move(ordered.models);
+    for (const ModelPoint& point : points) {
       if (point.model >= models_.size()) {
         throw InputError("a point has model " + std::to_string(point.model) + " of " +
                          std::to_string(models_.size()) + ": they count from 0");
       }
-      point.model = places[point.model];
+      points_.push_back({{ordered.places[point.model], point.point}, points_.size()});
     }
-    // Neighbours share a model, a fall, the state at touch, and all until the first turn.
-    std::iota(order_.begin(), order_.end(), std::size_t{0});
-    std::sort(order_.begin(), order_.end(), [this](std::size_t a, std::size_t b) {
-      return is_before(points_[a], a, points_[b], b);
-    });
+    std::sort(points_.begin(), points_.end(), is_before);
   }
 
+  /// Solves tasks until none is left, on a thread of its own.
   void solve() {
     Source source(*this);
     try {
       solve_points_of_models(source, *falls_, errors_, [this](Outcome&& outcome) {
-        outcome.number = order_[outcome.number];
+        outcome.number = points_[outcome.number].number;
         hand_on(std::move(outcome));
       });
     } catch (...) {
+      const std::lock_guard lock(mutex_);
       fail(std::current_exception());
     }
+    leave(1);
+  }
+
+  /// Counts threads that have ended, or could not be started.
+  void leave(std::size_t threads) {
     const std::lock_guard lock(mutex_);
-    --threads_;
+    threads_ -= threads;
     changed_.notify_all();
   }
 
@@ -109,14 +267,8 @@ class Work {
     return changed_.wait_for(lock, kLongestFarewell, [this] { return threads_ == 0; });
   }
 
-  /// Counts threads that could not be started.
-  void miss(std::size_t threads) {
-    const std::lock_guard lock(mutex_);
-    threads_ -= threads;
-  }
-
  private:
-  /// The points of one thread: tasks of neighbours.
+  /// The points of one thread: tasks of neighbours. A point's number is its place among points_.
   class Source : public PointSource {
    public:
     explicit Source(Work& work) : work_(work) {}
@@ -131,25 +283,20 @@ class Work {
       if (work_.stopped_) {  // one that was kept for a fall of its own
         throw SolveError("nobody waits for it any more");
       }
-      return work_.at(number);
+      return work_.points_[number].point;
     }
-    ModelParameters model(std::uint64_t number) override { return work_.models_[number]; }
-    std::vector<ModelParameters> models_ahead() override {
-      std::vector<ModelParameters> models;
-      std::uint64_t number = next_ - 1;  // given last
-      for (int run = 0; run < kRunsAhead && models.size() < kFallsAhead; ++run) {
-        const std::size_t model = work_.at(number).model;
-        add_ahead(models, work_.models_[model]);
-        const auto rest = work_.order_.begin() + static_cast<std::ptrdiff_t>(number);
-        const auto behind = std::upper_bound(
-            rest, work_.order_.end(), model,
-            [this](std::size_t m, std::size_t i) { return m < work_.points_[i].model; });
-        if (behind == work_.order_.end()) {
-          break;
-        }
-        number = static_cast<std::uint64_t>(behind - work_.order_.begin());
-      }
-      return models;
+    std::size_t model_of(std::uint64_t number) override {
+      return work_.points_[number].point.model;
+    }
+    ModelParameters model(std::size_t number) override { return work_.models_[number]; }
+    std::optional<std::uint64_t> behind_model(std::uint64_t number) override {
+      const auto& points = work_.points_;
+      const auto behind = std::upper_bound(
+          points.begin() + static_cast<std::ptrdiff_t>(number), points.end(), model_of(number),
+          [](std::size_t model, const Entry& entry) { return model < entry.point.model; });
+      return behind == points.end()
+                 ? std::nullopt
+                 : std::optional(static_cast<std::uint64_t>(behind - points.begin()));
     }
 
    private:
@@ -158,30 +305,9 @@ class Work {
     std::uint64_t end_ = 0;
   };
 
-  /// Sets models_ so that models of one fall follow each other, falls in the order of their first
-  /// models. Returns where each one is.
-  std::vector<std::size_t> take_models(std::span<const ModelParameters> models) {
-    std::unordered_map<std::uint64_t, std::size_t> falls;  // numbers by hash
-    std::vector<std::pair<std::size_t, std::size_t>> by_fall;
-    for (std::size_t i = 0; i < models.size(); ++i) {
-      const auto fall = falls.try_emplace(fall_hash(models[i]), falls.size()).first;
-      by_fall.emplace_back(fall->second, i);
-    }
-    std::sort(by_fall.begin(), by_fall.end());
-    std::vector<std::size_t> places(models.size());
-    for (const auto& [fall, number] : by_fall) {
-      places[number] = models_.size();
-      models_.push_back(models[number]);
-    }
-    return places;
-  }
-
-  /// By its place in the order.
-  const ModelPoint& at(std::uint64_t number) const { return points_[order_[number]]; }
-
   bool take_task(std::uint64_t& begin, std::uint64_t& end) {
     const std::lock_guard lock(mutex_);
-    const std::uint64_t left = order_.size() - given_;
+    const std::uint64_t left = points_.size() - given_;
     if (left == 0) {
       return false;
     }
@@ -200,26 +326,19 @@ class Work {
       (*take_)(std::move(outcome));
       ++outcomes_;
     } catch (...) {
-      set_failure(std::current_exception());
+      fail(std::current_exception());
     }
   }
 
+  /// Needs the lock.
   void fail(std::exception_ptr failure) {
-    const std::lock_guard lock(mutex_);
-    if (!failure_) {
-      set_failure(std::move(failure));
-    }
-  }
-
-  void set_failure(std::exception_ptr failure) {
-    failure_ = std::move(failure);
+    failure_ = failure_ ? failure_ : std::move(failure);
     stopped_ = true;
     changed_.notify_all();
   }
 
   std::vector<ModelParameters> models_;
-  std::vector<ModelPoint> points_;
-  std::vector<std::size_t> order_;  ///< places of points, neighbours together
+  std::vector<Entry> points_;  ///< neighbours together
   std::atomic<bool> stopped_ = false;
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -227,58 +346,51 @@ class Work {
   const bool errors_;
   const std::shared_ptr<FallCache> falls_;
   std::size_t threads_;      ///< at work
-  std::uint64_t given_ = 0;  ///< of the order
+  std::uint64_t given_ = 0;  ///< points in tasks
   std::size_t outcomes_ = 0;
   std::exception_ptr failure_;
 };
 
-/// The threads at some work. However that ends, nothing is handed on when this is gone.
-class Threads {
- public:
-  explicit Threads(Work& work) : work_(work) {}
-  ~Threads() {
-    const bool all_end = work_.end();
-    for (std::thread& thread : threads_) {
-      all_end ? thread.join() : thread.detach();
+/// Throws std::system_error when not one can be started; fewer do it all.
+std::vector<std::thread> start_threads(std::size_t count, const std::shared_ptr<Work>& work) {
+  std::vector<std::thread> threads;
+  threads.reserve(count);
+  try {
+    while (threads.size() < count) {
+      threads.emplace_back([work] { work->solve(); });
+    }
+  } catch (const std::system_error&) {
+    work->leave(count - threads.size());
+    if (threads.empty()) {
+      throw;
     }
   }
-  Threads(const Threads&) = delete;
-  Threads& operator=(const Threads&) = delete;
-
-  /// Throws std::system_error when not one can be started; fewer do it all.
-  void start(std::size_t count, const std::shared_ptr<Work>& work) {
-    threads_.reserve(count);
-    try {
-      while (threads_.size() < count) {
-        threads_.emplace_back([work] { work->solve(); });
-      }
-    } catch (const std::system_error&) {
-      work_.miss(count - threads_.size());
-      if (threads_.empty()) {
-        throw;
-      }
-    }
-  }
-
- private:
-  Work& work_;
-  std::vector<std::thread> threads_;
-};
-
-std::size_t threads_for(const ManyOptions& options, std::size_t points) {
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  return std::min(std::max<std::size_t>(points, 1), options.threads == 0 ? cores : options.threads);
+  return threads;
 }
 
 }  // namespace
 
 bool solve_many(std::span<const ModelParameters> models, std::span<const ModelPoint> points,
                 const TakeOutcome& take, const ManyOptions& options) {
-  const std::size_t threads = threads_for(options, points.size());
-  const auto work = std::make_shared<Work>(models, points, take, options, threads);
-  Threads running(*work);
-  running.start(threads, work);
-  return work->wait(options.goes_on);
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t count = std::min(std::max<std::size_t>(points.size(), 1),
+                                     options.threads == 0 ? cores : options.threads);
+  const auto work = std::make_shared<Work>(models, points, take, options, count);
+  std::vector<std::thread> threads = start_threads(count, work);
+  const auto end = [&] {
+    const bool all_end = work->end();
+    for (std::thread& thread : threads) {
+      all_end ? thread.join() : thread.detach();
+    }
+  };
+  try {
+    const bool is_complete = work->wait(options.goes_on);
+    end();
+    return is_complete;
+  } catch (...) {
+    end();
+    throw;
+  }
 }
 
 }  // namespace oblique::solver

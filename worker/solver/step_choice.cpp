@@ -61,17 +61,11 @@ double rounding_step_s(const ModelParameters& model) {
   return std::numeric_limits<double>::epsilon() * std::sqrt(length_m / model.g_m_s2);
 }
 
-double link_mass_kg(const ModelParameters& model) {
-  return model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() + model.tip_mass_kg;
-}
-
-double stiffest_N_m(const ModelParameters& model) {
-  return model.k_N_m * std::max(1.0, 1.0 / model.eta2);
-}
-
 double chosen_contact_s(const ModelParameters& model, double tip_inertia_kg, double limit_s) {
   if (model.integrator == Integrator::kGeneralizedAlpha) {
-    return StepChoice::kImplicitContactFraction * std::sqrt(link_mass_kg(model) / model.k_N_m) *
+    const double link_mass_kg =
+        model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() + model.tip_mass_kg;
+    return StepChoice::kImplicitContactFraction * std::sqrt(link_mass_kg / model.k_N_m) *
            at_tolerance(model, kGeneralizedAlphaOrder);
   }
   const double tip_rad_s = std::sqrt(model.k_N_m / tip_inertia_kg);
@@ -89,7 +83,7 @@ StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
       integrator_(model.integrator),
       asked_contact_s_(model.dt_s),
       tip_inertia_kg_(chain.tip_inertia_kg()),
-      compression_limit_s_(limit_s(chain, stiffest_N_m(model))),
+      compression_limit_s_(limit_s(chain, model.k_N_m * std::max(1.0, 1.0 / model.eta2))),
       chosen_contact_s_(chosen_contact_s(model, tip_inertia_kg_, compression_limit_s_)),
       step_factor_(model.step_factor),
       rounding_step_s_(rounding_step_s(model)),

@@ -12,7 +12,7 @@
 
 #include "worker/solver/fast/lane_stepper.h"
 #include "worker/solver/model/trace.h"
-#include "worker/solver/reference/reaction_peaks.h"
+#include "worker/solver/reference/contact_record.h"
 #include "worker/solver/reference/solve_contact.h"
 
 namespace oblique::solver {

@@ -43,9 +43,10 @@ std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, d
   if (is_far_from_events(law_, tip_, end, h_s, vt_sign_)) {
     return earliest;
   }
-  const PossibleEvents possible = possible_events(law_);
-  for (std::size_t i = 0; i < possible.count; ++i) {
-    const ContactEvent event = possible.events[i];
+  for (const ContactEvent event : kContactEvents) {
+    if (!is_possible(law_, event)) {
+      continue;
+    }
     const auto guess =
         guess_event(law_, event, tip_, end, h_s, vt_sign_, (fresh_ & bit(event)) != 0);
     if (!guess || (guess->inside_only && (refuted_ & bit(event)) != 0)) {

@@ -5,7 +5,6 @@
 
 #include "worker/solver/reference/contact_events.h"
 #include "worker/solver/reference/contact_law.h"
-#include "worker/solver/reference/contact_margin.h"
 #include "worker/solver/reference/contact_record.h"
 
 namespace oblique::solver {

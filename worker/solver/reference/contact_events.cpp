@@ -1,6 +1,7 @@
 #include "worker/solver/reference/contact_events.h"
 
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 namespace oblique::solver {
@@ -24,38 +25,32 @@ struct Cubic {
 
   /// Ends of the stretches of [0, 1] on which the cubic is monotone: turning points, then 1.
   struct Stretches {
-    std::array<double, 3> end;
-    std::size_t count;
+    std::array<double, 3> end{1.0, 1.0, 1.0};
+    std::size_t count = 0;
+    void add(double z) {
+      if (z > 0.0 && z < 1.0) {
+        end[count++] = z;
+      }
+    }
   };
-  Stretches stretches() const;
+  Stretches stretches() const {
+    Stretches result;
+    const double a = 3.0 * a3;
+    const double b = 2.0 * a2;
+    const double discriminant = b * b - 4.0 * a * a1;
+    if (discriminant > 0.0) {
+      // The form without cancellation: one root is q/a, the other a1/q; NaN and infinity are out.
+      const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
+      result.add(q / a);
+      result.add(a1 / q);
+    }
+    if (result.count == 2 && result.end[0] > result.end[1]) {
+      std::swap(result.end[0], result.end[1]);
+    }
+    result.end[result.count++] = 1.0;
+    return result;
+  }
 };
-
-Cubic::Stretches Cubic::stretches() const {
-  Stretches result{{1.0, 1.0, 1.0}, 0};
-  const auto add = [&result](double z) {
-    if (z > 0.0 && z < 1.0) {
-      result.end[result.count++] = z;
-    }
-  };
-  const double a = 3.0 * a3;
-  const double b = 2.0 * a2;
-  const double discriminant = b * b - 4.0 * a * a1;
-  if (discriminant > 0.0) {
-    // The form without cancellation: one root is q/a, the other a1/q.
-    const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
-    if (a != 0.0) {
-      add(q / a);
-    }
-    if (q != 0.0) {
-      add(a1 / q);
-    }
-  }
-  if (result.count == 2 && result.end[0] > result.end[1]) {
-    std::swap(result.end[0], result.end[1]);
-  }
-  result.end[result.count++] = 1.0;
-  return result;
-}
 
 /// Root of a function that rises through zero and is monotone on [low, high]: Newton's steps, and
 /// bisection where they leave the bracket.
@@ -81,21 +76,17 @@ bool is_force_event(ContactEvent event) {
          event == ContactEvent::kSlipBackward;
 }
 
-PossibleEvents possible_events(const ContactLaw& law) {
-  PossibleEvents possible{};
-  const auto add = [&](ContactEvent event) { possible.events[possible.count++] = event; };
-  if (!law.is_compression()) {
-    add(ContactEvent::kSeparation);
+bool is_possible(const ContactLaw& law, ContactEvent event) {
+  switch (event) {
+    case ContactEvent::kSeparation:
+      return !law.is_compression();
+    case ContactEvent::kTurn:
+      return true;
+    case ContactEvent::kStick:
+      return !law.is_stick();
+    default:
+      return law.is_stick();
   }
-  add(ContactEvent::kTurn);
-  if (law.is_stick()) {
-    add(ContactEvent::kSlipForward);
-    add(ContactEvent::kSlipBackward);
-    add(ContactEvent::kTangentialExtremum);
-  } else {
-    add(ContactEvent::kStick);
-  }
-  return possible;
 }
 
 EventFunction event_function(const ContactLaw& law, ContactEvent event, const TipState& tip,
@@ -145,11 +136,10 @@ std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh) {
   const Cubic phi = event_polynomial(law, event, start, end, h_s, vt_sign);
-  if (phi.is_clearly_negative()) {
-    return std::nullopt;  // as nearly always; what follows costs much more
-  }
-  if (phi.is_zero()) {
-    return std::nullopt;  // a tip that does not move along the ground: nothing rises
+  // Negative as nearly always; what follows costs much more. Zero where the tip does not move along
+  // the ground: nothing rises.
+  if (phi.is_clearly_negative() || phi.is_zero()) {
+    return std::nullopt;
   }
   const bool ends_below = phi.at(1.0) < 0.0;
   if (!fresh && phi.a0 >= 0.0 && (phi.a1 > 0.0 || !ends_below)) {

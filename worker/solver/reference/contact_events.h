@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <optional>
 
 #include "worker/solver/reference/contact_law.h"
@@ -18,6 +17,9 @@ enum class ContactEvent {
   kStick,               ///< eq. 24, slip: P's velocity falls to 0
   kTangentialExtremum,  ///< stick: V_t changes sign; an extremum of F_t, no change of regime
 };
+inline constexpr std::array kContactEvents{
+    ContactEvent::kSeparation,   ContactEvent::kTurn,  ContactEvent::kSlipForward,
+    ContactEvent::kSlipBackward, ContactEvent::kStick, ContactEvent::kTangentialExtremum};
 
 inline constexpr double kSimultaneous_s = 1e-12;
 
@@ -32,12 +34,8 @@ struct EventFunction {
 /// velocities.
 bool is_force_event(ContactEvent event);
 
-/// Events possible in the present regime.
-struct PossibleEvents {
-  std::array<ContactEvent, 5> events;
-  std::size_t count;
-};
-PossibleEvents possible_events(const ContactLaw& law);
+/// Whether the event can happen in the present regime.
+bool is_possible(const ContactLaw& law, ContactEvent event);
 
 /// phi of one event. `vt_sign` is the sign of V_t at the start of the step (for the extremum).
 EventFunction event_function(const ContactLaw& law, ContactEvent event, const TipState& tip,

@@ -9,7 +9,7 @@
 
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
-#include "worker/solver/reference/reaction_peaks.h"
+#include "worker/solver/reference/contact_record.h"
 
 namespace oblique::solver {
 namespace {

@@ -69,6 +69,7 @@ TEST(Falls, SayHowFarTheyAre) {
     const double turn_m = outcomes[i].fallen->fall().largest_drop_m();
     // Told now and then, so the end is not told to the last digit.
     EXPECT_NEAR(chains[i]->fall_progress(), turn_m, 0.02 * turn_m) << i;
+    EXPECT_EQ(Finger(chains[i]->model(), chains[i]).drop_so_far_m(), chains[i]->fall_progress());
   }
 }
 
@@ -93,15 +94,6 @@ TEST(Falls, OfDifferentShapesAndWaysAreThoseThatEachHasAlone) {
     EXPECT_EQ(fall.state_at(drop_m).q, alone.fallen->fall().state_at(drop_m).q);
     EXPECT_EQ(fall.state_at(drop_m).v, alone.fallen->fall().state_at(drop_m).v);
   }
-}
-
-TEST(Falls, AFingerSaysHowFarItsFallIsAndWhatASharedOneCameTo) {
-  const Finger finger(coarse_model());
-  EXPECT_EQ(finger.drop_so_far_m(), 0.0);
-  const double turn_m = finger.largest_drop_m();
-  EXPECT_NEAR(finger.drop_so_far_m(), turn_m, 0.02 * turn_m);
-  const auto fallen = solve_falls(std::vector{coarse_model()}).front().fallen;
-  EXPECT_NEAR(Finger(coarse_model(), fallen).drop_so_far_m(), turn_m, 0.02 * turn_m);
 }
 
 TEST(Falls, ASharedFallGivesEachModelTheBitsOfItsOwn) {

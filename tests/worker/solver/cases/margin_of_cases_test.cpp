@@ -1,11 +1,7 @@
 // The margin of whole contacts: small where the mode is about to change, and only there.
-#include <cstddef>
-#include <cstdint>
-#include <optional>
 #include <random>
 #include <set>
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -85,20 +81,6 @@ TEST(Margin, IsFromZeroToOneAndNamesAnEventThatMayHappen) {
                            ? std::set<std::string>{"separation", "turn"}
                            : std::set<std::string>{"touch", "separation", "turn", "slip", "stick"};
     EXPECT_TRUE(names.contains(*result.margin_event)) << *result.margin_event;
-  }
-}
-
-TEST(Margin, OfAPointDoesNotKnowOfTheRestitutionOfItsNeighboursInTheLanes) {
-  // Neighbours that differ in e* alone share the contact up to the first turn.
-  std::vector<Point> points;
-  for (int i = 0; i < 20; ++i) {
-    points.push_back({0.9, 0.7, 0.4 + 0.03 * i});
-  }
-  for (const Outcome& outcome : solve_points(coarse_finger(), points)) {
-    const Point& point = points[outcome.number];
-    const CaseResult alone = coarse_finger().solve(point.H_m, point.mu, point.e_star);
-    EXPECT_EQ(outcome.result->margin, alone.margin) << point.e_star;
-    EXPECT_EQ(outcome.result->margin_event, alone.margin_event);
   }
 }
 

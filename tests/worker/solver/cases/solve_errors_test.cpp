@@ -37,6 +37,15 @@ std::string model_error(const std::function<void(ModelParameters&)>& change) {
   return message_of<InputError>([&] { Finger{model}; });
 }
 
+/// Of solving a point of the coarse model with that change.
+template <class Error = SolveError>
+std::string solve_error(const std::function<void(ModelParameters&)>& change, double e_star = 1.0) {
+  ModelParameters model = coarse_model();
+  change(model);
+  const Finger finger{model};
+  return message_of<Error>([&] { finger.solve(0.5, 0.4, e_star); });
+}
+
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 TEST(SolveErrors, ValueOutsideItsRangeIsNamedWithWhatIsAllowed) {
@@ -58,47 +67,33 @@ TEST(SolveErrors, TouchWithoutSpeedSaysThatThereIsNothingToSolve) {
 TEST(SolveErrors, StepAboveTheStabilityLimitNamesTheLimit) {
   EXPECT_THAT(model_error([](ModelParameters& m) { m.dt_fall_s = 1e-3; }),
               AllOf(HasSubstr("dt_fall = 0.001 s"), HasSubstr("stable up to 1.84")));
-  ModelParameters model = coarse_model();
-  model.dt_s = 1e-3;
-  const Finger finger{model};
-  EXPECT_THAT(message_of<InputError>([&] { finger.solve(1.0, 0.4, 1.0); }),
+  EXPECT_THAT(solve_error<InputError>([](ModelParameters& m) { m.dt_s = 1e-3; }),
               AllOf(HasSubstr("dt = 0.001 s"), HasSubstr("stable up to 1.8")));
   // The stiffer spring of restitution lowers the limit.
+  ModelParameters model = coarse_model();
   model.dt_s = 1e-5;
-  const Finger lower{model};
-  EXPECT_NO_THROW(lower.solve(1.0, 0.4, 1.0));
-  EXPECT_THAT(message_of<InputError>([&] { lower.solve(1.0, 0.4, 0.05); }),
+  EXPECT_NO_THROW(Finger{model}.solve(0.5, 0.4, 1.0));
+  EXPECT_THAT(solve_error<InputError>([](ModelParameters& m) { m.dt_s = 1e-5; }, 0.05),
               HasSubstr("dt = 1e-05 s"));
 }
 
 TEST(SolveErrors, ContactThatOutlastsTheStatedTimeIsGivenUp) {
-  ModelParameters model = coarse_model();
-  model.k_N_m = 1e3;  // half a period of a link on it takes 45 ms
-  const Finger soft{model};
-  EXPECT_THAT(message_of<SolveError>([&] { soft.solve(0.5, 0.4, 1.0); }),
+  // Half a period of a link on the soft spring takes 45 ms.
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.k_N_m = 1e3; }),
               HasSubstr("did not end within 0.02 s"));
-  model = coarse_model();
-  model.tip_mass_kg = 1e4;
-  const Finger heavy{model};
-  EXPECT_THAT(message_of<SolveError>([&] { heavy.solve(0.5, 0.4, 1.0); }),
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.tip_mass_kg = 1e4; }),
               HasSubstr("did not end within 0.02 s"));
 }
 
 TEST(SolveErrors, AFallOrContactWithoutAnEndNamesTheUnusualValueThatIsLikelyToBlame) {
-  const auto error = [](const std::function<void(ModelParameters&)>& change) {
-    ModelParameters model = coarse_model();
-    change(model);
-    const Finger finger{model};
-    return message_of<SolveError>([&] { finger.solve(0.5, 0.4, 1.0); });
-  };
   const char* const soft = "; likely cause: E = 70 Pa is outside the usual 1e8 to 1e12 Pa";
-  EXPECT_THAT(error([](ModelParameters& m) { m.E_Pa = 70; }),
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.E_Pa = 70; }),
               AllOf(HasSubstr("fall"), testing::EndsWith(soft)));
   const char* const loose =
       "did not end within 0.02 s; likely cause: k = 27 N/m is outside the "
       "usual 10000 to 1e10 N/m";
-  EXPECT_THAT(error([](ModelParameters& m) { m.k_N_m = 27; }), testing::EndsWith(loose));
-  EXPECT_THAT(error([](ModelParameters& m) {
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.k_N_m = 27; }), testing::EndsWith(loose));
+  EXPECT_THAT(solve_error([](ModelParameters& m) {
                 m.k_N_m = 27;
                 m.integrator = Integrator::kGeneralizedAlpha;
               }),
@@ -109,27 +104,18 @@ TEST(SolveErrors, MagnitudesBeyondNumbersAreAnErrorInBoundedTime) {
   EXPECT_THAT(model_error([](ModelParameters& m) { m.I_m4 = 1e300; }), HasSubstr("magnitude"));
   EXPECT_THAT(model_error([](ModelParameters& m) { m.rho_kg_m3 = 1e-300; }),
               HasSubstr("magnitude"));
-  ModelParameters model = coarse_model();
-  model.dt_fall_s = 1e-300;
-  const Finger finger{model};
-  EXPECT_THAT(message_of<SolveError>([&] { finger.solve(0.5, 0.4, 1.0); }),
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.dt_fall_s = 1e-300; }),
               HasSubstr("more than 1e+09 steps"));
 }
 
 TEST(SolveErrors, StepsTooShortForAnyContactFailAtOnce) {
-  const auto error = [](const std::function<void(ModelParameters&)>& change) {
-    ModelParameters model = coarse_model();
-    change(model);
-    const Finger finger{model};
-    return message_of<SolveError>([&] { finger.solve(0.5, 0.4, 1.0); });
-  };
-  EXPECT_THAT(error([](ModelParameters& m) { m.dt_s = 1e-300; }),
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.dt_s = 1e-300; }),
               AllOf(HasSubstr("steps of 1e-300 s"), HasSubstr("a longer dt")));
   EXPECT_THAT(
-      error([](ModelParameters& m) { m.dt_s = 1e-14; }),
+      solve_error([](ModelParameters& m) { m.dt_s = 1e-14; }),
       AllOf(HasSubstr("more than 5000000 steps of 1e-14 s"), HasSubstr("dt must be longer")));
-  EXPECT_THAT(error([](ModelParameters& m) { m.k_N_m = 1e30; }), HasSubstr("k = 1e+30 N/m"));
-  EXPECT_THAT(error([](ModelParameters& m) {
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.k_N_m = 1e30; }), HasSubstr("k = 1e+30 N/m"));
+  EXPECT_THAT(solve_error([](ModelParameters& m) {
                 m.integrator = Integrator::kGeneralizedAlpha;
                 m.dt_s = 1e-300;
               }),

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <string>
+#include <vector>
 
 #include "tests/worker/solver/cases/shared_fingers.h"
 
-/// What one expects of an impact before any number is known.
 namespace oblique::solver {
 namespace {
 
@@ -58,6 +61,171 @@ TEST(Impact, FrictionAndNormalWorkAddUpToWhatTheFingerLost) {
   EXPECT_NEAR(change_J, -energy.friction_J - energy.restitution_J, 1e-6 * energy.exchanged_J);
   EXPECT_LT(energy.kinetic_change_J, 0.0);
   EXPECT_GT(energy.kinetic_in_J, -energy.kinetic_change_J);
+}
+
+void expect_finite(const CaseResult& r) {
+  for (const double value : {r.fall_time_s,
+                             r.impact_x_m,
+                             r.vt_in_m_s,
+                             r.vn_in_m_s,
+                             r.duration_s,
+                             r.fn_peak_N,
+                             r.ft_peak_N,
+                             r.impulse_n_Ns,
+                             r.impulse_t_Ns,
+                             r.slide_m,
+                             r.vt_out_m_s,
+                             r.vn_out_m_s,
+                             r.stick_total_s,
+                             r.energy.kinetic_in_J,
+                             r.energy.friction_J,
+                             r.energy.restitution_J,
+                             r.energy.kinetic_change_J,
+                             r.energy.strain_change_J,
+                             r.energy.gravity_change_J,
+                             r.energy.exchanged_J,
+                             r.energy.closure,
+                             r.solver.dt_s}) {
+    EXPECT_TRUE(std::isfinite(value));
+  }
+}
+
+/// What holds for every contact, whatever the parameters.
+void expect_physical(const CaseResult& r, double worst_closure) {
+  EXPECT_GT(r.duration_s, 0.0);
+  EXPECT_GT(r.impulse_n_Ns, 0.0);
+  EXPECT_LT(r.vn_in_m_s, 0.0);
+  EXPECT_LE(std::abs(r.impulse_t_Ns), r.mu * r.impulse_n_Ns * (1.0 + 1e-9));
+  EXPECT_LE(r.ft_peak_N, r.mu * r.fn_peak_N * (1.0 + 1e-9));
+  EXPECT_GE(r.slide_m, 0.0);
+  EXPECT_GE(r.energy.friction_J, -1e-9 * r.energy.exchanged_J);
+  EXPECT_GE(r.energy.restitution_J, -1e-9 * r.energy.exchanged_J);
+  EXPECT_GE(r.energy.closure, 0.0);
+  EXPECT_LT(r.energy.closure, worst_closure);
+}
+
+/// Phases alternate and fill the contact; peaks lie between them; sticks lie inside.
+void expect_in_order(const CaseResult& r) {
+  ASSERT_EQ(r.phases.size(), 2 * r.peaks.size());
+  double t_s = 0.0;
+  for (std::size_t i = 0; i < r.phases.size(); ++i) {
+    EXPECT_EQ(r.phases[i].kind, i % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution);
+    EXPECT_EQ(r.phases[i].t0_s, t_s);
+    EXPECT_GE(r.phases[i].t1_s, t_s);
+    t_s = r.phases[i].t1_s;
+    if (i % 2 == 0) {
+      EXPECT_EQ(r.peaks[i / 2].t_s, t_s);
+      EXPECT_EQ(r.peaks[i / 2].fn_N, r.phases[i].fn_end_N);
+      EXPECT_GE(r.peaks[i / 2].fn_N, 0.0);
+    }
+  }
+  EXPECT_EQ(t_s, r.duration_s);
+  double stick_end_s = 0.0;
+  double stick_s = 0.0;
+  for (const StickInterval& stick : r.stick_intervals) {
+    EXPECT_GE(stick.t0_s, stick_end_s);
+    EXPECT_GE(stick.t1_s, stick.t0_s);
+    stick_end_s = stick.t1_s;
+    stick_s += stick.t1_s - stick.t0_s;
+  }
+  EXPECT_LE(stick_end_s, r.duration_s);
+  EXPECT_NEAR(stick_s, r.stick_total_s, 1e-15);
+  ASSERT_GE(r.mode.size(), 2U);
+  EXPECT_EQ(r.mode[1], 'C');
+  EXPECT_EQ(r.mode.back(), 'R');
+}
+
+/// A random point, one in six of them at an extreme. Never at the very top, where the tip stands.
+Point random_point(const Finger& finger, std::mt19937_64& generator) {
+  const auto uniform = [&generator](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(generator);
+  };
+  const double top_m = std::min(
+      finger.largest_drop_m(), 0.999999 * [&finger] {
+        double length_m = 0.0;
+        for (const double link_m : finger.model().lengths_m) {
+          length_m += link_m;
+        }
+        return length_m;
+      }());
+  Point point{top_m * uniform(0.05, 0.98), uniform(0.0, 2.0), uniform(0.05, 1.0)};
+  switch (std::uniform_int_distribution<int>(0, 17)(generator)) {
+    case 0:
+      point.mu = 0.0;
+      break;
+    case 1:
+      point.e_star = 0.02;
+      break;
+    case 2:
+      point.H_m = top_m * (1.0 - 1e-8);
+      break;
+    case 3:
+      point.H_m = uniform(1e-5, 1e-3);
+      break;
+    case 4:
+      point.mu = uniform(2.0, 50.0);
+      break;
+    case 5:
+      point.e_star = 1.0;
+      break;
+    default:
+      break;
+  }
+  return point;
+}
+
+void sweep(const ModelParameters& model, int points, unsigned seed, double worst_closure = 1e-4) {
+  const Finger finger{model};
+  std::mt19937_64 generator(seed);
+  for (int i = 0; i < points; ++i) {
+    const Point point = random_point(finger, generator);
+    SCOPED_TRACE("H = " + std::to_string(point.H_m) + ", mu = " + std::to_string(point.mu) +
+                 ", e* = " + std::to_string(point.e_star));
+    const CaseResult result = finger.solve(point.H_m, point.mu, point.e_star);
+    expect_finite(result);
+    expect_physical(result, worst_closure);
+    expect_in_order(result);
+  }
+}
+
+TEST(SolveSweep, WhateverTheModelResultsAreFinitePhysicalAndInOrder) {
+  struct Case {
+    int elements_per_link;
+    std::vector<double> lengths_m = {0.4, 0.4, 0.4};
+    double tip_mass_kg = 0.0;
+    double k_N_m = 2.7e7;
+    double eta2 = 1.2463;
+    int points = 20;
+    double worst_closure = 1e-4;
+  };
+  const Case cases[] = {
+      {.elements_per_link = 2, .points = 60},
+      {.elements_per_link = 1, .points = 60},
+      {.elements_per_link = 3, .lengths_m = {0.8}, .points = 60},
+      {.elements_per_link = 1, .lengths_m = {0.3, 0.2, 0.25, 0.15, 0.1}, .points = 40},
+      {.elements_per_link = 1, .tip_mass_kg = 0.5, .points = 40},
+      {.elements_per_link = 1, .tip_mass_kg = 1e-3},
+      {.elements_per_link = 1, .k_N_m = 1e6},
+      {.elements_per_link = 1, .k_N_m = 2.7e8},
+      // On a spring four hundred times the default's the step is set by that spring alone.
+      {.elements_per_link = 1, .k_N_m = 1e10, .worst_closure = 1e-3},
+      {.elements_per_link = 1, .eta2 = 5.0},
+      {.elements_per_link = 1, .eta2 = 0.3},
+  };
+  unsigned seed = 0;
+  for (const Case& c : cases) {
+    ModelParameters model = coarse_model(c.elements_per_link);
+    model.lengths_m = c.lengths_m;
+    model.tip_mass_kg = c.tip_mass_kg;
+    model.k_N_m = c.k_N_m;
+    model.eta2 = c.eta2;
+    SCOPED_TRACE(++seed);
+    sweep(model, c.points, seed, c.worst_closure);
+  }
+}
+
+TEST(SolveSweep, SlowManyPointsOfThePaper) {
+  sweep(preset("paper"), 3000, 11);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -12,26 +13,17 @@
 #include "tests/worker/solver/cases/same_bits.h"
 #include "tests/worker/solver/cases/shared_fingers.h"
 #include "worker/solver/falls.h"
-#include "worker/solver/fast/lane_batch.h"
-#include "worker/solver/reference/fall.h"
-#include "worker/solver/reference/solve_contact.h"
-#include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
 namespace {
 
-struct NumberedPoint {
-  std::uint64_t number;
-  Point point;
-};
-
 /// Points of all kinds of impact, short and long, numbered from 0.
-std::vector<NumberedPoint> points() {
-  std::vector<NumberedPoint> list;
+std::vector<FingerPoint> points_of(const Finger& finger) {
+  std::vector<FingerPoint> list;
   for (const double H_m : {0.3, 0.9, 1.0, 1.04}) {
     for (const double mu : {0.0, 0.4, 0.9, 1.4}) {
       for (const double e_star : {1.0, 0.7, 0.15}) {
-        list.push_back({list.size(), {H_m, mu, e_star}});
+        list.push_back({finger, list.size(), {H_m, mu, e_star}});
       }
     }
   }
@@ -40,22 +32,23 @@ std::vector<NumberedPoint> points() {
 
 using Results = std::map<std::uint64_t, CaseResult>;
 
-Results solved_together(const Finger& finger, const std::vector<NumberedPoint>& list) {
-  std::vector<Point> bare;
-  for (const auto& [number, point] : list) {
-    bare.push_back(point);
-  }
+Results solved_together(const std::vector<FingerPoint>& list) {
   Results results;
-  for (Outcome& outcome : solve_points(finger, bare)) {
-    EXPECT_TRUE(outcome.result) << outcome.error;
-    results.emplace(list[outcome.number].number, std::move(*outcome.result));
-  }
+  std::size_t next = 0;
+  solve_points(
+      [&]() -> std::optional<FingerPoint> {
+        return next < list.size() ? std::optional(list[next++]) : std::nullopt;
+      },
+      [&results](Outcome&& outcome) {
+        EXPECT_TRUE(outcome.result) << outcome.error;
+        EXPECT_TRUE(results.emplace(outcome.number, std::move(*outcome.result)).second);
+      });
   return results;
 }
 
-Results solved_one_by_one(const Finger& finger, const std::vector<NumberedPoint>& list) {
+Results solved_one_by_one(const std::vector<FingerPoint>& list) {
   Results results;
-  for (const auto& [number, point] : list) {
+  for (const auto& [finger, number, point] : list) {
     results.emplace(number, finger.solve(point.H_m, point.mu, point.e_star));
   }
   return results;
@@ -70,39 +63,40 @@ void expect_same(const Results& a, const Results& b) {
   }
 }
 
-TEST(SameBits, WhateverWasSolvedBefore) {
-  const auto list = points();
-  const Finger fresh{coarse_model()};
-  expect_same(solved_one_by_one(fresh, {list.rbegin(), list.rend()}),
-              solved_one_by_one(coarse_finger(), list));
-}
-
-TEST(SameBits, WhateverNeighboursItHasInTheLanes) {
-  auto list = points();
-  const Results alone = solved_one_by_one(coarse_finger(), list);
-  expect_same(solved_together(coarse_finger(), list), alone);
+void expect_same_in_any_company(std::vector<FingerPoint> list) {
+  const Results alone = solved_one_by_one(list);
+  expect_same(solved_together(list), alone);
   std::mt19937_64 generator(1);
   for (int shuffle = 0; shuffle < 3; ++shuffle) {
     std::shuffle(list.begin(), list.end(), generator);
-    expect_same(solved_together(coarse_finger(), list), alone);
+    expect_same(solved_together(list), alone);
   }
 }
 
+TEST(SameBits, WhateverWasSolvedBefore) {
+  const auto list = points_of(Finger{coarse_model()});
+  expect_same(solved_one_by_one({list.rbegin(), list.rend()}),
+              solved_one_by_one(points_of(coarse_finger())));
+}
+
+TEST(SameBits, WhateverNeighboursItHasInTheLanes) {
+  expect_same_in_any_company(points_of(coarse_finger()));
+}
+
 TEST(SameBits, FromSeveralThreadsAtOnceThatShareAFinger) {
-  const auto list = points();
-  const Finger shared{coarse_model()};
+  const auto list = points_of(Finger{coarse_model()});
   std::vector<Results> by_thread(4);
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < by_thread.size(); ++i) {
     threads.emplace_back([&, i] {
       // The first to come solves the fall.
-      by_thread[i] = i % 2 == 0 ? solved_together(shared, list) : solved_one_by_one(shared, list);
+      by_thread[i] = i % 2 == 0 ? solved_together(list) : solved_one_by_one(list);
     });
   }
   for (std::thread& thread : threads) {
     thread.join();
   }
-  const Results alone = solved_one_by_one(coarse_finger(), list);
+  const Results alone = solved_one_by_one(points_of(coarse_finger()));
   for (const Results& results : by_thread) {
     expect_same(results, alone);
   }
@@ -135,32 +129,8 @@ std::vector<FingerPoint> crowd() {
   return crowd;
 }
 
-Results solved_as_crowd(const std::vector<FingerPoint>& list) {
-  Results results;
-  std::size_t next = 0;
-  solve_points(
-      [&]() -> std::optional<FingerPoint> {
-        return next < list.size() ? std::optional(list[next++]) : std::nullopt;
-      },
-      [&results](Outcome&& outcome) {
-        EXPECT_TRUE(outcome.result) << outcome.error;
-        EXPECT_TRUE(results.emplace(outcome.number, std::move(*outcome.result)).second);
-      });
-  return results;
-}
-
 TEST(SameBits, InAMixedCrowdOfModels) {
-  auto list = crowd();
-  Results alone;
-  for (const auto& [finger, number, point] : list) {
-    alone.emplace(number, finger.solve(point.H_m, point.mu, point.e_star));
-  }
-  expect_same(solved_as_crowd(list), alone);
-  std::mt19937_64 generator(2);
-  for (int shuffle = 0; shuffle < 3; ++shuffle) {
-    std::shuffle(list.begin(), list.end(), generator);
-    expect_same(solved_as_crowd(list), alone);
-  }
+  expect_same_in_any_company(crowd());
 }
 
 TEST(SameBits, WithATraceOrWithout) {

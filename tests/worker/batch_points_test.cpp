@@ -1,14 +1,10 @@
-#include "worker/point_solver.h"
-
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -18,8 +14,11 @@
 #include "proto/result_message.h"
 #include "tests/support/recipes.h"
 #include "tests/worker/conversation_fixture.h"
+#include "worker/batch_solver.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/kernels.h"
+#include "worker/solver/point_runs.h"
+#include "worker/trace_solver.h"
 
 namespace oblique::worker {
 namespace {
@@ -32,30 +31,29 @@ Batch batch_of(const protocol::Recipe& recipe) {
 }
 
 /// Solves all points of a batch on so many threads; the results in the order of the points.
-std::vector<protocol::PointResult> solved(const Batch& batch, PointSolver& solver,
+std::vector<protocol::PointResult> solved(const Batch& batch, solver::FallCache& falls,
                                           std::size_t threads = 1) {
+  std::promise<void> ended;
+  BatchSolver solver(
+      [&falls](const Batch& of, auto& points, const auto& take) {
+        solver::solve_points_of_models(points, falls, of.points().wants_errors(), take);
+      },
+      [&ended] { ended.set_value(); }, threads);
+  solver.add(batch);
+  ended.get_future().wait();
   std::vector<protocol::PointResult> results(batch.size());
-  std::atomic<std::uint64_t> given = 0;
-  const auto next = [&]() -> std::optional<std::uint64_t> {
-    const std::uint64_t index = given++;
-    return index < batch.size() ? std::optional(index) : std::nullopt;
-  };
-  const auto take = [&](protocol::PointResult&& result) {
-    const std::uint64_t point = result.point();
-    EXPECT_EQ(results.at(point).reals_size(), 0) << "point " << point << " came twice";
-    results.at(point) = std::move(result);
-  };
-  std::vector<std::jthread> workers;
-  for (std::size_t i = 0; i < threads; ++i) {
-    workers.emplace_back([&] { solver.solve(batch, next, take); });
+  for (Progress& progress : solver.collect()) {
+    for (protocol::PointResult& result : progress.results) {
+      EXPECT_FALSE(results.at(result.point()).has_model()) << result.point() << " came twice";
+      results.at(result.point()) = std::move(result);
+    }
   }
-  workers.clear();
   return results;
 }
 
 std::vector<protocol::PointResult> solved(const Batch& batch) {
-  PointSolver solver(kFallBytes);
-  return solved(batch, solver);
+  solver::FallCache falls(kFallBytes);
+  return solved(batch, falls);
 }
 
 /// The bytes of a result's outputs but for the time that it took.
@@ -110,7 +108,7 @@ struct CountedFalls {
   std::vector<std::vector<solver::ModelParameters>> solved;
 };
 
-TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
+TEST(PointsOfABatch, EveryPointGivesWhatTheFingerGivesForItAlone) {
   const Batch batch = batch_of(recipe_with_points(12));
   const auto results = solved(batch);
   const solver::Finger finger(solver::preset("paper"));
@@ -125,7 +123,7 @@ TEST(PointSolverTest, EveryPointGivesWhatTheFingerGivesForItAlone) {
   }
 }
 
-TEST(PointSolverTest, ResultsHaveTheInputsOfTheirPointsAlsoWhenTheyFailed) {
+TEST(PointsOfABatch, ResultsHaveTheInputsOfTheirPointsAlsoWhenTheyFailed) {
   protocol::Recipe recipe = recipe_with_points(2);
   recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
   add_model_axis(recipe, "k", {1e7, 2e7});
@@ -144,7 +142,7 @@ TEST(PointSolverTest, ResultsHaveTheInputsOfTheirPointsAlsoWhenTheyFailed) {
   EXPECT_EQ(failed, 4U);
 }
 
-TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved) {
+TEST(PointsOfABatch, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved) {
   protocol::Recipe recipe = recipe_with_points(2);
   recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
   const auto results = solved(batch_of(recipe));
@@ -153,7 +151,7 @@ TEST(PointSolverTest, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved
   EXPECT_NE(results[2].error().find("1.19"), std::string::npos) << results[2].error();
 }
 
-TEST(PointSolverTest, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
+TEST(PointsOfABatch, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
   const Batch batch = batch_of(protocol::recipe_of(
       {{protocol::following("k", "if(mu < 0.5, 2.7e7, -1)"), protocol::listed("H", {0.5}),
         protocol::listed("mu", {0.4, 0.6}), protocol::listed("e", {1.0})}}));
@@ -163,7 +161,7 @@ TEST(PointSolverTest, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
   EXPECT_NE(results[1].error().find("mu = 0.6"), std::string::npos);
 }
 
-TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
+TEST(PointsOfABatch, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
   // The recipe takes any positive number, the solver only one that leaves it a step.
   protocol::Recipe recipe = recipe_with_points(3);
   solver::ModelParameters model = solver::preset("paper");
@@ -176,12 +174,12 @@ TEST(PointSolverTest, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
   }
 }
 
-TEST(PointSolverTest, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
+TEST(PointsOfABatch, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
   const Batch batch = batch_of(recipe_with_models(3, {6e10, 7e10, 8e10}, {2e7, 3e7}));
   ASSERT_EQ(batch.size(), 18U);
   CountedFalls falls;
-  PointSolver one({}, falls.solve);
-  PointSolver several({}, falls.solve);
+  solver::FallCache one({}, falls.solve);
+  solver::FallCache several({}, falls.solve);
   const auto results = solved(batch, one);
   EXPECT_EQ(falls.count(), 3U) << "k does not enter the fall";
   const auto by_threads = solved(batch, several, 3);
@@ -199,18 +197,18 @@ TEST(PointSolverTest, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
   }
 }
 
-TEST(PointSolverTest, FallsThatLaterPointsMissAreSolvedBesideTheFirst) {
+TEST(PointsOfABatch, FallsThatLaterPointsMissAreSolvedBesideTheFirst) {
   const Batch batch = batch_of(recipe_with_models(2, {5e10, 6e10, 7e10, 8e10}, {2e7, 3e7}));
   CountedFalls falls;
-  PointSolver solver({}, falls.solve);
-  solved(batch, solver);
+  solver::FallCache cache({}, falls.solve);
+  solved(batch, cache);
   ASSERT_FALSE(falls.solved.empty());
   const std::size_t lanes = solver::runnable_lane_kernels().front().lanes;
   EXPECT_EQ(falls.solved.front().size(), std::min<std::size_t>(lanes, 4));
   EXPECT_EQ(falls.count(), 4U);
 }
 
-TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlone) {
+TEST(PointsOfABatch, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlone) {
   protocol::Recipe recipe = recipe_with_models(4, {7e10}, {2e7, 3e7});
   solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
@@ -219,9 +217,9 @@ TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlon
   add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails in the first
   const Batch batch = batch_of(recipe);
   CountedFalls falls;
-  PointSolver solver({}, falls.solve);
+  solver::FallCache cache({}, falls.solve);
   for (int again = 0; again < 2; ++again) {
-    const auto results = solved(batch, solver);
+    const auto results = solved(batch, cache);
     for (const auto& result : results) {
       const bool fails =
           batch.points().model(batch.points().point(result.point()).model).dt_fall_s == 0.025;
@@ -231,7 +229,7 @@ TEST(PointSolverTest, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlon
   EXPECT_EQ(falls.count(), 2U);
 }
 
-TEST(PointSolverTest, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumbers) {
+TEST(PointsOfABatch, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumbers) {
   protocol::Recipe recipe = recipe_with_models(3, {7e10, 6e10}, {2.7e7, 1e7});
   recipe.mutable_model()->set_elements_per_link(2);  // one has no coarser mesh
   const auto without = solved(batch_of(recipe));
@@ -275,16 +273,19 @@ void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, 
   add_model_axis(recipe, "k", {2e7, 3e7});
   recipe.set_errors(errors);
   const Batch batch = batch_of(recipe);
-  PointSolver solver(kFallBytes);
-  const auto results = solved(batch, solver);
+  solver::FallCache falls(kFallBytes);
+  const auto results = solved(batch, falls);
   for (const std::uint64_t number : {std::uint64_t{0}, batch.size() - 1}) {
     std::size_t rows = 0;
     protocol::TraceOrder order = order_of(batch, number);
     order.set_shape(shape);
-    const auto traced = solver.trace(order, [&](const solver::TraceRow& row) {
-      ++rows;
-      EXPECT_EQ(row.nodes_m.empty(), !shape);
-    });
+    const auto traced = solve_trace(
+        order,
+        [&](const solver::TraceRow& row) {
+          ++rows;
+          EXPECT_EQ(row.nodes_m.empty(), !shape);
+        },
+        falls);
     ASSERT_EQ(traced.error(), "");
     EXPECT_EQ(bits_of(traced), bits_of(results[number]))
         << "errors " << errors << " shape " << shape << " point " << number;
@@ -292,7 +293,7 @@ void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, 
   }
 }
 
-TEST(PointSolverTest, ATracedPointHasTheBitsThatItHadInItsBatch) {
+TEST(SolveTrace, ATracedPointHasTheBitsThatItHadInItsBatch) {
   for (const bool errors : {false, true}) {
     for (const bool shape : {false, true}) {
       expect_traces_to_repeat(solver::Integrator::kExplicit, 12, errors, shape);
@@ -300,21 +301,22 @@ TEST(PointSolverTest, ATracedPointHasTheBitsThatItHadInItsBatch) {
   }
 }
 
-TEST(PointSolverTest, ATraceByGeneralizedAlphaHasTheBitsOfItsBatchToo) {
+TEST(SolveTrace, ATraceByGeneralizedAlphaHasTheBitsOfItsBatchToo) {
   expect_traces_to_repeat(solver::Integrator::kGeneralizedAlpha, 2, false, true);
 }
 
-TEST(PointSolverTest, ATraceBeginsWithTheFallWhereThatIsOrdered) {
+TEST(SolveTrace, ATraceBeginsWithTheFallWhereThatIsOrdered) {
   solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   protocol::Recipe recipe = recipe_with_points(2);
   *recipe.mutable_model() = protocol::to_message(model);
-  PointSolver solver(kFallBytes);
+  solver::FallCache falls(kFallBytes);
   protocol::TraceOrder order = order_of(batch_of(recipe), 0);
   for (const bool fall : {false, true}) {
     order.set_fall(fall);
     std::vector<std::string> states;
-    solver.trace(order, [&](const solver::TraceRow& row) { states.push_back(row.state); });
+    solve_trace(
+        order, [&](const solver::TraceRow& row) { states.push_back(row.state); }, falls);
     ASSERT_FALSE(states.empty());
     EXPECT_EQ(std::count(states.begin(), states.end(), solver::kFalling),
               fall ? solver::kFallRows : 0);
@@ -322,15 +324,15 @@ TEST(PointSolverTest, ATraceBeginsWithTheFallWhereThatIsOrdered) {
   }
 }
 
-TEST(PointSolverTest, ATraceWithoutAnswerFailsWithTheReasonOfItsPoint) {
-  PointSolver solver(kFallBytes);
+TEST(SolveTrace, ATraceWithoutAnswerFailsWithTheReasonOfItsPoint) {
+  solver::FallCache falls(kFallBytes);
   const Batch batch = batch_of(recipe_with_points(2));
   protocol::TraceOrder order = order_of(batch, 0);
   order.set_h_m(1.19);  // beyond the largest drop
   const auto nothing = [](const solver::TraceRow&) {};
-  EXPECT_NE(solver.trace(order, nothing).error().find("1.19"), std::string::npos);
+  EXPECT_NE(solve_trace(order, nothing, falls).error().find("1.19"), std::string::npos);
   order.mutable_model()->set_e_pa(-1.0);
-  EXPECT_NE(solver.trace(order, nothing).error().find("E = -1"), std::string::npos);
+  EXPECT_NE(solve_trace(order, nothing, falls).error().find("E = -1"), std::string::npos);
 }
 
 }  // namespace
