@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "worker/solver/fast/lane_falls.h"
-#include "worker/solver/model/usual_ranges.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
