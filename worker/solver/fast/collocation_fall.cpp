@@ -52,7 +52,7 @@ struct DenseWeights {
   double by_q[kStages];
 };
 
-double weighted(const double* weights, const std::array<double, kStages>& a) {
+double weighted(const double* weights, const double* a) {
   double sum = 0.0;
   for (std::size_t k = 0; k < kStages; ++k) {
     sum += weights[k] * a[k];
@@ -62,30 +62,21 @@ double weighted(const double* weights, const std::array<double, kStages>& a) {
 
 /// The tip's height over one step: the polynomial through the stages.
 struct TipOverStep {
-  /// From what CollocationLanes::state_and_stages() gives; `tip` is the entry of the tip's height.
-  TipOverStep(double step_s, const std::vector<double>& numbers, std::size_t tip) : h_s(step_s) {
-    const std::size_t size = numbers.size() / (3 + kStages);
-    start_y_m = numbers[tip];
-    start_vy_m_s = numbers[size + tip];
-    for (std::size_t stage = 0; stage < kStages; ++stage) {
-      ay_m_s2[stage] = numbers[(3 + stage) * size + tip];
-    }
-  }
-
   double h_s;
-  double start_y_m;
-  double start_vy_m_s;
-  std::array<double, kStages> ay_m_s2;
+  CollocationLanes::Entries tip;  ///< of the tip's height
+
+  double start_vy_m_s() const { return tip[1]; }
+  const double* ay_m_s2() const { return tip.data() + 3; }
 
   /// At the fraction c of the step.
   double y_m(double c) const {
-    return start_y_m +
-           (c * h_s * start_vy_m_s + h_s * h_s * weighted(DenseWeights(c).by_q, ay_m_s2));
+    return tip[0] +
+           (c * h_s * start_vy_m_s() + h_s * h_s * weighted(DenseWeights(c).by_q, ay_m_s2()));
   }
   double vy_m_s(double c) const {
     double b[kStages];
     gauss_collocation().integrals(c, b);
-    return start_vy_m_s + h_s * weighted(b, ay_m_s2);
+    return start_vy_m_s() + h_s * weighted(b, ay_m_s2());
   }
 
   /// Where the tip first stops falling, as a fraction of the step; above 1 when it falls on. It is
@@ -97,7 +88,7 @@ struct TipOverStep {
       const bool is_stage = place < kStages;
       double high = is_stage ? rule.node[place] : 1.0;
       const double* weights = is_stage ? rule.integral[place] : rule.weight;
-      if (start_vy_m_s + h_s * weighted(weights, ay_m_s2) < 0.0) {
+      if (start_vy_m_s() + h_s * weighted(weights, ay_m_s2()) < 0.0) {
         low = high;
         continue;
       }
@@ -142,23 +133,24 @@ class CollocationFall : public Fall {
   CollocationFall(const LaneKernel& kernel, const Chain& chain, double error_m)
       : kernel_(kernel), chain_(chain), error_m_(error_m) {}
 
-  /// Takes the state before a step and its stages. True when the tip turns within it: the fall is
-  /// then complete.
-  bool append(double h_s, const std::vector<double>& state_and_stages) {
-    const TipOverStep tip_over(h_s, state_and_stages, tip());
+  /// Takes the last attempt of a lane before it is accepted. True when the tip turns within it: the
+  /// fall is then complete.
+  bool append(const CollocationLanes& lanes, std::size_t lane) {
+    const TipOverStep tip_over{lanes.step(lane).h_s, lanes.entries(lane, tip())};
     if (steps_.size() % steps_kept_ == 0) {
-      const auto first = state_and_stages.begin();
+      const std::vector<double> numbers = lanes.state_and_stages(lane);
+      const auto first = numbers.begin();
       states_.emplace_back(first, first + static_cast<std::ptrdiff_t>(3 * size()));
       thin_states();
     }
-    steps_.push_back({time_s_, -tip_over.start_y_m, h_s});
+    steps_.push_back({time_s_, -tip_over.tip[0], tip_over.h_s});
     const double turn = tip_over.turn();
     if (turn <= 1.0) {
       last_turn_ = turn;
       largest_drop_m_ = -tip_over.y_m(turn);
       return true;
     }
-    time_s_ += h_s;
+    time_s_ += tip_over.h_s;
     return false;
   }
 
@@ -188,7 +180,10 @@ class CollocationFall : public Fall {
     const std::size_t number = step_from(H_m, &Step::drop_m);
     const std::vector<double> numbers = solve_again(number);
     const double last = number + 1 == steps_.size() ? last_turn_ : 1.0;
-    const TipOverStep tip_over(steps_[number].h_s, numbers, tip());
+    TipOverStep tip_over{steps_[number].h_s, {}};
+    for (std::size_t i = 0; i < tip_over.tip.size(); ++i) {
+      tip_over.tip[i] = numbers[i * size() + tip()];
+    }
     return within(steps_[number], numbers, tip_over.at_drop(H_m, last));
   }
 
@@ -349,12 +344,12 @@ class FallingChain {
              fail("the fall could not be solved on from t = " + readable_number(fall_->time_s()) +
                   " s: steps of " + readable_number(step.h_s) + " s still do not converge");
     }
-    const std::vector<double> numbers = lanes.state_and_stages(lane);
-    const double y_m = numbers[2 * static_cast<std::size_t>(request_.chain->tip_row()) + 1];
+    const auto tip = 2 * static_cast<std::size_t>(request_.chain->tip_row()) + 1;
+    const double y_m = lanes.entries(lane, tip)[0];
     if (!(std::abs(y_m) <= 2.0 * length_m_)) {
       return fail("the fall diverged at t = " + readable_number(fall_->time_s()) + " s");
     }
-    if (fall_->append(step.h_s, numbers)) {
+    if (fall_->append(lanes, lane)) {
       solution_.fall = fall_;
       return true;
     }

@@ -220,6 +220,16 @@ void CollocationLanes::accept() {
   std::swap(arrays_.state, arrays_.next);
 }
 
+CollocationLanes::Entries CollocationLanes::entries(std::size_t lane, std::size_t i) const {
+  Entries entries;
+  for (std::size_t vector = 0; vector < entries.size(); ++vector) {
+    const std::size_t row = vector < 3 ? vector : vector - 3;
+    const double* numbers = vector < 3 ? arrays_.state : arrays_.stage_a;
+    entries[vector] = numbers[(row * size_ + i) * lanes() + lane];
+  }
+  return entries;
+}
+
 std::vector<double> CollocationLanes::state_and_stages(std::size_t lane) const {
   std::vector<double> numbers;
   numbers.reserve((3 + GaussCollocation::kStages) * size_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -46,8 +47,11 @@ class CollocationLanes {
   /// Takes the states at the end of the last attempt in the lanes whose step is_accepted.
   void accept();
 
-  /// Position, rates and mean acceleration of a lane's state, and the accelerations at the stages
-  /// of its last attempt.
+  /// Entry i of position, rates and mean acceleration of a lane's state, and of the accelerations
+  /// at the stages of its last attempt.
+  using Entries = std::array<double, 3 + GaussCollocation::kStages>;
+  Entries entries(std::size_t lane, std::size_t i) const;
+  /// All of them, a vector after the other.
   std::vector<double> state_and_stages(std::size_t lane) const;
 
  private:

@@ -63,9 +63,10 @@ void LaneBatch::fill(std::size_t lane, const Source& source, const Tracing& trac
     const Branch branch = std::move(branches_.front());
     branches_.pop_front();
     const ContactCase& next = branch.contact_case;
-    Progress progress = *branch.progress;
-    progress.contact = progress.contact.branched(next.parameters.e_star, next.steps);
-    start(lane, next, *branch.state, std::move(progress));
+    const Progress& trunk = *branch.progress;
+    start(lane, next, *branch.state,
+          {trunk.contact.branched(next.parameters.e_star, next.steps), trunk.touch, trunk.in,
+           trunk.reactions});
     return;
   }
   const auto next = upcoming_ || is_exhausted_ ? std::exchange(upcoming_, std::nullopt) : source();

@@ -9,6 +9,7 @@ LaneStepper::LaneStepper(const ChainTables<double>& chain, const LaneKernel& ker
     : kernel_(kernel),
       size_(2 * chain.rows),
       chains_(kernel.lanes),
+      is_copied_(kernel.lanes, 0),
       side_by_side_(chain, kernel.lanes),
       memory_(kernel.lanes) {
   for (double** const array :
@@ -26,7 +27,7 @@ LaneStepper::LaneStepper(const ChainTables<double>& chain, const LaneKernel& ker
 void LaneStepper::load(std::size_t lane, const ChainTables<double>& chain, const double* q,
                        const double* v) {
   chains_[lane] = chain;
-  side_by_side_.set(lane, chain);
+  is_copied_[lane] = 0;
   compare_chains();
   for (std::size_t i = 0; i < size_; ++i) {
     arrays_.q[i * lanes() + lane] = q[i];
@@ -73,9 +74,15 @@ void LaneStepper::set_force(std::size_t lane, const AffineContactForce<double>& 
 void LaneStepper::step() {
   if (one_chain_ != nullptr) {
     kernel_.step_one_chain(*one_chain_, arrays_);
-  } else {
-    kernel_.step_chains(side_by_side_.tables(), arrays_);
+    return;
   }
+  for (std::size_t lane = 0; lane < lanes(); ++lane) {
+    if (chains_[lane] && is_copied_[lane] == 0) {
+      side_by_side_.set(lane, *chains_[lane]);
+      is_copied_[lane] = 1;
+    }
+  }
+  kernel_.step_chains(side_by_side_.tables(), arrays_);
 }
 
 ContactIntegrals<double> LaneStepper::integrals(std::size_t lane) const {

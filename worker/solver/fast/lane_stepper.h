@@ -58,6 +58,7 @@ class LaneStepper {
   std::size_t size_;                                        ///< entries of one state
   std::vector<std::optional<ChainTables<double>>> chains_;  ///< none: the lane is idle
   const ChainTables<double>* one_chain_ = nullptr;  ///< of all lanes that are not idle, if one
+  std::vector<unsigned char> is_copied_;            ///< whether side_by_side_ has the lane's chain
   LaneChains side_by_side_;                         ///< all chains, for when they differ
   LaneMemory memory_;
   LaneArrays arrays_{};
