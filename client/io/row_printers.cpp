@@ -21,7 +21,6 @@
 #include "proto/text.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"
-#include "worker/solver/model/written_number.h"
 
 namespace oblique::client {
 namespace {

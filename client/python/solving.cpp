@@ -29,7 +29,6 @@
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/model/trace_columns.h"
-#include "worker/solver/model/usual_ranges.h"
 
 namespace oblique::python {
 namespace {

@@ -13,7 +13,6 @@
 #include "proto/recipe/model_message.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"
-#include "worker/solver/model/usual_ranges.h"
 
 namespace oblique::client {
 namespace {

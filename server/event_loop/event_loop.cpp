@@ -215,7 +215,8 @@ void EventLoop::note_disconnects() {
   for (const Disconnect& disconnect : network_.take_disconnects()) {
     service_->client_left(disconnect.identity);
     if (disconnect.refused) {
-      service_->log_stranger(fmt::format("{} was refused: {}", disconnect.address, disconnect.reason));
+      service_->log_stranger(
+          fmt::format("{} was refused: {}", disconnect.address, disconnect.reason));
     } else if (!disconnect.reason.empty()) {
       service_->log_stranger(fmt::format("a connection was ended: {}", disconnect.reason));
     }

@@ -13,7 +13,7 @@
 #include "worker/solver/fast/kernels.h"
 #include "worker/solver/fast/lane_falls.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/usual_ranges.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 

@@ -14,7 +14,7 @@
 
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/lane_batch.h"
-#include "worker/solver/model/usual_ranges.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/step_choice.h"
 

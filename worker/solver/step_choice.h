@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/solver/model/smallest_restitution.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/chain.h"
 #include "worker/solver/reference/contact_law.h"
 

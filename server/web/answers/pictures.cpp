@@ -22,7 +22,6 @@
 #include "server/web/answers/fields.h"
 #include "server/web/answers/study_answers.h"
 #include "server/web/http/http_message.h"
-#include "worker/solver/model/number.h"
 
 namespace oblique::server {
 namespace {
@@ -359,7 +358,7 @@ constexpr double kEndTolerance = 1e-12;
 /// A number as SQL text.
 std::string sql_number(double value) {
   constexpr double kMost = std::numeric_limits<double>::max();
-  return fmt::format("({})", solver::exact_real(std::clamp(value, -kMost, kMost)));
+  return fmt::format("({:#})", std::clamp(value, -kMost, kMost));
 }
 
 /// The bins along one column.

@@ -97,8 +97,8 @@ class ServiceQueryTest : public ServiceTest {
   void give(std::size_t index) {
     protocol::QueryReply chunk;
     chunk.set_chunk_rows(1);
-    service_->query_report({QueryReport::Kind::kRows, ports_.queries.at(index).ticket,
-                            reply_of(chunk)});
+    service_->query_report(
+        {QueryReport::Kind::kRows, ports_.queries.at(index).ticket, reply_of(chunk)});
   }
 };
 

@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -87,9 +88,8 @@ class StudyOnLan : public ::testing::Test {
   std::unique_ptr<Process> worker_on(const Host& host) const {
     const Inside inside(host);
     auto arguments = access("worker");
-    arguments.insert(arguments.end(),
-                     {"--threads", "1", "--name", host.name(), "--stop-with-parent",
-                      std::to_string(getpid())});
+    arguments.insert(arguments.end(), {"--threads", "1", "--name", host.name(),
+                                       "--stop-with-parent", std::to_string(getpid())});
     return std::make_unique<Process>(folder_, worker_program(), arguments);
   }
   /// `oblique` with these arguments, and how the server is reached, on the client's machine.

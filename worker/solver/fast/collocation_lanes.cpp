@@ -1,14 +1,26 @@
 #include "worker/solver/fast/collocation_lanes.h"
 
-#include <algorithm>
-#include <array>
+#include <Eigen/Eigenvalues>
 #include <cmath>
+#include <complex>
+#include <numbers>
 #include <utility>
 
 #include "worker/solver/fast/front_kernel.h"
 
 namespace oblique::solver {
 namespace {
+
+/// Legendre polynomials up to the degree kStages at x in [-1, 1].
+struct LegendreValues {
+  explicit LegendreValues(double x) : P{1.0, x} {
+    for (std::size_t n = 2; n <= GaussCollocation::kStages; ++n) {
+      const auto k = static_cast<double>(n);
+      P[n] = ((2.0 * k - 1.0) * x * P[n - 1] - (k - 1.0) * P[n - 2]) / k;
+    }
+  }
+  double P[GaussCollocation::kStages + 1];
+};
 
 /// After so many iterations the step is taken to be too long.
 constexpr int kMostIterations = 10;
@@ -22,30 +34,101 @@ constexpr std::size_t numbers_of() {
 
 }  // namespace
 
+GaussCollocation::GaussCollocation() {
+  const auto n = static_cast<double>(kStages);
+  for (std::size_t i = 0; i < kStages; ++i) {
+    double x = -std::cos(std::numbers::pi * (static_cast<double>(i) + 0.75) / (n + 0.5));
+    double slope = 0.0;
+    for (int newton = 0; newton < 20; ++newton) {
+      const LegendreValues at(x);
+      slope = n * (x * at.P[kStages] - at.P[kStages - 1]) / (x * x - 1.0);
+      x -= at.P[kStages] / slope;
+    }
+    node[i] = 0.5 * (1.0 + x);
+    weight[i] = 1.0 / ((1.0 - x * x) * slope * slope);
+    position_weight[i] = weight[i] * (1.0 - node[i]);
+    const LegendreValues at(x);
+    for (std::size_t degree = 0; degree < kStages; ++degree) {
+      legendre[degree][i] = (2.0 * static_cast<double>(degree) + 1.0) * weight[i] * at.P[degree];
+    }
+  }
+  for (std::size_t i = 0; i < kStages; ++i) {
+    integrals(node[i], integral[i]);
+  }
+  constexpr auto kRows = static_cast<Eigen::Index>(kStages);
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::MatrixXd A = Eigen::Map<const RowMajor>(integral[0], kRows, kRows);
+  const Eigen::EigenSolver<Eigen::MatrixXd> eigen(A);
+  const Eigen::MatrixXcd T = eigen.eigenvectors();
+  const Eigen::MatrixXcd inverse = T.inverse();
+  std::size_t pair = 0;
+  for (Eigen::Index k = 0; k < kRows; ++k) {
+    const std::complex<double> lambda = eigen.eigenvalues()[k];
+    if (lambda.imag() < 0.0) {
+      continue;  // the other one of a pair
+    }
+    const std::complex<double> squared = lambda * lambda;
+    squared_re[pair] = squared.real();
+    squared_im[pair] = squared.imag();
+    for (Eigen::Index row = 0; row < kRows; ++row) {
+      const auto i = static_cast<std::size_t>(row);
+      const std::complex<double> back = 2.0 * T(row, k);
+      into_re[pair][i] = inverse(k, row).real();
+      into_im[pair][i] = inverse(k, row).imag();
+      back_re[i][pair] = back.real();
+      back_im[i][pair] = -back.imag();
+      shift_re[i][pair] = (back * squared).real();
+      shift_im[i][pair] = -(back * squared).imag();
+    }
+    ++pair;
+  }
+}
+
+void GaussCollocation::integrals(double c, double* b) const {
+  const LegendreValues at(2.0 * c - 1.0);
+  // int_0^c P_k(2 t - 1) dt
+  double of_legendre[kStages];
+  of_legendre[0] = c;
+  for (std::size_t k = 1; k < kStages; ++k) {
+    of_legendre[k] = 0.5 * (at.P[k + 1] - at.P[k - 1]) / (2.0 * static_cast<double>(k) + 1.0);
+  }
+  for (std::size_t j = 0; j < kStages; ++j) {
+    b[j] = 0.0;
+    for (std::size_t k = kStages; k-- > 0;) {
+      b[j] += legendre[k][j] * of_legendre[k];
+    }
+  }
+}
+
+const GaussCollocation& gauss_collocation() {
+  static const GaussCollocation rule;
+  return rule;
+}
+
 CollocationLanes::CollocationLanes(const LaneKernel& kernel, const Chain& chain)
     : kernel_(kernel),
       size_(2 * static_cast<std::size_t>(chain.rows())),
       chains_(chain.tables(), kernel.lanes),
-      total_kg_(kernel.lanes) {
+      memory_(kernel.lanes),
+      total_kg_(kernel.lanes),
+      steps_(kernel.lanes) {
   constexpr std::size_t kStages = GaussCollocation::kStages;
   constexpr std::size_t kPairs = GaussCollocation::kPairs;
   const std::size_t links = chain.links();
   const std::size_t elements = links * chain.tables().elements_per_link;
-  const std::array<LaneMemory::Array, 12> arrays{
-      {{&arrays_.mass_kg, size_ / 2},
-       {&arrays_.h_s, 1},
-       {&arrays_.active, 1},
-       {&arrays_.state, 3 * size_},
-       {&arrays_.next, 3 * size_},
-       {&arrays_.stage_q, kStages * size_},
-       {&arrays_.stage_a, kStages * size_},
-       {&arrays_.work, 2 * kPairs * size_},
-       {&arrays_.tangents, elements * numbers_of<TangentBlocks<double>>()},
-       {&arrays_.fronts, kPairs * elements * numbers_of<ElementFront<double>>()},
-       {&arrays_.ends, kPairs * links * numbers_of<EndFront<double>>()},
-       {&arrays_.squares, 1}}};
-  memory_.allocate(arrays, kernel.lanes);
   arrays_.chain = chains_.tables();
+  arrays_.mass_kg = memory_.zeros(size_ / 2);
+  arrays_.h_s = memory_.zeros(1);
+  arrays_.active = memory_.zeros(1);
+  arrays_.state = memory_.zeros(3 * size_);
+  arrays_.next = memory_.zeros(3 * size_);
+  arrays_.stage_q = memory_.zeros(kStages * size_);
+  arrays_.stage_a = memory_.zeros(kStages * size_);
+  arrays_.work = memory_.zeros(2 * kPairs * size_);
+  arrays_.tangents = memory_.zeros(elements * numbers_of<TangentBlocks<double>>());
+  arrays_.fronts = memory_.zeros(kPairs * elements * numbers_of<ElementFront<double>>());
+  arrays_.ends = memory_.zeros(kPairs * links * numbers_of<EndFront<double>>());
+  arrays_.squares = memory_.zeros(1);
   for (std::size_t lane = 0; lane < lanes(); ++lane) {
     load(lane, chain);
   }
@@ -74,84 +157,89 @@ void CollocationLanes::load(std::size_t lane, const Chain& chain) {
   }
   total_kg_[lane] = chain.mass_kg();
   const ChainState rest = chain.at_rest();
-  const std::vector<double> none(size_, 0.0);
-  set_state(lane, rest.q.data(), rest.v.data(), none.data());
+  std::vector<double> state(rest.q.data(), rest.q.data() + size_);
+  state.resize(3 * size_, 0.0);
+  set_state(lane, state.data());
 }
 
-void CollocationLanes::set_state(std::size_t lane, const double* q, const double* v,
-                                 const double* mean) {
-  double* to = arrays_.state + lane;
-  for (const double* from : {q, v, mean}) {
-    for (std::size_t i = 0; i < size_; ++i) {
-      *to = from[i];
-      to += lanes();
-    }
+void CollocationLanes::set_state(std::size_t lane, const double* q_v_mean) {
+  for (std::size_t i = 0; i < 3 * size_; ++i) {
+    arrays_.state[i * lanes() + lane] = q_v_mean[i];
   }
 }
 
-void CollocationLanes::attempt(std::span<const double> h_s, std::span<const double> error_m,
-                               std::span<Attempt> attempts) {
-  std::vector<double> before_m(lanes(), 0.0);
+void CollocationLanes::attempt() {
+  bool is_any_active = false;
   for (std::size_t lane = 0; lane < lanes(); ++lane) {
-    arrays_.h_s[lane] = h_s[lane];
-    arrays_.active[lane] = h_s[lane] > 0.0 ? 1.0 : 0.0;
-    attempts[lane] = {};
+    Step& step = steps_[lane];
+    step = {.h_s = step.h_s, .error_m = step.error_m};
+    arrays_.h_s[lane] = step.h_s;
+    arrays_.active[lane] = step.h_s > 0.0 ? 1.0 : 0.0;
+    is_any_active = is_any_active || step.h_s > 0.0;
   }
-  const auto any_is_active = [this] {
-    return std::any_of(arrays_.active, arrays_.active + lanes(),
-                       [](double active) { return active != 0.0; });
-  };
   kernel_.prepare(gauss_collocation(), arrays_);
-  for (int iteration = 1; any_is_active(); ++iteration) {
+  std::vector<double> before_m(lanes(), 0.0);
+  for (int iteration = 1; is_any_active; ++iteration) {
     kernel_.iterate(gauss_collocation(), arrays_);
+    is_any_active = false;
     for (std::size_t lane = 0; lane < lanes(); ++lane) {
       if (arrays_.active[lane] == 0.0) {
         continue;
       }
-      Attempt& attempt = attempts[lane];
-      attempt.iterations = iteration;
+      Step& step = steps_[lane];
+      step.iterations = iteration;
       const double size_m = std::sqrt(arrays_.squares[lane] / total_kg_[lane]);
       // What is left is the next correction and those after it: a geometric series.
       const double ratio = iteration > 1 ? size_m / before_m[lane] : 1.0;
       const bool is_rounding =
-          iteration > 2 && ratio > 0.1 && size_m <= kRoundingErrors * error_m[lane];
-      attempt.converged = size_m <= error_m[lane] || is_rounding ||
-                          (ratio < 0.5 && size_m * ratio <= error_m[lane]);
+          iteration > 2 && ratio > 0.1 && size_m <= kRoundingErrors * step.error_m;
+      step.converged =
+          size_m <= step.error_m || is_rounding || (ratio < 0.5 && size_m * ratio <= step.error_m);
       const bool is_hopeless =
           !std::isfinite(size_m) || ratio > 2.0 || iteration >= kMostIterations;
-      if (attempt.converged || is_hopeless) {
-        arrays_.active[lane] = 0.0;
-      }
       before_m[lane] = size_m;
+      if (step.converged || is_hopeless) {
+        arrays_.active[lane] = 0.0;
+      } else {
+        is_any_active = true;
+      }
     }
   }
   kernel_.finish(gauss_collocation(), arrays_);
   for (std::size_t lane = 0; lane < lanes(); ++lane) {
-    attempts[lane].unresolved_m_s = std::sqrt(arrays_.squares[lane] / total_kg_[lane]);
+    steps_[lane].unresolved_m_s = std::sqrt(arrays_.squares[lane] / total_kg_[lane]);
   }
 }
 
-void CollocationLanes::settle(std::span<const unsigned char> accept) {
+void CollocationLanes::accept() {
   for (std::size_t lane = 0; lane < lanes(); ++lane) {
-    if (accept[lane] == 0) {
-      for (std::size_t i = lane; i < 3 * size_ * lanes(); i += lanes()) {
-        arrays_.next[i] = arrays_.state[i];
-      }
+    for (std::size_t i = lane; !steps_[lane].is_accepted && i < 3 * size_ * lanes(); i += lanes()) {
+      arrays_.next[i] = arrays_.state[i];
     }
   }
   std::swap(arrays_.state, arrays_.next);
 }
 
-void CollocationLanes::copy_state(std::size_t lane, double* q_v_mean) const {
-  for (std::size_t i = 0; i < 3 * size_; ++i) {
-    q_v_mean[i] = arrays_.state[i * lanes() + lane];
+CollocationLanes::Entries CollocationLanes::entries(std::size_t lane, std::size_t i) const {
+  Entries entries;
+  for (std::size_t vector = 0; vector < entries.size(); ++vector) {
+    const std::size_t row = vector < 3 ? vector : vector - 3;
+    const double* numbers = vector < 3 ? arrays_.state : arrays_.stage_a;
+    entries[vector] = numbers[(row * size_ + i) * lanes() + lane];
   }
+  return entries;
 }
 
-void CollocationLanes::copy_stages(std::size_t lane, double* accelerations) const {
-  for (std::size_t i = 0; i < GaussCollocation::kStages * size_; ++i) {
-    accelerations[i] = arrays_.stage_a[i * lanes() + lane];
+std::vector<double> CollocationLanes::state_and_stages(std::size_t lane) const {
+  std::vector<double> numbers;
+  numbers.reserve((3 + GaussCollocation::kStages) * size_);
+  for (std::size_t i = lane; i < 3 * size_ * lanes(); i += lanes()) {
+    numbers.push_back(arrays_.state[i]);
   }
+  for (std::size_t i = lane; i < GaussCollocation::kStages * size_ * lanes(); i += lanes()) {
+    numbers.push_back(arrays_.stage_a[i]);
+  }
+  return numbers;
 }
 
 }  // namespace oblique::solver

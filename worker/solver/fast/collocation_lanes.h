@@ -1,11 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "worker/solver/fast/kernels.h"
-#include "worker/solver/fast/lane_chains.h"
 #include "worker/solver/reference/chain.h"
 
 namespace oblique::solver {
@@ -24,39 +23,36 @@ class CollocationLanes {
   /// Entries of a vector of positions, rates or accelerations: 2 rows.
   std::size_t size() const { return size_; }
 
-  /// Puts a chain at rest into a lane.
-  void load(std::size_t lane, const Chain& chain);
-  /// Position, rates, and the mean acceleration over the step that led there.
-  void set_state(std::size_t lane, const double* q, const double* v, const double* mean);
-
-  struct Attempt {
+  /// A lane's next step, and what became of the last attempt.
+  struct Step {
+    double h_s = 0.0;      ///< 0 leaves the lane alone
+    double error_m = 0.0;  ///< how far positions may be from the solution, as unresolved_m_s
     /// False when Newton's method did not converge: there is no new state then.
     bool converged = false;
     int iterations = 0;
     /// Speed [m/s] that the step hardly resolves: h times the two highest Legendre coefficients of
     /// the accelerations, mean square over the chain's mass.
     double unresolved_m_s = 0.0;
+    bool is_accepted = true;
   };
-  /// Tries a step of h_s[lane] seconds in each lane; 0 leaves a lane alone. `error_m` is how far
-  /// positions may be from the solution, mean square over the chain's mass.
-  void attempt(std::span<const double> h_s, std::span<const double> error_m,
-               std::span<Attempt> attempts);
-  /// Makes the states at the end of the last attempt the lanes' own where accept[lane] != 0; the
-  /// others stay.
-  void settle(std::span<const unsigned char> accept);
+  Step& step(std::size_t lane) { return steps_[lane]; }
+  const Step& step(std::size_t lane) const { return steps_[lane]; }
 
-  /// Copies out position, rates and mean acceleration of a lane's state.
-  void copy_state(std::size_t lane, double* q_v_mean) const;
-  /// Copies out the accelerations at the stages of the last attempt.
-  void copy_stages(std::size_t lane, double* accelerations) const;
-  /// Entry i of a lane's position or rates, and of a stage's acceleration in the last attempt.
-  double q(std::size_t lane, std::size_t i) const { return arrays_.state[i * lanes() + lane]; }
-  double v(std::size_t lane, std::size_t i) const {
-    return arrays_.state[(size_ + i) * lanes() + lane];
-  }
-  double stage_a(std::size_t lane, std::size_t stage, std::size_t i) const {
-    return arrays_.stage_a[(stage * size_ + i) * lanes() + lane];
-  }
+  /// Puts a chain at rest into a lane.
+  void load(std::size_t lane, const Chain& chain);
+  /// Position, rates, and the mean acceleration over the step that led there.
+  void set_state(std::size_t lane, const double* q_v_mean);
+  /// Tries the step of each lane.
+  void attempt();
+  /// Takes the states at the end of the last attempt in the lanes whose step is_accepted.
+  void accept();
+
+  /// Entry i of position, rates and mean acceleration of a lane's state, and of the accelerations
+  /// at the stages of its last attempt.
+  using Entries = std::array<double, 3 + GaussCollocation::kStages>;
+  Entries entries(std::size_t lane, std::size_t i) const;
+  /// All of them, a vector after the other.
+  std::vector<double> state_and_stages(std::size_t lane) const;
 
  private:
   LaneKernel kernel_;
@@ -65,6 +61,7 @@ class CollocationLanes {
   LaneMemory memory_;
   CollocationArrays arrays_{};
   std::vector<double> total_kg_;
+  std::vector<Step> steps_;
 };
 
 }  // namespace oblique::solver

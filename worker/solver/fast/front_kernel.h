@@ -70,6 +70,17 @@ constexpr std::size_t column_start(std::size_t size, std::size_t pivot) {
   return pivot * (2 * size - 1 - pivot) / 2;
 }
 
+/// Copies the lower triangle of that many rows of `from`, from row and column `first` on.
+template <std::size_t size, class Real>
+inline void copy_corner(const LaneComplex<Real> (&from)[size][size], std::size_t first,
+                        std::size_t rows, LaneComplex<Real> (&to)[4][4]) {
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      to[i][j] = from[first + i][first + j];
+    }
+  }
+}
+
 /// Eliminates the first `pivots` unknowns of a symmetric front; only its lower triangle counts.
 template <std::size_t pivots, std::size_t size, class Real>
 inline void eliminate(LaneComplex<Real> (&front)[size][size], LaneComplex<Real>* inverse_pivot,
@@ -192,11 +203,7 @@ inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlock
         front[5][5].re += *chain.tip_mass_kg;
       }
       eliminate<4>(front, fronts->inverse_pivot, fronts->below);
-      for (std::size_t i = 0; i < 4; ++i) {
-        for (std::size_t j = 0; j <= i; ++j) {
-          carried[i][j] = front[4 + i][4 + j];
-        }
-      }
+      copy_corner(front, 4, 4, carried);
     }
     if (link + 1 == chain.links) {
       eliminate<4>(carried, ends[link].inverse_pivot, ends[link].below);
@@ -204,14 +211,8 @@ inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlock
     }
     eliminate<2>(carried, ends[link].inverse_pivot, ends[link].below);
     LaneComplex<Real> joint[4][4]{};
-    joint[0][0] = carried[2][2];
-    joint[1][0] = carried[3][2];
-    joint[1][1] = carried[3][3];
-    for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) {
-        carried[i][j] = joint[i][j];
-      }
-    }
+    copy_corner(carried, 2, 2, joint);
+    copy_corner(joint, 0, 4, carried);
   }
 }
 

@@ -17,20 +17,20 @@ struct GaussCollocation {
 
   GaussCollocation();
 
-  double node[kStages];
-  double weight[kStages];             ///< b_j
-  double position_weight[kStages];    ///< b_j (1 - c_j)
-  double integral[kStages][kStages];  ///< A
-  double squared_re[kPairs];          ///< lambda^2
-  double squared_im[kPairs];
-  double into_re[kPairs][kStages];  ///< T^-1
-  double into_im[kPairs][kStages];
-  double back_re[kStages][kPairs];  ///< a_i = sum_k back_re z_re + back_im z_im: 2 Re(T z)
-  double back_im[kStages][kPairs];
-  double shift_re[kStages][kPairs];  ///< the same of A A a: 2 Re(T lambda^2 z)
-  double shift_im[kStages][kPairs];
+  double node[kStages]{};
+  double weight[kStages]{};             ///< b_j
+  double position_weight[kStages]{};    ///< b_j (1 - c_j)
+  double integral[kStages][kStages]{};  ///< A
+  double squared_re[kPairs]{};          ///< lambda^2
+  double squared_im[kPairs]{};
+  double into_re[kPairs][kStages]{};  ///< T^-1
+  double into_im[kPairs][kStages]{};
+  double back_re[kStages][kPairs]{};  ///< a_i = sum_k back_re z_re + back_im z_im: 2 Re(T z)
+  double back_im[kStages][kPairs]{};
+  double shift_re[kStages][kPairs]{};  ///< the same of A A a: 2 Re(T lambda^2 z)
+  double shift_im[kStages][kPairs]{};
   /// Legendre coefficients of the Lagrange polynomials: l_j = sum_k legendre[k][j] P_k(2 c - 1).
-  double legendre[kStages][kStages];
+  double legendre[kStages][kStages]{};
 
   /// b_j(c) = int_0^c l_j, l_j the Lagrange polynomials of the nodes.
   void integrals(double c, double* b) const;

@@ -1,9 +1,5 @@
 #include "worker/solver/fast/kernel_of.h"
 
-namespace oblique::solver {
-
-LaneKernel avx2_kernel() {
+oblique::solver::LaneKernel oblique::solver::avx2_kernel() {
   return kernel_of<LanePack<Avx2Vectors, 1>>("avx2");
 }
-
-}  // namespace oblique::solver

@@ -1,9 +1,5 @@
 #include "worker/solver/fast/kernel_of.h"
 
-namespace oblique::solver {
-
-LaneKernel avx512_kernel() {
+oblique::solver::LaneKernel oblique::solver::avx512_kernel() {
   return kernel_of<LanePack<Avx512Vectors, 1>>("avx512");
 }
-
-}  // namespace oblique::solver

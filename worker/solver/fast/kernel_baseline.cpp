@@ -1,9 +1,5 @@
 #include "worker/solver/fast/kernel_of.h"
 
-namespace oblique::solver {
-
-LaneKernel baseline_kernel() {
+oblique::solver::LaneKernel oblique::solver::baseline_kernel() {
   return kernel_of<LanePack<BaselineVectors, 2>>("baseline");
 }
-
-}  // namespace oblique::solver

@@ -55,49 +55,36 @@ class LaneBatch {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// Largest group: the first case and those that branch off.
-  static constexpr std::size_t kLargestGroup = 16;
 
-  /// A span shorter than this fraction of a step, as beside an event, gives no mean of a reaction
-  /// that rounding leaves alone.
-  static constexpr double kShortestSpan = 1e-3;
-
-  struct Lane {
-    std::optional<Contact> contact;  ///< empty: the lane idles
-    ContactCase contact_case{};
-    std::optional<ExplicitMotion> motion;
-    TipState touch{};
-    Energies in{};
-    ReactionPeaks reactions{0};
-    std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
-    std::optional<ContactTracer> tracer;
-    Clock::time_point started{};
-    bool failed = false;
-  };
-  /// A contact at its first turn.
-  struct Trunk {
+  /// A contact on its way, and what its result needs besides.
+  struct Progress {
     Contact contact;
-    ChainState state;
     TipState touch;
     Energies in;
     ReactionPeaks reactions;
   };
+  struct Lane {
+    std::optional<Progress> progress;  ///< empty: the lane idles
+    ContactCase contact_case{};
+    std::optional<ExplicitMotion> motion;
+    std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
+    std::optional<ContactTracer> tracer;
+    Clock::time_point started{};
+  };
+  /// A case that goes on from the first turn of its group.
   struct Branch {
-    std::shared_ptr<const Trunk> trunk;
+    std::shared_ptr<const Progress> progress;
+    std::shared_ptr<const ChainState> state;
     ContactCase contact_case;
   };
-  /// Contact and state of a case into its lane.
-  void put_in(std::size_t lane, Contact contact, const ChainState& state);
+
   void fill(std::size_t lane, const Source& source, const Tracing& tracing);
-  void take(std::size_t lane, const ContactCase& next);
-  void start(std::size_t lane, const ContactCase& next);
-  void start_branch(std::size_t lane);
+  void start(std::size_t lane, const ContactCase& next, const ChainState& state, Progress progress);
   void take_followers(Lane& slot, const Source& source);
   void branch_off(std::size_t lane);
   bool advance(std::size_t lane, const Sink& sink);
   void finish(std::size_t lane, std::size_t busy, const Sink& sink);
   std::vector<ReactionPeak> reaction_peaks(std::size_t lane);
-  std::size_t busy_lanes() const;
   const ChainState& stored(std::size_t lane);
 
   std::size_t tip_row_;
@@ -105,6 +92,7 @@ class LaneBatch {
   std::vector<Lane> lanes_;
   std::deque<Branch> branches_;          ///< taken before further cases
   std::optional<ContactCase> upcoming_;  ///< taken from the source, the first of its group
+  bool is_exhausted_ = false;            ///< the source gives nothing more
   std::vector<unsigned char> accept_;
   ChainState column_;
 };

@@ -2,7 +2,6 @@
 
 #include <exception>
 #include <new>
-#include <optional>
 #include <utility>
 
 #include "worker/solver/fast/lane_stepper.h"
@@ -21,91 +20,82 @@ class FallLanes {
         column_(requests.front().chain->at_rest()) {}
 
   std::vector<FallSolution> solve() {
-    for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-      fill(lane);
-    }
-    while (busy_ > 0) {
+    for (;;) {
+      bool is_any_falling = false;
+      for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
+        fill(lane);
+        is_any_falling = is_any_falling || lanes_[lane].fall;
+      }
+      if (!is_any_falling) {
+        return std::move(solutions_);
+      }
       stepper_.step();
       for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-        if (lanes_[lane]) {
-          look(lane);
-        }
+        end_if_over(lane);
       }
       stepper_.settle(all_);
       for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-        after_step(lane);
+        if (lanes_[lane].fall && lanes_[lane].fall->keeps_last()) {
+          lanes_[lane].fall->keep(stored(lane));
+        }
       }
     }
-    return std::move(solutions_);
   }
 
  private:
   struct Lane {
-    std::size_t number;  ///< of the fall
-    std::shared_ptr<SteppedFall> fall;
-    bool is_over = false;
+    std::size_t number = 0;             ///< of the fall
+    std::shared_ptr<SteppedFall> fall;  ///< none: the lane idles
   };
 
-  /// The next fall that can begin, if there is one.
+  /// Starts the next fall that can begin in an idle lane, if there is one.
   void fill(std::size_t lane) {
-    while (next_ < requests_.size()) {
+    while (!lanes_[lane].fall && next_ < requests_.size()) {
       const std::size_t number = next_++;
       const FallRequest& request = requests_[number];
-      try {
-        lanes_[lane] = Lane{number, std::make_shared<SteppedFall>(request.motion, request.dt_s,
-                                                                  longest_fall_s(*request.chain),
-                                                                  request.progress)};
-      } catch (const std::bad_alloc&) {  // says nothing of this fall
-        throw;
-      } catch (const std::exception& error) {
-        solutions_[number].error = error.what();
-        continue;
-      }
-      const ChainState rest = request.chain->at_rest();
-      stepper_.load(lane, request.chain->tables(), rest.q.data(), rest.v.data());
-      stepper_.set_step(lane, request.dt_s);
-      stepper_.set_force(lane, {});
-      ++busy_;
-      return;
+      unless_it_fails(number, [&] {
+        lanes_[lane] = {number, std::make_shared<SteppedFall>(request.motion, request.dt_s,
+                                                              longest_fall_s(*request.chain),
+                                                              request.progress)};
+        const ChainState rest = request.chain->at_rest();
+        stepper_.load(lane, request.chain->tables(), rest.q.data(), rest.v.data());
+        stepper_.set_step(lane, request.dt_s);
+        stepper_.set_force(lane, {});
+      });
     }
   }
 
   /// At the end of a step, while the state before it can still be had.
-  void look(std::size_t lane) {
-    Lane& slot = *lanes_[lane];
-    const auto tip = static_cast<std::size_t>(2 * requests_[slot.number].chain->tip_row());
-    FallSolution& solution = solutions_[slot.number];
-    try {
-      if (slot.fall->is_over_after_next(
-              {stepper_.trial_q(lane, tip), stepper_.trial_q(lane, tip + 1),
-               stepper_.trial_v(lane, tip), stepper_.trial_v(lane, tip + 1)})) {
+  void end_if_over(std::size_t lane) {
+    Lane& slot = lanes_[lane];
+    if (!slot.fall) {
+      return;
+    }
+    const auto tip_row = static_cast<std::size_t>(requests_[slot.number].chain->tip_row());
+    const bool goes_on = unless_it_fails(slot.number, [&] {
+      if (slot.fall->is_over_after_next(stepper_.trial_tip(lane, tip_row))) {
         slot.fall->end(stored(lane));
-        solution.fall = slot.fall;
-        slot.is_over = true;
+        solutions_[slot.number].fall = slot.fall;
       }
-    } catch (const std::bad_alloc&) {
-      throw;
-    } catch (const std::exception& error) {
-      solution.error = error.what();
-      slot.is_over = true;
+    });
+    if (!goes_on || solutions_[slot.number].fall) {
+      slot.fall.reset();
+      stepper_.idle(lane);
     }
   }
 
-  void after_step(std::size_t lane) {
-    std::optional<Lane>& slot = lanes_[lane];
-    if (!slot) {
-      return;
+  /// Calls `work` for a fall, whose error becomes its solution. False when it fails.
+  template <class Work>
+  bool unless_it_fails(std::size_t number, const Work& work) {
+    try {
+      work();
+      return true;
+    } catch (const std::bad_alloc&) {  // says nothing of this fall
+      throw;
+    } catch (const std::exception& error) {
+      solutions_[number].error = error.what();
+      return false;
     }
-    if (!slot->is_over) {
-      if (slot->fall->keeps_last()) {
-        slot->fall->keep(stored(lane));
-      }
-      return;
-    }
-    slot.reset();
-    --busy_;
-    stepper_.idle(lane);
-    fill(lane);
   }
 
   const ChainState& stored(std::size_t lane) {
@@ -116,11 +106,10 @@ class FallLanes {
   std::span<const FallRequest> requests_;
   std::vector<FallSolution> solutions_;
   LaneStepper stepper_;
-  std::vector<std::optional<Lane>> lanes_;
+  std::vector<Lane> lanes_;
   std::vector<unsigned char> all_;  ///< every lane takes each step
   ChainState column_;
   std::size_t next_ = 0;
-  std::size_t busy_ = 0;
 };
 
 }  // namespace

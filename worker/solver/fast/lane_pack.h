@@ -15,17 +15,17 @@ namespace oblique::solver {
 struct BaselineVectors {
   using Vector = double __attribute__((vector_size(16), may_alias));
 #if defined(__aarch64__)
-  static inline Vector plus_product(Vector c, Vector a, Vector b) {
+  static Vector plus_product(Vector c, Vector a, Vector b) {
     return vfmaq_f64(c, a, b);
   }
-  static inline Vector less_product(Vector c, Vector a, Vector b) {
+  static Vector less_product(Vector c, Vector a, Vector b) {
     return vfmsq_f64(c, a, b);
   }
 #else
-  static inline Vector plus_product(Vector c, Vector a, Vector b) {
+  static Vector plus_product(Vector c, Vector a, Vector b) {
     return c + a * b;
   }
-  static inline Vector less_product(Vector c, Vector a, Vector b) {
+  static Vector less_product(Vector c, Vector a, Vector b) {
     return c - a * b;
   }
 #endif
@@ -34,24 +34,16 @@ struct BaselineVectors {
 #if defined(__AVX2__) && defined(__FMA__)
 struct Avx2Vectors {
   using Vector = double __attribute__((vector_size(32), may_alias));
-  static inline Vector plus_product(Vector c, Vector a, Vector b) {
-    return _mm256_fmadd_pd(a, b, c);
-  }
-  static inline Vector less_product(Vector c, Vector a, Vector b) {
-    return _mm256_fnmadd_pd(a, b, c);
-  }
+  static Vector plus_product(Vector c, Vector a, Vector b) { return _mm256_fmadd_pd(a, b, c); }
+  static Vector less_product(Vector c, Vector a, Vector b) { return _mm256_fnmadd_pd(a, b, c); }
 };
 #endif
 
 #if defined(__AVX512F__)
 struct Avx512Vectors {
   using Vector = double __attribute__((vector_size(64), may_alias));
-  static inline Vector plus_product(Vector c, Vector a, Vector b) {
-    return _mm512_fmadd_pd(a, b, c);
-  }
-  static inline Vector less_product(Vector c, Vector a, Vector b) {
-    return _mm512_fnmadd_pd(a, b, c);
-  }
+  static Vector plus_product(Vector c, Vector a, Vector b) { return _mm512_fmadd_pd(a, b, c); }
+  static Vector less_product(Vector c, Vector a, Vector b) { return _mm512_fnmadd_pd(a, b, c); }
 };
 #endif
 
@@ -101,26 +93,20 @@ struct LanePack {
   inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
 };
 
-/// As those of planar_vector.h; c and a are packs of the same kind or numbers.
+/// As those of element_force.h; c and a are packs of the same kind or numbers.
 template <class C, class A, class Hardware, std::size_t count>
-inline LanePack<Hardware, count> plus_product(const C& c, const A& a,
-                                              const LanePack<Hardware, count>& b) {
+inline auto plus_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
   using Pack = LanePack<Hardware, count>;
-  const Pack& c_pack = Pack::all(c);
-  const Pack& a_pack = Pack::all(a);
   return Pack::each([&](std::size_t i) {
-    return Hardware::plus_product(c_pack.part[i], a_pack.part[i], b.part[i]);
+    return Hardware::plus_product(Pack::all(c).part[i], Pack::all(a).part[i], b.part[i]);
   });
 }
 
 template <class C, class A, class Hardware, std::size_t count>
-inline LanePack<Hardware, count> less_product(const C& c, const A& a,
-                                              const LanePack<Hardware, count>& b) {
+inline auto less_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
   using Pack = LanePack<Hardware, count>;
-  const Pack& c_pack = Pack::all(c);
-  const Pack& a_pack = Pack::all(a);
   return Pack::each([&](std::size_t i) {
-    return Hardware::less_product(c_pack.part[i], a_pack.part[i], b.part[i]);
+    return Hardware::less_product(Pack::all(c).part[i], Pack::all(a).part[i], b.part[i]);
   });
 }
 

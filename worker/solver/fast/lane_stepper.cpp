@@ -1,34 +1,33 @@
 #include "worker/solver/fast/lane_stepper.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 namespace oblique::solver {
+
 LaneStepper::LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel)
     : kernel_(kernel),
       size_(2 * chain.rows),
       chains_(kernel.lanes),
-      is_side_by_side_(kernel.lanes, 0) {
-  const std::size_t links = chain.links;
-  const std::array<LaneMemory::Array, 11> arrays{{{&arrays_.q, size_},
-                                                  {&arrays_.v, size_},
-                                                  {&arrays_.q_next, size_},
-                                                  {&arrays_.v_next, size_},
-                                                  {&arrays_.scratch, size_},
-                                                  {&arrays_.h_s, 1},
-                                                  {&arrays_.inverse_h_Hz, 1},
-                                                  {&arrays_.force, 7},
-                                                  {&arrays_.integrals, 3},
-                                                  {&arrays_.momenta, 4 * links},
-                                                  {&arrays_.reactions, links}}};
-  memory_.allocate(arrays, lanes());
+      is_copied_(kernel.lanes, 0),
+      side_by_side_(chain, kernel.lanes),
+      memory_(kernel.lanes) {
+  for (double** const array :
+       {&arrays_.q, &arrays_.v, &arrays_.q_next, &arrays_.v_next, &arrays_.scratch}) {
+    *array = memory_.zeros(size_);
+  }
+  arrays_.h_s = memory_.zeros(1);
+  arrays_.inverse_h_Hz = memory_.zeros(1);
+  arrays_.force = memory_.zeros(7);
+  arrays_.integrals = memory_.zeros(3);
+  arrays_.momenta = memory_.zeros(4 * chain.links);
+  arrays_.reactions = memory_.zeros(chain.links);
 }
 
 void LaneStepper::load(std::size_t lane, const ChainTables<double>& chain, const double* q,
                        const double* v) {
   chains_[lane] = chain;
-  is_side_by_side_[lane] = 0;
+  is_copied_[lane] = 0;
   compare_chains();
   for (std::size_t i = 0; i < size_; ++i) {
     arrays_.q[i * lanes() + lane] = q[i];
@@ -78,20 +77,12 @@ void LaneStepper::step() {
     return;
   }
   for (std::size_t lane = 0; lane < lanes(); ++lane) {
-    if (!chains_[lane]) {
-      continue;
-    }
-    if (!side_by_side_) {
-      side_by_side_.emplace(*chains_[lane], lanes());
-    }
-    if (is_side_by_side_[lane] == 0) {
-      side_by_side_->set(lane, *chains_[lane]);
-      is_side_by_side_[lane] = 1;
+    if (chains_[lane] && is_copied_[lane] == 0) {
+      side_by_side_.set(lane, *chains_[lane]);
+      is_copied_[lane] = 1;
     }
   }
-  if (side_by_side_) {
-    kernel_.step_chains(side_by_side_->tables(), arrays_);
-  }
+  kernel_.step_chains(side_by_side_.tables(), arrays_);
 }
 
 ContactIntegrals<double> LaneStepper::integrals(std::size_t lane) const {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "worker/solver/fast/kernels.h"
-#include "worker/solver/fast/lane_chains.h"
 #include "worker/solver/reference/tip.h"
 
 namespace oblique::solver {
@@ -39,12 +38,11 @@ class LaneStepper {
 
   /// Steps every lane from its accepted state to a trial state.
   void step();
-  /// Entry `i` of a lane's trial coordinates or rates.
-  double trial_q(std::size_t lane, std::size_t i) const {
-    return arrays_.q_next[i * lanes() + lane];
-  }
-  double trial_v(std::size_t lane, std::size_t i) const {
-    return arrays_.v_next[i * lanes() + lane];
+  /// The tip after that step.
+  TipState trial_tip(std::size_t lane, std::size_t tip_row) const {
+    const std::size_t x = 2 * tip_row * lanes() + lane;
+    const std::size_t y = x + lanes();
+    return {arrays_.q_next[x], arrays_.q_next[y], arrays_.v_next[x], arrays_.v_next[y]};
   }
   ContactIntegrals<double> integrals(std::size_t lane) const;
   /// Squared magnitudes of the mean reactions on the links' inner ends over the last step [N^2],
@@ -60,8 +58,8 @@ class LaneStepper {
   std::size_t size_;                                        ///< entries of one state
   std::vector<std::optional<ChainTables<double>>> chains_;  ///< none: the lane is idle
   const ChainTables<double>* one_chain_ = nullptr;  ///< of all lanes that are not idle, if one
-  std::optional<LaneChains> side_by_side_;          ///< once it was needed
-  std::vector<unsigned char> is_side_by_side_;      ///< whether it holds the lane's chain
+  std::vector<unsigned char> is_copied_;            ///< whether side_by_side_ has the lane's chain
+  LaneChains side_by_side_;                         ///< all chains, for when they differ
   LaneMemory memory_;
   LaneArrays arrays_{};
 };

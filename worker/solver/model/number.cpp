@@ -1,7 +1,5 @@
 #include "worker/solver/model/number.h"
 
-#include "worker/solver/model/written_number.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -11,43 +9,20 @@
 namespace oblique::solver {
 namespace {
 
-constexpr double kSmallestPlain = 1e-4;
-constexpr int kPlainDigits = 6;  // before the point
-
 /// Room for the longest fixed form: 309 digits before the point, 17 after it.
 using Digits = std::array<char, 352>;
 
-template <typename... Form>
-std::string formatted(double value, Form... form) {
+std::string formatted(double value, std::chars_format form, int precision) {
   Digits digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value, form...).ptr;
-  return {digits.data(), end};
-}
-
-/// "-0.00" without its sign.
-std::string without_minus_zero(std::string text) {
-  if (text.starts_with('-') && text.find_first_of("123456789in") == std::string::npos) {
-    text.erase(0, 1);
-  }
-  return text;
-}
-
-/// "2.500" as "2.5", "4.000" as "4".
-std::string without_end_zeros(std::string text) {
-  if (text.find('.') != std::string::npos) {
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.ends_with('.')) {
-      text.pop_back();
-    }
-  }
-  return text;
+  return {digits.data(),
+          std::to_chars(digits.data(), digits.data() + digits.size(), value, form, precision).ptr};
 }
 
 }  // namespace
 
 char* write_exact_number(double value, char* at) {
   const double size = std::abs(value);
-  const bool is_plain = size == 0.0 || (size >= kSmallestPlain && size < 1e6);
+  const bool is_plain = size == 0.0 || (size >= 1e-4 && size < 1e6);
   char* const end = at + kLongestExactNumber;
   return is_plain ? std::to_chars(at, end, value, std::chars_format::fixed).ptr
                   : std::to_chars(at, end, value).ptr;
@@ -58,31 +33,23 @@ std::string exact_number(double value) {
   return {text.data(), write_exact_number(value, text.data())};
 }
 
-std::string exact_real(double value) {
-  auto text = exact_number(value);
-  if (text.find_first_of(".e") == std::string::npos) {
-    text += ".0";
+std::string readable_number(double value, int significant) {
+  std::string text = formatted(value == 0.0 ? 0.0 : value, std::chars_format::general, significant);
+  if (const auto at = text.find('e'); at != std::string::npos) {
+    const int exponent = std::stoi(text.substr(at + 1));
+    if (exponent >= 0 && exponent < 6) {  // more digits before the point than are significant
+      return fixed_number(value, 0);
+    }
   }
   return text;
 }
 
-std::string readable_number(double value, int significant) {
-  if (value == 0.0 || !std::isfinite(value)) {
-    return without_minus_zero(formatted(value));
-  }
-  // The exponent after rounding: 9.99 of two digits is 10.
-  auto rounded = formatted(value, std::chars_format::scientific, significant - 1);
-  const auto at = rounded.find('e');
-  const int exponent = std::stoi(rounded.substr(at + 1));
-  if (exponent < -4 || exponent >= std::max(significant, kPlainDigits)) {
-    return without_end_zeros(rounded.substr(0, at)) + rounded.substr(at);
-  }
-  return without_end_zeros(
-      formatted(value, std::chars_format::fixed, std::max(0, significant - 1 - exponent)));
-}
-
 std::string fixed_number(double value, int decimals) {
-  return without_minus_zero(formatted(value, std::chars_format::fixed, decimals));
+  std::string text = formatted(value, std::chars_format::fixed, decimals);
+  if (text.starts_with('-') && text.find_first_of("123456789in") == std::string::npos) {
+    text.erase(0, 1);  // -0.00
+  }
+  return text;
 }
 
 std::string signed_number(double value, int decimals) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,8 +14,11 @@ namespace oblique::solver {
 /// from 0.0001 up to a million, and elsewhere where that is as short.
 std::string exact_number(double value);
 
-/// The same as JSON and SQL take it for a real number: a whole one has ".0". Finite values only.
-std::string exact_real(double value);
+/// Longest text of `exact_number` [bytes].
+inline constexpr std::size_t kLongestExactNumber = 32;
+/// Writes that text to `at`, where there is room for the longest, without a zero byte behind it,
+/// and returns its end. For many numbers into one text.
+char* write_exact_number(double value, char* at);
 
 /// `value` rounded to so many significant digits (1 to 17), without zeros at its end and never -0;
 /// digits before the point are all kept. With an exponent only below 0.0001, and from a million or

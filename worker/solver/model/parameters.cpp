@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <numeric>
+#include <optional>
+#include <type_traits>
 
 #include "worker/solver/model/number.h"
-
-#include "worker/solver/model/smallest_restitution.h"
+#include "worker/solver/model/version.h"
 
 namespace oblique::solver {
 namespace {
@@ -38,6 +40,23 @@ using Model = ModelParameters;
 constexpr double kLeastTolerance = 1e-9;
 constexpr double kLargestTolerance = 1e-2;
 
+/// The key of that member.
+template <auto member>
+constexpr ParameterKey key(std::string_view name, std::string_view unit, std::string_view meaning,
+                           std::string_view allowed, bool (*is_allowed)(double),
+                           const UsualRange& usual = {}) {
+  return {name,
+          unit,
+          meaning,
+          allowed,
+          is_allowed,
+          [](const Model& model) { return static_cast<double>(model.*member); },
+          [](Model& model, double value) {
+            model.*member = static_cast<std::remove_cvref_t<decltype(model.*member)>>(value);
+          },
+          usual};
+}
+
 constexpr std::array<ParameterKey, 16> kModelKeys{{
     {"links", "", "number of links", "a whole number from 1 to 64",
      [](double v) { return is_whole(v) && v >= 1 && v <= kMaxLinks; },
@@ -45,63 +64,111 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
      [](Model& m, double v) {
        m.lengths_m.assign(static_cast<std::size_t>(v), m.lengths_m.front());
      }},
-    {"length", "m", "length of every link", "> 0", positive,
+    {"length",
+     "m",
+     "length of every link",
+     "> 0",
+     positive,
      [](const Model& m) { return m.lengths_m.front(); },
-     [](Model& m, double v) { std::fill(m.lengths_m.begin(), m.lengths_m.end(), v); }},
-    {"E", "Pa", "Young's modulus", "> 0", positive, [](const Model& m) { return m.E_Pa; },
-     [](Model& m, double v) { m.E_Pa = v; }},
-    {"A", "m^2", "cross-section area", "> 0", positive, [](const Model& m) { return m.A_m2; },
-     [](Model& m, double v) { m.A_m2 = v; }},
-    {"I", "m^4", "second moment of area", "> 0", positive, [](const Model& m) { return m.I_m4; },
-     [](Model& m, double v) { m.I_m4 = v; }},
-    {"rho", "kg/m^3", "density", "> 0", positive, [](const Model& m) { return m.rho_kg_m3; },
-     [](Model& m, double v) { m.rho_kg_m3 = v; }},
-    {"g", "m/s^2", "gravity, downwards", "> 0", positive, [](const Model& m) { return m.g_m_s2; },
-     [](Model& m, double v) { m.g_m_s2 = v; }},
-    {"elements_per_link", "", "elements a link", "a whole number from 1 to 256",
-     [](double v) { return is_whole(v) && v >= 1 && v <= kMaxElementsPerLink; },
-     [](const Model& m) { return static_cast<double>(m.elements_per_link); },
-     [](Model& m, double v) { m.elements_per_link = static_cast<int>(v); }},
-    {"k", "N/m", "normal contact stiffness in compression", "> 0", positive,
-     [](const Model& m) { return m.k_N_m; }, [](Model& m, double v) { m.k_N_m = v; }},
-    {"eta2", "", "ratio of normal to tangential contact stiffness", "> 0", positive,
-     [](const Model& m) { return m.eta2; }, [](Model& m, double v) { m.eta2 = v; }},
-    {"tip_mass", "kg", "point mass at the tip", ">= 0", not_negative,
-     [](const Model& m) { return m.tip_mass_kg; }, [](Model& m, double v) { m.tip_mass_kg = v; }},
-    {"integrator", "", "how the equations of motion are stepped", "explicit or generalized-alpha",
-     [](double v) { return is_whole(v) && v >= 0 && v < double{kIntegratorNames.size()}; },
-     [](const Model& m) { return static_cast<double>(m.integrator); },
-     [](Model& m, double v) { m.integrator = static_cast<Integrator>(v); }},
-    {"spectral_radius", "", "of generalized-alpha at infinite frequency",
-     ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
-     [](double v) { return v >= 0.0 && v < 1.0; }, [](const Model& m) { return m.spectral_radius; },
-     [](Model& m, double v) { m.spectral_radius = v; }},
-    {"dt", "s", "step in contact; 0: chosen by the tolerance", ">= 0", not_negative,
-     [](const Model& m) { return m.dt_s; }, [](Model& m, double v) { m.dt_s = v; }},
-    {"dt_fall", "s", "step in the fall; 0: chosen for the integrator", ">= 0", not_negative,
-     [](const Model& m) { return m.dt_fall_s; }, [](Model& m, double v) { m.dt_fall_s = v; }},
-    {"tolerance", "", "relative error that chosen steps leave in the outputs of a contact",
-     "from 1e-9 (rounding leaves more below) to 0.01 (modes mean nothing above)",
-     [](double v) { return v >= kLeastTolerance && v <= kLargestTolerance; },
-     [](const Model& m) { return m.tolerance; }, [](Model& m, double v) { m.tolerance = v; }},
+     [](Model& m, double v) { std::fill(m.lengths_m.begin(), m.lengths_m.end(), v); },
+     {1e-3, 100.0}},
+    key<&Model::E_Pa>("E", "Pa", "Young's modulus", "> 0", positive,
+                      {1e8, 1e12, "softer than rubber", "stiffer than diamond"}),
+    key<&Model::A_m2>("A", "m^2", "cross-section area", "> 0", positive, {1e-8, 1.0}),
+    key<&Model::I_m4>("I", "m^4", "second moment of area", "> 0", positive, {1e-17, 0.1}),
+    key<&Model::rho_kg_m3>("rho", "kg/m^3", "density", "> 0", positive,
+                           {100.0, 25'000.0, "lighter than cork", "denser than any metal"}),
+    key<&Model::g_m_s2>("g", "m/s^2", "gravity, downwards", "> 0", positive, {0.1, 100.0}),
+    key<&Model::elements_per_link>(
+        "elements_per_link", "", "elements a link", "a whole number from 1 to 256",
+        [](double v) { return is_whole(v) && v >= 1 && v <= kMaxElementsPerLink; }),
+    key<&Model::k_N_m>("k", "N/m", "normal contact stiffness in compression", "> 0", positive,
+                       {1e4, 1e10}),
+    key<&Model::eta2>("eta2", "", "ratio of normal to tangential contact stiffness", "> 0",
+                      positive, {0.1, 10.0}),
+    key<&Model::tip_mass_kg>("tip_mass", "kg", "point mass at the tip", ">= 0", not_negative,
+                             {1e-6, 10.0}),
+    key<&Model::integrator>(
+        "integrator", "", "how the equations of motion are stepped",
+        "explicit or generalized-alpha",
+        [](double v) { return is_whole(v) && v >= 0 && v < double{kIntegratorNames.size()}; }),
+    key<&Model::spectral_radius>(
+        "spectral_radius", "", "of generalized-alpha at infinite frequency",
+        ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
+        [](double v) { return v >= 0.0 && v < 1.0; }),
+    key<&Model::dt_s>("dt", "s", "step in contact; 0: chosen by the tolerance", ">= 0",
+                      not_negative),
+    key<&Model::dt_fall_s>("dt_fall", "s", "step in the fall; 0: chosen for the integrator", ">= 0",
+                           not_negative),
+    key<&Model::tolerance>(
+        "tolerance", "", "relative error that chosen steps leave in the outputs of a contact",
+        "from 1e-9 (rounding leaves more below) to 0.01 (modes mean nothing above)",
+        [](double v) { return v >= kLeastTolerance && v <= kLargestTolerance; }),
 }};
 
 constexpr std::array<ParameterKey, 3> kPointKeys{{
-    {"H", "m", "drop of the tip at touch", "> 0 and at most the largest drop of the tip", positive,
-     nullptr, nullptr},
-    {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr},
+    {"H",
+     "m",
+     "drop of the tip at touch",
+     "> 0 and at most the largest drop of the tip",
+     positive,
+     nullptr,
+     nullptr,
+     {1e-4, 10.0}},
+    {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr, {0.0, 5.0}},
     {"e", "", "Stronge's energetic coefficient of restitution", "in [0.001, 1]",
      [](double v) { return v >= kSmallestRestitution && v <= 1.0; }, nullptr, nullptr},
 }};
 
-template <std::size_t n>
-std::string joined(const std::array<std::string_view, n>& names) {
-  std::string text;
-  for (const auto name : names) {
-    text += (text.empty() ? "" : ", ");
-    text += name;
+/// Throws InputError that `name` is none of the values of a key.
+[[noreturn]] void refuse_name(const std::string& key, std::string_view name,
+                              std::span<const std::string_view> names) {
+  std::string text = key + " = \"" + std::string(name) + "\" is not allowed: " + key + " must be ";
+  for (const std::string_view allowed : names) {
+    text.append(allowed == names.front() ? "" : ", ").append(allowed);
+  }
+  throw InputError(key, text);
+}
+
+bool is_usual(const ParameterKey& key, double value) {
+  return value == 0.0 || !std::isfinite(value) || !key.is_allowed(value) ||
+         (value >= key.usual.from && value <= key.usual.to);
+}
+
+/// As people type it: 7e10, 2700.
+std::string short_number(double value) {
+  std::string text = readable_number(value);
+  if (auto exponent = text.find('e') + 1; exponent != 0) {  // after the e
+    exponent += text[exponent] == '-' ? 1U : 0U;
+    text.erase(exponent, text.find_first_not_of("+0", exponent) - exponent);
   }
   return text;
+}
+
+std::string with_unit(const ParameterKey& key, double value) {
+  return short_number(value) + (key.unit.empty() ? "" : " ") + std::string(key.unit);
+}
+
+std::string outside(const ParameterKey& key) {
+  return "outside the usual " + short_number(key.usual.from) + " to " +
+         with_unit(key, key.usual.to);
+}
+
+/// The value times the power of 1000 that brings it into the range; of several the nearest to its
+/// middle. Nothing for a key without a unit.
+std::optional<double> in_another_unit(const ParameterKey& key, double value) {
+  const auto& [from, to, below, above] = key.usual;
+  const double middle = std::sqrt(from * to);
+  std::optional<double> best;
+  for (int power = -12; power <= 12 && !key.unit.empty(); power += 3) {
+    // Division by a power of ten rounds once, multiplication by a negative one twice.
+    const double other = power < 0 ? value / std::pow(10.0, -power) : value * std::pow(10.0, power);
+    if (other >= from && other <= to &&
+        (!best || std::abs(std::log(other / middle)) < std::abs(std::log(*best / middle)))) {
+      best = other;
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -111,8 +178,7 @@ std::span<const ParameterKey> model_keys() {
 }
 
 const ParameterKey* find_model_key(std::string_view name) {
-  const auto found = std::find_if(kModelKeys.begin(), kModelKeys.end(),
-                                  [&](const auto& k) { return k.name == name; });
+  const auto* found = std::ranges::find(kModelKeys, name, &ParameterKey::name);
   return found == kModelKeys.end() ? nullptr : &*found;
 }
 
@@ -125,13 +191,9 @@ void check_value(const ParameterKey& key, double value) {
     return;
   }
   const std::string name(key.name);
-  std::string message = name + " = " + exact_number(value);
-  if (!key.unit.empty()) {
-    message += ' ';
-    message += key.unit;
-  }
-  throw InputError(name, message + " is not allowed: " + name + " must be " +
-                             (std::isfinite(value) ? "" : "finite and ") +
+  const std::string unit = (key.unit.empty() ? "" : " ") + std::string(key.unit);
+  throw InputError(name, name + " = " + exact_number(value) + unit + " is not allowed: " + name +
+                             " must be " + (std::isfinite(value) ? "" : "finite and ") +
                              std::string(key.allowed));
 }
 
@@ -168,9 +230,7 @@ std::string_view integrator_name(Integrator integrator) {
 Integrator integrator_named(std::string_view name) {
   const auto found = std::find(kIntegratorNames.begin(), kIntegratorNames.end(), name);
   if (found == kIntegratorNames.end()) {
-    throw InputError("integrator", "integrator = \"" + std::string(name) +
-                                       "\" is not allowed: integrator must be " +
-                                       joined(kIntegratorNames));
+    refuse_name("integrator", name, kIntegratorNames);
   }
   return static_cast<Integrator>(found - kIntegratorNames.begin());
 }
@@ -192,8 +252,7 @@ ModelParameters preset(std::string_view name) {
   } else if (name == "converged") {
     model.elements_per_link = 48;
   } else if (name != kPresetNames[0]) {
-    throw InputError("preset", "preset = \"" + std::string(name) +
-                                   "\" is not allowed: preset must be " + joined(kPresetNames));
+    refuse_name("preset", name, kPresetNames);
   }
   return model;
 }
@@ -204,6 +263,40 @@ std::span<const std::string_view> preset_names() {
 
 std::span<const MeshAccuracy> mesh_accuracies() {
   return kMeshAccuracies;
+}
+
+std::string note_on_value(const ParameterKey& key, double value) {
+  if (is_usual(key, value)) {
+    return {};
+  }
+  const std::string_view words = value < key.usual.from ? key.usual.below : key.usual.above;
+  const auto other = in_another_unit(key, value);
+  return std::string(key.name) + " = " + with_unit(key, value) + " is " +
+         (words.empty() ? outside(key) : std::string(words)) +
+         (other ? "; " + short_number(*other) + "?" : "");
+}
+
+std::string with_likely_cause(std::string error, const ModelParameters& model) {
+  for (const auto& key : model_keys()) {
+    std::vector<double> values{key.get(model)};
+    if (key.name == "length") {
+      const auto [least, largest] =
+          std::minmax_element(model.lengths_m.begin(), model.lengths_m.end());
+      values = {*least, *largest};
+    }
+    values.erase(std::unique(values.begin(), values.end()), values.end());
+    for (const double value : values) {
+      if (!is_usual(key, value)) {
+        error += "; likely cause: " + std::string(key.name) + " = " + with_unit(key, value) +
+                 " is " + outside(key);
+      }
+    }
+  }
+  return error;
+}
+
+std::string solver_version() {
+  return OBLIQUE_SOLVER_VERSION;
 }
 
 }  // namespace oblique::solver

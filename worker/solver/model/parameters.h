@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -41,6 +42,19 @@ struct ModelParameters {
   bool operator==(const ModelParameters&) const = default;
 };
 
+/// Smallest e*. Below, k/e*^2 turns the rounding of the tip's position into forces of newtons, and
+/// events come faster than they can be told apart in double precision.
+inline constexpr double kSmallestRestitution = 1e-3;
+
+/// Values that a parameter of real fingers has; 0 is usual wherever it is allowed. Others are
+/// computed as well: they are likely to be in another unit.
+struct UsualRange {
+  double from = 0.0;
+  double to = std::numeric_limits<double>::infinity();
+  std::string_view below = {};  ///< what such a value is, in words; else the range is named
+  std::string_view above = {};
+};
+
 /// One numeric parameter as users write it: in study files, as an axis, as a flag (`_` becomes
 /// `-`), and as a column of the table `models`.
 struct ParameterKey {
@@ -51,6 +65,7 @@ struct ParameterKey {
   bool (*is_allowed)(double value);
   double (*get)(const ModelParameters&);
   void (*set)(ModelParameters&, double value);
+  UsualRange usual = {};
 };
 
 /// All numeric model keys in the order that listings use. `links` and `length` act on `lengths_m`:
@@ -66,6 +81,13 @@ std::span<const ParameterKey> point_keys();
 
 /// Throws InputError naming key, value and what is allowed, unless `value` is finite and allowed.
 void check_value(const ParameterKey& key, double value);
+
+/// "E = 70000 Pa is softer than rubber; 7e10?" for a value outside the usual range of its key, with
+/// the value that a power of 1000 brings into it. Empty for all other values.
+std::string note_on_value(const ParameterKey& key, double value);
+/// `error` of a fall or a contact, and "; likely cause: E = 70 Pa is outside the usual 1e8 to
+/// 1e12 Pa" for each parameter of the model that is.
+std::string with_likely_cause(std::string error, const ModelParameters& model);
 
 /// Throws InputError for the first parameter outside its domain.
 void validate(const ModelParameters& model);

@@ -41,21 +41,38 @@ constexpr auto at = [] {
 
 /// That member of the n-th peak, from 1, of those that are left when ripples are merged.
 template <int n, double Peak::*member>
-constexpr Member<double> of_major_peak{[](const CaseResult& result) -> const double* {
-                                         int number = 0;
-                                         for (const Peak& peak : result.peaks) {
-                                           if (peak.major && ++number == n) {
-                                             return &(peak.*member);
-                                           }
-                                         }
-                                         return nullptr;
-                                       },
-                                       nullptr, true};
-
-template <class... Values>
-std::array<Cell, sizeof...(Values)> element(Values... values) {
-  return {Cell(values)...};
+const double* major_peak(const CaseResult& result) {
+  int number = 0;
+  for (const Peak& peak : result.peaks) {
+    if (peak.major && ++number == n) {
+      return &(peak.*member);
+    }
+  }
+  return nullptr;
 }
+
+Cell cell(double number) {
+  return number;
+}
+Cell cell(bool flag) {
+  return flag;
+}
+Cell cell(PhaseKind kind) {
+  return phase_kind_name(kind);
+}
+
+/// Gives `take` these members of each element of a list.
+template <auto list, auto... members>
+void each_of(const CaseResult& result, const TakeElement& take) {
+  for (const auto& element : result.*list) {
+    const std::array<Cell, sizeof...(members)> cells{cell(element.*members)...};
+    take(cells);
+  }
+}
+
+using Result = CaseResult;
+using Energy = ContactEnergy;
+using Errors = ErrorEstimate;
 
 // What the members of elements are called, in the database's views too.
 constexpr std::array<std::string_view, 4> kPeakMembers{"t_s", "fn_N", "ft_N", "major"};
@@ -65,114 +82,113 @@ constexpr std::array<std::string_view, 2> kStickMembers{"t0_s", "t1_s"};
 constexpr std::array<std::string_view, 2> kReactionMembers{"t_s", "force_N"};
 
 constexpr ResultList kPeaks{
-    .column = "peaks",
-    .unit = "s, N",
-    .meaning =
-        "peaks of the normal force, ripples included: t_s from touch, fn_N, ft_N the largest "
-        "tangential magnitude around the peak, major 1 or, for a ripple, 0; peaks[1] may be a "
-        "ripple, the second major peak is major_peak_2_N",
-    .members = kPeakMembers,
-    .each = [](const CaseResult& result, const TakeElement& take) {
-      for (const Peak& peak : result.peaks) {
-        take(element(peak.t_s, peak.fn_N, peak.ft_N, peak.major));
-      }
-    }};
-
+    "peaks", "s, N",
+    "peaks of the normal force, ripples included: t_s from touch, fn_N, ft_N the largest "
+    "tangential magnitude around the peak, major 1 or, for a ripple, 0; peaks[1] may be a "
+    "ripple, the second major peak is major_peak_2_N",
+    kPeakMembers, each_of<&Result::peaks, &Peak::t_s, &Peak::fn_N, &Peak::ft_N, &Peak::major>};
 constexpr ResultList kFtPeaks{
-    .column = "ft_peaks",
-    .unit = "s, N",
-    .meaning = "every peak of the tangential magnitude: t_s counted from touch and ft_N",
-    .members = kFtPeakMembers,
-    .each = [](const CaseResult& result, const TakeElement& take) {
-      for (const TangentialPeak& peak : result.ft_peaks) {
-        take(element(peak.t_s, peak.ft_N));
-      }
-    }};
-
+    "ft_peaks", "s, N", "every peak of the tangential magnitude: t_s counted from touch and ft_N",
+    kFtPeakMembers, each_of<&Result::ft_peaks, &TangentialPeak::t_s, &TangentialPeak::ft_N>};
 constexpr ResultList kPhases{
-    .column = "phases",
-    .unit = "s",
-    .meaning = "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch",
-    .members = kPhaseMembers,
-    .each = [](const CaseResult& result, const TakeElement& take) {
-      for (const Phase& phase : result.phases) {
-        take(element(phase_kind_name(phase.kind), phase.t0_s, phase.t1_s));
-      }
-    }};
-
-constexpr ResultList kStickIntervals{.column = "stick_intervals",
-                                     .unit = "s",
-                                     .meaning = "the same as stick_intervals_s",
-                                     .members = kStickMembers,
-                                     .has_names = false,
-                                     .each = [](const CaseResult& result, const TakeElement& take) {
-                                       for (const StickInterval& stick : result.stick_intervals) {
-                                         take(element(stick.t0_s, stick.t1_s));
-                                       }
-                                     }};
-
+    "phases", "s", "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch",
+    kPhaseMembers, each_of<&Result::phases, &Phase::kind, &Phase::t0_s, &Phase::t1_s>};
+constexpr ResultList kStickIntervals{
+    "stick_intervals",
+    "s",
+    "the same as stick_intervals_s",
+    kStickMembers,
+    each_of<&Result::stick_intervals, &StickInterval::t0_s, &StickInterval::t1_s>,
+    false};
 constexpr ResultList kReactionPeaks{
-    .column = "reaction_peaks",
-    .unit = "s, N",
-    .meaning =
-        "largest force on the outer link at the pin O, then at each joint: t_s, its instant "
-        "counted from touch, and force_N, its magnitude",
-    .members = kReactionMembers,
-    .each = [](const CaseResult& result, const TakeElement& take) {
-      for (const ReactionPeak& peak : result.reaction_peaks) {
-        take(element(peak.t_s, peak.force_N));
-      }
-    }};
+    "reaction_peaks", "s, N",
+    "largest force on the outer link at the pin O, then at each joint: t_s, its instant "
+    "counted from touch, and force_N, its magnitude",
+    kReactionMembers, each_of<&Result::reaction_peaks, &ReactionPeak::t_s, &ReactionPeak::force_N>};
 
 constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
 
-constexpr ResultField output(std::string_view name, std::string_view unit, std::string_view meaning,
+/// A unit, and the one in which tables for people show it.
+struct Unit {
+  constexpr Unit(const char* name) : si(name), shown(name) {}
+  constexpr Unit(const char* name, const char* shown_name, double shown_per_si)
+      : si(name), shown(shown_name), per_si(shown_per_si) {}
+
+  std::string_view si;
+  std::string_view shown;
+  double per_si = 1.0;
+};
+constexpr Unit kMicroseconds{"s", "us", 1e6};
+constexpr Unit kMilliseconds{"s", "ms", 1e3};
+constexpr Unit kMillimetres{"m", "mm", 1e3};
+
+constexpr ResultField output(std::string_view name, Unit unit, std::string_view meaning,
                              decltype(ResultField::value) value) {
   return {.name = name,
           .column = name,
-          .unit = unit,
+          .unit = unit.si,
           .meaning = meaning,
           .value = value,
-          .shown_unit = unit};
+          .shown_unit = unit.shown,
+          .shown_per_unit = unit.per_si};
 }
 
-/// As a member of that object of `solve --json`.
-constexpr ResultField in_group(std::string_view group, ResultField field,
-                               std::string_view column = {}) {
+template <auto member>
+constexpr ResultField output(std::string_view name, Unit unit, std::string_view meaning) {
+  return output(name, unit, meaning, at<member>);
+}
+
+template <int n, double Peak::*member>
+constexpr ResultField output_of_peak(std::string_view name, Unit unit, std::string_view meaning) {
+  ResultField field =
+      output(name, unit, meaning, Member<double>{major_peak<n, member>, nullptr, true});
+  field.sent_with = SentWith::kPeaks;
+  return field;
+}
+
+constexpr ResultField in_group(std::string_view group, std::string_view column, ResultField field) {
   field.group = group;
-  field.column = column.empty() ? field.name : column;
+  field.column = column;
   return field;
 }
 
-constexpr ResultField shown_in(std::string_view unit, double per_unit, ResultField field) {
-  field.shown_unit = unit;
-  field.shown_per_unit = per_unit;
-  return field;
+template <double Energy::*member>
+constexpr ResultField energy(std::string_view name, std::string_view meaning, Unit unit = "J") {
+  return in_group("energy", name, output(name, unit, meaning, at<&Result::energy, member>));
 }
 
-constexpr ResultField sent(SentWith sent_with, ResultField field) {
+template <auto member>
+constexpr ResultField error(std::string_view name, std::string_view column,
+                            std::string_view meaning) {
+  return in_group("errors", column, output(name, "", meaning, at<&Result::errors, member>));
+}
+
+template <auto member>
+constexpr ResultField report(std::string_view name, Unit unit, std::string_view meaning,
+                             SentWith sent_with = SentWith::kResult) {
+  const std::string_view column = sent_with == SentWith::kWorker ? "solver_version" : name;
+  ResultField field =
+      in_group("solver", column, output(name, unit, meaning, at<&Result::solver, member>));
   field.sent_with = sent_with;
   return field;
 }
 
 constexpr std::array kFields{
-    output("fall_time_s", "s", "time from rest to touch", at<&CaseResult::fall_time_s>),
-    output("impact_x_m", "m", "where the tip lands: distance from the pin O along the ground",
-           at<&CaseResult::impact_x_m>),
-    output("vt_in_m_s", "m/s",
-           "tangential velocity of the tip at touch, along x; negative: towards the pin",
-           at<&CaseResult::vt_in_m_s>),
-    output("vn_in_m_s", "m/s",
-           "normal velocity of the tip at touch, upwards; negative: into the ground",
-           at<&CaseResult::vn_in_m_s>),
-    shown_in("us", 1e6,
-             output("duration_s", "s", "duration of contact, from touch to separation",
-                    at<&CaseResult::duration_s>)),
-    output("fn_peak_N", "N",
-           "largest normal force; forces act on the tip, the normal one upwards, never negative",
-           at<&CaseResult::fn_peak_N>),
-    output("ft_peak_N", "N", "largest magnitude of the tangential force",
-           at<&CaseResult::ft_peak_N>),
+    output<&Result::fall_time_s>("fall_time_s", "s", "time from rest to touch"),
+    output<&Result::impact_x_m>("impact_x_m", "m",
+                                "where the tip lands: distance from the pin O along the ground"),
+    output<&Result::vt_in_m_s>(
+        "vt_in_m_s", "m/s",
+        "tangential velocity of the tip at touch, along x; negative: towards the pin"),
+    output<&Result::vn_in_m_s>(
+        "vn_in_m_s", "m/s",
+        "normal velocity of the tip at touch, upwards; negative: into the ground"),
+    output<&Result::duration_s>("duration_s", kMicroseconds,
+                                "duration of contact, from touch to separation"),
+    output<&Result::fn_peak_N>(
+        "fn_peak_N", "N",
+        "largest normal force; forces act on the tip, the normal one upwards, never negative"),
+    output<&Result::ft_peak_N>("ft_peak_N", "N", "largest magnitude of the tangential force"),
     output("fn_peaks_N", "N",
            "every peak of the normal force, ripples included, in order of time; the second one "
            "that is no ripple is major_peak_2_N",
@@ -182,153 +198,98 @@ constexpr std::array kFields{
            ListPart{&kFtPeaks, "ft_N"}),
     output("major_peaks_N", "N", "the peaks of the normal force left when ripples are merged",
            ListPart{&kPeaks, "fn_N", "major"}),
-    sent(SentWith::kPeaks,
-         output("major_peak_1_N", "N", "first peak of the normal force, ripples merged",
-                of_major_peak<1, &Peak::fn_N>)),
-    sent(SentWith::kPeaks,
-         output("major_peak_2_N", "N",
-                "second peak of the normal force, ripples merged; NULL: there is none",
-                of_major_peak<2, &Peak::fn_N>)),
-    sent(SentWith::kPeaks,
-         output("major_peak_3_N", "N",
-                "third peak of the normal force, ripples merged; NULL: there is none",
-                of_major_peak<3, &Peak::fn_N>)),
-    sent(SentWith::kPeaks,
-         shown_in("us", 1e6,
-                  output("major_peak_1_t_s", "s", "when major_peak_1_N is reached, from touch",
-                         of_major_peak<1, &Peak::t_s>))),
-    sent(SentWith::kPeaks,
-         shown_in("us", 1e6,
-                  output("major_peak_2_t_s", "s", "when major_peak_2_N is reached, from touch",
-                         of_major_peak<2, &Peak::t_s>))),
-    sent(SentWith::kPeaks,
-         shown_in("us", 1e6,
-                  output("major_peak_3_t_s", "s", "when major_peak_3_N is reached, from touch",
-                         of_major_peak<3, &Peak::t_s>))),
-    output("impulse_n_Ns", "N s", "impulse of the normal force, upwards",
-           at<&CaseResult::impulse_n_Ns>),
-    output("impulse_t_Ns", "N s",
-           "impulse of the tangential force, along x; positive: away from the pin",
-           at<&CaseResult::impulse_t_Ns>),
-    shown_in("mm", 1e3,
-             output("slide_m", "m",
-                    "length of the path of the contact particle P along the ground, there and back "
-                    "both counted",
-                    at<&CaseResult::slide_m>)),
-    output("vt_out_m_s", "m/s",
-           "tangential velocity of the tip at separation, along x; negative: towards the pin",
-           at<&CaseResult::vt_out_m_s>),
-    output("vn_out_m_s", "m/s",
-           "normal velocity of the tip at separation, upwards; positive: off the ground",
-           at<&CaseResult::vn_out_m_s>),
-    output("mode", "", "order of states: S stick, s slip; C compression, R restitution",
-           at<&CaseResult::mode>),
-    output("major_mode", "", "the same with ripples merged", at<&CaseResult::major_mode>),
-    output("margin", "",
-           "how far the contact kept from another order of events, from 0; near 0 the mode is not "
-           "to be trusted",
-           at<&CaseResult::margin>),
-    output("margin_event", "", "the event that came so near to happening, or to not happening",
-           at<&CaseResult::margin_event>),
-    shown_in("us", 1e6,
-             output("stick_total_s", "s", "total time in stick", at<&CaseResult::stick_total_s>)),
+    output_of_peak<1, &Peak::fn_N>("major_peak_1_N", "N",
+                                   "first peak of the normal force, ripples merged"),
+    output_of_peak<2, &Peak::fn_N>(
+        "major_peak_2_N", "N",
+        "second peak of the normal force, ripples merged; NULL: there is none"),
+    output_of_peak<3, &Peak::fn_N>(
+        "major_peak_3_N", "N",
+        "third peak of the normal force, ripples merged; NULL: there is none"),
+    output_of_peak<1, &Peak::t_s>("major_peak_1_t_s", kMicroseconds,
+                                  "when major_peak_1_N is reached, from touch"),
+    output_of_peak<2, &Peak::t_s>("major_peak_2_t_s", kMicroseconds,
+                                  "when major_peak_2_N is reached, from touch"),
+    output_of_peak<3, &Peak::t_s>("major_peak_3_t_s", kMicroseconds,
+                                  "when major_peak_3_N is reached, from touch"),
+    output<&Result::impulse_n_Ns>("impulse_n_Ns", "N s", "impulse of the normal force, upwards"),
+    output<&Result::impulse_t_Ns>(
+        "impulse_t_Ns", "N s",
+        "impulse of the tangential force, along x; positive: away from the pin"),
+    output<&Result::slide_m>(
+        "slide_m", kMillimetres,
+        "length of the path of the contact particle P along the ground, there and back "
+        "both counted"),
+    output<&Result::vt_out_m_s>(
+        "vt_out_m_s", "m/s",
+        "tangential velocity of the tip at separation, along x; negative: towards the pin"),
+    output<&Result::vn_out_m_s>(
+        "vn_out_m_s", "m/s",
+        "normal velocity of the tip at separation, upwards; positive: off the ground"),
+    output<&Result::mode>("mode", "",
+                          "order of states: S stick, s slip; C compression, R restitution"),
+    output<&Result::major_mode>("major_mode", "", "the same with ripples merged"),
+    output<&Result::margin>(
+        "margin", "",
+        "how far the contact kept from another order of events, from 0; near 0 the mode is not "
+        "to be trusted"),
+    output<&Result::margin_event>("margin_event", "",
+                                  "the event that came so near to happening, or to not happening"),
+    output<&Result::stick_total_s>("stick_total_s", kMicroseconds, "total time in stick"),
     output("stick_intervals_s", "s",
            "spans in which P does not move: [from, to], counted from touch",
            ListPart{&kStickIntervals}),
-    output(kPhases.column, kPhases.unit, kPhases.meaning, ListPart{&kPhases}),
-    output(kReactionPeaks.column, kReactionPeaks.unit, kReactionPeaks.meaning,
-           ListPart{&kReactionPeaks}),
-    in_group("energy", output("kinetic_in_J", "J", "kinetic energy of the whole finger at touch",
-                              at<&CaseResult::energy, &ContactEnergy::kinetic_in_J>)),
-    in_group("energy",
-             output("friction_J", "J", "energy lost to friction at P; what is lost is positive",
-                    at<&CaseResult::energy, &ContactEnergy::friction_J>)),
-    in_group("energy", output("restitution_J", "J",
-                              "energy lost in the normal contact element; what is lost is positive",
-                              at<&CaseResult::energy, &ContactEnergy::restitution_J>)),
-    in_group("energy",
-             output("kinetic_change_J", "J", "kinetic energy at separation less that at touch",
-                    at<&CaseResult::energy, &ContactEnergy::kinetic_change_J>)),
-    in_group("energy", output("strain_change_J", "J",
-                              "strain energy of the links at separation less that at touch",
-                              at<&CaseResult::energy, &ContactEnergy::strain_change_J>)),
-    in_group("energy",
-             output("gravity_change_J", "J", "potential energy at separation less that at touch",
-                    at<&CaseResult::energy, &ContactEnergy::gravity_change_J>)),
-    in_group(
-        "energy",
-        output("exchanged_J", "J",
-               "work that the contact forces exchanged with the finger, to and fro both counted",
-               at<&CaseResult::energy, &ContactEnergy::exchanged_J>)),
-    in_group(
-        "energy",
-        output(
-            "closure", "",
-            "what does not add up in the energy balance, relative to exchanged_J; never negative",
-            at<&CaseResult::energy, &ContactEnergy::closure>)),
-    in_group("errors",
-             output("mode_same", "",
-                    "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
-                    "another. This and the errors below are there only when they were asked for",
-                    at<&CaseResult::errors, &ErrorEstimate::mode_same>),
-             "mode_same"),
-    in_group("errors",
-             output("fn_peak", "", "estimated error of fn_peak_N, as a fraction of it",
-                    at<&CaseResult::errors, &ErrorEstimate::fn_peak>),
-             "fn_peak_error"),
-    in_group("errors",
-             output("ft_peak", "", "estimated error of ft_peak_N, as a fraction of fn_peak_N",
-                    at<&CaseResult::errors, &ErrorEstimate::ft_peak>),
-             "ft_peak_error"),
-    in_group("errors",
-             output("duration", "", "estimated error of duration_s, as a fraction of it",
-                    at<&CaseResult::errors, &ErrorEstimate::duration>),
-             "duration_error"),
-    in_group(
-        "errors",
-        output("stick_total", "", "estimated error of stick_total_s, as a fraction of duration_s",
-               at<&CaseResult::errors, &ErrorEstimate::stick_total>),
-        "stick_total_error"),
-    in_group("errors",
-             output("slide", "",
-                    "estimated error of slide_m, as a fraction of speed at touch times duration_s",
-                    at<&CaseResult::errors, &ErrorEstimate::slide>),
-             "slide_error"),
-    in_group("errors",
-             output("impulse_n", "", "estimated error of impulse_n_Ns, as a fraction of it",
-                    at<&CaseResult::errors, &ErrorEstimate::impulse_n>),
-             "impulse_n_error"),
-    in_group(
-        "errors",
-        output("impulse_t", "", "estimated error of impulse_t_Ns, as a fraction of impulse_n_Ns",
-               at<&CaseResult::errors, &ErrorEstimate::impulse_t>),
-        "impulse_t_error"),
-    in_group("errors",
-             output("v_out", "",
-                    "estimated error of the velocity at separation (vt_out_m_s and vn_out_m_s as "
-                    "one vector), as a fraction of the speed at touch",
-                    at<&CaseResult::errors, &ErrorEstimate::v_out>),
-             "v_out_error"),
-    sent(SentWith::kModel,
-         in_group("solver",
-                  output("integrator", "",
-                         "how the equations of motion are stepped: explicit or generalized-alpha",
-                         at<&CaseResult::solver, &SolverReport::integrator>))),
-    shown_in("us", 1e6,
-             in_group("solver",
-                      output("dt_s", "s",
-                             "step in contact, in compression; restitution at low e steps shorter",
-                             at<&CaseResult::solver, &SolverReport::dt_s>))),
-    in_group("solver", output("steps", "", "accepted steps in contact",
-                              at<&CaseResult::solver, &SolverReport::steps>)),
-    shown_in(
-        "ms", 1e3,
-        in_group("solver", output("wall_s", "s", "wall time of the contact alone; not reproducible",
-                                  at<&CaseResult::solver, &SolverReport::wall_s>))),
-    sent(SentWith::kWorker, in_group("solver",
-                                     output("version", "", "version of the solver",
-                                            at<&CaseResult::solver, &SolverReport::version>),
-                                     "solver_version"))};
+    output("phases", "s", kPhases.meaning, ListPart{&kPhases}),
+    output("reaction_peaks", "s, N", kReactionPeaks.meaning, ListPart{&kReactionPeaks}),
+    energy<&Energy::kinetic_in_J>("kinetic_in_J", "kinetic energy of the whole finger at touch"),
+    energy<&Energy::friction_J>("friction_J",
+                                "energy lost to friction at P; what is lost is positive"),
+    energy<&Energy::restitution_J>(
+        "restitution_J", "energy lost in the normal contact element; what is lost is positive"),
+    energy<&Energy::kinetic_change_J>("kinetic_change_J",
+                                      "kinetic energy at separation less that at touch"),
+    energy<&Energy::strain_change_J>("strain_change_J",
+                                     "strain energy of the links at separation less that at touch"),
+    energy<&Energy::gravity_change_J>("gravity_change_J",
+                                      "potential energy at separation less that at touch"),
+    energy<&Energy::exchanged_J>(
+        "exchanged_J",
+        "work that the contact forces exchanged with the finger, to and fro both counted"),
+    energy<&Energy::closure>(
+        "closure",
+        "what does not add up in the energy balance, relative to exchanged_J; never negative", ""),
+    error<&Errors::mode_same>(
+        "mode_same", "mode_same",
+        "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
+        "another. This and the errors below are there only when they were asked for"),
+    error<&Errors::fn_peak>("fn_peak", "fn_peak_error",
+                            "estimated error of fn_peak_N, as a fraction of it"),
+    error<&Errors::ft_peak>("ft_peak", "ft_peak_error",
+                            "estimated error of ft_peak_N, as a fraction of fn_peak_N"),
+    error<&Errors::duration>("duration", "duration_error",
+                             "estimated error of duration_s, as a fraction of it"),
+    error<&Errors::stick_total>("stick_total", "stick_total_error",
+                                "estimated error of stick_total_s, as a fraction of duration_s"),
+    error<&Errors::slide>(
+        "slide", "slide_error",
+        "estimated error of slide_m, as a fraction of speed at touch times duration_s"),
+    error<&Errors::impulse_n>("impulse_n", "impulse_n_error",
+                              "estimated error of impulse_n_Ns, as a fraction of it"),
+    error<&Errors::impulse_t>("impulse_t", "impulse_t_error",
+                              "estimated error of impulse_t_Ns, as a fraction of impulse_n_Ns"),
+    error<&Errors::v_out>("v_out", "v_out_error",
+                          "estimated error of the velocity at separation (vt_out_m_s and "
+                          "vn_out_m_s as one vector), as a fraction of the speed at touch"),
+    report<&SolverReport::integrator>(
+        "integrator", "", "how the equations of motion are stepped: explicit or generalized-alpha",
+        SentWith::kModel),
+    report<&SolverReport::dt_s>(
+        "dt_s", kMicroseconds,
+        "step in contact, in compression; restitution at low e steps shorter"),
+    report<&SolverReport::steps>("steps", "", "accepted steps in contact"),
+    report<&SolverReport::wall_s>("wall_s", kMilliseconds,
+                                  "wall time of the contact alone; not reproducible"),
+    report<&SolverReport::version>("version", "", "version of the solver", SentWith::kWorker)};
 
 }  // namespace
 
@@ -341,14 +302,12 @@ std::span<const ResultList* const> result_lists() {
 }
 
 const ResultField* find_result_column(std::string_view column) {
-  const auto found = std::find_if(kFields.begin(), kFields.end(),
-                                  [&](const ResultField& field) { return field.column == column; });
+  const auto* found = std::ranges::find(kFields, column, &ResultField::column);
   return found == kFields.end() ? nullptr : &*found;
 }
 
 const ResultList* find_result_list(std::string_view column) {
-  const auto found = std::find_if(kLists.begin(), kLists.end(),
-                                  [&](const ResultList* list) { return list->column == column; });
+  const auto* found = std::ranges::find(kLists, column, &ResultList::column);
   return found == kLists.end() ? nullptr : *found;
 }
 

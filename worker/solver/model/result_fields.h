@@ -33,13 +33,12 @@ using TakeElement = std::function<void(std::span<const Cell> element)>;
 /// each element.
 struct ResultList {
   std::string_view column;
-  std::string_view unit = {};
-  std::string_view meaning = {};
-  std::span<const std::string_view> members =
-      {};                 ///< what an element's values are called, in order
-  bool has_names = true;  ///< elements of `solve --json` and `query` are objects, else arrays
+  std::string_view unit;
+  std::string_view meaning;
+  std::span<const std::string_view> members;  ///< what an element's values are called, in order
   /// Gives `take` the elements in order.
-  void (*each)(const CaseResult& result, const TakeElement& take) = nullptr;
+  void (*each)(const CaseResult& result, const TakeElement& take);
+  bool has_names = true;  ///< elements of `solve --json` and `query` are objects, else arrays
 };
 
 /// A list of outputs made of a ResultList: the list itself, or one member of its elements.

@@ -46,15 +46,24 @@ constexpr std::array kColumns{
                 TraceVectors{&TraceRow::nodes_m, false}},
 };
 
-/// How many vectors of that kind a trace has.
-std::size_t count_of(const TraceVectors& vectors, const TraceShape& shape) {
-  return vectors.of_links ? shape.links : shape.nodes;
+/// A row of that shape, all zeros.
+TraceRow zero_row(const TraceShape& shape) {
+  TraceRow row{};
+  row.reactions_N.resize(2 * shape.links);
+  row.nodes_m.resize(2 * shape.nodes);
+  return row;
 }
 
-std::string numbered(std::string_view name, std::size_t number) {
-  std::string text(name);
-  text.replace(text.find("{}"), 2, std::to_string(number));
-  return text;
+/// Calls `take` with a span of the numbers of each column, or of all columns of a vector.
+template <class Row, class Take>
+void for_each_numbers(Row&& row, const Take& take) {
+  for (const TraceColumn& column : kColumns) {
+    if (const auto* number = std::get_if<double TraceRow::*>(&column.value)) {
+      take(std::span(&(row.*(*number)), 1));
+    } else if (const auto* vectors = std::get_if<TraceVectors>(&column.value)) {
+      take(std::span(row.*(vectors->values)));
+    }
+  }
 }
 
 }  // namespace
@@ -68,6 +77,7 @@ TraceShape trace_shape(std::size_t links, std::size_t elements_per_link, bool wi
 }
 
 std::vector<std::string> trace_headings(const TraceShape& shape) {
+  const TraceRow row = zero_row(shape);
   std::vector<std::string> headings;
   for (const TraceColumn& column : kColumns) {
     const auto* vectors = std::get_if<TraceVectors>(&column.value);
@@ -76,9 +86,9 @@ std::vector<std::string> trace_headings(const TraceShape& shape) {
       continue;
     }
     const std::size_t space = column.name.find(' ');
-    for (std::size_t i = 0; i < count_of(*vectors, shape); ++i) {
-      headings.push_back(numbered(column.name.substr(0, space), i));
-      headings.push_back(numbered(column.name.substr(space + 1), i));
+    for (std::size_t i = 0; i < (row.*(vectors->values)).size(); ++i) {
+      std::string name(i % 2 == 0 ? column.name.substr(0, space) : column.name.substr(space + 1));
+      headings.push_back(name.replace(name.find("{}"), 2, std::to_string(i / 2)));
     }
   }
   return headings;
@@ -93,43 +103,25 @@ std::uint8_t code_of_state(std::string_view state) {
 }
 
 std::size_t trace_numbers(const TraceShape& shape) {
-  std::size_t numbers = 0;
-  for (const TraceColumn& column : kColumns) {
-    if (const auto* vectors = std::get_if<TraceVectors>(&column.value)) {
-      numbers += 2 * count_of(*vectors, shape);
-    } else if (std::holds_alternative<double TraceRow::*>(column.value)) {
-      ++numbers;
-    }
-  }
-  return numbers;
+  std::size_t count = 0;
+  for_each_numbers(zero_row(shape), [&](std::span<const double> some) { count += some.size(); });
+  return count;
 }
 
 void append_numbers(const TraceRow& row, std::vector<double>& numbers) {
-  for (const TraceColumn& column : kColumns) {
-    if (const auto* number = std::get_if<double TraceRow::*>(&column.value)) {
-      numbers.push_back(row.*(*number));
-    } else if (const auto* vectors = std::get_if<TraceVectors>(&column.value)) {
-      const std::vector<double>& values = row.*(vectors->values);
-      numbers.insert(numbers.end(), values.begin(), values.end());
-    }
-  }
+  for_each_numbers(row, [&](std::span<const double> some) {
+    numbers.insert(numbers.end(), some.begin(), some.end());
+  });
 }
 
 TraceRow trace_row(const TraceShape& shape, std::span<const double> numbers,
                    std::string_view state) {
-  TraceRow row{};
+  TraceRow row = zero_row(shape);
   row.state = state;
-  for (const TraceColumn& column : kColumns) {
-    if (const auto* number = std::get_if<double TraceRow::*>(&column.value)) {
-      row.*(*number) = numbers.front();
-      numbers = numbers.subspan(1);
-    } else if (const auto* vectors = std::get_if<TraceVectors>(&column.value)) {
-      const std::size_t count = 2 * count_of(*vectors, shape);
-      (row.*(vectors->values))
-          .assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(count));
-      numbers = numbers.subspan(count);
-    }
-  }
+  for_each_numbers(row, [&](std::span<double> some) {
+    std::copy_n(numbers.begin(), some.size(), some.begin());
+    numbers = numbers.subspan(some.size());
+  });
   return row;
 }
 

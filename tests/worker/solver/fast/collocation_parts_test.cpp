@@ -158,20 +158,18 @@ TEST(CollocationLanes, StepsOfHalfTheLengthErrAThousandTimesLess) {
   model.elements_per_link = 1;
   model.E_Pa = 1e5;
   const Chain chain(model);
-  const auto state_after = [&](int steps) {
+  const auto state_after = [&](int steps) -> Eigen::VectorXd {
     CollocationLanes lanes(runnable_lane_kernels().front(), chain);
-    const std::vector<double> h_s(lanes.lanes(), 0.2 / steps);
-    const std::vector<double> error_m(lanes.lanes(), 1e-14);
-    const std::vector<unsigned char> accept(lanes.lanes(), 1);
-    std::vector<CollocationLanes::Attempt> attempts(lanes.lanes());
+    const std::size_t lane = lanes.lanes() - 1;
+    lanes.step(lane).h_s = 0.2 / steps;
+    lanes.step(lane).error_m = 1e-14;
     for (int i = 0; i < steps; ++i) {
-      lanes.attempt(h_s, error_m, attempts);
-      EXPECT_TRUE(attempts[0].converged);
-      lanes.settle(accept);
+      lanes.attempt();
+      EXPECT_TRUE(lanes.step(lane).converged);
+      lanes.accept();
     }
-    Eigen::VectorXd state(static_cast<Eigen::Index>(3 * lanes.size()));
-    lanes.copy_state(lanes.lanes() - 1, state.data());
-    return Eigen::VectorXd(state.head(static_cast<Eigen::Index>(lanes.size())));
+    const std::vector<double> numbers = lanes.state_and_stages(lane);
+    return Eigen::Map<const Eigen::VectorXd>(numbers.data(), 2 * chain.rows());
   };
   const Eigen::VectorXd exact = state_after(28);
   const double coarse = (state_after(5) - exact).norm();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -98,8 +97,7 @@ std::vector<Chain> chains_of(const Shape& shape, std::size_t count) {
 TEST(LaneStepper, GivesALaneTheSameBitsBesideOtherChainsAsBesideItsOwn) {
   for (const LaneKernel& kernel : runnable_lane_kernels()) {
     for (const Shape& shape : kShapes) {
-      SCOPED_TRACE(std::string(kernel.name) + ", links " + std::to_string(shape.links) +
-                   ", elements " + std::to_string(shape.elements_per_link));
+      SCOPED_TRACE(testing::Message() << kernel.name << ", links " << shape.links);
       const auto chains = chains_of(shape, kernel.lanes);
       Steps mixed(chains[0], kernel);
       for (std::size_t lane = 0; lane < kernel.lanes; ++lane) {
@@ -137,8 +135,7 @@ std::vector<double> by_reference(const Chain& chain, int steps) {
 TEST(LaneStepper, StepsAsTheReferenceDoesButForRounding) {
   for (const LaneKernel& kernel : runnable_lane_kernels()) {
     for (const Shape& shape : kShapes) {
-      SCOPED_TRACE(std::string(kernel.name) + ", links " + std::to_string(shape.links) +
-                   ", elements " + std::to_string(shape.elements_per_link));
+      SCOPED_TRACE(testing::Message() << kernel.name << ", links " << shape.links);
       const auto chains = chains_of(shape, kernel.lanes);
       for (const bool side_by_side : {false, true}) {
         Steps steps(chains[0], kernel);

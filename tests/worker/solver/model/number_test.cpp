@@ -38,15 +38,7 @@ TEST(Number, ReadsBackAsTheSameBits) {
       continue;
     }
     ASSERT_EQ(read_back(exact_number(value)), value);
-    ASSERT_EQ(read_back(exact_real(value)), value);
   }
-}
-
-TEST(Number, IsARealOfJsonAlsoWhenWhole) {
-  EXPECT_EQ(exact_real(1.0), "1.0");
-  EXPECT_EQ(exact_real(-0.0), "-0.0");
-  EXPECT_EQ(exact_real(0.5), "0.5");
-  EXPECT_EQ(exact_real(1e22), "1e+22");
 }
 
 TEST(ReadableNumber, HasSignificantDigitsAndNoZerosAtItsEnd) {

@@ -1,4 +1,4 @@
-#include "worker/solver/model/usual_ranges.h"
+#include "worker/solver/model/parameters.h"
 
 #include <cmath>
 #include <limits>
