@@ -1,6 +1,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <ostream>
+#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -67,6 +68,9 @@ bool are_one_file(const std::string& one, const std::string& other) {
 std::vector<std::string> checked_sources(const MergeFlags& flags, Console& console) {
   std::vector<std::string> sources;
   for (const std::string& source : flags.sources) {
+    if (!std::filesystem::exists(source)) {  // before a new target is made
+      throw std::runtime_error(fmt::format("there is no file {}", source));
+    }
     if (are_one_file(source, flags.target.file)) {
       throw solver::InputError(fmt::format(
           "{} is the database that the others are merged into: name it by --db alone", source));

@@ -167,10 +167,11 @@ int list_studies(const StatusFlags& flags, Console& console) {
 int watch(const StatusFlags& flags, Console& console) {
   protocol::StopSignals stop;
   const auto source = open_source(console, flags.source, [&stop] { return !stop.requested(); });
+  FollowedStudy followed(*source, flags.study);
   bool answered = false;
   const auto ask = [&](const Tell& tell) {
     // Before the first answer the address may be wrong: waiting for ever would hide that.
-    auto status = study_named(*source, flags.study, answered ? tell : Tell());
+    auto status = followed.status(answered ? tell : Tell());
     if (!std::exchange(answered, true)) {
       warn_if_insecure(console, source->access(), source->place());
     }

@@ -63,7 +63,8 @@ void print_submitted(Console& console, const Study& study, const protocol::Submi
 
 int watch(Console& console, const SubmitFlags& flags, const Study& study, Connection& connection,
           protocol::StopSignals& stop) {
-  const auto ask = [&](const Tell& tell) { return study_named(connection, study.name, tell); };
+  FollowedStudy followed(connection, study.name);
+  const auto ask = [&](const Tell& tell) { return followed.status(tell); };
   const auto status = watch_study(console, ask, stop);
   if (stop.requested()) {
     throw Interrupted("no longer watching");

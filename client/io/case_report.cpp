@@ -29,7 +29,7 @@ using solver::readable_number;
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
 /// Nearer than this, changes in the fifth digit of H, mu or e* change modes
-/// (worker/solver/contact/README.md).
+/// (worker/solver/reference/theory.md).
 constexpr double kDoubtfulMargin = 1e-4;
 
 ordered_json json_of(const solver::Cell& cell) {
@@ -107,7 +107,7 @@ void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>&
   }
 }
 
-/// Each as a percentage of its scale, which README.md of worker/solver names.
+/// Each as a percentage of its scale, which worker/solver/accuracy.md names.
 void print_errors(std::ostream& out, const solver::ErrorEstimate& errors) {
   if (!errors.mode_same) {
     return;

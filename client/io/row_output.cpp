@@ -139,9 +139,8 @@ Format format_of_output(const std::string& flag, const std::string& file,
     return usual;
   }
   throw solver::InputError(
-      fmt::format("--out {} does not say in which format: end its name in .csv or .json{}, or "
-                  "give --format",
-                  file, allowed.size() > 2 ? ", or .jsonl" : ""));
+      fmt::format("--out {} does not say in which format: end its name in {}, or give --format",
+                  file, allowed.size() > 2 ? ".csv, .json or .jsonl" : ".csv or .json"));
 }
 
 ShownColumn shown_column(const std::string& name, const std::string& unit) {

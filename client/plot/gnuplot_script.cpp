@@ -370,7 +370,9 @@ class Script {
         std::clamp(std::floor(room / static_cast<double>(longest + 8)), 1.0, 3.0);
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
     add("set key {} maxcols {}\n",
-        is_below ? "bmargin left horizontal width -2" : "rmargin top vertical",
+        !is_below  ? "rmargin top vertical"
+        : is_text_ ? "bmargin left horizontal"  // its letters would be drawn over each other
+                   : "bmargin left horizontal width -1",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {
       add("set bmargin at screen {:.4f}\n",
@@ -390,7 +392,11 @@ class Script {
     out_ += figure_.panels.size() == 1 ? "\n# Axes\n" : fmt::format("\n# Panel {}\n", index + 1);
     write_frame(panel, index);
     write_axis("x", panel.x);
-    write_axis("y", panel.y);
+    FigureAxis y = panel.y;
+    if (is_text_ && figure_.panels.size() > 1) {
+      y.label.clear();  // it would cover numbers
+    }
+    write_axis("y", y);
     for (const Span& span : panel.spans) {
       if (!is_text_) {
         add("set object rectangle from {}, graph 0 to {}, graph 1 behind {}\n",
@@ -642,8 +648,13 @@ class Script {
            panel.has_key && !is_coloured && !curve.name.empty() ? titled(curve.name) : "notitle");
     }
     if (!panel.spans.empty() && !is_text_ && panel.has_key && !std::exchange(has_span_key_, true)) {
-      for (const auto& [name, fill] : kSpanStyles) {
-        plot("keyentry with boxes {} {}", fill, titled(std::string(name)));
+      for (std::size_t kind = 0; kind < kSpanStyles.size(); ++kind) {
+        const auto& [name, fill] = kSpanStyles.at(kind);
+        if (std::ranges::any_of(panel.spans, [kind](const Span& span) {
+              return static_cast<std::size_t>(span.kind) == kind;
+            })) {
+          plot("keyentry with boxes {} {}", fill, titled(std::string(name)));
+        }
       }
     }
   }

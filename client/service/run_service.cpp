@@ -135,9 +135,10 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
   if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
     console.notes() << fmt::format("\"{}\": {}\n", study.name, taken);
   }
+  FollowedStudy followed(connection, study.name);
   const auto ask = [&](const Tell& tell) {
     keep_waiting();
-    auto status = study_named(connection, study.name, tell);
+    auto status = followed.status(tell);
     if (const auto reason = objection_to_waiting(status); !reason.empty()) {
       throw std::runtime_error(reason);
     }

@@ -98,6 +98,27 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
   return found.front();
 }
 
+protocol::StudyStatus FollowedStudy::status(const Tell& tell) {
+  if (study_id_ == 0) {
+    auto first = study_named(source_, name_, tell);
+    study_id_ = first.study_id();
+    return first;
+  }
+  auto found = source_.status(name_, tell);
+  if (found.size() != 1 || found.front().study_id() != study_id_) {
+    found = source_.status({}, tell);
+    std::erase_if(found, [this](const auto& study) { return study.study_id() != study_id_; });
+    if (found.empty()) {
+      return study_named(source_, name_, tell);
+    }
+    if (tell) {
+      tell(fmt::format("{} is called {} now.", name_, found.front().name()));
+    }
+    name_ = found.front().name();
+  }
+  return found.front();
+}
+
 int print_end(Console& console, const protocol::StudyStatus& status,
               const std::function<protocol::Table(const std::string&)>& query) {
   if (status.failed() > 0) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/io/console.h"
@@ -43,6 +44,20 @@ protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
 /// The study of that name. Throws std::runtime_error where there is none. Given a `tell`, waits for
 /// a server that is away.
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
+
+/// The status of one study again and again: found by its name, and after a change of that by its
+/// number.
+class FollowedStudy {
+ public:
+  FollowedStudy(Source& source, std::string name) : source_(source), name_(std::move(name)) {}
+  /// Throws as `study_named`.
+  protocol::StudyStatus status(const Tell& tell);
+
+ private:
+  Source& source_;
+  std::string name_;
+  std::uint64_t study_id_ = 0;  ///< 0: not found yet
+};
 
 /// Prints failed points with their reasons, or that the study was cancelled, to standard error.
 /// Returns the exit code: kDone when every point is solved.

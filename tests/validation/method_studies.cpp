@@ -1,5 +1,5 @@
-// The two studies of the method that worker/solver/README.md shows: which mesh is good enough, and
-// what the chosen steps leave.
+// The two studies of the method that worker/solver/accuracy.md shows: which mesh is good enough,
+// and what the chosen steps leave.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -16,7 +16,7 @@ ModelParameters companion_model(const ModelParameters& model);
 /// `companion`, that of the same point of `companion_model(model)`:
 /// error = d (1 + (2 l/L)^4)/(r^p - 1) + tolerance, with r the ratio of the meshes, l the length of
 /// an element of the companion, L the length of the bending waves that the contact makes, p an
-/// order for each output, and the tolerance that chooses the step (README.md, "Errors of single
+/// order for each output, and the tolerance that chooses the step (accuracy.md, "Errors of single
 /// results"). Dimensionless: of forces and impulses relative to the normal one, of times to the
 /// duration, of the slide to speed at touch times duration, of speeds to the speed at touch. Absent
 /// where that is 0.

@@ -16,7 +16,7 @@ namespace oblique::solver {
 /// omega_max; a longer step asked for is refused above the limit. omega_max is the highest
 /// frequency of the chain, in contact with its tip on the stiffest contact spring, omega_tip that
 /// of the tip's own inertia on that spring in compression. Generalized-alpha: fractions of the
-/// times that the motion itself takes, on any mesh. README.md has what the numbers were measured
+/// times that the motion itself takes, on any mesh. accuracy.md has what the numbers were measured
 /// by.
 class StepChoice {
  public:

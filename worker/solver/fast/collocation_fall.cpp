@@ -21,7 +21,7 @@ constexpr std::size_t kStages = GaussCollocation::kStages;
 /// than it should beside a contact; more leave room for fewer falls.
 constexpr std::size_t kMostOfStates = (std::size_t{16} << 20) / sizeof(double);
 /// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
-/// length): README.md.
+/// length): collocation.md.
 constexpr double kUnresolved = 1.5;
 /// First step, in parts of sqrt(length/g).
 constexpr double kFirstStep = 1.0 / 4000.0;

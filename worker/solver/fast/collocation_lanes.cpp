@@ -112,8 +112,6 @@ CollocationLanes::CollocationLanes(const LaneKernel& kernel, const Chain& chain)
       memory_(kernel.lanes),
       total_kg_(kernel.lanes),
       steps_(kernel.lanes) {
-  constexpr std::size_t kStages = GaussCollocation::kStages;
-  constexpr std::size_t kPairs = GaussCollocation::kPairs;
   const std::size_t links = chain.links();
   const std::size_t elements = links * chain.tables().elements_per_link;
   arrays_.chain = chains_.tables();
@@ -122,12 +120,13 @@ CollocationLanes::CollocationLanes(const LaneKernel& kernel, const Chain& chain)
   arrays_.active = memory_.zeros(1);
   arrays_.state = memory_.zeros(3 * size_);
   arrays_.next = memory_.zeros(3 * size_);
-  arrays_.stage_q = memory_.zeros(kStages * size_);
-  arrays_.stage_a = memory_.zeros(kStages * size_);
-  arrays_.work = memory_.zeros(2 * kPairs * size_);
+  arrays_.stage_q = memory_.zeros(GaussCollocation::kStages * size_);
+  arrays_.stage_a = memory_.zeros(GaussCollocation::kStages * size_);
+  arrays_.work = memory_.zeros(2 * GaussCollocation::kPairs * size_);
   arrays_.tangents = memory_.zeros(elements * numbers_of<TangentBlocks<double>>());
-  arrays_.fronts = memory_.zeros(kPairs * elements * numbers_of<ElementFront<double>>());
-  arrays_.ends = memory_.zeros(kPairs * links * numbers_of<EndFront<double>>());
+  arrays_.fronts =
+      memory_.zeros(GaussCollocation::kPairs * elements * numbers_of<ElementFront<double>>());
+  arrays_.ends = memory_.zeros(GaussCollocation::kPairs * links * numbers_of<EndFront<double>>());
   arrays_.squares = memory_.zeros(1);
   for (std::size_t lane = 0; lane < lanes(); ++lane) {
     load(lane, chain);

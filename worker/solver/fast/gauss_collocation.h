@@ -12,7 +12,7 @@ namespace oblique::solver {
 ///
 /// A A is diagonalised, A A = T diag(lambda^2) T^-1, in conjugate pairs.
 struct GaussCollocation {
-  static constexpr std::size_t kStages = 8;  ///< chosen by work and precision (README.md)
+  static constexpr std::size_t kStages = 8;  ///< chosen by work and precision (collocation.md)
   static constexpr std::size_t kPairs = kStages / 2;
 
   GaussCollocation();

@@ -12,7 +12,8 @@
 namespace oblique::solver {
 
 /// Tightest accuracy that falls are solved to by collocation. Its errors fall slowly with the step,
-/// as vibrations that it does not resolve do; beyond this, explicit steps are quicker (README.md).
+/// as vibrations that it does not resolve do; beyond this, explicit steps are quicker
+/// (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 
 /// A chain whose fall is wanted. What is pointed to must outlive the fall, `progress` only its

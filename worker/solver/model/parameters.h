@@ -33,7 +33,8 @@ struct ModelParameters {
   double spectral_radius = 0.9;  ///< of generalized-alpha at infinite frequency
   double dt_s = 0.0;             ///< step in contact; 0: chosen for the integrator
   double dt_fall_s = 0.0;        ///< step in the fall; 0: chosen for the integrator
-  /// Relative error that chosen steps leave in the outputs of a contact (worker/solver/README.md).
+  /// Relative error that chosen steps leave in the outputs of a contact
+  /// (worker/solver/accuracy.md).
   double tolerance = 1e-5;
   /// Steps in contact are so many times those that are asked for or chosen, where they are stable.
   /// No key: 1 in all models but the companions of error estimates (worker/solver/estimate.h).
