@@ -31,16 +31,6 @@ StudyTable stored(const protocol::Recipe& recipe, std::uint64_t points) {
   return StudyTable(recipe.SerializeAsString(), points);
 }
 
-TEST(StudyTable, IsTheSameWhenItsRecipeIsWrittenInAnotherWay) {
-  const auto as_range = recipe_of_mu(range("mu", 0.1, 0.5, 2));
-  const auto as_list = recipe_of_mu(listed("mu", {0.1, 0.5}));
-  for (const StudyTable& one : {judged(as_range), stored(as_range, 2)}) {
-    for (const StudyTable& other : {judged(as_list), stored(as_list, 2)}) {
-      EXPECT_EQ(one.growth_to(other).kind, Growth::Kind::kSame);
-    }
-  }
-}
-
 TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
   protocol::Recipe before = recipe_of_mu(listed("mu", {0.1, 0.2}));
   protocol::Recipe longer = before;
