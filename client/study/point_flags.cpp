@@ -267,16 +267,14 @@ void add_block_flags(CLI::App& command, PointFlags& flags) {
       ->group("Points");
 }
 
-constexpr std::string_view kSingleLengths = "Single lengths";
-
 /// Help with 64 single lengths would have no end: those of `--lengths` name them. A hidden flag
 /// would have no name in messages.
 class BriefHelp : public CLI::Formatter {
  public:
   std::string make_group(std::string group, bool is_positional,
                          std::vector<const CLI::Option*> options) const override {
-    return group == kSingleLengths ? std::string()
-                                   : CLI::Formatter::make_group(group, is_positional, options);
+    return group == protocol::kUnlisted ? std::string()
+                                        : CLI::Formatter::make_group(group, is_positional, options);
   }
 };
 
@@ -328,7 +326,7 @@ void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values,
   }
   command.footer(fmt::format("{}\n\n{}", command.get_footer(), table_of_presets()));
   for (std::size_t link = 1; with_single_lengths && link <= protocol::kMostLinks; ++link) {
-    add(protocol::axis_key(fmt::format("length{}", link)), std::string(kSingleLengths));
+    add(protocol::axis_key(fmt::format("length{}", link)), protocol::kUnlisted);
   }
 }
 

@@ -127,6 +127,9 @@ std::string cases_of(CLI::App& verb, const std::string& path, const ValueWords& 
     cases += cases_of(*each, before + each->get_name(), words);
   }
   for (auto* option : verb.get_options()) {
+    if (option->get_group().empty() || option->get_group() == kUnlisted) {
+      continue;
+    }
     const std::string values = values_of(*option, words);
     offers += option->get_positional() ? values : "";
     for (const std::string& name : option->get_lnames()) {

@@ -29,6 +29,9 @@ CLI::Validator number_between(double least, double largest);
 /// A check for whole numbers of 64 bits that are at least `least`.
 CLI::Validator whole_number_from(std::int64_t least);
 
+/// Group of options that neither help nor completion lists.
+inline constexpr const char* kUnlisted = "Unlisted";
+
 /// Notes the values that an option may have, for completion; the reader of the value checks it.
 /// Returns `option`.
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);

@@ -146,7 +146,7 @@ TEST_F(RowOutputTest, TheFormatIsWhatTheFlagOrTheEndOfTheNameSays) {
     }
   };
   for (const char* file : {"x.txt", "x", "x.table", "x.npz"}) {
-    EXPECT_THAT(refusal("", file), testing::HasSubstr(".csv or .json, or .jsonl, or give"));
+    EXPECT_THAT(refusal("", file), testing::HasSubstr(".csv, .json or .jsonl, or give"));
   }
   EXPECT_THAT(refusal("", "x.jsonl", kCsvAndJson), testing::HasSubstr(".csv or .json, or give"));
   EXPECT_THAT(refusal("jsn", ""), testing::HasSubstr("did you mean `json`?"));
