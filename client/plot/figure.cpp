@@ -53,7 +53,7 @@ std::string label_of(const std::string& name) {
 }  // namespace
 
 Range range_of(const std::vector<double>& values, bool positive_only) {
-  Range range{INFINITY, -INFINITY};
+  Range range{HUGE_VAL, -HUGE_VAL};
   for (const double value : values) {
     if (std::isfinite(value) && (!positive_only || value > 0.0)) {
       range = united(range, {value, value});

@@ -147,7 +147,8 @@ struct Raster {
     return (static_cast<double>(part % columns) + 0.5) / static_cast<double>(columns);
   }
   double y_share(std::size_t part) const {
-    return (static_cast<double>(part / columns) + 0.5) / static_cast<double>(rows);
+    const std::size_t line = part / columns;
+    return (static_cast<double>(line) + 0.5) / static_cast<double>(rows);
   }
 };
 
@@ -343,7 +344,8 @@ class Script {
     frame_.width = size_.width / static_cast<double>(figure_.columns);
     frame_.height = (size_.height - above() - below()) / static_cast<double>(rows_of(figure_));
     frame_.left = frame_.width * static_cast<double>(index % figure_.columns);
-    frame_.bottom = above() + frame_.height * static_cast<double>(index / figure_.columns + 1);
+    const std::size_t panel_row = index / figure_.columns;
+    frame_.bottom = above() + frame_.height * static_cast<double>(panel_row + 1);
     const double title_height = panel.title.empty() ? kMargin : (is_text_ ? 2.0 : 1.6) * kLine;
     add("set origin {:.4f}, {:.4f}\nset size {} {:.4f}, {:.4f}\nset tmargin at screen {:.4f}\n",
         frame_.left / size_.width, 1.0 - frame_.bottom / size_.height,

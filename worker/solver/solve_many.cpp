@@ -170,11 +170,11 @@ struct Entry {
 bool is_before(const Entry& a, const Entry& b) {
   std::strong_ordering order = a.point.model <=> b.point.model;
   for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e_star}) {
-    if (order == 0) {
+    if (std::is_eq(order)) {
       order = std::strong_order(a.point.point.*value, b.point.point.*value);
     }
   }
-  return order == 0 ? a.number < b.number : order < 0;
+  return std::is_eq(order) ? a.number < b.number : std::is_lt(order);
 }
 
 /// Models so that those of one fall follow each other, falls in the order of their first models.
