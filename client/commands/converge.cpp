@@ -144,7 +144,7 @@ void add_converge(CLI::App& app, Action& parsed) {
   command.add_option("--halvings", flags.halvings, "how often the step is halved")
       ->type_name("N")
       ->capture_default_str();
-  add_point_flags(command, flags.points, FlagValues::kMany, true);
+  add_point_flags(command, flags.points, FlagValues::kMany);
 }
 
 }  // namespace oblique::client

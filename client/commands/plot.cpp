@@ -301,7 +301,7 @@ void add_flags_of_point(CLI::App& command, PlotFlags& flags) {
   for (const char* flag : {"--local", "--on-worker"}) {
     command.get_option(flag)->group(group);
   }
-  add_point_flags(command, flags.values, FlagValues::kOne, true);
+  add_point_flags(command, flags.values, FlagValues::kOne);
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ void add_run(CLI::App& app, Action& parsed) {
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();
-  add_study_flags(command, flags.study, true);
+  add_study_flags(command, flags.study);
 }
 
 }  // namespace oblique::client

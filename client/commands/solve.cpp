@@ -111,7 +111,7 @@ void add_solve(CLI::App& app, Action& parsed) {
       ->needs(trace);
   command.add_flag("--errors", flags.errors,
                    "estimate errors: solve the point also on half the mesh and at twice the step");
-  add_point_flags(command, flags.points, FlagValues::kOne, true);
+  add_point_flags(command, flags.points, FlagValues::kOne);
 }
 
 }  // namespace oblique::client

@@ -247,7 +247,7 @@ void add_study(CLI::App& app, Action& parsed) {
       kStudyCheckExamples, check_study);
   command.add_flag("--json", flags.json, "print one JSON object");
   command.add_flag("--no-rate", flags.no_rate, "solve no points, and predict no time");
-  add_study_flags(command, flags.study, true);
+  add_study_flags(command, flags.study);
 }
 
 }  // namespace oblique::client

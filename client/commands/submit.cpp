@@ -128,7 +128,7 @@ void add_submit(CLI::App& app, Action& parsed) {
                               protocol::kPriorities))
       ->type_name("N");
   add_no_reuse_flag(command, flags.settings.no_reuse);
-  add_study_flags(command, flags.study, true);
+  add_study_flags(command, flags.study);
 }
 
 }  // namespace oblique::client

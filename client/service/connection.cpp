@@ -362,6 +362,18 @@ std::vector<protocol::StudyStatus> Connection::status(const std::string& study, 
   return {reply.studies().begin(), reply.studies().end()};
 }
 
+protocol::StudyStatus Connection::status_of(std::uint64_t study_id, const std::string& name,
+                                            const Tell& tell) {
+  protocol::ClientRequest request;
+  request.mutable_status()->set_study(name);  // for the server's error
+  request.mutable_status()->set_study_id(study_id);
+  const auto reply = call(std::move(request), tell).status();
+  if (reply.studies_size() != 1) {
+    throw ServerError(fmt::format("the server no longer has the study \"{}\"", name));
+  }
+  return reply.studies(0);
+}
+
 protocol::WorkersReply Connection::workers() {
   protocol::WorkersReply all;
   std::uint64_t after = 0;

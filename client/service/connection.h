@@ -90,6 +90,8 @@ class Connection : public Source {
 
   using Source::status;
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override;
+  protocol::StudyStatus status_of(std::uint64_t study_id, const std::string& name,
+                                  const Tell& tell) override;
   /// The same, with what the server says of itself.
   protocol::StatusReply full_status(const std::string& study = {}, const Tell& tell = {});
   protocol::WorkersReply workers();  ///< all of them

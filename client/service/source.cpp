@@ -1,5 +1,6 @@
 #include "client/service/source.h"
 
+#include <stdexcept>
 #include <utility>
 #include <variant>
 
@@ -98,6 +99,16 @@ protocol::QueryRequest request_for(const ResultQuery& query) {
     question.set_limit(static_cast<std::uint64_t>(*query.limit));
   }
   return request;
+}
+
+protocol::StudyStatus Source::status_of(std::uint64_t study_id, const std::string& name,
+                                        const Tell& tell) {
+  for (auto& study : status({}, tell)) {
+    if (study.study_id() == study_id) {
+      return std::move(study);
+    }
+  }
+  throw std::runtime_error(fmt::format("the study \"{}\" is no longer in {}", name, place()));
 }
 
 protocol::Table Source::query(const std::string& sql) {

@@ -63,6 +63,10 @@ class Source {
   /// `tell`, waits for a server that is away; see Connection.
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;
   std::vector<protocol::StudyStatus> status(const std::string& study) { return status(study, {}); }
+  /// The study of that number, whatever its name is now. Throws std::runtime_error, with `name`,
+  /// where there is none.
+  virtual protocol::StudyStatus status_of(std::uint64_t study_id, const std::string& name,
+                                          const Tell& tell);
   /// Who may use it, as StatusReply.access of the last status; empty for a file.
   virtual std::string access() const { return {}; }
   /// "oblique.db" or "tcp://127.0.0.1:7600", for messages.

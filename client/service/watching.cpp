@@ -99,24 +99,16 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
 }
 
 protocol::StudyStatus FollowedStudy::status(const Tell& tell) {
-  if (study_id_ == 0) {
-    auto first = study_named(source_, name_, tell);
-    study_id_ = first.study_id();
-    return first;
-  }
-  auto found = source_.status(name_, tell);
-  if (found.size() != 1 || found.front().study_id() != study_id_) {
-    found = source_.status({}, tell);
-    std::erase_if(found, [this](const auto& study) { return study.study_id() != study_id_; });
-    if (found.empty()) {
-      return study_named(source_, name_, tell);
-    }
+  auto status = study_id_ == 0 ? study_named(source_, name_, tell)
+                               : source_.status_of(study_id_, name_, tell);
+  study_id_ = status.study_id();
+  if (status.name() != name_) {
     if (tell) {
-      tell(fmt::format("{} is called {} now.", name_, found.front().name()));
+      tell(fmt::format("{} is called {} now.", name_, status.name()));
     }
-    name_ = found.front().name();
+    name_ = status.name();
   }
-  return found.front();
+  return status;
 }
 
 int print_end(Console& console, const protocol::StudyStatus& status,

@@ -45,12 +45,12 @@ protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
 /// a server that is away.
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});
 
-/// The status of one study again and again: found by its name, and after a change of that by its
-/// number.
+/// The status of one study again and again: found by its name first, then by its number, so that
+/// it may be renamed.
 class FollowedStudy {
  public:
   FollowedStudy(Source& source, std::string name) : source_(source), name_(std::move(name)) {}
-  /// Throws as `study_named`.
+  /// Throws as `study_named` and Source::status_of. Reports a new name to `tell`.
   protocol::StudyStatus status(const Tell& tell);
 
  private:

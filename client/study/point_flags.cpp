@@ -280,8 +280,7 @@ class BriefHelp : public CLI::Formatter {
 
 }  // namespace
 
-void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values,
-                     bool with_single_lengths) {
+void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values) {
   const auto help = std::make_shared<BriefHelp>();
   help->column_width(command.get_formatter()->get_column_width());
   command.formatter(help);
@@ -325,7 +324,7 @@ void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values,
     add(key, group)->default_str(default_of(key));
   }
   command.footer(fmt::format("{}\n\n{}", command.get_footer(), table_of_presets()));
-  for (std::size_t link = 1; with_single_lengths && link <= protocol::kMostLinks; ++link) {
+  for (std::size_t link = 1; link <= protocol::kMostLinks; ++link) {
     add(protocol::axis_key(fmt::format("length{}", link)), protocol::kUnlisted);
   }
 }
@@ -434,7 +433,7 @@ std::string name_of_recipe(const protocol::Recipe& recipe) {
   return fmt::format("sweep-{}", protocol::recipe_digest(recipe).substr(0, kDigits));
 }
 
-void add_study_flags(CLI::App& command, StudyFlags& flags, bool with_single_lengths) {
+void add_study_flags(CLI::App& command, StudyFlags& flags) {
   command
       .add_option(
           "STUDY.toml", flags.file,
@@ -451,7 +450,7 @@ void add_study_flags(CLI::App& command, StudyFlags& flags, bool with_single_leng
                 "estimate errors: solve each point also on half the mesh and at twice the step, at "
                 "a quarter more cost")
       ->group("Points");
-  add_point_flags(command, flags.points, FlagValues::kMany, with_single_lengths);
+  add_point_flags(command, flags.points, FlagValues::kMany);
 }
 
 Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {

@@ -32,11 +32,10 @@ struct PointFlags {
 /// Whether flags may give one value only (`solve`) or lists and ranges as well.
 enum class FlagValues { kOne, kMany };
 
-/// Adds --H, --mu, --e, --preset, --lengths and a flag for every model key, and those of single
-/// lengths (--length1 ...) if wanted, and a table of presets to the footer of help. `flags` must
-/// live as long as `command`.
-void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values,
-                     bool with_single_lengths);
+/// Adds --H, --mu, --e, --preset, --lengths, a flag for every model key and for single lengths
+/// (--length1 ...), and a table of presets to the footer of help. `flags` must live as long as
+/// `command`.
+void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values);
 
 /// How a key is written as a flag: `tip_mass` is --tip-mass.
 std::string flag_of_key(std::string_view key);
@@ -69,7 +68,7 @@ struct StudyFlags {
 
 /// Adds the STUDY.toml argument, --name, --errors and the point flags. `flags` must live as long as
 /// `command`.
-void add_study_flags(CLI::App& command, StudyFlags& flags, bool with_single_lengths);
+void add_study_flags(CLI::App& command, StudyFlags& flags);
 
 /// Throws InputError when both a file and flags say what the points are, or none, and for what
 /// either says wrong, `check_reach` included. What only its points tell is left to `check_points`.

@@ -263,8 +263,8 @@ class SimulatedWorker {
 
 using server::StudyState;
 
-/// `points` points, in models of `points_a_model` and, if some are left, one more. H has the mark.
-/// Models have three falls in turn: points that share one lie apart.
+/// A recipe of `points` points, all with this H. Each `points_a_model` of them share a model; the
+/// last model has the rest. Every third model has the same fall, so points of one fall lie apart.
 inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model,
                                          double H) {
   using protocol::listed;

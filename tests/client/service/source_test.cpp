@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -194,6 +195,41 @@ TEST(WaitMessages, NameAReasonThatChanged) {
   EXPECT_NE(update(messages, 3, "a worker"), "");
   EXPECT_EQ(update(messages, 4, "the database"), "");
   EXPECT_EQ(update(messages, 6, "the database"), "The study waits for the database.");
+}
+
+// ---- Studies that are renamed
+// --------------------------------------------------------------------
+
+/// A source with one study.
+class OneStudy : public Source {
+ public:
+  using Source::status;
+  std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
+    if (study.empty() || study == held.name()) {
+      return {held};
+    }
+    throw std::runtime_error("there is no study called " + study);
+  }
+  std::unique_ptr<RowStream> rows(protocol::QueryRequest) override { return nullptr; }
+  std::string place() const override { return "here"; }
+
+  protocol::StudyStatus held;
+};
+
+TEST(FollowedStudy, IsFoundUnderItsNewNameAndNotReplacedByAnotherStudyOfItsName) {
+  OneStudy source;
+  source.held.set_study_id(7);
+  source.held.set_name("first");
+  FollowedStudy followed(source, "first");
+  std::string said;
+  const Tell tell = [&said](const std::string& sentence) { said += sentence; };
+  EXPECT_EQ(followed.status(tell).name(), "first");
+  source.held.set_name("other");
+  EXPECT_EQ(followed.status(tell).name(), "other");
+  EXPECT_EQ(followed.status(tell).name(), "other");
+  EXPECT_EQ(said, "first is called other now.") << "it is said once";
+  source.held.set_study_id(8);
+  EXPECT_THROW(followed.status(tell), std::runtime_error) << "study 7 was deleted";
 }
 
 }  // namespace

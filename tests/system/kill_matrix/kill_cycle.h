@@ -62,8 +62,8 @@ struct MatrixReport {
   std::vector<std::string> failures;  ///< the case and what was wrong
 };
 
-/// Runs the cases of `count` seeds from `first_seed`, several at once: most of their time they wait
-/// for somebody to be given up.
+/// Runs the cases of `count` seeds from `first_seed`, several at once, because a cycle mostly waits
+/// until a halted process counts as lost.
 MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count);
 
 /// The first difference between two databases in what must not depend on who solved what and when:
