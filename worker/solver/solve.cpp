@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "worker/solver/falls.h"
-#include "worker/solver/fast/lane_batch.h"
+#include "worker/solver/fast/lane_contacts.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/step_choice.h"
@@ -143,7 +143,6 @@ class Crowd {
   void solve_in_lanes() {
     const auto first = upcoming_->finger.parts();  // keeps its chain
     const Chain& shape = first->prepared().chain();
-    LaneBatch batch(shape, runnable_lane_kernels().front());
     const auto take = [&]() -> std::optional<ContactCase> {
       while (fetch() && shares_lanes_of(shape)) {
         if (const auto next = begun(*std::exchange(upcoming_, std::nullopt))) {
@@ -152,8 +151,8 @@ class Crowd {
       }
       return std::nullopt;
     };
-    batch.solve(
-        take, [this](ContactOutcome&& contact) { give(std::move(contact)); }, tracing_);
+    solve_contacts(
+        shape, take, [this](ContactOutcome&& contact) { give(std::move(contact)); }, tracing_);
   }
 
   /// Makes the next point upcoming_; false when none follows.

@@ -19,14 +19,12 @@ class CollocationLanes {
   CollocationLanes& operator=(const CollocationLanes&) = delete;
   ~CollocationLanes() = default;
 
-  std::size_t lanes() const { return kernel_.lanes; }
-  /// Entries of a vector of positions, rates or accelerations: 2 rows.
-  std::size_t size() const { return size_; }
+  std::size_t lanes() const { return memory_.lanes(); }
 
   /// A lane's next step, and what became of the last attempt.
   struct Step {
     double h_s = 0.0;      ///< 0 leaves the lane alone
-    double error_m = 0.0;  ///< how far positions may be from the solution, as unresolved_m_s
+    double error_m = 0.0;  ///< allowed error of positions, mean square over the chain's mass
     /// False when Newton's method did not converge: there is no new state then.
     bool converged = false;
     int iterations = 0;
@@ -40,27 +38,34 @@ class CollocationLanes {
 
   /// Puts a chain at rest into a lane.
   void load(std::size_t lane, const Chain& chain);
-  /// Position, rates, and the mean acceleration over the step that led there.
-  void set_state(std::size_t lane, const double* q_v_mean);
+  /// Positions, rates, and mean accelerations over the step that led there, a vector each.
+  std::vector<double> state(std::size_t lane) const;
+  void set_state(std::size_t lane, const std::vector<double>& q_v_mean);
   /// Tries the step of each lane.
   void attempt();
   /// Takes the states at the end of the last attempt in the lanes whose step is_accepted.
   void accept();
 
-  /// Entry i of position, rates and mean acceleration of a lane's state, and of the accelerations
-  /// at the stages of its last attempt.
-  using Entries = std::array<double, 3 + GaussCollocation::kStages>;
-  Entries entries(std::size_t lane, std::size_t i) const;
-  /// All of them, a vector after the other.
-  std::vector<double> state_and_stages(std::size_t lane) const;
+  /// One coordinate of a lane at the start of the last attempt, and its accelerations at the
+  /// stages.
+  struct Coordinate {
+    double q;
+    double v;
+    std::array<double, GaussCollocation::kStages> a;
+  };
+  Coordinate coordinate(std::size_t lane, std::size_t i) const;
+  /// Number of coordinates: 2 rows.
+  std::size_t coordinates() const { return vector_; }
 
  private:
+  bool iterate(int iteration);
+
   LaneKernel kernel_;
-  std::size_t size_;
-  LaneChains chains_;
+  std::size_t vector_;  ///< entries of one of positions, rates or accelerations
   LaneMemory memory_;
-  CollocationArrays arrays_{};
+  CollocationArrays arrays_;
   std::vector<double> total_kg_;
+  std::vector<double> correction_m_;  ///< of the last iteration
   std::vector<Step> steps_;
 };
 

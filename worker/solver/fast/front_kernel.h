@@ -2,44 +2,51 @@
 
 #include <cstddef>
 
+#include "worker/solver/fast/gauss_collocation.h"
 #include "worker/solver/reference/chain_kernel.h"
 
-/// (M + z K) x = b for complex z and a whole chain, packs of lanes: LDLT without pivoting, element
-/// by element. An element's eight unknowns are a dense front; the four of its left node are
-/// eliminated, and what is left is carried into the next front. Rows come as in Chain, x before y,
-/// so the half bandwidth is 7, and of its rows only the part is computed that is not zero.
+/// (M + z K) x = b for complex z and a whole chain, for numbers or packs of lanes, by the frontal
+/// method: L D L^T without pivoting, element by element. A front has eight unknowns, both
+/// directions of p_i, s_i, p_j and s_j in the order of the rows of Chain. Those that no later
+/// element has are eliminated; the next front begins with the others. The half bandwidth is 7, and
+/// only entries of L that are not zero are computed.
 namespace oblique::solver {
 
+/// Plain: kernels share no functions, which those of std::complex are (README.md).
 template <class Real>
-struct LaneComplex {
+struct Complex {
   Real re;
   Real im;
 };
 
-/// Pivots and columns below them, column by column: rows 1 to 7 of the first, 2 to 7 of the
-/// second...
-template <class Real>
-struct ElementFront {
-  LaneComplex<Real> inverse_pivot[4];
-  LaneComplex<Real> below[22];
-};
-/// The right node of a link's last element: at a joint the slope of the inner link, which no other
-/// element has, at the tip all that is left.
-template <class Real>
-struct EndFront {
-  LaneComplex<Real> inverse_pivot[4];
-  LaneComplex<Real> below[6];
-};
+/// Complex numbers in the first `pivots` columns of a front's lower triangle.
+constexpr std::size_t front_factors(std::size_t pivots) {
+  return pivots * (17 - pivots) / 2;
+}
+/// Complex numbers in the factors of a chain's matrix: column by column the inverse of D, then L
+/// below it.
+constexpr std::size_t chain_factors(std::size_t links, std::size_t elements_per_link) {
+  return links * ((elements_per_link - 1) * front_factors(4) + front_factors(6)) +
+         front_factors(8) - front_factors(6);
+}
 
 namespace front_detail {
+
+/// Unknowns eliminated with an element: those of its left node, at a joint also the slope of the
+/// inner link, at the tip all.
+template <class Constant>
+inline std::size_t pivots_of(const ChainTables<Constant>& chain, std::size_t element) {
+  const bool ends_link = (element + 1) % chain.elements_per_link == 0;
+  const bool ends_chain = element + 1 == chain.links * chain.elements_per_link;
+  return ends_chain ? 8 : ends_link ? 6 : 4;
+}
 
 template <std::size_t number>
 struct Place {
   static constexpr std::size_t value = number;
 };
 
-/// operation(Place<first>), ..., operation(Place<last - 1>): a loop that is unrolled, whatever the
-/// compiler thinks of its length.
+/// operation(Place<first>), ..., operation(Place<last - 1>): a loop that is always unrolled.
 template <std::size_t first, std::size_t last, class Operation>
 inline void for_each_place(const Operation& operation) {
   if constexpr (first < last) {
@@ -49,240 +56,186 @@ inline void for_each_place(const Operation& operation) {
 }
 
 template <class Real>
-inline LaneComplex<Real> product(const LaneComplex<Real>& a, const LaneComplex<Real>& b) {
+inline Complex<Real> product(const Complex<Real>& a, const Complex<Real>& b) {
   return {less_product(a.re * b.re, a.im, b.im), plus_product(a.re * b.im, a.im, b.re)};
 }
 /// c - a b.
 template <class Real>
-inline LaneComplex<Real> less(const LaneComplex<Real>& c, const LaneComplex<Real>& a,
-                              const LaneComplex<Real>& b) {
+inline Complex<Real> less(const Complex<Real>& c, const Complex<Real>& a, const Complex<Real>& b) {
   return {plus_product(less_product(c.re, a.re, b.re), a.im, b.im),
           less_product(less_product(c.im, a.re, b.im), a.im, b.re)};
 }
 template <class Real>
-inline LaneComplex<Real> inverse(const LaneComplex<Real>& a) {
+inline Complex<Real> inverse(const Complex<Real>& a) {
   const Real scale = 1.0 / plus_product(a.re * a.re, a.im, a.im);
   return {a.re * scale, (0.0 - a.im) * scale};
 }
 
-/// Where column `pivot` of a front of `size` rows begins in `below`.
-constexpr std::size_t column_start(std::size_t size, std::size_t pivot) {
-  return pivot * (2 * size - 1 - pivot) / 2;
-}
-
-/// Copies the lower triangle of that many rows of `from`, from row and column `first` on.
-template <std::size_t size, class Real>
-inline void copy_corner(const LaneComplex<Real> (&from)[size][size], std::size_t first,
-                        std::size_t rows, LaneComplex<Real> (&to)[4][4]) {
-  for (std::size_t i = 0; i < rows; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      to[i][j] = from[first + i][first + j];
-    }
-  }
-}
-
-/// Eliminates the first `pivots` unknowns of a symmetric front; only its lower triangle counts.
-template <std::size_t pivots, std::size_t size, class Real>
-inline void eliminate(LaneComplex<Real> (&front)[size][size], LaneComplex<Real>* inverse_pivot,
-                      LaneComplex<Real>* below) {
-  for_each_place<0, pivots>([&](auto pivot) {
+/// Eliminates the unknowns first..last - 1 of a symmetric front, of which only the lower triangle
+/// is read.
+template <std::size_t first, std::size_t last, class Real>
+inline void eliminate(Complex<Real> (&front)[8][8], Complex<Real>* factors) {
+  for_each_place<first, last>([&](auto pivot) {
     constexpr std::size_t k = decltype(pivot)::value;
-    const LaneComplex<Real> inverse_of_pivot = inverse(front[k][k]);
-    inverse_pivot[k] = inverse_of_pivot;
-    for_each_place<k + 1, size>([&](auto column) {
-      constexpr std::size_t j = decltype(column)::value;
-      const LaneComplex<Real> factor = product(front[j][k], inverse_of_pivot);
-      for_each_place<j, size>([&](auto row) {
+    Complex<Real>* const column = factors + front_factors(k) - k;
+    const Complex<Real> inverse_pivot = inverse(front[k][k]);
+    column[k] = inverse_pivot;
+    for_each_place<k + 1, 8>([&](auto below) {
+      constexpr std::size_t j = decltype(below)::value;
+      const Complex<Real> factor = product(front[j][k], inverse_pivot);
+      for_each_place<j, 8>([&](auto row) {
         constexpr std::size_t i = decltype(row)::value;
         front[i][j] = less(front[i][j], front[i][k], factor);
       });
-      below[column_start(size, k) + j - k - 1] = factor;
+      column[j] = factor;
     });
   });
 }
 
-template <std::size_t pivots, std::size_t size, class Real>
-inline void substitute_forward(const LaneComplex<Real>* below, LaneComplex<Real>* x) {
+/// L y = x for the first `pivots` unknowns of a front.
+template <std::size_t pivots, class Real>
+inline void substitute_forward(const Complex<Real>* factors, Complex<Real> (&x)[8]) {
   for_each_place<0, pivots>([&](auto pivot) {
     constexpr std::size_t k = decltype(pivot)::value;
-    for_each_place<k + 1, size>([&](auto row) {
+    for_each_place<k + 1, 8>([&](auto row) {
       constexpr std::size_t i = decltype(row)::value;
-      x[i] = less(x[i], below[column_start(size, k) + i - k - 1], x[k]);
+      x[i] = less(x[i], factors[front_factors(k) + i - k], x[k]);
     });
   });
 }
 
-template <std::size_t pivots, std::size_t size, class Real>
-inline void substitute_backward(const LaneComplex<Real>* inverse_pivot,
-                                const LaneComplex<Real>* below, LaneComplex<Real>* x) {
+/// D L^T x = y for the first `pivots` unknowns of a front.
+template <std::size_t pivots, class Real>
+inline void substitute_backward(const Complex<Real>* factors, Complex<Real> (&x)[8]) {
   for_each_place<0, pivots>([&](auto place) {
     constexpr std::size_t k = pivots - 1 - decltype(place)::value;
-    LaneComplex<Real> value = product(x[k], inverse_pivot[k]);
+    Complex<Real> value = product(x[k], factors[front_factors(k)]);
     // The row that became known last comes last: what waits for it is then short.
-    for_each_place<0, size - 1 - k>([&](auto later) {
-      constexpr std::size_t i = size - 1 - decltype(later)::value;
-      value = less(value, below[column_start(size, k) + i - k - 1], x[i]);
+    for_each_place<0, 7 - k>([&](auto later) {
+      constexpr std::size_t i = 7 - decltype(later)::value;
+      value = less(value, factors[front_factors(k) + i - k], x[i]);
     });
     x[k] = value;
   });
 }
 
-/// Adds a block of M + z K at (row, column), and its mirror where it lies on the diagonal's right.
+/// Puts a block of M + z K at (row, column); entries above the diagonal do not count.
 template <class Real, class Constant>
-inline void put_block(LaneComplex<Real> (&front)[8][8], std::size_t row, std::size_t column,
-                      const Constant& mass, const LaneComplex<Real>& z,
-                      const SymmetricPair<Real>& K) {
+inline void put_block(Complex<Real> (&front)[8][8], std::size_t row, std::size_t column,
+                      const Constant& mass, const Complex<Real>& z, const SymmetricPair<Real>& K) {
   front[row][column] = {plus_product(mass, z.re, K.xx), z.im * K.xx};
   front[row + 1][column] = {z.re * K.xy, z.im * K.xy};
   front[row][column + 1] = front[row + 1][column];
   front[row + 1][column + 1] = {plus_product(mass, z.re, K.yy), z.im * K.yy};
 }
 
-/// M + z K of one element, its left node first, then p_j and s_j, or at a joint s_j and p_j.
+/// M + z K of one element. At a joint s_j comes before p_j.
 template <class Real, class Constant>
-inline void put_element(LaneComplex<Real> (&front)[8][8], bool ends_at_joint,
-                        const ElementConstants<Constant>& k, const TangentBlocks<Real>& tangent,
-                        const LaneComplex<Real>& z) {
+inline void put_element(Complex<Real> (&front)[8][8], bool ends_at_joint,
+                        const ElementConstants<Constant>& m, const TangentBlocks<Real>& tangent,
+                        const Complex<Real>& z) {
   const std::size_t p = ends_at_joint ? 6 : 4;
   const std::size_t s = ends_at_joint ? 4 : 6;
-  const LaneComplex<Real> minus_z{0.0 - z.re, 0.0 - z.im};
-  put_block(front, 0, 0, k.m_pp, z, tangent.pp);
-  put_block(front, 2, 0, k.m_ps, z, tangent.ps_i);
-  put_block(front, 2, 2, k.m_ss, z, tangent.ss_ii);
-  put_block(front, p, 0, k.n_pp, minus_z, tangent.pp);
-  put_block(front, p, 2, k.n_ps, minus_z, tangent.ps_i);
-  put_block(front, p, p, k.m_pp, z, tangent.pp);
-  put_block(front, s, 0, 0.0 - k.n_ps, z, tangent.ps_j);
-  put_block(front, s, 2, 0.0 - k.n_ss, z, tangent.ss_ij);
-  put_block(front, s, s, k.m_ss, z, tangent.ss_jj);
-  put_block(front, 6, 4, 0.0 - k.m_ps, minus_z, tangent.ps_j);
-}
-
-template <class Real>
-inline void add_corner(const LaneComplex<Real> (&carried)[4][4], LaneComplex<Real> (&front)[8][8]) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      front[i][j].re += carried[i][j].re;
-      front[i][j].im += carried[i][j].im;
-    }
-  }
-}
-
-/// Row and column of the pin's position become those of the unit matrix.
-template <class Real>
-inline void hold_pin(LaneComplex<Real> (&front)[8][8]) {
-  for (std::size_t j = 0; j < 2; ++j) {
-    for (std::size_t i = j; i < 8; ++i) {
-      front[i][j] = {};
-    }
-    front[j][j].re = front[j][j].re + 1.0;
-  }
+  const Complex<Real> minus_z{0.0 - z.re, 0.0 - z.im};
+  put_block(front, 0, 0, m.m_pp, z, tangent.pp);
+  put_block(front, 2, 0, m.m_ps, z, tangent.ps_i);
+  put_block(front, 2, 2, m.m_ss, z, tangent.ss_ii);
+  put_block(front, p, 0, m.n_pp, minus_z, tangent.pp);
+  put_block(front, p, 2, m.n_ps, minus_z, tangent.ps_i);
+  put_block(front, p, p, m.m_pp, z, tangent.pp);
+  put_block(front, s, 0, 0.0 - m.n_ps, z, tangent.ps_j);
+  put_block(front, s, 2, 0.0 - m.n_ss, z, tangent.ss_ij);
+  put_block(front, s, s, m.m_ss, z, tangent.ss_jj);
+  put_block(front, 6, 4, 0.0 - m.m_ps, minus_z, tangent.ps_j);
 }
 
 }  // namespace front_detail
 
-/// Factors M + z K: one front an element and one end a link.
+/// Factors M + z K into chain_factors() numbers. `tangent` has one entry an element. The pin's
+/// position is no unknown: its columns of `factors` are left alone and must be zero.
 template <class Real, class Constant>
 inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlocks<Real>* tangent,
-                          const LaneComplex<Real>& z, ElementFront<Real>* fronts,
-                          EndFront<Real>* ends) {
+                          const Complex<Real>& z, Complex<Real>* factors) {
   using namespace front_detail;
-  LaneComplex<Real> carried[4][4]{};
-  for (std::size_t link = 0; link < chain.links; ++link) {
-    for (std::size_t e = 0; e < chain.elements_per_link; ++e, ++tangent, ++fronts) {
-      const bool is_last = e + 1 == chain.elements_per_link;
-      const bool ends_at_tip = is_last && link + 1 == chain.links;
-      LaneComplex<Real> front[8][8];
-      put_element(front, is_last && !ends_at_tip, chain.link[link], *tangent, z);
-      add_corner(carried, front);
-      if (link == 0 && e == 0) {
-        hold_pin(front);
+  Complex<Real> carried[4][4]{};  // what the front before leaves to this one
+  const std::size_t elements = chain.links * chain.elements_per_link;
+  for (std::size_t element = 0; element < elements; ++element) {
+    const std::size_t pivots = pivots_of(chain, element);
+    const std::size_t link = element / chain.elements_per_link;
+    Complex<Real> front[8][8];
+    put_element(front, pivots == 6, chain.link[link], tangent[element], z);
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) {
+        front[i][j].re += carried[i][j].re;
+        front[i][j].im += carried[i][j].im;
       }
-      if (ends_at_tip) {
-        front[4][4].re += *chain.tip_mass_kg;
-        front[5][5].re += *chain.tip_mass_kg;
+    }
+    if (pivots == 8) {
+      front[4][4].re += *chain.tip_mass_kg;
+      front[5][5].re += *chain.tip_mass_kg;
+    }
+    if (element > 0) {
+      eliminate<0, 2>(front, factors);
+    }
+    eliminate<2, 4>(front, factors);
+    if (pivots > 4) {
+      eliminate<4, 6>(front, factors);
+    }
+    if (pivots > 6) {
+      eliminate<6, 8>(front, factors);
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) {
+        carried[i][j] = pivots + i < 8 ? front[pivots + i][pivots + j] : Complex<Real>{};
       }
-      eliminate<4>(front, fronts->inverse_pivot, fronts->below);
-      copy_corner(front, 4, 4, carried);
     }
-    if (link + 1 == chain.links) {
-      eliminate<4>(carried, ends[link].inverse_pivot, ends[link].below);
-      return;
-    }
-    eliminate<2>(carried, ends[link].inverse_pivot, ends[link].below);
-    LaneComplex<Real> joint[4][4]{};
-    copy_corner(carried, 2, 2, joint);
-    copy_corner(joint, 0, 4, carried);
+    factors += front_factors(pivots);
   }
 }
 
-/// Solves in place for `systems` factored matrices and right sides at once: system s has its fronts
-/// from fronts[s elements] on, its ends from ends[s links] on, and its right side, real and
-/// imaginary parts, in the vectors 2 s and 2 s + 1 of `size` entries of `x`. The pin's rows must be
-/// zero.
-template <std::size_t systems, class Real>
-inline void solve_fronts(std::size_t links, std::size_t elements_per_link,
-                         const ElementFront<Real>* fronts, const EndFront<Real>* ends,
-                         std::size_t size, Real* x) {
+/// Solves in place for `systems` factored matrices and right sides at once: system s has the s-th
+/// chain_factors() of `factors`, and its right side, real and imaginary parts, in the vectors 2 s
+/// and 2 s + 1 of `x`, each of 2 rows entries. The pin's rows must be zero.
+template <std::size_t systems, class Real, class Constant>
+inline void solve_fronts(const ChainTables<Constant>& chain, const Complex<Real>* factors,
+                         Real* x) {
   using namespace front_detail;
-  const std::size_t elements = links * elements_per_link;
-  LaneComplex<Real> z[8];
-  const auto take = [&](std::size_t system, std::size_t first) {
-    const Real* re = x + 2 * system * size + first;
-    for_each_place<0, 8>([&](auto place) {
-      constexpr std::size_t i = decltype(place)::value;
-      z[i] = {re[i], re[i + size]};
-    });
-  };
-  const auto give = [&](std::size_t system, std::size_t first) {
-    Real* re = x + 2 * system * size + first;
-    for_each_place<0, 8>([&](auto place) {
-      constexpr std::size_t i = decltype(place)::value;
-      re[i] = z[i].re;
-      re[i + size] = z[i].im;
-    });
-  };
-  std::size_t first = 0;  // row of the element's first unknown, counting x and y
-  std::size_t element = 0;
-  for (std::size_t link = 0; link < links; ++link) {
-    for (std::size_t e = 0; e < elements_per_link; ++e, ++element) {
-      const bool is_last = e + 1 == elements_per_link;
-      for (std::size_t system = 0; system < systems; ++system) {
-        take(system, first);
-        substitute_forward<4, 8>(fronts[system * elements + element].below, z);
-        if (is_last) {
-          const EndFront<Real>& end = ends[system * links + link];
-          if (link + 1 == links) {
-            substitute_forward<4, 4>(end.below, z + 4);
-          } else {
-            substitute_forward<2, 4>(end.below, z + 4);
-          }
-        }
-        give(system, first);
-      }
-      first += is_last ? 6 : 4;
+  const std::size_t size = 2 * chain.rows;
+  const std::size_t elements = chain.links * chain.elements_per_link;
+  const std::size_t all_factors = chain_factors(chain.links, chain.elements_per_link);
+  std::size_t first = 0;  // unknown of the front
+  const auto for_each_system = [&](const auto& substitute) {
+    for (std::size_t system = 0; system < systems; ++system) {
+      Real* const re = x + 2 * system * size + first;
+      Real* const im = re + size;
+      Complex<Real> z[8];
+      for_each_place<0, 8>([&](auto i) { z[i.value] = {re[i.value], im[i.value]}; });
+      substitute(factors + system * all_factors, z);
+      for_each_place<0, 8>([&](auto i) {
+        re[i.value] = z[i.value].re;
+        im[i.value] = z[i.value].im;
+      });
     }
+  };
+  for (std::size_t element = 0; element < elements; ++element) {
+    const std::size_t pivots = pivots_of(chain, element);
+    for_each_system([&](const Complex<Real>* f, Complex<Real>(&z)[8]) {
+      pivots == 4   ? substitute_forward<4>(f, z)
+      : pivots == 6 ? substitute_forward<6>(f, z)
+                    : substitute_forward<8>(f, z);
+    });
+    first += pivots;
+    factors += front_factors(pivots);
   }
-  for (std::size_t link = links; link-- > 0;) {
-    for (std::size_t e = elements_per_link; e-- > 0;) {
-      --element;
-      const bool is_last = e + 1 == elements_per_link;
-      first -= is_last ? 6 : 4;
-      for (std::size_t system = 0; system < systems; ++system) {
-        take(system, first);
-        if (is_last) {
-          const EndFront<Real>& end = ends[system * links + link];
-          if (link + 1 == links) {
-            substitute_backward<4, 4>(end.inverse_pivot, end.below, z + 4);
-          } else {
-            substitute_backward<2, 4>(end.inverse_pivot, end.below, z + 4);
-          }
-        }
-        const ElementFront<Real>& front = fronts[system * elements + element];
-        substitute_backward<4, 8>(front.inverse_pivot, front.below, z);
-        give(system, first);
-      }
-    }
+  for (std::size_t element = elements; element-- > 0;) {
+    const std::size_t pivots = pivots_of(chain, element);
+    first -= pivots;
+    factors -= front_factors(pivots);
+    for_each_system([&](const Complex<Real>* f, Complex<Real>(&z)[8]) {
+      pivots == 4   ? substitute_backward<4>(f, z)
+      : pivots == 6 ? substitute_backward<6>(f, z)
+                    : substitute_backward<8>(f, z);
+    });
   }
 }
 

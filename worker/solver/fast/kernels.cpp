@@ -1,8 +1,7 @@
 #include "worker/solver/fast/kernels.h"
 
-#include <array>
+#include <algorithm>
 #include <cstring>
-#include <vector>
 
 namespace oblique::solver {
 namespace {
@@ -21,19 +20,14 @@ std::vector<LaneKernel> find_kernels() {
   return kernels;
 }
 
-/// One array of a chain's constants as plain numbers.
-struct Numbers {
-  const double* first;
-  std::size_t count;
-};
-
 template <class Constants>
-Numbers numbers(const Constants* first, std::size_t count) {
+std::span<const double> numbers(const Constants* first, std::size_t count) {
   static_assert(sizeof(Constants) % sizeof(double) == 0);
   return {reinterpret_cast<const double*>(first), count * sizeof(Constants) / sizeof(double)};
 }
 
-std::array<Numbers, LaneTables::kArrays> constants_of(const ChainTables<double>& chain) {
+/// A chain's arrays of constants as plain numbers, in the order of ChainTables.
+std::array<std::span<const double>, 6> constants_of(const ChainTables<double>& chain) {
   return {
       numbers(chain.link, chain.links),    numbers(chain.mass_factor, chain.rows + kHalfBandwidth),
       numbers(chain.weight_N, chain.rows), numbers(chain.momentum_kg, chain.rows),
@@ -47,6 +41,49 @@ std::span<const LaneKernel> runnable_lane_kernels() {
   return kernels;
 }
 
+double* LaneMemory::zeros(std::size_t entries) {
+  constexpr std::size_t kLine = sizeof(Line) / sizeof(double);
+  return arrays_.emplace_back((entries * lanes_ + kLine - 1) / kLine).front().numbers;
+}
+
+void LaneMemory::write(double* array, std::size_t lane, std::span<const double> values) const {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    array[i * lanes_ + lane] = values[i];
+  }
+}
+
+void LaneMemory::read(const double* array, std::size_t lane, std::span<double> values) const {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = array[i * lanes_ + lane];
+  }
+}
+
+LaneTables LaneMemory::tables(const ChainTables<double>& chain) {
+  LaneTables tables{chain.rows, chain.tip_row, chain.links, chain.elements_per_link, {}};
+  const auto constants = constants_of(chain);
+  for (std::size_t i = 0; i < constants.size(); ++i) {
+    tables.constants[i] = zeros(constants[i].size());
+  }
+  for (std::size_t lane = 0; lane < lanes_; ++lane) {
+    write(tables, lane, chain);
+  }
+  return tables;
+}
+
+void LaneMemory::write(const LaneTables& tables, std::size_t lane,
+                       const ChainTables<double>& chain) const {
+  const auto constants = constants_of(chain);
+  for (std::size_t i = 0; i < constants.size(); ++i) {
+    write(tables.constants[i], lane, constants[i]);
+  }
+}
+
+void LaneMemory::copy(const double* from, double* to, std::size_t lane, std::size_t entries) const {
+  for (std::size_t i = lane; i < entries * lanes_; i += lanes_) {
+    to[i] = from[i];
+  }
+}
+
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b) {
   return a.links == b.links && a.elements_per_link == b.elements_per_link;
 }
@@ -57,36 +94,10 @@ bool are_equal(const ChainTables<double>& a, const ChainTables<double>& b) {
   }
   const auto of_a = constants_of(a);
   const auto of_b = constants_of(b);
-  for (std::size_t i = 0; i < of_a.size(); ++i) {
-    if (of_a[i].first != of_b[i].first &&
-        std::memcmp(of_a[i].first, of_b[i].first, of_a[i].count * sizeof(double)) != 0) {
-      return false;
-    }
-  }
-  return true;
-}
-
-LaneChains::LaneChains(const ChainTables<double>& chain, std::size_t lanes)
-    : lanes_(lanes),
-      tables_{chain.rows, chain.tip_row, chain.links, chain.elements_per_link, {}},
-      memory_(lanes) {
-  const auto constants = constants_of(chain);
-  for (std::size_t i = 0; i < constants.size(); ++i) {
-    tables_.constants[i] = memory_.zeros(constants[i].count);
-  }
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    set(lane, chain);
-  }
-}
-
-void LaneChains::set(std::size_t lane, const ChainTables<double>& chain) {
-  const auto constants = constants_of(chain);
-  for (std::size_t array = 0; array < constants.size(); ++array) {
-    double* to = tables_.constants[array] + lane;
-    for (std::size_t i = 0; i < constants[array].count; ++i) {
-      to[i * lanes_] = constants[array].first[i];
-    }
-  }
+  return std::ranges::equal(of_a, of_b, [](const auto& one, const auto& other) {
+    return one.data() == other.data() ||
+           std::memcmp(one.data(), other.data(), one.size_bytes()) == 0;
+  });
 }
 
 }  // namespace oblique::solver

@@ -11,35 +11,14 @@
 
 namespace oblique::solver {
 
-/// Memory of arrays with one number a lane for each entry; each begins on a line as wide as the
-/// widest vector.
-class LaneMemory {
- public:
-  explicit LaneMemory(std::size_t lanes) : lanes_(lanes) {}
-  /// An array of that many zeros a lane, which lives as long as this.
-  double* zeros(std::size_t count) {
-    constexpr std::size_t kLine = sizeof(Line) / sizeof(double);
-    return arrays_.emplace_back((count * lanes_ + kLine - 1) / kLine).front().numbers;
-  }
-
- private:
-  struct alignas(64) Line {
-    double numbers[8];
-  };
-  std::size_t lanes_;
-  std::vector<std::vector<Line>> arrays_;
-};
-
-/// Tables of chains side by side as a kernel behind a pointer to a function takes them: the same as
-/// ChainTables, each constant one number a lane. Aligned for the widest vectors.
+/// ChainTables of chains side by side, each constant one number a lane, without the type of packs:
+/// kernels are called through pointers to functions.
 struct LaneTables {
-  static constexpr std::size_t kArrays = 6;
-
   std::size_t rows;
   std::size_t tip_row;
   std::size_t links;
   std::size_t elements_per_link;
-  std::array<double*, kArrays> constants;  ///< in the order of ChainTables
+  std::array<double*, 6> constants;  ///< in the order of ChainTables
 
   /// As packs of as many lanes as there are chains.
   template <class Pack>
@@ -57,23 +36,47 @@ struct LaneTables {
   }
 };
 
-/// Arrays of one PEFRL step of all lanes, element [i * lanes + lane]; aligned for the widest
-/// vectors.
-struct LaneArrays {
-  double* q;
-  double* v;
-  double* q_next;
-  double* v_next;
-  double* scratch;
-  double* h_s;  ///< one a lane
-  double* inverse_h_Hz;
-  double* force;      ///< fn0, ft0, k_nn, k_tn, k_tt, x0, y0: one a lane each
-  double* integrals;  ///< impulse_n, impulse_t, work_t: one a lane each
-  double* momenta;    ///< scratch for 4 entries a link
-  double* reactions;  ///< squared means of the reactions: for each link one a lane
+/// Owns arrays with one number a lane in each entry: entry i of a lane is element
+/// [i * lanes + lane]. Arrays are aligned for the widest vectors.
+class LaneMemory {
+ public:
+  explicit LaneMemory(std::size_t lanes) : lanes_(lanes) {}
+
+  std::size_t lanes() const { return lanes_; }
+  /// An array of zeros, which lives as long as this.
+  double* zeros(std::size_t entries);
+
+  /// Writes the first entries of one lane.
+  void write(double* array, std::size_t lane, std::span<const double> values) const;
+  /// Reads the first entries of one lane.
+  void read(const double* array, std::size_t lane, std::span<double> values) const;
+  /// Tables of chains of the shape of `chain`, which is in every lane until another is written.
+  LaneTables tables(const ChainTables<double>& chain);
+  void write(const LaneTables& tables, std::size_t lane, const ChainTables<double>& chain) const;
+  /// Copies the first entries of one lane.
+  void copy(const double* from, double* to, std::size_t lane, std::size_t entries) const;
+
+ private:
+  struct alignas(64) Line {
+    double numbers[8];
+  };
+  std::size_t lanes_;
+  std::vector<std::vector<Line>> arrays_;
 };
 
-/// Arrays of one collocation step of all lanes, likewise. A vector has 2 rows entries.
+/// Arrays of a LaneMemory for one PEFRL step. A vector has 2 rows entries.
+struct PefrlArrays {
+  double* state;  ///< q and v: a vector each
+  double* next;   ///< the same at the end of the step
+  double* scratch;
+  double* h_s;
+  double* force;      ///< fn0, ft0, k_nn, k_tn, k_tt, x0, y0
+  double* integrals;  ///< impulse_n, impulse_t, work_t
+  double* momenta;    ///< scratch for 4 entries a link
+  double* reactions;  ///< squared mean of each link's reaction
+};
+
+/// Arrays of a LaneMemory for one collocation step.
 struct CollocationArrays {
   LaneTables chain;
   double* mass_kg;  ///< diagonal of the mass matrix, one a row
@@ -85,9 +88,8 @@ struct CollocationArrays {
   double* stage_a;
   double* work;
   double* tangents;  ///< TangentBlocks of each element
-  double* fronts;    ///< ElementFront of each pair and element
-  double* ends;      ///< EndFront of each pair and link
-  double* squares;   ///< one a lane
+  double* factors;   ///< chain_factors() for each pair
+  double* squares;
 };
 
 /// The steps compiled for one instruction set. A lane gets the same bits whatever the others hold.
@@ -96,8 +98,8 @@ struct LaneKernel {
   std::size_t lanes;
   /// PEFRL, of lanes that share a chain's constants, and of lanes with chains of their own. A lane
   /// gets the same bits from both.
-  void (*step_one_chain)(const ChainTables<double>& chain, const LaneArrays& arrays);
-  void (*step_chains)(const LaneTables& chains, const LaneArrays& arrays);
+  void (*step_one_chain)(const ChainTables<double>& chain, const PefrlArrays& arrays);
+  void (*step_chains)(const LaneTables& chains, const PefrlArrays& arrays);
   /// Collocation: predicts, and factors the matrices of Newton's method.
   void (*prepare)(const GaussCollocation& rule, const CollocationArrays& arrays);
   /// One iteration in the lanes that are active. Leaves in `squares` the sum over stages and rows
@@ -121,23 +123,5 @@ LaneKernel avx512_kernel();  ///< AVX-512 F and DQ
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b);
 /// Whether chains have one shape and equal constants: they move alike.
 bool are_equal(const ChainTables<double>& a, const ChainTables<double>& b);
-
-/// The tables of as many chains of one shape as there are lanes.
-class LaneChains {
- public:
-  /// Every lane has `chain` until it is given another.
-  LaneChains(const ChainTables<double>& chain, std::size_t lanes);
-
-  /// Copies the constants of `chain`, of the shape given at construction, into a lane.
-  void set(std::size_t lane, const ChainTables<double>& chain);
-
-  /// Points into this.
-  const LaneTables& tables() const { return tables_; }
-
- private:
-  std::size_t lanes_;
-  LaneTables tables_;
-  LaneMemory memory_;
-};
 
 }  // namespace oblique::solver

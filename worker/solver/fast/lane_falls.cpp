@@ -1,122 +1,525 @@
 #include "worker/solver/fast/lane_falls.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <exception>
+#include <memory>
 #include <new>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
 #include <utility>
+#include <vector>
 
+#include "worker/solver/fast/collocation_lanes.h"
 #include "worker/solver/fast/lane_stepper.h"
+#include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::solver {
 namespace {
 
-class FallLanes {
- public:
-  FallLanes(std::span<const FallRequest> requests, const LaneKernel& kernel)
-      : requests_(requests),
-        solutions_(requests.size()),
-        stepper_(requests.front().chain->tables(), kernel),
-        lanes_(kernel.lanes),
-        all_(kernel.lanes, 1),
-        column_(requests.front().chain->at_rest()) {}
+constexpr std::size_t kStages = GaussCollocation::kStages;
+/// Numbers in the states that a fall keeps at most: 16 MB. With fewer a state at a drop costs more
+/// than it should beside a contact; more leave room for fewer falls.
+constexpr std::size_t kMostOfStates = (std::size_t{16} << 20) / sizeof(double);
+/// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
+/// length): collocation.md.
+constexpr double kUnresolved = 1.5;
+/// First step, in parts of sqrt(length/g).
+constexpr double kFirstStep = 1.0 / 4000.0;
+/// No step is longer, in the same parts: the chain turns by some 0.1 then.
+constexpr double kLongestStep = 1.0 / 100.0;
+/// Newton's method leaves positions this wrong at most, in parts of the length and of the accuracy.
+constexpr double kPositionError = 1e-8;
+constexpr double kSmallestPositionError = 1e-15;
+/// Steps in a fall beyond which it is given up.
+constexpr std::size_t kMostSteps = 2'000'000;
+/// Halvings in a row after which a fall is given up.
+constexpr int kMostHalvings = 30;
 
-  std::vector<FallSolution> solve() {
-    for (;;) {
-      bool is_any_falling = false;
-      for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-        fill(lane);
-        is_any_falling = is_any_falling || lanes_[lane].fall;
+/// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is a way to
+/// fall, with
+///
+///   lanes()               number of lanes, all idle at first
+///   start(lane, request)  puts a fall into an idle lane
+///   step()                tries a step in all lanes
+///   judge(lane)           after each step: the lane's fall when it is complete, else nullptr
+///   idle(lane)            ends a lane's fall
+///   settle()              accepts the step
+///
+/// What start() and judge() throw becomes the error of that fall, except for std::bad_alloc.
+template <class Lanes>
+std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> requests, Lanes& lanes) {
+  std::vector<FallSolution> solutions(requests.size());
+  std::vector<std::optional<std::size_t>> falling(lanes.lanes());  // numbers of requests
+  // Calls `work`, and frees the lane when its fall is complete or has failed.
+  const auto attempt = [&](std::size_t lane, const auto& work) {
+    FallSolution& solution = solutions[*falling[lane]];
+    try {
+      work(solution);
+    } catch (const std::bad_alloc&) {  // no fault of this fall
+      throw;
+    } catch (const std::exception& error) {
+      solution.error = error.what();
+    }
+    if (solution.fall || !solution.error.empty()) {
+      falling[lane].reset();
+      lanes.idle(lane);
+    }
+  };
+  for (std::size_t next = 0;;) {
+    bool is_any_falling = false;
+    for (std::size_t lane = 0; lane < falling.size(); ++lane) {
+      while (!falling[lane] && next < requests.size()) {
+        falling[lane] = next++;
+        attempt(lane, [&](FallSolution&) { lanes.start(lane, requests[*falling[lane]]); });
       }
-      if (!is_any_falling) {
-        return std::move(solutions_);
+      is_any_falling = is_any_falling || falling[lane];
+    }
+    if (!is_any_falling) {
+      return solutions;
+    }
+    lanes.step();
+    for (std::size_t lane = 0; lane < falling.size(); ++lane) {
+      if (falling[lane]) {
+        attempt(lane, [&](FallSolution& solution) { solution.fall = lanes.judge(lane); });
       }
-      stepper_.step();
-      for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-        end_if_over(lane);
-      }
-      stepper_.settle(all_);
-      for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-        if (lanes_[lane].fall && lanes_[lane].fall->keeps_last()) {
-          lanes_[lane].fall->keep(stored(lane));
-        }
+    }
+    lanes.settle();
+  }
+}
+
+/// Falls by explicit steps, one a lane.
+class SteppedLanes {
+ public:
+  SteppedLanes(const Chain& shape, const LaneKernel& kernel)
+      : stepper_(shape.tables(), kernel),
+        falls_(kernel.lanes),
+        all_(kernel.lanes, 1),
+        column_(shape.at_rest()) {}
+
+  std::size_t lanes() const { return falls_.size(); }
+
+  void start(std::size_t lane, const FallRequest& request) {
+    falls_[lane] = std::make_shared<SteppedFall>(request.motion, request.dt_s,
+                                                 longest_fall_s(*request.chain), request.progress);
+    const ChainState rest = request.chain->at_rest();
+    stepper_.load(lane, request.chain->tables(), rest.q.data(), rest.v.data());
+    stepper_.set_step(lane, request.dt_s);
+    stepper_.set_force(lane, {});
+  }
+  void step() { stepper_.step(); }
+
+  std::shared_ptr<const Fall> judge(std::size_t lane) {
+    if (!falls_[lane]->is_over_after_next(stepper_.trial_tip(lane))) {
+      return nullptr;
+    }
+    falls_[lane]->end(stored(lane));
+    return falls_[lane];
+  }
+  void idle(std::size_t lane) {
+    falls_[lane].reset();
+    stepper_.idle(lane);
+  }
+  void settle() {
+    stepper_.settle(all_);
+    for (std::size_t lane = 0; lane < lanes(); ++lane) {
+      if (falls_[lane] && falls_[lane]->keeps_last()) {
+        falls_[lane]->keep(stored(lane));
       }
     }
   }
 
  private:
-  struct Lane {
-    std::size_t number = 0;             ///< of the fall
-    std::shared_ptr<SteppedFall> fall;  ///< none: the lane idles
-  };
-
-  /// Starts the next fall that can begin in an idle lane, if there is one.
-  void fill(std::size_t lane) {
-    while (!lanes_[lane].fall && next_ < requests_.size()) {
-      const std::size_t number = next_++;
-      const FallRequest& request = requests_[number];
-      unless_it_fails(number, [&] {
-        lanes_[lane] = {number, std::make_shared<SteppedFall>(request.motion, request.dt_s,
-                                                              longest_fall_s(*request.chain),
-                                                              request.progress)};
-        const ChainState rest = request.chain->at_rest();
-        stepper_.load(lane, request.chain->tables(), rest.q.data(), rest.v.data());
-        stepper_.set_step(lane, request.dt_s);
-        stepper_.set_force(lane, {});
-      });
-    }
-  }
-
-  /// At the end of a step, while the state before it can still be had.
-  void end_if_over(std::size_t lane) {
-    Lane& slot = lanes_[lane];
-    if (!slot.fall) {
-      return;
-    }
-    const auto tip_row = static_cast<std::size_t>(requests_[slot.number].chain->tip_row());
-    const bool goes_on = unless_it_fails(slot.number, [&] {
-      if (slot.fall->is_over_after_next(stepper_.trial_tip(lane, tip_row))) {
-        slot.fall->end(stored(lane));
-        solutions_[slot.number].fall = slot.fall;
-      }
-    });
-    if (!goes_on || solutions_[slot.number].fall) {
-      slot.fall.reset();
-      stepper_.idle(lane);
-    }
-  }
-
-  /// Calls `work` for a fall, whose error becomes its solution. False when it fails.
-  template <class Work>
-  bool unless_it_fails(std::size_t number, const Work& work) {
-    try {
-      work();
-      return true;
-    } catch (const std::bad_alloc&) {  // says nothing of this fall
-      throw;
-    } catch (const std::exception& error) {
-      solutions_[number].error = error.what();
-      return false;
-    }
-  }
-
   const ChainState& stored(std::size_t lane) {
     stepper_.store(lane, column_.q.data(), column_.v.data());
     return column_;
   }
 
-  std::span<const FallRequest> requests_;
-  std::vector<FallSolution> solutions_;
   LaneStepper stepper_;
-  std::vector<Lane> lanes_;
+  std::vector<std::shared_ptr<SteppedFall>> falls_;
   std::vector<unsigned char> all_;  ///< every lane takes each step
   ChainState column_;
-  std::size_t next_ = 0;
+};
+
+/// Weights of the stages' accelerations a in the position q + (c h v + h^2 sum by_q a) and the rate
+/// v + h sum by_v a at the fraction c of a step.
+struct DenseWeights {
+  explicit DenseWeights(double fraction) : c(fraction) {
+    const GaussCollocation& rule = gauss_collocation();
+    rule.integrals(c, by_v);
+    for (std::size_t k = 0; k < kStages; ++k) {
+      by_q[k] = 0.0;
+      for (std::size_t j = 0; j < kStages; ++j) {
+        by_q[k] += by_v[j] * rule.integral[j][k];
+      }
+    }
+  }
+  double c;
+  double by_v[kStages];
+  double by_q[kStages];
+};
+
+/// One coordinate over a step: the polynomial through the stages.
+struct CoordinateOverStep {
+  double h_s;
+  CollocationLanes::Coordinate at;
+
+  double position(const DenseWeights& weights) const {
+    return at.q + (weights.c * h_s * at.v + h_s * h_s * weighted(weights.by_q));
+  }
+  double rate(const double* by_v) const { return at.v + h_s * weighted(by_v); }
+
+ private:
+  double weighted(const double* weights) const {
+    return std::inner_product(at.a.begin(), at.a.end(), weights, 0.0);
+  }
+};
+
+/// Fraction of the step at which the height y first stops falling; above 1 when it falls on. Looks
+/// at the stages and at the end.
+double turn_of(const CoordinateOverStep& y) {
+  const GaussCollocation& rule = gauss_collocation();
+  double low = 0.0;
+  for (std::size_t place = 0; place <= kStages; ++place) {
+    const bool is_stage = place < kStages;
+    double high = is_stage ? rule.node[place] : 1.0;
+    if (y.rate(is_stage ? rule.integral[place] : rule.weight) < 0.0) {
+      low = high;
+      continue;
+    }
+    for (int i = 0; i < 60; ++i) {
+      const double middle = 0.5 * (low + high);
+      (y.rate(DenseWeights(middle).by_v) < 0.0 ? low : high) = middle;
+    }
+    return low;
+  }
+  return 2.0;
+}
+
+/// Fraction of the step, up to `last`, at which the height y is -H_m. Newton's method held by
+/// bisection, which takes over near the largest drop, where the speed vanishes.
+double fraction_at_drop(const CoordinateOverStep& y, double H_m, double last) {
+  double low = 0.0;
+  double high = last;
+  double c = 0.5 * last;
+  for (int i = 0; i < 80 && low < high; ++i) {
+    const DenseWeights weights(c);
+    const double missing_m = H_m + y.position(weights);
+    if (missing_m == 0.0) {
+      break;
+    }
+    const double rate_m_s = y.rate(weights.by_v);
+    (missing_m > 0.0 && rate_m_s < 0.0 ? low : high) = c;
+    const double newton = c - missing_m / (y.h_s * rate_m_s);
+    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
+    if (std::abs(next - c) < 1e-15) {
+      break;
+    }
+    c = next;
+  }
+  return c;
+}
+
+/// A fall solved by Gauss collocation. It keeps every step's length and some of the states, from
+/// which it solves steps again, with the same bits.
+class CollocationFall : public Fall {
+ public:
+  /// `chain` must outlive this. `error_m` is that of the lanes' steps.
+  CollocationFall(const LaneKernel& kernel, const Chain& chain, double error_m)
+      : kernel_(kernel), chain_(chain), error_m_(error_m) {}
+
+  /// Adds the step that a lane has solved and not accepted yet. True when the tip turns within it:
+  /// the fall is then complete.
+  bool append(const CollocationLanes& lanes, std::size_t lane, const CoordinateOverStep& tip_y) {
+    if (steps_.size() % steps_kept_ == 0) {
+      states_.push_back(lanes.state(lane));
+      thin_states();
+    }
+    steps_.push_back({time_s_, -tip_y.at.q, tip_y.h_s});
+    const double turn = turn_of(tip_y);
+    if (turn <= 1.0) {
+      last_turn_ = turn;
+      largest_drop_m_ = -tip_y.position(DenseWeights(turn));
+      return true;
+    }
+    time_s_ += tip_y.h_s;
+    return false;
+  }
+
+  double largest_drop_m() const override { return largest_drop_m_; }
+
+  ChainState state_at_time(double t_s) const override {
+    const std::size_t number = step_from(t_s, &Step::t_s);
+    const Step& step = steps_[number];
+    return within(number, solve_again(number), std::min((t_s - step.t_s) / step.h_s, 1.0));
+  }
+
+  std::size_t bytes() const override {
+    return steps_.size() * sizeof(Step) + sizeof(double) * states_.size() * states_.front().size();
+  }
+
+  /// Of the steps so far.
+  double time_s() const { return time_s_; }
+  std::size_t steps() const { return steps_.size(); }
+  /// Number of the coordinate that is the tip's height.
+  std::size_t tip_y() const { return 2 * static_cast<std::size_t>(chain_.tip_row()) + 1; }
+
+ private:
+  struct Step {
+    double t_s;     ///< at its begin
+    double drop_m;  ///< at its begin
+    double h_s;
+  };
+
+  ChainState state_at_drop(double H_m) const override {
+    const std::size_t number = step_from(H_m, &Step::drop_m);
+    const std::vector<CoordinateOverStep> step = solve_again(number);
+    const double last = number + 1 == steps_.size() ? last_turn_ : 1.0;
+    return within(number, step, fraction_at_drop(step[tip_y()], H_m, last));
+  }
+
+  /// The last step that begins at `value` of that member or before.
+  std::size_t step_from(double value, double Step::*member) const {
+    const auto after = std::ranges::upper_bound(steps_, value, {}, member);
+    return static_cast<std::size_t>(after - steps_.begin() - 1);
+  }
+
+  /// Keeps every second state once they are too many.
+  void thin_states() {
+    if (states_.size() * states_.front().size() <= kMostOfStates) {
+      return;
+    }
+    for (std::size_t i = 1; 2 * i < states_.size(); ++i) {
+      states_[i] = std::move(states_[2 * i]);
+    }
+    states_.resize((states_.size() + 1) / 2);
+    steps_kept_ *= 2;
+  }
+
+  std::vector<CoordinateOverStep> solve_again(std::size_t number) const {
+    CollocationLanes lanes(kernel_, chain_);
+    lanes.set_state(0, states_[number / steps_kept_]);
+    lanes.step(0).error_m = error_m_;
+    for (std::size_t step = number / steps_kept_ * steps_kept_;; ++step) {
+      lanes.step(0).h_s = steps_[step].h_s;
+      lanes.attempt();
+      if (step == number) {
+        break;
+      }
+      lanes.accept();
+    }
+    std::vector<CoordinateOverStep> coordinates;
+    for (std::size_t i = 0; i < lanes.coordinates(); ++i) {
+      coordinates.push_back({steps_[number].h_s, lanes.coordinate(0, i)});
+    }
+    return coordinates;
+  }
+
+  /// The state at the fraction c of a step.
+  ChainState within(std::size_t number, const std::vector<CoordinateOverStep>& step,
+                    double c) const {
+    const DenseWeights weights(c);
+    ChainState state;
+    state.t_s = steps_[number].t_s + c * steps_[number].h_s;
+    state.q.resize(2, chain_.rows());
+    state.v.resize(2, chain_.rows());
+    for (std::size_t i = 0; i < step.size(); ++i) {
+      state.q.data()[i] = step[i].position(weights);
+      state.v.data()[i] = step[i].rate(weights.by_v);
+    }
+    return state;
+  }
+
+  LaneKernel kernel_;
+  const Chain& chain_;
+  double error_m_;
+  double time_s_ = 0.0;
+  double largest_drop_m_ = 0.0;
+  double last_turn_ = 1.0;  ///< where the tip turns, as a fraction of the last step
+  std::vector<Step> steps_;
+  std::size_t steps_kept_ = 2;               ///< steps from one kept state to the next
+  std::vector<std::vector<double>> states_;  ///< position, rates, mean acceleration
+};
+
+/// How long steps are. Changed seldom and by little: while it does not change, the method is
+/// symplectic.
+class StepControl {
+ public:
+  StepControl(double length_m, double gravity_m_s2, double accuracy)
+      : h_s_(kFirstStep * std::sqrt(length_m / gravity_m_s2)),
+        longest_s_(kLongestStep * std::sqrt(length_m / gravity_m_s2)),
+        allowed_m_s_(kUnresolved * accuracy * std::sqrt(length_m * gravity_m_s2)) {}
+
+  double h_s() const { return h_s_; }
+
+  /// True when the step is to be taken; false when it is to be tried again with the new h_s().
+  bool accepts(const CollocationLanes::Step& attempt) {
+    const double error = attempt.unresolved_m_s / allowed_m_s_;
+    if (!attempt.converged || error > kRefused) {
+      ++halvings_;
+      change(0.5);
+      return false;
+    }
+    halvings_ = 0;
+    mean_square_ += kWeight * (error * error - mean_square_);
+    ++steps_;
+    const double mean = std::sqrt(mean_square_);
+    if (attempt.iterations >= kManyIterations) {
+      change(0.8);
+    } else if (steps_ >= kPatience && (mean > 1.0 + kBand || mean < 1.0 - kBand)) {
+      // What is unresolved falls as h^1.4 where it is vibrations of a released chain.
+      change(std::clamp(std::pow(std::max(mean, 1e-6), -0.7), 0.5, 1.5));
+    }
+    return true;
+  }
+  bool is_hopeless() const { return halvings_ > kMostHalvings; }
+
+ private:
+  static constexpr double kRefused = 4.0;
+  static constexpr double kWeight = 0.125;
+  static constexpr double kBand = 0.15;
+  static constexpr int kPatience = 16;
+  static constexpr int kManyIterations = 6;
+
+  void change(double factor) {
+    const double longer_s = std::min(factor * h_s_, longest_s_);
+    if (longer_s != h_s_) {
+      h_s_ = longer_s;
+      steps_ = 0;
+      mean_square_ = 1.0;
+    }
+  }
+
+  double h_s_;
+  double longest_s_;
+  double allowed_m_s_;
+  double mean_square_ = 1.0;
+  int steps_ = 0;
+  int halvings_ = 0;
+};
+
+/// A fall that is being solved in a lane.
+class FallingChain {
+ public:
+  FallingChain(const LaneKernel& kernel, const FallRequest& request)
+      : length_m_(request.chain->length_m()),
+        longest_s_(longest_fall_s(*request.chain)),
+        progress_(request.progress),
+        error_m_(length_m_ * std::max(kSmallestPositionError, kPositionError * request.accuracy)),
+        fall_(std::make_shared<CollocationFall>(kernel, *request.chain, error_m_)),
+        control_(length_m_, request.chain->gravity_m_s2(), request.accuracy) {}
+
+  /// Sets the lane's next step.
+  void set(CollocationLanes::Step& step) const {
+    step.h_s = control_.h_s();
+    step.error_m = error_m_;
+  }
+
+  /// Accepts or refuses the lane's last attempt. The fall once it is complete, else nullptr. Throws
+  /// SolveError when it is given up.
+  std::shared_ptr<const Fall> judge(CollocationLanes& lanes, std::size_t lane) {
+    CollocationLanes::Step& step = lanes.step(lane);
+    step.is_accepted = control_.accepts(step);
+    if (!step.is_accepted) {
+      if (control_.is_hopeless()) {
+        throw SolveError(
+            "the fall could not be solved on from t = " + readable_number(fall_->time_s()) +
+            " s: steps of " + readable_number(step.h_s) + " s still do not converge");
+      }
+      return nullptr;
+    }
+    const CoordinateOverStep tip_y{step.h_s, lanes.coordinate(lane, fall_->tip_y())};
+    if (!(std::abs(tip_y.at.q) <= 2.0 * length_m_)) {
+      throw SolveError("the fall diverged at t = " + readable_number(fall_->time_s()) + " s");
+    }
+    if (fall_->append(lanes, lane, tip_y)) {
+      return fall_;
+    }
+    if (fall_->time_s() > longest_s_) {
+      throw SolveError("the tip did not turn back within " + readable_number(longest_s_) +
+                       " s of falling");
+    }
+    if (fall_->steps() >= kMostSteps) {
+      throw SolveError("the fall would take more than " +
+                       exact_number(static_cast<double>(kMostSteps)) + " steps");
+    }
+    if (progress_ != nullptr) {
+      progress_->store(-tip_y.at.q, std::memory_order_relaxed);
+    }
+    return nullptr;
+  }
+
+ private:
+  double length_m_;
+  double longest_s_;
+  FallProgress* progress_;
+  double error_m_;
+  std::shared_ptr<CollocationFall> fall_;
+  StepControl control_;
+};
+
+/// Falls by collocation, one a lane.
+class CollocationFalls {
+ public:
+  CollocationFalls(const Chain& shape, const LaneKernel& kernel)
+      : kernel_(kernel), lanes_(kernel, shape), falling_(kernel.lanes) {}
+
+  std::size_t lanes() const { return falling_.size(); }
+
+  void start(std::size_t lane, const FallRequest& request) {
+    lanes_.load(lane, *request.chain);
+    falling_[lane].emplace(kernel_, request);
+  }
+  void step() {
+    for (std::size_t lane = 0; lane < lanes(); ++lane) {
+      if (falling_[lane]) {
+        falling_[lane]->set(lanes_.step(lane));
+      }
+    }
+    lanes_.attempt();
+  }
+  std::shared_ptr<const Fall> judge(std::size_t lane) {
+    return falling_[lane]->judge(lanes_, lane);
+  }
+  void idle(std::size_t lane) {
+    falling_[lane].reset();
+    lanes_.step(lane) = {.is_accepted = false};
+  }
+  void settle() { lanes_.accept(); }
+
+ private:
+  LaneKernel kernel_;
+  CollocationLanes lanes_;
+  std::vector<std::optional<FallingChain>> falling_;
 };
 
 }  // namespace
 
 std::vector<FallSolution> solve_by_steps(std::span<const FallRequest> requests,
                                          const LaneKernel& kernel) {
-  return requests.empty() ? std::vector<FallSolution>{} : FallLanes(requests, kernel).solve();
+  if (requests.empty()) {
+    return {};
+  }
+  SteppedLanes lanes(*requests.front().chain, kernel);
+  return solve_side_by_side(requests, lanes);
+}
+
+std::vector<FallSolution> solve_by_collocation(std::span<const FallRequest> requests,
+                                               const LaneKernel& kernel) {
+  if (requests.empty()) {
+    return {};
+  }
+  const Chain& first = *requests.front().chain;
+  for (const FallRequest& request : requests) {
+    if (!have_one_shape(request.chain->tables(), first.tables())) {
+      throw std::invalid_argument("falls side by side are of chains of one shape");
+    }
+  }
+  CollocationFalls lanes(first, kernel);
+  return solve_side_by_side(requests, lanes);
 }
 
 }  // namespace oblique::solver

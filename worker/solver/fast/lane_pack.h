@@ -47,9 +47,8 @@ struct Avx512Vectors {
 };
 #endif
 
-/// `count` hardware vectors used as one: lanes of independent cases. More than one vector hides the
-/// latency of the banded solve, whose rows depend on each other. Arithmetic only; a number beside a
-/// pack goes to all lanes.
+/// `count` hardware vectors used as one number for each lane. More than one vector hides the
+/// latency of the banded solve, whose rows depend on each other.
 template <class Hardware, std::size_t count>
 struct LanePack {
   using Vector = typename Hardware::Vector;
@@ -57,19 +56,18 @@ struct LanePack {
 
   Vector part[count];
 
+  LanePack() = default;
+  /// `value` in all lanes.
+  inline LanePack(double value) : LanePack(each([&](std::size_t) { return value - Vector{}; })) {}
+
   template <class Operation>
-  static inline LanePack each(Operation operation) {
+  static inline LanePack each(const Operation& operation) {
     LanePack result;
     for (std::size_t i = 0; i < count; ++i) {
       result.part[i] = operation(i);
     }
     return result;
   }
-  /// `value` in all lanes.
-  static inline LanePack all(double value) {
-    return each([&](std::size_t) { return value - Vector{}; });
-  }
-  static inline const LanePack& all(const LanePack& value) { return value; }
 
   friend inline LanePack operator+(const LanePack& a, const LanePack& b) {
     return each([&](std::size_t i) { return a.part[i] + b.part[i]; });
@@ -80,14 +78,8 @@ struct LanePack {
   friend inline LanePack operator*(const LanePack& a, const LanePack& b) {
     return each([&](std::size_t i) { return a.part[i] * b.part[i]; });
   }
-  friend inline LanePack operator+(const LanePack& a, double b) { return a + all(b); }
-  friend inline LanePack operator-(const LanePack& a, double b) { return a - all(b); }
-  friend inline LanePack operator*(const LanePack& a, double b) { return a * all(b); }
-  friend inline LanePack operator+(double a, const LanePack& b) { return all(a) + b; }
-  friend inline LanePack operator-(double a, const LanePack& b) { return all(a) - b; }
-  friend inline LanePack operator*(double a, const LanePack& b) { return all(a) * b; }
-  friend inline LanePack operator/(double a, const LanePack& b) {
-    return each([&](std::size_t i) { return a / b.part[i]; });
+  friend inline LanePack operator/(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] / b.part[i]; });
   }
   inline LanePack& operator+=(const LanePack& b) { return *this = *this + b; }
   inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
@@ -97,16 +89,20 @@ struct LanePack {
 template <class C, class A, class Hardware, std::size_t count>
 inline auto plus_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
   using Pack = LanePack<Hardware, count>;
+  const Pack c_pack = c;
+  const Pack a_pack = a;
   return Pack::each([&](std::size_t i) {
-    return Hardware::plus_product(Pack::all(c).part[i], Pack::all(a).part[i], b.part[i]);
+    return Hardware::plus_product(c_pack.part[i], a_pack.part[i], b.part[i]);
   });
 }
 
 template <class C, class A, class Hardware, std::size_t count>
 inline auto less_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
   using Pack = LanePack<Hardware, count>;
+  const Pack c_pack = c;
+  const Pack a_pack = a;
   return Pack::each([&](std::size_t i) {
-    return Hardware::less_product(Pack::all(c).part[i], Pack::all(a).part[i], b.part[i]);
+    return Hardware::less_product(c_pack.part[i], a_pack.part[i], b.part[i]);
   });
 }
 

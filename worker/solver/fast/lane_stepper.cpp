@@ -1,38 +1,34 @@
 #include "worker/solver/fast/lane_stepper.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace oblique::solver {
 
 LaneStepper::LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel)
     : kernel_(kernel),
-      size_(2 * chain.rows),
+      vector_(2 * chain.rows),
+      tip_row_(chain.tip_row),
       chains_(kernel.lanes),
-      is_copied_(kernel.lanes, 0),
-      side_by_side_(chain, kernel.lanes),
-      memory_(kernel.lanes) {
-  for (double** const array :
-       {&arrays_.q, &arrays_.v, &arrays_.q_next, &arrays_.v_next, &arrays_.scratch}) {
-    *array = memory_.zeros(size_);
-  }
-  arrays_.h_s = memory_.zeros(1);
-  arrays_.inverse_h_Hz = memory_.zeros(1);
-  arrays_.force = memory_.zeros(7);
-  arrays_.integrals = memory_.zeros(3);
-  arrays_.momenta = memory_.zeros(4 * chain.links);
-  arrays_.reactions = memory_.zeros(chain.links);
-}
+      memory_(kernel.lanes),
+      side_by_side_(memory_.tables(chain)),
+      arrays_{.state = memory_.zeros(2 * vector_),
+              .next = memory_.zeros(2 * vector_),
+              .scratch = memory_.zeros(vector_),
+              .h_s = memory_.zeros(1),
+              .force = memory_.zeros(7),
+              .integrals = memory_.zeros(3),
+              .momenta = memory_.zeros(4 * chain.links),
+              .reactions = memory_.zeros(chain.links)} {}
 
 void LaneStepper::load(std::size_t lane, const ChainTables<double>& chain, const double* q,
                        const double* v) {
   chains_[lane] = chain;
-  is_copied_[lane] = 0;
+  memory_.write(side_by_side_, lane, chain);
   compare_chains();
-  for (std::size_t i = 0; i < size_; ++i) {
-    arrays_.q[i * lanes() + lane] = q[i];
-    arrays_.v[i * lanes() + lane] = v[i];
-  }
+  memory_.write(arrays_.state, lane, {q, vector_});
+  memory_.write(arrays_.state + vector_ * lanes(), lane, {v, vector_});
 }
 
 void LaneStepper::idle(std::size_t lane) {
@@ -56,57 +52,40 @@ void LaneStepper::compare_chains() {
 }
 
 void LaneStepper::store(std::size_t lane, double* q, double* v) const {
-  for (std::size_t i = 0; i < size_; ++i) {
-    q[i] = arrays_.q[i * lanes() + lane];
-    v[i] = arrays_.v[i * lanes() + lane];
-  }
+  memory_.read(arrays_.state, lane, {q, vector_});
+  memory_.read(arrays_.state + vector_ * lanes(), lane, {v, vector_});
 }
 
 void LaneStepper::set_force(std::size_t lane, const AffineContactForce<double>& force) {
-  double* entry = arrays_.force + lane;
-  for (const double value :
-       {force.fn0, force.ft0, force.k_nn, force.k_tn, force.k_tt, force.x0, force.y0}) {
-    *entry = value;
-    entry += lanes();
-  }
+  memory_.write(
+      arrays_.force, lane,
+      std::array{force.fn0, force.ft0, force.k_nn, force.k_tn, force.k_tt, force.x0, force.y0});
 }
 
 void LaneStepper::step() {
   if (one_chain_ != nullptr) {
     kernel_.step_one_chain(*one_chain_, arrays_);
-    return;
+  } else {
+    kernel_.step_chains(side_by_side_, arrays_);
   }
-  for (std::size_t lane = 0; lane < lanes(); ++lane) {
-    if (chains_[lane] && is_copied_[lane] == 0) {
-      side_by_side_.set(lane, *chains_[lane]);
-      is_copied_[lane] = 1;
-    }
-  }
-  kernel_.step_chains(side_by_side_.tables(), arrays_);
 }
 
 ContactIntegrals<double> LaneStepper::integrals(std::size_t lane) const {
-  return {arrays_.integrals[lane], arrays_.integrals[lanes() + lane],
-          arrays_.integrals[2 * lanes() + lane]};
+  std::array<double, 3> values;
+  memory_.read(arrays_.integrals, lane, values);
+  return {values[0], values[1], values[2]};
 }
 
 void LaneStepper::settle(std::span<const unsigned char> accept) {
-  const auto accepted = static_cast<std::size_t>(
-      std::count_if(accept.begin(), accept.end(), [](auto a) { return a != 0; }));
-  if (accepted == 0) {
+  if (std::ranges::count(accept, 0) == std::ssize(accept)) {
     return;
   }
-  for (std::size_t lane = 0; lane < lanes() && accepted < lanes(); ++lane) {
-    if (accept[lane] != 0) {
-      continue;
-    }
-    for (std::size_t i = lane; i < size_ * lanes(); i += lanes()) {
-      arrays_.q_next[i] = arrays_.q[i];
-      arrays_.v_next[i] = arrays_.v[i];
+  for (std::size_t lane = 0; lane < lanes(); ++lane) {
+    if (accept[lane] == 0) {
+      memory_.copy(arrays_.state, arrays_.next, lane, 2 * vector_);
     }
   }
-  std::swap(arrays_.q, arrays_.q_next);
-  std::swap(arrays_.v, arrays_.v_next);
+  std::swap(arrays_.state, arrays_.next);
 }
 
 }  // namespace oblique::solver

@@ -10,39 +10,37 @@
 
 namespace oblique::solver {
 
-/// States of as many cases as the kernel has lanes, side by side (structure of arrays, lane =
-/// case), with a chain, a step length and a force law each. Every lane is accepted or refused on
-/// its own. While the chains of all lanes are equal, their constants are read once for all.
+/// States of as many cases as the kernel has lanes, with a chain, a step length and a force law
+/// each, stepped by PEFRL. Every lane is accepted or refused on its own. While the chains of all
+/// lanes are equal, their constants are read once for all.
 class LaneStepper {
  public:
-  /// For chains of the shape of `chain`, which need not outlive this. All lanes stand idle.
+  /// For chains of the shape of `chain`, which need not outlive this. All lanes are idle.
   LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel);
+  LaneStepper(const LaneStepper&) = delete;
+  LaneStepper& operator=(const LaneStepper&) = delete;
+  ~LaneStepper() = default;
 
-  std::size_t lanes() const { return kernel_.lanes; }
+  std::size_t lanes() const { return memory_.lanes(); }
 
   /// Puts a state (2 rows entries each) of `chain` into a lane. What `chain` points to must live
   /// until the lane is loaded again or idle.
   void load(std::size_t lane, const ChainTables<double>& chain, const double* q, const double* v);
   /// Makes a lane stand still.
   void idle(std::size_t lane);
-  /// Takes the accepted state of a lane out.
+  /// Copies the accepted state of a lane to q and v.
   void store(std::size_t lane, double* q, double* v) const;
 
-  void set_step(std::size_t lane, double h_s) {
-    if (h_s != arrays_.h_s[lane]) {
-      arrays_.h_s[lane] = h_s;
-      arrays_.inverse_h_Hz[lane] = h_s > 0.0 ? 1.0 / h_s : 0.0;
-    }
-  }
+  void set_step(std::size_t lane, double h_s) { arrays_.h_s[lane] = h_s; }
   void set_force(std::size_t lane, const AffineContactForce<double>& force);
 
   /// Steps every lane from its accepted state to a trial state.
   void step();
   /// The tip after that step.
-  TipState trial_tip(std::size_t lane, std::size_t tip_row) const {
-    const std::size_t x = 2 * tip_row * lanes() + lane;
-    const std::size_t y = x + lanes();
-    return {arrays_.q_next[x], arrays_.q_next[y], arrays_.v_next[x], arrays_.v_next[y]};
+  TipState trial_tip(std::size_t lane) const {
+    const double* x = arrays_.next + 2 * tip_row_ * lanes() + lane;
+    const double* vx = x + vector_ * lanes();
+    return {x[0], x[lanes()], vx[0], vx[lanes()]};
   }
   ContactIntegrals<double> integrals(std::size_t lane) const;
   /// Squared magnitudes of the mean reactions on the links' inner ends over the last step [N^2],
@@ -55,13 +53,13 @@ class LaneStepper {
   void compare_chains();
 
   LaneKernel kernel_;
-  std::size_t size_;                                        ///< entries of one state
+  std::size_t vector_;  ///< entries of q, and of v
+  std::size_t tip_row_;
   std::vector<std::optional<ChainTables<double>>> chains_;  ///< none: the lane is idle
   const ChainTables<double>* one_chain_ = nullptr;  ///< of all lanes that are not idle, if one
-  std::vector<unsigned char> is_copied_;            ///< whether side_by_side_ has the lane's chain
-  LaneChains side_by_side_;                         ///< all chains, for when they differ
   LaneMemory memory_;
-  LaneArrays arrays_{};
+  LaneTables side_by_side_;  ///< all chains, for when they differ
+  PefrlArrays arrays_;
 };
 
 }  // namespace oblique::solver

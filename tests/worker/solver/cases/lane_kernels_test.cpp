@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "worker/solver/fast/lane_batch.h"
-#include "worker/solver/fast/lane_stepper.h"
+#include "worker/solver/fast/lane_contacts.h"
 #include "worker/solver/reference/chain.h"
 #include "worker/solver/reference/fall.h"
 #include "worker/solver/step_choice.h"
@@ -43,26 +42,27 @@ std::vector<CaseResult> solve_by(const LaneKernel& kernel) {
   std::vector<CaseResult> results(all.size());
   ChainState touch;
   std::size_t next = 0;
-  LaneBatch(chain, kernel)
-      .solve(
-          [&]() -> std::optional<ContactCase> {
-            if (next == all.size()) {
-              return std::nullopt;
-            }
-            const Case& c = all[next];
-            touch = fall->state_at(c.H_m);
-            const std::size_t number = next++;
-            return ContactCase{number,
-                               number / 3,
-                               &chain,
-                               {model.k_N_m, model.eta2, c.mu, c.e_star},
-                               steps.contact(c.e_star),
-                               &touch};
-          },
-          [&](ContactOutcome&& outcome) {
-            ASSERT_TRUE(outcome.result) << outcome.error;
-            results.at(outcome.tag) = std::move(*outcome.result);
-          });
+  solve_contacts(
+      chain,
+      [&]() -> std::optional<ContactCase> {
+        if (next == all.size()) {
+          return std::nullopt;
+        }
+        const Case& c = all[next];
+        touch = fall->state_at(c.H_m);
+        const std::size_t number = next++;
+        return ContactCase{number,
+                           number / 3,
+                           &chain,
+                           {model.k_N_m, model.eta2, c.mu, c.e_star},
+                           steps.contact(c.e_star),
+                           &touch};
+      },
+      [&](ContactOutcome&& outcome) {
+        ASSERT_TRUE(outcome.result) << outcome.error;
+        results.at(outcome.tag) = std::move(*outcome.result);
+      },
+      {}, kernel);
   return results;
 }
 

@@ -89,10 +89,9 @@ TEST(FrontKernel, SolvesWhatTheDenseMatrixSolves) {
   tables.elements_per_link = DenseChain::kElements;
   tables.link = links.data();
   tables.tip_mass_kg = &DenseChain::kTip_kg;
-  std::vector<ElementFront<double>> fronts(4);
-  std::vector<EndFront<double>> ends(DenseChain::kLinks);
-  factor_fronts(tables, chain.blocks.data(), LaneComplex<double>{z.real(), z.imag()}, fronts.data(),
-                ends.data());
+  tables.rows = static_cast<std::size_t>(DenseChain::kRows);
+  std::vector<Complex<double>> factors(chain_factors(DenseChain::kLinks, DenseChain::kElements));
+  factor_fronts(tables, chain.blocks.data(), {z.real(), z.imag()}, factors.data());
   constexpr auto kSize = static_cast<std::size_t>(2 * DenseChain::kRows);
   Eigen::VectorXcd right = Eigen::VectorXcd::Zero(2 * DenseChain::kRows);
   std::vector<double> x(2 * kSize, 0.0);
@@ -101,8 +100,7 @@ TEST(FrontKernel, SolvesWhatTheDenseMatrixSolves) {
     x[kSize + i] = std::cos(3.0 * static_cast<double>(i));
     right[static_cast<Eigen::Index>(i)] = {x[i], x[kSize + i]};
   }
-  solve_fronts<1>(DenseChain::kLinks, DenseChain::kElements, fronts.data(), ends.data(), kSize,
-                  x.data());
+  solve_fronts<1>(tables, factors.data(), x.data());
   const Eigen::VectorXcd exact = chain.matrix(z).partialPivLu().solve(right);
   for (std::size_t i = 0; i < kSize; ++i) {
     const std::complex<double> value = exact[static_cast<Eigen::Index>(i)];
@@ -137,13 +135,10 @@ TEST(GaussCollocation, DiagonalisesTheSquareOfItsMatrix) {
     for (std::size_t j = 0; j < GaussCollocation::kStages; ++j) {
       double unit = 0.0;
       double square = 0.0;
-      for (std::size_t k = 0; k < GaussCollocation::kPairs; ++k) {
-        unit += rule.back_re[i][k] * rule.into_re[k][j] + rule.back_im[i][k] * rule.into_im[k][j];
-        square +=
-            rule.shift_re[i][k] * rule.into_re[k][j] + rule.shift_im[i][k] * rule.into_im[k][j];
-      }
       double exact = 0.0;
       for (std::size_t k = 0; k < GaussCollocation::kStages; ++k) {
+        unit += rule.back[i][k] * rule.into[k][j];
+        square += rule.shift[i][k] * rule.into[k][j];
         exact += rule.integral[i][k] * rule.integral[k][j];
       }
       EXPECT_NEAR(unit, i == j ? 1.0 : 0.0, 1e-11);
@@ -168,7 +163,7 @@ TEST(CollocationLanes, StepsOfHalfTheLengthErrAThousandTimesLess) {
       EXPECT_TRUE(lanes.step(lane).converged);
       lanes.accept();
     }
-    const std::vector<double> numbers = lanes.state_and_stages(lane);
+    const std::vector<double> numbers = lanes.state(lane);
     return Eigen::Map<const Eigen::VectorXd>(numbers.data(), 2 * chain.rows());
   };
   const Eigen::VectorXd exact = state_after(28);

@@ -1,4 +1,4 @@
-#include "worker/solver/fast/lane_batch.h"
+#include "worker/solver/fast/lane_contacts.h"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@
 namespace oblique::solver {
 namespace {
 
-/// A coarse model with its fall, as LaneBatch needs them.
+/// A coarse model with its fall, as solve_contacts() needs them.
 struct Coarse {
   ModelParameters model = coarse_model();
   Chain chain{model};
@@ -41,10 +41,10 @@ const Coarse& coarse() {
 std::map<std::uint64_t, ContactOutcome> solved(
     const std::vector<ContactCase>& cases,
     const LaneKernel& kernel = runnable_lane_kernels().front()) {
-  LaneBatch batch(coarse().chain, kernel);
   std::map<std::uint64_t, ContactOutcome> outcomes;
   std::size_t next = 0;
-  batch.solve(
+  solve_contacts(
+      coarse().chain,
       [&]() -> std::optional<ContactCase> {
         return next < cases.size() ? std::optional(cases[next++]) : std::nullopt;
       },
@@ -52,7 +52,8 @@ std::map<std::uint64_t, ContactOutcome> solved(
         const std::uint64_t tag = outcome.tag;
         const bool is_new = outcomes.emplace(tag, std::move(outcome)).second;
         EXPECT_TRUE(is_new) << "case " << tag << " came twice";
-      });
+      },
+      {}, kernel);
   return outcomes;
 }
 
@@ -76,7 +77,7 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   return all;
 }
 
-TEST(LaneBatch, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
+TEST(LaneContacts, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
   std::vector<ChainState> touches;
   for (const auto& model : unlike_models()) {
     touches.push_back(model->fall->state_at(0.9));
@@ -103,7 +104,7 @@ TEST(LaneBatch, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
   }
 }
 
-TEST(LaneBatch, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAreLeftAlone) {
+TEST(LaneContacts, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAreLeftAlone) {
   const Coarse& other = *unlike_models()[2];
   const ChainState sound = other.fall->state_at(0.9);
   ChainState broken = coarse().fall->state_at(0.9);
@@ -130,12 +131,12 @@ TEST(LaneBatch, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAreLef
   }
 }
 
-TEST(LaneBatch, AChainMayGoOnceItsCaseIsDone) {
+TEST(LaneContacts, AChainMayGoOnceItsCaseIsDone) {
   std::vector<std::unique_ptr<Chain>> chains;
   const ChainState touch = coarse().fall->state_at(0.5);
-  LaneBatch batch(coarse().chain, runnable_lane_kernels().front());
   std::size_t done = 0;
-  batch.solve(
+  solve_contacts(
+      coarse().chain,
       [&]() -> std::optional<ContactCase> {
         if (chains.size() == 40) {
           return std::nullopt;
@@ -155,7 +156,7 @@ TEST(LaneBatch, AChainMayGoOnceItsCaseIsDone) {
   EXPECT_EQ(done, chains.size());
 }
 
-TEST(LaneBatch, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
+TEST(LaneContacts, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
   const ExplicitMotion motion(coarse().chain);
   std::vector<ChainState> touches;
   for (const double H_m : {0.01, 0.5, 0.9, 1.04}) {
