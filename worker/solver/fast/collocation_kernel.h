@@ -82,7 +82,7 @@ class CollocationStep {
 };
 
 template <class Pack>
-void CollocationStep<Pack>::prepare() const {
+[[gnu::flatten]] void CollocationStep<Pack>::prepare() const {
   const Pack squared_h = h_s_ * h_s_;
   const Pack* q = packs(arrays_.state);
   const Pack* v = q + size_;
@@ -157,7 +157,7 @@ void CollocationStep<Pack>::put_residual(const Pack* q, const Pack* a, Pack* res
 }
 
 template <class Pack>
-void CollocationStep<Pack>::iterate() const {
+[[gnu::flatten]] void CollocationStep<Pack>::iterate() const {
   Pack* const work = packs(arrays_.work);
   for (std::size_t stage = 0; stage < kStages; ++stage) {
     const std::size_t first = stage * size_;
@@ -191,7 +191,7 @@ void CollocationStep<Pack>::iterate() const {
 }
 
 template <class Pack>
-void CollocationStep<Pack>::finish() const {
+[[gnu::flatten]] void CollocationStep<Pack>::finish() const {
   const Pack* state = packs(arrays_.state);
   Pack* next = packs(arrays_.next);
   Pack squares{};
