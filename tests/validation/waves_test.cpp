@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_waves.h"
 #include "tests/worker/solver/reference/chain_probe.h"
@@ -94,7 +95,7 @@ BeamErrors beam_errors(int elements) {
   const ChainState start = turning(chain, kLength_m);
   return {force_error(solver::ExplicitMotion(chain), spring, start, 0.1e-6, kWindow_s,
                       beam.peak_N(), right),
-          force_error(constrained, spring, constrained.chain().from_eliminated(start), 0.1e-6,
+          force_error(constrained, spring, from_eliminated(constrained.chain(), start), 0.1e-6,
                       kWindow_s, beam.peak_N(), right)};
 }
 
