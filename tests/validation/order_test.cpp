@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/validation/both_ways.h"
 #include "tests/validation/validation_table.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/reference/contact.h"
 
 namespace oblique::validation {

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/validation/validation_table.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 #include "worker/solver/reference/pefrl.h"

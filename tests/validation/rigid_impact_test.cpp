@@ -8,9 +8,9 @@
 #include <cstddef>
 #include <string>
 
-#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_rigid_impact.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/worker/solver/reference/rigid_tip_motion.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/solve_contact.h"

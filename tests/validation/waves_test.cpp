@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
-#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_waves.h"
 #include "tests/worker/solver/reference/chain_probe.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 #include "worker/solver/reference/pefrl.h"
