@@ -21,7 +21,6 @@ Eigen::Matrix2d contact_stiffness(const AffineContactForce<double>& force) {
   return Eigen::Matrix2d{{force.k_tt, force.k_tn}, {0.0, force.k_nn}};
 }
 
-/// Solves for all unknowns in place.
 void solve(const ConstrainedChain::Matrix& factored, Coordinates& unknowns) {
   factored.solve(std::span(unknowns.data(), static_cast<std::size_t>(unknowns.size())));
 }
