@@ -28,7 +28,7 @@
 #include "proto/system/available_memory.h"
 #include "worker/session.h"
 #include "worker/solver/fall_cache.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/point_runs.h"
 #include "worker/solver/solve.h"
 #include "worker/trace_solver.h"

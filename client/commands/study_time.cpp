@@ -19,7 +19,7 @@
 #include "worker/solver/estimate.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/kernels.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {

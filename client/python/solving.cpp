@@ -25,7 +25,6 @@
 #include "proto/recipe/point_table.h"
 #include "proto/system/available_memory.h"
 #include "worker/solver/library/solver.h"
-#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/model/trace_columns.h"

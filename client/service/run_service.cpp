@@ -28,8 +28,7 @@
 #include "proto/system/available_memory.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/fall_model.h"
-#include "worker/solver/model/version.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {

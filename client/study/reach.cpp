@@ -10,8 +10,8 @@
 
 #include "proto/recipe/blocks.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 

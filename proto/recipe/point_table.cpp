@@ -20,8 +20,8 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/sampling.h"
 #include "proto/text.h"
-#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::protocol {
 namespace {

@@ -31,7 +31,7 @@
 #include "server/event_loop/event_loop.h"
 #include "server/query/query_pool.h"
 #include "server/web/web.h"
-#include "worker/solver/model/version.h"
+#include "worker/solver/model/parameters.h"
 
 namespace {
 

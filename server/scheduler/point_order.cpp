@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "proto/recipe/blocks.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
 namespace {

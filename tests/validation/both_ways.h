@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/reference/chain.h"
 #include "worker/solver/reference/contact_law.h"
@@ -48,7 +49,7 @@ class BothWays {
   /// The state at touch in the coordinates of each integrator.
   solver::ChainState explicit_touch(double H_m) const { return fall_->state_at(H_m); }
   solver::ChainState generalized_alpha_touch(double H_m) const {
-    return generalized_alpha_.chain().from_eliminated(fall_->state_at(H_m));
+    return from_eliminated(generalized_alpha_.chain(), fall_->state_at(H_m));
   }
   solver::ContactParameters contact(const Point& point) const {
     return {model_.k_N_m, model_.eta2, point.mu, point.e_star};

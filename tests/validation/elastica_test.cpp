@@ -87,8 +87,7 @@ void ClampedBeam::equilibrate(const TipLoad& load) {
 }
 
 double ClampedBeam::newton_step(const TipLoad& load) {
-  solver::BandedLu<kBandwidth> matrix;
-  matrix.set_zero(q_.size() - kClamped);
+  solver::BandedLu<kBandwidth> matrix(q_.size() - kClamped);
   std::vector<double> residual(q_.size() - kClamped, 0.0);
   const auto constants =
       solver::element_constants(element_length_m_, properties_.EA_N, properties_.EI_N_m2, 0.0);

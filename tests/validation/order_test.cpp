@@ -10,6 +10,7 @@
 
 #include "tests/validation/both_ways.h"
 #include "tests/validation/validation_table.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/reference/contact.h"
 
 namespace oblique::validation {
@@ -102,7 +103,7 @@ Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlp
   ChainState state;
   state.q = in_columns(outcome.position);
   state.v = in_columns(outcome.velocity);
-  state = motion.chain().from_eliminated(state);
+  state = from_eliminated(motion.chain(), state);
   outcome.position = in_turn(state.q);
   outcome.velocity = in_turn(state.v);
   return outcome;

@@ -10,6 +10,7 @@
 
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_rigid_impact.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "tests/worker/solver/reference/rigid_tip_motion.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/solve_contact.h"
@@ -213,7 +214,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidOnesByGeneralizedAlpha) {
   const solver::GeneralizedAlphaMotion motion(links.model);
   for (const ChainRegime& regime : kChainRegimes) {
     const auto p = links.impact(regime.mu, {-1e-4 * regime.vt_over_vn, -1e-4});
-    const auto touch = motion.chain().from_eliminated(links.state(chain, p.V0_m_s));
+    const auto touch = from_eliminated(motion.chain(), links.state(chain, p.V0_m_s));
     expect_at_most(
         {std::string("two stiff links, generalized-alpha, E * 1e6 (") + regime.mode + ")",
          kReference, stiff_chain_error(motion, p, touch, 1e-6, regime.mode), 1e-5,

@@ -10,6 +10,7 @@
 #include "tests/validation/validation_table.h"
 #include "tests/worker/solver/analytic/analytic_waves.h"
 #include "tests/worker/solver/reference/chain_probe.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 #include "worker/solver/reference/pefrl.h"
@@ -94,7 +95,7 @@ BeamErrors beam_errors(int elements) {
   const ChainState start = turning(chain, kLength_m);
   return {force_error(solver::ExplicitMotion(chain), spring, start, 0.1e-6, kWindow_s,
                       beam.peak_N(), right),
-          force_error(constrained, spring, constrained.chain().from_eliminated(start), 0.1e-6,
+          force_error(constrained, spring, from_eliminated(constrained.chain(), start), 0.1e-6,
                       kWindow_s, beam.peak_N(), right)};
 }
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "worker/solver/fall_cache.h"
-#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/chain.h"
 #include "worker/solver/reference/fall.h"

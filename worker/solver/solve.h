@@ -13,7 +13,6 @@
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/trace.h"
-#include "worker/solver/model/version.h"
 
 namespace oblique::solver {
 

@@ -19,7 +19,7 @@
 
 #include "worker/solver/estimate.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/point_runs.h"
 

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/solve.h"
 

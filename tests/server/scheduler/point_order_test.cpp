@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/recipes.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
 namespace {

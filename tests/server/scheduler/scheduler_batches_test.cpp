@@ -11,7 +11,7 @@
 
 #include "tests/server/scheduler/scheduler_bench.h"
 #include "tests/support/recipes.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
 namespace {

@@ -42,14 +42,13 @@ struct StickInterval {
   double t1_s;
 };
 
-/// Largest reaction at the pin or a joint during a contact: the force on the outer link. Between
-/// steps it is a parabola's.
+/// Largest reaction at the pin or a joint during a contact: the force on the outer link.
 struct ReactionPeak {
   double t_s;
   double force_N;  ///< magnitude
 };
 
-/// Energy balance of one contact. Signs: what is lost is positive.
+/// Energy balance of one contact. Losses are positive.
 struct ContactEnergy {
   double kinetic_in_J;   ///< kinetic energy of the whole finger at touch
   double friction_J;     ///< dissipated by friction at P
@@ -58,14 +57,14 @@ struct ContactEnergy {
   double strain_change_J;
   double gravity_change_J;
   double exchanged_J;  ///< integral of |F_n V_n| + |F_t V_t|
-  double closure;      ///< what does not add up, relative to exchanged_J; never negative
+  double closure;      ///< error of the balance, relative to exchanged_J; never negative
 };
 
-/// Estimated errors of outputs, dimensionless and never negative: relative to the output's own
-/// scale (worker/solver/estimate.h). Absent when no errors were asked for, or the coarser solution
-/// of the point has no answer.
+/// Estimated errors of outputs, relative to the output's own scale (worker/solver/estimate.h);
+/// never negative. Absent when not requested, or when the coarser solution of the point has no
+/// answer.
 struct ErrorEstimate {
-  std::optional<std::int64_t> mode_same;  ///< 1: both solutions have one major mode, else 0
+  std::optional<std::int64_t> mode_same;  ///< 1: both solutions have the same major mode, else 0
   std::optional<double> fn_peak;
   std::optional<double> ft_peak;
   std::optional<double> duration;
@@ -73,7 +72,7 @@ struct ErrorEstimate {
   std::optional<double> slide;
   std::optional<double> impulse_n;
   std::optional<double> impulse_t;
-  std::optional<double> v_out;  ///< of the exit velocity, both components together
+  std::optional<double> v_out;  ///< of the exit velocity as a vector
 
   bool operator==(const ErrorEstimate&) const = default;
 };
@@ -86,7 +85,7 @@ struct SolverReport {
   std::string version;  ///< solver version
 };
 
-/// What solving one point gave. SI units; times count from touch unless named otherwise.
+/// The result of one point. SI units; times count from touch unless named otherwise.
 struct CaseResult {
   double H_m;
   double mu;
@@ -107,9 +106,8 @@ struct CaseResult {
   double vn_out_m_s;
   std::string mode;        ///< order of states, as "SC SR sR sC sR"
   std::string major_mode;  ///< the same with ripples merged
-  /// How far the contact kept from another order of events, as a fraction of the force, speed or
-  /// time that the nearest other order would have needed to differ; >= 0, and near 0 the mode is
-  /// not to be trusted. Absent from results of earlier solvers, as is the event's name.
+  /// Distance from another order of events, dimensionless, >= 0; near 0 the mode is unreliable.
+  /// margin_event is the event that nearly changed it. Absent from results of earlier solvers.
   std::optional<double> margin;
   std::optional<std::string> margin_event;
   double stick_total_s;

@@ -10,16 +10,15 @@
 
 namespace oblique::solver {
 
-/// A value from the user that is not allowed. Front ends add the place by key and block; nothing
-/// parses the message.
+/// A value from the user that is not allowed.
 class InputError : public std::runtime_error {
  public:
   struct Fields {
     std::string text;                         ///< names key, value and what is allowed
-    std::string key = {};                     ///< also "where", "sample" and the like
-    std::string expression = {};              ///< the text in which `text` finds a fault
-    std::optional<std::size_t> block = {};    ///< its number from 0, in a study of several
-    std::optional<std::uint64_t> point = {};  ///< its number in the study
+    std::string key = {};                     ///< also "where", "sample"
+    std::string expression = {};              ///< the text that `text` is about
+    std::optional<std::size_t> block = {};    ///< number from 0, in a study of several
+    std::optional<std::uint64_t> point = {};  ///< number in the study
     std::string place = {};                   ///< "study.toml:3:6" or "--mu 0.4"
   };
 
@@ -47,7 +46,7 @@ class InputError : public std::runtime_error {
 
  private:
   /// `study.toml:3:6: block 2: point 7: mu = "k": ...`. A place that ends with the expression
-  /// stands for it.
+  /// replaces it.
   static std::string sentence(const Fields& fields) {
     std::string line = fields.place.empty() ? "" : fields.place + ": ";
     line += fields.block ? "block " + std::to_string(*fields.block + 1) + ": " : "";
@@ -61,7 +60,7 @@ class InputError : public std::runtime_error {
   Fields fields_;
 };
 
-/// Calls `work`. An InputError that it throws gets this key.
+/// Calls `work`, and adds the key to an InputError that it throws.
 template <typename Work>
 decltype(auto) with_key(std::string_view key, Work work) {
   try {
@@ -71,7 +70,7 @@ decltype(auto) with_key(std::string_view key, Work work) {
   }
 }
 
-/// A point that has no answer: the contact does not end, a step diverged.
+/// A point without an answer: the contact does not end, a step diverged.
 class SolveError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

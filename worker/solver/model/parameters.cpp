@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <type_traits>
 
 #include "worker/solver/model/number.h"
-#include "worker/solver/model/version.h"
 
 namespace oblique::solver {
 namespace {
@@ -20,27 +21,20 @@ bool positive(double value) {
 bool not_negative(double value) {
   return value >= 0.0;
 }
+template <int from, int to>
 bool is_whole(double value) {
-  return value == std::floor(value);
+  return value == std::floor(value) && value >= from && value <= to;
 }
 
 constexpr int kMaxLinks = 64;
-constexpr int kMaxElementsPerLink = 256;
 
 constexpr std::array<std::string_view, 2> kIntegratorNames{"explicit", "generalized-alpha"};
 constexpr std::array<std::string_view, 4> kPresetNames{"standard", "paper", "printed", "converged"};
 constexpr std::array<MeshAccuracy, 3> kMeshAccuracies{
     {{4, 3.0, 12.0, 59.0}, {8, 0.15, 1.0, 90.0}, {16, 0.02, 0.07, 98.0}}};
-constexpr int kPublishedElements = 4;
 
 using Model = ModelParameters;
 
-/// Below the least, rounding and the location of events leave more; above the largest, modes are
-/// not those of the equations, and the stability limit decides anyway.
-constexpr double kLeastTolerance = 1e-9;
-constexpr double kLargestTolerance = 1e-2;
-
-/// The key of that member.
 template <auto member>
 constexpr ParameterKey key(std::string_view name, std::string_view unit, std::string_view meaning,
                            std::string_view allowed, bool (*is_allowed)(double),
@@ -58,8 +52,7 @@ constexpr ParameterKey key(std::string_view name, std::string_view unit, std::st
 }
 
 constexpr std::array<ParameterKey, 16> kModelKeys{{
-    {"links", "", "number of links", "a whole number from 1 to 64",
-     [](double v) { return is_whole(v) && v >= 1 && v <= kMaxLinks; },
+    {"links", "", "number of links", "a whole number from 1 to 64", is_whole<1, kMaxLinks>,
      [](const Model& m) { return static_cast<double>(m.lengths_m.size()); },
      [](Model& m, double v) {
        m.lengths_m.assign(static_cast<std::size_t>(v), m.lengths_m.front());
@@ -79,19 +72,17 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
     key<&Model::rho_kg_m3>("rho", "kg/m^3", "density", "> 0", positive,
                            {100.0, 25'000.0, "lighter than cork", "denser than any metal"}),
     key<&Model::g_m_s2>("g", "m/s^2", "gravity, downwards", "> 0", positive, {0.1, 100.0}),
-    key<&Model::elements_per_link>(
-        "elements_per_link", "", "elements a link", "a whole number from 1 to 256",
-        [](double v) { return is_whole(v) && v >= 1 && v <= kMaxElementsPerLink; }),
+    key<&Model::elements_per_link>("elements_per_link", "", "elements a link",
+                                   "a whole number from 1 to 256", is_whole<1, 256>),
     key<&Model::k_N_m>("k", "N/m", "normal contact stiffness in compression", "> 0", positive,
                        {1e4, 1e10}),
     key<&Model::eta2>("eta2", "", "ratio of normal to tangential contact stiffness", "> 0",
                       positive, {0.1, 10.0}),
     key<&Model::tip_mass_kg>("tip_mass", "kg", "point mass at the tip", ">= 0", not_negative,
                              {1e-6, 10.0}),
-    key<&Model::integrator>(
-        "integrator", "", "how the equations of motion are stepped",
-        "explicit or generalized-alpha",
-        [](double v) { return is_whole(v) && v >= 0 && v < double{kIntegratorNames.size()}; }),
+    key<&Model::integrator>("integrator", "", "how the equations of motion are stepped",
+                            "explicit or generalized-alpha",
+                            is_whole<0, static_cast<int>(kIntegratorNames.size()) - 1>),
     key<&Model::spectral_radius>(
         "spectral_radius", "", "of generalized-alpha at infinite frequency",
         ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
@@ -103,7 +94,7 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
     key<&Model::tolerance>(
         "tolerance", "", "relative error that chosen steps leave in the outputs of a contact",
         "from 1e-9 (rounding leaves more below) to 0.01 (modes mean nothing above)",
-        [](double v) { return v >= kLeastTolerance && v <= kLargestTolerance; }),
+        [](double v) { return v >= 1e-9 && v <= 1e-2; }),
 }};
 
 constexpr std::array<ParameterKey, 3> kPointKeys{{
@@ -120,9 +111,13 @@ constexpr std::array<ParameterKey, 3> kPointKeys{{
      [](double v) { return v >= kSmallestRestitution && v <= 1.0; }, nullptr, nullptr},
 }};
 
-/// Throws InputError that `name` is none of the values of a key.
-[[noreturn]] void refuse_name(const std::string& key, std::string_view name,
-                              std::span<const std::string_view> names) {
+/// The position of `name` in `names`. Throws InputError about `key` when it is not among them.
+std::size_t index_of(std::string_view name, std::span<const std::string_view> names,
+                     const std::string& key) {
+  const auto found = std::ranges::find(names, name);
+  if (found != names.end()) {
+    return static_cast<std::size_t>(found - names.begin());
+  }
   std::string text = key + " = \"" + std::string(name) + "\" is not allowed: " + key + " must be ";
   for (const std::string_view allowed : names) {
     text.append(allowed == names.front() ? "" : ", ").append(allowed);
@@ -228,11 +223,7 @@ std::string_view integrator_name(Integrator integrator) {
 }
 
 Integrator integrator_named(std::string_view name) {
-  const auto found = std::find(kIntegratorNames.begin(), kIntegratorNames.end(), name);
-  if (found == kIntegratorNames.end()) {
-    refuse_name("integrator", name, kIntegratorNames);
-  }
-  return static_cast<Integrator>(found - kIntegratorNames.begin());
+  return static_cast<Integrator>(index_of(name, kIntegratorNames, "integrator"));
 }
 
 std::span<const std::string_view> integrator_names() {
@@ -241,18 +232,13 @@ std::span<const std::string_view> integrator_names() {
 
 ModelParameters preset(std::string_view name) {
   ModelParameters model;
-  if (name == "paper") {
-    model.elements_per_link = kPublishedElements;
-  } else if (name == "printed") {
-    model.elements_per_link = kPublishedElements;
+  constexpr std::array kElementsPerLink{16, 4, 4, 48};
+  model.elements_per_link = kElementsPerLink[index_of(name, kPresetNames, "preset")];
+  if (name == "printed") {
     model.A_m2 = 5e-4;
     model.I_m4 = 2e-8;
     model.k_N_m = 2.5e7;
     model.eta2 = 1.21;
-  } else if (name == "converged") {
-    model.elements_per_link = 48;
-  } else if (name != kPresetNames[0]) {
-    refuse_name("preset", name, kPresetNames);
   }
   return model;
 }
@@ -278,13 +264,11 @@ std::string note_on_value(const ParameterKey& key, double value) {
 
 std::string with_likely_cause(std::string error, const ModelParameters& model) {
   for (const auto& key : model_keys()) {
-    std::vector<double> values{key.get(model)};
+    std::set<double> values{key.get(model)};
     if (key.name == "length") {
-      const auto [least, largest] =
-          std::minmax_element(model.lengths_m.begin(), model.lengths_m.end());
-      values = {*least, *largest};
+      const auto [least, largest] = std::ranges::minmax(model.lengths_m);
+      values = {least, largest};
     }
-    values.erase(std::unique(values.begin(), values.end()), values.end());
     for (const double value : values) {
       if (!is_usual(key, value)) {
         error += "; likely cause: " + std::string(key.name) + " = " + with_unit(key, value) +
@@ -293,6 +277,44 @@ std::string with_likely_cause(std::string error, const ModelParameters& model) {
     }
   }
   return error;
+}
+
+ModelParameters fall_model(const ModelParameters& model) {
+  const ModelParameters defaults;
+  ModelParameters falling = model;
+  falling.k_N_m = defaults.k_N_m;
+  falling.eta2 = defaults.eta2;
+  falling.dt_s = defaults.dt_s;
+  falling.step_factor = defaults.step_factor;
+  falling.tolerance = std::min(falling.tolerance, defaults.tolerance);
+  if (falling.integrator != Integrator::kGeneralizedAlpha) {
+    falling.spectral_radius = defaults.spectral_radius;
+  }
+  return falling;
+}
+
+bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
+  ModelParameters one = model;
+  ModelParameters other = model;
+  key.set(one, 1.0);  // no key takes these two values for one
+  key.set(other, 2.0);
+  return !(fall_model(one) == fall_model(other));
+}
+
+std::uint64_t fall_hash(const ModelParameters& model) {
+  constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio
+  const ModelParameters falling = fall_model(model);
+  std::uint64_t hash = 0;
+  const auto add = [&hash](double value) {
+    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * kOdd;
+    hash ^= hash >> 32;
+  };
+  std::for_each(falling.lengths_m.begin(), falling.lengths_m.end(), add);
+  for (const auto& key : model_keys()) {
+    add(key.get(falling));
+  }
+  add(falling.step_factor);
+  return hash;
 }
 
 std::string solver_version() {

@@ -10,33 +10,45 @@
 namespace oblique::solver {
 namespace {
 
-/// A member that every result has.
-template <class T>
-struct Held {
-  using Value = T;
-  static constexpr bool kMayBeAbsent = false;
-  static const T* of(const T& member) { return &member; }
-  static T& in(T& member) { return member; }
-};
+/// "H_m" for &CaseResult::H_m, from the compiler's text of this function: outputs are named like
+/// the members that hold them.
+template <auto member>
+constexpr std::string_view name_of() {
+  constexpr std::string_view text = __PRETTY_FUNCTION__;
+  constexpr std::size_t end = text.find_first_of(";]", text.find("member = "));
+  constexpr std::size_t begin = text.rfind("::", end) + 2;
+  return text.substr(begin, end - begin);
+}
+static_assert(name_of<&CaseResult::H_m>() == "H_m");
 
-/// One that results may lack.
-template <class T>
-struct Held<std::optional<T>> {
-  using Value = T;
-  static constexpr bool kMayBeAbsent = true;
-  static const T* of(const std::optional<T>& member) { return member ? &*member : nullptr; }
-  static T& in(std::optional<T>& member) { return member ? *member : member.emplace(); }
-};
+template <auto... members>
+constexpr std::array kNames{name_of<members>()...};
 
-/// The member that is reached by these steps from a CaseResult.
+template <class T>
+const T* present(const T& member) {
+  return &member;
+}
+template <class T>
+const T* present(const std::optional<T>& member) {
+  return member ? &*member : nullptr;
+}
+template <class T>
+T& created(T& member) {
+  return member;
+}
+template <class T>
+T& created(std::optional<T>& member) {
+  return member ? *member : member.emplace();
+}
+
+/// The member that these steps reach from a CaseResult.
 template <auto... steps>
 constexpr auto at = [] {
-  using Kind = Held<std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>>;
-  using Value = typename Kind::Value;
-  return Member<Value>{
-      [](const CaseResult& result) -> const Value* { return Kind::of((result.*....*steps)); },
-      [](CaseResult& result) -> Value& { return Kind::in((result.*....*steps)); },
-      Kind::kMayBeAbsent};
+  using Kept = std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>;
+  using Value = std::remove_reference_t<decltype(created(std::declval<Kept&>()))>;
+  return Member<Value>{[](const CaseResult& result) { return present((result.*....*steps)); },
+                       [](CaseResult& result) -> Value& { return created((result.*....*steps)); },
+                       !std::is_same_v<Kept, Value>};
 }();
 
 /// That member of the n-th peak, from 1, of those that are left when ripples are merged.
@@ -74,37 +86,32 @@ using Result = CaseResult;
 using Energy = ContactEnergy;
 using Errors = ErrorEstimate;
 
-// What the members of elements are called, in the database's views too.
-constexpr std::array<std::string_view, 4> kPeakMembers{"t_s", "fn_N", "ft_N", "major"};
-constexpr std::array<std::string_view, 2> kFtPeakMembers{"t_s", "ft_N"};
-constexpr std::array<std::string_view, 3> kPhaseMembers{"kind", "t0_s", "t1_s"};
-constexpr std::array<std::string_view, 2> kStickMembers{"t0_s", "t1_s"};
-constexpr std::array<std::string_view, 2> kReactionMembers{"t_s", "force_N"};
+/// A list whose column and elements are named like its members.
+template <auto list, auto... members>
+constexpr ResultList list_of(std::string_view unit, std::string_view meaning,
+                             bool has_names = true) {
+  return {name_of<list>(), unit, meaning, kNames<members...>, each_of<list, members...>, has_names};
+}
 
-constexpr ResultList kPeaks{
-    "peaks", "s, N",
-    "peaks of the normal force, ripples included: t_s from touch, fn_N, ft_N the largest "
-    "tangential magnitude around the peak, major 1 or, for a ripple, 0; peaks[1] may be a "
-    "ripple, the second major peak is major_peak_2_N",
-    kPeakMembers, each_of<&Result::peaks, &Peak::t_s, &Peak::fn_N, &Peak::ft_N, &Peak::major>};
-constexpr ResultList kFtPeaks{
-    "ft_peaks", "s, N", "every peak of the tangential magnitude: t_s counted from touch and ft_N",
-    kFtPeakMembers, each_of<&Result::ft_peaks, &TangentialPeak::t_s, &TangentialPeak::ft_N>};
-constexpr ResultList kPhases{
-    "phases", "s", "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch",
-    kPhaseMembers, each_of<&Result::phases, &Phase::kind, &Phase::t0_s, &Phase::t1_s>};
-constexpr ResultList kStickIntervals{
-    "stick_intervals",
-    "s",
-    "the same as stick_intervals_s",
-    kStickMembers,
-    each_of<&Result::stick_intervals, &StickInterval::t0_s, &StickInterval::t1_s>,
-    false};
-constexpr ResultList kReactionPeaks{
-    "reaction_peaks", "s, N",
-    "largest force on the outer link at the pin O, then at each joint: t_s, its instant "
-    "counted from touch, and force_N, its magnitude",
-    kReactionMembers, each_of<&Result::reaction_peaks, &ReactionPeak::t_s, &ReactionPeak::force_N>};
+constexpr ResultList kPeaks =
+    list_of<&Result::peaks, &Peak::t_s, &Peak::fn_N, &Peak::ft_N, &Peak::major>(
+        "s, N",
+        "peaks of the normal force, ripples included: t_s from touch, fn_N, ft_N the largest "
+        "tangential magnitude around the peak, major 1 or, for a ripple, 0; peaks[1] may be a "
+        "ripple, the second major peak is major_peak_2_N");
+constexpr ResultList kFtPeaks =
+    list_of<&Result::ft_peaks, &TangentialPeak::t_s, &TangentialPeak::ft_N>(
+        "s, N", "every peak of the tangential magnitude: t_s counted from touch and ft_N");
+constexpr ResultList kPhases = list_of<&Result::phases, &Phase::kind, &Phase::t0_s, &Phase::t1_s>(
+    "s", "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch");
+constexpr ResultList kStickIntervals =
+    list_of<&Result::stick_intervals, &StickInterval::t0_s, &StickInterval::t1_s>(
+        "s", "the same as stick_intervals_s", false);
+constexpr ResultList kReactionPeaks =
+    list_of<&Result::reaction_peaks, &ReactionPeak::t_s, &ReactionPeak::force_N>(
+        "s, N",
+        "largest force on the outer link at the pin O, then at each joint: t_s, its instant "
+        "counted from touch, and force_N, its magnitude");
 
 constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
 
@@ -134,8 +141,20 @@ constexpr ResultField output(std::string_view name, Unit unit, std::string_view 
 }
 
 template <auto member>
-constexpr ResultField output(std::string_view name, Unit unit, std::string_view meaning) {
-  return output(name, unit, meaning, at<member>);
+constexpr ResultField output(Unit unit, std::string_view meaning) {
+  return output(name_of<member>(), unit, meaning, at<member>);
+}
+
+/// Output of an object inside the result.
+template <auto object, auto member>
+constexpr ResultField output_of(std::string_view group, Unit unit, std::string_view meaning,
+                                std::string_view column = name_of<member>(),
+                                SentWith sent_with = SentWith::kResult) {
+  ResultField field = output(name_of<member>(), unit, meaning, at<object, member>);
+  field.group = group;
+  field.column = column;
+  field.sent_with = sent_with;
+  return field;
 }
 
 template <int n, double Peak::*member>
@@ -146,49 +165,36 @@ constexpr ResultField output_of_peak(std::string_view name, Unit unit, std::stri
   return field;
 }
 
-constexpr ResultField in_group(std::string_view group, std::string_view column, ResultField field) {
-  field.group = group;
-  field.column = column;
-  return field;
-}
-
-template <double Energy::*member>
-constexpr ResultField energy(std::string_view name, std::string_view meaning, Unit unit = "J") {
-  return in_group("energy", name, output(name, unit, meaning, at<&Result::energy, member>));
+template <auto member>
+constexpr ResultField energy(std::string_view meaning, Unit unit = "J") {
+  return output_of<&Result::energy, member>("energy", unit, meaning);
 }
 
 template <auto member>
-constexpr ResultField error(std::string_view name, std::string_view column,
-                            std::string_view meaning) {
-  return in_group("errors", column, output(name, "", meaning, at<&Result::errors, member>));
+constexpr ResultField error(std::string_view column, std::string_view meaning) {
+  return output_of<&Result::errors, member>("errors", "", meaning, column);
 }
 
 template <auto member>
-constexpr ResultField report(std::string_view name, Unit unit, std::string_view meaning,
+constexpr ResultField report(Unit unit, std::string_view meaning,
                              SentWith sent_with = SentWith::kResult) {
-  const std::string_view column = sent_with == SentWith::kWorker ? "solver_version" : name;
-  ResultField field =
-      in_group("solver", column, output(name, unit, meaning, at<&Result::solver, member>));
-  field.sent_with = sent_with;
-  return field;
+  return output_of<&Result::solver, member>(
+      "solver", unit, meaning,
+      sent_with == SentWith::kWorker ? "solver_version" : name_of<member>(), sent_with);
 }
 
 constexpr std::array kFields{
-    output<&Result::fall_time_s>("fall_time_s", "s", "time from rest to touch"),
-    output<&Result::impact_x_m>("impact_x_m", "m",
+    output<&Result::fall_time_s>("s", "time from rest to touch"),
+    output<&Result::impact_x_m>("m",
                                 "where the tip lands: distance from the pin O along the ground"),
     output<&Result::vt_in_m_s>(
-        "vt_in_m_s", "m/s",
-        "tangential velocity of the tip at touch, along x; negative: towards the pin"),
+        "m/s", "tangential velocity of the tip at touch, along x; negative: towards the pin"),
     output<&Result::vn_in_m_s>(
-        "vn_in_m_s", "m/s",
-        "normal velocity of the tip at touch, upwards; negative: into the ground"),
-    output<&Result::duration_s>("duration_s", kMicroseconds,
-                                "duration of contact, from touch to separation"),
+        "m/s", "normal velocity of the tip at touch, upwards; negative: into the ground"),
+    output<&Result::duration_s>(kMicroseconds, "duration of contact, from touch to separation"),
     output<&Result::fn_peak_N>(
-        "fn_peak_N", "N",
-        "largest normal force; forces act on the tip, the normal one upwards, never negative"),
-    output<&Result::ft_peak_N>("ft_peak_N", "N", "largest magnitude of the tangential force"),
+        "N", "largest normal force; forces act on the tip, the normal one upwards, never negative"),
+    output<&Result::ft_peak_N>("N", "largest magnitude of the tangential force"),
     output("fn_peaks_N", "N",
            "every peak of the normal force, ripples included, in order of time; the second one "
            "that is no ripple is major_peak_2_N",
@@ -212,84 +218,72 @@ constexpr std::array kFields{
                                   "when major_peak_2_N is reached, from touch"),
     output_of_peak<3, &Peak::t_s>("major_peak_3_t_s", kMicroseconds,
                                   "when major_peak_3_N is reached, from touch"),
-    output<&Result::impulse_n_Ns>("impulse_n_Ns", "N s", "impulse of the normal force, upwards"),
+    output<&Result::impulse_n_Ns>("N s", "impulse of the normal force, upwards"),
     output<&Result::impulse_t_Ns>(
-        "impulse_t_Ns", "N s",
-        "impulse of the tangential force, along x; positive: away from the pin"),
+        "N s", "impulse of the tangential force, along x; positive: away from the pin"),
     output<&Result::slide_m>(
-        "slide_m", kMillimetres,
+        kMillimetres,
         "length of the path of the contact particle P along the ground, there and back "
         "both counted"),
     output<&Result::vt_out_m_s>(
-        "vt_out_m_s", "m/s",
-        "tangential velocity of the tip at separation, along x; negative: towards the pin"),
+        "m/s", "tangential velocity of the tip at separation, along x; negative: towards the pin"),
     output<&Result::vn_out_m_s>(
-        "vn_out_m_s", "m/s",
-        "normal velocity of the tip at separation, upwards; positive: off the ground"),
-    output<&Result::mode>("mode", "",
-                          "order of states: S stick, s slip; C compression, R restitution"),
-    output<&Result::major_mode>("major_mode", "", "the same with ripples merged"),
+        "m/s", "normal velocity of the tip at separation, upwards; positive: off the ground"),
+    output<&Result::mode>("", "order of states: S stick, s slip; C compression, R restitution"),
+    output<&Result::major_mode>("", "the same with ripples merged"),
     output<&Result::margin>(
-        "margin", "",
+        "",
         "how far the contact kept from another order of events, from 0; near 0 the mode is not "
         "to be trusted"),
-    output<&Result::margin_event>("margin_event", "",
+    output<&Result::margin_event>("",
                                   "the event that came so near to happening, or to not happening"),
-    output<&Result::stick_total_s>("stick_total_s", kMicroseconds, "total time in stick"),
+    output<&Result::stick_total_s>(kMicroseconds, "total time in stick"),
     output("stick_intervals_s", "s",
            "spans in which P does not move: [from, to], counted from touch",
            ListPart{&kStickIntervals}),
     output("phases", "s", kPhases.meaning, ListPart{&kPhases}),
     output("reaction_peaks", "s, N", kReactionPeaks.meaning, ListPart{&kReactionPeaks}),
-    energy<&Energy::kinetic_in_J>("kinetic_in_J", "kinetic energy of the whole finger at touch"),
-    energy<&Energy::friction_J>("friction_J",
-                                "energy lost to friction at P; what is lost is positive"),
+    energy<&Energy::kinetic_in_J>("kinetic energy of the whole finger at touch"),
+    energy<&Energy::friction_J>("energy lost to friction at P; what is lost is positive"),
     energy<&Energy::restitution_J>(
-        "restitution_J", "energy lost in the normal contact element; what is lost is positive"),
-    energy<&Energy::kinetic_change_J>("kinetic_change_J",
-                                      "kinetic energy at separation less that at touch"),
-    energy<&Energy::strain_change_J>("strain_change_J",
-                                     "strain energy of the links at separation less that at touch"),
-    energy<&Energy::gravity_change_J>("gravity_change_J",
-                                      "potential energy at separation less that at touch"),
+        "energy lost in the normal contact element; what is lost is positive"),
+    energy<&Energy::kinetic_change_J>("kinetic energy at separation less that at touch"),
+    energy<&Energy::strain_change_J>("strain energy of the links at separation less that at touch"),
+    energy<&Energy::gravity_change_J>("potential energy at separation less that at touch"),
     energy<&Energy::exchanged_J>(
-        "exchanged_J",
         "work that the contact forces exchanged with the finger, to and fro both counted"),
     energy<&Energy::closure>(
-        "closure",
         "what does not add up in the energy balance, relative to exchanged_J; never negative", ""),
     error<&Errors::mode_same>(
-        "mode_same", "mode_same",
+        "mode_same",
         "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
         "another. This and the errors below are there only when they were asked for"),
-    error<&Errors::fn_peak>("fn_peak", "fn_peak_error",
-                            "estimated error of fn_peak_N, as a fraction of it"),
-    error<&Errors::ft_peak>("ft_peak", "ft_peak_error",
+    error<&Errors::fn_peak>("fn_peak_error", "estimated error of fn_peak_N, as a fraction of it"),
+    error<&Errors::ft_peak>("ft_peak_error",
                             "estimated error of ft_peak_N, as a fraction of fn_peak_N"),
-    error<&Errors::duration>("duration", "duration_error",
+    error<&Errors::duration>("duration_error",
                              "estimated error of duration_s, as a fraction of it"),
-    error<&Errors::stick_total>("stick_total", "stick_total_error",
+    error<&Errors::stick_total>("stick_total_error",
                                 "estimated error of stick_total_s, as a fraction of duration_s"),
     error<&Errors::slide>(
-        "slide", "slide_error",
+        "slide_error",
         "estimated error of slide_m, as a fraction of speed at touch times duration_s"),
-    error<&Errors::impulse_n>("impulse_n", "impulse_n_error",
+    error<&Errors::impulse_n>("impulse_n_error",
                               "estimated error of impulse_n_Ns, as a fraction of it"),
-    error<&Errors::impulse_t>("impulse_t", "impulse_t_error",
+    error<&Errors::impulse_t>("impulse_t_error",
                               "estimated error of impulse_t_Ns, as a fraction of impulse_n_Ns"),
-    error<&Errors::v_out>("v_out", "v_out_error",
+    error<&Errors::v_out>("v_out_error",
                           "estimated error of the velocity at separation (vt_out_m_s and "
                           "vn_out_m_s as one vector), as a fraction of the speed at touch"),
     report<&SolverReport::integrator>(
-        "integrator", "", "how the equations of motion are stepped: explicit or generalized-alpha",
+        "", "how the equations of motion are stepped: explicit or generalized-alpha",
         SentWith::kModel),
     report<&SolverReport::dt_s>(
-        "dt_s", kMicroseconds,
-        "step in contact, in compression; restitution at low e steps shorter"),
-    report<&SolverReport::steps>("steps", "", "accepted steps in contact"),
-    report<&SolverReport::wall_s>("wall_s", kMilliseconds,
+        kMicroseconds, "step in contact, in compression; restitution at low e steps shorter"),
+    report<&SolverReport::steps>("", "accepted steps in contact"),
+    report<&SolverReport::wall_s>(kMilliseconds,
                                   "wall time of the contact alone; not reproducible"),
-    report<&SolverReport::version>("version", "", "version of the solver", SentWith::kWorker)};
+    report<&SolverReport::version>("", "version of the solver", SentWith::kWorker)};
 
 }  // namespace
 
@@ -313,15 +307,15 @@ const ResultList* find_result_list(std::string_view column) {
 
 bool is_finite(const CaseResult& result) {
   bool finite = true;
-  for_each_sent<double>([&](const ResultField&, const Member<double>& member) {
-    const double* number = member.of(result);
+  const auto check = [&finite](const double* number) {
     finite = finite && (number == nullptr || std::isfinite(*number));
-  });
+  };
+  for_each_sent<double>(
+      [&](const ResultField&, const Member<double>& member) { check(member.of(result)); });
   for (const ResultList* list : kLists) {
     list->each(result, [&](std::span<const Cell> element) {
       for (const Cell& cell : element) {
-        const auto* number = std::get_if<double>(&cell);
-        finite = finite && (number == nullptr || std::isfinite(*number));
+        check(std::get_if<double>(&cell));
       }
     });
   }

@@ -32,22 +32,21 @@ struct TraceRow {
   std::vector<double> nodes_m;
 };
 
-/// TraceRow::state before touch. Nothing is deformed and no force acts then, and P goes along with
-/// the tip.
+/// TraceRow::state before touch. Forces and deformations are zero then, and P moves with the tip.
 inline constexpr std::string_view kFalling = "falling";
-/// The instants of the fall that a trace has: from release to touch, both ends in, evenly spaced.
+/// Rows of the fall: evenly spaced from release to touch, both included.
 inline constexpr int kFallRows = 121;
 
-/// Whether a phase ends at a row of the contact: compression follows restitution there, or the
-/// reverse. `before` is the state of the row before; empty: there is none.
+/// Whether compression follows restitution at a row of the contact, or the reverse. `before` is the
+/// state of the row before, empty at the first.
 inline bool ends_phase(std::string_view before, std::string_view state) {
   return !before.empty() && before != kFalling && before.back() != state.back();
 }
 
-/// What is wanted of the time histories of a contact, and where they go.
+/// Which rows of a contact to compute, and their receiver.
 struct Tracing {
   using Sink = std::function<void(const TraceRow&)>;
-  Sink sink;  ///< called at every accepted step, from touch to separation; may be none
+  Sink sink;  ///< called at every accepted step, from touch to separation; may be empty
   bool with_shape = false;  ///< fill TraceRow::nodes_m
   bool with_fall = false;   ///< call `sink` at kFallRows instants of the fall before that
 };

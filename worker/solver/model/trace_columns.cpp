@@ -46,22 +46,18 @@ constexpr std::array kColumns{
                 TraceVectors{&TraceRow::nodes_m, false}},
 };
 
-/// A row of that shape, all zeros.
-TraceRow zero_row(const TraceShape& shape) {
-  TraceRow row{};
-  row.reactions_N.resize(2 * shape.links);
-  row.nodes_m.resize(2 * shape.nodes);
-  return row;
+std::size_t count_of(const TraceVectors& vectors, const TraceShape& shape) {
+  return 2 * (vectors.of_links ? shape.links : shape.nodes);
 }
 
-/// Calls `take` with a span of the numbers of each column, or of all columns of a vector.
+/// Calls `take` with each number of a row, in the order of the columns. Row is TraceRow or const.
 template <class Row, class Take>
-void for_each_numbers(Row&& row, const Take& take) {
+void for_each_number(Row& row, const Take& take) {
   for (const TraceColumn& column : kColumns) {
     if (const auto* number = std::get_if<double TraceRow::*>(&column.value)) {
-      take(std::span(&(row.*(*number)), 1));
+      take(row.*(*number));
     } else if (const auto* vectors = std::get_if<TraceVectors>(&column.value)) {
-      take(std::span(row.*(vectors->values)));
+      std::ranges::for_each(row.*(vectors->values), take);
     }
   }
 }
@@ -77,7 +73,6 @@ TraceShape trace_shape(std::size_t links, std::size_t elements_per_link, bool wi
 }
 
 std::vector<std::string> trace_headings(const TraceShape& shape) {
-  const TraceRow row = zero_row(shape);
   std::vector<std::string> headings;
   for (const TraceColumn& column : kColumns) {
     const auto* vectors = std::get_if<TraceVectors>(&column.value);
@@ -86,7 +81,7 @@ std::vector<std::string> trace_headings(const TraceShape& shape) {
       continue;
     }
     const std::size_t space = column.name.find(' ');
-    for (std::size_t i = 0; i < (row.*(vectors->values)).size(); ++i) {
+    for (std::size_t i = 0; i < count_of(*vectors, shape); ++i) {
       std::string name(i % 2 == 0 ? column.name.substr(0, space) : column.name.substr(space + 1));
       headings.push_back(name.replace(name.find("{}"), 2, std::to_string(i / 2)));
     }
@@ -104,24 +99,26 @@ std::uint8_t code_of_state(std::string_view state) {
 
 std::size_t trace_numbers(const TraceShape& shape) {
   std::size_t count = 0;
-  for_each_numbers(zero_row(shape), [&](std::span<const double> some) { count += some.size(); });
+  for (const TraceColumn& column : kColumns) {
+    const auto* vectors = std::get_if<TraceVectors>(&column.value);
+    const bool is_number = std::holds_alternative<double TraceRow::*>(column.value);
+    count += vectors != nullptr ? count_of(*vectors, shape) : (is_number ? 1 : 0);
+  }
   return count;
 }
 
 void append_numbers(const TraceRow& row, std::vector<double>& numbers) {
-  for_each_numbers(row, [&](std::span<const double> some) {
-    numbers.insert(numbers.end(), some.begin(), some.end());
-  });
+  for_each_number(row, [&](double number) { numbers.push_back(number); });
 }
 
 TraceRow trace_row(const TraceShape& shape, std::span<const double> numbers,
                    std::string_view state) {
-  TraceRow row = zero_row(shape);
+  TraceRow row{};
   row.state = state;
-  for_each_numbers(row, [&](std::span<double> some) {
-    std::copy_n(numbers.begin(), some.size(), some.begin());
-    numbers = numbers.subspan(some.size());
-  });
+  row.reactions_N.resize(2 * shape.links);
+  row.nodes_m.resize(2 * shape.nodes);
+  auto next = numbers.begin();
+  for_each_number(row, [&](double& number) { number = *next++; });
   return row;
 }
 

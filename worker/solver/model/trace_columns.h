@@ -13,17 +13,14 @@
 
 namespace oblique::solver {
 
-// What a trace tells of each instant, as one table. Files, messages and documents walk it, so that
-// a column is named once.
-
 /// A vector at each link or node: two columns each, x and y, numbered from 0 at the pin.
 struct TraceVectors {
   std::vector<double> TraceRow::*values;
   bool of_links;  ///< one a link, else one a node
 };
 
-/// One column, or for vectors those of all links or nodes. `{}` in a name is the number of a link
-/// or node, and two names, of x and y, are parted by a space.
+/// A column of a trace, or for vectors the columns of all links or nodes. `{}` in a name is the
+/// number of a link or node, and the names of x and y are separated by a space.
 struct TraceColumn {
   std::string_view name;
   std::string_view unit;     ///< SI; empty for texts
@@ -31,34 +28,31 @@ struct TraceColumn {
   std::variant<double TraceRow::*, std::string TraceRow::*, TraceVectors> value;
 };
 
-/// All columns, in the order of files.
+/// All columns, in the order of files and messages.
 std::span<const TraceColumn> trace_columns();
 
-/// How many of the numbered columns a trace has.
 struct TraceShape {
   std::size_t links = 0;
-  std::size_t nodes = 0;  ///< 0: positions were not asked for
+  std::size_t nodes = 0;  ///< 0: without positions
 
   bool operator==(const TraceShape&) const = default;
 };
 
-/// The shape of a trace of that model.
 TraceShape trace_shape(std::size_t links, std::size_t elements_per_link, bool with_nodes);
 
-/// One heading a column of a file.
 std::vector<std::string> trace_headings(const TraceShape& shape);
 
-/// The states of a contact, and that before it; their places here are their codes in messages.
+/// The states of a contact and of the fall; the index is the code in messages.
 inline constexpr std::array<std::string_view, 5> kTraceStates{"SC", "SR", "sC", "sR", kFalling};
 inline constexpr std::uint8_t kFallingCode = 4;
 /// Throws std::invalid_argument for another text.
 std::uint8_t code_of_state(std::string_view state);
 
-/// How many numbers a row has; the state is none.
+/// Count of numbers in a row, all but the state.
 std::size_t trace_numbers(const TraceShape& shape);
 /// Appends the numbers of a row in the order of the columns.
 void append_numbers(const TraceRow& row, std::vector<double>& numbers);
-/// The row with these numbers, as many as `trace_numbers` says, and that state.
+/// The row with this state and these numbers, trace_numbers() of them.
 TraceRow trace_row(const TraceShape& shape, std::span<const double> numbers,
                    std::string_view state);
 

@@ -16,14 +16,13 @@ namespace oblique::solver {
 /// Symmetric matrix of half-bandwidth 3, lower part by rows: at(i, d) is entry (i, i - d).
 class BandedMatrix {
  public:
-  explicit BandedMatrix(std::size_t rows) : bands_(rows) {}
+  explicit BandedMatrix(std::size_t rows = 0) : bands_(rows) {}
 
   std::size_t rows() const { return bands_.size(); }
   double& at(std::size_t row, std::size_t distance) { return bands_[row][distance]; }
   double at(std::size_t row, std::size_t distance) const { return bands_[row][distance]; }
 
-  /// Adds to the entry (row, column) and, by symmetry, (column, row).
-  /// Needs |row - column| <= kHalfBandwidth.
+  /// Adds to the entry (row, column) of the lower part. Needs |row - column| <= kHalfBandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     if (row >= column) {
       bands_[row][row - column] += value;
@@ -51,14 +50,12 @@ class BandedMatrix {
 /// A = L D Lᵀ of a symmetric positive definite banded matrix, L with unit diagonal.
 class BandedCholesky {
  public:
-  /// Factors `matrix`; `positive_definite()` tells whether that succeeded.
+  BandedCholesky() = default;
+  /// Factors `matrix`, if it is positive_definite().
   explicit BandedCholesky(const BandedMatrix& matrix) : rows_(matrix.rows() + kHalfBandwidth) {
     std::vector<double> pivots(rows_.size());
     for (std::size_t i = 0; i < matrix.rows(); ++i) {
-      for (std::size_t d = kHalfBandwidth; d >= 1; --d) {
-        if (d > i) {
-          continue;
-        }
+      for (std::size_t d = std::min(kHalfBandwidth, i); d >= 1; --d) {
         const std::size_t j = i - d;
         double entry = matrix.at(i, d);
         for (std::size_t m = 1; m + d <= kHalfBandwidth && m <= j; ++m) {
@@ -80,17 +77,16 @@ class BandedCholesky {
 
   bool positive_definite() const { return positive_definite_; }
 
-  /// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c].
-  /// `Real` is a number or a pack of lanes. Needs positive_definite().
-  template <class Real>
-  void solve_pairs(Real* f) const {
-    ForwardSubstitution<Real> forward;
+  /// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c]. Needs
+  /// positive_definite().
+  void solve_pairs(double* f) const {
+    ForwardSubstitution<double> forward;
     const std::size_t rows = rows_.size() - kHalfBandwidth;
     for (std::size_t i = 0; i < rows; ++i) {
       put_pair(f, i, forward.next(rows_[i], f[2 * i], f[2 * i + 1]));
     }
-    substitute_back(rows_.data(), rows, 0, f, [&](std::size_t i, const Real& x, const Real& y) {
-      put_pair(f, i, PlanarVector<Real>{x, y});
+    substitute_back(rows_.data(), rows, 0, f, [f](std::size_t i, double x, double y) {
+      put_pair(f, i, PlanarVector<double>{x, y});
     });
   }
 
@@ -102,30 +98,25 @@ class BandedCholesky {
   bool positive_definite_ = true;
 };
 
-/// A square banded matrix, of no rows to begin with, `bandwidth` diagonals on either side, and its
-/// LU factors with partial pivoting inside the band: work and memory are linear in the number of
-/// rows, and a zero on the diagonal (a multiplier's row) does no harm.
+/// A square banded matrix with `bandwidth` diagonals on either side, and its LU factors with
+/// partial pivoting inside the band: work and memory are linear in the number of rows, and a zero
+/// on the diagonal (a multiplier's row) is allowed.
 template <std::size_t bandwidth>
 class BandedLu {
  public:
-  /// A matrix of zeros of that size. Allocates when the size grows.
-  void set_zero(std::size_t rows) {
-    rows_.resize(rows);
-    pivots_.resize(rows);
-    for (auto& row : rows_) {
-      row.fill(0.0);
-    }
-  }
+  /// A matrix of zeros.
+  explicit BandedLu(std::size_t rows) : rows_(rows), pivots_(rows) {}
+
   /// Needs |row - column| <= bandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     rows_[row][column + bandwidth - row] += value;
   }
 
-  /// Adds a dense block whose first entry is (row, column).
+  /// Adds a dense square block whose first entry is (first, first).
   template <class Block>
-  void add_block(std::size_t row, std::size_t column, const Block& block) {
+  void add_block(std::size_t first, const Block& block) {
     for (int i = 0; i < block.rows(); ++i) {
-      double* target = &entry(row + static_cast<std::size_t>(i), column);
+      double* target = &entry(first + static_cast<std::size_t>(i), first);
       for (int j = 0; j < block.cols(); ++j) {
         target[j] += block(i, j);
       }

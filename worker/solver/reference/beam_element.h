@@ -7,9 +7,8 @@
 /// The planar two-node ANCF Euler beam element (eqs. 1 to 12).
 ///
 /// Coordinates q_e of one direction (eq. 2): position p_i, slope s_i = dr/dx, position p_j, slope
-/// s_j; r = S q_e with cubic Hermite shape functions on a length l (eqs. 1, 3 and 4). Everything
-/// the element stores depends on the gradient r'(x), a quadratic, written here in Legendre
-/// polynomials of zeta = 2x/l - 1:
+/// s_j; r = S q_e with cubic Hermite shape functions on a length l (eqs. 1, 3 and 4). The energy
+/// depends on the gradient r'(x), a quadratic, here in Legendre polynomials of zeta = 2x/l - 1:
 ///
 ///   r' = c0 + c1 P1(zeta) + c2 P2(zeta),
 ///   c0 = (p_j - p_i)/l,  c1 = (s_j - s_i)/2,  c2 = (s_i + s_j)/2 - c0.
@@ -23,7 +22,7 @@ using ElementCoordinates = Eigen::Matrix<double, 2, 4>;
 /// c0, c1, c2 of one element side by side.
 using GradientCoefficients = Eigen::Matrix<double, 2, 3>;
 
-/// By differences: a rigid shift is gone before anything is rounded.
+/// Of differences, so that a rigid shift causes no rounding.
 GradientCoefficients gradient_coefficients(const ElementCoordinates& q, double inverse_length);
 
 /// For elements of that length, EA [N], EI [N m^2] and mass per length [kg/m].
@@ -43,7 +42,7 @@ using ElementTangent = Eigen::Matrix<double, 8, 8>;
 ElementTangent elastic_tangent(const ElementCoordinates& q,
                                const ElementConstants<double>& constants);
 
-/// A matrix of one direction as one of both: each entry times the unit matrix of x and y.
+/// Each entry times the unit matrix of x and y.
 ElementTangent in_both_directions(const Eigen::Matrix4d& matrix);
 
 /// Eq. 6: mass matrix of one direction, int rho A s_a s_b dx, rows p_i, s_i, p_j, s_j.
@@ -55,8 +54,7 @@ Eigen::Matrix4d bending_matrix(double length);
 /// int s_a' s_b' dx: the axial stiffness of the straight element without EA.
 Eigen::Matrix4d gradient_matrix(double length);
 
-/// Eq. 12 without the weight: int s_a dx, what a uniform load of 1 N/m puts on the coordinates of
-/// its direction.
+/// Eq. 12 without the weight: int s_a dx, the generalised force of a uniform load of 1 N/m.
 Eigen::Vector4d uniform_load(double length);
 
 }  // namespace oblique::solver

@@ -10,12 +10,6 @@
 namespace oblique::solver {
 namespace {
 
-BandedMatrix with_unit_pin(Eigen::Index rows, double unit) {
-  BandedMatrix matrix(static_cast<std::size_t>(rows));
-  matrix.at(0, 0) = unit;
-  return matrix;
-}
-
 void add_element(BandedMatrix& matrix, const std::array<Eigen::Index, 4>& row,
                  const Eigen::Matrix4d& entries, double factor) {
   for (std::size_t a = 0; a < 4; ++a) {
@@ -48,11 +42,8 @@ bool is_above_eigenvalues(double lambda, const BandedMatrix& stiffness, const Ba
 }
 
 double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mass) {
-  const auto is_above = [&](double lambda) {
-    return is_above_eigenvalues(lambda, stiffness, mass);
-  };
   double high = 1.0;
-  while (!is_above(high)) {
+  while (!is_above_eigenvalues(high, stiffness, mass)) {
     high *= 4.0;
     if (!std::isfinite(high)) {
       throw InputError(
@@ -63,7 +54,7 @@ double largest_eigenvalue(const BandedMatrix& stiffness, const BandedMatrix& mas
   double low = 0.25 * high;
   while (high - low > kEigenvalueAccuracy * high) {
     const double middle = 0.5 * (low + high);
-    (is_above(middle) ? high : low) = middle;
+    (is_above_eigenvalues(middle, stiffness, mass) ? high : low) = middle;
   }
   return high;
 }
@@ -141,16 +132,12 @@ Coordinates ElementChain::node_positions_m(const Coordinates& q) const {
   return nodes;
 }
 
-Chain::Chain(const ModelParameters& model)
-    : ElementChain(model),
-      tip_mass_kg_(model.tip_mass_kg),
-      mass_(0),
-      mass_factor_(BandedMatrix(0)),
-      along_(0) {
+Chain::Chain(const ModelParameters& model) : ElementChain(model), tip_mass_kg_(model.tip_mass_kg) {
   number_rows(static_cast<std::size_t>(model.elements_per_link));
   add_loads(elements_.back().row[2] + 2, tip_mass_kg_);
-  mass_ = with_unit_pin(rows_, 1.0);
-  along_ = with_unit_pin(rows_, 0.0);
+  mass_ = BandedMatrix(static_cast<std::size_t>(rows_));
+  along_ = mass_;
+  mass_.at(0, 0) = 1.0;
   for (const Element& element : elements_) {
     const double length = length_of(element);
     add_element(mass_, element.row, mass_matrix(mass_per_length_, length), 1.0);
@@ -232,7 +219,7 @@ double Chain::tip_inertia_kg() const {
 }
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
-  // Across, the stiffness is the smaller by the axial part, so the highest frequency lies along.
+  // Without the axial part the stiffness across the chain is smaller.
   if (tip_stiffness_N_m == 0.0) {
     return std::sqrt(free_eigenvalue_);
   }
@@ -245,10 +232,10 @@ double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
   return std::sqrt(largest_eigenvalue(held, mass_));
 }
 
-/// Where a spring of that stiffness s at the tip lifts the largest eigenvalue to. It is the root of
+/// The largest eigenvalue with a spring of that stiffness s at the tip: the root of
 /// 1 / (e^T (lambda M - K)^-1 e) = s above that of the free chain. The left side rises with lambda
-/// and is concave, so Newton's steps stay below the root; each is the Rayleigh quotient of
-/// z = (lambda M - K)^-1 e, so it errs by no more than it is below.
+/// and is concave, so Newton's steps stay below the root. Each is the Rayleigh quotient of
+/// z = (lambda M - K)^-1 e.
 double Chain::risen_eigenvalue(double tip_stiffness_N_m) const {
   constexpr int kMostSteps = 30;
   const std::size_t tip = 2 * static_cast<std::size_t>(tip_row());

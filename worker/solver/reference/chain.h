@@ -15,41 +15,31 @@ namespace oblique::solver {
 /// Positions and slopes of a chain, or their rates: one a column, x above y.
 using Coordinates = Eigen::Matrix2Xd;
 
-/// Scratch memory, so that steps allocate nothing. No part of a state: a copy is empty, and
-/// assignment leaves it alone.
-struct StepRoom {
-  StepRoom() = default;
-  StepRoom(const StepRoom&) {}
-  StepRoom(StepRoom&&) noexcept = default;
-  StepRoom& operator=(const StepRoom&) { return *this; }
-  StepRoom& operator=(StepRoom&&) noexcept = default;
-  ~StepRoom() = default;
-
-  Coordinates vectors;
-  BandedLu<7> matrix;  ///< of ConstrainedChain
-};
-
 struct ChainState {
   double t_s = 0.0;  ///< since release
   Coordinates q;     ///< [m] and [-]
   Coordinates v;     ///< [m/s] and [1/s]
   // Of generalized-alpha; empty otherwise.
   Coordinates acceleration;  ///< q'' at t_s
-  /// (a - q'')/h: a_n is q'' a fixed part of a step away, so it is kept per second and serves a
-  /// next step of any length.
+  /// (a - q'')/h: a is q'' a fixed fraction of a step later, so this serves steps of any length.
   Coordinates algorithmic_offset_rate;
   Coordinates multipliers_N;     ///< a column a link
   bool has_offset_rate = false;  ///< false after a restart: the next step finds it
-  StepRoom room = {};
 };
 
-/// The elements of all links, and what follows from them however the links are joined: the columns
-/// of an element are given by the chain that derives from this. Immutable.
+struct Energies {
+  double kinetic_J;
+  double strain_J;   ///< 0 when unstressed
+  double gravity_J;  ///< 0 at the height of O
+};
+
+/// The elements of all links. The classes derived from this join the links: they assign the columns
+/// of Coordinates to elements. Immutable.
 class ElementChain {
  public:
   virtual ~ElementChain() = default;
 
-  /// Columns of Coordinates; those of this chain's matrices are as many.
+  /// Columns of Coordinates, and rows of this chain's matrices.
   Eigen::Index rows() const { return rows_; }
   Eigen::Index tip_row() const { return rows_ - 2; }
   std::size_t links() const { return constants_.size(); }
@@ -66,6 +56,9 @@ class ElementChain {
   /// Eq. 7, of all elements.
   double strain_energy_J(const Coordinates& q) const;
   double gravity_energy_J(const Coordinates& q) const { return -q.row(1).dot(weight_N_); }
+  Energies energies(const ChainState& state) const {
+    return {kinetic_energy_J(state.v), strain_energy_J(state.q), gravity_energy_J(state.q)};
+  }
   Eigen::Vector2d momentum_Ns(const Coordinates& v) const { return v * momentum_kg_; }
   /// O first, then the outer end of each element.
   Coordinates node_positions_m(const Coordinates& q) const;
@@ -76,14 +69,10 @@ class ElementChain {
     std::size_t link;
   };
 
-  /// Throws InputError when `model` is outside its domain. The elements are left to add.
+  /// Without elements. Throws InputError when `model` is outside its domain.
   explicit ElementChain(const ModelParameters& model);
-  ElementChain(const ElementChain&) = default;
-  ElementChain(ElementChain&&) = default;
-  ElementChain& operator=(const ElementChain&) = default;
-  ElementChain& operator=(ElementChain&&) = default;
 
-  /// Once all elements are there: gravity (eq. 12) and momentum.
+  /// After the elements: gravity (eq. 12) and momentum.
   void add_loads(Eigen::Index rows, double tip_mass_kg);
 
   ElementCoordinates coordinates_of(const Element& element, const Coordinates& q) const {
@@ -103,16 +92,15 @@ class ElementChain {
   std::vector<ElementConstants<double>> constants_;  ///< of an element of each link
   std::vector<Element> elements_;
   Eigen::VectorXd weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
-  Eigen::VectorXd momentum_kg_;  ///< what a rate adds to the momentum [kg] and [kg m]
+  Eigen::VectorXd momentum_kg_;  ///< momentum per rate, one a row [kg] and [kg m]
 };
 
-/// The chain with joints eliminated (eq. 13): links share the position of a joint and keep slopes
-/// of their own. Immutable; what changes is ChainState.
+/// The chain with joints eliminated (eq. 13): links share the position of a joint, and each has its
+/// own slope there. Immutable.
 ///
-/// Rows run along the chain so that each element owns four consecutive ones: the pin's position
-/// (row 0, held at zero), its slope, then position and slope of each node; at a joint the slope of
-/// the inner link, the position, the slope of the outer link. All matrices then have half-bandwidth
-/// 3. Both directions share one scalar matrix.
+/// Rows along the chain: the pin's position (row 0, held at zero), its slope, then position and
+/// slope of each node; at a joint the slope of the inner link, the position, the slope of the outer
+/// link. Each element has four consecutive rows, so all matrices have half-bandwidth 3.
 class Chain : public ElementChain {
  public:
   /// Throws InputError when `model` is outside its domain.
@@ -127,8 +115,7 @@ class Chain : public ElementChain {
   }
 
   double kinetic_energy_J(const Coordinates& v) const override;
-  /// Force on a link at its inner end (the pin or a joint), from the balance of its first node:
-  /// M q'' + dU/dq - Q there.
+  /// Force on a link at its inner end (the pin or a joint): M q'' + dU/dq - Q of its first node.
   Eigen::Vector2d inner_end_force(std::size_t link, const Coordinates& q,
                                   const Coordinates& acceleration) const;
 
@@ -136,8 +123,8 @@ class Chain : public ElementChain {
   /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
   double highest_frequency_rad_s(double tip_stiffness_N_m) const;
 
-  /// Mass that the tip shows to a sudden force across or along the chain [kg]: 1/(M^-1) at the tip,
-  /// tip_mass and about a sixteenth of the last element.
+  /// Inertia of the tip against a sudden force [kg]: 1/(M^-1) at the tip, which is the tip mass and
+  /// about a sixteenth of the last element.
   double tip_inertia_kg() const;
 
  private:
@@ -151,7 +138,7 @@ class Chain : public ElementChain {
   BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
-  double free_eigenvalue_ = 0.0;  ///< square of the highest frequency without springs
+  double free_eigenvalue_ = 0.0;  ///< square of the highest frequency without springs at the tip
 };
 
 }  // namespace oblique::solver

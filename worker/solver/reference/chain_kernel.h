@@ -4,11 +4,9 @@
 
 #include "worker/solver/reference/element_force.h"
 
-/// The innermost loops: the chain's accelerations for one number or a pack of lanes. Plain tables
-/// and templates over `Real` only, so that one source serves every instruction set: nothing here
-/// may call an ordinary inline function that other translation units share. `Constant` is a number,
-/// shared by all lanes, or a pack that gives each lane a chain of its own; with multiply-adds by
-/// name both round alike.
+/// The innermost loops: the chain's accelerations for numbers or packs of lanes, from plain tables.
+/// `Real` and `Constant` are those of element_force.h, and as there, nothing is shared with other
+/// translation units.
 namespace oblique::solver {
 
 /// Half-bandwidth of every matrix of the eliminated chain: an element spans four consecutive rows.
@@ -21,15 +19,15 @@ struct FactorRow {
   Constant inverse_pivot;
 };
 
-/// What the momentum of a link and all beyond it asks for besides the weights of its rows.
+/// Constants of the momentum balance of a link and all links beyond it.
 template <class Constant>
 struct LinkBalance {
-  Constant inner_end_kg;     ///< the link's own share of the row in which its inner end lies
+  Constant inner_end_kg;     ///< the link's own share of the row of its inner end
   Constant weight_beyond_N;  ///< of the link and all beyond it
 };
 
-/// What the loops read. Points into what it was made from (a Chain, LaneChains), which must outlive
-/// it. Elements of a link have one length: weights and momenta of the slopes between them are zero.
+/// Tables of a Chain or of LaneChains, which must outlive this. Elements of a link have one length,
+/// so weights and momenta of the slopes between them are zero.
 template <class Constant>
 struct ChainTables {
   std::size_t rows;
@@ -68,9 +66,8 @@ inline void put_pair(Real* values, std::size_t row, const PlanarVector<Real>& pa
   values[2 * row + 1] = pair.y;
 }
 
-/// L y = f, row by row downwards. The row just before comes last into each sum: what rows wait for
-/// is then one multiply-add. Component by component, here and below: compilers copy pairs of packs
-/// through memory.
+/// L y = f, row by row downwards. The row just before enters each sum last, so that a row waits for
+/// one multiply-add. By components, here and below: compilers copy pairs of packs through memory.
 template <class Real>
 class ForwardSubstitution {
  public:
@@ -104,7 +101,7 @@ class ForwardSubstitution {
 template <class Constant, class Real, class Take>
 inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
                             const Real* y, const Take& take) {
-  // Three rows a turn, each into the variables of the row three after it: nothing need be moved.
+  // Three rows a turn, each in the variables of the row three after it, so that none is moved.
   Real ax{}, ay{}, bx{}, by{}, cx{}, cy{};
   const auto next = [&](std::size_t row, Real& zx, Real& zy, const Real& x_1, const Real& y_1,
                         const Real& x_2, const Real& y_2) {
@@ -129,8 +126,8 @@ inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows,
   }
 }
 
-/// The way down: y = L^-1 (Q_gravity + S_tipᵀ F - dU/dq), forces and substitution in one pass along
-/// the chain. `q` and `y` have 2 rows entries. What it says of the pin's row has no meaning.
+/// Eqs. 9 to 13: y = L^-1 (Q_gravity + S_tipᵀ F - dU/dq), forces and substitution in one pass along
+/// the chain. `q` and `y` have 2 rows entries. The pin's row of `y` has no meaning.
 template <class Constant, class Real>
 inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q, const Real& ft_N,
                               const Real& fn_N, Real* y) {
@@ -170,8 +167,8 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
   }
 }
 
-/// The way up: q'' = L^-T D^-1 y, given to `take(row, x'', y'')` from the tip to the row after the
-/// pin, which does not move.
+/// q'' = L^-T D^-1 y, given to `take(row, x'', y'')` from the tip to the row after the pin, which
+/// does not move.
 template <class Constant, class Real, class Take>
 inline void substitute_accelerations(const ChainTables<Constant>& chain, const Real* y,
                                      const Take& take) {
@@ -191,8 +188,8 @@ inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* 
   put_pair(acceleration, 0, PlanarVector<Real>{});
 }
 
-/// Momentum of each link and all beyond it, x and y in turn, gathered as rates come row by row from
-/// the tip to the row after the pin.
+/// Sums the momentum of each link and all beyond it from rates that come row by row, from the tip
+/// to the row after the pin.
 template <class Constant, class Real>
 class LinkMomenta {
  public:
@@ -232,9 +229,9 @@ class LinkMomenta {
   PlanarVector<Real> sum_{};
 };
 
-/// Squared mean of the reaction on each link's inner end over a step of h seconds, one a link: the
-/// change of the momentum of all beyond it, less the impulses of the contact forces and of the
-/// weight, over h. Exact but for the step's own error.
+/// Squared mean of the reaction on each link's inner end over a step of h seconds: the change of
+/// the momentum of this and all outer links, less the impulses of contact forces and weight, over
+/// h.
 template <class Constant, class Real>
 inline void mean_reactions_squared(const ChainTables<Constant>& chain,
                                    const Real* momenta_before_Ns, const Real* momenta_after_Ns,

@@ -1,16 +1,6 @@
 #include "worker/solver/reference/constrained_chain.h"
 
-#include <array>
-
 namespace oblique::solver {
-namespace {
-
-/// Index of a row's x among the unknowns one by one.
-std::size_t unknown(Eigen::Index row) {
-  return 2 * static_cast<std::size_t>(row);
-}
-
-}  // namespace
 
 ConstrainedChain::ConstrainedChain(const ModelParameters& model)
     : ElementChain(model), tip_mass_kg_(model.tip_mass_kg) {
@@ -26,22 +16,6 @@ ConstrainedChain::ConstrainedChain(const ModelParameters& model)
   }
   joints_.front().before = -1;
   add_loads(row, tip_mass_kg_);
-}
-
-ChainState ConstrainedChain::from_eliminated(const ChainState& eliminated) const {
-  ChainState state = at_rest();
-  state.t_s = eliminated.t_s;
-  std::size_t left = 0;  // row of the inner node's position in the eliminated chain
-  for (std::size_t e = 0; e < elements_.size(); ++e) {
-    const Element& element = elements_[e];
-    const bool ends_at_joint = e + 1 < elements_.size() && elements_[e + 1].link != element.link;
-    const ElementRows rows = rows_of_element(left, ends_at_joint);
-    const std::array<std::size_t, 4> from{rows.p_i, rows.s_i, rows.p_j, rows.s_j};
-    state.q(Eigen::all, element.row) = eliminated.q(Eigen::all, from);
-    state.v(Eigen::all, element.row) = eliminated.v(Eigen::all, from);
-    left = rows.p_j;
-  }
-  return state;
 }
 
 void ConstrainedChain::add_inertia(const Coordinates& acceleration, Coordinates& residual) const {
@@ -80,17 +54,19 @@ void ConstrainedChain::set_constraints(const Coordinates& q, double factor,
   }
 }
 
-void ConstrainedChain::take_multipliers(Coordinates& unknowns, Coordinates& multipliers) const {
-  multipliers.resize(2, static_cast<Eigen::Index>(links()));
+Coordinates ConstrainedChain::take_multipliers(Coordinates& unknowns) const {
+  Coordinates multipliers(2, static_cast<Eigen::Index>(links()));
   for (std::size_t link = 0; link < links(); ++link) {
     multipliers.col(static_cast<Eigen::Index>(link)) = unknowns.col(multiplier_row(link));
     unknowns.col(multiplier_row(link)).setZero();
   }
+  return multipliers;
 }
 
 void ConstrainedChain::add_tangent(const Coordinates& q, double mass_factor,
                                    double stiffness_factor, Matrix& matrix) const {
-  const auto add_to_both = [&matrix](Eigen::Index row, Eigen::Index column, double value) {
+  const auto unknown = [](Eigen::Index row) { return 2 * static_cast<std::size_t>(row); };
+  const auto add_to_both = [&](Eigen::Index row, Eigen::Index column, double value) {
     matrix.add(unknown(row), unknown(column), value);
     matrix.add(unknown(row) + 1, unknown(column) + 1, value);
   };
@@ -100,7 +76,7 @@ void ConstrainedChain::add_tangent(const Coordinates& q, double mass_factor,
       tangent +=
           stiffness_factor * elastic_tangent(coordinates_of(element, q), constants_of(element));
     }
-    matrix.add_block(unknown(element.row[0]), unknown(element.row[0]), tangent);
+    matrix.add_block(unknown(element.row[0]), tangent);
   }
   add_to_both(tip_row(), tip_row(), mass_factor * tip_mass_kg_);
   for (const Joint& joint : joints_) {

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <type_traits>
 #include <vector>
 
 #include "worker/solver/model/parameters.h"
@@ -11,28 +10,23 @@
 
 namespace oblique::solver {
 
-/// The chain as the paper has it: every link with nodes of its own, the pin and the joints as
-/// constraints Phi(q) = 0, multipliers lambda as unknowns:
+/// The chain of the paper: every link has its own nodes, pin and joints are constraints:
 ///
-///   M q'' + Phi_qᵀ lambda + dU/dq = Q + F_c,   Phi(q) = 0        (paper, eqs. 14 to 16)
+///   M q'' + Phi_qᵀ lambda + dU/dq = Q + F_c,   Phi(q) = 0        (eqs. 14 to 16)
 ///
 /// Unknowns are interleaved along the chain, so that every matrix is banded: for each link the
-/// multiplier of its inner end, then position and slope of each node, each x before y. Coordinates
-/// of this chain have a column for each of these, with zeros at the multipliers' places.
+/// multiplier of its inner end, then position and slope of each node. Coordinates have a column for
+/// each of these, with zeros for the multipliers.
 class ConstrainedChain : public ElementChain {
  public:
-  /// An element spans eight unknowns; a multiplier reaches five back, over the last node before it.
+  /// An element has eight unknowns; a multiplier reaches five back, to the last node before it.
   static constexpr std::size_t kBandwidth = 7;
   using Matrix = BandedLu<kBandwidth>;
-  static_assert(std::is_same_v<Matrix, decltype(StepRoom::matrix)>);
 
   /// Throws InputError when `model` is outside its domain.
   explicit ConstrainedChain(const ModelParameters& model);
 
   Eigen::Index multiplier_row(std::size_t link) const { return joints_[link].multiplier; }
-
-  /// The state of the eliminated chain `eliminated`, read in these coordinates.
-  ChainState from_eliminated(const ChainState& eliminated) const;
 
   /// residual += M q''.
   void add_inertia(const Coordinates& acceleration, Coordinates& residual) const;
@@ -42,8 +36,8 @@ class ConstrainedChain : public ElementChain {
   void add_constraint_forces(const Coordinates& multipliers_N, Coordinates& residual) const;
   /// residual = factor Phi(q) in the rows of multipliers.
   void set_constraints(const Coordinates& q, double factor, Coordinates& residual) const;
-  /// Takes the multipliers out of a vector of unknowns, a column a link, and leaves zeros.
-  void take_multipliers(Coordinates& unknowns, Coordinates& multipliers) const;
+  /// The multipliers among the unknowns, a column a link; sets them to zero there.
+  Coordinates take_multipliers(Coordinates& unknowns) const;
 
   /// matrix += mass_factor M + stiffness_factor d2U/dq2(q) + Phi_q and its transpose.
   void add_tangent(const Coordinates& q, double mass_factor, double stiffness_factor,

@@ -34,12 +34,8 @@ Contact::Contact(const ContactParameters& parameters, const TipState& touch,
       record_(law_, touch),
       margin_(law_, touch) {}
 
-double Contact::phi(ContactEvent event, const TipState& tip) const {
-  return event_function(law_, event, tip, vt_sign_).value;
-}
-
-std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, double h_s) const {
-  std::optional<Candidate> earliest;
+std::optional<EventGuess> Contact::earliest_event(const TipState& end, double h_s) const {
+  std::optional<EventGuess> earliest;
   if (is_far_from_events(law_, tip_, end, h_s, vt_sign_)) {
     return earliest;
   }
@@ -52,8 +48,8 @@ std::optional<Contact::Candidate> Contact::earliest_event(const TipState& end, d
     if (!guess || (guess->inside_only && (refuted_ & bit(event)) != 0)) {
       continue;
     }
-    if (!earliest || guess->fraction * h_s < earliest->guess.fraction * h_s - kSimultaneous_s) {
-      earliest = Candidate{event, *guess};
+    if (!earliest || guess->fraction * h_s < earliest->fraction * h_s - kSimultaneous_s) {
+      earliest = guess;
     }
   }
   return earliest;
@@ -64,64 +60,43 @@ bool Contact::judge(const TipState& end, const ContactIntegrals<double>& integra
     throw SolveError("the contact diverged after " + readable_number(t_s_) +
                      " s with dt = " + readable_number(full_step_s()) + " s");
   }
-  switch (search_.seeking) {
-    case Seeking::kNothing:
-      return judge_advance(end, integrals);
-    case Seeking::kPeak:
-      return judge_peak(end);
-    case Seeking::kCrossing:
-      return judge_crossing(end, integrals);
+  if (search_.seeking == Seeking::kPeak) {
+    const bool has_crossed = event_function(law_, search_.event, end, vt_sign_).value >= 0.0;
+    search_.seeking = has_crossed ? Seeking::kCrossing : Seeking::kNothing;
+    trial_s_ = has_crossed ? search_.guess_s : search_.full_s;
+    refuted_ |= has_crossed ? 0U : bit(search_.event);
+    return false;
   }
-  return false;
-}
-
-bool Contact::judge_advance(const TipState& end, const ContactIntegrals<double>& integrals) {
-  if (const auto candidate = earliest_event(end, trial_s_)) {
-    start_search(*candidate, trial_s_);
+  if (search_.seeking == Seeking::kCrossing) {
+    return judge_crossing(end, integrals);
+  }
+  if (const auto guess = earliest_event(end, trial_s_)) {
+    start_search(*guess, trial_s_);
     return false;
   }
   accept(end, integrals);
   return true;
 }
 
-void Contact::start_search(const Candidate& candidate, double h_s) {
-  const EventGuess& guess = candidate.guess;
+void Contact::start_search(const EventGuess& guess, double h_s) {
   search_ = Search{};
-  search_.event = candidate.event;
+  search_.seeking = guess.inside_only ? Seeking::kPeak : Seeking::kCrossing;
+  search_.event = guess.event;
   search_.slope = guess.slope / h_s;
   search_.full_s = h_s;
   search_.guess_s = guess.fraction * h_s;
-  if (guess.inside_only) {
-    search_.seeking = Seeking::kPeak;
-    search_.high_s = guess.peak_fraction * h_s;
-    trial_s_ = search_.high_s;
-  } else {
-    search_.seeking = Seeking::kCrossing;
-    search_.high_s = h_s;
-    trial_s_ = search_.guess_s;
-  }
-}
-
-bool Contact::judge_peak(const TipState& end) {
-  if (phi(search_.event, end) >= 0.0) {
-    search_.seeking = Seeking::kCrossing;
-    trial_s_ = search_.guess_s;
-  } else {
-    refuted_ |= bit(search_.event);
-    search_.seeking = Seeking::kNothing;
-    trial_s_ = search_.full_s;
-  }
-  return false;
+  search_.high_s = guess.inside_only ? guess.peak_fraction * h_s : h_s;
+  trial_s_ = guess.inside_only ? search_.high_s : search_.guess_s;
 }
 
 bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals) {
   const double t = trial_s_;
-  // Over a shorter time the mean of a velocity is rounding alone, and what follows from it would
-  // take what has just happened for an event again.
+  // Over a shorter time the mean of a velocity is rounding, and the last event would be found
+  // again.
   if (t > kSimultaneous_s) {
     const auto first = earliest_event(end, t);
     if (first && first->event != search_.event &&
-        (first->guess.fraction * t < t - kSimultaneous_s || first->event < search_.event)) {
+        (first->fraction * t < t - kSimultaneous_s || first->event < search_.event)) {
       start_search(*first, t);
       return false;
     }

@@ -9,24 +9,23 @@
 
 namespace oblique::solver {
 
-/// One contact from touch to separation as a machine that any integrator drives. The integrator
-/// keeps the state at the last accepted instant; the machine says how far to step from there and
-/// under which forces, then judges the end of the step:
+/// One contact from touch to separation, as a state machine that any integrator drives. The
+/// integrator keeps the state at the last accepted instant. The machine gives the length of the
+/// next step and its forces, then judges the end of the step:
 ///
 ///   while (!contact.finished()) {
 ///     step a copy of the accepted state by contact.trial_step_s() under contact.force();
 ///     if (contact.judge(tip, integrals)) make the copy the accepted state;
 ///   }
 ///
-/// A step that passes an event is refused and a shorter one asked for until the event falls on the
-/// step's end. The machine sees nothing but the tip.
+/// A step that passes an event is refused; shorter ones follow until the event is at a step's end.
 class Contact {
  public:
-  /// Stated time within which a contact must end [s].
+  /// Time within which a contact must end [s].
   static constexpr double kLongest_s = 20e-3;
-  /// Most events of one contact; more means that states follow each other without time passing.
+  /// More events mean that states follow each other without time passing.
   static constexpr int kMostEvents = 10'000;
-  /// Most steps of one contact, ten thousand times what the default step takes.
+  /// Ten thousand times the steps that a contact takes by default.
   static constexpr std::int64_t kMostSteps = 5'000'000;
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
@@ -40,13 +39,13 @@ class Contact {
   /// contact outlasts kLongest_s, or has more than kMostEvents events or kMostSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
-  /// Whether the last accepted step ended at the first turn. Up to there e* has no say.
+  /// Whether the last accepted step ended at the first turn. Up to there e* has no effect.
   bool is_at_first_turn() const { return record_.turned_once_at(t_s_); }
-  /// This contact with another e* and its steps: the same as one that had them from touch on. Only
-  /// at the first turn; the step in compression must be the same.
+  /// This contact with another e* and other steps in restitution, as if it had them from touch on.
+  /// Only at the first turn.
   Contact branched(double e_star, const ContactSteps& steps) const;
 
-  /// What has been gathered so far; whole once finished.
+  /// Complete once finished.
   const ContactRecord& record() const { return record_; }
   const ContactMargin& margin() const { return margin_; }
   double time_s() const { return t_s_; }
@@ -65,23 +64,16 @@ class Contact {
     double slope = 0.0;    ///< d phi / dt near the crossing
     double last_s = -1.0;  ///< the last trial, < 0 before the first
     double last_value = 0.0;
-    double full_s = 0.0;   ///< the step in which the event was seen
+    double full_s = 0.0;   ///< the step in which the event was found
     double guess_s = 0.0;  ///< where the polynomial crosses
   };
-  struct Candidate {
-    ContactEvent event;
-    EventGuess guess;
-  };
 
-  std::optional<Candidate> earliest_event(const TipState& end, double h_s) const;
-  bool judge_advance(const TipState& end, const ContactIntegrals<double>& integrals);
-  bool judge_peak(const TipState& end);
+  std::optional<EventGuess> earliest_event(const TipState& end, double h_s) const;
   bool judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals);
-  void start_search(const Candidate& candidate, double h_s);
+  void start_search(const EventGuess& guess, double h_s);
   double full_step_s() const;
   void accept(const TipState& end, const ContactIntegrals<double>& integrals);
   void happen(ContactEvent event);
-  double phi(ContactEvent event, const TipState& tip) const;
 
   ContactLaw law_;
   ContactSteps steps_s_;

@@ -23,11 +23,8 @@ void ContactLaw::enter(PhaseKind phase) {
 }
 
 AffineContactForce<double> ContactLaw::affine() const {
-  AffineContactForce<double> force;
-  force.x0 = x_anchor_m_;
-  force.y0 = y_anchor_m_;
-  force.fn0 = fn_anchor_N_;
-  force.k_nn = normal_stiffness_N_m();
+  AffineContactForce<double> force{
+      .fn0 = fn_anchor_N_, .k_nn = normal_stiffness_N_m_, .x0 = x_anchor_m_, .y0 = y_anchor_m_};
   if (stick_) {
     force.ft0 = ft_anchor_N_;
     force.k_tt = tangential_stiffness_N_m();

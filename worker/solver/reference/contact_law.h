@@ -3,9 +3,9 @@
 #include "worker/solver/model/case_result.h"
 #include "worker/solver/reference/tip.h"
 
-/// The local compliant contact model: the tip R hangs on a bilinear normal and a linear tangential
-/// element from a massless particle P, which sticks to the ground or slides under Coulomb friction.
-/// Forces here act on the tip: F_n >= 0 upwards, F_t along x.
+/// The local compliant contact model: a bilinear normal and a linear tangential spring between the
+/// tip R and a massless particle P, which sticks to the ground or slides under Coulomb friction.
+/// Forces act on the tip: F_n >= 0 upwards, F_t along x.
 namespace oblique::solver {
 
 /// What is fixed during a contact.
@@ -16,7 +16,7 @@ struct ContactParameters {
   double e_star;  ///< Stronge's energetic restitution; stiffness in restitution is k / e*^2
 };
 
-/// Step lengths of one contact. The stiffer spring of restitution asks for shorter steps.
+/// Step lengths of one contact. The spring is stiffer in restitution.
 struct ContactSteps {
   double compression_s;
   double restitution_s;
@@ -60,24 +60,26 @@ class ContactLaw {
   double ux_m(const TipState& tip) const { return -ft_N(tip) / tangential_stiffness_N_m(); }
   /// Position of P along the ground [m].
   double xP_m(const TipState& tip) const { return tip.x_m - ux_m(tip); }
-  /// Eq. 24, the velocity that P has in slip: V_t + s mu eta2 (k_n/k) V_n.
-  double slip_velocity_m_s(const TipState& tip) const {
-    return tip.vx_m_s + s_ * slip_coupling_ * tip.vy_m_s;
+  /// Eq. 24: P's velocity in slip, V_t + s mu eta2 (k_n/k) V_n.
+  double slip_velocity_m_s(const TipState& tip) const { return s_ * slip_speed_m_s(tip, s_); }
+  /// P's speed in `direction` (1 or -1), if it slid in that direction.
+  double slip_speed_m_s(const TipState& tip, double direction) const {
+    return direction * tip.vx_m_s + slip_coupling_ * tip.vy_m_s;
   }
 
-  /// The laws as the integrators take them.
+  /// Eq. 16: the laws as affine functions of the tip's position.
   AffineContactForce<double> affine() const;
 
-  /// Makes e* another one, from here on.
+  /// Changes e* from here on.
   void set_restitution(double e_star) {
     parameters_.e_star = e_star;
     enter(phase_);
   }
   /// Eq. 22: compression becomes restitution, or the other way; forces are continuous.
   void turn(const TipState& tip);
-  /// P starts to slide in `direction`, 1 or -1 along x; the friction force is against it.
+  /// Eq. 23: P starts to slide in `direction`, 1 or -1 along x, against the friction force.
   void start_slip(const TipState& tip, double direction);
-  /// P comes to rest. Without friction there is no cone to stick in: P reverses instead.
+  /// Eq. 24: P comes to rest; without friction it reverses instead.
   void stop_slip(const TipState& tip);
 
  private:

@@ -1,14 +1,12 @@
 #pragma once
 
-/// The elastic force of the beam element and its derivatives: one source for numbers, for packs of
-/// lanes and, as `Constant`, for constants that all lanes share or each lane has for itself.
-/// Without Eigen, and without any function that other translation units share: kernels are compiled
-/// once for each instruction set.
+/// The elastic force of the beam element and its tangent: one source for numbers and packs of lanes
+/// (`Real`), with constants that are shared by all lanes or differ (`Constant`). Kernels are
+/// compiled once for each instruction set, so nothing here is shared with other translation units.
 namespace oblique::solver {
 
-/// c + a b. Multiply-adds are called by name, so that which operations round once is written here
-/// and not left to a compiler, whose choice may differ from one instance of a template to the next.
-/// For numbers it is what the compiler makes of it; packs have their own in lane_pack.h.
+/// c + a b. Multiply-adds are named, since compilers would fuse different ones in each instance of
+/// a template. Packs have fused ones in lane_pack.h.
 template <class C, class A, class B>
 inline auto plus_product(const C& c, const A& a, const B& b) {
   return c + a * b;
@@ -67,7 +65,7 @@ constexpr double legendre_p2(double zeta) {
   return 1.5 * zeta * zeta - 0.5;
 }
 
-/// What forces, tangent and mass of an element need; all elements of a link have one.
+/// Constants of the forces, tangent and mass of each element of a link.
 template <class Constant>
 struct ElementConstants {
   // Of elastic_forces().
@@ -89,8 +87,8 @@ struct ElementConstants {
   Constant n_ss;  ///< -(s_i with s_j)
 };
 
-/// What one element's strain energy U does: -dU/dq is pull on p_i, -pull on p_j, by_d - by_t on s_i
-/// and -by_d - by_t on s_j.
+/// Derivatives of one element's strain energy U: -dU/dq is pull on p_i, -pull on p_j, by_d - by_t
+/// on s_i and -by_d - by_t on s_j.
 template <class Real>
 struct ElasticForces {
   PlanarVector<Real> pull;
@@ -144,12 +142,30 @@ inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
           {by_t.x, by_t.y}};
 }
 
+/// A symmetric matrix of 2 x 2.
 template <class Real>
 struct SymmetricPair {
   Real xx;
   Real xy;
   Real yy;
+
+  friend inline SymmetricPair operator+(const SymmetricPair& A, const SymmetricPair& B) {
+    return {A.xx + B.xx, A.xy + B.xy, A.yy + B.yy};
+  }
+  friend inline SymmetricPair operator-(const SymmetricPair& A, const SymmetricPair& B) {
+    return {A.xx - B.xx, A.xy - B.xy, A.yy - B.yy};
+  }
+  template <class Constant>
+  friend inline SymmetricPair operator*(const Constant& a, const SymmetricPair& B) {
+    return {a * B.xx, a * B.xy, a * B.yy};
+  }
 };
+
+template <class Real>
+inline SymmetricPair<Real> plus_product(const SymmetricPair<Real>& C, double a,
+                                        const SymmetricPair<Real>& B) {
+  return {plus_product(C.xx, a, B.xx), plus_product(C.xy, a, B.xy), plus_product(C.yy, a, B.yy)};
+}
 
 /// The blocks of d2U/dq2 that differ, each symmetric: p_j p_j is pp, p_i p_j is -pp, p_j s_i is
 /// -ps_i, p_j s_j is -ps_j.
@@ -162,12 +178,6 @@ struct TangentBlocks {
   SymmetricPair<Real> ss_ij;
   SymmetricPair<Real> ss_jj;
 };
-
-namespace tangent_detail {
-
-using Gauss = GaussRule;
-inline constexpr double kOuterP2 = legendre_p2(Gauss::outer);
-inline constexpr double kInnerP2 = legendre_p2(Gauss::inner);
 
 /// f (a aT + b bT).
 template <class Real>
@@ -185,106 +195,71 @@ inline SymmetricPair<Real> mixed(const Real& f, const PlanarVector<Real>& a,
   return {twice * (a.x * b.x), f * plus_product(a.x * b.y, a.y, b.x), twice * (a.y * b.y)};
 }
 
-/// a A + b B.
+/// G + (tr(G)/2 + more) I.
 template <class Real>
-inline SymmetricPair<Real> sum(double a, const SymmetricPair<Real>& A, double b,
-                               const SymmetricPair<Real>& B) {
-  return {plus_product(b * B.xx, a, A.xx), plus_product(b * B.xy, a, A.xy),
-          plus_product(b * B.yy, a, A.yy)};
+inline SymmetricPair<Real> with_trace(const SymmetricPair<Real>& G, const Real& more) {
+  const Real trace = plus_product(more, 0.5, G.xx + G.yy);
+  return {G.xx + trace, G.xy, G.yy + trace};
 }
-
-/// C + c D + (tr(C + c D)/2 + more) I.
-template <class Real>
-inline SymmetricPair<Real> with_trace(const SymmetricPair<Real>& C, double c,
-                                      const SymmetricPair<Real>& D, const Real& more) {
-  const Real xx = plus_product(C.xx, c, D.xx);
-  const Real yy = plus_product(C.yy, c, D.yy);
-  const Real trace = plus_product(more, 0.5, xx + yy);
-  return {xx + trace, plus_product(C.xy, c, D.xy), yy + trace};
-}
-
-/// Tangent in the coefficients of the gradient.
-template <class Real>
-struct GradientTangent {
-  SymmetricPair<Real> c00;
-  SymmetricPair<Real> c01;
-  SymmetricPair<Real> c02;
-  SymmetricPair<Real> c11;
-  SymmetricPair<Real> c12;
-  SymmetricPair<Real> c22;
-};
-
-template <class Real, class Constant>
-inline GradientTangent<Real> gradient_tangent(const PlanarVector<Real>& c0,
-                                              const PlanarVector<Real>& c1,
-                                              const PlanarVector<Real>& c2,
-                                              const ElementConstants<Constant>& k) {
-  using Vector = PlanarVector<Real>;
-  // r' = even +- odd at +-zeta.
-  const Vector outer_even = plus_product(c0, kOuterP2, c2);
-  const Vector inner_even = plus_product(c0, kInnerP2, c2);
-  const Vector centre = less_product(c0, 0.5, c2);
-  const Vector outer_odd = Gauss::outer * c1;
-  const Vector inner_odd = Gauss::inner * c1;
-  const Real outer = Gauss::outer_weight * k.axial;
-  const Real inner = Gauss::inner_weight * k.axial;
-  const SymmetricPair<Real> Mo = squares(outer, outer_even, outer_odd);
-  const SymmetricPair<Real> Mi = squares(inner, inner_even, inner_odd);
-  const SymmetricPair<Real> Mc = squares(0.25 * Gauss::centre_weight * k.axial, centre, centre);
-  const SymmetricPair<Real> Oo = mixed(outer, outer_even, outer_odd);
-  const SymmetricPair<Real> Oi = mixed(inner, inner_even, inner_odd);
-  const Real none = k.axial - k.axial;
-  return {with_trace(sum(1.0, Mo, 1.0, Mi), 1.0, Mc, -0.5 * k.axial),
-          with_trace(sum(Gauss::outer, Oo, Gauss::inner, Oi), 0.0, Mc, none),
-          with_trace(sum(kOuterP2, Mo, kInnerP2, Mi), -0.5, Mc, none),
-          with_trace(sum(Gauss::outer * Gauss::outer, Mo, Gauss::inner * Gauss::inner, Mi), 0.0, Mc,
-                     2.0 * k.bending - (1.0 / 6.0) * k.axial),
-          with_trace(sum(Gauss::outer * kOuterP2, Oo, Gauss::inner * kInnerP2, Oi), 0.0, Mc, none),
-          with_trace(sum(kOuterP2 * kOuterP2, Mo, kInnerP2 * kInnerP2, Mi), 0.25, Mc,
-                     6.0 * k.bending - 0.1 * k.axial)};
-}
-
-/// The blocks' entries of one kind (xx, xy or yy) from those of the gradient's tangent: with
-/// dc0 = (dp_j - dp_i)/l, dc1 = (ds_j - ds_i)/2, dc2 = (ds_i + ds_j)/2 - dc0.
-template <class Real, class Constant>
-inline void put_entries(const GradientTangent<Real>& g, const Constant& inverse_length,
-                        Real SymmetricPair<Real>::*entry, TangentBlocks<Real>& blocks) {
-  const Real c12 = g.c12.*entry;
-  const Real along = g.c01.*entry - c12;
-  const Real across = g.c02.*entry - g.c22.*entry;
-  const Real half = 0.5 * inverse_length;
-  blocks.pp.*entry = inverse_length * inverse_length * ((g.c00.*entry - g.c02.*entry) - across);
-  blocks.ps_i.*entry = half * (along - across);
-  blocks.ps_j.*entry = (0.0 - half) * (along + across);
-  const Real ends = 0.25 * (g.c11.*entry + g.c22.*entry);
-  blocks.ss_ii.*entry = less_product(ends, 0.5, c12);
-  blocks.ss_jj.*entry = plus_product(ends, 0.5, c12);
-  blocks.ss_ij.*entry = 0.25 * (g.c22.*entry - g.c11.*entry);
-}
-
-}  // namespace tangent_detail
 
 /// The derivative of elastic_forces(): with coefficients c_a of the gradient and S = EA l,
 ///
 ///   d2U/dc_a dc_b = G_ab + (tr G_ab - S/2 int P_a P_b dzeta)/2 I + bending,
 ///   G_ab = S/2 int P_a P_b r' r'T dzeta over [-1, 1],
 ///
-/// by five Gauss points, which are exact.
+/// by five Gauss points, which are exact: the centre and two pairs +-zeta, where r' = even +- odd.
+/// Then in coordinates, by dc0 = (dp_j - dp_i)/l, dc1 = (ds_j - ds_i)/2, dc2 = (ds_i + ds_j)/2 -
+/// dc0.
 template <class Real, class Constant>
 inline TangentBlocks<Real> element_tangent(const PlanarVector<Real>& p_i,
                                            const PlanarVector<Real>& s_i,
                                            const PlanarVector<Real>& p_j,
                                            const PlanarVector<Real>& s_j,
                                            const ElementConstants<Constant>& k) {
-  const PlanarVector<Real> c0 = k.inverse_length * (p_j - p_i);
-  const PlanarVector<Real> c1 = 0.5 * (s_j - s_i);
-  const PlanarVector<Real> c2 = 0.5 * (s_i + s_j) - c0;
-  const tangent_detail::GradientTangent<Real> g = tangent_detail::gradient_tangent(c0, c1, c2, k);
-  TangentBlocks<Real> blocks;
-  tangent_detail::put_entries(g, k.inverse_length, &SymmetricPair<Real>::xx, blocks);
-  tangent_detail::put_entries(g, k.inverse_length, &SymmetricPair<Real>::xy, blocks);
-  tangent_detail::put_entries(g, k.inverse_length, &SymmetricPair<Real>::yy, blocks);
-  return blocks;
+  using Vector = PlanarVector<Real>;
+  using Matrix = SymmetricPair<Real>;
+  constexpr double kOuter = GaussRule::outer;
+  constexpr double kInner = GaussRule::inner;
+  constexpr double kOuterP2 = legendre_p2(kOuter);
+  constexpr double kInnerP2 = legendre_p2(kInner);
+  const Vector c0 = k.inverse_length * (p_j - p_i);
+  const Vector c1 = 0.5 * (s_j - s_i);
+  const Vector c2 = 0.5 * (s_i + s_j) - c0;
+  const Vector outer_even = plus_product(c0, kOuterP2, c2);
+  const Vector inner_even = plus_product(c0, kInnerP2, c2);
+  const Vector centre = less_product(c0, 0.5, c2);
+  const Vector outer_odd = kOuter * c1;
+  const Vector inner_odd = kInner * c1;
+  const Real outer = GaussRule::outer_weight * k.axial;
+  const Real inner = GaussRule::inner_weight * k.axial;
+  const Matrix Mo = squares(outer, outer_even, outer_odd);
+  const Matrix Mi = squares(inner, inner_even, inner_odd);
+  const Matrix Mc = squares(0.25 * GaussRule::centre_weight * k.axial, centre, centre);
+  const Matrix Oo = mixed(outer, outer_even, outer_odd);
+  const Matrix Oi = mixed(inner, inner_even, inner_odd);
+  const auto sum = [](double a, const Matrix& A, double b, const Matrix& B) {
+    return plus_product(b * B, a, A);
+  };
+  const Real none = k.axial - k.axial;
+  const Matrix g00 = with_trace(plus_product(Mo + Mi, 1.0, Mc), -0.5 * k.axial);
+  const Matrix g01 = with_trace(sum(kOuter, Oo, kInner, Oi), none);
+  const Matrix g02 = with_trace(plus_product(sum(kOuterP2, Mo, kInnerP2, Mi), -0.5, Mc), none);
+  const Matrix g11 = with_trace(sum(kOuter * kOuter, Mo, kInner * kInner, Mi),
+                                2.0 * k.bending - (1.0 / 6.0) * k.axial);
+  const Matrix g12 = with_trace(sum(kOuter * kOuterP2, Oo, kInner * kInnerP2, Oi), none);
+  const Matrix g22 =
+      with_trace(plus_product(sum(kOuterP2 * kOuterP2, Mo, kInnerP2 * kInnerP2, Mi), 0.25, Mc),
+                 6.0 * k.bending - 0.1 * k.axial);
+  const Matrix along = g01 - g12;
+  const Matrix across = g02 - g22;
+  const Matrix ends = 0.25 * (g11 + g22);
+  const Constant half = 0.5 * k.inverse_length;
+  return {.pp = k.inverse_length * k.inverse_length * ((g00 - g02) - across),
+          .ps_i = half * (along - across),
+          .ps_j = (0.0 - half) * (along + across),
+          .ss_ii = plus_product(ends, -0.5, g12),
+          .ss_ij = 0.25 * (g22 - g11),
+          .ss_jj = plus_product(ends, 0.5, g12)};
 }
 
 }  // namespace oblique::solver

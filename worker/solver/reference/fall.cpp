@@ -11,12 +11,10 @@
 namespace oblique::solver {
 namespace {
 
-/// Most states kept. A state costs 32 bytes a row; when there are more, every other one goes.
+/// Most states kept. A state has 32 bytes a row; when there are more, every other one is dropped.
 constexpr std::size_t kMostKept = 4096;
-/// Steps in sqrt(2 length / g) beyond which a fall is not begun: it would take hours.
+/// More steps in sqrt(2 length/g) would take hours.
 constexpr double kMostSteps = 1e9;
-
-constexpr AffineContactForce<double> kNoContact{};
 
 }  // namespace
 
@@ -45,7 +43,7 @@ SteppedFall::SteppedFall(std::shared_ptr<const Motion> motion, double dt_s, doub
 }
 
 bool SteppedFall::is_over_after_next(const TipState& tip) {
-  // Times are products, not sums: a long fall would otherwise gather rounding.
+  // Times are products, since sums would accumulate rounding.
   const double t_s = time_s(++step_);
   if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m_) {
     throw SolveError("the fall diverged at t = " + readable_number(t_s) +
@@ -135,17 +133,15 @@ ChainState SteppedFall::state_at_time(double t_s) const {
 }
 
 std::size_t SteppedFall::bytes() const {
-  const auto numbers = [](const ChainState& state) {
-    return state.q.size() + state.v.size() + state.acceleration.size() +
-           state.algorithmic_offset_rate.size() + state.multipliers_N.size();
-  };
-  const auto a_state = static_cast<std::size_t>(numbers(kept_.front())) * sizeof(double);
-  return kept_.size() * (sizeof(ChainState) + a_state);
+  const ChainState& state = kept_.front();
+  const auto numbers = state.q.size() + state.v.size() + state.acceleration.size() +
+                       state.algorithmic_offset_rate.size() + state.multipliers_N.size();
+  return kept_.size() * (sizeof(ChainState) + static_cast<std::size_t>(numbers) * sizeof(double));
 }
 
 ChainState SteppedFall::locate(double H_m, const ChainState& before) const {
-  // Newton on the drop, kept inside the step; near the largest drop, where the speed vanishes, it
-  // falls back on bisection.
+  // Newton on the drop, bracketed by the step; bisection near the largest drop, where the speed
+  // vanishes.
   double low = 0.0;
   double high = dt_s_;
   double h = 0.5 * dt_s_;
@@ -176,7 +172,7 @@ std::shared_ptr<const Fall> solve_stepped_fall(const std::shared_ptr<const Motio
   ChainState before = motion->at_rest();
   ChainState state = before;
   for (;;) {
-    motion->step(before, {}, dt_s, state);
+    motion->step(before, kNoContact, dt_s, state);
     if (fall->is_over_after_next(motion->tip(state))) {
       fall->end(before);
       return fall;

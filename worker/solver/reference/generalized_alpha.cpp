@@ -21,7 +21,6 @@ Eigen::Matrix2d contact_stiffness(const AffineContactForce<double>& force) {
   return Eigen::Matrix2d{{force.k_tt, force.k_tn}, {0.0, force.k_nn}};
 }
 
-/// Solves for all unknowns in place.
 void solve(const ConstrainedChain::Matrix& factored, Coordinates& unknowns) {
   factored.solve(std::span(unknowns.data(), static_cast<std::size_t>(unknowns.size())));
 }
@@ -31,9 +30,8 @@ Eigen::RowVectorXd inverse_scale(const ConstrainedChain& chain, const ModelParam
       *std::min_element(model.lengths_m.begin(), model.lengths_m.end()) / model.elements_per_link;
   Eigen::RowVectorXd scale = Eigen::RowVectorXd::Ones(chain.rows());
   for (std::size_t link = 0; link < chain.links(); ++link) {
-    for (int node = 0; node <= model.elements_per_link; ++node) {
-      scale(chain.multiplier_row(link) + 1 + 2 * node) = 1.0 / element_length_m;
-    }
+    const Eigen::Index first = chain.multiplier_row(link) + 1;
+    scale(Eigen::seqN(first, model.elements_per_link + 1, 2)).setConstant(1.0 / element_length_m);
   }
   return scale;
 }
@@ -49,19 +47,21 @@ ChainState GeneralizedAlphaMotion::at_rest() const {
   return state;
 }
 
-Energies GeneralizedAlphaMotion::energies(const ChainState& state) const {
-  return {chain_.kinetic_energy_J(state.v), chain_.strain_energy_J(state.q),
-          chain_.gravity_energy_J(state.q)};
+ConstrainedChain::Matrix GeneralizedAlphaMotion::factored_matrix(
+    const AffineContactForce<double>& force, double mass_factor, double stiffness_factor,
+    const ChainState& state) const {
+  ConstrainedChain::Matrix matrix(static_cast<std::size_t>(2 * chain_.rows()));
+  chain_.add_tangent(state.q, mass_factor, stiffness_factor, matrix);
+  matrix.add_block(2 * static_cast<std::size_t>(chain_.tip_row()),
+                   (stiffness_factor * contact_stiffness(force)).eval());
+  if (!matrix.factor()) {
+    throw SolveError("the matrix of accelerations and constraint forces is singular");
+  }
+  return matrix;
 }
 
 void GeneralizedAlphaMotion::restart(const AffineContactForce<double>& force,
                                      ChainState& state) const {
-  ConstrainedChain::Matrix& matrix = state.room.matrix;
-  matrix.set_zero(static_cast<std::size_t>(2 * chain_.rows()));
-  chain_.add_tangent(state.q, 1.0, 0.0, matrix);
-  if (!matrix.factor()) {
-    throw SolveError("the constraints of this chain are not independent");
-  }
   // M q'' + Phi_qᵀ lambda = Q + F_c - dU/dq, Phi_q q'' = 0.
   const Eigen::Index tip = chain_.tip_row();
   Coordinates& unknowns = state.acceleration;
@@ -69,33 +69,13 @@ void GeneralizedAlphaMotion::restart(const AffineContactForce<double>& force,
   chain_.add_elastic_and_gravity(state.q, unknowns);
   unknowns.col(tip) -= contact_force(force, state.q.col(tip));
   unknowns = -unknowns;
-  solve(matrix, unknowns);
-  chain_.take_multipliers(unknowns, state.multipliers_N);
+  solve(factored_matrix(force, 1.0, 0.0, state), unknowns);
+  state.multipliers_N = chain_.take_multipliers(unknowns);
   state.has_offset_rate = false;
-}
-
-double GeneralizedAlphaMotion::mass_factor() const {
-  return (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f);
-}
-
-void GeneralizedAlphaMotion::factor_newton_matrix(const Coordinates& q,
-                                                  const AffineContactForce<double>& force,
-                                                  double h_s,
-                                                  ConstrainedChain::Matrix& matrix) const {
-  const auto tip = 2 * static_cast<std::size_t>(chain_.tip_row());
-  const double stiffness_factor = alpha_.beta * h_s * h_s;
-  matrix.set_zero(static_cast<std::size_t>(2 * chain_.rows()));
-  chain_.add_tangent(q, mass_factor(), stiffness_factor, matrix);
-  const Eigen::Matrix2d at_tip = stiffness_factor * contact_stiffness(force);
-  matrix.add_block(tip, tip, at_tip);
-  if (!matrix.factor()) {
-    throw SolveError("the Newton matrix is singular");
-  }
 }
 
 void GeneralizedAlphaMotion::find_offset_rate(const AffineContactForce<double>& force, double h_s,
                                               ChainState& state) const {
-  factor_newton_matrix(state.q, force, h_s, state.room.matrix);
   const Eigen::Index tip = chain_.tip_row();
   Coordinates& rate = state.algorithmic_offset_rate;
   rate.setZero(2, chain_.rows());
@@ -103,10 +83,8 @@ void GeneralizedAlphaMotion::find_offset_rate(const AffineContactForce<double>& 
   rate.col(tip) += contact_stiffness(force) * state.v.col(tip);
   // a_n stands for q'' at t_n + (alpha_m - alpha_f) h.
   rate *= mass_factor() * (alpha_.alpha_f - alpha_.alpha_m);
-  solve(state.room.matrix, rate);
-  for (std::size_t link = 0; link < chain_.links(); ++link) {
-    rate.col(chain_.multiplier_row(link)).setZero();
-  }
+  solve(factored_matrix(force, mass_factor(), alpha_.beta * h_s * h_s, state), rate);
+  chain_.take_multipliers(rate);
   state.has_offset_rate = true;
 }
 
@@ -119,9 +97,8 @@ void GeneralizedAlphaMotion::predict(const ChainState& from,
     find_offset_rate(force, h_s, to);
   }
   to.t_s = from.t_s + h_s;
-  Coordinates& a_from = to.room.vectors;
   Coordinates& a = to.algorithmic_offset_rate;
-  a_from = from.acceleration + h_s * a;
+  const Coordinates a_from = from.acceleration + h_s * a;
   a = (from.acceleration - alpha_m * a_from) / (1.0 - alpha_m);
   to.q += h_s * (from.v + h_s * ((0.5 - beta) * a_from + beta * a));
   to.v += h_s * ((1.0 - gamma) * a_from + gamma * a);
@@ -140,16 +117,11 @@ void GeneralizedAlphaMotion::evaluate(const AffineContactForce<double>& force, d
 
 double GeneralizedAlphaMotion::correct(const AffineContactForce<double>& force, double h_s,
                                        ChainState& state) const {
-  Coordinates& correction = state.room.vectors;  // -(Delta a and Delta lambda)
-  evaluate(force, h_s, state, correction);
-  factor_newton_matrix(state.q, force, h_s, state.room.matrix);
-  solve(state.room.matrix, correction);
-  for (std::size_t link = 0; link < chain_.links(); ++link) {
-    auto of_multiplier = correction.col(chain_.multiplier_row(link));
-    state.multipliers_N.col(static_cast<Eigen::Index>(link)) -= of_multiplier;
-    of_multiplier.setZero();
-  }
   const double by_position = alpha_.beta * h_s * h_s;
+  Coordinates correction;  // -(Delta a and Delta lambda)
+  evaluate(force, h_s, state, correction);
+  solve(factored_matrix(force, mass_factor(), by_position, state), correction);
+  state.multipliers_N -= chain_.take_multipliers(correction);
   state.algorithmic_offset_rate -= correction;
   state.acceleration -= mass_factor() * correction;
   state.q -= by_position * correction;
@@ -198,13 +170,9 @@ ContactIntegrals<double> GeneralizedAlphaMotion::integrals(const AffineContactFo
     const Eigen::Index tip = chain_.tip_row();
     const auto v = state.v.col(tip);
     const auto a = state.acceleration.col(tip);
-    End end;
-    end.F = contact_force(force, state.q.col(tip));
-    end.F_1 = -K * v;
-    end.F_2 = -K * a;
-    end.P = end.F.x() * v.x();
-    end.P_1 = end.F_1.x() * v.x() + end.F.x() * a.x();
-    return end;
+    const Eigen::Vector2d F = contact_force(force, state.q.col(tip));
+    const Eigen::Vector2d F_1 = -K * v;
+    return End{F, F_1, -K * a, F.x() * v.x(), F_1.x() * v.x() + F.x() * a.x()};
   };
   const End e0 = at(from);
   const End e1 = at(to);

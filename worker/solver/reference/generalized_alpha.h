@@ -30,15 +30,13 @@ struct GeneralizedAlphaParameters {
 ///   (1 - alpha_m) a_{n+1} + alpha_m a_n = (1 - alpha_f) q''_{n+1} + alpha_f q''_n   (eq. 28)
 ///
 /// with the equations of motion and Phi = 0 holding at t_{n+1}. Newton's unknowns are a_{n+1} and
-/// lambda_{n+1} with the constraints divided by beta h^2: the matrix
-/// [c M + beta h^2 K, Phi_qᵀ; Phi_q, 0], c = (1 - alpha_m)/(1 - alpha_f), tends to a regular one as
-/// h -> 0.
+/// lambda_{n+1}. The constraints are divided by beta h^2, so that the matrix
+/// [c M + beta h^2 K, Phi_qᵀ; Phi_q, 0], c = (1 - alpha_m)/(1 - alpha_f), is regular as h -> 0.
 class GeneralizedAlphaMotion : public Motion {
  public:
   /// Newton stops when a correction moves no position by more than this fraction of an element's
-  /// length and no slope by more than this. Convergence is quadratic: what remains is about the
-  /// square, far below the step's own error. Steps in contact are done after one iteration on any
-  /// mesh.
+  /// length and no slope by more than this. Convergence is quadratic: the remaining error is about
+  /// the square. Steps in contact take one iteration.
   static constexpr double kNewtonTolerance = 1e-6;
   static constexpr int kMostIterations = 20;
 
@@ -48,7 +46,7 @@ class GeneralizedAlphaMotion : public Motion {
 
   ChainState at_rest() const override;
   TipState tip(const ChainState& state) const override { return chain_.tip(state); }
-  Energies energies(const ChainState& state) const override;
+  Energies energies(const ChainState& state) const override { return chain_.energies(state); }
   /// Throws SolveError when Newton does not converge.
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
@@ -66,27 +64,28 @@ class GeneralizedAlphaMotion : public Motion {
 
  private:
   /// (1 - alpha_m)/(1 - alpha_f), by which q'' follows a.
-  double mass_factor() const;
-  /// Factors [mass_factor M + beta h^2 K, Phi_qᵀ; Phi_q, 0].
-  void factor_newton_matrix(const Coordinates& q, const AffineContactForce<double>& force,
-                            double h_s, ConstrainedChain::Matrix& matrix) const;
-  /// (a_0 - q''_0)/h of the first step after a restart, (alpha_m - alpha_f) q''' with
+  double mass_factor() const { return (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f); }
+  /// The factors of [mass_factor M + stiffness_factor K, Phi_qᵀ; Phi_q, 0] at `state`.
+  ConstrainedChain::Matrix factored_matrix(const AffineContactForce<double>& force,
+                                           double mass_factor, double stiffness_factor,
+                                           const ChainState& state) const;
+  /// (a_0 - q''_0)/h of the first step after a restart: (alpha_m - alpha_f) q''' with
   ///
   ///   (M + beta h^2/mass_factor K) q''' + Phi_qᵀ lambda' = -K v,   Phi_q q''' = 0.
   ///
-  /// The term in K changes q''' by order h^2 where the step resolves the motion. Where it does not,
-  /// it keeps the offset as small as the velocity allows; -M^-1 K v would multiply rounding.
+  /// The term in K changes it by order h^2 where the step resolves the motion. Elsewhere it keeps
+  /// the offset as small as the velocity allows, where -M^-1 K v would multiply rounding.
   void find_offset_rate(const AffineContactForce<double>& force, double h_s,
                         ChainState& state) const;
-  /// Eqs. 26 to 28 as if q''_{n+1} were q''_n. What is a_{n+1} stands in `algorithmic_offset_rate`
-  /// until the step is done.
+  /// Eqs. 26 to 28 as if q''_{n+1} were q''_n. a_{n+1} is stored in `algorithmic_offset_rate` until
+  /// the step is done.
   void predict(const ChainState& from, const AffineContactForce<double>& force, double h_s,
                ChainState& to) const;
   /// Eq. 15: M q'' + Phi_qᵀ lambda + dU/dq - Q - F_c and Phi/(beta h^2).
   void evaluate(const AffineContactForce<double>& force, double h_s, const ChainState& state,
                 Coordinates& residual) const;
-  /// One correction by Newton's method, in the parts of eqs. 26 to 28. How far it moves the chain,
-  /// as kNewtonTolerance counts.
+  /// One correction of eqs. 26 to 28 by Newton's method. Returns how far it moves the chain, in the
+  /// norm of kNewtonTolerance.
   double correct(const AffineContactForce<double>& force, double h_s, ChainState& state) const;
   ContactIntegrals<double> integrals(const AffineContactForce<double>& force, double h_s,
                                      const ChainState& from, const ChainState& to) const;

@@ -7,15 +7,9 @@
 
 namespace oblique::solver {
 
-struct Energies {
-  double kinetic_J;
-  double strain_J;
-  double gravity_J;
-};
-
-/// An integrator with the system of equations it solves. Fixed during a solve; what changes is the
-/// ChainState, whose coordinates belong to the Motion that made it. Const members may be called
-/// from several threads at once.
+/// An integrator with its system of equations. Constant; the state is a ChainState, whose
+/// coordinates belong to the Motion that made it. Const members may be called from several threads
+/// at once.
 class Motion {
  public:
   virtual ~Motion() = default;
@@ -24,14 +18,13 @@ class Motion {
   virtual TipState tip(const ChainState& state) const = 0;
   virtual Energies energies(const ChainState& state) const = 0;
 
-  /// Advances `from` by h_s >= 0 seconds under `force` into `to` (whose vectors and room are
-  /// reused, so that a second step allocates nothing), and gives the integrals of the contact
-  /// forces over the step.
+  /// Advances `from` by h_s >= 0 seconds under `force` into `to`, and returns the integrals of the
+  /// contact forces over the step.
   virtual ContactIntegrals<double> step(const ChainState& from,
                                         const AffineContactForce<double>& force, double h_s,
                                         ChainState& to) const = 0;
 
-  /// Makes what the integrator remembers consistent with `force`, after an event changed the law.
+  /// Makes accelerations and multipliers consistent with `force`, after an event changed the law.
   virtual void restart(const AffineContactForce<double>& force, ChainState& state) const = 0;
 
   /// Linear momentum of the whole chain [N s].
@@ -39,8 +32,8 @@ class Motion {
   /// Positions of the nodes along the chain, one a column: O first, the tip last.
   virtual Coordinates node_positions_m(const ChainState& state) const = 0;
 
-  /// Forces on the outer link at O and at each joint from what holds it, one a column, from O
-  /// outwards. Allocates when the number of columns is another.
+  /// Forces on the outer link at O and at each joint, one a column, from O outwards. Allocates when
+  /// the number of columns differs.
   virtual void reactions(const AffineContactForce<double>& force, const ChainState& state,
                          Eigen::Matrix2Xd& reactions_N) const = 0;
 };
@@ -53,7 +46,7 @@ class ExplicitMotion : public Motion {
 
   ChainState at_rest() const override { return chain_.at_rest(); }
   TipState tip(const ChainState& state) const override { return chain_.tip(state); }
-  Energies energies(const ChainState& state) const override;
+  Energies energies(const ChainState& state) const override { return chain_.energies(state); }
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
   void restart(const AffineContactForce<double>&, ChainState&) const override {}

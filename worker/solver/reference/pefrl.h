@@ -19,21 +19,20 @@ struct Pefrl {
 
   static constexpr std::size_t kKicks = 4;
 
-  /// Largest stable omega h on a harmonic oscillator, found from the trace of the step's map.
-  static double stability_limit();
+  /// Largest stable omega h on a harmonic oscillator: there the trace of the step's map is -2.
+  static constexpr double stability_limit() { return 2.9894495459063712; }
 };
 
-/// Watches nothing.
 template <class Real>
 struct UnwatchedStep {
   void start(std::size_t, const PlanarVector<Real>&) {}
   void end(std::size_t, const PlanarVector<Real>&) {}
 };
 
-/// Steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next, which may be q
-/// and v themselves. `scratch` has the same size. As chain_kernel.h, for numbers and lanes. `watch`
-/// is told the rates at the start and at the end of the step, row by row from the tip to the row
-/// after the pin, while they are in registers.
+/// Eqs. 13 and 15: steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next,
+/// which may be q and v themselves. `scratch` has the same size. For numbers and lanes, as
+/// chain_kernel.h. Calls `watch` with the rates at the start and at the end of the step, row by row
+/// from the tip to the row after the pin, while they are in registers.
 template <class Constant, class Real, class Watch = UnwatchedStep<Real>>
 inline ContactIntegrals<Real> pefrl_step(const ChainTables<Constant>& chain,
                                          const AffineContactForce<Real>& force, const Real& h_s,

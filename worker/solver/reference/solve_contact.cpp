@@ -43,32 +43,18 @@ void balance(const Energies& in, const Energies& out, const ContactRecord& recor
   }
 }
 
-TraceRow trace_row(const Contact& contact, double touch_y_m) {
-  const ContactLaw& law = contact.law();
-  const TipState& tip = contact.tip();
+/// A row with the values that concern the chain; the others are zero.
+TraceRow chain_row(const Motion& motion, const AffineContactForce<double>& force,
+                   const ChainState& state, bool with_shape) {
+  const auto in_turn = [](const Eigen::Matrix2Xd& columns) {
+    return std::vector<double>(columns.data(), columns.data() + columns.size());
+  };
   TraceRow row{};
-  row.t_s = contact.time_s();
-  row.fn_N = law.fn_N(tip);
-  row.ft_N = law.ft_N(tip);
-  row.uy_m = tip.y_m - touch_y_m;
-  row.ux_m = law.ux_m(tip);
-  row.xP_m = tip.x_m - row.ux_m;
-  row.vP_m_s = law.is_stick() ? 0.0 : law.slip_velocity_m_s(tip);
+  const TipState tip = motion.tip(state);
   row.x_m = tip.x_m;
   row.y_m = tip.y_m;
   row.vt_m_s = tip.vx_m_s;
   row.vn_m_s = tip.vy_m_s;
-  row.state = {law.is_stick() ? 'S' : 's', law.is_compression() ? 'C' : 'R'};
-  return row;
-}
-
-/// Fills the parts of a row that concern the whole chain: reactions, energies, momentum, and where
-/// it is wanted the shape.
-void add_chain(const Motion& motion, const AffineContactForce<double>& force,
-               const ChainState& state, bool with_shape, TraceRow& row) {
-  const auto in_turn = [](const Eigen::Matrix2Xd& columns) {
-    return std::vector<double>(columns.data(), columns.data() + columns.size());
-  };
   Eigen::Matrix2Xd reactions_N;
   motion.reactions(force, state, reactions_N);
   row.reactions_N = in_turn(reactions_N);
@@ -82,22 +68,16 @@ void add_chain(const Motion& motion, const AffineContactForce<double>& force,
   if (with_shape) {
     row.nodes_m = in_turn(motion.node_positions_m(state));
   }
+  return row;
 }
 
-constexpr AffineContactForce<double> kNothingTouched{};
-
 TraceRow falling_row(const Motion& motion, ChainState& state, double touch_s, bool with_shape) {
-  const TipState tip = motion.tip(state);
-  TraceRow row{};
+  motion.restart(kNoContact, state);  // reactions then do not depend on the last step
+  TraceRow row = chain_row(motion, kNoContact, state, with_shape);
   row.t_s = state.t_s - touch_s;
-  row.xP_m = row.x_m = tip.x_m;
-  row.vP_m_s = row.vt_m_s = tip.vx_m_s;
-  row.y_m = tip.y_m;
-  row.vn_m_s = tip.vy_m_s;
+  row.xP_m = row.x_m;
+  row.vP_m_s = row.vt_m_s;
   row.state = kFalling;
-  // Reactions are then those of this state, whatever step led there.
-  motion.restart(kNothingTouched, state);
-  add_chain(motion, kNothingTouched, state, with_shape, row);
   return row;
 }
 
@@ -105,7 +85,7 @@ TraceRow falling_row(const Motion& motion, ChainState& state, double touch_s, bo
 
 CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
                           const TipState& touch, const Energies& in, const Energies& out) {
-  CaseResult result{};
+  CaseResult result = contact.record().result();
   result.mu = parameters.mu;
   result.e_star = parameters.e_star;
   result.impact_x_m = touch.x_m;
@@ -113,7 +93,6 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
   result.vn_in_m_s = touch.vy_m_s;
   result.vt_out_m_s = contact.tip().vx_m_s;
   result.vn_out_m_s = contact.tip().vy_m_s;
-  contact.record().write_to(result);
   const ContactMargin::Nearest nearest = contact.margin().nearest(result.fn_peak_N);
   result.margin = nearest.distance;
   result.margin_event = nearest.event;
@@ -122,8 +101,17 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
 }
 
 void ContactTracer::accepted(const Contact& contact, const ChainState& state) const {
-  TraceRow row = trace_row(contact, touch_y_m_);
-  add_chain(motion_, contact.force(), state, tracing_.with_shape, row);
+  const ContactLaw& law = contact.law();
+  const TipState& tip = contact.tip();
+  TraceRow row = chain_row(motion_, contact.force(), state, tracing_.with_shape);
+  row.t_s = contact.time_s();
+  row.fn_N = law.fn_N(tip);
+  row.ft_N = law.ft_N(tip);
+  row.uy_m = tip.y_m - touch_y_m_;
+  row.ux_m = law.ux_m(tip);
+  row.xP_m = tip.x_m - row.ux_m;
+  row.vP_m_s = law.is_stick() ? 0.0 : law.slip_velocity_m_s(tip);
+  row.state = {law.is_stick() ? 'S' : 's', law.is_compression() ? 'C' : 'R'};
   tracing_.sink(row);
 }
 

@@ -9,14 +9,14 @@
 namespace oblique::solver {
 
 /// Solves one contact by any integrator, from `touch` (a state of `motion`, the tip on the ground)
-/// to separation. Fills everything of the result but H, the fall time and the solver's name and
-/// version. Throws SolveError when there is no answer.
+/// to separation. The result lacks H, the fall time and the solver's name and version. Throws
+/// SolveError when there is no answer.
 CaseResult solve_contact(const Motion& motion, const ContactParameters& parameters,
                          const ContactSteps& steps, ChainState touch, const Tracing& tracing);
 
-/// Result of a finished contact, all but H, the fall time and the solver's report. `in` and `out`
-/// are the energies at touch and separation. Throws SolveError when the energy balance misses so
-/// much of the exchanged work that the step resolves nothing.
+/// Result of a finished contact without H, the fall time and the solver's report. `in` and `out`
+/// are the energies at touch and separation. Throws SolveError when the energy balance shows that
+/// the step is too long.
 CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
                           const TipState& touch, const Energies& in, const Energies& out);
 
@@ -36,9 +36,8 @@ class ContactTracer {
   double touch_y_m_;
 };
 
-/// Gives kFallRows instants of the fall to tracing.sink, from release to the drop H_m. The last one
-/// is the touch itself, as the contact's first row, but for the state and the velocity of P. Times
-/// in between are met to a thousandth of a step. Throws what Fall::state_at throws.
+/// Gives kFallRows instants of the fall to tracing.sink, from release to the touch at drop H_m.
+/// Times are exact to a thousandth of a step. Throws what Fall::state_at throws.
 void trace_fall(const Motion& motion, const Fall& fall, double H_m, const Tracing& tracing);
 
 }  // namespace oblique::solver

@@ -1,7 +1,7 @@
 #pragma once
 
-/// The seam between what moves a chain and the contact at its tip: the contact gives a force, the
-/// motion gives back the tip's state and what the force did.
+/// The interface between the motion of a chain and the contact at its tip: the contact gives a
+/// force, the motion returns the tip's state and the integrals of the force.
 namespace oblique::solver {
 
 /// Tip position and velocity in the fixed frame, origin at O, y up.
@@ -12,10 +12,9 @@ struct TipState {
   double vy_m_s;
 };
 
-/// F_c of eq. 16: contact forces as affine functions of the tip's position, as they are between two
-/// events:
+/// F_c of eq. 16 between two events, affine in the tip's position:
 ///   F_n = fn0 - k_nn (y - y0),   F_t = ft0 - k_tn (y - y0) - k_tt (x - x0).
-/// All zero in the fall. `Real` is a number or a vector of lanes.
+/// `Real` is a number or a vector of lanes.
 template <class Real>
 struct AffineContactForce {
   Real fn0{};
@@ -32,7 +31,9 @@ struct AffineContactForce {
   }
 };
 
-/// Time integrals over one step, carried through the same splitting, hence of its order.
+inline constexpr AffineContactForce<double> kNoContact{};
+
+/// Time integrals over one step, of the order of the integrator.
 template <class Real>
 struct ContactIntegrals {
   Real impulse_n{};  ///< int F_n dt [Ns]

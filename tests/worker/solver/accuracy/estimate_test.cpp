@@ -14,7 +14,7 @@
 #include "tests/worker/solver/cases/same_bits.h"
 #include "tests/worker/solver/cases/shared_fingers.h"
 #include "worker/solver/falls.h"
-#include "worker/solver/model/fall_model.h"
+#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/reference/chain.h"
 #include "worker/solver/solve.h"

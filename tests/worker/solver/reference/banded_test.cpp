@@ -94,8 +94,7 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesAlsoWithZerosOnTheDiagonal) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (std::size_t rows = 1; rows <= 30; ++rows) {
     const auto n = static_cast<Eigen::Index>(rows);
-    BandedLu<kBandwidth> banded;
-    banded.set_zero(rows);
+    BandedLu<kBandwidth> banded(rows);
     Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(n, n);
     for (std::size_t i = 0; i < rows; ++i) {
       for (std::size_t j = i < kBandwidth ? 0 : i - kBandwidth;
@@ -121,15 +120,11 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesAlsoWithZerosOnTheDiagonal) {
   }
 }
 
-TEST(BandedLu, ABlockIsItsEntriesOneByOneAndAMatrixSetToZeroIsANewOne) {
+TEST(BandedLu, ABlockIsItsEntriesOneByOne) {
   const Eigen::Matrix2d block{{4.0, 1.0}, {2.0, 3.0}};
-  BandedLu<1> by_block;
-  BandedLu<1> by_entries;
-  by_block.set_zero(4);
-  by_block.add_block(0, 0, block);
-  by_block.set_zero(3);
-  by_entries.set_zero(3);
-  by_block.add_block(1, 1, block);
+  BandedLu<1> by_block(3);
+  BandedLu<1> by_entries(3);
+  by_block.add_block(1, block);
   by_block.add(0, 0, 1.0);
   by_entries.add(0, 0, 1.0);
   by_entries.add(1, 1, 4.0);
@@ -146,8 +141,7 @@ TEST(BandedLu, ABlockIsItsEntriesOneByOneAndAMatrixSetToZeroIsANewOne) {
 }
 
 TEST(BandedLu, TellsASingularMatrix) {
-  BandedLu<1> matrix;
-  matrix.set_zero(3);
+  BandedLu<1> matrix(3);
   matrix.add(0, 0, 1.0);
   matrix.add(1, 0, 1.0);
   matrix.add(2, 2, 1.0);

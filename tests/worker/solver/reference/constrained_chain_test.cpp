@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 
@@ -38,7 +39,7 @@ TEST(ConstrainedChain, HasTheEnergiesOfTheEliminatedOne) {
   const Chain eliminated(three_links());
   const ConstrainedChain constrained(three_links());
   const ChainState state = bent_and_moving(eliminated);
-  const ChainState same = constrained.from_eliminated(state);
+  const ChainState same = from_eliminated(constrained, state);
   const auto expect_equal = [](double a, double b) { EXPECT_NEAR(a, b, 1e-12 * std::abs(b)); };
   expect_equal(constrained.kinetic_energy_J(same.v), eliminated.kinetic_energy_J(state.v));
   expect_equal(constrained.strain_energy_J(same.q), eliminated.strain_energy_J(state.q));
@@ -49,7 +50,7 @@ TEST(ConstrainedChain, HasTheEnergiesOfTheEliminatedOne) {
 TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedOne) {
   const Chain eliminated(three_links());
   const ConstrainedChain constrained(three_links());
-  const ChainState same = constrained.from_eliminated(bent_and_moving(eliminated));
+  const ChainState same = from_eliminated(constrained, bent_and_moving(eliminated));
   Coordinates residual = Coordinates::Zero(2, constrained.rows());
   constrained.set_constraints(same.q, 1.0, residual);
   EXPECT_EQ(residual, Coordinates::Zero(2, constrained.rows()));
@@ -69,10 +70,9 @@ TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
     const Coordinates multipliers_N = random(static_cast<Eigen::Index>(chain.links()));
     Coordinates forces = Coordinates::Zero(2, chain.rows());
     Coordinates breach = forces;
-    Coordinates breach_by_link;
     chain.add_constraint_forces(multipliers_N, forces);
     chain.set_constraints(dq, 1.0, breach);
-    chain.take_multipliers(breach, breach_by_link);
+    const Coordinates breach_by_link = chain.take_multipliers(breach);
     EXPECT_NEAR(dq.cwiseProduct(forces).sum(), multipliers_N.cwiseProduct(breach_by_link).sum(),
                 1e-13);
     EXPECT_EQ(breach.norm(), 0.0);
@@ -84,7 +84,7 @@ TEST(ConstrainedChain, ConsistentAccelerationsAndReactionsAreThoseOfTheEliminate
   const ExplicitMotion by_elimination(eliminated);
   const GeneralizedAlphaMotion by_constraints(three_links());
   const ChainState state = bent_and_moving(eliminated);
-  ChainState same = by_constraints.chain().from_eliminated(state);
+  ChainState same = from_eliminated(by_constraints.chain(), state);
   by_constraints.restart(kStick, same);
   const TipState tip = eliminated.tip(state);
   Coordinates a(2, eliminated.rows());

@@ -47,9 +47,7 @@ struct RecordedContact {
   }
   CaseResult finished(double t_s) {
     record.finish(law, tip, t_s);
-    CaseResult result{};
-    record.write_to(result);
-    return result;
+    return record.result();
   }
 
   TipState tip;

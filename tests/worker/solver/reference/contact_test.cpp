@@ -40,9 +40,7 @@ std::vector<Event> followed(Contact& contact, const TipPath& path, double until_
 }
 
 std::string mode_of(const Contact& contact) {
-  CaseResult result{};
-  contact.record().write_to(result);
-  return result.mode;
+  return contact.record().result().mode;
 }
 
 TEST(Contact, ABumpThatIsHigherOnOneSideOfItsStepIsLocated) {

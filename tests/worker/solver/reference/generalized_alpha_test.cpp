@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/worker/solver/reference/chain_probe.h"
+#include "tests/worker/solver/reference/from_eliminated.h"
 #include "worker/solver/model/errors.h"
 
 namespace oblique::solver {
@@ -50,7 +51,7 @@ struct MovingChain {
     for (Eigen::Index i = 2; i < state.v.size(); ++i) {
       state.v(i) = uniform(generator);
     }
-    constrained = motion.chain().from_eliminated(state);
+    constrained = from_eliminated(motion.chain(), state);
   }
   /// Phi of positions or velocities: the largest gap at the pin and the joints.
   double largest_gap(const Coordinates& values) const {
@@ -90,7 +91,7 @@ TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
   ChainState state = chain.at_rest();
   state.q.row(1) = -state.q.row(0);
   state.q.row(0).setZero();
-  state = motion.chain().from_eliminated(state);
+  state = from_eliminated(motion.chain(), state);
   motion.restart(kNoContact, state);
   ChainState next = state;
   Eigen::Matrix2Xd reactions_N;

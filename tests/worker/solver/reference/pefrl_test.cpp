@@ -94,6 +94,19 @@ TEST(Pefrl, OscillatorStaysBoundedJustBelowTheStabilityLimitAndGrowsJustAbove) {
   EXPECT_GT(largest_swing(1.001 * limit, 100'000), 1e10);
 }
 
+TEST(Pefrl, TraceOfTheStepOfAnOscillatorIsMinusTwoAtTheStabilityLimit) {
+  const auto trace = [](double h) {
+    Oscillator of_q{1.0, 0.0};
+    Oscillator of_v{0.0, 1.0};
+    step(h, of_q);
+    step(h, of_v);
+    return of_q.q + of_v.v;
+  };
+  EXPECT_NEAR(trace(Pefrl::stability_limit()), -2.0, 1e-9);
+  EXPECT_GT(trace(0.999 * Pefrl::stability_limit()), -2.0);
+  EXPECT_LT(trace(1.001 * Pefrl::stability_limit()), -2.0);
+}
+
 TEST(Pefrl, DriftsAndKicksAddUpToOneStep) {
   double drift = Pefrl::drift[Pefrl::kKicks];
   double kick = 0.0;
