@@ -10,29 +10,15 @@
 #include "worker/solver/solve.h"
 
 namespace oblique::worker {
-namespace {
-
-protocol::Trace not_taken(std::uint64_t trace_id) {
-  protocol::Trace trace;
-  trace.set_trace_id(trace_id);
-  trace.set_not_taken(true);
-  return trace;
-}
-
-}  // namespace
 
 TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
     : every_(std::max<std::uint64_t>(every, 1)),
       chooses_every_(every == 0),
       most_bytes_(most_bytes) {}
 
-std::size_t TraceRows::most_rows() const {
-  return most_bytes_ / row_bytes_;
-}
-
 void TraceRows::add(const solver::TraceRow& row) {
   if (!rows_.empty() && !stays(rows_.back())) {
-    rows_.pop_back();  // it was kept as the last one
+    rows_.pop_back();  // kept only while it was the last
   }
   const bool falls = row.state == solver::kFalling;
   const bool is_always_kept = falls || solver::ends_phase(last_state_, row.state);
@@ -48,7 +34,7 @@ void TraceRows::add(const solver::TraceRow& row) {
     std::erase_if(rows_,
                   [this](const Row& kept) { return !stays(kept) && &kept != &rows_.back(); });
   }
-  if (rows_.size() > most_rows()) {  // the rest is only counted
+  if (rows_.size() > most_rows()) {  // further rows are only counted
     is_too_long_ = true;
     rows_.pop_back();
   }
@@ -58,7 +44,7 @@ void TraceRows::move_to(protocol::Trace& trace) {
   trace.set_instants(instants_);
   trace.set_every(every_);
   if (is_too_long_) {
-    // The first instant and the last one are kept with any `every`.
+    // Any `every` keeps the first and the last instant.
     const std::uint64_t always = always_kept_ + 2;
     const std::uint64_t room = most_rows() > always ? most_rows() - always : 0;
     trace.set_every(room == 0 ? instants_ + 1 : (instants_ + room - 1) / room);
@@ -92,30 +78,29 @@ protocol::PointResult solve_trace(const protocol::TraceOrder& order,
 }
 
 TraceSolver::TraceSolver(Solve solve, std::function<void()> has_trace, std::size_t most_bytes)
-    : solve_(std::move(solve)),
-      has_trace_(std::move(has_trace)),
-      most_bytes_(most_bytes),
-      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+    : solve_(std::move(solve)), has_trace_(std::move(has_trace)), most_bytes_(most_bytes) {}
 
-TraceSolver::~TraceSolver() {
-  drop_all();
-  thread_.request_stop();
-}
-
-void TraceSolver::take(protocol::TraceOrder order) {
+void TraceSolver::take(const protocol::TraceOrder& order) {
   const std::lock_guard lock(mutex_);
   if (job_ || !solve_) {
-    traces_.push_back(not_taken(order.trace_id()));
-    has_trace_();
+    refuse(order.trace_id());
     return;
   }
-  job_.emplace(Job{std::move(order)});
-  changed_.notify_all();
+  // The assignment joins the last thread, which has released the lock and ends at once.
+  thread_ = std::jthread([this, order] { this->solve(order); });
+  job_ = Job{order.trace_id()};
+}
+
+void TraceSolver::refuse(std::uint64_t trace_id) {
+  protocol::Trace& trace = traces_.emplace_back();
+  trace.set_trace_id(trace_id);
+  trace.set_not_taken(true);
+  has_trace_();
 }
 
 void TraceSolver::cancel(std::uint64_t trace_id) {
   const std::lock_guard lock(mutex_);
-  if (job_ && job_->order.trace_id() == trace_id) {
+  if (job_ && job_->trace_id == trace_id) {
     job_->is_cancelled = true;
   }
 }
@@ -138,24 +123,24 @@ std::vector<protocol::Trace> TraceSolver::collect() {
   return std::exchange(traces_, {});
 }
 
-void TraceSolver::work(const std::stop_token& stop) {
-  std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop, [this] { return job_.has_value(); })) {
-    lock.unlock();
-    protocol::Trace trace;
-    trace.set_trace_id(job_->order.trace_id());
-    TraceRows rows(job_->order.every(), most_bytes_);
-    *trace.mutable_result() =
-        solve_(job_->order, [&rows](const solver::TraceRow& row) { rows.add(row); });
-    if (trace.result().error().empty()) {
-      rows.move_to(trace);
-    }
-    lock.lock();
-    const Job job = *std::exchange(job_, std::nullopt);
-    if (!job.is_dropped) {
-      traces_.push_back(job.is_cancelled ? not_taken(trace.trace_id()) : std::move(trace));
-      has_trace_();
-    }
+void TraceSolver::solve(const protocol::TraceOrder& order) {
+  protocol::Trace trace;
+  trace.set_trace_id(order.trace_id());
+  TraceRows rows(order.every(), most_bytes_);
+  *trace.mutable_result() = solve_(order, [&](const solver::TraceRow& row) { rows.add(row); });
+  if (trace.result().error().empty()) {
+    rows.move_to(trace);
+  }
+  const std::lock_guard lock(mutex_);
+  const Job job = *std::exchange(job_, std::nullopt);
+  if (job.is_dropped) {
+    return;
+  }
+  if (job.is_cancelled) {
+    refuse(order.trace_id());
+  } else {
+    traces_.push_back(std::move(trace));
+    has_trace_();
   }
 }
 
