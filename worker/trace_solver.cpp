@@ -1,6 +1,7 @@
 #include "worker/trace_solver.h"
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <utility>
 
@@ -10,6 +11,16 @@
 #include "worker/solver/solve.h"
 
 namespace oblique::worker {
+namespace {
+
+protocol::Trace not_taken(std::uint64_t trace_id) {
+  protocol::Trace trace;
+  trace.set_trace_id(trace_id);
+  trace.set_not_taken(true);
+  return trace;
+}
+
+}  // namespace
 
 TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
     : every_(std::max<std::uint64_t>(every, 1)),
@@ -81,49 +92,42 @@ TraceSolver::TraceSolver(Solve solve, std::function<void()> has_trace, std::size
     : solve_(std::move(solve)), has_trace_(std::move(has_trace)), most_bytes_(most_bytes) {}
 
 void TraceSolver::take(const protocol::TraceOrder& order) {
-  const std::lock_guard lock(mutex_);
-  if (job_ || !solve_) {
-    refuse(order.trace_id());
+  gather();
+  if (running_.valid() || !solve_) {
+    traces_.push_back(not_taken(order.trace_id()));
+    has_trace_();
     return;
   }
-  // The assignment joins the last thread, which has released the lock and ends at once.
-  thread_ = std::jthread([this, order] { this->solve(order); });
-  job_ = Job{order.trace_id()};
-}
-
-void TraceSolver::refuse(std::uint64_t trace_id) {
-  protocol::Trace& trace = traces_.emplace_back();
-  trace.set_trace_id(trace_id);
-  trace.set_not_taken(true);
-  has_trace_();
+  trace_id_ = order.trace_id();
+  is_cancelled_ = is_dropped_ = false;
+  std::packaged_task<protocol::Trace()> task([this, order] { return solved(order); });
+  running_ = task.get_future();
+  thread_ = std::jthread([this, task = std::move(task)]() mutable {
+    task();
+    has_trace_();
+  });
 }
 
 void TraceSolver::cancel(std::uint64_t trace_id) {
-  const std::lock_guard lock(mutex_);
-  if (job_ && job_->trace_id == trace_id) {
-    job_->is_cancelled = true;
-  }
+  is_cancelled_ = is_cancelled_ || trace_id == trace_id_;
 }
 
 void TraceSolver::drop_all() {
-  const std::lock_guard lock(mutex_);
   traces_.clear();
-  if (job_) {
-    job_->is_dropped = true;
-  }
+  is_dropped_ = true;
 }
 
 bool TraceSolver::is_solving() const {
-  const std::lock_guard lock(mutex_);
-  return job_.has_value();
+  return running_.valid() &&
+         running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
 }
 
 std::vector<protocol::Trace> TraceSolver::collect() {
-  const std::lock_guard lock(mutex_);
+  gather();
   return std::exchange(traces_, {});
 }
 
-void TraceSolver::solve(const protocol::TraceOrder& order) {
+protocol::Trace TraceSolver::solved(const protocol::TraceOrder& order) const {
   protocol::Trace trace;
   trace.set_trace_id(order.trace_id());
   TraceRows rows(order.every(), most_bytes_);
@@ -131,16 +135,16 @@ void TraceSolver::solve(const protocol::TraceOrder& order) {
   if (trace.result().error().empty()) {
     rows.move_to(trace);
   }
-  const std::lock_guard lock(mutex_);
-  const Job job = *std::exchange(job_, std::nullopt);
-  if (job.is_dropped) {
-    return;
-  }
-  if (job.is_cancelled) {
-    refuse(order.trace_id());
-  } else {
-    traces_.push_back(std::move(trace));
-    has_trace_();
+  return trace;
+}
+
+/// Moves the trace of running_, once it is solved, to the answers.
+void TraceSolver::gather() {
+  if (running_.valid() && !is_solving()) {
+    protocol::Trace trace = running_.get();
+    if (!is_dropped_) {
+      traces_.push_back(is_cancelled_ ? not_taken(trace_id_) : std::move(trace));
+    }
   }
 }
 

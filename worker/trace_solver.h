@@ -3,8 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <mutex>
-#include <optional>
+#include <future>
 #include <string>
 #include <thread>
 #include <vector>
@@ -55,7 +54,8 @@ class TraceRows {
 protocol::PointResult solve_trace(const protocol::TraceOrder& order,
                                   const solver::Tracing::Sink& sink, solver::FallCache& falls);
 
-/// Solves points for traces, one at a time, on a thread beside those of the batches.
+/// Solves points for traces, one at a time, on a thread beside those of the batches. Its functions
+/// are called by one thread.
 class TraceSolver {
  public:
   /// Solves the point of an order and passes its instants to the sink. Must not throw.
@@ -63,13 +63,9 @@ class TraceSolver {
                                                     const solver::Tracing::Sink&)>;
 
   /// Without `solve` no order is taken. `has_trace` is called when a trace can be collected, also
-  /// on the solving thread; it must not call this object.
+  /// on the solving thread.
   TraceSolver(Solve solve, std::function<void()> has_trace,
               std::size_t most_bytes = protocol::kMostTraceBytes);
-  /// Waits for the point that is being solved.
-  ~TraceSolver() = default;
-  TraceSolver(const TraceSolver&) = delete;
-  TraceSolver& operator=(const TraceSolver&) = delete;
 
   /// While an order is being solved, others are answered as not taken.
   void take(const protocol::TraceOrder& order);
@@ -77,29 +73,23 @@ class TraceSolver {
   void cancel(std::uint64_t trace_id);
   /// No order received so far will be answered.
   void drop_all();
-
   bool is_solving() const;
-
   /// Answers since the last call.
   std::vector<protocol::Trace> collect();
 
  private:
-  struct Job {
-    std::uint64_t trace_id;
-    bool is_cancelled = false;
-    bool is_dropped = false;
-  };
-
-  void solve(const protocol::TraceOrder& order);
-  void refuse(std::uint64_t trace_id);
+  protocol::Trace solved(const protocol::TraceOrder& order) const;
+  void gather();
 
   const Solve solve_;
   const std::function<void()> has_trace_;
   const std::size_t most_bytes_;
-  mutable std::mutex mutex_;
-  std::optional<Job> job_;  ///< being solved
+  std::future<protocol::Trace> running_;
+  std::uint64_t trace_id_ = 0;  ///< of running_
+  bool is_cancelled_ = false;   ///< running_ will be answered as not taken
+  bool is_dropped_ = false;     ///< running_ will not be answered
   std::vector<protocol::Trace> traces_;
-  std::jthread thread_;  ///< last: it uses the other members
+  std::jthread thread_;  ///< last: it uses the other members and is waited for
 };
 
 }  // namespace oblique::worker
