@@ -28,7 +28,9 @@ class Batch {
   const protocol::PointTable& points() const { return *points_; }
 
   std::uint64_t size() const { return size_; }
-  std::uint64_t point_at(std::uint64_t position) const;
+  std::uint64_t point_at(std::uint64_t position) const {
+    return points_from(position, size_).begin;
+  }
   /// The first position in [at, end) whose point the filter keeps, or `end`.
   std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;
   /// Appends the points at the positions [begin, end) to `ranges`; the last range may grow.
@@ -41,8 +43,8 @@ class Batch {
     std::uint64_t position;
     std::uint64_t point;
   };
-  std::size_t run_of(std::uint64_t position) const;
-  std::uint64_t end_of_run(std::size_t run) const;
+  /// Consecutive points from `position` on, at most up to the position `end`.
+  Range points_from(std::uint64_t position, std::uint64_t end) const;
 
   std::uint64_t number_;
   std::uint64_t study_id_;

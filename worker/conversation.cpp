@@ -100,7 +100,7 @@ Conversation::Conversation(protocol::WorkerHello hello, ConversationSettings set
     : hello_(std::move(hello)),
       settings_(std::move(settings)),
       server_(std::move(server)),
-      hello_timeout_ms_(settings_.hello_timeout_ms),
+      hello_timeout_ms_(settings_.hello_timeout.shortest_ms),
       outbox_(settings_.outbox) {}
 
 Effects Conversation::take_effects() {
@@ -130,8 +130,7 @@ void Conversation::connect(const std::string& reason) {
   effects_.emplace_back(Send{std::move(message)});
   state_ = State::kGreeting;
   deadline_ms_ = now_ms_ + hello_timeout_ms_;
-  backoff_ms_ =
-      std::clamp(2 * backoff_ms_, settings_.shortest_backoff_ms, settings_.longest_backoff_ms);
+  backoff_ms_ = settings_.backoff.after(backoff_ms_);
 }
 
 void Conversation::connect_after_backoff(const std::string& reason) {
@@ -163,8 +162,7 @@ Effects Conversation::on_rejected(const std::string& reason, std::int64_t now_ms
   constexpr std::int64_t kSecond_ms = 1000;
   now_ms_ = now_ms;
   if (state_ == State::kGreeting || state_ == State::kWelcomed) {
-    rejected_ms_ =
-        std::clamp(2 * rejected_ms_, settings_.shortest_rejected_ms, settings_.longest_rejected_ms);
+    rejected_ms_ = settings_.rejection.after(rejected_ms_);
     const bool is_known = std::exchange(rejection_, reason) == reason;
     note(fmt::format("{}trying again in {} s", is_known ? "still refused, " : reason + ": ",
                      rejected_ms_ / kSecond_ms),
@@ -186,7 +184,7 @@ Effects Conversation::on_time(std::int64_t now_ms) {
   const bool is_over = now_ms_ >= deadline_ms_;
   if (state_ == State::kGreeting && is_over) {
     // On a slow connection, handshake and hello may take longer than the timeout.
-    hello_timeout_ms_ = std::min(2 * hello_timeout_ms_, settings_.longest_hello_timeout_ms);
+    hello_timeout_ms_ = settings_.hello_timeout.after(hello_timeout_ms_);
     effects_.emplace_back(ReportUnreachable{});
     connect_after_backoff("");
   } else if (state_ == State::kWaiting && is_over) {
@@ -280,7 +278,7 @@ void Conversation::on(const protocol::Welcome& welcome) {
     return;
   }
   state_ = State::kWelcomed;
-  hello_timeout_ms_ = settings_.hello_timeout_ms;
+  hello_timeout_ms_ = settings_.hello_timeout.shortest_ms;
   rejected_ms_ = 0;
   rejection_.clear();
   was_welcomed_ = true;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -17,8 +18,7 @@
 
 namespace oblique::worker {
 
-// ---- Effects: what the conversation decides and the session does
-// ---------------------------------
+// ---- Effects, which the session carries out -----------------------------------------------------
 
 /// Close the socket, if there is one, with all queued messages, and open a new one.
 struct Connect {
@@ -130,19 +130,25 @@ struct ExitSettings {
   std::int64_t shutdown_grace_ms = 3000;  ///< it stops this long before `until_ms`
 };
 
+/// A time that doubles after each failure, from the first to the second one.
+struct Doubling {
+  std::int64_t shortest_ms;
+  std::int64_t longest_ms;
+
+  std::int64_t after(std::int64_t last_ms) const {
+    return std::clamp(2 * last_ms, shortest_ms, longest_ms);
+  }
+};
+
 struct ConversationSettings {
   std::uint32_t batches_held = 2;  ///< one is solved, the other waits
   OutboxLimits outbox = {};
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< a larger result has its own message
   std::size_t most_bytes_a_result = std::size_t{1} << 20U;
-  std::int64_t hello_timeout_ms = 3000;  ///< the first one; doubles after each
-  std::int64_t longest_hello_timeout_ms = 12'000;
-  std::int64_t shortest_backoff_ms = 50;  ///< pause between failures, doubling
-  std::int64_t longest_backoff_ms = 2000;
-  std::int64_t shortest_rejected_ms =
-      2000;  ///< pause after the server rejects the socket, doubling
-  std::int64_t longest_rejected_ms = 30'000;
+  Doubling hello_timeout{3000, 12'000};
+  Doubling backoff{50, 2000};           ///< pause between failures
+  Doubling rejection{2000, 30'000};     ///< pause after the server rejects the socket
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
   std::int64_t last_points_ms = 250;    ///< part of it, for points under way to end
   /// A request to stop this soon after the first is the same request: Slurm sends SIGTERM twice

@@ -122,8 +122,8 @@ void Session::open_socket() {
       .url = settings_.server,
       .example_url = SessionSettings().server,
       .linger_ms = kLinger_ms,
-      .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
-      .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms),
+      .shortest_pause_ms = static_cast<int>(settings_.conversation.backoff.shortest_ms),
+      .longest_pause_ms = static_cast<int>(settings_.conversation.backoff.longest_ms),
       .is_worker = true,
       .key = settings_.key};
   link_.reset();
