@@ -579,7 +579,7 @@ void Conversation::exit_if_due() {
     return;
   }
   if (!was_welcomed_) {
-    const char* what = rejection_.empty() ? "was never reached" : "never let this worker in";
+    const char* what = rejection_.empty() ? "was never reached" : "never accepted this worker";
     begin_stop(fmt::format("leaving: {} {} in {}", server_, what, seconds_of(now_ms_ - start_ms_)),
                false, 1);
   } else if (is_time) {
@@ -595,8 +595,8 @@ std::string Conversation::status() const {
   if (stopping_) {
     return fmt::format("stopping: {} results are to be delivered", outbox_.results());
   }
-  return state_ == State::kWelcomed ? fmt::format("{} batches from the server", held_.size())
-                                    : "looks for the server";
+  return state_ == State::kWelcomed ? fmt::format("holds {} batches", held_.size())
+                                    : "connecting to the server";
 }
 
 }  // namespace oblique::worker

@@ -144,7 +144,7 @@ int run_worker(Options options) {
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
                settings.threads, settings.server);
-  notifier.ready("looks for the server");
+  notifier.ready("connecting to the server");
   const int exit_code = session.run(stop.descriptor(), [&] {
     stop.requested();
     constexpr std::chrono::seconds kLongestEnd{5};
