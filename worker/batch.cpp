@@ -15,57 +15,44 @@ Batch::Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Ran
   }
 }
 
-std::size_t Batch::run_of(std::uint64_t position) const {
-  const auto after =
+Batch::Range Batch::points_from(std::uint64_t position, std::uint64_t end) const {
+  const auto next =
       std::upper_bound(runs_.begin(), runs_.end(), position,
                        [](std::uint64_t at, const Run& run) { return at < run.position; });
-  return static_cast<std::size_t>(std::distance(runs_.begin(), after)) - 1;
-}
-
-std::uint64_t Batch::end_of_run(std::size_t run) const {
-  return run + 1 < runs_.size() ? runs_[run + 1].position : size_;
-}
-
-std::uint64_t Batch::point_at(std::uint64_t position) const {
-  const Run& run = runs_[run_of(position)];
-  return run.point + (position - run.position);
+  const Run& run = *std::prev(next);
+  const std::uint64_t first = run.point + (position - run.position);
+  return {first, first + std::min(end, next == runs_.end() ? size_ : next->position) - position};
 }
 
 std::uint64_t Batch::first_to_solve(std::uint64_t at, std::uint64_t end) const {
-  if (!points_->has_filter()) {
-    return at;
-  }
-  while (at < end) {
-    const std::uint64_t run_end = std::min(end_of_run(run_of(at)), end);
-    const std::uint64_t first = point_at(at);
-    const std::uint64_t past = first + (run_end - at);
+  while (points_->has_filter() && at < end) {
+    const auto [first, past] = points_from(at, end);
     const std::uint64_t found = points_->first_left_in(first, past);
+    at += found - first;
     if (found < past) {
-      return at + (found - first);
+      break;
     }
-    at = run_end;
   }
-  return end;
+  return at;
 }
 
 void Batch::append_points(std::uint64_t begin, std::uint64_t end,
                           std::vector<Range>& ranges) const {
   while (begin < end) {
-    const std::uint64_t run_end = std::min(end_of_run(run_of(begin)), end);
-    const std::uint64_t first = point_at(begin);
-    if (ranges.empty() || ranges.back().end != first) {
-      ranges.push_back({first, first});
+    const Range points = points_from(begin, end);
+    begin += points.end - points.begin;
+    if (!ranges.empty() && ranges.back().end == points.begin) {
+      ranges.back().end = points.end;
+    } else {
+      ranges.push_back(points);
     }
-    ranges.back().end = first + (run_end - begin);
-    begin = run_end;
   }
 }
 
 std::uint64_t Batch::end_of_model(std::uint64_t position) const {
-  const std::uint64_t point = point_at(position);
-  const protocol::Segment segment = points_->segment_at(point);
-  return std::min(position + (segment.first_point + segment.count - point),
-                  end_of_run(run_of(position)));
+  const auto [first, past] = points_from(position, size_);
+  const protocol::Segment segment = points_->segment_at(first);
+  return position + std::min(segment.first_point + segment.count, past) - first;
 }
 
 std::optional<std::vector<Batch::Range>> ranges_of(const protocol::Batch& message,

@@ -14,8 +14,7 @@ namespace oblique::worker {
 
 class BatchSolver::Task : public solver::PointSource {
  public:
-  Task(BatchSolver& solver, OpenBatches::iterator open, const std::stop_token& stop)
-      : solver_(solver), open_(*open), batch_(open->batch), stop_(stop) {}
+  Task(BatchSolver& solver, OpenBatch& open) : solver_(solver), open_(open), batch_(open.batch) {}
 
   std::optional<std::uint64_t> next() override {
     do {
@@ -23,7 +22,7 @@ class BatchSolver::Task : public solver::PointSource {
       batch_.append_points(next_, found, left_out_);
       next_ = found;
       if (next_ < end_) {
-        // Points may be slow: the rest of a task that is dropped is not waited for.
+        // Points may be slow: the rest of a dropped task is not solved.
         return open_.dropped ? std::nullopt : std::optional(next_++);
       }
     } while (take_more());
@@ -37,39 +36,36 @@ class BatchSolver::Task : public solver::PointSource {
     const protocol::Point point = batch_.points().point(number);
     return {point.model, {point.H_m, point.mu, point.e_star}};
   }
-  std::size_t model_of(std::uint64_t position) override {
-    return batch_.points().segment_at(batch_.point_at(position)).model;
+  Run run_of(std::uint64_t position) override {
+    const auto next = batch_.first_to_solve(batch_.end_of_model(position), batch_.size());
+    return {batch_.points().segment_at(batch_.point_at(position)).model,
+            next < batch_.size() ? std::optional(next) : std::nullopt};
   }
   solver::ModelParameters model(std::size_t number) override {
     return batch_.points().model(number);
   }
-  std::optional<std::uint64_t> behind_model(std::uint64_t position) override {
-    const auto behind = batch_.first_to_solve(batch_.end_of_model(position), batch_.size());
-    return behind < batch_.size() ? std::optional(behind) : std::nullopt;
-  }
 
   void take(solver::Outcome&& outcome) {
-    constexpr std::chrono::milliseconds kLongestWait{20};  // of a result in its thread
+    constexpr std::chrono::milliseconds kLongestWait{20};
     const std::uint64_t number = batch_.point_at(outcome.number);
     results_.push_back(outcome.result ? protocol::to_message(number, *outcome.result)
                                       : protocol::failed_point(number, outcome.error));
     protocol::set_inputs(results_.back(), batch_.points());
     if (Clock::now() - busy_since_ > kLongestWait) {
       const std::lock_guard lock(solver_.mutex_);
-      hand_on();
+      pass_on();
     }
   }
 
   /// Needs the lock.
-  void hand_on() {
+  void pass_on() {
     if (results_.empty() && left_out_.empty()) {
-      return;  // the time since is that of results to come
+      return;  // the time so far belongs to the next results
     }
     const Clock::time_point now = Clock::now();
     if (!open_.unwanted) {
       Progress& progress = solver_.progress_of(batch_);
-      progress.results.insert(progress.results.end(), std::move_iterator(results_.begin()),
-                              std::move_iterator(results_.end()));
+      std::move(results_.begin(), results_.end(), std::back_inserter(progress.results));
       progress.left_out.insert(progress.left_out.end(), left_out_.begin(), left_out_.end());
       progress.busy_s += std::chrono::duration<double>(now - busy_since_).count();
     }
@@ -81,16 +77,16 @@ class BatchSolver::Task : public solver::PointSource {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// Takes the next part of the batch, of which a filter may keep nothing. False when none is left.
+  /// Takes the next part of the batch, of which a filter may keep no point. False at its end.
   bool take_more() {
     std::unique_lock lock(solver_.mutex_);
-    hand_on();
+    pass_on();
     if (solver_.paused_) {
-      solver_.changed_.wait(lock, stop_, [&] { return !solver_.paused_ || open_.dropped; });
+      solver_.changed_.wait(lock, [&] { return !solver_.paused_ || open_.dropped; });
       busy_since_ = Clock::now();
     }
     const std::uint64_t left = batch_.size() - open_.given;
-    if (open_.dropped || stop_.stop_requested() || left == 0) {
+    if (open_.dropped || left == 0) {
       return false;
     }
     next_ = open_.given;
@@ -100,20 +96,17 @@ class BatchSolver::Task : public solver::PointSource {
   }
 
   BatchSolver& solver_;
-  OpenBatch& open_;  // stays while a thread is at work on it
+  OpenBatch& open_;  ///< stays while a thread works on it
   const Batch& batch_;
-  const std::stop_token& stop_;
-  std::uint64_t next_ = 0;                       // position
-  std::uint64_t end_ = 0;                        // past the last position
-  std::vector<protocol::PointResult> results_;   // not handed on yet
-  std::vector<Batch::Range> left_out_;           // the same, of points that a filter leaves out
-  Clock::time_point busy_since_ = Clock::now();  // work before this is handed on
+  std::uint64_t next_ = 0;                       ///< position
+  std::uint64_t end_ = 0;                        ///< after the last position
+  std::vector<protocol::PointResult> results_;   ///< not passed on yet
+  std::vector<Batch::Range> left_out_;           ///< the same
+  Clock::time_point busy_since_ = Clock::now();  ///< start of the work not passed on yet
 };
 
 BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)
-    : solve_(std::move(solve)),
-      batch_ended_(std::move(batch_ended)),
-      thread_count_(std::max<std::size_t>(threads, 1)) {
+    : solve_(std::move(solve)), batch_ended_(std::move(batch_ended)), thread_count_(threads) {
   for (std::size_t i = 0; i < thread_count_; ++i) {
     threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
   }
@@ -136,11 +129,10 @@ void BatchSolver::add(Batch batch) {
 void BatchSolver::drop_study(std::uint64_t study_id) {
   const std::lock_guard lock(mutex_);
   std::erase_if(progress_, [&](const auto& entry) { return entry.second.study_id == study_id; });
-  drop([&](OpenBatch& open) {
-    const bool is_of_study = open.batch.study_id() == study_id;
-    open.unwanted = open.unwanted || is_of_study;
-    return is_of_study;
-  });
+  for (OpenBatch& open : open_) {
+    open.unwanted = open.unwanted || open.batch.study_id() == study_id;
+  }
+  drop([](const OpenBatch& open) { return open.unwanted; });
 }
 
 void BatchSolver::drop_batch(std::uint64_t number) {
@@ -153,10 +145,10 @@ void BatchSolver::drop_all() {
   drop([](const OpenBatch&) { return true; });
 }
 
-/// A batch that is worked on stays, marked, until the last thread leaves it. Needs the lock.
-void BatchSolver::drop(const std::function<bool(OpenBatch&)>& is_to_drop) {
+/// Removes batches, those in work when the last thread leaves them. Needs the lock.
+void BatchSolver::drop(const std::function<bool(const OpenBatch&)>& is_to_drop) {
   open_.remove_if([&](OpenBatch& open) {
-    open.dropped = is_to_drop(open) || open.dropped;
+    open.dropped = open.dropped || is_to_drop(open);
     return open.dropped && open.solvers == 0;
   });
   changed_.notify_all();
@@ -186,12 +178,11 @@ std::vector<Progress> BatchSolver::collect() {
 }
 
 Progress& BatchSolver::progress_of(const Batch& batch) {
-  return progress_
-      .try_emplace(batch.number(), Progress{batch.number(), batch.study_id(), {}, 0.0, false, {}})
+  return progress_.try_emplace(batch.number(), Progress{batch.number(), batch.study_id()})
       .first->second;
 }
 
-/// The first batch with points that no thread took.
+/// The first batch with points that no thread has taken.
 BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
   return std::find_if(open_.begin(), open_.end(), [](const OpenBatch& open) {
     return !open.dropped && open.given < open.batch.size();
@@ -202,23 +193,23 @@ void BatchSolver::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !paused_ && next_batch() != open_.end(); })) {
     const auto open = next_batch();
-    Task task(*this, open, stop);
+    Task task(*this, *open);
     ++open->solvers;
     lock.unlock();
     solve_(open->batch, task, [&](solver::Outcome&& outcome) { task.take(std::move(outcome)); });
     lock.lock();
-    task.hand_on();
+    task.pass_on();
     if (--open->solvers > 0) {
       continue;
     }
-    const bool ended = !open->dropped && open->given == open->batch.size();
-    if (ended) {
+    const bool is_done = !open->dropped && open->given == open->batch.size();
+    if (is_done) {
       progress_of(open->batch).batch_done = true;
     }
-    if (open->dropped || ended) {
+    if (is_done || open->dropped) {
       open_.erase(open);
     }
-    if (ended) {
+    if (is_done) {
       lock.unlock();
       batch_ended_();
       lock.lock();

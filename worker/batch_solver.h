@@ -19,19 +19,18 @@
 
 namespace oblique::worker {
 
-/// Solves batches in the order in which they were added, on threads of its own, so that solving
-/// never delays heartbeats. Points that a filter leaves out are named and not solved. The threads
-/// split each batch into tasks of one point or a few and take a lock once a task.
+/// Solves batches, in the order in which they were added, on threads of its own, so that solving
+/// never delays heartbeats. Points that a filter leaves out are reported, not solved. Threads split
+/// each batch into tasks of up to 32 points and lock once a task.
 class BatchSolver {
  public:
-  /// Solves the points of a batch that the source gives, some of them at a time, and hands each
-  /// outcome to the last in any order. Numbers of points are positions in the batch. Called from
-  /// several threads at once.
+  /// Solves the points that the source gives and passes the outcomes on, in any order. Numbers of
+  /// points are positions in the batch. Called by several threads at once; must not throw.
   using SolvePoints =
       std::function<void(const Batch&, solver::PointSource&, const solver::TakeOutcome&)>;
 
-  /// `solve` must not throw. `batch_ended` is called from a solving thread after the last point of
-  /// a batch; it must not call back. `threads` is at least 1.
+  /// A solving thread calls `batch_ended` after the last point of a batch; it must not call this
+  /// object. `threads` is at least 1.
   BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads = 1);
 
   /// Waits for the points that are being solved.
@@ -43,22 +42,16 @@ class BatchSolver {
 
   /// Drops the batches of a study and their results that were not collected.
   void drop_study(std::uint64_t study_id);
-
-  /// Drops one batch; what is solved of it can still be collected. An unknown number is passed
-  /// over.
+  /// Drops a batch, or all; their results can still be collected. Ignores an unknown number.
   void drop_batch(std::uint64_t number);
-
-  /// Drops all batches; what is solved can still be collected.
   void drop_all();
 
-  /// While paused, no further point is begun.
+  /// While paused, no further point begins.
   void set_paused(bool paused);
 
-  /// Whether points are being solved now.
   bool is_solving() const;
 
-  /// What was solved since the last call, by batch. A thread hands its results on when it takes
-  /// further points, so those of quick points may be a few milliseconds late.
+  /// Results since the last call, by batch. Threads pass results on after 20 ms at the latest.
   std::vector<Progress> collect();
 
  private:
@@ -66,18 +59,18 @@ class BatchSolver {
     explicit OpenBatch(Batch&& opened) : batch(std::move(opened)) {}
 
     const Batch batch;
-    std::uint64_t given = 0;  ///< positions that a thread took
-    std::size_t solvers = 0;  ///< threads at work on it
-    /// No further point is begun; set under the lock, read before each point without it.
+    std::uint64_t given = 0;  ///< positions that threads have taken
+    std::size_t solvers = 0;  ///< threads that work on it
+    /// No further point begins. Set under the lock, read before each point without it.
     std::atomic<bool> dropped = false;
-    bool unwanted = false;  ///< nor are results kept
+    bool unwanted = false;  ///< its results are dropped too
   };
   using OpenBatches = std::list<OpenBatch>;
-  class Task;  ///< the part of a batch that one thread solves at a time, and then the next
+  class Task;  ///< the part of a batch that one thread solves, and then the next part
 
   void work(const std::stop_token& stop);
   OpenBatches::iterator next_batch();
-  void drop(const std::function<bool(OpenBatch&)>& is_to_drop);
+  void drop(const std::function<bool(const OpenBatch&)>& is_to_drop);
   Progress& progress_of(const Batch& batch);
 
   const SolvePoints solve_;
@@ -85,10 +78,10 @@ class BatchSolver {
   const std::size_t thread_count_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  OpenBatches open_;                            // in the order of their numbers
-  std::map<std::uint64_t, Progress> progress_;  // by the batch's number
+  OpenBatches open_;                            ///< in the order of their numbers
+  std::map<std::uint64_t, Progress> progress_;  ///< by the batch's number
   bool paused_ = false;
-  std::vector<std::jthread> threads_;  // last: they use all the others
+  std::vector<std::jthread> threads_;  ///< last: they use the other members
 };
 
 }  // namespace oblique::worker

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -16,9 +18,9 @@
 
 namespace oblique::worker {
 
-// ---- Effects: what the conversation decides and the session carries out -------------------------
+// ---- Effects, which the session carries out -----------------------------------------------------
 
-/// Drop the socket, if there is one, with all that waits in it, and open a new one.
+/// Close the socket, if there is one, with all queued messages, and open a new one.
 struct Connect {
   std::string reason;  ///< empty for the first one
 };
@@ -32,21 +34,19 @@ struct Solve {
 struct DropStudy {
   std::uint64_t study_id;
 };
-/// Drop that batch.
 struct DropBatch {
   std::uint64_t number;
 };
-/// Drop all batches and traces; the server leases their points anew.
+/// Drop all batches and traces.
 struct DropAll {};
 /// Solve that point for a trace, beside the batches.
 struct SolveTrace {
   protocol::TraceOrder order;
 };
-/// No client waits for that trace any more.
 struct CancelTrace {
   std::uint64_t trace_id;
 };
-/// The hello had no answer: log why, as far as the socket shows the cause.
+/// The server did not answer: log why, as far as the socket shows the cause.
 struct ReportUnreachable {};
 /// A line for the log.
 struct Note {
@@ -63,67 +63,58 @@ using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll,
                             CancelTrace, ReportUnreachable, Note, Finish>;
 using Effects = std::vector<Effect>;
 
-// ---- Results on their way
-// -------------------------------------------------------------------------
+// ---- Results until they are acknowledged --------------------------------------------------------
 
-/// How much of what is solved is kept and sent.
 struct OutboxLimits {
-  /// With so many results not acknowledged, or so many bytes of them, no more are solved.
+  /// Solving pauses while this many results, or bytes of them, are not acknowledged.
   std::size_t unacknowledged_results = 50'000;
   std::size_t unacknowledged_bytes = std::size_t{64} << 20U;
-  /// Of those, so many messages and bytes are on their way at a time; the others wait here, so that
-  /// what was solved while the server was away does not come upon it all at once.
+  /// Messages and bytes sent and not acknowledged; others wait. This spares a server that was away
+  /// from receiving all results at once.
   std::size_t messages_on_their_way = 256;
   std::size_t bytes_on_their_way = std::size_t{8} << 20U;
 };
 
-/// Results that the server has not acknowledged, in the order of their sequence numbers: those on
-/// their way, then those that wait.
+/// Results that the server has not acknowledged, in the order of their sequence numbers. Those on
+/// their way come before those that wait.
 class Outbox {
  public:
   explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}
 
-  /// Gives the results the next sequence number and keeps them.
+  /// Keeps the results, under the next sequence number.
   void add(protocol::Results results);
-  /// The next results to send, which are on their way from now on; nothing while none waits or
-  /// enough are on their way.
+  /// The next results to send, which count as sent; null if none wait or enough are on their way.
   const protocol::Results* next_to_send();
-  /// The server has them. A number that is not kept is passed over.
+  /// Removes the results with that number, if there are any.
   void acknowledged(std::uint64_t sequence);
   void drop_study(std::uint64_t study_id);
   void drop_all();
-  /// Nothing is on its way any more, nor does any lease end with these results.
+  /// All results wait again and belong to no lease.
   void start_over();
 
-  bool is_empty() const { return unacknowledged_.empty(); }
-  /// Whether any results are not even on their way.
-  bool has_waiting() const { return on_their_way_ < unacknowledged_.size(); }
+  bool is_empty() const { return messages_.empty(); }
+  bool has_waiting() const { return on_their_way_ < messages_.size(); }
   bool is_full() const {
     return results_ >= limits_.unacknowledged_results || bytes_ >= limits_.unacknowledged_bytes;
   }
   std::size_t results() const { return results_; }
-  /// Calls `see` with all that are kept.
-  template <class See>
-  void for_each(const See& see) const {
-    for (const Message& message : unacknowledged_) {
-      see(message.results);
-    }
-  }
+  /// Adds the lease of each message; 0 for none.
+  void add_leases(std::set<std::uint64_t>& leases) const;
 
  private:
   struct Message {
     protocol::Results results;
     std::size_t bytes;
-    bool on_its_way;  ///< sent in this session
+    bool is_on_its_way;
   };
-  void forget(const Message& message);
+  void count();
 
   const OutboxLimits limits_;
-  std::deque<Message> unacknowledged_;
+  std::deque<Message> messages_;
   std::size_t results_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t on_their_way_ = 0;        // messages
-  std::size_t bytes_on_their_way_ = 0;  // of those
+  std::size_t on_their_way_ = 0;  ///< messages
+  std::size_t bytes_on_their_way_ = 0;
   std::uint64_t next_sequence_ = 1;
 };
 
@@ -133,73 +124,78 @@ inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max
 
 /// When a worker ends by itself.
 struct ExitSettings {
-  std::int64_t until_ms = kNever_ms;      ///< the process has ended by then; same clock as `now_ms`
+  std::int64_t until_ms = kNever_ms;      ///< end of the process, by the clock of `now_ms`
   std::string until = {};                 ///< the same as the user wrote it
   std::int64_t idle_exit_ms = kNever_ms;  ///< longest time without work
   std::int64_t shutdown_grace_ms = 3000;  ///< it stops this long before `until_ms`
 };
 
+/// A time that doubles after each failure, from the first to the second one.
+struct Doubling {
+  std::int64_t shortest_ms;
+  std::int64_t longest_ms;
+
+  std::int64_t after(std::int64_t last_ms) const {
+    return std::clamp(2 * last_ms, shortest_ms, longest_ms);
+  }
+};
+
 struct ConversationSettings {
-  std::uint32_t batches_held = 2;  ///< one is solved, the next waits ready
+  std::uint32_t batches_held = 2;  ///< one is solved, the other waits
   OutboxLimits outbox = {};
   std::size_t results_a_message = 1000;
-  std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< then another one begins
+  std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< a larger result has its own message
   std::size_t most_bytes_a_result = std::size_t{1} << 20U;
-  std::int64_t hello_timeout_ms = 3000;            ///< a hello without answer is said again
-  std::int64_t longest_hello_timeout_ms = 12'000;  ///< doubling up to this
-  std::int64_t shortest_backoff_ms = 50;           ///< between failures, doubling
-  std::int64_t longest_backoff_ms = 2000;
-  std::int64_t shortest_rejected_ms = 2000;  ///< between attempts that the server rejects, doubling
-  std::int64_t longest_rejected_ms = 30'000;
+  Doubling hello_timeout{3000, 12'000};
+  Doubling backoff{50, 2000};           ///< pause between failures
+  Doubling rejection{2000, 30'000};     ///< pause after the server rejects the socket
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
-  std::int64_t last_points_ms = 250;    ///< of these: for points that are being solved to end
-  /// A request to stop that follows so soon is part of the one before: Slurm sends SIGTERM twice
+  std::int64_t last_points_ms = 250;    ///< part of it, for points under way to end
+  /// A request to stop this soon after the first is the same request: Slurm sends SIGTERM twice
   /// within milliseconds to jobs that it preempts.
   std::int64_t stop_repeats_ms = 1000;
   ExitSettings exit = {};
 };
 
-/// The worker's side of the conversation with the server (proto/protocol.md): decides what follows
-/// from each message, from solved points and from the passing of time. No I/O, no clock, no thread.
-/// `now_ms` is of any clock that never runs backwards. README.md has the table of states and
-/// events.
+/// The worker's side of the protocol (proto/protocol.md): decides what follows from messages,
+/// solved points and time. It has no I/O, clock or thread. `now_ms` may be of any clock that never
+/// runs backwards. README.md has the table of states and events.
 class Conversation {
  public:
   /// `server` is its address, for messages.
   Conversation(protocol::WorkerHello hello, ConversationSettings settings,
                std::string server = "the server");
 
-  /// To be called once, first.
+  /// Call it first, once.
   Effects start(std::int64_t now_ms);
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
-  /// What the tracing of a point gave so far.
   Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
-  /// A message could not be sent; what follows it of the same effects must not be sent either.
+  /// A message could not be sent. The messages after it in the same effects must not be sent.
   Effects on_send_failed(std::int64_t now_ms);
-  /// The server has rejected the socket, for a reason that a person must mend.
+  /// The server rejected the socket, for a reason that a person must resolve.
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
-  /// To be called at `next_deadline_ms` or a little later.
+  /// Call it at `next_deadline_ms` or a little later.
   Effects on_time(std::int64_t now_ms);
-  /// Give back what is not solved, deliver what is, say goodbye and finish. While
-  /// `points_are_solved` what comes of them within `last_points_ms` is delivered too. A second call
-  /// after `stop_repeats_ms` finishes at once.
-  Effects stop(std::int64_t now_ms, bool points_are_solved = false);
-  /// After a stop: no point is being solved any more, and all that was is reported.
+  /// Gives back unsolved points, delivers results, says goodbye and finishes. If `is_solving`, it
+  /// also delivers points that end within `last_points_ms`. A second call after `stop_repeats_ms`
+  /// finishes at once.
+  Effects stop(std::int64_t now_ms, bool is_solving = false);
+  /// After a stop: no point is being solved, and all results are reported.
   Effects on_solver_idle(std::int64_t now_ms);
   bool is_stopping() const { return stopping_; }
   /// The state in words, for a service manager.
   std::string status() const;
 
   std::int64_t next_deadline_ms() const;
-  /// Whether further points may be solved: false while too many results wait to be acknowledged.
+  /// False while too many results are not acknowledged.
   bool may_solve() const { return !outbox_.is_full(); }
   std::size_t unacknowledged_results() const { return outbox_.results(); }
 
  private:
   enum class State {
-    kGreeting,  ///< hello was said
-    kWaiting,   ///< for the time to try again
+    kGreeting,  ///< sent hello
+    kWaiting,   ///< pauses before the next attempt
     kWelcomed,
     kFinished
   };
@@ -211,6 +207,8 @@ class Conversation {
 
   void connect(const std::string& reason);
   void connect_after_backoff(const std::string& reason);
+  void wait(std::int64_t duration_ms);
+  void handle(const protocol::ServerToWorker& message);
   void on(const protocol::Welcome& welcome);
   void on(const protocol::StudyDefinition& definition);
   void on(const protocol::Batch& batch);
@@ -220,15 +218,19 @@ class Conversation {
   void on(const protocol::TraceOrder& order);
 
   void report(Progress& progress);
+  void add_results(protocol::Results results);
   void deliver();
   void send(protocol::WorkerMessage message);
+  void note(std::string text, bool is_warning = false);
   void send_heartbeat();
   void give_credit();
+  /// Sends waiting results before it requests batches: the server must not lease their points
+  /// again.
+  void go_on();
   std::int64_t exit_ms() const;
   std::int64_t idle_exit_ms() const;
   void exit_if_due();
-  void begin_stop(const std::string& reason, bool points_are_solved, int exit_code = 0);
-  void exit_by_itself(const std::string& reason);
+  void begin_stop(const std::string& reason, bool is_solving, int exit_code = 0);
   void finish_if_delivered();
   void finish(int exit_code, const std::string& reason);
   Effects take_effects();
@@ -239,14 +241,14 @@ class Conversation {
 
   State state_ = State::kWaiting;
   std::int64_t now_ms_ = 0;
-  std::int64_t deadline_ms_ = 0;   ///< of the state: hello unanswered, try again, server silent
-  std::int64_t hello_timeout_ms_;  ///< of the present attempt
+  std::int64_t deadline_ms_ = 0;  ///< of the state: no answer to hello, next attempt, server silent
+  std::int64_t hello_timeout_ms_;
   std::int64_t heartbeat_due_ms_ = 0;
   std::int64_t heartbeat_interval_ms_ = 1000;
   std::int64_t lost_after_ms_ = 3000;
-  std::int64_t backoff_ms_ = 0;   ///< 0: the last attempt came to something
-  std::int64_t rejected_ms_ = 0;  ///< pause after the last rejection; 0: welcomed since
-  std::string rejection_;         ///< what the last one was for; empty: welcomed since
+  std::int64_t backoff_ms_ = 0;   ///< 0: the last session did some work
+  std::int64_t rejected_ms_ = 0;  ///< last pause after a rejection; 0: welcomed since
+  std::string rejection_;         ///< reason of the last rejection; empty: welcomed since
   std::int64_t start_ms_ = 0;
   std::int64_t last_work_ms_ = 0;  ///< when it last had a batch, a trace or results to deliver
   bool was_welcomed_ = false;      ///< ever
@@ -260,12 +262,12 @@ class Conversation {
   std::string database_id_;
 
   std::map<std::uint64_t, std::shared_ptr<const protocol::PointTable>> studies_;
-  std::map<std::uint64_t, Held> held_;  // by the batch's number
+  std::map<std::uint64_t, Held> held_;  ///< by the batch's number
   std::uint64_t next_batch_ = 1;
-  std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches were of another database
-  std::uint32_t open_credit_ = 0;              ///< batches asked for and not yet come
+  std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches belong to another database
+  std::uint32_t open_credit_ = 0;              ///< batches requested and not received yet
   Outbox outbox_;
-  Effects effects_;  // of the call being made
+  Effects effects_;  ///< of the present call
 };
 
 }  // namespace oblique::worker

@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
@@ -35,11 +36,20 @@
 
 namespace {
 
-using oblique::protocol::Configuration;
-using oblique::protocol::LogSettings;
 using oblique::worker::SessionSettings;
 
 constexpr const char* kProgram = "oblique-worker";
+constexpr std::size_t kMostThreads = 4096;
+constexpr double kLongest_s = 1e9;
+
+struct Options {
+  SessionSettings session;
+  oblique::protocol::LogSettings log;
+  std::string keys;
+  std::uint64_t fall_memory_bytes = 0;  ///< 0: a part of the free memory
+  double idle_exit_s = 0.0;
+  pid_t parent = 0;
+};
 
 std::string host_name() {
   std::array<char, 256> host{};
@@ -47,8 +57,8 @@ std::string host_name() {
   return host.data();
 }
 
-/// Empty for a name that any terminal shows and any message carries, else what is wrong with it.
-std::string objection_to_name(const std::string& name) {
+/// Why `name` cannot be shown on any terminal and sent in any message; else empty.
+std::string check_name(const std::string& name) {
   constexpr std::size_t kLongestName = 200;
   const bool is_plain =
       std::all_of(name.begin(), name.end(), [](char c) { return c >= ' ' && c <= '~'; });
@@ -57,27 +67,18 @@ std::string objection_to_name(const std::string& name) {
              : "a name has 1 to 200 printable ASCII characters";
 }
 
-constexpr std::size_t kMostThreads = 4096;
-
-std::size_t cores() {
-  return std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
-}
-
-/// The time from now to `text`, negative for the past: a time in UTC, as 2026-11-22T05:00:00Z, or a
+/// Seconds from now to `text`, negative for the past: a time in UTC, as 2026-11-22T05:00:00Z, or a
 /// duration, as 90m. Nothing for other text.
-std::optional<std::chrono::milliseconds> time_until(const std::string& text) {
-  using std::chrono::milliseconds;
+std::optional<double> seconds_until(const std::string& text) {
   std::tm parts{};
   const char* const end = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
   if (end != nullptr && *end == '\0') {
     const int day = parts.tm_mday;
-    const auto now = std::chrono::system_clock::now().time_since_epoch();
-    const milliseconds left =
-        std::chrono::floor<milliseconds>(std::chrono::seconds(timegm(&parts)) - now);
-    // A day that the month does not have has become one of the next month.
-    return parts.tm_mday == day ? std::optional(left) : std::nullopt;
+    const std::chrono::duration<double> left =
+        std::chrono::system_clock::from_time_t(timegm(&parts)) - std::chrono::system_clock::now();
+    // timegm makes a day that the month does not have one of the next month.
+    return parts.tm_mday == day ? std::optional(left.count()) : std::nullopt;
   }
-  constexpr double kLongest_s = 1e9;
   constexpr std::array kUnits_s{1.0, 60.0, 3600.0};
   const std::size_t unit = std::string_view("smh").find(text.empty() ? ' ' : text.back());
   double value = 0.0;
@@ -86,57 +87,50 @@ std::optional<std::chrono::milliseconds> time_until(const std::string& text) {
       value * kUnits_s[unit] > kLongest_s) {
     return std::nullopt;
   }
-  return milliseconds(std::llround(value * kUnits_s[unit] * 1000.0));
+  return value * kUnits_s[unit];
 }
 
-/// Empty for a time or duration, else what is wrong with it.
-std::string objection_to_until(const std::string& text) {
-  return time_until(text)
-             ? ""
-             : "\"" + text +
-                   "\" is neither a time, as 2026-11-22T05:00:00Z, nor a duration, as 90m";
+std::string check_until(const std::string& text) {
+  return seconds_until(text) ? ""
+                             : fmt::format(
+                                   "\"{}\" must be a time in UTC, as "
+                                   "2026-11-22T05:00:00Z, or a duration, as 90m",
+                                   text);
 }
 
-/// Fills in the settings that follow from `--until` and `--idle-exit`. Returns what is wrong where
-/// the worker would have to leave before it works; else an empty text.
+/// Sets the times at which the worker exits. Returns what is wrong with them; else an empty text.
 std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
-  using std::chrono::duration_cast;
-  using std::chrono::milliseconds;
+  constexpr double kSecond_ms = 1000.0;
   if (idle_exit_s > 0.0) {
-    exit.idle_exit_ms = std::max<std::int64_t>(std::llround(idle_exit_s * 1000.0), 1);
+    exit.idle_exit_ms = std::max<std::int64_t>(std::llround(idle_exit_s * kSecond_ms), 1);
   }
-  const auto left = time_until(exit.until);
-  if (!left) {
+  if (exit.until.empty()) {
     return {};
   }
+  const auto left_ms = std::llround(seconds_until(exit.until).value() * kSecond_ms);
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  exit.until_ms = (duration_cast<milliseconds>(now) + *left).count();
-  if (left->count() < 0) {
-    return fmt::format("--until {} is in the past", exit.until);
-  }
-  constexpr std::int64_t kSecond_ms = 1000;
-  return left->count() > exit.shutdown_grace_ms
+  exit.until_ms = std::chrono::floor<std::chrono::milliseconds>(now).count() + left_ms;
+  return left_ms > exit.shutdown_grace_ms
              ? ""
-             : fmt::format("--until {} leaves no time to work: leaving begins {} s before it",
-                           exit.until, exit.shutdown_grace_ms / kSecond_ms);
+             : fmt::format("--until {} must be more than {} s from now, the time to stop",
+                           exit.until, static_cast<double>(exit.shutdown_grace_ms) / kSecond_ms);
 }
 
-int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t parent) {
+int run_worker(Options options) {
+  SessionSettings& settings = options.session;
   oblique::protocol::Notifier notifier;
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
-  if (!oblique::protocol::stop_with_parent(parent)) {
-    spdlog::warn("the parent process was gone before this one began");
+  if (!oblique::protocol::stop_with_parent(options.parent)) {
+    spdlog::warn("the parent process ended before this one began");
     return oblique::protocol::kDone;
   }
-  if (fall_memory_bytes == 0) {
-    fall_memory_bytes =
-        oblique::protocol::available_memory_bytes() / oblique::solver::kFallsPartOfMemory;
-  }
-  oblique::solver::FallCache falls(fall_memory_bytes);
-  const oblique::worker::Session* running = nullptr;
-  settings.on_turn = [&] {
-    notifier.status(running->status());
+  oblique::solver::FallCache falls(options.fall_memory_bytes != 0
+                                       ? options.fall_memory_bytes
+                                       : oblique::protocol::available_memory_bytes() /
+                                             oblique::solver::kFallsPartOfMemory);
+  settings.on_turn = [&](const std::string& status) {
+    notifier.status(status);
     notifier.turn(oblique::protocol::Notifier::Clock::now());
   };
   oblique::worker::Session session(
@@ -150,75 +144,66 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t 
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
                settings.threads, settings.server);
-  running = &session;
-  notifier.ready("looks for the server");  // which may come later
+  notifier.ready("connecting to the server");
   const int exit_code = session.run(stop.descriptor(), [&] {
     stop.requested();
     constexpr std::chrono::seconds kLongestEnd{5};
     notifier.stopping("stopping", kLongestEnd);
   });
   if (session.is_solving()) {
-    // Points cannot be interrupted and may take long; nobody waits for them any more.
+    // Points cannot be interrupted and may take long; their results are not needed.
     spdlog::default_logger()->flush();
     std::_Exit(exit_code);
   }
   return exit_code;
 }
 
-void add_options(CLI::App& app, Configuration& configuration, pid_t& parent,
-                 SessionSettings& settings, std::uint64_t& fall_memory_bytes, double& idle_exit_s,
-                 std::string& keys, LogSettings& log) {
+void add_options(CLI::App& app, Options& options) {
+  SessionSettings& session = options.session;
   app.set_version_flag("--version", "oblique-worker " + oblique::protocol::version_and_commit());
-  app.add_option("--server", settings.server, "Where the server awaits workers")
+  app.add_option("--server", session.server, "Address of the server for workers")
       ->type_name("URL")
       ->capture_default_str();
-  app.add_option("--keys", keys, "Key file for a server that has keys")
+  app.add_option("--keys", options.keys, "Key file for a server that has keys")
       ->type_name("FILE")
       ->envname("OBLIQUE_KEYS");
-  app.add_option("--name", settings.name, "Name that people see; the default is HOST:PROCESS")
+  app.add_option("--name", session.name, "Name of the worker in lists; the default is HOST:PROCESS")
       ->type_name("NAME")
-      ->check(objection_to_name);
-  app.add_option("--threads", settings.threads,
-                 "Points solved at a time, each thread on a core; the default is all cores here")
+      ->check(check_name);
+  session.threads = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
+  app.add_option("--threads", session.threads,
+                 "Threads that solve points; the default is one for each core")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMostThreads));
-  app.add_option(
-         "--fall-memory", fall_memory_bytes,
-         "Memory for solved falls, as 2GB: points that share a fall need not solve it again; "
-         "the default is an eighth of the free memory, or of the container's limit")
+  app.add_option("--fall-memory", options.fall_memory_bytes,
+                 "Memory for solved falls, which points share, as 2GB; the default is an eighth of "
+                 "the free memory, or of the container's limit")
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false).description(""));
-  app.add_option("--until", settings.conversation.exit.until,
-                 "Be gone by then: a time in UTC, as 2026-11-22T05:00:00Z, "
-                 "or a duration from now, as 90m")
+  app.add_option("--until", session.conversation.exit.until,
+                 "Exit before this time: in UTC, as 2026-11-22T05:00:00Z, or from now, as 90m")
       ->type_name("TIME")
-      ->check(objection_to_until);
-  constexpr double kLongestIdle_s = 1e9;
-  app.add_option("--idle-exit", idle_exit_s, "Leave after so many seconds without work; 0: stay")
+      ->check(check_until);
+  app.add_option("--idle-exit", options.idle_exit_s,
+                 "Exit after this many seconds without work; 0: never")
       ->type_name("SECONDS")
       ->capture_default_str()
-      ->check(oblique::protocol::number_between(0.0, kLongestIdle_s));
-  oblique::protocol::add_stop_with_parent(app, parent);
-  configuration.add_log_options(log);
+      ->check(oblique::protocol::number_between(0.0, kLongest_s));
+  oblique::protocol::add_stop_with_parent(app, options.parent);
 }
 
-/// Everything but errors that nobody foresaw.
 int run_program(int argc, char** argv) {
   oblique::protocol::set_up_log(kProgram);
   oblique::protocol::silence_protobuf();
-  SessionSettings settings;
-  LogSettings log;
-  std::string keys;
-  settings.threads = cores();
+  Options options;
+  SessionSettings& session = options.session;
   CLI::App app(
       "Solves points of parameter studies for an oblique-server.\n"
       "Example: oblique-worker --server tcp://127.0.0.1:7601",
       kProgram);
-  Configuration configuration(app, "OBLIQUE_WORKER_", "worker.toml");
-  pid_t parent = 0;
-  double idle_exit_s = 0.0;
-  std::uint64_t fall_memory_bytes = 0;
-  add_options(app, configuration, parent, settings, fall_memory_bytes, idle_exit_s, keys, log);
+  oblique::protocol::Configuration configuration(app, "OBLIQUE_WORKER_", "worker.toml");
+  add_options(app, options);
+  configuration.add_log_options(options.log);
   if (const auto exit_code = oblique::protocol::print_completion(app, argc, argv)) {
     return *exit_code;
   }
@@ -229,20 +214,20 @@ int run_program(int argc, char** argv) {
     std::cout << configuration.printed();
     return oblique::protocol::kDone;
   }
-  if (const std::string objection = set_exit(settings.conversation.exit, idle_exit_s);
-      !objection.empty()) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), objection);
+  if (const std::string error = set_exit(session.conversation.exit, options.idle_exit_s);
+      !error.empty()) {
+    return oblique::protocol::tell_wrong_usage(app.get_name(), error);
   }
-  settings.host = host_name();
-  if (settings.name.empty()) {
-    settings.name = settings.host + ":" + std::to_string(getpid());
+  session.host = host_name();
+  if (session.name.empty()) {
+    session.name = session.host + ":" + std::to_string(getpid());
   }
-  oblique::protocol::set_up_log(kProgram, log);
+  oblique::protocol::set_up_log(kProgram, options.log);
   try {
-    if (!keys.empty()) {
-      settings.key = oblique::protocol::read_key_file(keys);
+    if (!options.keys.empty()) {
+      session.key = oblique::protocol::read_key_file(options.keys);
     }
-    return run_worker(settings, fall_memory_bytes, parent);
+    return run_worker(std::move(options));
   } catch (const oblique::solver::InputError& error) {
     return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
   }

@@ -3,26 +3,23 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <iomanip>
 #include <random>
-#include <sstream>
-#include <string_view>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/result_message.h"
-#include "proto/socket/socket.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::worker {
 namespace {
 
-constexpr int kLinger_ms = 500;         ///< for the goodbye to leave
-constexpr int kLastReports_ms = 10;     ///< between reports of points that end a stopped worker
-constexpr int kMessagesAtATime = 1000;  ///< then other duties get their turn
+constexpr int kLinger_ms = 500;         ///< for the goodbye to be sent
+constexpr int kLastReports_ms = 10;     ///< between reports of a stopping worker
+constexpr int kMessagesAtATime = 1000;  ///< then the loop does its other work
 
 std::int64_t now_ms() {
   using std::chrono::duration_cast;
@@ -30,15 +27,14 @@ std::int64_t now_ms() {
   return duration_cast<milliseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// 128 bits that no other process draws, in hexadecimal digits.
+/// 128 random bits in hexadecimal digits.
 std::string random_id() {
   std::random_device source;
-  std::ostringstream digits;
-  digits << std::hex << std::setfill('0');
+  std::string digits;
   for (int i = 0; i < 4; ++i) {
-    digits << std::setw(8) << source();
+    digits += fmt::format("{:08x}", source());
   }
-  return digits.str();
+  return digits;
 }
 
 protocol::WorkerHello hello_of(const SessionSettings& settings) {
@@ -51,6 +47,20 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   hello.set_process_id(random_id());
   hello.set_host(settings.host);
   return hello;
+}
+
+/// Calls `work` again as long as a signal interrupts it.
+template <class Work>
+auto uninterrupted(const Work& work) {
+  while (true) {
+    try {
+      return work();
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) {
+        throw;
+      }
+    }
+  }
 }
 
 template <class... Handlers>
@@ -69,45 +79,6 @@ Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve, Trace
           std::move(solve), [this] { news_.wake(); }, settings_.threads),
       tracer_(std::move(trace), [this] { news_.wake(); }) {}
 
-Session::~Session() = default;
-
-void Session::open_socket() {
-  const protocol::DealerSettings settings{
-      .url = settings_.server,
-      .example_url = SessionSettings().server,
-      .linger_ms = kLinger_ms,
-      .shortest_pause_ms = static_cast<int>(settings_.conversation.shortest_backoff_ms),
-      .longest_pause_ms = static_cast<int>(settings_.conversation.longest_backoff_ms),
-      .is_worker = true,
-      .key = settings_.key};
-  link_.reset();
-  link_.emplace(context_, settings);
-  if (!std::exchange(was_heard_, false)) {
-    ++attempt_;
-  }
-  protocol::connect(link_->socket, settings, attempt_);
-}
-
-void Session::report_unreachable() {
-  // In the time that a hello is waited for, attempts that are refused are more, those that nothing
-  // answers fewer.
-  constexpr unsigned kManyAttempts = 4;
-  const auto attempts = link_->monitor.attempts();
-  const std::string host = protocol::host_of(settings_.server);
-  const auto [has_v4, has_v6] = protocol::families_of(host);
-  const std::string cause =
-      attempts.was_accepted
-          ? "connections are accepted, but no worker is welcomed: is this its port for workers?"
-      : !host.empty() && !has_v4 && !has_v6
-          ? fmt::format("no address is known here for the name {}", host)
-      : attempts.failed >= kManyAttempts
-          ? "connections fail at once: is it running there?"
-          : "attempts to connect get no answer: does a firewall drop them?";
-  if (reported_causes_.insert(cause).second) {
-    spdlog::warn("no server answers at {} ({}); trying again", settings_.server, cause);
-  }
-}
-
 int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
   apply(conversation_.start(now_ms()));
   while (!exit_code_) {
@@ -116,17 +87,10 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
                                {nullptr, stop_descriptor, ZMQ_POLLIN, 0},
                                {link_->monitor.handle(), 0, ZMQ_POLLIN, 0}};
     const std::int64_t due_ms = std::min(conversation_.next_deadline_ms(), report_due_ms_);
-    try {
-      zmq::poll(items, std::size(items),
-                std::chrono::milliseconds(std::max<std::int64_t>(due_ms - now_ms(), 0)));
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        throw;
-      }
-      continue;
-    }
+    const std::chrono::milliseconds timeout(std::max<std::int64_t>(due_ms - now_ms(), 0));
+    uninterrupted([&] { return zmq::poll(items, std::size(items), timeout); });
     if (settings_.on_turn) {
-      settings_.on_turn();
+      settings_.on_turn(conversation_.status());
     }
     receive_all();
     if (const auto rejection = link_->monitor.rejection()) {
@@ -149,8 +113,42 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     solver_.set_paused(!conversation_.may_solve());
   }
   link_.reset();
-  context_.close();  // waits for the goodbye, no longer than the socket lingers
+  context_.close();  // waits for the goodbye, at most kLinger_ms
   return *exit_code_;
+}
+
+void Session::open_socket() {
+  const protocol::DealerSettings settings{
+      .url = settings_.server,
+      .example_url = SessionSettings().server,
+      .linger_ms = kLinger_ms,
+      .shortest_pause_ms = static_cast<int>(settings_.conversation.backoff.shortest_ms),
+      .longest_pause_ms = static_cast<int>(settings_.conversation.backoff.longest_ms),
+      .is_worker = true,
+      .key = settings_.key};
+  link_.reset();
+  link_.emplace(context_, settings);
+  attempt_ += std::exchange(has_received_, false) ? 0U : 1U;
+  protocol::connect(link_->socket, settings, attempt_);
+}
+
+void Session::report_unreachable() {
+  // During one hello, connections that are refused fail more often than this, those that nothing
+  // answers less often.
+  constexpr unsigned kManyAttempts = 4;
+  const auto attempts = link_->monitor.attempts();
+  const std::string host = protocol::host_of(settings_.server);
+  const auto [has_v4, has_v6] = protocol::families_of(host);
+  const std::string cause =
+      attempts.was_accepted
+          ? "connections are accepted, but no worker is welcomed: is this its port for workers?"
+      : !host.empty() && !has_v4 && !has_v6 ? fmt::format("the name {} has no known address", host)
+      : attempts.failed >= kManyAttempts
+          ? "connections fail at once: is it running there?"
+          : "attempts to connect get no answer: does a firewall drop them?";
+  if (reported_causes_.insert(cause).second) {
+    spdlog::warn("no server answers at {} ({}); trying again", settings_.server, cause);
+  }
 }
 
 void Session::report_progress() {
@@ -163,22 +161,16 @@ void Session::report_progress() {
 void Session::receive_all() {
   for (int i = 0; i < kMessagesAtATime && !exit_code_; ++i) {
     zmq::message_t frame;
-    try {
-      if (!link_->socket.recv(frame, zmq::recv_flags::dontwait)) {
-        return;
-      }
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        throw;
-      }
-      continue;
+    const auto receive = [&] { return link_->socket.recv(frame, zmq::recv_flags::dontwait); };
+    if (!uninterrupted(receive)) {
+      return;
     }
     protocol::ServerToWorker message;
     if (!protocol::decode({frame.data<char>(), frame.size()}, message)) {
-      spdlog::warn("a frame of {} bytes that is no message was dropped", frame.size());
+      spdlog::warn("ignored a frame of {} bytes that is not a message", frame.size());
       continue;
     }
-    was_heard_ = true;
+    has_received_ = true;
     if (message.has_welcome()) {
       reported_causes_.clear();
     }
@@ -188,15 +180,14 @@ void Session::receive_all() {
 
 bool Session::send(const protocol::WorkerMessage& message) {
   const std::string frame = protocol::encode(message);
-  while (true) {
-    try {
-      return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait).has_value();
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        spdlog::warn("sending failed: {}", error.what());
-        return false;
-      }
-    }
+  const auto attempt = [&] {
+    return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait);
+  };
+  try {
+    return uninterrupted(attempt).has_value();
+  } catch (const zmq::error_t& error) {
+    spdlog::warn("sending failed: {}", error.what());
+    return false;
   }
 }
 
@@ -217,7 +208,7 @@ void Session::apply(Effects effects) {
         solver_.drop_all();
         tracer_.drop_all();
       },
-      [&](SolveTrace& effect) { tracer_.take(std::move(effect.order)); },
+      [&](const SolveTrace& effect) { tracer_.take(effect.order); },
       [&](const CancelTrace& effect) { tracer_.cancel(effect.trace_id); },
       [&](const ReportUnreachable&) { report_unreachable(); },
       [&](const Note& note) {

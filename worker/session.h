@@ -20,36 +20,32 @@ namespace oblique::worker {
 
 /// Settings of the worker; help texts print the defaults from here.
 struct SessionSettings {
-  std::string server = "tcp://127.0.0.1:7601";  ///< where the server awaits workers
+  std::string server = "tcp://127.0.0.1:7601";  ///< its address for workers
   std::string name;                             ///< for people
   std::string host;                             ///< name of this machine, for people
   std::size_t threads = 1;                      ///< that solve points
-  std::function<void()> on_turn;                ///< called several times a second
-  std::int64_t report_interval_ms = 100;        ///< solved points wait at most so long
-  std::optional<protocol::KeyFile> key = {};    ///< its own; none: plain text
+  /// Called several times a second with the state in words.
+  std::function<void(const std::string& status)> on_turn;
+  std::int64_t report_interval_ms = 100;      ///< longest time until solved points are sent
+  std::optional<protocol::KeyFile> key = {};  ///< none: plain text
   ConversationSettings conversation;
 };
 
-/// Runs a worker: the socket and the heartbeats on the calling thread, solving on others.
+/// Runs a worker: socket and heartbeats on the calling thread, solving on others.
 class Session {
  public:
-  /// Solves points of batches by `solve`, and those that somebody wants to look at by `trace`.
-  /// Connects to nothing yet.
+  /// Solves points of batches by `solve` and those of traces by `trace`. Does not connect yet.
   Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace = {});
-  ~Session();
+  ~Session() = default;
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Runs until the worker is stopped or refused, and returns the exit code.
-  /// Stops when `stop_descriptor` is readable; reading it is left to `on_stop`, so that a second
-  /// request can be told from the first. Throws solver::InputError unless `settings.server` is an
-  /// address.
+  /// Runs until the worker is stopped or refused, and returns the exit code. A readable
+  /// `stop_descriptor` is a request to stop; `on_stop` must read it, so that a second request can
+  /// be recognised. Throws solver::InputError unless `settings.server` is an address.
   int run(int stop_descriptor, const std::function<void()>& on_stop);
 
-  /// Where the conversation is, as a sentence part.
-  std::string status() const { return conversation_.status(); }
-
-  /// Whether a point is still being solved: destruction would wait for it.
+  /// Whether a point is still being solved: the destructor would wait for it.
   bool is_solving() const { return solver_.is_solving() || tracer_.is_solving(); }
 
  private:
@@ -65,7 +61,7 @@ class Session {
   void open_socket();
   void report_unreachable();
   void apply(Effects effects);
-  /// False when the message could not be handed to the socket.
+  /// False if the socket did not accept the message.
   bool send(const protocol::WorkerMessage& message);
   void receive_all();
   void report_progress();
@@ -73,14 +69,14 @@ class Session {
   const SessionSettings settings_;
   zmq::context_t context_;
   std::optional<Link> link_;
-  unsigned attempt_ = 0;   ///< to connect: which of the families of addresses the host has is tried
-  bool was_heard_ = true;  ///< something came over this socket
-  std::set<std::string> reported_causes_;  ///< of the server's silence, since it last welcomed us
-  protocol::WakeUp news_;                  ///< a batch ended, or there is more of a trace
+  unsigned attempt_ = 0;      ///< to connect: selects IPv4 or IPv6 for a host with both
+  bool has_received_ = true;  ///< a message, over this socket
+  std::set<std::string> reported_causes_;  ///< why no server answers; since the last welcome
+  protocol::WakeUp news_;                  ///< a batch ended, or a trace is ready
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;
-  BatchSolver solver_;  // these two last: their threads use the ones above
+  BatchSolver solver_;  ///< these two last: their threads use the other members
   TraceSolver tracer_;
 };
 

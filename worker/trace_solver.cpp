@@ -1,6 +1,7 @@
 #include "worker/trace_solver.h"
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <utility>
 
@@ -26,13 +27,9 @@ TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
       chooses_every_(every == 0),
       most_bytes_(most_bytes) {}
 
-std::size_t TraceRows::most_rows() const {
-  return most_bytes_ / row_bytes_;
-}
-
 void TraceRows::add(const solver::TraceRow& row) {
   if (!rows_.empty() && !stays(rows_.back())) {
-    rows_.pop_back();  // it was kept as the last one
+    rows_.pop_back();  // kept only while it was the last
   }
   const bool falls = row.state == solver::kFalling;
   const bool is_always_kept = falls || solver::ends_phase(last_state_, row.state);
@@ -48,7 +45,7 @@ void TraceRows::add(const solver::TraceRow& row) {
     std::erase_if(rows_,
                   [this](const Row& kept) { return !stays(kept) && &kept != &rows_.back(); });
   }
-  if (rows_.size() > most_rows()) {  // the rest is only counted
+  if (rows_.size() > most_rows()) {  // further rows are only counted
     is_too_long_ = true;
     rows_.pop_back();
   }
@@ -58,7 +55,7 @@ void TraceRows::move_to(protocol::Trace& trace) {
   trace.set_instants(instants_);
   trace.set_every(every_);
   if (is_too_long_) {
-    // The first instant and the last one are kept with any `every`.
+    // Any `every` keeps the first and the last instant.
     const std::uint64_t always = always_kept_ + 2;
     const std::uint64_t room = most_rows() > always ? most_rows() - always : 0;
     trace.set_every(room == 0 ? instants_ + 1 : (instants_ + room - 1) / room);
@@ -92,69 +89,61 @@ protocol::PointResult solve_trace(const protocol::TraceOrder& order,
 }
 
 TraceSolver::TraceSolver(Solve solve, std::function<void()> has_trace, std::size_t most_bytes)
-    : solve_(std::move(solve)),
-      has_trace_(std::move(has_trace)),
-      most_bytes_(most_bytes),
-      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+    : solve_(std::move(solve)), has_trace_(std::move(has_trace)), most_bytes_(most_bytes) {}
 
-TraceSolver::~TraceSolver() {
-  drop_all();
-  thread_.request_stop();
-}
-
-void TraceSolver::take(protocol::TraceOrder order) {
-  const std::lock_guard lock(mutex_);
-  if (job_ || !solve_) {
+void TraceSolver::take(const protocol::TraceOrder& order) {
+  gather();
+  if (running_.valid() || !solve_) {
     traces_.push_back(not_taken(order.trace_id()));
     has_trace_();
     return;
   }
-  job_.emplace(Job{std::move(order)});
-  changed_.notify_all();
+  trace_id_ = order.trace_id();
+  is_cancelled_ = is_dropped_ = false;
+  std::packaged_task<protocol::Trace()> task([this, order] { return solved(order); });
+  running_ = task.get_future();
+  thread_ = std::jthread([this, task = std::move(task)]() mutable {
+    task();
+    has_trace_();
+  });
 }
 
 void TraceSolver::cancel(std::uint64_t trace_id) {
-  const std::lock_guard lock(mutex_);
-  if (job_ && job_->order.trace_id() == trace_id) {
-    job_->is_cancelled = true;
-  }
+  is_cancelled_ = is_cancelled_ || trace_id == trace_id_;
 }
 
 void TraceSolver::drop_all() {
-  const std::lock_guard lock(mutex_);
   traces_.clear();
-  if (job_) {
-    job_->is_dropped = true;
-  }
+  is_dropped_ = true;
 }
 
 bool TraceSolver::is_solving() const {
-  const std::lock_guard lock(mutex_);
-  return job_.has_value();
+  return running_.valid() &&
+         running_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
 }
 
 std::vector<protocol::Trace> TraceSolver::collect() {
-  const std::lock_guard lock(mutex_);
+  gather();
   return std::exchange(traces_, {});
 }
 
-void TraceSolver::work(const std::stop_token& stop) {
-  std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop, [this] { return job_.has_value(); })) {
-    lock.unlock();
-    protocol::Trace trace;
-    trace.set_trace_id(job_->order.trace_id());
-    TraceRows rows(job_->order.every(), most_bytes_);
-    *trace.mutable_result() =
-        solve_(job_->order, [&rows](const solver::TraceRow& row) { rows.add(row); });
-    if (trace.result().error().empty()) {
-      rows.move_to(trace);
-    }
-    lock.lock();
-    const Job job = *std::exchange(job_, std::nullopt);
-    if (!job.is_dropped) {
-      traces_.push_back(job.is_cancelled ? not_taken(trace.trace_id()) : std::move(trace));
-      has_trace_();
+protocol::Trace TraceSolver::solved(const protocol::TraceOrder& order) const {
+  protocol::Trace trace;
+  trace.set_trace_id(order.trace_id());
+  TraceRows rows(order.every(), most_bytes_);
+  *trace.mutable_result() = solve_(order, [&](const solver::TraceRow& row) { rows.add(row); });
+  if (trace.result().error().empty()) {
+    rows.move_to(trace);
+  }
+  return trace;
+}
+
+/// Moves the trace of running_, once it is solved, to the answers.
+void TraceSolver::gather() {
+  if (running_.valid() && !is_solving()) {
+    protocol::Trace trace = running_.get();
+    if (!is_dropped_) {
+      traces_.push_back(is_cancelled_ ? not_taken(trace_id_) : std::move(trace));
     }
   }
 }

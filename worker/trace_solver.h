@@ -1,12 +1,9 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <mutex>
-#include <optional>
-#include <stop_token>
+#include <future>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,7 +23,7 @@ class TraceRows {
   TraceRows(std::uint64_t every, std::size_t most_bytes);
 
   void add(const solver::TraceRow& row);
-  /// Moves the rows into the message. If they have more than `most_bytes` it gets none, and the
+  /// Moves the rows into the message. If they have more than `most_bytes`, it gets no rows but the
   /// least `every` with which they would fit.
   void move_to(protocol::Trace& trace);
 
@@ -39,7 +36,7 @@ class TraceRows {
   };
 
   bool stays(const Row& row) const { return row.is_always_kept || row.instant % every_ == 0; }
-  std::size_t most_rows() const;
+  std::size_t most_rows() const { return most_bytes_ / row_bytes_; }
 
   std::uint64_t every_;
   const bool chooses_every_;
@@ -52,59 +49,47 @@ class TraceRows {
   std::vector<Row> rows_;
 };
 
-/// Solves the point of an order over a fall of `falls` and gives its instants to `sink`: the same
-/// bits as in a batch. The result's number is 0. Nothing is thrown for a point without an answer,
-/// nor for an order that makes no sense: it fails.
+/// Solves the point of an order with a fall from `falls` and passes its instants to `sink`. Gives
+/// the same bits as in a batch; the result's number is 0. A wrong order gives a failed result.
 protocol::PointResult solve_trace(const protocol::TraceOrder& order,
                                   const solver::Tracing::Sink& sink, solver::FallCache& falls);
 
-/// Solves points for traces, one at a time, on a thread of its own beside those of the batches.
+/// Solves points for traces, one at a time, on a thread beside those of the batches. Its functions
+/// are called by one thread.
 class TraceSolver {
  public:
-  /// Solves the point of an order and passes its instants to the sink. Must not throw. If there is
-  /// no such function, no order is taken.
+  /// Solves the point of an order and passes its instants to the sink. Must not throw.
   using Solve = std::function<protocol::PointResult(const protocol::TraceOrder&,
                                                     const solver::Tracing::Sink&)>;
 
-  /// `has_trace` is called when a trace can be collected, also on the solving thread; it must not
-  /// call back.
+  /// Without `solve` no order is taken. `has_trace` is called when a trace can be collected, also
+  /// on the solving thread.
   TraceSolver(Solve solve, std::function<void()> has_trace,
               std::size_t most_bytes = protocol::kMostTraceBytes);
-  /// Waits for the point that is being solved.
-  ~TraceSolver();
-  TraceSolver(const TraceSolver&) = delete;
-  TraceSolver& operator=(const TraceSolver&) = delete;
 
-  /// While an order is being solved another one is answered as not taken.
-  void take(protocol::TraceOrder order);
-  /// The order will be answered as not taken, once its point is solved. An unknown number has no
-  /// effect.
+  /// While an order is being solved, others are answered as not taken.
+  void take(const protocol::TraceOrder& order);
+  /// The order will be answered as not taken when its point is solved. Ignores an unknown number.
   void cancel(std::uint64_t trace_id);
-  /// No order so far will be answered.
+  /// No order received so far will be answered.
   void drop_all();
-
   bool is_solving() const;
-
-  /// Answers to orders that were not collected yet.
+  /// Answers since the last call.
   std::vector<protocol::Trace> collect();
 
  private:
-  struct Job {
-    protocol::TraceOrder order;
-    bool is_cancelled = false;
-    bool is_dropped = false;
-  };
-
-  void work(const std::stop_token& stop);
+  protocol::Trace solved(const protocol::TraceOrder& order) const;
+  void gather();
 
   const Solve solve_;
   const std::function<void()> has_trace_;
   const std::size_t most_bytes_;
-  mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
-  std::optional<Job> job_;               // guarded by mutex_; its order stays as it is
-  std::vector<protocol::Trace> traces_;  // guarded by mutex_
-  std::jthread thread_;                  // last: it uses all the others
+  std::future<protocol::Trace> running_;
+  std::uint64_t trace_id_ = 0;  ///< of running_
+  bool is_cancelled_ = false;   ///< running_ will be answered as not taken
+  bool is_dropped_ = false;     ///< running_ will not be answered
+  std::vector<protocol::Trace> traces_;
+  std::jthread thread_;  ///< last: it uses the other members and is waited for
 };
 
 }  // namespace oblique::worker

@@ -20,6 +20,7 @@
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/kernels.h"
 #include "worker/solver/model/parameters.h"
+#include "worker/solver/parallel_for.h"
 
 namespace oblique::client {
 namespace {
@@ -28,18 +29,15 @@ using Clock = std::chrono::steady_clock;
 using solver::FingerPoint;
 using solver::ModelParameters;
 
-/// Seconds that `work` takes for 0, 1, ..., each on a thread of its own, in all.
-double thread_seconds(std::size_t threads, const std::function<void(std::size_t)>& work) {
-  std::vector<double> each_s(threads);
-  std::vector<std::jthread> at_work;
-  for (std::size_t i = 0; i < threads; ++i) {
-    at_work.emplace_back([&, i] {
-      const auto start = Clock::now();
-      work(i);
-      each_s[i] = std::chrono::duration<double>(Clock::now() - start).count();
-    });
-  }
-  at_work.clear();  // joins
+/// Calls `work` with each number below `count`, each on a thread of its own. Returns the sum of the
+/// times that the calls took [s].
+double thread_seconds(std::size_t count, const std::function<void(std::size_t)>& work) {
+  std::vector<double> each_s(count);
+  solver::parallel_for(count, count, [&](std::size_t i) {
+    const auto start = Clock::now();
+    work(i);
+    each_s[i] = std::chrono::duration<double>(Clock::now() - start).count();
+  });
   return std::accumulate(each_s.begin(), each_s.end(), 0.0);
 }
 

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <future>
 #include <limits>
 #include <mutex>
 #include <utility>
@@ -13,6 +12,7 @@
 
 #include "worker/solver/fall_cache.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/parallel_for.h"
 #include "worker/solver/reference/chain.h"
 #include "worker/solver/solve.h"
 #include "worker/solver/step_choice.h"
@@ -351,19 +351,12 @@ std::vector<SolvedLevel> solve_levels(const std::vector<Level>& levels, const Co
                                       const std::function<void(const SolvedLevel&)>& after_each) {
   solver::FallCache falls;
   std::mutex reporting;
-  std::vector<std::future<SolvedLevel>> running;
-  for (const auto& level : levels) {
-    running.push_back(std::async(std::launch::async, [&] {
-      auto solved = solved_level(level, point, falls, line);
-      const std::lock_guard lock(reporting);
-      after_each(solved);
-      return solved;
-    }));
-  }
-  std::vector<SolvedLevel> solved;
-  for (auto& level : running) {
-    solved.push_back(level.get());
-  }
+  std::vector<SolvedLevel> solved(levels.size());
+  solver::parallel_for(levels.size(), levels.size(), [&](std::size_t i) {
+    solved[i] = solved_level(levels[i], point, falls, line);
+    const std::lock_guard lock(reporting);
+    after_each(solved[i]);
+  });
   return solved;
 }
 

@@ -13,17 +13,17 @@
 namespace oblique::solver {
 namespace {
 
-/// Order in which the error of an output is taken to fall with the mesh. Observed is 3.5 to 5 for
-/// the first and 1.5 to 4 for the second. The errors of two meshes have no fixed signs, so their
-/// difference may be far smaller than either: a lower order is the safety against that.
+/// Assumed orders of the mesh's error. Observed orders are 3.5 to 5 for smooth outputs and 1.5 to 4
+/// for rough ones. The lower ones here are a margin: the errors of two meshes may have either sign,
+/// so their difference may be far smaller than each.
 constexpr int kSmoothOrder = 2;  ///< largest normal force, duration, slide, impulses
-constexpr int kRoughOrder = 1;   ///< what fast vibrations or single events decide
+constexpr int kRoughOrder = 1;   ///< outputs that fast vibrations or single events decide
 constexpr int kRefinement = 2;
 
 /// (2 l/L)^4, with l the longest element and L the length of a bending wave as fast as the contact:
-/// the part of the mesh's error that has no order yet. The end of a beam struck on a spring k
-/// answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at the tip the
-/// contact is not faster than that mass on the spring. A wave of angular frequency w has the
+/// the part of the mesh's error for which no order holds yet. The end of a beam struck on a spring
+/// k answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at the tip
+/// the contact is not faster than that mass on the spring. A wave of angular frequency w has the
 /// wavenumber (rho A w^2/(E I))^(1/4).
 double unresolved_waves(const ModelParameters& model) {
   const double mass_per_length_kg_m = model.rho_kg_m3 * model.A_m2;
@@ -41,17 +41,11 @@ double unresolved_waves(const ModelParameters& model) {
   return std::pow(element_m * wavenumber_1_m / std::numbers::pi, 4);
 }
 
-/// What differences are multiplied with, for an output of that order.
+/// Factor of the difference of an output whose error has that order.
 double factor(const ModelParameters& model, int order) {
   const ModelParameters companion = companion_model(model);
   const double ratio = static_cast<double>(model.elements_per_link) / companion.elements_per_link;
   return (1.0 + unresolved_waves(companion)) / (std::pow(ratio, order) - 1.0);
-}
-
-/// Nothing where the scale is 0, or the quotient is no number.
-std::optional<double> relative(double difference, double scale) {
-  const double quotient = std::abs(difference) / std::abs(scale);
-  return std::isfinite(quotient) ? std::optional(quotient) : std::nullopt;
 }
 
 }  // namespace
@@ -68,14 +62,15 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   const double smooth = factor(model, kSmoothOrder);
   const double rough = factor(model, kRoughOrder);
   const double speed_m_s = std::hypot(result.vt_in_m_s, result.vn_in_m_s);
-  // What the steps leave by their choice; steps that the user chose are judged by the difference.
+  // Error of chosen steps. That of steps that the user set is part of the difference.
   const double step_error = model.dt_s == 0.0 ? model.tolerance : 0.0;
-  const auto error_of = [&](double difference, double scale) {
-    auto error = relative(difference, scale);
-    if (error && *error > 0.0) {  // without a difference the output is exact, as 0 without friction
-      *error += step_error;
+  const auto error_of = [&](double difference, double scale) -> std::optional<double> {
+    const double error = std::abs(difference) / std::abs(scale);
+    if (!std::isfinite(error)) {
+      return std::nullopt;
     }
-    return error;
+    // Without a difference the output is exact, as 0 without friction.
+    return error > 0.0 ? error + step_error : error;
   };
   const auto error = [&](double factor, double CaseResult::*output, double scale) {
     return error_of(factor * (result.*output - companion.*output), scale);
@@ -89,7 +84,7 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
   errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
   errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
-  // Both components carry one vibration, whose phase lets the difference of either pass through 0.
+  // One vibration is in both components, so the difference of either may pass through 0.
   errors.v_out = error_of(rough * std::hypot(result.vt_out_m_s - companion.vt_out_m_s,
                                              result.vn_out_m_s - companion.vn_out_m_s),
                           speed_m_s);
@@ -113,28 +108,26 @@ ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult
 
 namespace {
 
-/// A point that waits for the points beside it or for its companion.
-struct WaitingPoint {
+struct SolvedPoint {
   FingerPoint point;
   std::optional<CaseResult> result = {};
-  std::optional<Finger> companion = {};  ///< none where there is no coarser mesh or no fall on it
+  std::optional<Finger> companion = {};  ///< none without a coarser mesh or a fall on it
 };
 
-/// Solves the next points of the source, some hundred or for about a second. True when it may have
-/// more.
-bool solve_next(const FingerPoints& source, std::vector<WaitingPoint>& points,
-                const TakeOutcome& sink) {
+/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` when the source
+/// has no more.
+std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
+                                    bool& ended) {
   using Clock = std::chrono::steady_clock;
   constexpr std::size_t kMostPoints = 256;
   constexpr std::chrono::seconds kLongest{1};
-  const Clock::time_point begun = Clock::now();
-  bool may_have_more = true;
-  const auto next = [&]() -> std::optional<FingerPoint> {
+  std::vector<SolvedPoint> points;
+  const auto next = [&, begun = Clock::now()]() -> std::optional<FingerPoint> {
     if (points.size() >= kMostPoints || Clock::now() - begun > kLongest) {
       return std::nullopt;
     }
     auto point = source();
-    may_have_more = point.has_value();
+    ended = !point;
     if (point) {
       points.push_back({*point});
       point->number = points.size() - 1;
@@ -142,19 +135,19 @@ bool solve_next(const FingerPoints& source, std::vector<WaitingPoint>& points,
     return point;
   };
   solve_points(next, [&](Outcome&& outcome) {
-    WaitingPoint& waiting = points[outcome.number];
-    waiting.result = std::move(outcome.result);
-    if (!waiting.result) {
-      sink({waiting.point.number, std::nullopt, std::move(outcome.error)});
+    SolvedPoint& solved = points[outcome.number];
+    solved.result = std::move(outcome.result);
+    if (!solved.result) {
+      sink({solved.point.number, std::nullopt, std::move(outcome.error)});
     }
   });
-  return may_have_more;
+  return points;
 }
 
-/// Gives the points their companions, one for those of a model that follow each other.
-void find_companions(std::vector<WaitingPoint>& points, FallCache& falls) {
+/// Sets the companions of points, one for points of a model that follow each other.
+void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
   std::vector<ModelParameters> companions;
-  std::vector<std::size_t> first;  // the first point of each
+  std::vector<std::size_t> first;  // point of each
   for (std::size_t i = 0; i < points.size(); ++i) {
     const ModelParameters& model = points[i].point.finger.model();
     if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
@@ -175,46 +168,38 @@ void find_companions(std::vector<WaitingPoint>& points, FallCache& falls) {
   }
 }
 
-/// Hands all results on, with their errors where there is a companion.
-void estimate(std::vector<WaitingPoint>& points, const TakeOutcome& sink) {
-  const auto hand_on = [&sink](WaitingPoint& waiting) {
-    sink({waiting.point.number, std::move(waiting.result), {}});
-  };
-  std::size_t last = 0;
-  const auto next = [&]() -> std::optional<FingerPoint> {
-    while (last < points.size()) {
-      const std::size_t i = last++;
-      WaitingPoint& waiting = points[i];
-      if (waiting.result && waiting.companion) {
-        return FingerPoint{*waiting.companion, i, waiting.point.point};
-      }
-      if (waiting.result) {
-        hand_on(waiting);
-      }
-    }
-    return std::nullopt;
-  };
-  solve_points(next, [&](Outcome&& companion) {
-    WaitingPoint& waiting = points[companion.number];
-    if (companion.result) {
-      waiting.result->errors =
-          estimated_errors(waiting.point.finger.model(), *waiting.result, *companion.result);
-    }
-    hand_on(waiting);
-  });
-}
-
 }  // namespace
 
-// Chains of two shapes share no lanes: points are solved by their own models first and then by the
-// companions of these.
+// Chains of different shapes share no lanes, so companions are solved after the points.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink) {
-  for (bool may_have_more = true; may_have_more;) {
-    std::vector<WaitingPoint> points;
-    may_have_more = solve_next(source, points, sink);
-    find_companions(points, falls);
-    estimate(points, sink);
+  for (bool ended = false; !ended;) {
+    std::vector<SolvedPoint> points = solve_next(source, sink, ended);
+    set_companions(points, falls);
+    const auto pass_on = [&sink](SolvedPoint& solved) {
+      sink({solved.point.number, std::move(solved.result), {}});
+    };
+    std::size_t count = 0;
+    const auto next = [&]() -> std::optional<FingerPoint> {
+      while (count < points.size()) {
+        const std::size_t i = count++;
+        if (points[i].result && points[i].companion) {
+          return FingerPoint{*points[i].companion, i, points[i].point.point};
+        }
+        if (points[i].result) {
+          pass_on(points[i]);
+        }
+      }
+      return std::nullopt;
+    };
+    solve_points(next, [&](Outcome&& companion) {
+      SolvedPoint& solved = points[companion.number];
+      if (companion.result) {
+        solved.result->errors =
+            estimated_errors(solved.point.finger.model(), *solved.result, *companion.result);
+      }
+      pass_on(solved);
+    });
   }
 }
 

@@ -7,13 +7,13 @@
 
 namespace oblique::solver {
 
-/// The model whose solution of a point is held against that of `model`: half as many elements a
-/// link, rounded down (1 stays 1, and has no estimate), and twice the steps in contact where these
-/// are stable. It costs about a quarter, its fall aside, which depends on the mesh alone.
+/// The model whose results are compared with those of `model`: half as many elements a link,
+/// rounded down (1 stays 1 and has no estimate), and steps in contact twice as long, where these
+/// are stable. It takes about a quarter of the time, apart from its own fall.
 ModelParameters companion_model(const ModelParameters& model);
 
-/// Estimated errors of `result`, the solution of a point of `model`, from its differences d to
-/// `companion`, that of the same point of `companion_model(model)`:
+/// Estimated errors of `result`, a point of `model`, from its differences d to `companion`, the
+/// same point of `companion_model(model)`:
 /// error = d (1 + (2 l/L)^4)/(r^p - 1) + tolerance, with r the ratio of the meshes, l the length of
 /// an element of the companion, L the length of the bending waves that the contact makes, p an
 /// order for each output, and the tolerance that chooses the step (accuracy.md, "Errors of single
@@ -23,16 +23,15 @@ ModelParameters companion_model(const ModelParameters& model);
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 
-/// The same of the result of one point, its companion solved here over a fall from
-/// `falls`: the bits that solve_points_with_errors() gives it. Empty where there is
-/// no coarser mesh, and where the companion has no answer.
+/// The same for one point: its companion is solved here, with a fall from `falls`. Gives the same
+/// bits as solve_points_with_errors(). Empty if there is no coarser mesh or the companion has no
+/// answer.
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
                                   FallCache& falls);
 
-/// As solve_points(), and each result has its estimated errors, where its companion has an answer;
-/// every other number has the same bits. Some hundred points at a time, of about a second at most,
-/// are solved before their companions, whose falls come from `falls`, so outcomes come in
-/// bursts.
+/// Like solve_points(), with estimated errors in each result whose companion has an answer. All
+/// other outputs have the same bits. Solves up to 256 points, for about a second, before their
+/// companions, so outcomes come in bursts. Falls of companions come from `falls`.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink);
 

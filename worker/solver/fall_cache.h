@@ -9,14 +9,13 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::solver {
 
-class FallenChain;  ///< of the implementation: a chain with its fall (falls.h)
+class FallenChain;  ///< of the implementation: a chain with its fall
 
 /// A fall, or the reason why there is none.
 struct FallOutcome {
@@ -24,10 +23,9 @@ struct FallOutcome {
   std::string error;
 };
 
-/// Falls that models share. Keeps those used last; one that fails is kept as its error,
-/// so it fails once. What the solution throws, as where memory is short, is not kept: it leaves
-/// `fall`, and the next call solves it anew. May be used by several threads at once; falls are
-/// solved by the threads that call.
+/// Falls that models share; the least recently used ones are removed. A fall that fails is kept as
+/// its error, so it fails once. May be used by several threads at once; the calling threads solve
+/// the falls.
 class FallCache {
  public:
   struct Bounds {
@@ -37,31 +35,31 @@ class FallCache {
 
   using Solve = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
 
-  /// Solves missing falls by `solve`, or by solve_falls().
+  /// Solves missing falls by `solve`, by default solve_falls().
   explicit FallCache(const Bounds& bounds, Solve solve = {});
-  /// Keeps at most so many bytes of falls, the last one aside.
+  /// Keeps at most `most_bytes` of falls, but at least one fall.
   explicit FallCache(std::size_t most_bytes = std::size_t{1} << 30)
       : FallCache(Bounds{.bytes = most_bytes}) {}
 
-  /// The fall of `model`; fall_model() need not have gone through. What is not kept is solved, and
-  /// beside it, as far as lanes go, those of `ahead`, the first first, that nobody has solved or is
-  /// solving; when another thread solves that of `model`, those of `ahead` are solved while it
-  /// does. Does not wait for falls of `ahead` that others solve. A model outside its domain fails
-  /// with what is wrong with it.
+  /// The fall of `model`. A missing one is solved, together with the first falls of `ahead` that
+  /// are missing, as many as there are lanes. While another thread solves the fall of `model`, this
+  /// one solves those of `ahead`. Does not wait for falls of `ahead` that other threads solve. A
+  /// model outside its domain has an error as its outcome. Exceptions of `solve`, as
+  /// std::bad_alloc, are passed on and not kept: the next call solves the fall again.
   FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
 
-  /// One fall for each model; those that are missing are solved side by side. One for which there
-  /// is no memory just then fails.
+  /// The falls of all models; missing ones are solved side by side. An exception of `solve` becomes
+  /// the error of that fall.
   std::vector<FallOutcome> falls(std::span<const ModelParameters> models);
 
-  /// The fall of `model` when it is kept; solves and waits for nothing.
+  /// The fall of `model` if it is kept. Does not solve or wait.
   std::optional<FallOutcome> kept_fall(const ModelParameters& model);
 
  private:
   struct Entry {
-    ModelParameters model;               ///< as fall_model() gives it
+    ModelParameters model;               ///< as returned by fall_model()
     std::optional<FallOutcome> outcome;  ///< empty while it is being solved
-    bool is_used = false;                ///< somebody asked for it, not only ahead of others
+    bool is_used = false;                ///< requested, not only solved ahead
   };
   using Entries = std::list<Entry>;
 
@@ -74,10 +72,10 @@ class FallCache {
   void make_room();
 
   const Bounds bounds_;
-  Solve solve_;
+  const Solve solve_;
   std::mutex mutex_;
   std::condition_variable solved_;
-  Entries entries_;              ///< the one used last comes first
+  Entries entries_;              ///< most recently used first
   std::size_t usual_bytes_ = 0;  ///< of falls solved lately
 };
 

@@ -27,41 +27,27 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// Explicit steps in sqrt(2 length / g), up to which they are quicker than collocation
+/// Most explicit steps in sqrt(2 length / g) for which they are faster than collocation
 /// (fast/README.md).
 constexpr double kFewSteps = 150'000.0;
 
-enum class WayToFall { kStepsAlone, kSteps, kCollocation };
-
-WayToFall way_to_fall(const FallenChain& chain) {
+bool falls_by_collocation(const FallenChain& chain) {
   const ModelParameters& model = chain.model();
-  if (model.integrator != Integrator::kExplicit) {
-    return WayToFall::kStepsAlone;
-  }
   const double steps = longest_fall_s(chain.chain()) / kLongestFall / chain.fall_step_s();
-  return model.dt_fall_s != 0.0 || model.tolerance < kTightestCollocation || steps <= kFewSteps
-             ? WayToFall::kSteps
-             : WayToFall::kCollocation;
+  return model.integrator == Integrator::kExplicit && model.dt_fall_s == 0.0 &&
+         model.tolerance >= kTightestCollocation && steps > kFewSteps;
 }
 
-/// Solves falls, all in one way and of one shape.
-std::vector<FallSolution> solve(WayToFall way, std::span<const FallRequest> requests) {
-  if (way != WayToFall::kStepsAlone) {
-    return way == WayToFall::kSteps ? solve_by_steps(requests) : solve_by_collocation(requests);
+FallSolution solve_alone(const FallRequest& request) {
+  try {
+    return {solve_stepped_fall(request.motion, request.dt_s, longest_fall_s(*request.chain),
+                               request.progress),
+            {}};
+  } catch (const std::bad_alloc&) {  // is no property of this fall
+    throw;
+  } catch (const std::exception& error) {
+    return {nullptr, error.what()};
   }
-  std::vector<FallSolution> solutions(requests.size());
-  for (std::size_t i = 0; i < requests.size(); ++i) {
-    const FallRequest& request = requests[i];
-    try {
-      solutions[i].fall = solve_stepped_fall(request.motion, request.dt_s,
-                                             longest_fall_s(*request.chain), request.progress);
-    } catch (const std::bad_alloc&) {  // says nothing of this fall
-      throw;
-    } catch (const std::exception& error) {
-      solutions[i].error = error.what();
-    }
-  }
-  return solutions;
 }
 
 }  // namespace
@@ -78,11 +64,13 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b) {
 }
 
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains) {
-  using Kind = std::tuple<WayToFall, std::size_t, int>;  // with links and elements a link
+  using Kind = std::tuple<Integrator, bool, std::size_t, int>;  // links and elements a link last
   std::map<Kind, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const ModelParameters& model = chains[i]->model();
-    places[{way_to_fall(*chains[i]), model.lengths_m.size(), model.elements_per_link}].push_back(i);
+    places[{model.integrator, falls_by_collocation(*chains[i]), model.lengths_m.size(),
+            model.elements_per_link}]
+        .push_back(i);
   }
   std::vector<FallOutcome> outcomes(chains.size());
   for (const auto& [kind, alike] : places) {
@@ -92,15 +80,19 @@ std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain
       requests.push_back({&chain.chain(), chain.motion(), chain.fall_step_s(),
                           chain.model().tolerance, &chain.fall_progress()});
     }
-    std::vector<FallSolution> solutions = solve(std::get<WayToFall>(kind), requests);
+    std::vector<FallSolution> solutions;
+    if (std::get<Integrator>(kind) == Integrator::kExplicit) {
+      solutions = std::get<bool>(kind) ? solve_by_collocation(requests) : solve_by_steps(requests);
+    } else {
+      std::transform(requests.begin(), requests.end(), std::back_inserter(solutions), solve_alone);
+    }
     for (std::size_t i = 0; i < alike.size(); ++i) {
       const std::shared_ptr<FallenChain>& chain = chains[alike[i]];
-      FallOutcome& outcome = outcomes[alike[i]];
       if (solutions[i].fall) {
         chain->set_fall(std::move(solutions[i].fall));
-        outcome.fallen = chain;
+        outcomes[alike[i]].fallen = chain;
       } else {
-        outcome.error = with_likely_cause(std::move(solutions[i].error), chain->model());
+        outcomes[alike[i]].error = with_likely_cause(std::move(solutions[i].error), chain->model());
       }
     }
   }
@@ -136,8 +128,8 @@ std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
   return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
 }
 
-/// Why this is no model; empty: it is one. One with a NaN, which equals nothing, would never be
-/// found among those that are kept.
+/// Why `falling` is outside its domain; else empty. A NaN, which equals nothing, would never be
+/// found among the entries.
 std::string fault_of(const ModelParameters& falling) {
   try {
     validate(falling);
@@ -147,14 +139,14 @@ std::string fault_of(const ModelParameters& falling) {
   }
 }
 
+std::vector<FallOutcome> solve_models(std::span<const ModelParameters> models) {
+  return solve_falls(models);
+}
+
 }  // namespace
 
 FallCache::FallCache(const Bounds& bounds, Solve solve)
-    : bounds_(bounds), solve_(std::move(solve)) {
-  if (!solve_) {
-    solve_ = [](std::span<const ModelParameters> models) { return solve_falls(models); };
-  }
-}
+    : bounds_(bounds), solve_(solve ? std::move(solve) : solve_models) {}
 
 FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelParameters> ahead) {
   const ModelParameters falling = fall_model(model);
@@ -169,7 +161,7 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
     }
     const auto claimed = claim(falling, ahead);
     if (claimed.empty()) {
-      solved_.wait(lock);  // and look again: it may have been solved and forgotten meanwhile
+      solved_.wait(lock);  // then look again: it may have been solved and removed
     } else {
       solve(claimed, lock);
     }
@@ -192,10 +184,7 @@ std::optional<FallOutcome> FallCache::kept_fall(const ModelParameters& model) {
   const ModelParameters falling = fall_model(model);
   const std::lock_guard lock(mutex_);
   const auto found = find(falling);
-  if (found == entries_.end() || !found->outcome) {
-    return std::nullopt;
-  }
-  return use(found);
+  return found != entries_.end() && found->outcome ? std::optional(use(found)) : std::nullopt;
 }
 
 FallCache::Entries::iterator FallCache::find(const ModelParameters& falling) {
@@ -209,7 +198,7 @@ FallOutcome FallCache::use(Entries::iterator entry) {
   return *entry->outcome;
 }
 
-/// Makes entries for what this thread is to solve now: none when others solve it all.
+/// Makes entries for the falls that this thread will solve; none if other threads solve them all.
 std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters& falling,
                                                            std::span<const ModelParameters> ahead) {
   const bool in_lanes = fall_side_by_side(falling, falling);
@@ -217,8 +206,7 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
   std::vector<Entries::iterator> claimed;
   const auto claim_if_missing = [&](const ModelParameters& missing) {
     if (find(missing) == entries_.end()) {
-      entries_.push_back({missing, std::nullopt});
-      claimed.push_back(std::prev(entries_.end()));
+      claimed.push_back(entries_.insert(entries_.end(), {missing, std::nullopt}));
     }
   };
   claim_if_missing(falling);
@@ -237,35 +225,34 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
 void FallCache::solve(const std::vector<Entries::iterator>& claimed,
                       std::unique_lock<std::mutex>& lock) {
   std::vector<FallOutcome> outcomes;
+  std::exception_ptr failure;
+  lock.unlock();
   try {
     std::vector<ModelParameters> models;
-    models.reserve(claimed.size());
-    for (const auto& entry : claimed) {
+    for (const auto& entry : claimed) {  // its model never changes
       models.push_back(entry->model);
     }
-    lock.unlock();
     outcomes = solve_(models);
-  } catch (...) {  // no memory just then: others wait for these entries, and may have more luck
-    if (!lock.owns_lock()) {
-      lock.lock();
-    }
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  lock.lock();
+  solved_.notify_all();
+  if (failure) {  // threads that wait for these falls solve them again
     for (const auto& entry : claimed) {
       entries_.erase(entry);
     }
-    solved_.notify_all();
-    throw;
+    std::rethrow_exception(failure);
   }
-  lock.lock();
-  for (std::size_t i = claimed.size(); i-- > 0;) {  // the one wanted first is to stay longest
+  for (std::size_t i = claimed.size(); i-- > 0;) {  // the fall needed first is kept longest
     claimed[i]->outcome = std::move(outcomes[i]);
     usual_bytes_ = std::max(bytes_of(claimed[i]->outcome), usual_bytes_ / 2);
     entries_.splice(entries_.begin(), entries_, claimed[i]);
   }
   make_room();
-  solved_.notify_all();
 }
 
-/// Falls solved ahead, and those under way, may take half of the room.
+/// Whether falls solved ahead, with those being solved, take less than half of the bounds.
 bool FallCache::has_room_ahead() const {
   std::size_t falls = 0;
   std::size_t bytes = 0;
@@ -278,7 +265,7 @@ bool FallCache::has_room_ahead() const {
   return 2 * falls < bounds_.falls && 2 * bytes < bounds_.bytes;
 }
 
-/// Forgets what was not used for longest, of falls solved ahead only when no other are left.
+/// Removes the least recently used falls; those solved ahead only if no others are left.
 void FallCache::make_room() {
   std::size_t falls = 0;
   std::size_t bytes = 0;

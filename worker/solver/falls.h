@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "worker/solver/fall_cache.h"
@@ -12,23 +13,23 @@
 
 namespace oblique::solver {
 
-/// A chain with its motion and, once solve_falls() has solved it, its fall: what points of all
-/// models with one fall_model() share. Constant from then on. Motion and others refer to its parts,
-/// so it stays at one address.
+/// A chain with its motion and, once solve_falls() has solved it, its fall: what models with the
+/// same fall_model() share. Does not change after that. The motion refers to the chain, so objects
+/// are not copied.
 class FallenChain {
  public:
-  /// Throws InputError when `model` is outside its domain or its dt_fall is above its limit.
+  /// Throws InputError when `model` is outside its domain or its dt_fall is above the limit.
   explicit FallenChain(const ModelParameters& model);
   FallenChain(const FallenChain&) = delete;
   FallenChain& operator=(const FallenChain&) = delete;
   ~FallenChain() = default;
 
-  /// As fall_model() gives it.
+  /// As returned by fall_model().
   const ModelParameters& model() const { return model_; }
   const Chain& chain() const { return chain_; }
   const std::shared_ptr<const Motion>& motion() const { return motion_; }
   double fall_step_s() const { return fall_step_s_; }
-  /// Needs a fall that is solved.
+  /// Only after the fall is solved.
   const Fall& fall() const { return *fall_; }
   void set_fall(std::shared_ptr<const Fall> fall) { fall_ = std::move(fall); }
   FallProgress& fall_progress() const { return fall_progress_; }
@@ -42,16 +43,17 @@ class FallenChain {
   mutable FallProgress fall_progress_ = 0.0;
 };
 
-/// Whether solve_falls() solves the two side by side, so that both cost hardly more than one.
+/// Whether solve_falls() solves the two falls side by side, so that both take hardly longer than
+/// one.
 bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b);
 
-/// Solves the falls of some chains, side by side where their integrator and shapes allow, and gives
-/// the outcomes in the same order. A fall has the same bits whatever was solved beside it, and one
-/// that fails leaves the others alone.
+/// Solves falls, side by side where integrator and shapes allow. Outcomes are in the order of the
+/// chains. A fall has the same bits whatever is solved beside it; one that fails does not affect
+/// the others.
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains);
 
-/// The same for the falls of some models, which fall_model() need not have gone through. A model
-/// outside its domain fails as a fall does. Throws std::bad_alloc where there is no memory.
+/// The same for any models. A model outside its domain has an error as its outcome. Throws
+/// std::bad_alloc if memory is short.
 std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models);
 
 }  // namespace oblique::solver

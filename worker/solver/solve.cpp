@@ -20,10 +20,10 @@
 
 namespace oblique::solver {
 
-/// What copies of a Finger share: the model, its steps in contact, and the fall, solved or not yet.
+/// What copies of a Finger share: the model, its steps in contact, and the fall, solved or not.
 class Finger::Parts {
  public:
-  /// Its fall is `fallen`, or comes from `falls`, or without both is solved here.
+  /// The fall is `fallen`, or comes from `falls`, or without both is solved here.
   Parts(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen,
         std::shared_ptr<FallCache> falls)
       : model_(validated(model)),
@@ -31,24 +31,21 @@ class Finger::Parts {
         falls_(std::move(falls)),
         fall_{std::move(fallen), {}},
         steps_(prepared().chain(), model) {
-    if (fall_.fallen) {
-      if (!(fall_model(model) == fall_.fallen->model())) {
-        throw std::invalid_argument("the fall is of another model");
-      }
-      std::call_once(fall_once_, [] {});
+    if (fall_.fallen && !(fall_model(model) == fall_.fallen->model())) {
+      throw std::invalid_argument("the fall is of another model");
     }
   }
 
   const ModelParameters& model() const { return model_; }
   /// The chain, whether its fall is solved or not.
   const FallenChain& prepared() const { return falling_ ? *falling_ : *fall_.fallen; }
-  const StepChoice& steps() const { return steps_; }
 
-  /// Throws SolveError when the fall has no end, again and at once for every point: what one long
-  /// computation has said need not be computed again.
+  /// Throws SolveError when the fall has no answer, without solving it again.
   const std::shared_ptr<const FallenChain>& fallen() const {
     std::call_once(fall_once_, [this] {
-      fall_ = falls_ ? falls_->fall(model_) : solve_falls({&falling_, 1}).front();
+      if (!fall_.fallen) {
+        fall_ = falls_ ? falls_->fall(model_) : solve_falls({&falling_, 1}).front();
+      }
     });
     if (!fall_.fallen) {
       throw SolveError(fall_.error);
@@ -57,30 +54,14 @@ class Finger::Parts {
   }
   const Fall& fall() const { return fallen()->fall(); }
 
-  /// Throws InputError for a value outside its range, a step that is too long, an H never reached.
-  void check(const Point& point) const {
+  /// Steps in the contact. Throws InputError for a value outside its range and for a step that is
+  /// too long.
+  ContactSteps steps_for(const Point& point) const {
     validate_point(model_, point.H_m, point.mu, point.e_star);
-    steps_.contact(point.e_star);
-    if (point.H_m > fall().largest_drop_m()) {
-      fall().state_at(point.H_m);
-    }
+    return steps_.contact(point.e_star);
   }
   ContactParameters contact_parameters(const Point& point) const {
     return {model_.k_N_m, model_.eta2, point.mu, point.e_star};
-  }
-  void sign(SolverReport& report) const {
-    report.integrator = integrator_name(model_.integrator);
-    report.version = solver_version();
-  }
-  CaseResult solve_by_motion(const Point& point, const Tracing& tracing) const {
-    ChainState touch = fall().state_at(point.H_m);
-    const double fall_time_s = touch.t_s;
-    CaseResult result = solve_contact(*prepared().motion(), contact_parameters(point),
-                                      steps_.contact(point.e_star), std::move(touch), tracing);
-    result.H_m = point.H_m;
-    result.fall_time_s = fall_time_s;
-    sign(result.solver);
-    return result;
   }
 
  private:
@@ -90,7 +71,7 @@ class Finger::Parts {
   }
 
   ModelParameters model_;
-  std::shared_ptr<FallenChain> falling_;  ///< none where the fall was given
+  std::shared_ptr<FallenChain> falling_;  ///< empty if a fall was given
   std::shared_ptr<FallCache> falls_;
   mutable std::once_flag fall_once_;
   mutable FallOutcome fall_;
@@ -99,24 +80,20 @@ class Finger::Parts {
 
 namespace {
 
-/// Points of any fingers, from a source to a sink.
-class Crowd {
+/// Solves points of any fingers from a source to a sink.
+class PointSolver {
  public:
-  Crowd(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing)
+  PointSolver(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing)
       : source_(source), sink_(sink), tracing_(tracing) {}
 
   void solve() {
     while (fetch()) {
-      if (is_for_lanes(*upcoming_)) {
-        solve_in_lanes();
-      } else {
-        solve_by_motion(*std::exchange(upcoming_, std::nullopt));
-      }
+      is_for_lanes(*upcoming_) ? solve_in_lanes() : solve_by_motion();
     }
   }
 
  private:
-  struct Entry {
+  struct Begun {
     FingerPoint point;
     double fall_time_s;
   };
@@ -125,37 +102,7 @@ class Crowd {
     return point.finger.model().integrator == Integrator::kExplicit;
   }
 
-  void solve_by_motion(const FingerPoint& point) {
-    Outcome outcome{point.number, std::nullopt, {}};
-    bool touches = false;
-    try {
-      point.finger.parts()->check(point.point);
-      touches = true;
-      outcome.result = point.finger.parts()->solve_by_motion(point.point, tracing_);
-    } catch (const std::exception& error) {
-      outcome.error =
-          touches ? with_likely_cause(error.what(), point.finger.model()) : error.what();
-    }
-    sink_(std::move(outcome));
-  }
-
-  /// The points from upcoming_ on whose chains can share its lanes.
-  void solve_in_lanes() {
-    const auto first = upcoming_->finger.parts();  // keeps its chain
-    const Chain& shape = first->prepared().chain();
-    const auto take = [&]() -> std::optional<ContactCase> {
-      while (fetch() && shares_lanes_of(shape)) {
-        if (const auto next = begun(*std::exchange(upcoming_, std::nullopt))) {
-          return next;
-        }
-      }
-      return std::nullopt;
-    };
-    solve_contacts(
-        shape, take, [this](ContactOutcome&& contact) { give(std::move(contact)); }, tracing_);
-  }
-
-  /// Makes the next point upcoming_; false when none follows.
+  /// Sets upcoming_ to the next point; false at the end.
   bool fetch() {
     if (!upcoming_ && !has_ended_) {
       upcoming_ = source_();
@@ -163,24 +110,57 @@ class Crowd {
     }
     return upcoming_.has_value();
   }
+
+  /// Solves one point, by any integrator.
+  void solve_by_motion() {
+    const std::optional<ContactCase> next = begin(*std::exchange(upcoming_, std::nullopt));
+    if (!next) {
+      return;
+    }
+    ContactOutcome contact{next->tag, std::nullopt, {}};
+    try {
+      const Motion& motion = *last_->finger.parts()->prepared().motion();
+      contact.result = solve_contact(motion, next->parameters, next->steps, *next->touch, tracing_);
+    } catch (const std::exception& error) {
+      contact.error = error.what();
+    }
+    pass_on(std::move(contact));
+  }
+
+  /// Solves points, from upcoming_ on, as long as their chains can share lanes.
+  void solve_in_lanes() {
+    const auto first = upcoming_->finger.parts();  // owns the chain
+    const Chain& shape = first->prepared().chain();
+    const auto next = [&]() -> std::optional<ContactCase> {
+      while (fetch() && shares_lanes_of(shape)) {
+        if (const auto begun = begin(*std::exchange(upcoming_, std::nullopt))) {
+          return begun;
+        }
+      }
+      return std::nullopt;
+    };
+    solve_contacts(
+        shape, next, [this](ContactOutcome&& contact) { pass_on(std::move(contact)); }, tracing_);
+  }
+
   bool shares_lanes_of(const Chain& chain) const {
     return is_for_lanes(*upcoming_) &&
            have_one_shape(upcoming_->finger.parts()->prepared().chain().tables(), chain.tables());
   }
 
-  std::optional<ContactCase> begun(FingerPoint&& point) {
-    const Point& request = point.point;
-    const auto& finger = point.finger.parts();
+  /// The contact of a point, whose state at touch is valid until the next call. Passes on the error
+  /// of a point that has none.
+  std::optional<ContactCase> begin(FingerPoint&& point) {
+    const Finger::Parts& finger = *point.finger.parts();
     try {
-      validate_point(finger->model(), request.H_m, request.mu, request.e_star);
-      const ContactSteps steps = finger->steps().contact(request.e_star);
-      const ChainState& touch = touch_of(*finger, request.H_m);
+      const ContactSteps steps = finger.steps_for(point.point);
+      const ChainState& touch = touch_of(finger, point.point.H_m);
       group_ += continues_group(point, steps) ? 0U : 1U;
       last_ = point;
       last_compression_s_ = steps.compression_s;
-      under_way_.insert_or_assign(next_tag_, Entry{point, touch.t_s});
+      begun_.insert_or_assign(next_tag_, Begun{point, touch.t_s});
       return ContactCase{
-          next_tag_++, group_, &finger->prepared().chain(), finger->contact_parameters(request),
+          next_tag_++, group_, &finger.prepared().chain(), finger.contact_parameters(point.point),
           steps,       &touch};
     } catch (const std::exception& error) {
       sink_({point.number, std::nullopt, error.what()});
@@ -188,7 +168,7 @@ class Crowd {
     }
   }
 
-  /// The state at touch, found once for neighbours. Valid until the next call.
+  /// The state at touch, found once for neighbours.
   const ChainState& touch_of(const Finger::Parts& finger, double H_m) {
     constexpr std::size_t kMostTouches = 16;
     if (fallen_ != finger.fallen() || touches_.size() >= kMostTouches) {
@@ -202,22 +182,24 @@ class Crowd {
     return found->second;
   }
 
-  /// Whether the contact comes the same way as that begun last up to its first turn.
+  /// Whether the contact is the same as the last one up to its first turn.
   bool continues_group(const FingerPoint& point, const ContactSteps& steps) const {
     return last_ && last_->finger.parts() == point.finger.parts() &&
            last_->point.H_m == point.point.H_m && last_->point.mu == point.point.mu &&
            last_compression_s_ == steps.compression_s;
   }
 
-  void give(ContactOutcome&& contact) {
-    const auto entry = under_way_.extract(contact.tag);
+  void pass_on(ContactOutcome&& contact) {
+    const auto entry = begun_.extract(contact.tag);
     const auto& [point, fall_time_s] = entry.mapped();
+    const ModelParameters& model = point.finger.model();
     if (contact.result) {
       contact.result->H_m = point.point.H_m;
       contact.result->fall_time_s = fall_time_s;
-      point.finger.parts()->sign(contact.result->solver);
+      contact.result->solver.integrator = integrator_name(model.integrator);
+      contact.result->solver.version = solver_version();
     } else {
-      contact.error = with_likely_cause(std::move(contact.error), point.finger.model());
+      contact.error = with_likely_cause(std::move(contact.error), model);
     }
     sink_({point.number, std::move(contact.result), std::move(contact.error)});
   }
@@ -225,13 +207,13 @@ class Crowd {
   const FingerPoints& source_;
   const TakeOutcome& sink_;
   const Tracing& tracing_;
-  std::shared_ptr<const FallenChain> fallen_;  ///< of the touches; keeps its address its own
+  std::shared_ptr<const FallenChain> fallen_;  ///< that of touches_
   std::map<double, ChainState> touches_;       ///< by H
   std::optional<FingerPoint> upcoming_;        ///< taken from the source, not begun
   bool has_ended_ = false;
-  std::optional<FingerPoint> last_;  ///< begun last in lanes
+  std::optional<FingerPoint> last_;  ///< begun last
   double last_compression_s_ = 0.0;  ///< its step
-  std::map<std::uint64_t, Entry> under_way_;
+  std::map<std::uint64_t, Begun> begun_;
   std::uint64_t next_tag_ = 0;
   std::uint64_t group_ = 0;
 };
@@ -243,10 +225,11 @@ std::string instruction_set() {
 }
 
 void solve_points(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing) {
-  Crowd(source, sink, tracing).solve();
+  PointSolver(source, sink, tracing).solve();
 }
 
-std::vector<Outcome> solve_points(const Finger& finger, std::span<const Point> points) {
+std::vector<Outcome> solve_points(const Finger& finger, std::span<const Point> points,
+                                  const Tracing& tracing) {
   std::vector<Outcome> outcomes(points.size());
   std::size_t next = 0;
   solve_points(
@@ -257,7 +240,7 @@ std::vector<Outcome> solve_points(const Finger& finger, std::span<const Point> p
         const std::size_t number = next++;
         return FingerPoint{finger, number, points[number]};
       },
-      [&](Outcome&& outcome) { outcomes[outcome.number] = std::move(outcome); });
+      [&](Outcome&& outcome) { outcomes[outcome.number] = std::move(outcome); }, tracing);
   return outcomes;
 }
 
@@ -277,15 +260,15 @@ double Finger::drop_so_far_m() const {
 }
 
 CaseResult Finger::solve(double H_m, double mu, double e_star, const Tracing& tracing) const {
-  const Point asked{H_m, mu, e_star};
-  parts_->check(asked);
+  const Point point{H_m, mu, e_star};
+  parts_->steps_for(point);
+  if (H_m > largest_drop_m()) {
+    parts_->fall().state_at(H_m);  // throws InputError
+  }
   if (tracing.sink && tracing.with_fall) {
     trace_fall(*parts_->prepared().motion(), parts_->fall(), H_m, tracing);
   }
-  std::optional<FingerPoint> point = FingerPoint{*this, 0, asked};
-  Outcome outcome{};
-  solve_points([&point] { return std::exchange(point, std::nullopt); },
-               [&outcome](Outcome&& o) { outcome = std::move(o); }, tracing);
+  Outcome outcome = std::move(solve_points(*this, {&point, 1}, tracing).front());
   if (!outcome.result) {
     throw SolveError(outcome.error);
   }

@@ -4,14 +4,13 @@
 #include <atomic>
 #include <chrono>
 #include <compare>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <thread>
 #include <unordered_map>
 #include <utility>
@@ -21,95 +20,63 @@
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
+#include "worker/solver/parallel_for.h"
 #include "worker/solver/point_runs.h"
 
 namespace oblique::solver {
 namespace {
 
-/// Gives the points of a source with their fingers. A point whose fall is missing ends a run of
-/// points: those under way are solved first, since a fall may take long, and then it begins the
-/// next run.
-class PointRuns {
+/// The points of a source with their fingers.
+class FingerSource {
  public:
-  PointRuns(FallCache& falls, PointSource& source, const TakeOutcome& sink)
+  FingerSource(FallCache& falls, PointSource& source, const TakeOutcome& sink)
       : falls_(falls), source_(source), sink_(sink) {}
 
-  /// Waits for the fall of the first point of a run. False when no point is left.
-  bool begin_run() {
-    while (!first_) {
-      if (!held_ && !(held_ = source_.next())) {
-        return false;
-      }
-      const std::uint64_t number = *std::exchange(held_, std::nullopt);
-      first_ = point_of(number, [&](const ModelParameters& model) {
-        return std::optional(falls_.fall(model, models_ahead(number)));
-      });
-    }
-    return true;
-  }
-
-  /// The next point of the run.
-  std::optional<FingerPoint> next() {
-    if (first_) {
-      return std::exchange(first_, std::nullopt);
-    }
-    while (!held_ && (held_ = source_.next())) {
-      bool is_missing = false;
-      auto point = point_of(*held_, [&](const ModelParameters& model) {
-        auto fall = falls_.kept_fall(model);
-        is_missing = !fall;
-        return fall;
-      });
-      if (is_missing) {
-        break;  // it stays held
-      }
-      held_.reset();
-      if (point) {
-        return point;
+  /// The next point; nothing at the end. Unless `solves_falls`, nothing also when the point's fall
+  /// is missing: the next call returns that point.
+  std::optional<FingerPoint> next(bool solves_falls) {
+    while (upcoming_ || (upcoming_ = source_.next())) {
+      const std::uint64_t number = *upcoming_;
+      try {
+        const ModelPoint point = source_.point(number);
+        if (!finger_ || point.model != model_) {
+          finger_.reset();
+          const ModelParameters model = source_.model(point.model);
+          const auto fall =
+              solves_falls ? falls_.fall(model, models_from(number)) : falls_.kept_fall(model);
+          if (!fall) {
+            return std::nullopt;
+          }
+          if (!fall->fallen) {
+            throw SolveError(fall->error);
+          }
+          finger_.emplace(model, fall->fallen);
+          model_ = point.model;
+        }
+        upcoming_.reset();
+        return FingerPoint{*finger_, number, point.point};
+      } catch (const std::exception& error) {
+        upcoming_.reset();
+        sink_({number, std::nullopt, error.what()});
       }
     }
     return std::nullopt;
   }
 
  private:
-  /// Nothing when `fall_of` gives no fall, and when the point has failed, which is handed on.
-  template <class FallOf>
-  std::optional<FingerPoint> point_of(std::uint64_t number, const FallOf& fall_of) {
-    try {
-      const ModelPoint point = source_.point(number);
-      if (!finger_ || point.model != model_) {
-        finger_.reset();
-        const ModelParameters model = source_.model(point.model);
-        const std::optional<FallOutcome> fall = fall_of(model);
-        if (!fall) {
-          return std::nullopt;
-        }
-        if (!fall->fallen) {
-          throw SolveError(fall->error);
-        }
-        finger_.emplace(model, fall->fallen);
-        model_ = point.model;
-      }
-      return FingerPoint{*finger_, number, point.point};
-    } catch (const std::exception& error) {
-      sink_({number, std::nullopt, error.what()});
-      return std::nullopt;
-    }
-  }
-
-  /// Models of that point and of those behind it, in order, those of one fall that follow each
-  /// other once: their falls are solved beside its own.
-  std::vector<ModelParameters> models_ahead(std::uint64_t number) {
-    constexpr int kMostRuns = 4096;  // of points of one model
+  /// Fall models of that point and of those after it, without repetitions in a row.
+  std::vector<ModelParameters> models_from(std::uint64_t number) {
+    constexpr int kMostRuns = 4096;
     constexpr std::size_t kMostFalls = 64;
     std::vector<ModelParameters> models;
     std::optional<std::uint64_t> at = number;
-    for (int run = 0; at && run < kMostRuns && models.size() < kMostFalls; ++run) {
-      ModelParameters falling = fall_model(source_.model(source_.model_of(*at)));
+    for (int i = 0; at && i < kMostRuns && models.size() < kMostFalls; ++i) {
+      const PointSource::Run run = source_.run_of(*at);
+      ModelParameters falling = fall_model(source_.model(run.model));
       if (models.empty() || !(models.back() == falling)) {
         models.push_back(std::move(falling));
       }
-      at = source_.behind_model(*at);
+      at = run.next;
     }
     return models;
   }
@@ -117,18 +84,16 @@ class PointRuns {
   FallCache& falls_;
   PointSource& source_;
   const TakeOutcome& sink_;
-  std::optional<std::uint64_t> held_;  ///< a point taken whose fall was missing
-  std::optional<FingerPoint> first_;   ///< of the run that has begun
-  std::optional<Finger> finger_;       ///< of the point given last
-  std::size_t model_ = 0;              ///< its model's number
+  std::optional<std::uint64_t> upcoming_;
+  std::optional<Finger> finger_;  ///< of the point returned last
+  std::size_t model_ = 0;         ///< number of its model
 };
 
 }  // namespace
 
 void solve_points_of_models(PointSource& source, FallCache& falls, bool with_errors,
                             const TakeOutcome& sink) {
-  PointRuns runs(falls, source, sink);
-  const auto next_of_run = [&runs] { return runs.next(); };
+  FingerSource fingers(falls, source, sink);
   const auto take = [&sink](Outcome&& outcome) {
     if (outcome.result && !is_finite(*outcome.result)) {
       outcome.result.reset();
@@ -136,11 +101,15 @@ void solve_points_of_models(PointSource& source, FallCache& falls, bool with_err
     }
     sink(std::move(outcome));
   };
-  while (runs.begin_run()) {
+  // A fall may take long: points under way are finished before a missing one is solved.
+  while (auto first = fingers.next(true)) {
+    const auto next = [&] {
+      return first ? std::exchange(first, std::nullopt) : fingers.next(false);
+    };
     if (with_errors) {
-      solve_points_with_errors(next_of_run, falls, take);
+      solve_points_with_errors(next, falls, take);
     } else {
-      solve_points(next_of_run, take);
+      solve_points(next, take);
     }
   }
 }
@@ -150,125 +119,76 @@ std::uint64_t points_of_task(std::uint64_t left, std::size_t threads) {
   return std::clamp<std::uint64_t>(left / (4 * threads), 1, kLargestTask);
 }
 
-// ---- On many threads ----------------------------------------------------------------------------
+// ---- On several threads -------------------------------------------------------------------------
 
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kBetweenQuestions = 50ms;
-/// Threads that take longer to end, as in the middle of a long fall, are left to end by themselves.
-constexpr auto kLongestFarewell = 150ms;
+// Together less than 0.2 s, in which a call that is interrupted returns.
+constexpr auto kPollInterval = 50ms;
+constexpr auto kLongestJoin = 140ms;  ///< a thread in a long fall takes longer and is abandoned
 
-/// A point under its place in the caller's list.
-struct Entry {
-  ModelPoint point;
-  std::size_t number;
-};
-
-/// Neighbours share a model, a fall, the state at touch, and all until the first turn. NaN has a
-/// place too.
-bool is_before(const Entry& a, const Entry& b) {
-  std::strong_ordering order = a.point.model <=> b.point.model;
-  for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e_star}) {
-    if (std::is_eq(order)) {
-      order = std::strong_order(a.point.point.*value, b.point.point.*value);
-    }
-  }
-  return std::is_eq(order) ? a.number < b.number : std::is_lt(order);
-}
-
-/// Models so that those of one fall follow each other, falls in the order of their first models.
-struct OrderedModels {
-  explicit OrderedModels(std::span<const ModelParameters> given) : places(given.size()) {
-    std::unordered_map<std::uint64_t, std::size_t> falls;  // numbers by hash
-    std::vector<std::pair<std::size_t, std::size_t>> by_fall;
-    for (std::size_t i = 0; i < given.size(); ++i) {
-      const auto fall = falls.try_emplace(fall_hash(given[i]), falls.size()).first;
-      by_fall.emplace_back(fall->second, i);
-    }
-    std::sort(by_fall.begin(), by_fall.end());
-    for (const auto& [fall, number] : by_fall) {
-      places[number] = models.size();
-      models.push_back(given[number]);
-    }
-  }
-
-  std::vector<ModelParameters> models;
-  std::vector<std::size_t> places;  ///< of the given models among these
-};
-
-/// Points to solve and who solves them. Held by each thread, so that one that is left behind has
-/// all that it needs.
+/// What the threads of one call share. Each thread owns it together with the call, so that an
+/// abandoned thread never uses what the caller has freed.
 class Work {
  public:
   Work(std::span<const ModelParameters> models, std::span<const ModelPoint> points,
        const TakeOutcome& take, const ManyOptions& options, std::size_t threads)
-      : take_(&take),
+      : models_(models.begin(), models.end()),
+        take_(take),
         errors_(options.errors),
         falls_(options.falls ? options.falls : std::make_shared<FallCache>()),
         threads_(threads) {
-    OrderedModels ordered(models);
-    models_ = std::move(ordered.models);
     for (const ModelPoint& point : points) {
-      if (point.model >= models_.size()) {
+      if (point.model >= models.size()) {
         throw InputError("a point has model " + std::to_string(point.model) + " of " +
-                         std::to_string(models_.size()) + ": they count from 0");
+                         std::to_string(models.size()) + ": they count from 0");
       }
-      points_.push_back({{ordered.places[point.model], point.point}, points_.size()});
+      points_.push_back({point, points_.size()});
     }
-    std::sort(points_.begin(), points_.end(), is_before);
+    sort_points();
   }
 
-  /// Solves tasks until none is left, on a thread of its own.
+  /// Solves points until none is left, on one of the threads.
   void solve() {
     Source source(*this);
     try {
       solve_points_of_models(source, *falls_, errors_, [this](Outcome&& outcome) {
-        outcome.number = points_[outcome.number].number;
-        hand_on(std::move(outcome));
+        const std::lock_guard lock(mutex_);
+        if (!stopped_) {
+          outcome.number = points_[outcome.number].number;
+          take_(std::move(outcome));
+          ++outcomes_;
+        }
       });
     } catch (...) {
       const std::lock_guard lock(mutex_);
-      fail(std::current_exception());
+      failure_ = failure_ ? failure_ : std::current_exception();
+      stopped_ = true;
     }
-    leave(1);
   }
 
-  /// Counts threads that have ended, or could not be started.
-  void leave(std::size_t threads) {
+  bool is_stopped() const { return stopped_; }
+  std::size_t outcomes() const { return outcomes_; }
+  void rethrow_failure() {
     const std::lock_guard lock(mutex_);
-    threads_ -= threads;
-    changed_.notify_all();
-  }
-
-  /// Waits for all, or for the first failure; whether all was handed on.
-  bool wait(const std::function<bool(std::size_t)>& goes_on) {
-    std::unique_lock lock(mutex_);
-    const auto is_over = [this] { return threads_ == 0 || failure_; };
-    while (!changed_.wait_for(lock, kBetweenQuestions, is_over)) {
-      const std::size_t outcomes = outcomes_;
-      lock.unlock();
-      if (goes_on && !goes_on(outcomes)) {
-        return false;
-      }
-      lock.lock();
-    }
     if (failure_) {
       std::rethrow_exception(failure_);
     }
-    return true;
   }
-
-  /// Behind this nothing is handed on. Whether all threads are about to end.
-  bool end() {
-    std::unique_lock lock(mutex_);
-    take_ = nullptr;
+  /// Returns when `take` is no longer called.
+  void stop() {
+    const std::lock_guard lock(mutex_);
     stopped_ = true;
-    return changed_.wait_for(lock, kLongestFarewell, [this] { return threads_ == 0; });
   }
 
  private:
-  /// The points of one thread: tasks of neighbours. A point's number is its place among points_.
+  struct Entry {
+    ModelPoint point;
+    std::size_t number;  ///< index in the caller's list
+  };
+
+  /// The points of one thread. Their numbers are indices of points_.
   class Source : public PointSource {
    public:
     explicit Source(Work& work) : work_(work) {}
@@ -280,24 +200,21 @@ class Work {
       return next_++;
     }
     ModelPoint point(std::uint64_t number) override {
-      if (work_.stopped_) {  // one that was kept for a fall of its own
-        throw SolveError("nobody waits for it any more");
+      if (work_.stopped_) {  // do not solve its fall
+        throw SolveError("stopped");
       }
       return work_.points_[number].point;
     }
-    std::size_t model_of(std::uint64_t number) override {
-      return work_.points_[number].point.model;
+    Run run_of(std::uint64_t number) override {
+      const auto& points = work_.points_;
+      const std::size_t model = points[number].point.model;
+      const auto end =
+          std::partition_point(points.begin() + static_cast<std::ptrdiff_t>(number), points.end(),
+                               [model](const Entry& entry) { return entry.point.model == model; });
+      const auto next = static_cast<std::uint64_t>(end - points.begin());
+      return {model, end == points.end() ? std::nullopt : std::optional(next)};
     }
     ModelParameters model(std::size_t number) override { return work_.models_[number]; }
-    std::optional<std::uint64_t> behind_model(std::uint64_t number) override {
-      const auto& points = work_.points_;
-      const auto behind = std::upper_bound(
-          points.begin() + static_cast<std::ptrdiff_t>(number), points.end(), model_of(number),
-          [](std::size_t model, const Entry& entry) { return model < entry.point.model; });
-      return behind == points.end()
-                 ? std::nullopt
-                 : std::optional(static_cast<std::uint64_t>(behind - points.begin()));
-    }
 
    private:
     Work& work_;
@@ -305,92 +222,78 @@ class Work {
     std::uint64_t end_ = 0;
   };
 
+  /// Neighbours share a fall, a model, the state at touch, and the contact up to the first turn.
+  void sort_points() {
+    std::unordered_map<std::uint64_t, std::size_t> numbers;  // of falls, by their hashes
+    std::vector<std::size_t> falls;                          // number of each model's fall
+    for (const ModelParameters& model : models_) {
+      falls.push_back(numbers.try_emplace(fall_hash(model), numbers.size()).first->second);
+    }
+    std::sort(points_.begin(), points_.end(), [&falls](const Entry& a, const Entry& b) {
+      std::strong_ordering order = falls[a.point.model] <=> falls[b.point.model];
+      order = std::is_eq(order) ? a.point.model <=> b.point.model : order;
+      for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e_star}) {
+        if (std::is_eq(order)) {
+          order = std::strong_order(a.point.point.*value, b.point.point.*value);  // NaN too
+        }
+      }
+      return std::is_eq(order) ? a.number < b.number : std::is_lt(order);
+    });
+  }
+
   bool take_task(std::uint64_t& begin, std::uint64_t& end) {
     const std::lock_guard lock(mutex_);
-    const std::uint64_t left = points_.size() - given_;
-    if (left == 0) {
-      return false;
-    }
     begin = given_;
-    given_ += points_of_task(left, std::max<std::size_t>(threads_, 1));
+    if (given_ < points_.size()) {
+      given_ += points_of_task(points_.size() - given_, threads_);
+    }
     end = given_;
-    return true;
+    return begin != end;
   }
 
-  void hand_on(Outcome&& outcome) {
-    const std::lock_guard lock(mutex_);
-    if (take_ == nullptr || failure_) {
-      return;
-    }
-    try {
-      (*take_)(std::move(outcome));
-      ++outcomes_;
-    } catch (...) {
-      fail(std::current_exception());
-    }
-  }
-
-  /// Needs the lock.
-  void fail(std::exception_ptr failure) {
-    failure_ = failure_ ? failure_ : std::move(failure);
-    stopped_ = true;
-    changed_.notify_all();
-  }
-
-  std::vector<ModelParameters> models_;
-  std::vector<Entry> points_;  ///< neighbours together
-  std::atomic<bool> stopped_ = false;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  const TakeOutcome* take_;  ///< null: nobody wants outcomes any more
+  const std::vector<ModelParameters> models_;
+  std::vector<Entry> points_;
+  const TakeOutcome& take_;  ///< not to be used once stopped
   const bool errors_;
   const std::shared_ptr<FallCache> falls_;
-  std::size_t threads_;      ///< at work
-  std::uint64_t given_ = 0;  ///< points in tasks
-  std::size_t outcomes_ = 0;
+  const std::size_t threads_;
+  std::atomic<bool> stopped_ = false;
+  std::atomic<std::size_t> outcomes_ = 0;
+  std::mutex mutex_;
+  std::uint64_t given_ = 0;  ///< points that threads have taken
   std::exception_ptr failure_;
 };
-
-/// Throws std::system_error when not one can be started; fewer do it all.
-std::vector<std::thread> start_threads(std::size_t count, const std::shared_ptr<Work>& work) {
-  std::vector<std::thread> threads;
-  threads.reserve(count);
-  try {
-    while (threads.size() < count) {
-      threads.emplace_back([work] { work->solve(); });
-    }
-  } catch (const std::system_error&) {
-    work->leave(count - threads.size());
-    if (threads.empty()) {
-      throw;
-    }
-  }
-  return threads;
-}
 
 }  // namespace
 
 bool solve_many(std::span<const ModelParameters> models, std::span<const ModelPoint> points,
                 const TakeOutcome& take, const ManyOptions& options) {
   const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  const std::size_t count = std::min(std::max<std::size_t>(points.size(), 1),
-                                     options.threads == 0 ? cores : options.threads);
-  const auto work = std::make_shared<Work>(models, points, take, options, count);
-  std::vector<std::thread> threads = start_threads(count, work);
-  const auto end = [&] {
-    const bool all_end = work->end();
-    for (std::thread& thread : threads) {
-      all_end ? thread.join() : thread.detach();
+  const std::size_t threads = std::min(std::max<std::size_t>(points.size(), 1),
+                                       options.threads == 0 ? cores : options.threads);
+  const auto work = std::make_shared<Work>(models, points, take, options, threads);
+  std::packaged_task<void()> solving(
+      [work, threads] { parallel_for(threads, threads, [&work](std::size_t) { work->solve(); }); });
+
+  struct Running {
+    ~Running() {
+      work.stop();
+      ended.wait_for(kLongestJoin) == std::future_status::ready ? thread.join() : thread.detach();
     }
+    Work& work;
+    std::future<void> ended;
+    std::thread thread;
   };
-  try {
-    const bool is_complete = work->wait(options.goes_on);
-    end();
-    return is_complete;
-  } catch (...) {
-    end();
-    throw;
+  std::future<void> ended = solving.get_future();
+  Running running{*work, std::move(ended), std::thread(std::move(solving))};
+  while (running.ended.wait_for(kPollInterval) != std::future_status::ready &&
+         !work->is_stopped()) {
+    if (options.goes_on && !options.goes_on(work->outcomes())) {
+      return false;
+    }
   }
+  work->rethrow_failure();
+  return true;
 }
 
 }  // namespace oblique::solver

@@ -25,7 +25,7 @@ void check_asked(const char* key, double asked_s, double limit_s) {
   }
 }
 
-/// What `order` makes of the model's tolerance: steps at it over those at the default one.
+/// Ratio of steps at the model's tolerance to those at the default one, for a method of `order`.
 double at_tolerance(const ModelParameters& model, double order) {
   return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
 }
@@ -43,7 +43,7 @@ double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
     }
     return model.dt_fall_s;
   }
-  // A looser tolerance is for the contact alone: one fall serves models that differ in it.
+  // A looser tolerance changes the contact only, so that models that differ in it share a fall.
   if (implicit) {
     return StepChoice::kImplicitFallFraction * std::sqrt(model.lengths_m.back() / model.g_m_s2) *
            std::min(1.0, at_tolerance(model, kGeneralizedAlphaOrder));
@@ -52,13 +52,6 @@ double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
   const double fraction = StepChoice::kFallFraction *
                           std::pow(tolerance / StepChoice::kFallTolerance, 1.0 / kPefrlOrder);
   return longest_s * std::min(fraction, StepChoice::kLongestFraction);
-}
-
-/// Step in which the tip, fallen by about the chain's length, moves by less than rounding of its
-/// position.
-double rounding_step_s(const ModelParameters& model) {
-  const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
-  return std::numeric_limits<double>::epsilon() * std::sqrt(length_m / model.g_m_s2);
 }
 
 double chosen_contact_s(const ModelParameters& model, double tip_inertia_kg, double limit_s) {
@@ -78,27 +71,24 @@ double chosen_contact_s(const ModelParameters& model, double tip_inertia_kg, dou
 
 StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
     : chain_(chain),
-      k_N_m_(model.k_N_m),
-      tangential_ratio_(1.0 / model.eta2),
-      integrator_(model.integrator),
-      asked_contact_s_(model.dt_s),
+      model_(model),
       tip_inertia_kg_(chain.tip_inertia_kg()),
       compression_limit_s_(limit_s(chain, model.k_N_m * std::max(1.0, 1.0 / model.eta2))),
       chosen_contact_s_(chosen_contact_s(model, tip_inertia_kg_, compression_limit_s_)),
-      step_factor_(model.step_factor),
-      rounding_step_s_(rounding_step_s(model)),
       fall_s_(chosen_fall_s(chain, model)) {}
 
 ContactSteps StepChoice::contact_limits(double e_star) const {
-  const double stiffest_N_m = k_N_m_ * std::max(1.0 / (e_star * e_star), tangential_ratio_);
+  const double stiffest_N_m = model_.k_N_m * std::max(1.0 / (e_star * e_star), 1.0 / model_.eta2);
   return {compression_limit_s_, limit_s(chain_, stiffest_N_m)};
 }
 
+/// `steps`, at most kLongestFraction of the stability limit.
 ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const {
-  // A spring at the tip raises the square of the highest frequency by its stiffness over the tip's
-  // inertia at most. That spares each e* a search for the frequency itself.
-  const double added_N_m = k_N_m_ * (std::max(1.0 / (e_star * e_star), tangential_ratio_) -
-                                     std::max(1.0, tangential_ratio_));
+  // A spring at the tip adds at most its stiffness over the tip's inertia to the square of the
+  // highest frequency. This bound is cheap, the frequency itself would be searched for each e*.
+  const double tangential_ratio = 1.0 / model_.eta2;
+  const double added_N_m = model_.k_N_m * (std::max(1.0 / (e_star * e_star), tangential_ratio) -
+                                           std::max(1.0, tangential_ratio));
   const double part = compression_limit_s_ / Pefrl::stability_limit();
   const double slower = std::sqrt(1.0 + added_N_m / tip_inertia_kg_ * part * part);
   const double longest_s = kLongestFraction * compression_limit_s_;
@@ -106,14 +96,18 @@ ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const 
           std::min(steps.restitution_s, longest_s / slower)};
 }
 
+/// Throws SolveError for steps in compression with which Contact::kMostSteps end before the contact
+/// can, and for steps in which the tip, fallen by about the chain's length, moves by less than the
+/// rounding of its position.
 void StepChoice::check_can_end(double step_s) const {
-  if (step_s < rounding_step_s_) {
+  const double length_m = std::accumulate(model_.lengths_m.begin(), model_.lengths_m.end(), 0.0);
+  if (step_s < std::numeric_limits<double>::epsilon() * std::sqrt(length_m / model_.g_m_s2)) {
     throw SolveError("steps of " + readable_number(step_s) +
                      " s in contact are too short: the tip moves by less than rounding in them; a "
                      "longer dt is needed or, with dt = 0, a smaller k (k = " +
-                     exact_number(k_N_m_) + " N/m here)");
+                     exact_number(model_.k_N_m) + " N/m here)");
   }
-  const double shortest_s = kShortestContact * std::sqrt(tip_inertia_kg_ / k_N_m_);
+  const double shortest_s = kShortestContact * std::sqrt(tip_inertia_kg_ / model_.k_N_m);
   if (step_s * static_cast<double>(Contact::kMostSteps) < shortest_s) {
     throw SolveError("the contact would take more than " + std::to_string(Contact::kMostSteps) +
                      " steps of " + readable_number(step_s) +
@@ -122,31 +116,32 @@ void StepChoice::check_can_end(double step_s) const {
 }
 
 ContactSteps StepChoice::contact(double e_star) const {
-  ContactSteps steps = single_contact(e_star);
+  ContactSteps steps = without_step_factor(e_star);
   check_can_end(steps.compression_s);
-  if (step_factor_ == 1.0) {
+  if (model_.step_factor == 1.0) {
     return steps;
   }
-  steps.compression_s *= step_factor_;
-  steps.restitution_s *= step_factor_;
-  return integrator_ == Integrator::kExplicit ? stable(steps, e_star) : steps;
+  steps.compression_s *= model_.step_factor;
+  steps.restitution_s *= model_.step_factor;
+  return model_.integrator == Integrator::kExplicit ? stable(steps, e_star) : steps;
 }
 
-ContactSteps StepChoice::single_contact(double e_star) const {
+ContactSteps StepChoice::without_step_factor(double e_star) const {
+  const bool is_explicit = model_.integrator == Integrator::kExplicit;
   if (e_star < kSmallestRestitution) {
     throw SolveError("e = " + exact_number(e_star) +
-                     " cannot be solved in double precision: the restitution spring k/e^2 is too "
-                     "stiff; e from " +
-                     exact_number(kSmallestRestitution) + " on can");
+                     " cannot be solved in double precision, because the restitution spring k/e^2 "
+                     "is too stiff; e must be at least " +
+                     exact_number(kSmallestRestitution));
   }
-  if (asked_contact_s_ != 0.0) {
-    if (integrator_ == Integrator::kExplicit) {
-      check_asked("dt", asked_contact_s_, contact_limits(e_star).restitution_s);
+  if (model_.dt_s != 0.0) {
+    if (is_explicit) {
+      check_asked("dt", model_.dt_s, contact_limits(e_star).restitution_s);
     }
-    return {asked_contact_s_, asked_contact_s_};
+    return {model_.dt_s, model_.dt_s};
   }
   const auto slower = [](double e) { return std::min(1.0, e / kFastRestitution); };
-  if (integrator_ != Integrator::kExplicit) {
+  if (!is_explicit) {
     return {chosen_contact_s_, chosen_contact_s_ * slower(e_star)};
   }
   const double compression_e_star = std::max(e_star, kFastestForCompression);
