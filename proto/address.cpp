@@ -14,7 +14,7 @@ constexpr std::string_view kScheme = "tcp://";
 
 }  // namespace
 
-std::string objection_to_address(const std::string& url) {
+std::string address_error(const std::string& url) {
   constexpr int kHighestPort = 65535;
   if (!url.starts_with(kScheme)) {
     return {};

@@ -6,7 +6,7 @@ namespace oblique::protocol {
 
 /// Why nothing can be connected to at `url`, or an empty text: a tcp address is tcp://HOST:PORT
 /// with a port from 1 to 65535, an address of IPv6 in brackets. Addresses of other kinds pass.
-std::string objection_to_address(const std::string& url);
+std::string address_error(const std::string& url);
 
 /// The host of such an address, as 127.0.0.1, fe80::1%eth0 (without brackets) or a name; empty
 /// where it is none.

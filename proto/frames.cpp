@@ -8,7 +8,7 @@
 
 namespace oblique::protocol {
 
-std::string objection_to_version(std::uint32_t version, const std::string& who) {
+std::string version_error(std::uint32_t version, const std::string& who) {
   return version == kProtocolVersion
              ? ""
              : fmt::format(

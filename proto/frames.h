@@ -16,7 +16,7 @@ inline constexpr std::uint32_t kProtocolVersion = 8;
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;
 
 /// Why the server refuses a `who` ("worker", "client") of that version, or an empty text.
-std::string objection_to_version(std::uint32_t version, const std::string& who);
+std::string version_error(std::uint32_t version, const std::string& who);
 
 /// Serialises a message into one frame.
 std::string encode(const google::protobuf::MessageLite& message);

@@ -145,9 +145,9 @@ std::string fault_of_lists(const PointResult& message) {
     const std::string_view name = solver::result_lists()[i]->column;
     const Numbers& numbers = (message.*kLists[i].numbers)();
     const int elements = numbers.size() / kLists[i].members;
-    if (elements > kMostListElements) {
+    if (elements > kMaxListElements) {
       return fmt::format("the worker sent {} {}, and a result has at most {}", elements, name,
-                         kMostListElements);
+                         kMaxListElements);
     }
     if (numbers.size() % kLists[i].members != 0) {
       return fmt::format("the worker sent {} of the wrong length", name);
@@ -216,9 +216,9 @@ std::string fault_of(const PointResult& message) {
       std::any_of(message.texts().begin(), message.texts().end(), is_too_long)) {
     return "the worker sent a text that is too long";
   }
-  if (message.ByteSizeLong() > kMostResultBytes) {
+  if (message.ByteSizeLong() > kMaxResultBytes) {
     return fmt::format("the worker sent a result of {} bytes, and one has at most {}",
-                       message.ByteSizeLong(), kMostResultBytes);
+                       message.ByteSizeLong(), kMaxResultBytes);
   }
   if (!message.error().empty()) {
     return {};
@@ -264,7 +264,7 @@ std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, 
   return fault_of(trace.result());
 }
 
-void say_protocol(WorkerHello& hello) {
+void set_protocol(WorkerHello& hello) {
   hello.set_protocol_version(kProtocolVersion);
   hello.set_outputs(sent_outputs());
 }
@@ -280,13 +280,13 @@ std::string sent_outputs() {
   return names;
 }
 
-std::string objection_to_worker(const WorkerHello& hello) {
-  std::string objection = objection_to_version(hello.protocol_version(), "worker");
-  if (objection.empty() && hello.outputs() != sent_outputs()) {
+std::string hello_error(const WorkerHello& hello) {
+  std::string error = version_error(hello.protocol_version(), "worker");
+  if (error.empty() && hello.outputs() != sent_outputs()) {
     return "its results have other outputs than those that are stored here: install the same "
            "release on both";
   }
-  return objection;
+  return error;
 }
 
 }  // namespace oblique::protocol

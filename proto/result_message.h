@@ -15,11 +15,11 @@ namespace oblique::protocol {
 /// finger, and small enough that it stays finite in every unit in which it is shown.
 inline constexpr double kLargestOutput = 1e100;
 /// Most elements of a list in a result, as peaks. Honest ones have dozens.
-inline constexpr int kMostListElements = 4096;
+inline constexpr int kMaxListElements = 4096;
 /// Most ranges of points that a filter leaves out, in one message.
-inline constexpr int kMostLeftOutRanges = 10'000;
+inline constexpr int kMaxLeftOutRanges = 10'000;
 /// Most bytes of a result.
-inline constexpr std::size_t kMostResultBytes = std::size_t{1} << 20U;
+inline constexpr std::size_t kMaxResultBytes = std::size_t{1} << 20U;
 
 // What a worker sends of a solved point. The scalars are those of solver::result_fields(), in its
 // order and without their names, which the worker says once, when it joins.
@@ -40,8 +40,8 @@ PointResult failed_point(std::uint64_t point, const std::string& reason);
 std::string fault_of(const PointResult& message);
 
 /// Most bytes of the rows of a trace: with its result and the model it fits into one frame.
-inline constexpr std::size_t kMostTraceBytes =
-    kMaxFrameBytes - kMostResultBytes - (std::size_t{64} << 10U);
+inline constexpr std::size_t kMaxTraceBytes =
+    kMaxFrameBytes - kMaxResultBytes - (std::size_t{64} << 10U);
 
 /// What is wrong with a trace of that shape from the network, or an empty text: rows of the wrong
 /// length, values that are not finite, unknown states, rows of the fall unasked or after the touch,
@@ -49,14 +49,14 @@ inline constexpr std::size_t kMostTraceBytes =
 std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, bool with_fall);
 
 /// Sets the protocol version and the outputs of this build.
-void say_protocol(WorkerHello& hello);
+void set_protocol(WorkerHello& hello);
 
 /// The names of the scalars that results have, in their order, with spaces between.
 std::string sent_outputs();
 
 /// Why the server does not take results of that worker, or an empty text: it speaks another version
 /// of the protocol, or its results have other outputs, so that numbers would mean something else.
-std::string objection_to_worker(const WorkerHello& hello);
+std::string hello_error(const WorkerHello& hello);
 
 /// Points of a study that are solved, failed or left out by a filter.
 inline std::uint64_t completed_points(const StudyStatus& study) {

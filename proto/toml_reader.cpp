@@ -67,7 +67,7 @@ std::string toml_string(std::string_view text) {
 
 toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
-  constexpr std::size_t kMostKeyParts = 100;
+  constexpr std::size_t kMaxKeyParts = 100;
   // Tables nest as deep as their keys have parts, and destroying them takes stack for each. Nothing
   // is parsed: so many dots in a text without a comma or an equals sign count too.
   std::size_t parts = 1;
@@ -76,9 +76,9 @@ toml::table TomlReader::parse(std::string_view text) const {
     line += c == '\n' ? 1 : 0;
     const bool is_end = std::string_view("=,[]{}\n").find(c) != std::string_view::npos;
     parts = is_end ? 1 : parts + (c == '.' ? 1 : 0);
-    if (parts > kMostKeyParts) {
+    if (parts > kMaxKeyParts) {
       throw solver::InputError(
-          {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
+          {.text = fmt::format("more than {} parts with dots between them", kMaxKeyParts),
            .place = fmt::format("{}:{}", file_, line)});
     }
   }
@@ -119,7 +119,7 @@ std::string TomlReader::text(std::string_view key, const toml::node& node,
   return *node.value<std::string>();
 }
 
-bool TomlReader::yes(std::string_view key, const toml::node& node) const {
+bool TomlReader::boolean(std::string_view key, const toml::node& node) const {
   require(node.is_boolean(), key, node, "true or false");
   return *node.value<bool>();
 }

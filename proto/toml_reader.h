@@ -57,7 +57,7 @@ class TomlReader {
   // The value of a node that must be of that type; `key` and `expected` are for the message.
   double number(std::string_view key, const toml::node& node, std::string_view expected) const;
   std::string text(std::string_view key, const toml::node& node, std::string_view expected) const;
-  bool yes(std::string_view key, const toml::node& node) const;
+  bool boolean(std::string_view key, const toml::node& node) const;
   const toml::table& table(std::string_view key, const toml::node& node,
                            std::string_view expected) const;
 

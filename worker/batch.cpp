@@ -39,7 +39,7 @@ std::uint64_t Batch::first_to_solve(std::uint64_t at, std::uint64_t end) const {
     const std::uint64_t run_end = std::min(end_of_run(run_of(at)), end);
     const std::uint64_t first = point_at(at);
     const std::uint64_t past = first + (run_end - at);
-    const std::uint64_t found = points_->first_left_in(first, past);
+    const std::uint64_t found = points_->first_passing(first, past);
     if (found < past) {
       return at + (found - first);
     }

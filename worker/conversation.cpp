@@ -433,7 +433,7 @@ void Conversation::report(Progress& progress) {
   results.set_busy_s(progress.results.empty() ? progress.busy_s : 0.0);
   // Without the lease of its batch the server takes no range: it hands these points out again.
   for (std::size_t i = 0; found != held_.end() && i < progress.left_out.size(); ++i) {
-    if (results.left_out_size() >= 2 * protocol::kMostLeftOutRanges) {
+    if (results.left_out_size() >= 2 * protocol::kMaxLeftOutRanges) {
       outbox_.add(std::exchange(results, new_message()));
       deliver();
     }
@@ -504,7 +504,7 @@ void Conversation::on(const protocol::TraceOrder& order) {
   }
   protocol::WorkerMessage message;
   message.mutable_trace()->set_trace_id(order.trace_id());
-  message.mutable_trace()->set_not_taken(true);
+  message.mutable_trace()->set_declined(true);
   send(std::move(message));
 }
 

@@ -137,7 +137,7 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t 
   const oblique::worker::Session* running = nullptr;
   settings.on_turn = [&] {
     notifier.status(running->status());
-    notifier.turn(oblique::protocol::Notifier::Clock::now());
+    notifier.feed_watchdog(oblique::protocol::Notifier::Clock::now());
   };
   oblique::worker::Session session(
       settings,
@@ -231,7 +231,7 @@ int run_program(int argc, char** argv) {
   }
   if (const std::string objection = set_exit(settings.conversation.exit, idle_exit_s);
       !objection.empty()) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), objection);
+    return oblique::protocol::report_wrong_usage(app.get_name(), objection);
   }
   settings.host = host_name();
   if (settings.name.empty()) {
@@ -244,7 +244,7 @@ int run_program(int argc, char** argv) {
     }
     return run_worker(settings, fall_memory_bytes, parent);
   } catch (const oblique::solver::InputError& error) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
+    return oblique::protocol::report_wrong_usage(app.get_name(), error.what());
   }
 }
 

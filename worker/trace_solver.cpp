@@ -12,10 +12,10 @@
 namespace oblique::worker {
 namespace {
 
-protocol::Trace not_taken(std::uint64_t trace_id) {
+protocol::Trace declined(std::uint64_t trace_id) {
   protocol::Trace trace;
   trace.set_trace_id(trace_id);
-  trace.set_not_taken(true);
+  trace.set_declined(true);
   return trace;
 }
 
@@ -105,7 +105,7 @@ TraceSolver::~TraceSolver() {
 void TraceSolver::take(protocol::TraceOrder order) {
   const std::lock_guard lock(mutex_);
   if (job_ || !solve_) {
-    traces_.push_back(not_taken(order.trace_id()));
+    traces_.push_back(declined(order.trace_id()));
     has_trace_();
     return;
   }
@@ -153,7 +153,7 @@ void TraceSolver::work(const std::stop_token& stop) {
     lock.lock();
     const Job job = *std::exchange(job_, std::nullopt);
     if (!job.is_dropped) {
-      traces_.push_back(job.is_cancelled ? not_taken(trace.trace_id()) : std::move(trace));
+      traces_.push_back(job.is_cancelled ? declined(trace.trace_id()) : std::move(trace));
       has_trace_();
     }
   }

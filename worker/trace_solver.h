@@ -69,7 +69,7 @@ class TraceSolver {
   /// `has_trace` is called when a trace can be collected, also on the solving thread; it must not
   /// call back.
   TraceSolver(Solve solve, std::function<void()> has_trace,
-              std::size_t most_bytes = protocol::kMostTraceBytes);
+              std::size_t most_bytes = protocol::kMaxTraceBytes);
   /// Waits for the point that is being solved.
   ~TraceSolver();
   TraceSolver(const TraceSolver&) = delete;

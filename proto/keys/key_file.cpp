@@ -87,7 +87,7 @@ SecretKey::SecretKey() {
   bytes_->fill(0);
 }
 
-KeyPair made_key_pair() {
+KeyPair generate_key_pair() {
   static_assert(std::tuple_size_v<CurveKey> == crypto_box_PUBLICKEYBYTES);
   static_assert(std::tuple_size_v<CurveKey> == crypto_box_SECRETKEYBYTES);
   KeyPair pair;
@@ -95,7 +95,7 @@ KeyPair made_key_pair() {
   return pair;
 }
 
-CurveKey public_half_of(const SecretKey& secret_key) {
+CurveKey public_key_of(const SecretKey& secret_key) {
   CurveKey public_key{};
   crypto_scalarmult_base(public_key.data(), secret_key.data());
   return public_key;
@@ -117,7 +117,7 @@ std::string z85(const CurveKey& key) {
   return text;
 }
 
-std::optional<CurveKey> key_of_z85(std::string_view text) {
+std::optional<CurveKey> parse_z85(std::string_view text) {
   CurveKey key{};
   return decode_z85(text, key) ? std::optional(key) : std::nullopt;
 }
@@ -160,7 +160,7 @@ class KeyFields {
     fail("role", R"(must be "server", "client", "worker" or "reader")");
   }
   CurveKey key(std::string_view field) const {
-    if (const auto key = key_of_z85(text(field))) {
+    if (const auto key = parse_z85(text(field))) {
       return *key;
     }
     fail(field, "is no key: one has 40 characters, as `oblique keygen` writes them");
@@ -278,7 +278,7 @@ KeyFile read_key_file(const std::string& path) {
     fields.fail("secret", "must begin its line, as secret = \"KEY\"");
   }
   key.pair.secret_key = *secret;
-  if (public_half_of(*secret) != key.pair.public_key) {
+  if (public_key_of(*secret) != key.pair.public_key) {
     fields.fail("secret", "is not the other half of `public`");
   }
   if (key.role != Role::kServer) {
@@ -411,7 +411,7 @@ std::string authorized_keys_in(const std::string& folder) {
   return (std::filesystem::path(folder) / "authorized_keys.toml").string();
 }
 
-std::string key_folder_meant(const std::string& named) {
+std::string find_key_folder(const std::string& named) {
   const auto has_keys = [](const std::string& folder) {
     return exists(key_file_in(folder, "server"));
   };
@@ -439,7 +439,7 @@ CurveKey make_key_folder(const std::string& folder) {
       throw std::runtime_error(path + " is there already, and is never overwritten");
     }
   }
-  const KeyPair server = made_key_pair();
+  const KeyPair server = generate_key_pair();
   write_key_file(key_file_in(folder, "server"), {Role::kServer, "server", server});
   for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
     add_key(folder, std::string(name_of(role)), role, std::nullopt);
@@ -450,7 +450,7 @@ CurveKey make_key_folder(const std::string& folder) {
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key) {
   const KeyFile server = read_key_file(key_file_in(folder, "server"));
-  const KeyPair pair = public_key ? KeyPair{*public_key, {}} : made_key_pair();
+  const KeyPair pair = public_key ? KeyPair{*public_key, {}} : generate_key_pair();
   AuthorizedKey added{name, role, pair.public_key,
                       fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))};
   change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {

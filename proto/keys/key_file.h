@@ -52,13 +52,13 @@ struct KeyPair {
 };
 
 /// A new random pair.
-KeyPair made_key_pair();
-CurveKey public_half_of(const SecretKey& secret_key);
+KeyPair generate_key_pair();
+CurveKey public_key_of(const SecretKey& secret_key);
 
 /// A key as 40 printable characters, none of which is a quote, a backslash or a space.
 std::string z85(const CurveKey& key);
 /// None for a text that is no key.
-std::optional<CurveKey> key_of_z85(std::string_view text);
+std::optional<CurveKey> parse_z85(std::string_view text);
 
 /// The content of the key file of a program.
 struct KeyFile {
@@ -121,7 +121,7 @@ std::string authorized_keys_in(const std::string& folder);
 
 /// `named` or, if that is empty, the current folder or the `keys` in it. Throws solver::InputError
 /// for a folder without a server's key.
-std::string key_folder_meant(const std::string& named);
+std::string find_key_folder(const std::string& named);
 
 /// Makes server.key, client.key, worker.key, reader.key and the list with the last three, and a
 /// missing folder with mode 0700. Returns the server's public key. Throws std::runtime_error when

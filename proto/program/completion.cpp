@@ -11,20 +11,20 @@
 namespace oblique::protocol {
 namespace {
 
-// NAME stands for the program, CASES for the words that are offered. A key of CASES is a verb, or a
-// verb and a flag that takes a value.
+// NAME stands for the program, CASES for the words that are offered. A key of CASES is a command,
+// or a command and a flag that takes a value.
 constexpr std::string_view kBothShells = R"(_NAME_offers() {
   case $1 in
 CASES    *) return 1 ;;
   esac
 }
-# Sets `verb` to the verb in the words.
-_NAME_verb() {
+# Sets `command` to the command in the words.
+_NAME_command() {
   local each
-  verb=''
+  command=''
   for each; do
-    if [[ $each != -* ]] && _NAME_offers "${verb:+$verb }$each"; then
-      verb=${verb:+$verb }$each
+    if [[ $each != -* ]] && _NAME_offers "${command:+$command }$each"; then
+      command=${command:+$command }$each
     fi
   done
 }
@@ -33,12 +33,12 @@ _NAME_verb() {
 constexpr std::string_view kBash =
     R"(# Completion of bash for NAME, as `NAME completion bash` prints it.
 BOTH_SHELLS_NAME() {
-  local word=${2-} verb before=${COMP_WORDS[COMP_CWORD - 1]} offers=()
-  _NAME_verb "${COMP_WORDS[@]:1:COMP_CWORD-1}"
+  local word=${2-} command before=${COMP_WORDS[COMP_CWORD - 1]} offers=()
+  _NAME_command "${COMP_WORDS[@]:1:COMP_CWORD-1}"
   # bash makes three words of --flag=value.
   [[ $before != '=' ]] || before=${COMP_WORDS[COMP_CWORD - 2]}
-  if [[ $before != --* ]] || ! _NAME_offers "${verb:+$verb }$before"; then
-    _NAME_offers "$verb"
+  if [[ $before != --* ]] || ! _NAME_offers "${command:+$command }$before"; then
+    _NAME_offers "$command"
     [[ $word == -* ]] || offers=("${offers[@]/#-*/}")
   fi
   # The last item of a list, or the last name of an expression.
@@ -51,18 +51,18 @@ complete -o default -F _NAME NAME
 constexpr std::string_view kZsh = R"(#compdef NAME
 # Completion of zsh for NAME, as `NAME completion zsh` prints it.
 BOTH_SHELLS_NAME() {
-  local verb before=$words[CURRENT-1]
+  local command before=$words[CURRENT-1]
   local -a offers
-  _NAME_verb "${(@)words[2,CURRENT-1]}"
+  _NAME_command "${(@)words[2,CURRENT-1]}"
   if [[ $PREFIX == --*=* ]]; then
     before=${PREFIX%%=*}
     compset -P '--*='
   fi
-  if [[ $before == --* ]] && _NAME_offers "${verb:+$verb }$before"; then
+  if [[ $before == --* ]] && _NAME_offers "${command:+$command }$before"; then
     # The last item of a list, or the last name of an expression.
     compset -P '*[ ,(]'
   else
-    _NAME_offers "$verb"
+    _NAME_offers "$command"
     if [[ $PREFIX == -* ]]; then
       offers=(${(M)offers:#-*})
     else
@@ -114,19 +114,19 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
   return offers;
 }
 
-/// The cases of a verb, which is reached by the words `path`, and of its verbs.
-std::string cases_of(CLI::App& verb, const std::string& path, const ValueWords& words) {
+/// The cases of a command, which is reached by the words `path`, and of its commands.
+std::string cases_of(CLI::App& command, const std::string& path, const ValueWords& words) {
   std::string cases;
   std::string offers;
   const auto add_case = [&cases](const std::string& key, const std::string& values) {
     cases += "    " + quoted(key) + ") offers=(" + values + ") ;;\n";
   };
   const std::string before = path.empty() ? "" : path + ' ';
-  for (auto* each : verb.get_subcommands({})) {
+  for (auto* each : command.get_subcommands({})) {
     offers += ' ' + quoted(each->get_name());
     cases += cases_of(*each, before + each->get_name(), words);
   }
-  for (auto* option : verb.get_options()) {
+  for (auto* option : command.get_options()) {
     if (option->get_group().empty() || option->get_group() == kUnlisted) {
       continue;
     }
@@ -157,7 +157,7 @@ std::optional<int> print_completion(CLI::App& app, int argc, const char* const* 
   }
   const std::string_view shell = argc == 3 ? argv[2] : "";
   if (shell != "bash" && shell != "zsh") {
-    return tell_wrong_usage(app.get_name(), "write `completion bash` or `completion zsh`");
+    return report_wrong_usage(app.get_name(), "write `completion bash` or `completion zsh`");
   }
   const std::string script =
       replaced(std::string(shell == "zsh" ? kZsh : kBash), "BOTH_SHELLS", kBothShells);

@@ -145,9 +145,9 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
     }
     return std::nullopt;
   } catch (const solver::InputError& error) {
-    return tell_wrong_usage(app_.get_name(), error.what());
+    return report_wrong_usage(app_.get_name(), error.what());
   } catch (const CLI::ParseError& error) {
-    return tell_wrong_usage(app_.get_name(), place + objection_of(app_, app_, error));
+    return report_wrong_usage(app_.get_name(), place + parse_error_message(app_, app_, error));
   }
 }
 

@@ -120,7 +120,7 @@ void Notifier::stopping(const std::string& sentence, std::chrono::milliseconds l
        "\nEXTEND_TIMEOUT_USEC=" + std::to_string(std::chrono::microseconds(longest).count()));
 }
 
-void Notifier::turn(Clock::time_point now) {
+void Notifier::feed_watchdog(Clock::time_point now) {
   if (heartbeat_.count() > 0 && now >= next_heartbeat_) {
     next_heartbeat_ = now + heartbeat_;
     send("WATCHDOG=1");

@@ -67,7 +67,7 @@ class Notifier {
   /// The program ends, which may take up to `longest`.
   void stopping(const std::string& sentence, std::chrono::milliseconds longest) const;
   /// Call it several times a second: feeds the watchdog at half of WATCHDOG_USEC.
-  void turn(Clock::time_point now);
+  void feed_watchdog(Clock::time_point now);
 
  private:
   void send(const std::string& state) const;

@@ -465,7 +465,7 @@ void check_reach(const solver::ModelParameters& model, const Block& block) {
 
 }  // namespace
 
-bool is_judged_by_points(const solver::ModelParameters& model, const Block& block) {
+bool needs_point_validation(const solver::ModelParameters& model, const Block& block) {
   const bool has_expressions = std::any_of(block.axes().begin(), block.axes().end(),
                                            [](const Axis& a) { return !a.expression().empty(); });
   if (has_expressions || !block.where().empty()) {
@@ -490,7 +490,7 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
     check_zip(block);
   }
   check_single_lengths(model, block);
-  if (!is_judged_by_points(model, block)) {
+  if (!needs_point_validation(model, block)) {
     check_reach(model, block);
   }
 }

@@ -125,12 +125,12 @@ void check_ends(const solver::ParameterKey& key, double from, double to);
 /// list, a rising range, an expression or, in a sample, a distribution, and each value is finite
 /// and in the key's domain; unless the axes are in order, each once, and fit the kind of the block,
 /// and no H is larger than the length of the shortest finger of the block. H is not compared with
-/// the length in blocks where this depends on the point (`is_judged_by_points`).
+/// the length in blocks where this depends on the point (`needs_point_validation`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
 /// Whether some values, or whether H is within the finger's length, can be checked only point by
 /// point.
-bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
+bool needs_point_validation(const solver::ModelParameters& model, const Block& block);
 
 /// A block of the axes, sorted in the order of recipes: model keys as in listings, then H, mu and
 /// e. Does not check them. Keys must be known.

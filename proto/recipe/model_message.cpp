@@ -86,7 +86,7 @@ ModelParameters to_message(const solver::ModelParameters& model) {
   return message;
 }
 
-solver::ModelParameters unjudged_from_message(const ModelParameters& message) {
+solver::ModelParameters from_message_unchecked(const ModelParameters& message) {
   // The struct has `int` and an enumeration, so the ranges are checked before the conversion.
   solver::check_value(model_key("elements_per_link"), message.elements_per_link());
   solver::check_value(model_key("integrator"), message.integrator());
@@ -101,7 +101,7 @@ solver::ModelParameters unjudged_from_message(const ModelParameters& message) {
 }
 
 solver::ModelParameters from_message(const ModelParameters& message) {
-  solver::ModelParameters model = unjudged_from_message(message);
+  solver::ModelParameters model = from_message_unchecked(message);
   solver::validate(model);
   return model;
 }
@@ -129,7 +129,7 @@ bool is_same_block(const Block& a, const Block& b) {
 }
 
 std::string recipe_digest(const Recipe& recipe) {
-  std::string bytes = canonical_model(unjudged_from_message(recipe.model()));
+  std::string bytes = canonical_model(from_message_unchecked(recipe.model()));
   bytes += recipe.errors() ? " errors" : "";
   for (const Block& block : recipe.blocks()) {
     const std::string of_block = comparable_bytes(block);
@@ -151,7 +151,7 @@ void check_size(const Recipe& recipe) {
 }
 
 bool parse_recipe(std::string_view bytes, Recipe& recipe) {
-  return bytes.size() <= kLongestRecipe && is_of_a_recipes_shape(bytes) &&
+  return bytes.size() <= kLongestRecipe && is_unpadded_recipe(bytes) &&
          recipe.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
@@ -228,7 +228,7 @@ Axis expressed_axis(const solver::ParameterKey& key, std::string_view text) {
   return axis;
 }
 
-Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t seed) {
+Sample parse_sample(std::string_view kind, std::int64_t count, std::int64_t seed) {
   for (const auto& [name, value, least] : {std::tuple{"count", count, 1}, {"seed", seed, 0}}) {
     if (value < least) {
       throw InputError(
@@ -264,7 +264,7 @@ const solver::ParameterKey& model_key(std::string_view name) {
   if (const auto* key = solver::find_model_key(name)) {
     return *key;
   }
-  std::vector<std::string_view> known{WrittenModel::kPreset, WrittenModel::kLengths};
+  std::vector<std::string_view> known{ModelInput::kPreset, ModelInput::kLengths};
   for (const auto& key : solver::model_keys()) {
     known.push_back(key.name);
   }
@@ -272,11 +272,11 @@ const solver::ParameterKey& model_key(std::string_view name) {
       name, fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
 }
 
-solver::ModelParameters WrittenModel::model() const {
+solver::ModelParameters ModelInput::model() const {
   solver::ModelParameters model = solver::preset(preset);
   if (lengths_m) {
     if (values.contains("links") || values.contains("length")) {
-      throw InputError(kLengths, std::string(kLengthsStandAlone));
+      throw InputError(kLengths, std::string(kLengthsConflict));
     }
     if (lengths_m->empty()) {
       throw InputError(kLengths, "lengths = [] is not allowed: give the lengths in m, one a link");
@@ -301,7 +301,7 @@ solver::ModelParameters WrittenModel::model() const {
   return model;
 }
 
-std::string objection_to_study_name(const std::string& name) {
+std::string study_name_error(const std::string& name) {
   constexpr std::size_t kMostBytes = 100;
   if (!name.empty() && name.size() <= kMostBytes && name.front() != '-' && is_visible(name)) {
     return {};
@@ -313,7 +313,7 @@ std::string objection_to_study_name(const std::string& name) {
       visible(name.substr(0, kMostBytes)), kMostBytes);
 }
 
-std::string objection_to_priority(std::int64_t priority) {
+std::string priority_error(std::int64_t priority) {
   return priority >= -1000 && priority <= 1000
              ? ""
              : fmt::format("priority = {} is not allowed: {} is", priority, kPriorities);

@@ -23,7 +23,7 @@ solver::ModelParameters from_message(const ModelParameters& message);
 
 /// The same for a model that may be outside its domain, for example one that an earlier version
 /// stored. Throws solver::InputError only for numbers that the struct cannot hold.
-solver::ModelParameters unjudged_from_message(const ModelParameters& message);
+solver::ModelParameters from_message_unchecked(const ModelParameters& message);
 
 /// A text that is equal for equal models: "oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10 ...".
 /// README.md defines it byte by byte. The values need not be in their domains.
@@ -66,7 +66,7 @@ Axis drawn_axis(const solver::ParameterKey& key, Distribution distribution);
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text);
 
 /// `kind` is random, lhs or sobol.
-Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t seed);
+Sample parse_sample(std::string_view kind, std::int64_t count, std::int64_t seed);
 inline constexpr std::int64_t kUsualSeed = 1;
 
 /// Names in the order of the kinds' numbers: uniform, log-uniform, normal; random, lhs, sobol.
@@ -77,12 +77,12 @@ DistributionKind distribution_named(std::string_view name);
 
 /// A model from a study file or flags: a preset, lengths [m], one a link, and single keys that
 /// override it.
-struct WrittenModel {
+struct ModelInput {
   /// The keys of a written model in addition to `solver::model_keys()`.
   static constexpr std::string_view kPreset = "preset";
   static constexpr std::string_view kLengths = "lengths";
   /// The message if `lengths` is used together with the keys that it replaces.
-  static constexpr std::string_view kLengthsStandAlone =
+  static constexpr std::string_view kLengthsConflict =
       "lengths stands beside links or length: give either lengths, one a link, or links and length";
 
   std::string preset = std::string(solver::preset_names().front());
@@ -100,10 +100,10 @@ const solver::ParameterKey& model_key(std::string_view name);
 
 /// Why a study cannot have that name, or an empty text. A name has 1 to 100 bytes of UTF-8, has no
 /// control characters (text.h), and does not begin with '-'.
-std::string objection_to_study_name(const std::string& name);
+std::string study_name_error(const std::string& name);
 
 inline constexpr std::string_view kPriorities = "-1000 to 1000";  ///< those that are allowed
 /// Why a study cannot have that priority, or an empty text.
-std::string objection_to_priority(std::int64_t priority);
+std::string priority_error(std::int64_t priority);
 
 }  // namespace oblique::protocol

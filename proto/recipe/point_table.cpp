@@ -128,7 +128,7 @@ class PointTable::BlockPoints : public BlockPlace {
     return values;
   }
 
-  bool is_left_in(std::span<const double> values) const {
+  bool passes_filter(std::span<const double> values) const {
     const double kept = filter_ ? filter_->expression.value_at(values) : 1.0;
     return !std::isnan(kept) && kept != 0.0;
   }
@@ -154,7 +154,7 @@ class PointTable::BlockPoints : public BlockPlace {
     if (filter_ && std::isnan(filter_->expression.value_at(values))) {
       return InputError("where", "where has no value: " + in_words(values));
     }
-    if (!is_left_in(values)) {
+    if (!passes_filter(values)) {
       return std::nullopt;
     }
     try {
@@ -324,11 +324,11 @@ PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::mo
   if (recipe_->blocks().empty()) {
     throw InputError("the study has no block: it needs at least one with H, mu and e");
   }
-  if (static_cast<std::size_t>(recipe_->blocks_size()) > kMostBlocks) {
+  if (static_cast<std::size_t>(recipe_->blocks_size()) > kMaxBlocks) {
     throw InputError(
         fmt::format("the study has {} blocks, more than {}: write points that differ "
                     "in all values as a block with `zip`",
-                    recipe_->blocks_size(), kMostBlocks));
+                    recipe_->blocks_size(), kMaxBlocks));
   }
   for (const Block& block : recipe_->blocks()) {
     in_block(*recipe_, blocks_.size(), [&] { add_block(block); });
@@ -342,12 +342,12 @@ void PointTable::add_block(const Block& block) {
   check_block(base_model_, block);
   BlockPoints& added = blocks_.emplace_back(base_model_, block);
   expressions_ += added.expressions();
-  if (expressions_ > kMostExpressions) {
+  if (expressions_ > kMaxExpressions) {
     throw InputError(
-        fmt::format("the study has more than {} expressions and filters", kMostExpressions));
+        fmt::format("the study has more than {} expressions and filters", kMaxExpressions));
   }
   check_points(points_ + added.points);
-  added.is_judged_by_points = is_judged_by_points(base_model_, block);
+  added.needs_point_validation = needs_point_validation(base_model_, block);
   added.first_point = points_;
   const bool has_base_model = model_axes(block).empty();
   const bool is_known = has_base_model && !base_segments_.empty();
@@ -365,7 +365,7 @@ void PointTable::add_block(const Block& block) {
     }
   }
   has_filter_ = has_filter_ || !block.where().empty();
-  judged_blocks_ += added.is_judged_by_points ? 1 : 0;
+  blocks_to_validate_ += added.needs_point_validation ? 1 : 0;
   points_ += added.points;
 }
 
@@ -415,16 +415,16 @@ Segment PointTable::segment_at(std::uint64_t index) const {
   return {block.first_model + model, block.first_point + model * count, count};
 }
 
-bool PointTable::is_left_in(std::uint64_t index) const {
+bool PointTable::passes_filter(std::uint64_t index) const {
   if (!has_filter_) {
     return true;
   }
   const BlockPoints& block = blocks_[block_of_point(index)];
-  return block.is_left_in(block.values_at(index - block.first_point));
+  return block.passes_filter(block.values_at(index - block.first_point));
 }
 
-std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) const {
-  while (begin < end && !is_left_in(begin)) {
+std::uint64_t PointTable::first_passing(std::uint64_t begin, std::uint64_t end) const {
+  while (begin < end && !passes_filter(begin)) {
     ++begin;
   }
   return std::min(begin, end);
@@ -432,29 +432,29 @@ std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) 
 
 std::string PointTable::fault(std::uint64_t index) const {
   const BlockPoints& block = blocks_[block_of_point(index)];
-  const auto fault = block.is_judged_by_points
+  const auto fault = block.needs_point_validation
                          ? block.fault(base_model_, block.values_at(index - block.first_point))
                          : std::nullopt;
   return fault ? fault->what() : "";
 }
 
-void PointTable::judge_points() const {
-  const std::uint64_t most = kMostJudged / std::max<std::uint64_t>(judged_blocks_, 1);
+void PointTable::validate_points() const {
+  const std::uint64_t most = kMaxValidated / std::max<std::uint64_t>(blocks_to_validate_, 1);
   for (std::size_t number = 0; number < blocks_.size(); ++number) {
     const BlockPoints& block = blocks_[number];
     bool leaves_any_in = false;
-    const auto judge = [&](std::uint64_t i) {
+    const auto validate = [&](std::uint64_t i) {
       const auto values = block.values_at(i);
       if (const auto fault = block.fault(base_model_, values)) {
         throw InputError({.text = fault->fields().text,
                           .key = fault->fields().key,
                           .point = block.first_point + i});
       }
-      leaves_any_in = leaves_any_in || block.is_left_in(values);
+      leaves_any_in = leaves_any_in || block.passes_filter(values);
     };
     in_block(*recipe_, number, [&] {
-      if (block.is_judged_by_points && for_each_or_some(block.points, most, most, number, judge) &&
-          !leaves_any_in) {
+      if (block.needs_point_validation &&
+          for_each_or_some(block.points, most, most, number, validate) && !leaves_any_in) {
         in_expression("where", block.definition().where(),
                       [] { throw InputError("it leaves no point in"); });
       }
@@ -520,7 +520,7 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table) 
   // grown since.
   bool has_model = !result.has_model() && own.model == 0;
   try {
-    has_model = has_model || (result.has_model() && is_close(unjudged_from_message(result.model()),
+    has_model = has_model || (result.has_model() && is_close(from_message_unchecked(result.model()),
                                                              table.model(own.model)));
   } catch (const InputError&) {  // a whole number outside the domain
   }
@@ -541,19 +541,19 @@ constexpr std::uint64_t kBytesAModel = 600;
 
 /// More points than the first are not counted, but estimated from as many random points as the
 /// second.
-constexpr std::uint64_t kMostCounted = 100'000;
+constexpr std::uint64_t kMaxCounted = 100'000;
 constexpr std::uint64_t kLooks = 10'000;
 
 /// For a block of the recipe.
-PointsLeftIn points_left_in(const PointTable& table, int block) {
+PassingPoints passing_points(const PointTable& table, int block) {
   const BlockPlace& place = table.block(static_cast<std::size_t>(block));
   if (table.recipe().blocks(block).where().empty()) {
     return {place.points, false};
   }
   std::uint64_t found = 0;
   const bool is_counted = for_each_or_some(
-      place.points, kMostCounted, kLooks, 2,
-      [&](std::uint64_t i) { found += table.is_left_in(place.first_point + i) ? 1U : 0U; });
+      place.points, kMaxCounted, kLooks, 2,
+      [&](std::uint64_t i) { found += table.passes_filter(place.first_point + i) ? 1U : 0U; });
   const double share = static_cast<double>(found) / static_cast<double>(kLooks);
   return {
       is_counted ? found : static_cast<std::uint64_t>(share * static_cast<double>(place.points)),
@@ -563,10 +563,10 @@ PointsLeftIn points_left_in(const PointTable& table, int block) {
 /// Points that filters keep: all of them, or at most `kLooks` at random.
 std::vector<std::uint64_t> some_points(const PointTable& table) {
   constexpr std::uint64_t kTries = 100 * kLooks;
-  const std::uint64_t most = table.size() <= kMostCounted ? kMostCounted : kLooks;
+  const std::uint64_t most = table.size() <= kMaxCounted ? kMaxCounted : kLooks;
   std::vector<std::uint64_t> points;
-  for_each_or_some(table.size(), kMostCounted, kTries, 0, [&](std::uint64_t point) {
-    if (points.size() < most && table.is_left_in(point)) {
+  for_each_or_some(table.size(), kMaxCounted, kTries, 0, [&](std::uint64_t point) {
+    if (points.size() < most && table.passes_filter(point)) {
       points.push_back(point);
     }
   });
@@ -591,7 +591,7 @@ void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some
     ++met[fall];
   }
   size.falls = met.size();
-  if (table.size() > kMostCounted) {
+  if (table.size() > kMaxCounted) {
     const auto once =
         std::count_if(met.begin(), met.end(), [](const auto& each) { return each.second == 1; });
     const double share_met = 1.0 - static_cast<double>(once) / static_cast<double>(some.size());
@@ -609,7 +609,7 @@ StudySize size_of(const PointTable& table) {
   StudySize size{};
   size.models = table.models();
   for (int i = 0; i < table.recipe().blocks_size(); ++i) {
-    const PointsLeftIn& left_in = size.blocks.emplace_back(points_left_in(table, i));
+    const PassingPoints& left_in = size.blocks.emplace_back(passing_points(table, i));
     size.points += left_in.points;
     size.points_estimated = size.points_estimated || left_in.estimated;
   }

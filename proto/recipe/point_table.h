@@ -16,8 +16,8 @@
 namespace oblique::protocol {
 
 /// Most blocks, and most expressions, filters among them, that a study may have.
-inline constexpr std::size_t kMostBlocks = 10'000;
-inline constexpr std::size_t kMostExpressions = 1000;
+inline constexpr std::size_t kMaxBlocks = 10'000;
+inline constexpr std::size_t kMaxExpressions = 1000;
 
 /// One point of a study.
 struct Point {
@@ -40,7 +40,7 @@ struct BlockPlace {
   std::uint64_t points = 0;  ///< including those that the filter leaves out
   std::uint64_t first_model = 0;
   std::uint64_t models = 0;
-  bool is_judged_by_points = false;  ///< see blocks.h
+  bool needs_point_validation = false;  ///< see blocks.h
 };
 
 /// A checked recipe: point i and model j as functions of their numbers, in time and memory that do
@@ -64,18 +64,18 @@ class PointTable {
 
   bool has_filter() const { return has_filter_; }
   /// Whether the filter keeps the point. A filter that is NaN does not.
-  bool is_left_in(std::uint64_t index) const;
+  bool passes_filter(std::uint64_t index) const;
   /// The first point of [begin, end) that filters keep, or `end`.
-  std::uint64_t first_left_in(std::uint64_t begin, std::uint64_t end) const;
+  std::uint64_t first_passing(std::uint64_t begin, std::uint64_t end) const;
 
   /// Whether some values or filters can be checked only at points.
-  bool needs_judging() const { return judged_blocks_ > 0; }
-  /// Checks such blocks at all of their points, or at `kMostJudged` random points of all blocks
+  bool needs_point_validation() const { return blocks_to_validate_ > 0; }
+  /// Checks such blocks at all of their points, or at `kMaxValidated` random points of all blocks
   /// together (about 0.1 s). Throws solver::InputError with block and point for a value that is not
   /// allowed, and for a filter that leaves out all points of its block. A wrong value that was not
   /// found fails later (`fault`).
-  void judge_points() const;
-  static constexpr std::uint64_t kMostJudged = 100'000;
+  void validate_points() const;
+  static constexpr std::uint64_t kMaxValidated = 100'000;
 
   /// Why a point cannot be solved, or that its filter is NaN, as a sentence with the values; empty
   /// if nothing is wrong.
@@ -113,7 +113,7 @@ class PointTable {
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
-  std::uint64_t judged_blocks_ = 0;  ///< those that are judged by points
+  std::uint64_t blocks_to_validate_ = 0;  ///< those that are judged by points
   bool has_filter_ = false;
 };
 
@@ -140,7 +140,7 @@ Point inputs_of(const PointResult& result, const PointTable& table);
 
 /// Number of points that a filter keeps: counted in blocks of up to 10^5 points, else estimated
 /// from 10^4 random points.
-struct PointsLeftIn {
+struct PassingPoints {
   std::uint64_t points;
   bool estimated;
 };
@@ -153,8 +153,8 @@ struct StudySize {
   std::uint64_t falls;   ///< different falls
   bool falls_estimated;  ///< from 10^4 random points, because the study has more than 10^5
   std::uint64_t bytes;   ///< size in a database
-  std::vector<std::uint64_t> examples;    ///< numbers of up to 64 random points
-  std::vector<PointsLeftIn> blocks = {};  ///< of each block
+  std::vector<std::uint64_t> examples;     ///< numbers of up to 64 random points
+  std::vector<PassingPoints> blocks = {};  ///< of each block
 };
 StudySize size_of(const PointTable& table);
 

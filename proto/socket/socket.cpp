@@ -15,8 +15,8 @@
 namespace oblique::protocol {
 namespace {
 
-[[noreturn]] void refuse(const DealerSettings& settings, const std::string& objection) {
-  throw solver::InputError("server = \"" + settings.url + "\" is not an address: " + objection +
+[[noreturn]] void refuse(const DealerSettings& settings, const std::string& error) {
+  throw solver::InputError("server = \"" + settings.url + "\" is not an address: " + error +
                            ", as in " + settings.example_url);
 }
 
@@ -35,7 +35,7 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
 
 /// Why a server that has keys rejected ours. It sends the same answer for unknown keys and for keys
 /// for its other port.
-std::string key_objection(std::uint32_t status, const DealerSettings& settings) {
+std::string rejection_reason(std::uint32_t status, const DealerSettings& settings) {
   constexpr std::uint32_t kNotAdmitted = 400;
   if (status != kNotAdmitted) {
     return "the public key of the server in that file is not its own, which its log shows at the "
@@ -53,9 +53,9 @@ std::string key_objection(std::uint32_t status, const DealerSettings& settings) 
 
 }  // namespace
 
-zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings) {
-  if (const auto objection = objection_to_address(settings.url); !objection.empty()) {
-    refuse(settings, objection);
+zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings) {
+  if (const auto error = address_error(settings.url); !error.empty()) {
+    refuse(settings, error);
   }
   constexpr KeepAlive kKeepAlive;
   constexpr int kQueuedMessages = 1000;
@@ -180,7 +180,7 @@ std::optional<std::string> SocketMonitor::rejection() {
       is_mismatch
           ? "it has no keys. Start it with --keys, or leave out --keys and OBLIQUE_KEYS here "
             "to connect unencrypted"
-          : key_objection(failure_->value, settings_));
+          : rejection_reason(failure_->value, settings_));
 }
 
 }  // namespace oblique::protocol

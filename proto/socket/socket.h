@@ -27,7 +27,7 @@ struct DealerSettings {
 /// A DEALER socket with the options that all our sockets have (limits.h, the largest frame), which
 /// does not connect yet. Throws solver::InputError for a `url` that is no address, and for a key
 /// that is a server's.
-zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings);
+zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings);
 
 /// Lets it connect, in the background, and again whenever a connection ends; a host's name is
 /// looked up each time. A name may have addresses of both families, and the server need not listen

@@ -71,7 +71,7 @@ bool has_room_for_axes(std::string_view message, std::vector<int> path) {
 
 }  // namespace
 
-bool is_of_a_workers_size(std::string_view frame) {
+bool is_worker_frame_within_limits(std::string_view frame) {
   if (frame.size() > kMaxFrameBytes) {
     return false;
   }
@@ -83,14 +83,14 @@ bool is_of_a_workers_size(std::string_view frame) {
   const std::array results{static_cast<int>(Message::kResultsFieldNumber),
                            static_cast<int>(Results::kResultsFieldNumber)};
   return frame.size() - rows <= kMaxWorkerFrameBytes &&
-         find(frame, results).fields <= kMostResultsAMessage;
+         find(frame, results).fields <= kMaxResultsAMessage;
 }
 
-bool is_of_a_recipes_shape(std::string_view recipe) {
+bool is_unpadded_recipe(std::string_view recipe) {
   return has_room_for_axes(recipe, {});
 }
 
-bool is_of_a_requests_shape(std::string_view frame) {
+bool is_unpadded_request(std::string_view frame) {
   return has_room_for_axes(frame,
                            {ClientRequest::kSubmitFieldNumber, SubmitRequest::kRecipeFieldNumber});
 }

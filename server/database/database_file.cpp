@@ -135,7 +135,7 @@ bool is_network_file_system(std::string_view type) {
          (type.starts_with("fuse.") && std::ranges::none_of(kLocalFuse, begins_type));
 }
 
-std::string objection_to_shared_disk(const std::string& path) {
+std::string network_disk_error(const std::string& path) {
   const std::string type = file_system_of(path);
   if (!is_network_file_system(type)) {
     return {};
@@ -148,9 +148,9 @@ std::string objection_to_shared_disk(const std::string& path) {
 }
 
 const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk) {
-  const std::string objection = objection_to_shared_disk(path);
-  if (!objection.empty() && !allows_network_disk) {
-    throw StorageError(objection);
+  const std::string error = network_disk_error(path);
+  if (!error.empty() && !allows_network_disk) {
+    throw StorageError(error);
   }
   return path;
 }

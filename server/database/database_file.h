@@ -33,7 +33,7 @@ std::string file_system_of(const std::string& path);
 bool is_network_file_system(std::string_view type);
 
 /// write-ahead log needs: two machines could write at once and damage the file.
-std::string objection_to_shared_disk(const std::string& path);
+std::string network_disk_error(const std::string& path);
 
 /// Returns `path`. Throws StorageError when it is on a network disk and these are not allowed.
 const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk);

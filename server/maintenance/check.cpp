@@ -20,12 +20,12 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kMostOfAKind = 20;
+constexpr std::size_t kMaxOfAKind = 20;
 
-/// Appends the first column of the first kMostOfAKind rows.
+/// Appends the first column of the first kMaxOfAKind rows.
 void append(std::vector<std::string>& to, sqlite3* database, const std::string& sql) {
   Statement rows(database, sql);
-  for (std::size_t i = 0; i < kMostOfAKind && rows.step(); ++i) {
+  for (std::size_t i = 0; i < kMaxOfAKind && rows.step(); ++i) {
     to.push_back(rows.text(0));
   }
 }
@@ -65,7 +65,7 @@ class StudyCheck {
       check_completed(table, check_rows(table));
     }
     for (const auto* faults : {&study_faults_, &row_faults_}) {
-      const auto count = static_cast<std::ptrdiff_t>(std::min(faults->size(), kMostOfAKind));
+      const auto count = static_cast<std::ptrdiff_t>(std::min(faults->size(), kMaxOfAKind));
       found_.faults.insert(found_.faults.end(), faults->begin(), faults->begin() + count);
     }
     if (without_checksum_ > 0) {
@@ -84,12 +84,11 @@ class StudyCheck {
   /// be shown.
   void check_terms() {
     constexpr std::int64_t kLongestTime = 64;
-    for (const std::string& objection :
-         {protocol::objection_to_study_name(name_),
-          protocol::objection_to_priority(studies_.integer(5)),
+    for (const std::string& error :
+         {protocol::study_name_error(name_), protocol::priority_error(studies_.integer(5)),
           std::string(studies_.integer(6) > kLongestTime ? "its times are not valid" : "")}) {
-      if (!objection.empty()) {
-        add_fault(objection);
+      if (!error.empty()) {
+        add_fault(error);
       }
     }
   }
@@ -120,7 +119,7 @@ class StudyCheck {
       if (fault.empty() && table.is_made()) {
         fault = recipe_fault(*table.get());
       }
-      if (!fault.empty() && row_faults_.size() < kMostOfAKind) {
+      if (!fault.empty() && row_faults_.size() < kMaxOfAKind) {
         row_faults_.push_back(
             fmt::format("study {}, point {}: {}", name_, rows_.integer(0), fault));
       }

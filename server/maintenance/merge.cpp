@@ -143,8 +143,8 @@ class SourceMerge {
   }
 
   StudyRow add(const StudyRow& study, const std::string& name) {
-    if (const std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
-      throw MergeRefused(objection);
+    if (const std::string error = protocol::study_name_error(name); !error.empty()) {
+      throw MergeRefused(error);
     }
     ++merged_.studies_added;
     execute_with(
@@ -227,9 +227,9 @@ class SourceMerge {
   }
 
   void note_differing(Statement& differing, const std::string& study) {
-    constexpr std::size_t kMostRemarks = 10;
+    constexpr std::size_t kMaxRemarks = 10;
     while (differing.step()) {
-      if (++merged_.results_differing <= kMostRemarks) {
+      if (++merged_.results_differing <= kMaxRemarks) {
         merged_.remarks.push_back(fmt::format("study {}, point {}: the solved outputs differ",
                                               study, differing.number(0)));
       }

@@ -23,8 +23,8 @@ std::string recipe_bytes(const std::string& path, std::uint64_t study_id) {
 }  // namespace
 
 void rename_study(const std::string& path, std::uint64_t study_id, const std::string& name) {
-  if (const std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
-    throw StudyRefused(objection);
+  if (const std::string error = protocol::study_name_error(name); !error.empty()) {
+    throw StudyRefused(error);
   }
   (void)recipe_bytes(path, study_id);
   Store store(path);

@@ -115,14 +115,14 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
           curve_nonce("COOKIE--", initiate.substr(0, kRandomNonceBytes)).data(),
           cookie_key_.data()) == 0;
   cookie_key_.wipe();
-  const std::uint8_t* const brief_key = cookie.data();
-  const std::uint8_t* const own_brief_secret = cookie.data() + kKeyBytes;
+  const std::uint8_t* const short_term_key = cookie.data();
+  const std::uint8_t* const own_short_term_secret = cookie.data() + kKeyBytes;
   const std::string_view counter = initiate.substr(kCookieBytes, kCounterBytes);
   const std::string_view box = initiate.substr(kInitiateBoxAt);
   std::string text(box.size() - kMacBytes, '\0');
   Secret<kKeyBytes> shared;
   if (!is_own_cookie || number_of(counter) <= hello_counter_ ||
-      crypto_box_beforenm(shared.data(), brief_key, own_brief_secret) != 0 ||
+      crypto_box_beforenm(shared.data(), short_term_key, own_short_term_secret) != 0 ||
       crypto_box_open_easy_afternm(raw(text.data()), raw(box), box.size(),
                                    curve_nonce("CurveZMQINITIATE", counter).data(),
                                    shared.data()) != 0) {
@@ -130,8 +130,8 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
   }
   std::memcpy(key_.data(), text.data(), kKeyBytes);
   // Before the key is authenticated: a forged INITIATE must not reveal which keys are listed.
-  if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, brief_key,
-                  own_brief_secret)) {
+  if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, short_term_key,
+                  own_short_term_secret)) {
     return Refusal{RefusalCause::kFaulty, "it does not hold the key that it shows"};
   }
   AuthResult result = security_.authenticate(key_);
@@ -145,14 +145,14 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
 
 /// Whether the vouch proves that the peer holds `client_key`, in this handshake with this server.
 bool CurveHandshake::is_vouched(std::string_view vouch, const protocol::CurveKey& client_key,
-                                const std::uint8_t* brief_key,
-                                const std::uint8_t* own_brief_secret) const {
+                                const std::uint8_t* short_term_key,
+                                const std::uint8_t* own_short_term_secret) const {
   Secret<kVouchTextBytes> text;
   const CurveNonce nonce = curve_nonce("VOUCH---", vouch.substr(0, kRandomNonceBytes));
   return crypto_box_open_easy(text.data(), raw(vouch.substr(kRandomNonceBytes)),
                               kVouchBytes - kRandomNonceBytes, nonce.data(), client_key.data(),
-                              own_brief_secret) == 0 &&
-         sodium_memcmp(text.data(), brief_key, kKeyBytes) == 0 &&
+                              own_short_term_secret) == 0 &&
+         sodium_memcmp(text.data(), short_term_key, kKeyBytes) == 0 &&
          sodium_memcmp(text.data() + kKeyBytes, security_.server.public_key.data(), kKeyBytes) == 0;
 }
 

@@ -123,7 +123,8 @@ class CurveHandshake {
   Outcome take_initiate(std::string_view initiate);
   std::string welcome(std::string_view peers_key, const Secret<kKeyBytes>& hello_key);
   bool is_vouched(std::string_view vouch, const protocol::CurveKey& client_key,
-                  const std::uint8_t* brief_key, const std::uint8_t* own_brief_secret) const;
+                  const std::uint8_t* short_term_key,
+                  const std::uint8_t* own_short_term_secret) const;
 
   const PortSecurity& security_;
   Step next_ = Step::kHello;

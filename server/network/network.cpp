@@ -33,7 +33,7 @@ constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
 // Handshakes with keys. A step costs as much as hundreds of messages.
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
-constexpr std::size_t kMostPendingSteps = 64;
+constexpr std::size_t kMaxPendingSteps = 64;
 /// Parts of `handshake_ms`, after which the oldest makes room for another, or, of one source, one
 /// of the newest. With half of the first, thousands of handshakes of one busy process fail.
 constexpr std::int64_t kPartOfOldest = 10;
@@ -263,12 +263,12 @@ bool Network::has_more() const {
 // ---- New connections --------------------------------------------------------------------------
 
 void Network::accept_all(Port port) {
-  constexpr std::size_t kMostAtATime = 64;
+  constexpr std::size_t kMaxAtATime = 64;
   // No more than can be admitted in a turn: a crowd, as after a restart, waits in the system.
-  const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
+  const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMaxAtATime;
   std::size_t taken = 0;
   for (std::size_t i = 0;
-       i < kMostAtATime && taken < most && pending_steps_.size() < kMostPendingSteps; ++i) {
+       i < kMaxAtATime && taken < most && pending_steps_.size() < kMaxPendingSteps; ++i) {
     if (must_newcomers_wait()) {
       set_accepting(port, false);
       return;
@@ -292,17 +292,17 @@ void Network::accept_all(Port port) {
     handshakes_.insert(number);
     handshakes_of_[peer->address.source].insert(number);
     peer->connection.send_answers();
-    settle(number, *peer);
+    update(number, *peer);
   }
 }
 
 /// There are as many handshakes as may be, and the oldest has not had its time. It is not ended: it
 /// would come again at once, and nobody of a slow crowd would ever be admitted.
 bool Network::must_newcomers_wait() const {
-  return handshakes_.size() >= limits_.handshakes && !has_had(*handshakes_.begin(), kPartOfOldest);
+  return handshakes_.size() >= limits_.handshakes && !has_used(*handshakes_.begin(), kPartOfOldest);
 }
 
-bool Network::has_had(Number handshake, std::int64_t part) const {
+bool Network::has_used(Number handshake, std::int64_t part) const {
   return now_ms_ - peers_.at(handshake)->since_ms >= limits_.handshake_ms / part;
 }
 
@@ -337,8 +337,8 @@ bool Network::make_room_at_source(const PeerAddress& address) {
   const auto newest = static_cast<std::ptrdiff_t>(handshakes.size() / kPartForNewest);
   const Number oldest = *handshakes.begin();
   const Number one_of_newest = *std::prev(handshakes.end(), newest + 1);
-  const bool is_oldest_due = has_had(oldest, kPartOfOldest);
-  if (!is_oldest_due && !has_had(one_of_newest, kPartOfNewest)) {
+  const bool is_oldest_due = has_used(oldest, kPartOfOldest);
+  if (!is_oldest_due && !has_used(one_of_newest, kPartOfNewest)) {
     return false;
   }
   end(is_oldest_due ? oldest : one_of_newest, "too many handshakes of its address are under way",
@@ -398,7 +398,7 @@ void Network::serve(Number number, std::uint32_t events) {
       return;
     }
   }
-  settle(number, peer);
+  update(number, peer);
   if (peer.waiting_out_bytes > limits_.waiting_out_bytes) {
     end(number, kLeavesTooMuchUnread);
   }
@@ -418,7 +418,7 @@ void Network::run_handshakes() {
     peer.is_queued = false;
     peer.connection.run_step();
     if (examine(number, peer)) {
-      settle(number, peer);
+      update(number, peer);
     }
   }
 }
@@ -453,9 +453,9 @@ void Network::handshake_ended(Number number, Peer& peer) {
 /// After any change of a peer: updates the sums, its place in a queue and the awaited events. The
 /// input of a peer whose message waits is watched until the system reports some: most messages are
 /// taken before, and two system calls are saved.
-void Network::settle(Number number, Peer& peer) {
+void Network::update(Number number, Peer& peer) {
   const Connection& connection = peer.connection;
-  count(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
+  update_sums(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
   if (!peer.is_queued && connection.has_input_to_take()) {
     ports_[peer.port].queue.push_back(number);
     peer.is_queued = true;
@@ -466,7 +466,7 @@ void Network::settle(Number number, Peer& peer) {
   watch(number, peer, peer.wanted_events() | (peer.watched_events & EPOLLIN));
 }
 
-void Network::count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
+void Network::update_sums(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
   held_in_bytes_ += held_in_bytes - peer.held_in_bytes;
   ports_[peer.port].held_in_bytes += held_in_bytes - peer.held_in_bytes;
   waiting_out_bytes_ += waiting_out_bytes - peer.waiting_out_bytes;
@@ -496,7 +496,7 @@ void Network::read_paused_again() {
     for (const Number number : std::exchange(port.paused, {})) {
       if (const auto found = peers_.find(number); found != peers_.end()) {
         found->second->is_paused = false;
-        settle(number, *found->second);
+        update(number, *found->second);
       }
     }
   }
@@ -535,7 +535,7 @@ std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {
     }
     peer.is_queued = false;
     if (examine(number, peer)) {
-      settle(number, peer);
+      update(number, peer);
     }
     if (incoming) {
       return incoming;
@@ -553,7 +553,7 @@ Delivery Network::send(const std::string& identity, std::string_view body) {
   }
   const Number number = std::stoull(identity);
   peer->connection.send(body);
-  settle(number, *peer);
+  update(number, *peer);
   if (peer->waiting_out_bytes > limits_.waiting_out_bytes) {
     end(number, kLeavesTooMuchUnread);
     return Delivery::kGone;
@@ -598,7 +598,7 @@ void Network::end(Number number, const std::string& reason, std::optional<Refusa
   }
   disconnects_.push_back(
       {std::to_string(number), reason, cause, reason.empty() ? "" : peer.address.text});
-  count(peer, 0, 0);
+  update_sums(peer, 0, 0);
   --ports_[peer.port].connections;
   handshake_ended(number, peer);
   peers_.erase(found);

@@ -138,14 +138,14 @@ class Network {
   bool make_room_at_source(const PeerAddress& address);
   bool make_room_for_connection(Port port);
   bool end_oldest_handshake();
-  bool has_had(Number handshake, std::int64_t part) const;
+  bool has_used(Number handshake, std::int64_t part) const;
 
   void serve(Number number, std::uint32_t events);
   void run_handshakes();
   bool examine(Number number, Peer& peer);
   void handshake_ended(Number number, Peer& peer);
-  void settle(Number number, Peer& peer);
-  void count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes);
+  void update(Number number, Peer& peer);
+  void update_sums(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes);
   void watch(Number number, Peer& peer, std::uint32_t events);
   bool is_full(const OpenPort& port) const {
     return !port.queue.empty() && port.held_in_bytes >= limits_.held_in_to_pause_bytes;

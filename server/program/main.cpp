@@ -67,7 +67,7 @@ void take_all_descriptors() {
 }
 
 /// Empty for −1 and for a descriptor that is open, else what is wrong with it.
-std::string objection_to_descriptor(const std::string& text) {
+std::string descriptor_error(const std::string& text) {
   int fd = -1;
   const bool is_number = CLI::detail::lexical_cast(text, fd);
   return is_number && (fd == -1 || fcntl(fd, F_GETFD) != -1)
@@ -104,7 +104,7 @@ void notify(Notifier& notifier, const LoopState& state, std::chrono::millisecond
       notifier.stopping("stopping", kLongestEnd);
       break;
   }
-  notifier.turn(Notifier::Clock::now());
+  notifier.feed_watchdog(Notifier::Clock::now());
 }
 
 int run(LoopSettings settings, int ready_fd, pid_t parent) {
@@ -188,7 +188,7 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
   app.add_option("--ready-fd", options.ready_fd,
                  "File descriptor that gets one line of JSON with both endpoints "
                  "once the server can be used; -1: none")
-      ->check(objection_to_descriptor)
+      ->check(descriptor_error)
       ->configurable(false);
   options.http.add_to(app);
   app.add_option("--only-study", loop.service.only_study,
@@ -219,7 +219,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
     (void)oblique::server::address_to_bind(loop.access);
     loop.web = options.http.settings();
   } catch (const std::runtime_error& error) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
+    return oblique::protocol::report_wrong_usage(app.get_name(), error.what());
   }
   if (configuration.is_to_be_printed()) {
     std::cout << configuration.printed();

@@ -346,7 +346,7 @@ using Ranges = std::vector<PointRange>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// More ranges are merged into one, because the statement would be long and slow to start.
-constexpr std::size_t kMostRanges = 20'000;
+constexpr std::size_t kMaxRanges = 20'000;
 /// Conditions in more nested brackets than this are ignored.
 constexpr int kDeepest = 50;
 
@@ -514,7 +514,7 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
     }
     const PointRange all = hull(ranges).front();
     const bool is_whole = ranges.size() == 1 && all == PointRange{0, stride - 1};
-    if (is_whole || numbers->last - numbers->first >= kMostRanges / ranges.size()) {
+    if (is_whole || numbers->last - numbers->first >= kMaxRanges / ranges.size()) {
       ranges = {{numbers->first * stride + all.first, numbers->last * stride + all.last}};
     } else {
       Ranges copies;
@@ -684,7 +684,7 @@ std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string
         ranges.push_back({points + range.first, points + range.last});
       }
     }
-    if (ranges.size() > kMostRanges) {
+    if (ranges.size() > kMaxRanges) {
       ranges = hull(ranges);
     }
     points += protocol::points_of_block(block);
@@ -701,10 +701,10 @@ std::uint64_t points_in(const std::vector<PointRange>& ranges) {
 }
 
 std::string no_such_study(sqlite3* database, const std::string& name) {
-  constexpr std::size_t kMostCompared = 10'000;
+  constexpr std::size_t kMaxCompared = 10'000;
   Statement list(database, "SELECT name FROM studies");
   std::vector<std::string> names;
-  while (names.size() < kMostCompared && list.step()) {
+  while (names.size() < kMaxCompared && list.step()) {
     names.push_back(list.text(0));
   }
   return fmt::format(

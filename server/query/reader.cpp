@@ -45,13 +45,13 @@ int authorize(void*, int action, const char*, const char* function, const char*,
 }
 
 /// Adds from which studies the results of a study were copied.
-void add_taken(Statement& origins, protocol::StudyStatus& status) {
-  constexpr int kMostNamed = 20;
+void add_origins(Statement& origins, protocol::StudyStatus& status) {
+  constexpr int kMaxNamed = 20;
   origins.bind(1, status.study_id());
   while (origins.step()) {
-    auto& taken = *status.mutable_taken();
+    auto& taken = *status.mutable_reused();
     taken.set_points(taken.points() + origins.number(1));
-    if (taken.from_size() < kMostNamed) {
+    if (taken.from_size() < kMaxNamed) {
       auto& from = *taken.add_from();
       from.set_study(origins.text(0));
       from.set_points(origins.number(1));
@@ -334,7 +334,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_submitted_by(list.text(8));
     status.set_solver_version(list.text(9));
-    add_taken(origins, status);
+    add_origins(origins, status);
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {

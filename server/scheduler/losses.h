@@ -18,11 +18,11 @@ using WorkerId = std::uint64_t;
 using ProcessNumber = std::uint64_t;
 
 /// Stands for no process: the loss cannot be taken back.
-constexpr ProcessNumber kNobody = 0;
+constexpr ProcessNumber kNoProcess = 0;
 
 /// A lease that ended without an answer to its points.
 struct Loss {
-  ProcessNumber process;  ///< that was lost; kNobody if it ended the lease and lives on
+  ProcessNumber process;  ///< that was lost; kNoProcess if it ended the lease and lives on
   /// The process had solved points before, and held this one point and nothing else.
   bool alone;
 
@@ -30,34 +30,34 @@ struct Loss {
 };
 
 /// How suspect points are after losses. A later one includes the earlier ones.
-enum class Standing : std::uint8_t {
-  kSound,     ///< handed out with others, in batches of any size
-  kSuspect,   ///< in several losses: to a worker that holds nothing else
-  kAccused,   ///< a single point that cost a worker which held nothing else
-  kCondemned  ///< cost so many of those that it fails, unless one of them comes back
+enum class Suspicion : std::uint8_t {
+  kSound,    ///< handed out with others, in batches of any size
+  kSuspect,  ///< in several losses: to a worker that holds nothing else
+  kRisky,    ///< a single point that cost a worker which held nothing else
+  kFailing   ///< cost so many of those that it fails, unless one of them comes back
 };
 
 struct LossLimits {
-  std::uint32_t suspect_after = 2;    ///< losses of distinct processes
-  std::uint32_t condemned_after = 3;  ///< losses of processes that held nothing else
+  std::uint32_t suspect_after = 2;  ///< losses of distinct processes
+  std::uint32_t failing_after = 3;  ///< losses of processes that held nothing else
 };
 
 /// The losses that a range of points was in, each process once.
 class LossHistory {
  public:
-  /// Losses of kNobody are counted each time.
+  /// Losses of kNoProcess are counted each time.
   void add(const Loss& loss) {
-    constexpr std::size_t kMostNoted = 16;  // further losses change nothing unless alone
+    constexpr std::size_t kMaxNoted = 16;  // further losses change nothing unless alone
     const auto known = std::ranges::find(losses_, loss.process, &Loss::process);
-    if (loss.process != kNobody && known != losses_.end()) {
+    if (loss.process != kNoProcess && known != losses_.end()) {
       known->alone = known->alone || loss.alone;
-    } else if (loss.alone || losses_.size() < kMostNoted) {
+    } else if (loss.alone || losses_.size() < kMaxNoted) {
       losses_.push_back(loss);
     }
   }
   /// The process came back, so these points did not kill it. Returns whether it was in the history.
   bool take_back(ProcessNumber process) {
-    return process != kNobody &&
+    return process != kNoProcess &&
            std::erase_if(losses_, [&](const Loss& loss) { return loss.process == process; }) > 0;
   }
 
@@ -65,11 +65,11 @@ class LossHistory {
   std::uint32_t alone() const {
     return static_cast<std::uint32_t>(std::ranges::count(losses_, true, &Loss::alone));
   }
-  Standing standing(const LossLimits& limits) const {
+  Suspicion suspicion(const LossLimits& limits) const {
     if (alone() > 0) {
-      return alone() >= limits.condemned_after ? Standing::kCondemned : Standing::kAccused;
+      return alone() >= limits.failing_after ? Suspicion::kFailing : Suspicion::kRisky;
     }
-    return losses_.size() >= limits.suspect_after ? Standing::kSuspect : Standing::kSound;
+    return losses_.size() >= limits.suspect_after ? Suspicion::kSuspect : Suspicion::kSound;
   }
 
   bool operator==(const LossHistory&) const = default;
@@ -116,7 +116,7 @@ class WorkerProcesses {
   void forget(ProcessNumber number);
 
   std::size_t most_absent_;
-  ProcessNumber last_number_ = kNobody;
+  ProcessNumber last_number_ = kNoProcess;
   std::map<ProcessNumber, WorkerProcess> processes_;
   std::map<std::string, ProcessNumber> numbers_;  // by id
   std::deque<ProcessNumber> absent_;              // the one that left first in front

@@ -61,7 +61,7 @@ bool may_share_falls(const protocol::Block& block) {
 void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
                          const IntervalSet& open, std::uint64_t falls_a_group) {
   const auto& blocks = table.recipe().blocks();
-  if (first != end_ || table.models() > kMostModels ||
+  if (first != end_ || table.models() > kMaxModels ||
       std::none_of(blocks.begin(), blocks.end(), may_share_falls)) {
     return;
   }

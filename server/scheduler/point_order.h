@@ -18,7 +18,7 @@ class PointOrder {
  public:
   /// A study with more models stays in the order of its numbers: finding their falls takes about
   /// a microsecond a model.
-  static constexpr std::uint64_t kMostModels = 1'000'000;
+  static constexpr std::uint64_t kMaxModels = 1'000'000;
 
   /// Brings the points from `first` on, which is 0 or where the arranged ones end, into order if
   /// falls lie apart. `open` are points that may be handed out: a group has `falls_a_group` falls

@@ -179,7 +179,7 @@ void Scheduler::on(const StudyRemoved& event) {
   for (auto& [id, worker] : workers_) {
     worker.paces.erase(event.study);
   }
-  condemned_.erase(event.study);
+  failing_.erase(event.study);
   processes_.forget_study(event.study);
   if (study->second.rank) {
     free_.erase(*study->second.rank);
@@ -325,7 +325,7 @@ void Scheduler::on(const Tick&) {
   const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
   last_tick_ms_ = now_ms_;
   ready_workers_.unpark_all();  // time has passed
-  fail_condemned();
+  fail_due_points();
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
     if (gap_ms > kLongestTick_ms) {
@@ -428,7 +428,7 @@ void Scheduler::release_if_answered(LeaseId id) {
 }
 
 void Scheduler::on(Worker& worker, const ResultsReceived& event) {
-  if (names_other_points(event)) {
+  if (reports_foreign_points(event)) {
     remove_worker(event.worker, WorkerEnd::kLost);
     effects_.emplace_back(
         DropWorker{event.worker, "it says that a filter leaves out points which it was not given"});
@@ -453,7 +453,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
       worker.stored_ms = now_ms_;
     }
     requeue(event.study);
-    learn_pace(worker, event);
+    update_pace(worker, event);
   }
   note_answers(worker, event, !store.accepted.empty());
   effects_.emplace_back(std::move(store));
@@ -468,13 +468,13 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
     worker.solved_batches += is_solved ? 1U : 0U;
     // Points of a finished batch that got no answer count as lost, or a worker that never answers
     // them would take them for ever.
-    end_lease(event.lease, Loss{kNobody, is_proven(worker) && worker.leases.size() == 1});
+    end_lease(event.lease, Loss{kNoProcess, is_proven(worker) && worker.leases.size() == 1});
   }
   release_if_answered(twin);
 }
 
 /// A lease of the worker does not have all the points that the message says a filter leaves out.
-bool Scheduler::names_other_points(const ResultsReceived& event) const {
+bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   const auto lease = leases_.find(event.lease);
   if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {
     return false;
@@ -490,7 +490,7 @@ bool Scheduler::names_other_points(const ResultsReceived& event) const {
   return places.front().begin < batch.first_place || places.back().end > batch.end();
 }
 
-void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
+void Scheduler::update_pace(Worker& worker, const ResultsReceived& event) {
   const auto solved = static_cast<double>(event.outcomes.size());
   const double points = solved + static_cast<double>(event.left_out.size());
   if (points == 0.0 || !std::isfinite(event.busy_s) || event.busy_s <= 0.0 ||

@@ -119,8 +119,8 @@ class Scheduler {
   /// that the table names.
   std::vector<Effect> handle(const Event& event, std::int64_t now_ms);
 
-  bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
-  bool knows_study(StudyId study) const { return studies_.contains(study); }
+  bool has_worker(WorkerId worker) const { return workers_.contains(worker); }
+  bool has_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
   /// How often dispatch has examined a worker, which is what dispatch costs.
   std::uint64_t examined_workers() const { return examined_workers_; }
@@ -163,7 +163,7 @@ class Scheduler {
     std::optional<Rank> rank{};  ///< in `free_`
 
     bool has_suspect() const {
-      return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
+      return points.has(Suspicion::kSuspect) || points.has(Suspicion::kRisky);
     }
   };
   struct Lease {
@@ -192,7 +192,7 @@ class Scheduler {
     std::uint32_t threads;
     std::uint32_t credit = 0;
     bool is_busy = false;  ///< gets nothing
-    ProcessNumber process = kNobody;
+    ProcessNumber process = kNoProcess;
     LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
     std::int64_t last_heard_ms;
@@ -238,8 +238,8 @@ class Scheduler {
   bool has_open_points(const Lease& lease) const { return !open_places(lease).empty(); }
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
-  bool names_other_points(const ResultsReceived& event) const;
-  void learn_pace(Worker& worker, const ResultsReceived& event);
+  bool reports_foreign_points(const ResultsReceived& event) const;
+  void update_pace(Worker& worker, const ResultsReceived& event);
   /// The fastest workers' time of a thread for a point, by study; 0: unknown.
   using FastestPaces = std::map<StudyId, double>;
   double fastest_pace(StudyId id, FastestPaces& known) const;
@@ -258,7 +258,7 @@ class Scheduler {
   void note_end(const Worker& worker, WorkerEnd how);
   void note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted);
   void take_back_losses(ProcessNumber process);
-  void fail_condemned();
+  void fail_due_points();
   bool is_proven(const Worker& worker) const;
   bool is_set_aside(const Worker& worker) const;
   bool is_longest_proven(const Worker& worker) const;
@@ -269,14 +269,14 @@ class Scheduler {
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
   void serve_suspect(WorkerId id, Worker& worker, StudyId study);
-  std::optional<Standing> suspect_for(const StudyPoints& points, const Worker& worker) const;
+  std::optional<Suspicion> suspect_for(const StudyPoints& points, const Worker& worker) const;
   bool may_hold_more(const Worker& worker) const;
   void duplicate_stragglers();
   bool is_straggling(const Lease& lease, FastestPaces& paces) const;
   bool is_current(const Study& study) const;
   StudyId next_suspect_study(const Worker& worker) const;
   void stop_draining(WorkerId worker);
-  BatchSize portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
+  BatchSize batch_size_for(const Worker& worker, StudyId study, bool fills_lanes) const;
   void fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
   void use_credit(WorkerId id, Worker& worker);
@@ -287,9 +287,9 @@ class Scheduler {
   WorkerProcesses processes_{settings_.most_absent_processes};
   std::deque<std::int64_t> vanished_ms_;  // when the last newcomers vanished with points
   std::map<StudyId, Study> studies_;
-  std::set<Rank> free_;          // studies with free points to hand out, the next one first
-  std::set<StudyId> suspects_;   // those with suspect points to hand out
-  std::set<StudyId> condemned_;  // those with condemned points
+  std::set<Rank> free_;         // studies with free points to hand out, the next one first
+  std::set<StudyId> suspects_;  // those with suspect points to hand out
+  std::set<StudyId> failing_;   // those with condemned points
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // with credit

@@ -63,7 +63,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     return false;
   }
   const StudyId study = std::get<StudyId>(*free_.begin());
-  const BatchSize wanted = portion_for(worker, study, true);
+  const BatchSize wanted = batch_size_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
   // A batch that ended early with its run of points says nothing of the worker's capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
@@ -75,7 +75,7 @@ void Scheduler::serve_suspect(WorkerId id, Worker& worker, StudyId study) {
   StudyPoints& points = studies_.at(study).points;
   stop_draining(id);
   // The sooner these are known to be sound, the better: its lanes may stay empty.
-  const BatchSize wanted = portion_for(worker, study, false);
+  const BatchSize wanted = batch_size_for(worker, study, false);
   grant(id, worker, study, *points.take(*suspect_for(points, worker), wanted), true);
 }
 
@@ -143,15 +143,15 @@ StudyId Scheduler::next_suspect_study(const Worker& worker) const {
 /// Which of the study's suspect points the worker may get. For accused ones the worker is wanted
 /// that is least likely to be lost for a reason of its own. A newcomer gets none, but is told so
 /// here, that it may be probed.
-std::optional<Standing> Scheduler::suspect_for(const StudyPoints& points,
-                                               const Worker& worker) const {
-  if (points.has(Standing::kAccused) &&
+std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
+                                                const Worker& worker) const {
+  if (points.has(Suspicion::kRisky) &&
       (!is_proven(worker) ||
-       now_ms_ - points.returned_ms(Standing::kAccused) >= settings_.longest_proven_within_ms ||
+       now_ms_ - points.returned_ms(Suspicion::kRisky) >= settings_.longest_proven_within_ms ||
        is_longest_proven(worker))) {
-    return Standing::kAccused;
+    return Suspicion::kRisky;
   }
-  return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
+  return points.has(Suspicion::kSuspect) ? std::optional(Suspicion::kSuspect) : std::nullopt;
 }
 
 void Scheduler::stop_draining(WorkerId worker) {
@@ -162,7 +162,7 @@ void Scheduler::stop_draining(WorkerId worker) {
 }
 
 /// How many points the worker should get of the study.
-BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lanes) const {
+BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills_lanes) const {
   const auto known = worker.paces.find(id);
   const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
   std::uint64_t points = settings_.first_batch_points * worker.threads;

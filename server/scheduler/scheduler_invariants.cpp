@@ -32,7 +32,7 @@ void Scheduler::check_invariants() const {
     require(study.rank == rank_of(id, study) && (!study.rank || free_.contains(*study.rank)) &&
                 suspects_.contains(id) == (is_open(study) && study.has_suspect()),
             "a study is not where it belongs in the queue");
-    require(condemned_.contains(id) || !study.points.has(Standing::kCondemned),
+    require(failing_.contains(id) || !study.points.has(Suspicion::kFailing),
             "a condemned point is forgotten");
     with_free += study.rank ? 1U : 0U;
   }

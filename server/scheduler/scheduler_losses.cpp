@@ -29,7 +29,7 @@ std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
 
 /// The process was lost with points of that study, and may come back.
 void Scheduler::note_process(StudyId study, ProcessNumber process) {
-  if (process != kNobody) {
+  if (process != kNoProcess) {
     processes_.at(process).in_histories.insert(study);
   }
 }
@@ -40,14 +40,14 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   loss.alone = loss.alone && size_of(held) == 1;
   LossHistory losses = lease.batch.losses;
   losses.add(loss);
-  const Standing standing = losses.standing(settings_.loss_limits);
+  const Suspicion suspicion = losses.suspicion(settings_.loss_limits);
   // The parts are suspect too: those without the killer are solved, the other is split again.
-  const std::uint64_t parts = standing == Standing::kSound ? 1 : settings_.suspect_parts;
+  const std::uint64_t parts = suspicion == Suspicion::kSound ? 1 : settings_.suspect_parts;
   for (const Interval& interval : held) {
     points.give_back(split(interval, parts), lease.batch.attempts + 1, losses, now_ms_);
   }
-  if (standing == Standing::kCondemned) {
-    condemned_.insert(lease.study);
+  if (suspicion == Suspicion::kFailing) {
+    failing_.insert(lease.study);
   }
 }
 
@@ -64,19 +64,19 @@ void Scheduler::take_back_losses(ProcessNumber number) {
 }
 
 /// None of the processes that these points cost came back.
-void Scheduler::fail_condemned() {
-  for (const StudyId id : std::set<StudyId>(condemned_)) {
+void Scheduler::fail_due_points() {
+  for (const StudyId id : std::set<StudyId>(failing_)) {
     StudyPoints& points = studies_.at(id).points;
     for (const auto& [point, attempts, alone] :
-         points.fail_condemned(now_ms_ - settings_.return_within_ms)) {
+         points.take_due_failures(now_ms_ - settings_.return_within_ms)) {
       effects_.emplace_back(StoreFailure{
           id, point, attempts,
           "no answer: " + std::to_string(attempts) + " leases of this point ended without one, " +
               std::to_string(alone) +
               " of them because the worker was lost or gave up while it held nothing else"});
     }
-    if (!points.has(Standing::kCondemned)) {
-      condemned_.erase(id);
+    if (!points.has(Suspicion::kFailing)) {
+      failing_.erase(id);
     }
   }
 }

@@ -70,7 +70,7 @@ void StudyPoints::rest(bool has_leases) {
 
 void StudyPoints::give_back(std::span<const Interval> parts, std::uint32_t attempts,
                             const LossHistory& losses, std::int64_t now_ms) {
-  Returned& intervals = returned(losses.standing(limits_));
+  Returned& intervals = returned(losses.suspicion(limits_));
   for (const Interval& part : parts) {
     for (const Interval& interval : leased_.within(part.begin, part.end)) {
       intervals.emplace(interval.begin, History{interval.end, attempts, losses, now_ms});
@@ -92,7 +92,7 @@ void StudyPoints::take_back_losses(ProcessNumber process) {
     }
   }
   for (auto& [first, history] : cleared) {
-    returned(history.losses.standing(limits_)).emplace(first, history);
+    returned(history.losses.suspicion(limits_)).emplace(first, history);
   }
 }
 
@@ -251,8 +251,8 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
 
 std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   arrange(wanted.falls);
-  if (has(Standing::kSound)) {
-    return take(Standing::kSound, wanted);
+  if (has(Suspicion::kSound)) {
+    return take(Suspicion::kSound, wanted);
   }
   const auto free = next_fresh(wanted.follows);
   if (!free) {
@@ -322,8 +322,8 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   return Interval{last.begin + (last.end - last.begin) / 2, last.end};
 }
 
-std::optional<Batch> StudyPoints::take(Standing standing, const BatchSize& wanted) {
-  Returned& intervals = returned(standing);
+std::optional<Batch> StudyPoints::take(Suspicion suspicion, const BatchSize& wanted) {
+  Returned& intervals = returned(suspicion);
   if (intervals.empty()) {
     return std::nullopt;
   }
@@ -338,9 +338,9 @@ std::optional<Batch> StudyPoints::take(Standing standing, const BatchSize& wante
   return Batch{first, end - first, history.attempts, history.losses};
 }
 
-std::vector<StudyPoints::Failure> StudyPoints::fail_condemned(std::int64_t until_ms) {
+std::vector<StudyPoints::Failure> StudyPoints::take_due_failures(std::int64_t until_ms) {
   std::vector<Failure> failures;
-  Returned& condemned = returned(Standing::kCondemned);
+  Returned& condemned = returned(Suspicion::kFailing);
   for (auto entry = condemned.begin(); entry != condemned.end();) {
     const auto& [place, history] = *entry;
     if (history.returned_ms > until_ms) {
@@ -369,12 +369,12 @@ void StudyPoints::check_invariants() const {
   for (const auto* set : {&fresh_, &leased_, &committing_, &completed_}) {
     set->for_each(add);
   }
-  for (const Standing standing :
-       {Standing::kSound, Standing::kSuspect, Standing::kAccused, Standing::kCondemned}) {
-    for (const auto& [first, history] : returned(standing)) {
+  for (const Suspicion suspicion :
+       {Suspicion::kSound, Suspicion::kSuspect, Suspicion::kRisky, Suspicion::kFailing}) {
+    for (const auto& [first, history] : returned(suspicion)) {
       add({first, history.end});
       came_back += history.end - first;
-      if (history.losses.standing(limits_) != standing) {
+      if (history.losses.suspicion(limits_) != suspicion) {
         throw std::logic_error("returned points are in the place of another standing");
       }
     }

@@ -74,7 +74,7 @@ class StudyPoints {
   /// then the second half of what is left of the last. Nothing when there are none.
   std::optional<Batch> take(const BatchSize& wanted);
   /// The same out of the returned ones of that standing.
-  std::optional<Batch> take(Standing standing, const BatchSize& wanted);
+  std::optional<Batch> take(Suspicion suspicion, const BatchSize& wanted);
   /// A point that fails, and why.
   struct Failure {
     std::uint64_t point;
@@ -82,7 +82,7 @@ class StudyPoints {
     std::uint32_t alone;  ///< losses of workers that held nothing else
   };
   /// The points that were condemned at `until_ms` or before. Their failures are committing now.
-  std::vector<Failure> fail_condemned(std::int64_t until_ms);
+  std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
   /// The points at the places `parts`, in order, that are still leased are returned at `now_ms`,
   /// with the history given. Those between the parts stay where they are.
@@ -115,15 +115,15 @@ class StudyPoints {
   /// The completed ones among these points become fresh. Returns how many they were.
   std::uint64_t reopen(const IntervalSet& points);
 
-  bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
+  bool has_free() const { return has(Suspicion::kSound) || !fresh_.empty(); }
   bool has_filter() const { return table_->has_filter(); }
   /// Whether all of them are points of the study in blocks with a filter.
   bool may_leave_out(const IntervalSet& points) const;
   /// Returned points of that standing.
-  bool has(Standing standing) const { return !returned(standing).empty(); }
+  bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
   /// When the next points to be leased of that standing came back. There must be one.
-  std::int64_t returned_ms(Standing standing) const {
-    return returned(standing).begin()->second.returned_ms;
+  std::int64_t returned_ms(Suspicion suspicion) const {
+    return returned(suspicion).begin()->second.returned_ms;
   }
   bool is_complete() const { return completed() >= size(); }
   /// Some point has a result, durable or on its way. That a filter leaves a point out is none.
@@ -150,9 +150,11 @@ class StudyPoints {
   };
   using Returned = std::map<std::uint64_t, History>;  // by first point
 
-  Returned& returned(Standing standing) { return returned_.at(static_cast<std::size_t>(standing)); }
-  const Returned& returned(Standing standing) const {
-    return returned_.at(static_cast<std::size_t>(standing));
+  Returned& returned(Suspicion suspicion) {
+    return returned_.at(static_cast<std::size_t>(suspicion));
+  }
+  const Returned& returned(Suspicion suspicion) const {
+    return returned_.at(static_cast<std::size_t>(suspicion));
   }
   void arrange(std::uint64_t falls_a_group);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;

@@ -86,7 +86,7 @@ void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Insta
 }
 
 /// Why the request is refused whatever it asks for; empty: it is not.
-std::string ClientHandler::objection_to(const Client& client, const ReadRequest& read) {
+std::string ClientHandler::request_error(const Client& client, const ReadRequest& read) {
   const protocol::ClientRequest& request = read.request;
   const WriteLedger& ledger = core_.ledger;
   if (!read.is_readable) {
@@ -97,7 +97,7 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
     log_.bad_frame("a client");
     return "this is the port for clients; workers connect to the other one";
   }
-  if (std::string reason = protocol::objection_to_version(request.protocol_version(), "client");
+  if (std::string reason = protocol::version_error(request.protocol_version(), "client");
       !reason.empty()) {
     return reason;
   }
@@ -131,11 +131,11 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
 
 void ClientHandler::answer(const Client& client, const ReadRequest& read, std::string_view frame,
                            Instant now) {
-  if (const std::string reason = objection_to(client, read); !reason.empty()) {
+  if (const std::string reason = request_error(client, read); !reason.empty()) {
     core_.ports.reply_error(client, reason);
     return;
   }
-  if (read.needs_judging) {
+  if (read.needs_point_validation) {
     return check(client, frame, now);
   }
   const protocol::ClientRequest& request = read.request;
@@ -194,12 +194,12 @@ void ClientHandler::more_rows(const Client& client, const protocol::MoreRows& re
   const auto found = find(asker.identity, asker.request_id);
   if (found == pending_.end() || !found->second.is_query()) {
     core_.ports.reply_error(asker, "no answer to that request is under way");
-  } else if (request.taken() > found->second.sent) {
+  } else if (request.received() > found->second.sent) {
     cancel(found);
     core_.ports.reply_error(asker, "more of the answer was taken than was given");
-  } else if (request.taken() > found->second.received) {
-    found->second.received = request.taken();
-    core_.ports.more_rows(found->first, request.taken());
+  } else if (request.received() > found->second.received) {
+    found->second.received = request.received();
+    core_.ports.more_rows(found->first, request.received());
   }
 }
 

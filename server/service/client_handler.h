@@ -63,10 +63,10 @@ class ClientHandler {
     bool only_point;
     std::int64_t deadline_ms;
     protocol::TraceOrder order{};
-    protocol::TraceReply reply{};       ///< without the trace
-    bool is_ready = false;              ///< the point is known
-    std::optional<WorkerId> worker{};   ///< that solves it
-    std::set<WorkerId> not_taken_by{};  ///< workers
+    protocol::TraceReply reply{};      ///< without the trace
+    bool is_ready = false;             ///< the point is known
+    std::optional<WorkerId> worker{};  ///< that solves it
+    std::set<WorkerId> declined_by{};  ///< workers
     bool has_lost_worker = false;
   };
   /// A request that waits for the check thread, the query pool or a worker.
@@ -85,7 +85,7 @@ class ClientHandler {
 
   void check(const Client& client, std::string_view frame, Instant now);
   void checked(std::uint64_t ticket, const ReadRequest& read, Instant now);
-  std::string objection_to(const Client& client, const ReadRequest& read);
+  std::string request_error(const Client& client, const ReadRequest& read);
   /// `read` is that of `frame`, which may have to be checked.
   void answer(const Client& client, const ReadRequest& read, std::string_view frame, Instant now);
   void query(const Client& client, const protocol::QueryRequest& request, Instant now);

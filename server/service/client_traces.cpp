@@ -81,14 +81,14 @@ protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is
     // A copy of the recipe's bytes has a table of its own.
     const auto table =
         is_table_made ? study.get() : StudyTable(study.recipe_bytes(), study.size()).get();
-    const std::string objection =
-        point >= table->size() ? fmt::format("the study has no point {}: its points are 0 to {}",
-                                             point, table->size() - 1)
-        : !table->is_left_in(point)
-            ? fmt::format("point {} is left out by the study's filter", point)
-            : table->fault(point);
-    if (!objection.empty()) {
-      return error_reply(objection);
+    const std::string error = point >= table->size()
+                                  ? fmt::format("the study has no point {}: its points are 0 to {}",
+                                                point, table->size() - 1)
+                              : !table->passes_filter(point)
+                                  ? fmt::format("point {} is left out by the study's filter", point)
+                                  : table->fault(point);
+    if (!error.empty()) {
+      return error_reply(error);
     }
     protocol::ClientReply reply;
     protocol::TraceReply& fields = *reply.mutable_trace();
@@ -158,8 +158,8 @@ void ClientHandler::trace_received(WorkerId worker, protocol::Trace trace) {
   if (const auto request = pending_.find(trace.trace_id()); request != pending_.end()) {
     TraceJob& job = *request->second.trace;
     job.worker.reset();
-    if (trace.not_taken()) {
-      job.not_taken_by.insert(worker);
+    if (trace.declined()) {
+      job.declined_by.insert(worker);
     } else {
       core_.ports.reply(request->second.client, trace_reply(job, *record, std::move(trace)));
       pending_.erase(request);
@@ -221,7 +221,7 @@ void ClientHandler::dispatch_traces() {
 std::optional<WorkerId> ClientHandler::free_worker(const TraceJob& job) const {
   std::optional<WorkerId> free;
   for (const auto& [id, worker] : core_.workers.all()) {
-    if (!job.not_taken_by.contains(id)) {
+    if (!job.declined_by.contains(id)) {
       free = 0;
       if (!orders_.contains(id) && !worker.is_busy) {
         return id;

@@ -156,7 +156,7 @@ void Service::handle_worker_events(Instant now) {
 /// Results whose inputs are not those of their points become failures.
 void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
   // Of a study without open points nothing is stored, and its table need not be made.
-  if (!states_.contains(event.study) || !scheduler_.knows_study(event.study) ||
+  if (!states_.contains(event.study) || !scheduler_.has_study(event.study) ||
       scheduler_.study(event.study).open() == 0) {
     return;
   }

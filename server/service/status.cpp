@@ -64,14 +64,14 @@ protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
     }
   }
   if (record.reuse.points > 0 || record.reuse.lookup || record.reuse.cut_short) {
-    *status.mutable_taken() = reuse_status(record.reuse);
+    *status.mutable_reused() = reuse_status(record.reuse);
   }
   return status;
 }
 
-protocol::TakenOver reuse_status(const Reuse& reuse) {
-  constexpr std::size_t kMostOrigins = 20;
-  protocol::TakenOver message;
+protocol::ReusedPoints reuse_status(const Reuse& reuse) {
+  constexpr std::size_t kMaxOrigins = 20;
+  protocol::ReusedPoints message;
   message.set_points(reuse.points);
   message.set_under_way(reuse.lookup.has_value());
   message.set_cut_short(reuse.cut_short);
@@ -79,7 +79,7 @@ protocol::TakenOver reuse_status(const Reuse& reuse) {
                                                              reuse.origins.end());
   std::ranges::stable_sort(origins, std::ranges::greater(),
                            [](const auto& origin) { return origin.second; });
-  origins.resize(std::min(origins.size(), kMostOrigins));
+  origins.resize(std::min(origins.size(), kMaxOrigins));
   for (const auto& [study, points] : origins) {
     auto& origin = *message.add_from();
     origin.set_study(study);

@@ -95,7 +95,7 @@ struct Core {
 /// Throws std::out_of_range for a study that is not durable.
 protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now);
 /// Empty without anything to report.
-protocol::TakenOver reuse_status(const Reuse& reuse);
+protocol::ReusedPoints reuse_status(const Reuse& reuse);
 protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now);
 
 }  // namespace oblique::server

@@ -33,11 +33,11 @@ std::string unknown_study(const std::string& name, const StudyStates& states) {
 
 // ---- Reading -----------------------------------------------------------------------------------
 
-ReadRequest read_request(std::string_view frame, bool judges) {
+ReadRequest read_request(std::string_view frame, bool validates_points) {
   ReadRequest read;
   // Padding cannot make much of a shorter frame.
   read.is_readable =
-      (frame.size() <= limits::kLongestInlineRequest || protocol::is_of_a_requests_shape(frame)) &&
+      (frame.size() <= limits::kLongestInlineRequest || protocol::is_unpadded_request(frame)) &&
       protocol::decode(frame, read.request);
   read.request_id = read.is_readable ? read.request.request_id() : protocol::request_id_of(frame);
   if (!read.is_readable || !read.request.has_submit()) {
@@ -47,13 +47,13 @@ ReadRequest read_request(std::string_view frame, bool judges) {
     protocol::Recipe& recipe = *read.request.mutable_submit()->mutable_recipe();
     protocol::check_size(recipe);
     auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
-    read.needs_judging = table->needs_judging() && !judges;
-    if (judges) {
-      table->judge_points();
+    read.needs_point_validation = table->needs_point_validation() && !validates_points;
+    if (validates_points) {
+      table->validate_points();
     }
     read.table = std::move(table);
   } catch (const solver::InputError& error) {
-    read.objection = error.what();
+    read.recipe_error = error.what();
   }
   read.request.mutable_submit()->clear_recipe();
   return read;
@@ -119,8 +119,8 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   const std::int32_t priority = request.has_priority() ? request.priority()
                                 : known                ? core_.states.record(*known).priority
                                                        : 0;
-  for (const std::string& reason : {protocol::objection_to_study_name(request.name()),
-                                    protocol::objection_to_priority(priority), read.objection}) {
+  for (const std::string& reason : {protocol::study_name_error(request.name()),
+                                    protocol::priority_error(priority), read.recipe_error}) {
     if (!reason.empty()) {
       core_.ports.reply_error(client, reason);
       return;
@@ -349,7 +349,7 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
                           Instant now) {
   const std::string& name = request.new_name();
   const auto owner = core_.states.find(name);
-  if (const std::string reason = protocol::objection_to_study_name(name); !reason.empty()) {
+  if (const std::string reason = protocol::study_name_error(name); !reason.empty()) {
     core_.ports.reply_error(client, reason);
   } else if (owner == id) {
     reply_changed(client, study_status(id, core_, now));
@@ -448,8 +448,8 @@ void StudyChanges::release_replies(Instant now) {
     fields = held.reply;
     fields.set_study_id(held.study);
     fields.set_points(counts.points);
-    fields.set_settled(counts.completed);
-    *fields.mutable_taken() = reuse_status(reuse);
+    fields.set_completed(counts.completed);
+    *fields.mutable_reused() = reuse_status(reuse);
     core_.ports.reply(held.client, std::move(message));
     return true;
   });
@@ -506,7 +506,7 @@ void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant no
     return;
   }
   const bool goes_on = part.next_point && core_.states.record(id).state != StudyState::kCancelled;
-  reuse.cut_short = goes_on && (reuse.lookup->probes_in_vain >= kMostProbesInVain ||
+  reuse.cut_short = goes_on && (reuse.lookup->probes_in_vain >= kMaxProbesInVain ||
                                 now.steady_ms - reuse.lookup->last_result_ms >= kLongestInVain_ms);
   if (goes_on && !reuse.cut_short) {
     write_part(id, *part.next_point);

@@ -17,18 +17,18 @@ namespace oblique::server {
 
 /// A parsed request of a client and, if it submits a study, the table of its recipe.
 struct ReadRequest {
-  bool is_readable = false;         ///< otherwise only the number counts
-  std::uint64_t request_id = 0;     ///< 0: it cannot be read
-  protocol::ClientRequest request;  ///< its recipe is moved into the table
-  StudyTable table;                 ///< of a recipe without faults
-  std::string objection;            ///< what is wrong with the recipe; empty: nothing
-  bool needs_judging = false;       ///< the points of the recipe were not checked and must be
+  bool is_readable = false;             ///< otherwise only the number counts
+  std::uint64_t request_id = 0;         ///< 0: it cannot be read
+  protocol::ClientRequest request;      ///< its recipe is moved into the table
+  StudyTable table;                     ///< of a recipe without faults
+  std::string recipe_error;             ///< what is wrong with the recipe; empty: nothing
+  bool needs_point_validation = false;  ///< the points of the recipe were not checked and must be
 };
 
 /// Parses one frame. Time and memory are proportional to its bytes: a long one that is padded with
-/// empty messages is not parsed. With `judges` the points of a recipe are checked too
-/// (PointTable::judge_points), which may take a second.
-ReadRequest read_request(std::string_view frame, bool judges = true);
+/// empty messages is not parsed. With `validates_points` the points of a recipe are checked too
+/// (PointTable::validate_points), which may take a second.
+ReadRequest read_request(std::string_view frame, bool validates_points = true);
 
 /// Bounds on the studies that are neither done nor cancelled, and on their points.
 struct StudyBounds {
@@ -55,7 +55,7 @@ class StudyChanges {
   void release_replies(Instant now);
 
   /// A lookup of results ends early after so many probes, or so long, without one.
-  static constexpr std::uint64_t kMostProbesInVain = 1'000'000;
+  static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
   /// Looks up results of other studies for all open points, part by part. The scheduler must hold
   /// the study. The lookup of a cancelled study ends with the part that is being written.

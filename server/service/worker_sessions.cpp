@@ -32,7 +32,7 @@ std::string plain(const std::string& text) {
 std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   IntervalSet points;
   if (message.left_out_size() % 2 != 0 ||
-      message.left_out_size() > 2 * protocol::kMostLeftOutRanges) {
+      message.left_out_size() > 2 * protocol::kMaxLeftOutRanges) {
     return std::nullopt;
   }
   for (int i = 0; i < message.left_out_size(); i += 2) {
@@ -68,15 +68,16 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
   WorkerInput input;
   const auto known = ids_.find(identity);
   protocol::WorkerMessage message;
-  const bool is_small = protocol::is_of_a_workers_size(frame);  // checked before it is parsed
+  const bool is_small =
+      protocol::is_worker_frame_within_limits(frame);  // checked before it is parsed
   const bool is_read = is_small && protocol::decode(frame, message);
   const int lease_count =
       message.heartbeat().lease_ids_size() + message.give_back().lease_ids_size();
-  if (!is_small || lease_count > protocol::kMostLeasesAHeartbeat) {
+  if (!is_small || lease_count > protocol::kMaxLeasesAHeartbeat) {
     if (known == ids_.end()) {
       log_.bad_frame("a worker");
     } else {
-      give_up(known->second, "it sends more in one message than workers do", input);
+      disconnect(known->second, "it sends more in one message than workers do", input);
     }
     return input;
   }
@@ -146,9 +147,9 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
     input.events.emplace_back(WorkerLeft{old});
   }
   protocol::ServerToWorker reply;
-  if (const std::string objection = objection_to(hello); !objection.empty()) {
-    log_.write(Severity::kWarning, fmt::format("a worker is refused: {}", objection));
-    reply.mutable_refused()->set_reason(objection);
+  if (const std::string error = refusal_reason(hello); !error.empty()) {
+    log_.write(Severity::kWarning, fmt::format("a worker is refused: {}", error));
+    reply.mutable_refused()->set_reason(error);
     ports_.to_worker(identity, protocol::encode(reply));
     return;
   }
@@ -181,15 +182,15 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
 }
 
 /// Why the worker is refused; empty: it is not.
-std::string WorkerSessions::objection_to(const protocol::WorkerHello& hello) const {
-  std::string objection = protocol::objection_to_worker(hello);
-  if (objection.empty() && hello.solver_version() != settings_.solver_version) {
-    objection = fmt::format(
+std::string WorkerSessions::refusal_reason(const protocol::WorkerHello& hello) const {
+  std::string error = protocol::hello_error(hello);
+  if (error.empty() && hello.solver_version() != settings_.solver_version) {
+    error = fmt::format(
         "its solver has version {}, the server's {}: results of a study must come from one "
         "version; install the server's release of oblique there",
         plain(hello.solver_version()), settings_.solver_version);
   }
-  return objection;
+  return error;
 }
 
 void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerInput& input) {
@@ -198,7 +199,7 @@ void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerI
   }
   std::optional<IntervalSet> left_out = left_out_of(message);
   if (!left_out) {
-    give_up(worker, "it sends ranges of points that are none", input);
+    disconnect(worker, "it sends ranges of points that are none", input);
     return;
   }
   ResultsReceived event{worker,
@@ -221,7 +222,7 @@ void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerI
 }
 
 /// Disconnects the worker. A sound one joins again and delivers the results that it has kept.
-void WorkerSessions::give_up(WorkerId worker, const std::string& why, WorkerInput& input) {
+void WorkerSessions::disconnect(WorkerId worker, const std::string& why, WorkerInput& input) {
   log_.bad_frame("a worker");
   protocol::ServerToWorker again;
   again.mutable_hello_again();

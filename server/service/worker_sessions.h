@@ -94,9 +94,9 @@ class WorkerSessions {
  private:
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
              const std::string& key, WorkerInput& input);
-  std::string objection_to(const protocol::WorkerHello& hello) const;
+  std::string refusal_reason(const protocol::WorkerHello& hello) const;
   void results(WorkerId worker, protocol::Results results, WorkerInput& input);
-  void give_up(WorkerId worker, const std::string& why, WorkerInput& input);
+  void disconnect(WorkerId worker, const std::string& why, WorkerInput& input);
   void send_stopping(WorkerId worker);
   void forget(WorkerId worker);
   void send_frame(WorkerId worker, const std::string& frame, LeaseId lease = 0);

@@ -70,7 +70,8 @@ class Lookup {
       }
       for (const std::uint64_t end = std::min(segment_end, last); point < end && probes < kPart;
            ++point) {
-        if (!completed.contains(point) && table.is_left_in(point) && table.fault(point).empty()) {
+        if (!completed.contains(point) && table.passes_filter(point) &&
+            table.fault(point).empty()) {
           copy_to(point, model_id);
         }
       }

@@ -11,7 +11,7 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kMostCachedModels = 65536;
+constexpr std::size_t kMaxCachedModels = 65536;
 /// Instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
 constexpr int kStepsBetweenInterrupts = 1000;
 
@@ -310,7 +310,7 @@ bool Store::has_study(std::uint64_t study_id) {
 
 /// The row of `models` that has model number `model` of the study. Inserts it if there is none.
 std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
-  if (models_.size() >= kMostCachedModels) {
+  if (models_.size() >= kMaxCachedModels) {
     models_.clear();
   }
   const auto [known, is_new] = models_.emplace(std::pair{change.study_id, model}, 0);

@@ -62,7 +62,7 @@ void check_studies(sqlite3* database) {
 
 /// Why this version does not accept the study, or an empty text. Throws StorageError for a recipe
 /// that cannot be read.
-std::string objection_to(const StoredStudy& study) {
+std::string study_error(const StoredStudy& study) {
   if (!protocol::is_utf8(study.name)) {  // messages contain UTF-8 only
     return "its name is not UTF-8; rename it with sqlite3 while no server runs";
   }
@@ -112,10 +112,10 @@ std::vector<StoredStudy> Store::studies() {
     }
     reused.reset();
     const bool is_open = study.completed.size() < study.table.size();
-    const std::string objection = objection_to(study);
-    if (!objection.empty() && (is_open || !protocol::is_utf8(study.name))) {
+    const std::string error = study_error(study);
+    if (!error.empty() && (is_open || !protocol::is_utf8(study.name))) {
       skipped_.push_back(fmt::format("study {} (\"{}\") is skipped: {}", study.study_id,
-                                     protocol::visible(study.name), objection));
+                                     protocol::visible(study.name), error));
       continue;
     }
     if (!is_open || study.state != StudyState::kRunning) {

@@ -19,7 +19,7 @@ constexpr std::size_t kLargestGroup = 256;
 /// Pause before another attempt to write after a fault.
 constexpr std::chrono::milliseconds kRetryPause{500};
 
-/// Interval of the calls of `tend` while no job waits.
+/// Interval of the calls of `maintain` while no job waits.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
 /// Number of rows of deleted studies that are deleted at a time (about 10 ms). Waiting jobs are
@@ -110,7 +110,7 @@ void Writer::run() {
     const bool was_faulty = commits_.is_faulty();
     auto reports = !jobs.empty() ? write(jobs)
                    : may_clear() ? std::vector<WriteReport>()
-                                 : commits_.tend();
+                                 : commits_.maintain();
     if (may_clear() && !last_round && !commits_.clear(kRowsAtOnce, reports)) {
       clears_from_ = std::chrono::steady_clock::now() + kClearPause;
     }
@@ -175,7 +175,7 @@ std::vector<WriteReport> GroupCommit::write(std::deque<WriteJob>& jobs) {
   return reports;
 }
 
-std::vector<WriteReport> GroupCommit::tend() {
+std::vector<WriteReport> GroupCommit::maintain() {
   std::vector<WriteReport> reports;
   if (gone_) {
     return reports;

@@ -101,7 +101,7 @@ class GroupCommit {
 
   /// To be called regularly while no job waits: checks the file of the database, and merges its log
   /// once a study is done.
-  std::vector<WriteReport> tend();
+  std::vector<WriteReport> maintain();
 
   /// Merges the log. False when it was not merged; check `is_gone` before another attempt.
   bool merge(std::vector<WriteReport>& reports);

@@ -38,8 +38,8 @@ bool is_larger_sample(const Block& block, const Block& longer) {
 /// One line for each difference in the model and in the request for estimated errors.
 std::vector<std::string> head_differences(const Recipe& stored, const Recipe& given) {
   std::vector<std::string> lines;
-  const auto was = protocol::unjudged_from_message(stored.model());
-  const auto is = protocol::unjudged_from_message(given.model());
+  const auto was = protocol::from_message_unchecked(stored.model());
+  const auto is = protocol::from_message_unchecked(given.model());
   for (const solver::ParameterKey& key : solver::model_keys()) {
     if (key.get(was) != key.get(is)) {
       lines.push_back(fmt::format("model, {}: stored {}, given {}", key.name,

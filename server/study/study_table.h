@@ -34,7 +34,7 @@ Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given);
 class StudyTable {
  public:
   StudyTable() = default;
-  /// From the table of a recipe that passed `judge_points`.
+  /// From the table of a recipe that passed `validate_points`.
   StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: as good as the other
   /// From the bytes of a stored recipe, which was judged before, and its number of points.
   StudyTable(std::string recipe_bytes, std::uint64_t points);

@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view input(reinterpret_cast<const char*>(data), size);
   oblique::protocol::WorkerHello hello;
-  oblique::protocol::say_protocol(hello);
+  oblique::protocol::set_protocol(hello);
   oblique::worker::Conversation conversation(hello, {});
   std::int64_t now_ms = 0;
   conversation.start(now_ms);

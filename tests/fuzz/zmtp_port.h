@@ -14,8 +14,8 @@ namespace oblique::server {
 
 /// A port with keys, and a peer that is admitted there.
 struct KeyedPort {
-  protocol::KeyPair server = protocol::made_key_pair();
-  protocol::KeyPair own = protocol::made_key_pair();
+  protocol::KeyPair server = protocol::generate_key_pair();
+  protocol::KeyPair own = protocol::generate_key_pair();
   ListAuthenticator authenticator;
   PortSecurity security{server, authenticator};
   KeyedPort() { authenticator.add(own.public_key, "fuzz"); }

@@ -68,14 +68,14 @@ TEST(MemoryLimit, IsTheTightestOfTheGroupsFromTheProcessUpwards) {
 TEST(Address, IsObjectedToUnlessItHasAPortThatExistsAndBracketsAroundIpv6) {
   for (const char* url : {"tcp://127.0.0.1:7600", "tcp://host:1", "tcp://[::1]:65535",
                           "ipc:///tmp/x", "inproc://x"}) {
-    EXPECT_EQ(objection_to_address(url), "") << url;
+    EXPECT_EQ(address_error(url), "") << url;
   }
   for (const char* url : {"tcp://127.0.0.1:0", "tcp://127.0.0.1:65536", "tcp://127.0.0.1:76x",
                           "tcp://127.0.0.1:", "tcp://127.0.0.1", "tcp://", "tcp://127.0.0.1:-1",
                           "tcp://127.0.0.1:99999999999999999999"}) {
-    EXPECT_NE(objection_to_address(url).find("port"), std::string::npos) << url;
+    EXPECT_NE(address_error(url).find("port"), std::string::npos) << url;
   }
-  EXPECT_NE(objection_to_address("tcp://::1:7601").find("brackets"), std::string::npos);
+  EXPECT_NE(address_error("tcp://::1:7601").find("brackets"), std::string::npos);
 }
 
 TEST(Address, NamesAHost) {

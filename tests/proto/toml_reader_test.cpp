@@ -53,7 +53,7 @@ TEST(TomlReader, SaysWhatAValueIsAndMustBe) {
   const auto top = reader().parse("x = \"text\"\ny = [1, 2.5]\n");
   EXPECT_EQ(error_of([&] { (void)reader().number("x", *top.get("x"), "a number"); }),
             "a.toml:1:5: x = 'text' is a string: it must be a number");
-  EXPECT_EQ(error_of([&] { (void)reader().yes("y", *top.get("y")); }),
+  EXPECT_EQ(error_of([&] { (void)reader().boolean("y", *top.get("y")); }),
             "a.toml:2:5: y = [1, 2.5] is a list: it must be true or false");
 }
 

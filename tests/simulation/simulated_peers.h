@@ -98,7 +98,7 @@ class SimulatedWorker {
   };
   void start() {
     protocol::WorkerHello hello;
-    protocol::say_protocol(hello);
+    protocol::set_protocol(hello);
     hello.set_solver_version("1");
     hello.set_threads(1);
     ++life_;
@@ -296,7 +296,7 @@ inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Rec
   }
   try {
     protocol::PointTable table(std::move(recipe));
-    table.judge_points();
+    table.validate_points();
     return table;
   } catch (const solver::InputError&) {
     return std::nullopt;
@@ -374,7 +374,7 @@ class SimulatedClient {
       if (const auto table = filtered_here_and_there(recipe, filter)) {
         recipe_.mutable_blocks()->MergeFrom(table->recipe().blocks());
         for (std::uint64_t point = 0; point < points; ++point) {
-          left_in_ += table->is_left_in(point) ? 1U : 0U;
+          left_in_ += table->passes_filter(point) ? 1U : 0U;
         }
         return;
       }

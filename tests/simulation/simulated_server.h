@@ -43,7 +43,7 @@ class SimulatedServer final : public server::Ports {
     }
     on_started(found);
     server::ServiceSettings settings;
-    settings.scheduler.loss_limits.condemned_after = max_losses_;
+    settings.scheduler.loss_limits.failing_after = max_losses_;
     // As server/event_loop/event_loop.cpp does.
     settings.scheduler.first_lease_id = found.starts << 40U;
     settings.solver_version = "1";
@@ -210,7 +210,7 @@ class SimulatedServer final : public server::Ports {
       writing_ = true;
       after(commits_->is_faulty() ? 500 : 1, [this] { write_group(); });
     } else if (jobs_.empty()) {
-      commits_->tend();
+      commits_->maintain();
       ends();
     }
   }

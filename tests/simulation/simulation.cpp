@@ -137,7 +137,7 @@ class Simulation {
                                     message.batch().study_id() != 0);
     });
     protocol::WorkerMessage hello;
-    protocol::say_protocol(*hello.mutable_hello());
+    protocol::set_protocol(*hello.mutable_hello());
     hello.mutable_hello()->set_solver_version("1");
     hello.mutable_hello()->set_threads(1);
     hello.mutable_hello()->set_process_id("vanishing " + std::to_string(came_));

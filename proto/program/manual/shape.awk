@@ -1,6 +1,6 @@
-# From the help of a program or verb, as CLI11 prints it, to help from which help2man makes a page that
+# From the help of a program or command, as CLI11 prints it, to help from which help2man makes a page that
 # reads well: what stands in brackets behind a flag moves into its sentence, notes join the description.
-# Variables: nested (1: of a verb of a verb), examples (file that gets them, for an [EXAMPLES] of help2man).
+# Variables: nested (1: of a command of a command), examples (file that gets them, for an [EXAMPLES] of help2man).
 { line[NR] = $0 }
 
 function trimmed(text) { gsub(/^ +| +$/, "", text); return text }

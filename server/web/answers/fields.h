@@ -26,13 +26,13 @@ class FieldReader {
   std::optional<std::string> text(const std::string& name) const;
   std::optional<std::uint64_t> whole(const std::string& name) const;
   std::optional<double> number(const std::string& name) const;
-  /// Number of cells along one side of a picture, from 1 to kMostCells; `usual` if the field is
+  /// Number of cells along one side of a picture, from 1 to kMaxCells; `usual` if the field is
   /// absent.
   std::uint64_t cells(const std::string& name, std::uint64_t usual) const;
   /// The condition `where`, a complete SQL expression; empty if there is none.
   std::string condition() const;
 
-  static constexpr std::uint64_t kMostCells = 256;
+  static constexpr std::uint64_t kMaxCells = 256;
 
  private:
   const Fields& fields_;

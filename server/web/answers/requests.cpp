@@ -284,10 +284,10 @@ PendingAnswer submit_study(ServiceClient& service, const std::string& body) {
                         const protocol::SubmitReply& submitted = reply.submit();
                         return json_answer({{"id", submitted.study_id()},
                                             {"points", submitted.points()},
-                                            {"settled", submitted.settled()},
+                                            {"settled", submitted.completed()},
                                             {"created", submitted.created()},
                                             {"appended", submitted.appended()},
-                                            {"taken", submitted.taken().points()}});
+                                            {"taken", submitted.reused().points()}});
                       });
 }
 

@@ -116,7 +116,7 @@ class ServiceExchange {
   void request_more_rows() {
     protocol::ClientRequest more;
     more.mutable_more_rows()->set_request_id(number_);
-    more.mutable_more_rows()->set_taken(++chunks_);
+    more.mutable_more_rows()->set_received(++chunks_);
     service_.ask(number_, more);
   }
   /// The next reply, if it has come.

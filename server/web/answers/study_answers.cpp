@@ -87,7 +87,7 @@ ordered_json columns_json() {
 
 /// The model of blocks without model axes, key by key.
 ordered_json model_json(const protocol::Recipe& recipe) {
-  const auto model = protocol::unjudged_from_message(recipe.model());
+  const auto model = protocol::from_message_unchecked(recipe.model());
   ordered_json keys = ordered_json::array();
   for (const solver::ParameterKey& key : solver::model_keys()) {
     keys.push_back({{"key", key.name},
@@ -105,9 +105,9 @@ class WholeStudy : public StudyAnswer {
   Next next(const ServedStudy& study) override {
     const protocol::PointTable& table = *study.table;
     const protocol::Recipe& recipe = table.recipe();
-    constexpr int kMostBlocks = 1000;
+    constexpr int kMaxBlocks = 1000;
     ordered_json blocks = ordered_json::array();
-    for (int i = 0; i < std::min(recipe.blocks_size(), kMostBlocks); ++i) {
+    for (int i = 0; i < std::min(recipe.blocks_size(), kMaxBlocks); ++i) {
       blocks.push_back(block_json(recipe.blocks(i), table.block(static_cast<std::size_t>(i))));
     }
     return json_answer({{"id", study.id},
@@ -117,7 +117,7 @@ class WholeStudy : public StudyAnswer {
                         {"errors", recipe.errors()},
                         {"model", model_json(recipe)},
                         {"blocks", std::move(blocks)},
-                        {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
+                        {"blocks_left_out", std::max(recipe.blocks_size() - kMaxBlocks, 0)},
                         {"columns", columns_json()},
                         {"usual_columns", usual_columns(recipe)}});
   }
@@ -149,9 +149,9 @@ class OnePoint : public StudyAnswer {
 
 /// A model from JSON: names of a preset and an integrator, and numbers of single keys.
 protocol::ModelParameters model_of(const nlohmann::json& written) {
-  protocol::WrittenModel model;
+  protocol::ModelInput model;
   for (const auto& [key, value] : written.items()) {
-    if (key == protocol::WrittenModel::kPreset && value.is_string()) {
+    if (key == protocol::ModelInput::kPreset && value.is_string()) {
       model.preset = value.get<std::string>();
     } else if (key == "integrator" && value.is_string()) {
       model.values[key] = static_cast<double>(solver::integrator_named(value.get<std::string>()));
@@ -329,7 +329,7 @@ HttpAnswer check_answer(const std::string& body) {
   protocol::SubmitRequest asked = study_of_body(body);
   return parse_request([&] {
     const protocol::PointTable table(std::move(*asked.mutable_recipe()));
-    table.judge_points();
+    table.validate_points();
     const protocol::StudySize size = protocol::size_of(table);
     return json_answer({{"points", size.points},
                         {"models", size.models},

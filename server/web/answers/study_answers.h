@@ -25,7 +25,7 @@ struct ServedStudy {
   /// Whether the filter leaves out a point that has no row. In a study that is done it does: the
   /// worker decided, whose values may differ from those of this machine in the last digit.
   bool leaves_out(std::uint64_t point) const {
-    return table->has_filter() && (state == "done" || !table->is_left_in(point));
+    return table->has_filter() && (state == "done" || !table->passes_filter(point));
   }
 
   std::uint64_t id = 0;

@@ -220,7 +220,7 @@ MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const 
       return server.answer(connection, known);
     }
     known.request.body.append(upload, bytes);
-    return known.request.body.size() <= kMostBodyBytes ? MHD_YES : MHD_NO;
+    return known.request.body.size() <= kMaxBodyBytes ? MHD_YES : MHD_NO;
   } catch (const std::exception&) {
     return MHD_NO;  // no memory: the connection ends
   }

@@ -108,10 +108,10 @@ std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own
   const std::string length = request.header("content-length");
   if (request.headers.contains("transfer-encoding") ||
       (!length.empty() &&
-       read_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
+       read_number<std::uint64_t>(length).value_or(kMaxBodyBytes + 1) > kMaxBodyBytes)) {
     return text_answer(
         MHD_HTTP_CONTENT_TOO_LARGE,
-        fmt::format("a body states its length, which is at most {} bytes", kMostBodyBytes));
+        fmt::format("a body states its length, which is at most {} bytes", kMaxBodyBytes));
   }
   return std::nullopt;
 }

@@ -32,7 +32,7 @@ struct OwnNames {
   std::set<std::string> names;
 };
 
-inline constexpr std::uint64_t kMostBodyBytes = std::uint64_t{256} * 1024;
+inline constexpr std::uint64_t kMaxBodyBytes = std::uint64_t{256} * 1024;
 
 /// Why a request is refused; none: it is not. A POST must come from a page of this server, which
 /// its `Origin` says; programs use the clients' port. Of requests from pages of other sites only a

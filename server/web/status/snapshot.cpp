@@ -27,7 +27,7 @@ void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapsh
   std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by falling priority, then by age
   ranked.reserve(states.unfinished().size());
   for (const StudyId id : states.unfinished()) {
-    if (!service.scheduler().knows_study(id)) {
+    if (!service.scheduler().has_study(id)) {
       continue;  // it is not durable yet
     }
     const StudyCounts points = service.scheduler().study(id);
@@ -95,7 +95,7 @@ nlohmann::ordered_json study_json(const protocol::StudyStatus& study) {
           {"solver_version", study.solver_version()},
           {"created_at", study.created_at()},
           {"submitted_by", study.submitted_by()},
-          {"taken_over", study.taken().points()}};
+          {"taken_over", study.reused().points()}};
 }
 
 nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker) {

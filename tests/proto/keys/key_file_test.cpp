@@ -40,7 +40,7 @@ std::string message_of(const std::function<void()>& work) {
 }
 
 KeyFile worker_key() {
-  return {Role::kWorker, "worker", made_key_pair(), made_key_pair().public_key};
+  return {Role::kWorker, "worker", generate_key_pair(), generate_key_pair().public_key};
 }
 
 mode_t mode_of(const std::string& path) {
@@ -70,7 +70,7 @@ class KeyFileTest : public ::testing::Test {
 };
 
 TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
-  const KeyPair pair = made_key_pair();
+  const KeyPair pair = generate_key_pair();
   const std::string secret = z85(pair.secret_key.bytes());
   char text[kKeyCharacters + 1];
   ASSERT_NE(zmq_z85_encode(text, pair.secret_key.data(), pair.public_key.size()), nullptr);
@@ -78,21 +78,21 @@ TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
   char public_half[kKeyCharacters + 1];
   ASSERT_EQ(zmq_curve_public(public_half, secret.c_str()), 0);
   EXPECT_EQ(z85(pair.public_key), public_half);
-  EXPECT_EQ(public_half_of(pair.secret_key), pair.public_key);
+  EXPECT_EQ(public_key_of(pair.secret_key), pair.public_key);
 }
 
 TEST(CurveKeyTest, AreNotReadFromTextThatIsNone) {
-  const std::string good = z85(made_key_pair().public_key);
-  EXPECT_FALSE(key_of_z85(""));
-  EXPECT_FALSE(key_of_z85(good.substr(1)));
-  EXPECT_FALSE(key_of_z85(good + "00000"));
-  EXPECT_FALSE(key_of_z85(good.substr(5) + std::string(5, '\0')));
-  EXPECT_FALSE(key_of_z85(std::string(40, '"')));
-  EXPECT_FALSE(key_of_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
+  const std::string good = z85(generate_key_pair().public_key);
+  EXPECT_FALSE(parse_z85(""));
+  EXPECT_FALSE(parse_z85(good.substr(1)));
+  EXPECT_FALSE(parse_z85(good + "00000"));
+  EXPECT_FALSE(parse_z85(good.substr(5) + std::string(5, '\0')));
+  EXPECT_FALSE(parse_z85(std::string(40, '"')));
+  EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
 }
 
 TEST_F(KeyFileTest, IsReadAsItWasWrittenAndIsForItsOwnerAlone) {
-  const KeyFile server{Role::kServer, "server", made_key_pair(), std::nullopt};
+  const KeyFile server{Role::kServer, "server", generate_key_pair(), std::nullopt};
   for (const KeyFile& key : {worker_key(), server}) {
     const std::string path = folder_.file(key.name);
     write_key_file(path, key);
@@ -100,7 +100,7 @@ TEST_F(KeyFileTest, IsReadAsItWasWrittenAndIsForItsOwnerAlone) {
     EXPECT_EQ(read.role, key.role);
     EXPECT_EQ(read.name, key.name);
     EXPECT_EQ(read.pair.public_key, key.pair.public_key);
-    EXPECT_EQ(public_half_of(read.pair.secret_key), key.pair.public_key);
+    EXPECT_EQ(public_key_of(read.pair.secret_key), key.pair.public_key);
     EXPECT_EQ(read.server, key.server);
     EXPECT_EQ(mode_of(path), 0600U);
   }
@@ -131,7 +131,7 @@ TEST_F(KeyFileTest, IsRefusedWhenOthersMayReadItWithTheCommandThatMendsIt) {
 
 TEST_F(KeyFileTest, NamesFileLineAndKeyOfAFaultAndShowsNoSecret) {
   const KeyFile key = worker_key();
-  const std::string other = z85(made_key_pair().secret_key.bytes());
+  const std::string other = z85(generate_key_pair().secret_key.bytes());
   const std::string secret = z85(key.pair.secret_key.bytes());
   for (const auto& [from, to, place, words] : std::vector<std::array<std::string, 4>>{
            {"\"worker\"", "\"boss\"", ":1:", "`role` must be \"server\", \"client\", \"worker\""},
@@ -200,7 +200,7 @@ TEST_F(KeyFileTest, IsReadIntoLockedMemoryThatIsNotInACoreDump) {
 }
 
 AuthorizedKey key_called(const std::string& name, Role role = Role::kWorker) {
-  return {name, role, made_key_pair().public_key, "2026-11-22T03:00:00Z"};
+  return {name, role, generate_key_pair().public_key, "2026-11-22T03:00:00Z"};
 }
 
 class AuthorizedKeysTest : public ::testing::Test {
@@ -243,7 +243,7 @@ TEST_F(AuthorizedKeysTest, FindsKeysByKeyAndByNameUntilTheyAreRemoved) {
   EXPECT_EQ(keys.find(reader.public_key), keys.find("reader"));
   EXPECT_EQ(keys.find("reader")->role, Role::kReader);
   EXPECT_EQ(keys.find("reader")->added_at, "2026-11-22T03:00:00Z");
-  EXPECT_EQ(keys.find(made_key_pair().public_key), nullptr);
+  EXPECT_EQ(keys.find(generate_key_pair().public_key), nullptr);
 }
 
 TEST_F(AuthorizedKeysTest, NothingChangesWhenAChangeIsRefused) {
@@ -364,7 +364,7 @@ TEST_F(KeyFolderTest, TakesFurtherKeysWithAFileOrOnlyTheirPublicHalf) {
   make_key_folder(keys_);
   const AuthorizedKey alice = add_key(keys_, "alice", Role::kClient, std::nullopt);
   EXPECT_EQ(read_key_file(key_file_in(keys_, "alice")).pair.public_key, alice.public_key);
-  const CurveKey bobs = made_key_pair().public_key;
+  const CurveKey bobs = generate_key_pair().public_key;
   add_key(keys_, "bob", Role::kWorker, bobs);
   EXPECT_FALSE(std::filesystem::exists(key_file_in(keys_, "bob")));
   const AuthorizedKeys listed = read_authorized_keys(authorized_keys_in(keys_));

@@ -71,7 +71,7 @@ TEST_F(NotifierTest, SaysThatItLivesAtHalfOfTheTimeAndOnlyWhenItTurns) {
   Notifier notifier;
   std::size_t said = 0;
   for (int turn = 0; turn < 100; ++turn, now_ += 100ms) {  // 10 s
-    notifier.turn(now_);
+    notifier.feed_watchdog(now_);
     said += heard().size();
   }
   EXPECT_EQ(said, 20U);
@@ -83,7 +83,7 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
     setenv("NOTIFY_SOCKET", name.c_str(), 1);
     Notifier notifier;
     notifier.ready("ready");
-    notifier.turn(now_);
+    notifier.feed_watchdog(now_);
     notifier.stopping("stopping", 1s);
   }
   EXPECT_TRUE(heard().empty());

@@ -198,7 +198,7 @@ TEST(KeysTest, EveryKeyHasItsNumber) {
 
 std::string fault_of_points(const Block& block) {
   try {
-    PointTable(recipe_of_blocks({block})).judge_points();
+    PointTable(recipe_of_blocks({block})).validate_points();
   } catch (const solver::InputError& fault) {
     return fault.what();
   }
@@ -208,7 +208,7 @@ std::string fault_of_points(const Block& block) {
 std::vector<std::uint64_t> left_in(const PointTable& table) {
   std::vector<std::uint64_t> points;
   for (std::uint64_t i = 0; i < table.size(); ++i) {
-    if (table.is_left_in(i)) {
+    if (table.passes_filter(i)) {
       points.push_back(i);
     }
   }
@@ -229,16 +229,16 @@ Block with_k(const std::string& k, std::uint64_t points, const std::string& wher
 TEST(FilterTest, PointsThatAreLeftOutKeepTheirNumbersAndOtherBlocksTheirPoints) {
   const PointTable table(recipe_of_blocks({grid("mu > 1.9 * e"), grid(""), grid("mu < 0.05")}));
   EXPECT_EQ(table.size(), 66U);
-  EXPECT_TRUE(table.has_filter() && table.needs_judging());
+  EXPECT_TRUE(table.has_filter() && table.needs_point_validation());
   EXPECT_EQ(left_in(table).size(), 1U + 22U + 2U);
   EXPECT_EQ(table.point(20).mu, 1.0);
-  EXPECT_EQ(table.first_left_in(0, 66), 20U);
-  EXPECT_EQ(table.first_left_in(22, 66), 22U);
-  EXPECT_EQ(table.first_left_in(46, 66), 66U);
-  EXPECT_EQ(table.first_left_in(0, 10), 10U);
-  EXPECT_THROW(static_cast<void>(table.is_left_in(66)), std::out_of_range);
+  EXPECT_EQ(table.first_passing(0, 66), 20U);
+  EXPECT_EQ(table.first_passing(22, 66), 22U);
+  EXPECT_EQ(table.first_passing(46, 66), 66U);
+  EXPECT_EQ(table.first_passing(0, 10), 10U);
+  EXPECT_THROW(static_cast<void>(table.passes_filter(66)), std::out_of_range);
   const PointTable plain(recipe_of_blocks({grid("")}));
-  EXPECT_FALSE(plain.needs_judging() || plain.has_filter());
+  EXPECT_FALSE(plain.needs_point_validation() || plain.has_filter());
 }
 
 TEST(FilterTest, UsesExpressionsTheModelAndPointsOfZipsAndSamples) {

@@ -23,10 +23,10 @@ TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedAndCanBeReadUnjudged) {
   ModelParameters message = to_message(unusual_model());
   message.set_spectral_radius(1.0);
   EXPECT_THROW(from_message(message), solver::InputError);
-  EXPECT_EQ(unjudged_from_message(message).spectral_radius, 1.0);
+  EXPECT_EQ(from_message_unchecked(message).spectral_radius, 1.0);
   message = to_message(unusual_model());
   message.set_elements_per_link(4'000'000'000U);
-  EXPECT_THROW(unjudged_from_message(message), solver::InputError) << "no model could hold it";
+  EXPECT_THROW(from_message_unchecked(message), solver::InputError) << "no model could hold it";
 }
 
 // These texts stand in databases and names of studies. One that has to change needs another version
@@ -115,19 +115,19 @@ using namespace std::string_literals;
 using testing::AllOf;
 using testing::HasSubstr;
 
-TEST(WrittenModel, IsItsPresetAndTheKeysThatOverrideIt) {
+TEST(ModelInput, IsItsPresetAndTheKeysThatOverrideIt) {
   const auto model =
-      WrittenModel{.preset = "printed", .values = {{"length", 0.2}, {"k", 1e7}, {"links", 2}}}
+      ModelInput{.preset = "printed", .values = {{"length", 0.2}, {"k", 1e7}, {"links", 2}}}
           .model();
   EXPECT_EQ(model.lengths_m, (std::vector{0.2, 0.2}));
   EXPECT_EQ(model.k_N_m, 1e7);
   EXPECT_EQ(model.eta2, solver::preset("printed").eta2);
-  EXPECT_EQ(WrittenModel().model(), solver::preset("standard"));
+  EXPECT_EQ(ModelInput().model(), solver::preset("standard"));
 }
 
-TEST(WrittenModel, NamesKeyAndValueThatNoModelHas) {
+TEST(ModelInput, NamesKeyAndValueThatNoModelHas) {
   const struct {
-    WrittenModel model;
+    ModelInput model;
     const char* key;
     const char* says;
   } wrong[] = {
@@ -153,17 +153,17 @@ TEST(WrittenModel, NamesKeyAndValueThatNoModelHas) {
 
 TEST(StudyName, MayBeAnyTextThatPeopleCanReadAndShellsTake) {
   for (const auto& name : {"paper"s, "μ and e, 2nd"s, "a-b"s, "参数"s, std::string(100, 'x')}) {
-    EXPECT_EQ(objection_to_study_name(name), "") << name;
+    EXPECT_EQ(study_name_error(name), "") << name;
   }
   for (const auto& name : {""s, std::string(101, 'x'), "-x"s}) {
-    EXPECT_NE(objection_to_study_name(name), "") << name;
+    EXPECT_NE(study_name_error(name), "") << name;
   }
 }
 
 TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
   for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
                            "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
-    const auto objection = objection_to_study_name(name);
+    const auto objection = study_name_error(name);
     EXPECT_THAT(objection, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
                                  testing::Not(HasSubstr(name))));
   }
@@ -171,10 +171,10 @@ TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
 
 TEST(StudyPriority, IsWithinLimitsThatTheObjectionNames) {
   for (const std::int64_t priority : {-1000, 0, 1000}) {
-    EXPECT_EQ(objection_to_priority(priority), "");
+    EXPECT_EQ(priority_error(priority), "");
   }
-  EXPECT_EQ(objection_to_priority(1001), "priority = 1001 is not allowed: -1000 to 1000 is");
-  EXPECT_NE(objection_to_priority(-1001), "");
+  EXPECT_EQ(priority_error(1001), "priority = 1001 is not allowed: -1000 to 1000 is");
+  EXPECT_NE(priority_error(-1001), "");
 }
 
 }  // namespace

@@ -198,10 +198,10 @@ TEST(RecipeRules, ExpressionsAreReadable) {
 
 TEST(RecipeRules, AStudyHasABoundedNumberOfExpressionsBlocksAndPoints) {
   const Block expressed = filtered({kH, following("mu", "H / 2"), kE}, "");
-  EXPECT_EQ(refusal(recipe_of_blocks(std::vector<Block>(kMostExpressions, expressed))), "");
-  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMostExpressions + 1, expressed))),
+  EXPECT_EQ(refusal(recipe_of_blocks(std::vector<Block>(kMaxExpressions, expressed))), "");
+  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMaxExpressions + 1, expressed))),
               HasSubstr("more than 1000 expressions"));
-  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMostBlocks + 1, of_mu(kMu)))),
+  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMaxBlocks + 1, of_mu(kMu)))),
               HasSubstr("10001 blocks, more than 10000"));
   const std::uint64_t huge = std::numeric_limits<std::uint64_t>::max();
   const std::uint64_t half = std::uint64_t{1} << 32U;  // half * half would wrap to 0

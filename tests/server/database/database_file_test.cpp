@@ -51,8 +51,8 @@ class ReadOnlyFolderTest : public StoreFixture {
   /// Runs `what` as a user who can write nowhere but in `out`: root could write in every folder.
   /// Ends the process with 0 when `what` gives true.
   void as_stranger(const std::function<bool()>& what) const {
-    constexpr uid_t kNobody = 65534;
-    if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) {
+    constexpr uid_t kNoProcess = 65534;
+    if (::geteuid() == 0 && (::setgid(kNoProcess) != 0 || ::setuid(kNoProcess) != 0)) {
       std::_Exit(2);
     }
     try {
@@ -116,7 +116,7 @@ TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
   for (const char* type : {"ext4", "tmpfs", "overlay", "fuseblk", "fuse.mergerfs"}) {
     EXPECT_FALSE(is_network_file_system(type)) << type;
   }
-  EXPECT_EQ(objection_to_shared_disk("/dev/shm/oblique.db"), "") << "it is local";
+  EXPECT_EQ(network_disk_error("/dev/shm/oblique.db"), "") << "it is local";
 }
 
 }  // namespace

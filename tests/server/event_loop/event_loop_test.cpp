@@ -58,8 +58,8 @@ TEST_F(EventLoopTest, PointsThatAnotherStudyHasAreItsRows) {
   request.mutable_submit()->set_name("b");
   *request.mutable_submit()->mutable_recipe() = table_of(20)->recipe();
   const auto reply = client.ask(request).submit();
-  EXPECT_EQ(reply.settled(), 20U);
-  EXPECT_EQ(reply.taken().points(), 20U);
+  EXPECT_EQ(reply.completed(), 20U);
+  EXPECT_EQ(reply.reused().points(), 20U);
   EXPECT_EQ(client.status("b").state(), "done");
   EXPECT_EQ(client.rows("SELECT count(*) FROM runs WHERE reused_from = 'a/' || point").rows.at(0),
             protocol::Row{std::int64_t{20}});
@@ -244,7 +244,7 @@ constexpr std::size_t with_shadows(std::size_t bytes) {
 
 std::string hello_frame() {
   WorkerMessage message;
-  protocol::say_protocol(*message.mutable_hello());
+  protocol::set_protocol(*message.mutable_hello());
   message.mutable_hello()->set_solver_version("1.0");
   message.mutable_hello()->set_threads(1);
   return zmtp_frame(protocol::encode(message));

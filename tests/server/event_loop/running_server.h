@@ -138,7 +138,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
 
   ServerToWorker hello() {
     WorkerMessage message;
-    protocol::say_protocol(*message.mutable_hello());
+    protocol::set_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version("1.0");
     message.mutable_hello()->set_instruction_set("avx2");
     message.mutable_hello()->set_name("pretended");
@@ -178,7 +178,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
       if (failing_.contains(point)) {
         *results.add_results() =
             protocol::failed_point(point, "failed as " + std::to_string(point));
-      } else if (table.is_left_in(point)) {
+      } else if (table.passes_filter(point)) {
         *results.add_results() = solved_point(point, table);
       } else {
         results.add_left_out(point);

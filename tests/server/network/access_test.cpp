@@ -86,7 +86,7 @@ class AccessControlTest : public testing::Test {
     return text;
   }
   protocol::CurveKey add(const std::string& name, Role role = Role::kWorker) {
-    const protocol::CurveKey key = protocol::made_key_pair().public_key;
+    const protocol::CurveKey key = protocol::generate_key_pair().public_key;
     protocol::change_authorized_keys(list_, [&](AuthorizedKeys& keys) {
       keys.add({name, role, key, "2026-11-22T03:00:00Z"});
     });
@@ -106,7 +106,7 @@ class AccessControlTest : public testing::Test {
   test::TemporaryFolder folder_;
   std::string server_key_ = folder_.file("server.key");
   std::string list_ = folder_.file("authorized_keys.toml");
-  protocol::KeyPair server_ = protocol::made_key_pair();
+  protocol::KeyPair server_ = protocol::generate_key_pair();
   std::ostringstream log_;
   std::shared_ptr<spdlog::logger> logger_ = spdlog::default_logger();
   std::int64_t now_ms_ = 0;
@@ -121,7 +121,7 @@ TEST_F(AccessControlTest, AServerNeedsItsOwnKeyFileAndTheListBesideIt) {
   EXPECT_THAT(take_log(), AllOf(HasSubstr("the 1 keys of " + list_),
                                 HasSubstr(protocol::z85(server_.public_key))));
   protocol::write_key_file(folder_.file("worker.key"),
-                           {Role::kWorker, "w", protocol::made_key_pair(), server_.public_key});
+                           {Role::kWorker, "w", protocol::generate_key_pair(), server_.public_key});
   EXPECT_THROW(AccessControl({"127.0.0.1", folder_.file("worker.key"), false}), solver::InputError);
 }
 
@@ -136,7 +136,7 @@ TEST_F(AccessControlTest, EachRoleHasItsPort) {
   EXPECT_EQ(result_of(access, worker, PortRole::kClients), "key of another role");
   EXPECT_EQ(result_of(access, client), "key of another role");
   EXPECT_EQ(result_of(access, reader), "key of another role");
-  EXPECT_EQ(result_of(access, protocol::made_key_pair().public_key), "unknown key");
+  EXPECT_EQ(result_of(access, protocol::generate_key_pair().public_key), "unknown key");
 }
 
 TEST_F(AccessControlTest, ChangesOfTheListAreReadTwiceASecond) {

@@ -53,8 +53,8 @@ struct CurveClient {
 
   protocol::KeyPair own;
   protocol::CurveKey server;
-  protocol::KeyPair brief = protocol::made_key_pair();  // C', c'
-  std::uint64_t nonce = 1;                              // of the next command
+  protocol::KeyPair brief = protocol::generate_key_pair();  // C', c'
+  std::uint64_t nonce = 1;                                  // of the next command
   std::string properties = zmtp_properties("DEALER");
 
   // From WELCOME on.

@@ -136,8 +136,8 @@ class NetworkTest : public testing::Test {
   static constexpr std::size_t kWelcomedBytes = kGreetingBytes + 170;
 
   std::int64_t now_ms_ = 1000;
-  protocol::KeyPair server_ = protocol::made_key_pair();
-  protocol::KeyPair worker_ = protocol::made_key_pair();
+  protocol::KeyPair server_ = protocol::generate_key_pair();
+  protocol::KeyPair worker_ = protocol::generate_key_pair();
   ListAuthenticator authenticator_;
   Network network_;
   Network::Port keyed_ = 0;
@@ -366,7 +366,7 @@ TEST_F(TightNetworkTest, NewHandshakesReplaceEachOtherAndNoAdmittedPeer) {
 
 TEST_F(NetworkTest, RefusedHandshakesAreCountedAndLeaveNothingBehind) {
   constexpr std::size_t kPeers = 80;
-  const protocol::KeyPair stranger = protocol::made_key_pair();
+  const protocol::KeyPair stranger = protocol::generate_key_pair();
   std::vector<std::unique_ptr<KeyedPeer>> peers;
   for (std::size_t i = 0; i < kPeers; ++i) {
     peers.push_back(keyed_peer(stranger, i % 4 == 0 ? stranger.public_key : server_.public_key));
@@ -612,7 +612,7 @@ TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
 }
 
 TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
-  const protocol::KeyPair stranger = protocol::made_key_pair();
+  const protocol::KeyPair stranger = protocol::generate_key_pair();
   EXPECT_EQ(failure_of(*dealer(stranger, server_.public_key)),
             std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));
   EXPECT_EQ(failure_of(*dealer(worker_, stranger.public_key)),
@@ -630,7 +630,7 @@ TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
 }
 
 TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAtOnceWithAllThatItSent) {
-  const protocol::KeyPair other = protocol::made_key_pair();
+  const protocol::KeyPair other = protocol::generate_key_pair();
   authenticator_.add(other.public_key, "berta");
   const auto revoked = dealer(worker_, server_.public_key);
   const auto staying = dealer(other, server_.public_key);

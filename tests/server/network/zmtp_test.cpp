@@ -145,8 +145,8 @@ class CurveTest : public testing::Test {
     return link;
   }
 
-  protocol::KeyPair server_ = protocol::made_key_pair();
-  protocol::KeyPair own_ = protocol::made_key_pair();
+  protocol::KeyPair server_ = protocol::generate_key_pair();
+  protocol::KeyPair own_ = protocol::generate_key_pair();
   ListAuthenticator authenticator_;
   PortSecurity security_{server_, authenticator_};
 };
@@ -176,22 +176,22 @@ TEST_F(CurveTest, TwoHandshakesWithTheSameClientKeysDiffer) {
 }
 
 TEST_F(CurveTest, AKeyThatIsNotAuthorizedIsRefused) {
-  Link link = welcomed({protocol::made_key_pair(), server_.public_key});
+  Link link = welcomed({protocol::generate_key_pair(), server_.public_key});
   link.expect_refused(link.initiate_frame(), error_frame("400"));
   EXPECT_EQ(link.zmtp.cause(), RefusalCause::kUnknownKey);
 }
 
 TEST_F(CurveTest, AHelloForAnotherServerIsRefusedAtOnce) {
   Link link = greeted();
-  link.client = {own_, protocol::made_key_pair().public_key};
+  link.client = {own_, protocol::generate_key_pair().public_key};
   link.expect_refused(curve_greeting() + link.hello_frame());
   EXPECT_EQ(link.zmtp.cause(), RefusalCause::kWrongServerKey);
 }
 
 TEST_F(CurveTest, APeerThatDoesNotHoldTheKeyThatItShowsIsRefusedWhetherOrNotTheKeyIsListed) {
-  const protocol::KeyPair other = protocol::made_key_pair();
+  const protocol::KeyPair other = protocol::generate_key_pair();
   std::set<std::string> faults;
-  for (const protocol::KeyPair& shown : {own_, protocol::made_key_pair()}) {
+  for (const protocol::KeyPair& shown : {own_, protocol::generate_key_pair()}) {
     std::vector<CurveClient> thieves(3, {shown, server_.public_key});
     thieves[0].vouching_secret = other.secret_key;
     thieves[1].vouched_brief = other.public_key;

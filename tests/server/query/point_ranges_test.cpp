@@ -221,7 +221,7 @@ std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
   const Table points = table(recipe);
   AddResults results{number, points, 0, "", "", 1, "now", {}};
   for (std::uint64_t point = 0; point < points->size(); ++point) {
-    if (points->is_left_in(point) && (number % 4 != 0 || point % 3 != 0)) {
+    if (points->passes_filter(point) && (number % 4 != 0 || point % 3 != 0)) {
       results.results.push_back(point % 7 == 0 ? protocol::failed_point(point, "why")
                                                : solved_point(point));
     }

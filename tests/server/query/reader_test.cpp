@@ -143,9 +143,9 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(all[0].solved(), 2U);
   EXPECT_EQ(all[0].failed(), 1U);
   EXPECT_EQ(all[0].state(), "running");
-  EXPECT_EQ(all[0].taken().points(), 3U);
-  ASSERT_EQ(all[0].taken().from_size(), 2);
-  EXPECT_EQ(all[0].taken().from(0).study(), "y");
+  EXPECT_EQ(all[0].reused().points(), 3U);
+  ASSERT_EQ(all[0].reused().from_size(), 2);
+  EXPECT_EQ(all[0].reused().from(0).study(), "y");
   EXPECT_EQ(Reader(path_).study_status("b").at(0).solved(), 0U);
   EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
   commit({solved(study_of(4), {1})});

@@ -49,7 +49,7 @@ TEST_F(LeftOutPointsTest, AStudyIsDoneWhenEveryPointIsSolvedOrLeftOut) {
     bench.solve_all(bench.join(1, 2), 1e-3, table.get());
     std::uint64_t left_in = 0;
     for (std::uint64_t point = 0; point < 100; ++point) {
-      left_in += table->is_left_in(point) ? 1U : 0U;
+      left_in += table->passes_filter(point) ? 1U : 0U;
     }
     const StudyCounts counts = bench.scheduler.study(1);
     EXPECT_EQ(counts.solved(), left_in) << where;
@@ -105,7 +105,7 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingO
     const auto effects = bench.feed(event);
     ASSERT_EQ(only<DropWorker>(effects).size(), 1U) << point;
     EXPECT_TRUE(only<StoreResults>(effects).empty());
-    EXPECT_FALSE(bench.scheduler.knows_worker(1));
+    EXPECT_FALSE(bench.scheduler.has_worker(1));
     EXPECT_EQ(bench.scheduler.study(1).completed, 0U);
   }
 }
@@ -131,7 +131,7 @@ TEST_F(LeftOutPointsTest, OfALeaseThatHasEndedResultsCountAndRangesDoNot) {
   ASSERT_EQ(stores.size(), 1U);
   EXPECT_EQ(stores[0].accepted.size(), event.outcomes.size());
   EXPECT_TRUE(stores[0].left_out.empty());
-  EXPECT_TRUE(bench_.scheduler.knows_worker(1));
+  EXPECT_TRUE(bench_.scheduler.has_worker(1));
 }
 
 TEST_F(LeftOutPointsTest, AfterARestartTheyAreKnownAndNotHandedOut) {

@@ -133,7 +133,7 @@ TEST(PointOrderTest, PointsThatAStudyGrowsByComeBehindAllOthers) {
 }
 
 TEST(PointOrderTest, AStudyOfTooManyModelsStaysInTheOrderOfItsNumbers) {
-  const PointTable table(sample_with_falls(PointOrder::kMostModels + 1, 3));
+  const PointTable table(sample_with_falls(PointOrder::kMaxModels + 1, 3));
   PointOrder order;
   order.arrange(table, 0, IntervalSet(0, 1), 8);
   EXPECT_FALSE(order.is_arranged());

@@ -77,7 +77,7 @@ class SchedulerBench {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s, {}};
     for (const Interval& range : batch.points) {
       for (std::uint64_t point = range.begin; point < range.end; ++point) {
-        if (table == nullptr || table->is_left_in(point)) {
+        if (table == nullptr || table->passes_filter(point)) {
           event.outcomes.push_back({point, false});
         } else {
           event.left_out.insert(point);

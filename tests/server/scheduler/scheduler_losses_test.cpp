@@ -496,7 +496,7 @@ TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
   ASSERT_EQ(busy.size(), 2U);
   std::deque<SendBatch> held(busy.begin(), busy.end());
   bench.pass(3250, {3});  // worker 2 dies: its points are suspect now
-  EXPECT_FALSE(bench.scheduler.knows_worker(2));
+  EXPECT_FALSE(bench.scheduler.has_worker(2));
   bool suspect_was_leased = false;
   for (int i = 0; i < 200 && !held.empty() && !suspect_was_leased; ++i) {
     const auto batch = held.front();

@@ -210,7 +210,7 @@ TEST(SchedulerRemovalTest, WhoSolvesADeletedStudyDropsItAndGetsAnother) {
   ASSERT_TRUE(only<SendBatch>(batches).empty());
   const auto effects = bench.feed(StudyRemoved{1});
   EXPECT_EQ(only<WithdrawStudy>(effects).size(), 1U);
-  EXPECT_FALSE(bench.scheduler.knows_study(1));
+  EXPECT_FALSE(bench.scheduler.has_study(1));
   EXPECT_EQ(bench.scheduler.leases(), 0U);
   EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0).study, 2U);
 }

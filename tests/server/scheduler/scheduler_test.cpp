@@ -137,7 +137,7 @@ TEST(SchedulerTest, ALateResultOfAnOldAttemptIsKeptWhileThePointIsOpen) {
   SchedulerBench bench(table_of(4));
   const auto old = bench.join(1, 1).at(0);
   bench.pass(3250);
-  EXPECT_FALSE(bench.scheduler.knows_worker(1));
+  EXPECT_FALSE(bench.scheduler.has_worker(1));
   const auto again = bench.join(2, 1).at(0);
   ASSERT_EQ(again.first_point(), old.first_point());
   bench.join(3, 0);  // the lost worker with a new number

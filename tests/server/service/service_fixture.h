@@ -156,7 +156,7 @@ class ServiceTest : public testing::Test {
     results.set_batch_done(true);
     for (const std::uint64_t i : points_of(batch)) {
       if (batch.study_id() != 0 &&
-          !service_->states().record(batch.study_id()).table->is_left_in(i)) {
+          !service_->states().record(batch.study_id()).table->passes_filter(i)) {
         results.add_left_out(i);
         results.add_left_out(1);
         continue;
@@ -196,7 +196,7 @@ class ServiceTest : public testing::Test {
   }
   void hello(const std::string& identity = "worker", const std::string& solver = "1.0") {
     WorkerMessage message;
-    protocol::say_protocol(*message.mutable_hello());
+    protocol::set_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version(solver);
     message.mutable_hello()->set_threads(1);
     worker_says(message, identity);

@@ -90,7 +90,7 @@ class ServiceQueryTest : public ServiceTest {
                  const std::string& identity = "client") {
     ClientRequest message = client_request(request_id);
     message.mutable_more_rows()->set_request_id(request_id);
-    message.mutable_more_rows()->set_taken(taken);
+    message.mutable_more_rows()->set_received(taken);
     send(message, identity);
   }
   /// A reader gives another chunk of the answer.
@@ -268,10 +268,10 @@ class ServiceTraceTest : public ServiceTest {
     *trace.mutable_result() = solved_point(0);
     return trace;
   }
-  static protocol::Trace not_taken(const protocol::TraceOrder& order) {
+  static protocol::Trace declined(const protocol::TraceOrder& order) {
     protocol::Trace trace;
     trace.set_trace_id(order.trace_id());
-    trace.set_not_taken(true);
+    trace.set_declined(true);
     return trace;
   }
   void worker_sends(const protocol::Trace& trace, const std::string& identity = "worker") {
@@ -379,13 +379,13 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDoesNotTakeItIsReplacedOnce) {
     ask(7, 3);
     hello("two");
     const auto first = orders().size() - 1;
-    is_lost ? goodbye("one") : worker_sends(not_taken(orders()[first]), "one");
+    is_lost ? goodbye("one") : worker_sends(declined(orders()[first]), "one");
     ASSERT_EQ(orders().size(), first + 2);
     EXPECT_TRUE(ports_.replies.empty());
     if (is_lost) {
       hello("three");
     }
-    is_lost ? goodbye("two") : worker_sends(not_taken(orders()[first + 1]), "two");
+    is_lost ? goodbye("two") : worker_sends(declined(orders()[first + 1]), "two");
     EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no worker"));
     EXPECT_EQ(orders().size(), first + 2);
     goodbye("three");
@@ -404,7 +404,7 @@ TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
   EXPECT_EQ(cancels(), 1);
   ask(8, 4);
   EXPECT_EQ(orders().size(), 1U) << "the worker has not said that it is free";
-  worker_sends(not_taken(orders()[0]));
+  worker_sends(declined(orders()[0]));
   EXPECT_EQ(orders().size(), 2U);
   service_->client_left("client");
   EXPECT_EQ(cancels(), 2);

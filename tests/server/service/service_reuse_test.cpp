@@ -109,10 +109,10 @@ TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
   EXPECT_EQ(ended(), kStudy);
   write_all();
   const auto reply = last_reply().submit();
-  EXPECT_EQ(reply.settled(), 4U);
-  EXPECT_EQ(reply.taken().points(), 4U);
-  EXPECT_EQ(reply.taken().from(0).study(), "a");
-  EXPECT_FALSE(status_of("b").taken().under_way());
+  EXPECT_EQ(reply.completed(), 4U);
+  EXPECT_EQ(reply.reused().points(), 4U);
+  EXPECT_EQ(reply.reused().from(0).study(), "a");
+  EXPECT_FALSE(status_of("b").reused().under_way());
   EXPECT_EQ(status_of("b").waits_for(), "");
   EXPECT_THAT(ports_.jobs, IsEmpty());
 }
@@ -123,7 +123,7 @@ TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
   service_->tick(now_);
   const auto reply = last_reply().submit();
   EXPECT_EQ(reply.study_id(), kStudy);
-  EXPECT_TRUE(reply.taken().under_way());
+  EXPECT_TRUE(reply.reused().under_way());
 }
 
 TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShort) {
@@ -132,7 +132,7 @@ TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShor
     submit_study();
     const auto vain_part = [&](std::uint64_t next) {
       now_.steady_ms += is_long ? StudyChanges::kLongestInVain_ms / 2 : 0;
-      write_part({{}, {}, is_long ? 1 : StudyChanges::kMostProbesInVain / 2, next});
+      write_part({{}, {}, is_long ? 1 : StudyChanges::kMaxProbesInVain / 2, next});
     };
     vain_part(1);
     write_part(copies_of_a(IntervalSet(0, 1), 2));  // and both begin again
@@ -141,7 +141,7 @@ TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShor
     vain_part(4);
     EXPECT_EQ(ended(), kStudy);
     write_all();
-    EXPECT_TRUE(last_reply().submit().taken().cut_short());
+    EXPECT_TRUE(last_reply().submit().reused().cut_short());
   }
 }
 
@@ -150,7 +150,7 @@ TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
   write_all("a page is damaged");
   EXPECT_EQ(ended(), kStudy);
   write_all();
-  EXPECT_TRUE(last_reply().submit().taken().cut_short());
+  EXPECT_TRUE(last_reply().submit().reused().cut_short());
   EXPECT_EQ(status_of("b").waits_for(), "");
 }
 
@@ -205,11 +205,11 @@ TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
   pending.completed = IntervalSet(0, 3);
   start({}, {source, pending});
   EXPECT_THAT(parts(), ElementsAre(0));
-  EXPECT_EQ(status_of("b").taken().points(), 3U);
-  EXPECT_TRUE(status_of("b").taken().under_way());
+  EXPECT_EQ(status_of("b").reused().points(), 3U);
+  EXPECT_TRUE(status_of("b").reused().under_way());
   write_part(copies_of_a(IntervalSet(3, 5)));
   EXPECT_EQ(ended(), kStudy);
-  EXPECT_EQ(status_of("b").taken().points(), 5U);
+  EXPECT_EQ(status_of("b").reused().points(), 5U);
 }
 
 // ---- Filters ----

@@ -188,7 +188,7 @@ TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
 
 WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver_version) {
   WorkerMessage message;
-  protocol::say_protocol(*message.mutable_hello());
+  protocol::set_protocol(*message.mutable_hello());
   message.mutable_hello()->set_protocol_version(protocol_version);
   message.mutable_hello()->set_solver_version(solver_version);
   message.mutable_hello()->set_threads(1);
@@ -293,11 +293,11 @@ TEST_F(ServiceTest, AStudyWhoseResultsTheDiskDoesNotTakeSaysSoAndForgetsItAfterw
 
 TEST_F(ServiceTest, MessagesThatAreLongerThanThoseOfWorkersAreBadFramesThatAreNotParsed) {
   WorkerMessage heartbeat;
-  for (std::uint64_t i = 0; i <= protocol::kMostLeasesAHeartbeat; ++i) {
+  for (std::uint64_t i = 0; i <= protocol::kMaxLeasesAHeartbeat; ++i) {
     heartbeat.mutable_heartbeat()->add_lease_ids(i);
   }
   WorkerMessage results;
-  for (std::size_t i = 0; i <= protocol::kMostResultsAMessage; ++i) {
+  for (std::size_t i = 0; i <= protocol::kMaxResultsAMessage; ++i) {
     results.mutable_results()->add_results();
   }
   worker_says(heartbeat);

@@ -214,7 +214,7 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
     std::vector<std::string> expected;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
       const std::uint64_t fate = random() % 10;
-      if (!points->is_left_in(number)) {
+      if (!points->passes_filter(number)) {
         continue;
       }
       if (fate == 0) {
@@ -237,7 +237,7 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
     AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
-      if (points->is_left_in(number) && !completed.contains(number) && random() % 2 == 0) {
+      if (points->passes_filter(number) && !completed.contains(number) && random() % 2 == 0) {
         rest.results.push_back(solved_point(number));
         solved.emplace(inputs_of(*points, number), fmt::format("study {}/{}", study, number));
       }

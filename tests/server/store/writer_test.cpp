@@ -188,7 +188,7 @@ TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone
 TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
   using Way = std::function<void(GroupCommit&, std::vector<WriteReport>&)>;
   const std::vector<Way> ways{
-      [](auto& commits, auto& reports) { reports = commits.tend(); },
+      [](auto& commits, auto& reports) { reports = commits.maintain(); },
       [](auto& commits, auto& reports) { EXPECT_FALSE(commits.merge(reports)); },
       [](auto& commits, auto& reports) { EXPECT_FALSE(commits.clear(10, reports)); }};
   storage_.is_gone = true;
@@ -200,19 +200,19 @@ TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
     EXPECT_EQ(told(reports), (Reports{{Kind::kGone, 0}}));
     EXPECT_TRUE(commits.is_gone());
     EXPECT_FALSE(commits.has_to_clear());
-    EXPECT_THAT(commits.tend(), IsEmpty()) << "reported once";
+    EXPECT_THAT(commits.maintain(), IsEmpty()) << "reported once";
   }
 }
 
 TEST_F(GroupCommitTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersAllowIt) {
-  commits_.tend();
+  commits_.maintain();
   EXPECT_EQ(storage_.merges, 0) << "no study is done";
   jobs_ = {kept(1), answered(2)};
   write();
   storage_.merged_at = 8;
   std::vector<WriteReport> reports;
   for (int i = 0; i < 20; ++i) {
-    std::ranges::move(commits_.tend(), std::back_inserter(reports));
+    std::ranges::move(commits_.maintain(), std::back_inserter(reports));
   }
   EXPECT_EQ(storage_.merges, 8);
   EXPECT_EQ(told(reports), (Reports{{Kind::kUnmerged, 0}})) << "reported once";

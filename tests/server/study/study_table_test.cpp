@@ -23,7 +23,7 @@ protocol::Recipe recipe_of_mu(const protocol::Axis& mu) {
   return protocol::recipe_of({{listed("H", {1.0}), mu, listed("e", {1.0})}});
 }
 
-StudyTable judged(const protocol::Recipe& recipe) {
+StudyTable validated(const protocol::Recipe& recipe) {
   return StudyTable(std::make_shared<const protocol::PointTable>(recipe));
 }
 
@@ -38,8 +38,8 @@ TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
   for (const bool with_errors : {false, true}) {
     before.set_errors(with_errors);
     longer.set_errors(with_errors);
-    for (const StudyTable& one : {judged(before), stored(before, 2)}) {
-      for (const StudyTable& other : {judged(longer), stored(longer, 3)}) {
+    for (const StudyTable& one : {validated(before), stored(before, 2)}) {
+      for (const StudyTable& other : {validated(longer), stored(longer, 3)}) {
         EXPECT_EQ(one.growth_to(other).kind, Growth::Kind::kLonger);
         EXPECT_EQ(other.growth_to(one).kind, Growth::Kind::kShorter);
         EXPECT_EQ(one.growth_to(one).kind, Growth::Kind::kSame);
@@ -47,20 +47,22 @@ TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
     }
   }
   before.set_errors(false);
-  EXPECT_EQ(judged(before).growth_to(judged(longer)).kind, Growth::Kind::kOther) << "errors differ";
+  EXPECT_EQ(validated(before).growth_to(validated(longer)).kind, Growth::Kind::kOther)
+      << "errors differ";
   longer.set_errors(false);
   *longer.mutable_model() = protocol::to_message(solver::preset("converged"));
-  EXPECT_EQ(judged(before).growth_to(judged(longer)).kind, Growth::Kind::kOther) << "models differ";
+  EXPECT_EQ(validated(before).growth_to(validated(longer)).kind, Growth::Kind::kOther)
+      << "models differ";
 }
 
 TEST(StudyTable, DamagedBytesCannotBeCompared) {
   const StudyTable damaged(std::string("\xff"), 1);
-  EXPECT_THROW(damaged.growth_to(judged(recipe_of_mu(listed("mu", {0.1})))), std::runtime_error);
+  EXPECT_THROW(damaged.growth_to(validated(recipe_of_mu(listed("mu", {0.1})))), std::runtime_error);
 }
 
 TEST(StudyTable, ComparesWithoutMakingTheTableOfAStudyThatRests) {
   const auto resting = stored(recipe_of_mu(range("mu", 0.1, 0.5, 5)), 5);
-  (void)resting.growth_to(judged(recipe_of_mu(listed("mu", {1, 2, 3, 4, 5}))));
+  (void)resting.growth_to(validated(recipe_of_mu(listed("mu", {1, 2, 3, 4, 5}))));
   EXPECT_FALSE(resting.is_made());
 }
 

@@ -44,7 +44,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
   socket.set(zmq::sockopt::rcvtimeo, 200);
   socket.connect(server_url);
   protocol::WorkerMessage hello;
-  protocol::say_protocol(*hello.mutable_hello());
+  protocol::set_protocol(*hello.mutable_hello());
   hello.mutable_hello()->set_solver_version(solver_version);
   hello.mutable_hello()->set_name("pretended");
   hello.mutable_hello()->set_threads(1);

@@ -120,7 +120,7 @@ TEST_F(StudyFlowTest, AnAnswerIsMadeOfAllChunksOfAQuery) {
   EXPECT_FALSE(pending());
   const ClientRequest more = requested().at(0);
   EXPECT_EQ(more.more_rows().request_id(), query.request_id());
-  EXPECT_EQ(more.more_rows().taken(), 1U);
+  EXPECT_EQ(more.more_rows().received(), 1U);
   reply(query.request_id(), chunk_of({5}, true));
   EXPECT_EQ(pending()->body, "1 2 5 ");
 }
