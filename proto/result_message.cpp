@@ -22,10 +22,10 @@ using solver::Member;
 using solver::PhaseKind;
 using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
-/// Longest text that a result may have, in bytes.
+/// Longest text in a result [bytes].
 constexpr std::size_t kLongestText = 65536;
 
-/// Scalars travel by type. What a result lacks has a value that no result has.
+/// Scalars are sent by type. A missing scalar has a value that no result can have.
 template <class T>
 T absent() {
   if constexpr (std::is_same_v<T, double>) {
@@ -51,7 +51,7 @@ void add_scalars(const CaseResult& result, Values& values) {
   });
 }
 
-/// Reads the scalars of type T, as far as there are any.
+/// Reads the scalars of type T; `values` may be shorter than the list.
 template <class T, class Values>
 void read_scalars(const Values& values, CaseResult& result) {
   int i = 0;
@@ -63,7 +63,7 @@ void read_scalars(const Values& values, CaseResult& result) {
   });
 }
 
-/// How one of solver::result_lists() travels: some members of each element, one after another.
+/// How one of solver::result_lists() is sent: some members of each element, one after another.
 struct SentList {
   const Numbers& (PointResult::*numbers)() const;
   Numbers* (PointResult::*mutable_numbers)();
@@ -81,7 +81,7 @@ void read_peak(CaseResult& result, const double* x) {
   result.peaks.push_back({x[0], x[1], x[2], false});
 }
 
-/// A phase begins where that before it ends.
+/// A phase begins where the previous one ends.
 void read_phase(CaseResult& result, const double* end_s) {
   auto& phases = result.phases;
   const auto kind = phases.size() % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution;
@@ -131,7 +131,7 @@ void read_lists(const PointResult& message, CaseResult& result) {
   }
 }
 
-/// What is wrong with a number, or an empty text.
+/// Why a number is invalid, or an empty text.
 std::string fault_of_number(std::string_view name, double number) {
   return std::abs(number) <= kLargestOutput
              ? ""
@@ -243,23 +243,23 @@ std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, 
   if (std::any_of(states.begin(), states.end(), [](char state) {
         return static_cast<unsigned char>(state) >= solver::kTraceStates.size();
       })) {
-    return "it has a state that no contact has";
+    return "it has an unknown state";
   }
   const auto touch = states.find_first_not_of(static_cast<char>(solver::kFallingCode));
   if (touch != std::string::npos &&
       states.find(static_cast<char>(solver::kFallingCode), touch) != std::string::npos) {
-    return "it falls again after the touch";
+    return "it has rows of the fall after the touch";
   }
   if (!with_fall && touch != 0 && !states.empty()) {
-    return "it has rows of the fall that were not requested";
+    return "it has rows of the fall, which were not requested";
   }
   if (!std::all_of(trace.values().begin(), trace.values().end(),
                    [](double value) { return std::isfinite(value); })) {
     return "it has a value that is not finite";
   }
-  // Above 1, `every` says how a trace that is too long gets short enough.
+  // With `every` above 1 the trace is too long and has no rows.
   if (states.empty() && trace.result().error().empty() && trace.every() <= 1) {
-    return "it has no instant";
+    return "it has no rows";
   }
   return fault_of(trace.result());
 }
@@ -283,7 +283,7 @@ std::string sent_outputs() {
 std::string hello_error(const WorkerHello& hello) {
   std::string error = version_error(hello.protocol_version(), "worker");
   if (error.empty() && hello.outputs() != sent_outputs()) {
-    return "its results have other outputs than those that are stored here: install the same "
+    return "its results have other outputs than this server stores: install the same "
            "release on both";
   }
   return error;

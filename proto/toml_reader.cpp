@@ -14,7 +14,8 @@
 namespace oblique::protocol {
 namespace {
 
-/// A value as the file has it; in a list or table, nested ones only by their kind.
+/// A value as written in the file. Inside a list or table, nested lists and tables appear as their
+/// kind only.
 std::string element(const toml::node& node, bool is_nested) {
   std::vector<std::string> parts;
   if (is_nested && (node.is_array() || node.is_table())) {
@@ -66,10 +67,10 @@ std::string toml_string(std::string_view text) {
 }
 
 toml::table TomlReader::parse(std::string_view text) const {
-  constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
+  constexpr std::size_t kLongestError = 150;  // messages of toml++ end with a key of any length
   constexpr std::size_t kMaxKeyParts = 100;
-  // Tables nest as deep as their keys have parts, and destroying them takes stack for each. Nothing
-  // is parsed: so many dots in a text without a comma or an equals sign count too.
+  // Tables nest as deep as their keys have parts, and their destructors recurse. This check runs
+  // before parsing, so dots in any text without a comma or an equals sign count too.
   std::size_t parts = 1;
   std::size_t line = 1;
   for (const char c : text) {
@@ -106,7 +107,7 @@ double TomlReader::number(std::string_view key, const toml::node& node,
   require(node.is_number(), key, node, expected);
   const auto value = node.value<double>();
   if (!value) {
-    fail(node, fmt::format("{} = {} has more digits than a number here keeps: write it with an "
+    fail(node, fmt::format("{} = {} has more digits than a number can hold: write it with an "
                            "exponent, as 1e18",
                            key, shown(node)));
   }

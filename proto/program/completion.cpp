@@ -11,8 +11,8 @@
 namespace oblique::protocol {
 namespace {
 
-// NAME stands for the program, CASES for the words that are offered. A key of CASES is a command,
-// or a command and a flag that takes a value.
+// NAME is replaced by the name of the program and CASES by the words to offer. A key of CASES is a
+// command, or a command and a flag that takes a value.
 constexpr std::string_view kBothShells = R"(_NAME_offers() {
   case $1 in
 CASES    *) return 1 ;;
@@ -89,11 +89,11 @@ std::string quoted(const std::string& text) {
   return "'" + replaced(text, "'", R"('\'')") + "'";
 }
 
-/// The name of a check that is never active and that help does not show: CLI11 keeps no other notes
-/// with options.
+/// Name of a check that is never active and that help does not show. CLI11 has no other place for
+/// notes about an option.
 constexpr const char* kChoices = "choices";
 
-/// The words that complete a value, each in quotes and after a space.
+/// The words that complete a value, each quoted and after a space.
 std::string values_of(CLI::Option& option, const ValueWords& words) {
   std::vector<std::string> values;
   for (const std::string& key : {option.get_name(), option.get_type_name()}) {
@@ -105,7 +105,7 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
     // The description of an inactive check is empty.
     values = CLI::detail::split(option.get_validator(kChoices)->active().get_description(), ' ');
     option.get_validator(kChoices)->active(false);
-  } catch (const CLI::OptionNotFound&) {  // no choices are noted
+  } catch (const CLI::OptionNotFound&) {  // the option has no choices
   }
   std::string offers;
   for (const std::string& value : values) {
@@ -114,7 +114,7 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
   return offers;
 }
 
-/// The cases of a command, which is reached by the words `path`, and of its commands.
+/// The cases of a command and its subcommands. `path` contains the words that lead to it.
 std::string cases_of(CLI::App& command, const std::string& path, const ValueWords& words) {
   std::string cases;
   std::string offers;

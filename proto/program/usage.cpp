@@ -17,7 +17,7 @@ std::string empty_value_error(const std::string& value) {
   return value.empty() ? "the value is empty" : "";
 }
 
-/// Names of the commands of a command or the program, and of its flags.
+/// Names of the flags and subcommands of `command`.
 std::vector<std::string> known_words(const CLI::App& command) {
   std::vector<std::string> words;
   for (const auto* each : command.get_subcommands([](const CLI::App*) { return true; })) {
@@ -35,7 +35,7 @@ std::vector<std::string> known_words(const CLI::App& command) {
 
 void refuse_empty_values(CLI::App& app) {
   for (auto* option : app.get_options()) {
-    // An option that may stand without a value has none then.
+    // The value of an option may be optional.
     if (option->get_items_expected_min() > 0) {
       option->check(empty_value_error);
     }
@@ -78,7 +78,7 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
   std::vector<std::string_view> commands;
   std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(commands),
                [](std::string_view word) { return !word.starts_with("-"); });
-  // An unexpected word is more helpful than the missing command or flag that it may be a slip of.
+  // Report an unknown word rather than the missing command or flag for which it may be a slip.
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_command = !commands.empty() && !first.starts_with("-");
@@ -87,11 +87,11 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
   }
   if (!commands.empty() && command.get_subcommands().empty() &&
       error.get_name() == "RequiredError") {
-    return "a command is required; there are " + joined(commands);
+    return "a command is missing; the commands are " + joined(commands);
   }
   const std::string message = error.what();
   if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {
-    return message.substr(0, at) + " is given more than once: give it once";
+    return message.substr(0, at) + " was given more than once: give it once";
   }
   return message;
 }

@@ -28,7 +28,7 @@ using Model = solver::ModelParameters;
 using Message = ModelParameters;
 using Field = std::tuple<double Model::*, double (Message::*)() const, void (Message::*)(double)>;
 
-/// Numbers of a model, and their places in its message.
+/// Numeric members of a model, and their fields in the message.
 constexpr std::array<Field, 12> kFields{{
     {&Model::E_Pa, &Message::e_pa, &Message::set_e_pa},
     {&Model::A_m2, &Message::a_m2, &Message::set_a_m2},
@@ -44,10 +44,10 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-/// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
+/// Maximum size of a recipe [bytes]; the frame for a worker also has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// The bytes for comparison.
+/// Encodes a block for comparison.
 std::string comparable_bytes(Block block) {
   block.DiscardUnknownFields();
   return block.SerializeAsString();
@@ -67,7 +67,7 @@ int number_of_name(std::string_view name, std::span<const std::string_view> name
                    std::string_view key) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
-    throw InputError(key, fmt::format("the {} \"{}\" is not known{}: it must be one of {}", key,
+    throw InputError(key, fmt::format("unknown {} \"{}\"{}: it must be one of {}", key,
                                       excerpt(name), did_you_mean(name, names), joined(names)));
   }
   return static_cast<int>(found - names.begin());
@@ -87,7 +87,7 @@ ModelParameters to_message(const solver::ModelParameters& model) {
 }
 
 solver::ModelParameters from_message_unchecked(const ModelParameters& message) {
-  // The struct has `int` and an enumeration, so the ranges are checked before the conversion.
+  // The struct has `int` and an enumeration, so ranges are checked before the conversion.
   solver::check_value(model_key("elements_per_link"), message.elements_per_link());
   solver::check_value(model_key("integrator"), message.integrator());
   solver::ModelParameters model;
@@ -107,7 +107,7 @@ solver::ModelParameters from_message(const ModelParameters& message) {
 }
 
 std::string canonical_model(const solver::ModelParameters& model) {
-  std::vector<std::string> lengths;  // + 0.0: both zeros have the same text
+  std::vector<std::string> lengths;  // + 0.0 gives both zeros the same text
   for (const double length_m : model.lengths_m) {
     lengths.push_back(exact_number(length_m + 0.0));
   }
@@ -143,9 +143,10 @@ void check_size(const Recipe& recipe) {
   const std::size_t bytes = recipe.ByteSizeLong();
   if (bytes > kLongestRecipe) {
     throw InputError(fmt::format(
-        "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
-        "values as ranges, or long columns of a CSV file as several studies; a value that is "
-        "listed takes 8 bytes",
+        "the recipe has {} bytes, and at most {} fit into a message to a worker: write long lists "
+        "of "
+        "values as ranges, or split long columns of a CSV file into several studies; a listed "
+        "value takes 8 bytes",
         bytes, kLongestRecipe));
   }
 }
@@ -159,7 +160,7 @@ std::string sha256_of(std::string_view bytes) {
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
   crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(bytes.data()),
                      bytes.size());
-  std::string text(2 * digest.size() + 1, '\0');  // libsodium ends it with a zero
+  std::string text(2 * digest.size() + 1, '\0');  // libsodium appends a zero
   sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
   text.pop_back();
   return text;
@@ -206,12 +207,12 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   const double tolerance = 1e-9 * std::max(1.0, steps);
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;
-    throw InputError(
-        key.name,
-        fmt::format("{}: step = {} does not lead from {} to {}: the value after {} would be {}; "
-                    "change `to` or the step, or give `count`",
-                    key.name, exact_number(step), exact_number(from), exact_number(to),
-                    solver::readable_number(below, 10), solver::readable_number(below + step, 10)));
+    throw InputError(key.name, fmt::format("{}: step = {} does not lead from {} to {}: the last "
+                                           "value before `to` is {} and the next {}; "
+                                           "change `to` or the step, or give `count`",
+                                           key.name, exact_number(step), exact_number(from),
+                                           exact_number(to), solver::readable_number(below, 10),
+                                           solver::readable_number(below + step, 10)));
   }
   return counted_axis(key, from, to, static_cast<std::int64_t>(whole_steps) + 1);
 }
@@ -279,7 +280,8 @@ solver::ModelParameters ModelInput::model() const {
       throw InputError(kLengths, std::string(kLengthsConflict));
     }
     if (lengths_m->empty()) {
-      throw InputError(kLengths, "lengths = [] is not allowed: give the lengths in m, one a link");
+      throw InputError(kLengths,
+                       "lengths = [] is not allowed: give the lengths in m, one per link");
     }
     solver::ParameterKey key = model_key("length");
     key.name = kLengths;
@@ -291,7 +293,7 @@ solver::ModelParameters ModelInput::model() const {
   for (const auto& [name, value] : values) {
     solver::check_value(model_key(name), value);
   }
-  // In the order of the listing: `links` must come before `length`.
+  // `links` must be applied before `length`, as in the listing.
   for (const auto& key : solver::model_keys()) {
     if (const auto value = values.find(key.name); value != values.end()) {
       key.set(model, value->second);
@@ -307,7 +309,7 @@ std::string study_name_error(const std::string& name) {
     return {};
   }
   return fmt::format(
-      "name = \"{}\" is not allowed: a study's name has 1 to {} bytes of UTF-8, no control "
+      "name = \"{}\" is not allowed: the name of a study has 1 to {} bytes of UTF-8, no control "
       "characters, marks of writing direction or zero-width characters, and does not begin with "
       "'-'",
       visible(name.substr(0, kMostBytes)), kMostBytes);
@@ -316,7 +318,7 @@ std::string study_name_error(const std::string& name) {
 std::string priority_error(std::int64_t priority) {
   return priority >= -1000 && priority <= 1000
              ? ""
-             : fmt::format("priority = {} is not allowed: {} is", priority, kPriorities);
+             : fmt::format("priority = {} is not allowed: it must be {}", priority, kPriorities);
 }
 
 }  // namespace oblique::protocol

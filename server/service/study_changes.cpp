@@ -47,7 +47,7 @@ ReadRequest read_request(std::string_view frame, bool validates_points) {
     protocol::Recipe& recipe = *read.request.mutable_submit()->mutable_recipe();
     protocol::check_size(recipe);
     auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
-    read.needs_point_validation = table->needs_point_validation() && !validates_points;
+    read.needs_point_validation = table->has_points_to_validate() && !validates_points;
     if (validates_points) {
       table->validate_points();
     }

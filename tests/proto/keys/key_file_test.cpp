@@ -137,7 +137,7 @@ TEST_F(KeyFileTest, NamesFileLineAndKeyOfAFaultAndShowsNoSecret) {
            {"\"worker\"", "\"boss\"", ":1:", "`role` must be \"server\", \"client\", \"worker\""},
            {"\"w\"", "\"../w\"", ":2:", "`name`"},
            {"public", "pubic", ":3:", "did you mean `public`"},
-           {secret, other, ":4:", "not the other half"},
+           {secret, other, ":4:", "does not belong to `public`"},
            {"secret", " secret", ":4:", "must begin its line"},
            {"server = ", "#", ":1:", "`server` is missing"},
            {"server = ", "server = 3 #", ":5:", "`server` must be a text"},
@@ -308,7 +308,7 @@ TEST_F(AuthorizedKeysTest, NamesTheLineOfAnEntryThatIsWrongOrThereTwice) {
   AuthorizedKey same_key = a;
   same_key.name = "b";
   for (const auto& [text, line, says] : std::vector<std::array<std::string, 3>>{
-           {entry(a) + entry(key_called("a")), "6", "called a already"},
+           {entry(a) + entry(key_called("a")), "6", "already has a key called a"},
            {entry(a) + entry(same_key), "6", "there already, called a"},
            {entry(a) + "expires = 3\n", "6", "unknown key `expires`"},
            {entry(a) + "[", "6", ""},

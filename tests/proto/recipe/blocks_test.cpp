@@ -229,7 +229,7 @@ Block with_k(const std::string& k, std::uint64_t points, const std::string& wher
 TEST(FilterTest, PointsThatAreLeftOutKeepTheirNumbersAndOtherBlocksTheirPoints) {
   const PointTable table(recipe_of_blocks({grid("mu > 1.9 * e"), grid(""), grid("mu < 0.05")}));
   EXPECT_EQ(table.size(), 66U);
-  EXPECT_TRUE(table.has_filter() && table.needs_point_validation());
+  EXPECT_TRUE(table.has_filter() && table.has_points_to_validate());
   EXPECT_EQ(left_in(table).size(), 1U + 22U + 2U);
   EXPECT_EQ(table.point(20).mu, 1.0);
   EXPECT_EQ(table.first_passing(0, 66), 20U);
@@ -238,7 +238,7 @@ TEST(FilterTest, PointsThatAreLeftOutKeepTheirNumbersAndOtherBlocksTheirPoints) 
   EXPECT_EQ(table.first_passing(0, 10), 10U);
   EXPECT_THROW(static_cast<void>(table.passes_filter(66)), std::out_of_range);
   const PointTable plain(recipe_of_blocks({grid("")}));
-  EXPECT_FALSE(plain.needs_point_validation() || plain.has_filter());
+  EXPECT_FALSE(plain.has_points_to_validate() || plain.has_filter());
 }
 
 TEST(FilterTest, UsesExpressionsTheModelAndPointsOfZipsAndSamples) {
