@@ -347,7 +347,7 @@ void PointTable::add_block(const Block& block) {
     throw InputError(
         fmt::format("the study has more than {} expressions and filters", kMaxExpressions));
   }
-  check_points(points_ + added.points);
+  check_point_count(points_ + added.points);
   added.needs_point_validation = needs_point_validation(base_model_, block);
   added.first_point = points_;
   const bool has_base_model = model_axes(block).empty();

@@ -13,24 +13,24 @@
 namespace oblique::server {
 namespace {
 
-/// Why a running study makes no progress; empty: it does.
+/// Why a running study makes no progress, or an empty text.
 std::string reason_to_wait(const Core& core, const StudyCounts& counts, const Reuse& reuse) {
   const WriteLedger& ledger = core.ledger;
   if (ledger.is_gone()) {
     return ledger.fault();
   }
   if (!ledger.fault().empty()) {
-    return "the database, which takes no results: " + ledger.fault();
+    return "the database, which accepts no results: " + ledger.fault();
   }
   if (ledger.is_slow()) {
-    return fmt::format("the database, which stored nothing for over {} s",
+    return fmt::format("the database, which has stored nothing for over {} s",
                        WriteLedger::kSlowAfter_s);
   }
   if (reuse.lookup) {
-    return fmt::format("the lookup of results of other studies, {} reused so far", reuse.points);
+    return fmt::format("the lookup of results of other studies ({} reused so far)", reuse.points);
   }
   if (counts.is_of_other_solver) {
-    return fmt::format("a server with solver version {}, that of its results",
+    return fmt::format("a server with solver version {}, which solved its results",
                        counts.solver_version);
   }
   if (counts.leased == 0 && core.scheduler.sets_all_aside()) {
