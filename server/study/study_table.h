@@ -34,7 +34,7 @@ class StudyTable {
  public:
   StudyTable() = default;
   /// From the table of a recipe that passed `validate_points`.
-  StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: as good as the other
+  StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: implicit on purpose
   /// From the bytes and the number of points of a stored recipe, which was validated before.
   StudyTable(std::string recipe_bytes, std::uint64_t points);
 
