@@ -16,7 +16,7 @@ namespace oblique::protocol {
 inline constexpr double kLargestOutput = 1e100;
 /// Maximum number of elements of a list in a result, such as peaks. Real results have dozens.
 inline constexpr int kMaxListElements = 4096;
-/// Maximum number of ranges of excluded points in one message.
+/// Maximum number of ranges of left-out points in one message.
 inline constexpr int kMaxLeftOutRanges = 10'000;
 /// Maximum size of a result [bytes].
 inline constexpr std::size_t kMaxResultBytes = std::size_t{1} << 20U;
@@ -56,12 +56,12 @@ std::string sent_outputs();
 /// results have other outputs.
 std::string hello_error(const WorkerHello& hello);
 
-/// Number of points that are solved, failed or excluded by a filter.
+/// Number of points that are solved, failed or left out by a filter.
 inline std::uint64_t completed_points(const StudyStatus& study) {
   return study.solved() + study.failed() + study.left_out();
 }
 
-/// Number of all other points. The filter may still exclude some of them.
+/// Number of all other points. The filter may still leave out some of them.
 inline std::uint64_t open_points(const StudyStatus& study) {
   return study.points() - completed_points(study);
 }

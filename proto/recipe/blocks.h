@@ -91,7 +91,7 @@ std::span<const Axis* const> point_axes(const Block& block);
 /// Whether an axis of a sample is drawn: it has a distribution or several values.
 bool is_drawn(const Axis& axis);
 
-/// Number of points of a checked block, including those that its filter excludes. Throws
+/// Number of points of a checked block, including those that its filter leaves out. Throws
 /// solver::InputError above `kMaxPoints`.
 std::uint64_t points_of_block(const Block& block);
 

@@ -457,7 +457,7 @@ void PointTable::validate_points() const {
       if (block.needs_point_validation &&
           for_each_or_some(block.points, most, most, number, validate) && !leaves_any_in) {
         in_expression("where", block.definition().where(),
-                      [] { throw InputError("it excludes all points"); });
+                      [] { throw InputError("it leaves out all points"); });
       }
     });
   }

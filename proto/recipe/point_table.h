@@ -37,7 +37,7 @@ struct Segment {
 /// The points and models of one block.
 struct BlockPlace {
   std::uint64_t first_point = 0;
-  std::uint64_t points = 0;  ///< including those that the filter excludes
+  std::uint64_t points = 0;  ///< including those that the filter leaves out
   std::uint64_t first_model = 0;
   std::uint64_t models = 0;
   bool needs_point_validation = false;  ///< see blocks.h
@@ -60,11 +60,11 @@ class PointTable {
   const Recipe& recipe() const { return *recipe_; }
   /// Whether the study requests estimated errors.
   bool wants_errors() const { return recipe_->errors(); }
-  std::uint64_t size() const { return points_; }  ///< including points that filters exclude
+  std::uint64_t size() const { return points_; }  ///< including points that filters leave out
   std::uint64_t models() const { return models_; }
 
   bool has_filter() const { return has_filter_; }
-  /// Whether the filter includes the point. A condition that is NaN excludes it.
+  /// Whether the filter includes the point. A condition that is NaN leaves out it.
   bool passes_filter(std::uint64_t index) const;
   /// The first point of [begin, end) that passes the filters, or `end`.
   std::uint64_t first_passing(std::uint64_t begin, std::uint64_t end) const;
@@ -73,8 +73,8 @@ class PointTable {
   bool has_points_to_validate() const { return blocks_to_validate_ > 0; }
   /// Checks blocks with values or filters that can only be checked point by point: all of their
   /// points, or `kMostValidated` random ones in all (about 0.1 s). Throws solver::InputError, with
-  /// block and point, for a value that is not allowed and for a filter that excludes all points of
-  /// its block. A point with a wrong value that was not checked fails later (`fault`).
+  /// block and point, for a value that is not allowed and for a filter that leaves out all points
+  /// of its block. A point with a wrong value that was not checked fails later (`fault`).
   void validate_points() const;
   static constexpr std::uint64_t kMaxValidated = 100'000;
 

@@ -433,7 +433,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   if (reports_foreign_points(event)) {
     remove_worker(event.worker, WorkerEnd::kLost);
     effects_.emplace_back(DropWorker{
-        event.worker, "it reports that a filter excludes points which it did not lease"});
+        event.worker, "it reports that a filter leaves out points which it did not lease"});
     return;
   }
   StoreResults store{event.worker, event.study, event.sequence, {}};
@@ -475,7 +475,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   release_if_answered(twin);
 }
 
-/// Whether the message excludes points that are in no lease of the worker.
+/// Whether the message leaves out points that are in no lease of the worker.
 bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   const auto lease = leases_.find(event.lease);
   if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {
@@ -508,7 +508,7 @@ void Scheduler::update_pace(Worker& worker, const ResultsReceived& event) {
   };
   Pace& known = worker.paces[event.study];
   learn(known.busy_s, known.points, points);
-  // A message with excluded points only does not show how long a point takes.
+  // A message with left-out points only does not show how long a point takes.
   if (solved > 0.0) {
     learn(known.solved_busy_s, known.solved, solved);
     pace_s_ = kPaceFades * pace_s_ + event.busy_s;

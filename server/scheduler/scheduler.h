@@ -23,9 +23,9 @@ namespace oblique::server {
 /// Counts of the points of a study.
 struct StudyCounts {
   std::uint64_t points;
-  std::uint64_t completed;  ///< including failed and excluded points
+  std::uint64_t completed;  ///< including failed and left-out points
   std::uint64_t failed;
-  std::uint64_t left_out;  ///< excluded by a filter, as far as workers have reported
+  std::uint64_t left_out;  ///< left out by a filter, as far as workers have reported
   std::uint64_t leased;
   bool cancelled;
   std::string solver_version;  ///< of its results; empty without results

@@ -78,14 +78,14 @@ struct PointOutcome {
 struct StudyAdded {
   StudyId study;
   StudyTable table;
-  IntervalSet completed;     ///< points with a row, or excluded by a filter
+  IntervalSet completed;     ///< points with a row, or left out by a filter
   std::uint64_t failed = 0;  ///< number of completed points that failed
   bool cancelled = false;
   bool paused = false;
   std::int32_t priority = 0;
   std::string solver_version{};  ///< of its results; empty without results
   bool held = false;
-  std::uint64_t left_out = 0;  ///< number of completed points that a filter excludes
+  std::uint64_t left_out = 0;  ///< number of completed points that a filter leaves out
 };
 /// A held study gets no leases, whatever its state.
 struct StudyHeld {
@@ -146,7 +146,7 @@ struct ResultsReceived {
   bool batch_done;
   double busy_s;
   std::vector<PointOutcome> outcomes;
-  IntervalSet left_out{};  ///< points of the lease that a filter excludes
+  IntervalSet left_out{};  ///< points of the lease that a filter leaves out
 };
 /// A StoreResults or StoreFailure effect is durable.
 struct ResultsStored {
@@ -219,7 +219,7 @@ struct StoreResults {
   StudyId study;
   std::uint64_t sequence;
   std::vector<std::size_t> accepted;  ///< indices into the event's outcomes
-  IntervalSet left_out{};             ///< points that a filter excludes
+  IntervalSet left_out{};             ///< points that a filter leaves out
 };
 /// Store the failure of the point, then feed ResultsStored (worker 0).
 struct StoreFailure {

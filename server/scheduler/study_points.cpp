@@ -387,7 +387,7 @@ void StudyPoints::check_invariants() const {
     throw std::logic_error("the number of returned points is wrong");
   }
   if (left_out_ > completed_.size()) {
-    throw std::logic_error("a filter excludes more points than are completed");
+    throw std::logic_error("a filter leaves out more points than are completed");
   }
 }
 

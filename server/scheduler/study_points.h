@@ -51,11 +51,11 @@ struct Batch {
 /// intervals, not of points. Intervals, here and in Batch, consist of places: the first lease
 /// orders the points so that those with the same fall follow each other.
 ///
-/// Points that a filter excludes are leased like all others. The worker reports them, and they are
-/// completed without a row.
+/// Points that a filter leaves out are leased like all others. The worker reports them, and they
+/// are completed without a row.
 class StudyPoints {
  public:
-  /// `completed` contains the points that are already completed, `left_out` of them excluded by a
+  /// `completed` contains the points that are already completed, `left_out` of them left out by a
   /// filter. Does not make the table of a complete study.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
@@ -96,12 +96,12 @@ class StudyPoints {
   /// not in the study.
   bool receive(std::uint64_t point);
 
-  /// The same for excluded points. Returns those that are committing now.
+  /// The same for left-out points. Returns those that are committing now.
   IntervalSet receive(const IntervalSet& left_out);
 
   /// Completes a point whose result is durable. False if it was not committing.
   bool complete(std::uint64_t point);
-  /// Completes those of these excluded points that are committing.
+  /// Completes those of these left-out points that are committing.
   void complete(const IntervalSet& left_out);
 
   /// Appends fresh points to the study; `table` contains all points.
@@ -125,14 +125,14 @@ class StudyPoints {
     return returned(suspicion).begin()->second.returned_ms;
   }
   bool is_complete() const { return completed() >= size(); }
-  /// Whether some point has a result, durable or being written. Excluded points have none.
+  /// Whether some point has a result, durable or being written. Left-out points have none.
   bool has_results() const {
     return completed() + committing_.size() > left_out_ + committing_left_out_;
   }
 
   std::uint64_t free() const { return fresh_.size() + returned_points_; }
   std::uint64_t completed() const { return completed_.size(); }
-  std::uint64_t left_out() const { return left_out_; }  ///< excluded by a filter; all completed
+  std::uint64_t left_out() const { return left_out_; }  ///< left out by a filter; all completed
   std::uint64_t leased() const { return leased_.size(); }
   /// The leased places.
   const IntervalSet& leased_set() const { return leased_; }
@@ -174,7 +174,7 @@ class StudyPoints {
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet completed_;
-  std::uint64_t left_out_;  // number of completed points that a filter excludes
+  std::uint64_t left_out_;  // number of completed points that a filter leaves out
   std::uint64_t committing_left_out_ = 0;
   std::uint64_t returned_points_ = 0;  // of any suspicion
 };

@@ -85,7 +85,7 @@ protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is
                                   ? fmt::format("the study has no point {}: its points are 0 to {}",
                                                 point, table->size() - 1)
                               : !table->passes_filter(point)
-                                  ? fmt::format("point {} is excluded by the study's filter", point)
+                                  ? fmt::format("point {} is left out by the study's filter", point)
                                   : table->fault(point);
     if (!error.empty()) {
       return error_reply(error);

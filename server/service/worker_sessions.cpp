@@ -28,7 +28,7 @@ std::string plain(const std::string& text) {
   return kept;
 }
 
-/// The excluded points in a message; nothing if its ranges are invalid.
+/// The left-out points in a message; nothing if its ranges are invalid.
 std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   IntervalSet points;
   if (message.left_out_size() % 2 != 0 ||

@@ -92,7 +92,7 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  IntervalSet left_out{};         ///< excluded points, which are completed without a row
+  IntervalSet left_out{};         ///< left-out points, which are completed without a row
   std::size_t message_bytes = 0;  ///< size of the worker's message
 };
 

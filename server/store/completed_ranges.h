@@ -13,7 +13,7 @@ namespace oblique::server {
 IntervalSet completed_points(sqlite3* database, std::uint64_t study_id);
 
 /// Recomputes the completed points of each study with `counted` = 0 as the points with a row.
-/// Excluded points become open and a worker examines them again. To be called in a transaction.
+/// Left-out points become open and a worker examines them again. To be called in a transaction.
 /// Throws StorageError.
 void count_completed_points(sqlite3* database);
 

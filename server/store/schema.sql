@@ -13,7 +13,7 @@ CREATE TABLE studies (
   study_id     INTEGER PRIMARY KEY AUTOINCREMENT CHECK (study_id BETWEEN 1 AND 1000000000000), -- number of the study; never reused
   name         TEXT NOT NULL UNIQUE, -- name of the study
   recipe       BLOB NOT NULL,        -- oblique.protocol.Recipe, serialised: point i is a function of it
-  points       INTEGER NOT NULL CHECK (points > 0), -- number of points, including those that `where` excludes
+  points       INTEGER NOT NULL CHECK (points > 0), -- number of points, including those that `where` leaves out
   errors       INTEGER NOT NULL,     -- 1: the recipe requests estimated errors
   state        TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- running, paused, cancelled or done
   created_at   TEXT NOT NULL,        -- UTC, ISO 8601
@@ -21,7 +21,7 @@ CREATE TABLE studies (
   priority     INTEGER NOT NULL DEFAULT 0, -- studies of a higher priority come first
   submitted_by TEXT,                 -- name of the key that first submitted it; NULL: without keys
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, so `completed_ranges` must be computed again
-  left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` excludes
+  left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` leaves out
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results of other studies has not ended
   checksum     INTEGER               -- CRC-32 of study_id, recipe, points, errors and created_at; NULL after a change by hand
 ) STRICT;
@@ -97,7 +97,7 @@ CREATE TABLE results (
   PRIMARY KEY (study_id, point)
 ) STRICT, WITHOUT ROWID;
 
--- Completed points as ranges: points with a row, and points that `where` excludes.
+-- Completed points as ranges: points with a row, and points that `where` leaves out.
 CREATE TABLE completed_ranges (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
   first_point INTEGER NOT NULL, -- first point of the range

@@ -31,7 +31,7 @@ struct StoredStudy {
   IntervalSet failures;        ///< completed points that failed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
   bool reuses = false;         ///< the lookup of results of other studies has not ended
-  std::uint64_t left_out = 0;  ///< number of completed points that `where` excludes
+  std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out
   std::map<std::string, std::uint64_t> reused{};  ///< number of reused results by source study
 };
 

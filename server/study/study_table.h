@@ -38,7 +38,7 @@ class StudyTable {
   /// From the bytes and the number of points of a stored recipe, which was validated before.
   StudyTable(std::string recipe_bytes, std::uint64_t points);
 
-  /// Number of points, including excluded ones.
+  /// Number of points, including left-out ones.
   std::uint64_t size() const { return shared_->points; }
   /// Encoded oblique.protocol.Recipe.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }

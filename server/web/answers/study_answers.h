@@ -22,8 +22,8 @@ namespace oblique::server {
 
 /// A study, as reported by the service.
 struct ServedStudy {
-  /// Whether the filter excludes a point without a row. In a done study it does, because the worker
-  /// decided, whose values may differ from ours in the last digit.
+  /// Whether the filter leaves out a point without a row. In a done study it does, because the
+  /// worker decided, whose values may differ from ours in the last digit.
   bool leaves_out(std::uint64_t point) const {
     return table->has_filter() && (state == "done" || !table->passes_filter(point));
   }
@@ -65,7 +65,7 @@ PendingAnswer study_flow(ServiceClient& service, std::uint64_t study,
 
 /// The recipe of a study and the columns of its results.
 PendingAnswer study_answer(ServiceClient& service, std::uint64_t study);
-/// The inputs of a point according to the recipe, and whether the filter excludes it if it has no
+/// The inputs of a point according to the recipe, and whether the filter leaves out it if it has no
 /// row.
 PendingAnswer point_answer(ServiceClient& service, std::uint64_t study, std::uint64_t point);
 /// Values of one column over one or two axes of a grid.
