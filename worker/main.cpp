@@ -126,7 +126,7 @@ int run_worker(SessionSettings settings, std::uint64_t fall_memory_bytes, pid_t 
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!oblique::protocol::stop_with_parent(parent)) {
-    spdlog::warn("the parent process was gone before this one began");
+    spdlog::warn("the parent process ended before this one started");
     return oblique::protocol::kDone;
   }
   if (fall_memory_bytes == 0) {

@@ -34,7 +34,7 @@ TEST(FramesTest, AMessageComesBackFromItsFrame) {
   EXPECT_EQ(received.SerializeAsString(), sent.SerializeAsString());
 }
 
-TEST(FramesTest, ATruncatedFrameIsNeverTakenForTheWholeMessage) {
+TEST(FramesTest, ATruncatedFrameIsNotTheWholeMessage) {
   const std::string frame = encode(results_message());
   int refused = 0;
   for (std::size_t length = 0; length < frame.size(); ++length) {
@@ -49,12 +49,12 @@ TEST(FramesTest, ATruncatedFrameIsNeverTakenForTheWholeMessage) {
   EXPECT_EQ(refused, static_cast<int>(frame.size()) - 1);
 }
 
-TEST(FramesTest, TextIsForeign) {
+TEST(FramesTest, TextIsNoMessage) {
   WorkerMessage received;
   EXPECT_FALSE(decode("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", received));
 }
 
-TEST(FramesTest, AMessageAroundAnEncodedRecipeIsThatOfTheRecipe) {
+TEST(FramesTest, EncodingAroundAnEncodedRecipeEqualsEncodingTheWholeMessage) {
   StudyDefinition message;
   message.set_study_id(300);
   const StudyDefinition rest = message;
@@ -73,7 +73,7 @@ TEST(FramesTest, TextThatIsNotUtf8IsRefused) {
   EXPECT_FALSE(decode(frame, received));
 }
 
-TEST(FramesTest, TheLongestFrameIsReadAndNoLongerOne) {
+TEST(FramesTest, TheLongestFrameIsReadAndALongerOneIsNot) {
   constexpr std::size_t kHead = 5;  // a tag, and a length of four bytes
   Notice notice;
   notice.set_text(std::string(kMaxFrameBytes - kHead, 'x'));
@@ -103,7 +103,7 @@ ClientRequest submission() {
   return request;
 }
 
-TEST(FrameScanTest, WhatASoundWorkerSendsPasses) {
+TEST(FrameScanTest, FramesOfCorrectWorkersPass) {
   EXPECT_TRUE(is_worker_frame_within_limits(results_of(1000)));
   EXPECT_TRUE(is_worker_frame_within_limits(""));
   WorkerMessage long_text;
@@ -112,12 +112,12 @@ TEST(FrameScanTest, WhatASoundWorkerSendsPasses) {
   EXPECT_TRUE(is_worker_frame_within_limits(encode(long_text)));
 }
 
-TEST(FrameScanTest, MoreResultsThanAMessageHoldsAreTooMany) {
+TEST(FrameScanTest, AMessageWithTooManyResultsIsRefused) {
   EXPECT_TRUE(is_worker_frame_within_limits(results_of(kMaxResultsAMessage)));
   EXPECT_FALSE(is_worker_frame_within_limits(results_of(kMaxResultsAMessage + 1)));
 }
 
-TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedButForTheRowsOfATrace) {
+TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedUnlessItIsATrace) {
   EXPECT_FALSE(is_worker_frame_within_limits(std::string(kMaxWorkerFrameBytes + 1, '\xff')));
   WorkerMessage message;
   Trace& trace = *message.mutable_trace();
@@ -151,7 +151,7 @@ TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
   EXPECT_FALSE(is_unpadded_request(std::string("\x1a\x7f", 2))) << "cut off";
 }
 
-TEST(FrameScanTest, TheRecipeOfAFileIsJudgedAsThatOfARequest) {
+TEST(FrameScanTest, ARecipeInAFileIsCheckedLikeOneInARequest) {
   Recipe recipe = submission().submit().recipe();
   EXPECT_TRUE(is_unpadded_recipe(recipe.SerializeAsString()));
   for (int i = 0; i < 20; ++i) {
@@ -168,7 +168,7 @@ TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
   EXPECT_EQ(request_id_of("\xff\xff"), 0U);
 }
 
-TEST(FrameScanTest, NoTruncationOrForeignByteIsReadBeyondTheEnd) {
+TEST(FrameScanTest, TruncatedAndForeignFramesAreNotReadBeyondTheirEnd) {
   const std::string frame = encode(submission());
   for (std::size_t length = 0; length <= frame.size(); ++length) {
     for (const char foreign : {'\x00', '\x0f', '\x7f', '\xff'}) {

@@ -69,7 +69,7 @@ class KeyFileTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
+TEST(CurveKeyTest, AreFormattedAsByLibzmq) {
   const KeyPair pair = generate_key_pair();
   const std::string secret = z85(pair.secret_key.bytes());
   char text[kKeyCharacters + 1];
@@ -81,7 +81,7 @@ TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
   EXPECT_EQ(public_key_of(pair.secret_key), pair.public_key);
 }
 
-TEST(CurveKeyTest, AreNotReadFromTextThatIsNone) {
+TEST(CurveKeyTest, AreNotParsedFromInvalidText) {
   const std::string good = z85(generate_key_pair().public_key);
   EXPECT_FALSE(parse_z85(""));
   EXPECT_FALSE(parse_z85(good.substr(1)));
@@ -91,7 +91,7 @@ TEST(CurveKeyTest, AreNotReadFromTextThatIsNone) {
   EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
 }
 
-TEST_F(KeyFileTest, IsReadAsItWasWrittenAndIsForItsOwnerAlone) {
+TEST_F(KeyFileTest, IsReadAsWrittenAndOnlyItsOwnerMayReadIt) {
   const KeyFile server{Role::kServer, "server", generate_key_pair(), std::nullopt};
   for (const KeyFile& key : {worker_key(), server}) {
     const std::string path = folder_.file(key.name);
@@ -118,7 +118,7 @@ TEST_F(KeyFileTest, IsNeverOverwrittenNorWrittenThroughALink) {
   EXPECT_FALSE(std::filesystem::exists(folder_.file("elsewhere")));
 }
 
-TEST_F(KeyFileTest, IsRefusedWhenOthersMayReadItWithTheCommandThatMendsIt) {
+TEST_F(KeyFileTest, IsRefusedWithTheRemedyWhenOthersMayReadIt) {
   for (const mode_t mode : {0640U, 0604U, 0666U}) {
     const std::string path = written(text_of(worker_key()), mode);
     EXPECT_THAT(message_of([&] { read_key_file(path); }),
@@ -129,7 +129,7 @@ TEST_F(KeyFileTest, IsRefusedWhenOthersMayReadItWithTheCommandThatMendsIt) {
   EXPECT_NO_THROW(read_key_file(folder_.file("some.key")));
 }
 
-TEST_F(KeyFileTest, NamesFileLineAndKeyOfAFaultAndShowsNoSecret) {
+TEST_F(KeyFileTest, ErrorsHaveFileLineAndKeyAndNoSecret) {
   const KeyFile key = worker_key();
   const std::string other = z85(generate_key_pair().secret_key.bytes());
   const std::string secret = z85(key.pair.secret_key.bytes());
@@ -181,7 +181,7 @@ void expect_no_copy_in_a_core_dump(const SecretKey& key) {
       test::is_in_a_core_dump({reinterpret_cast<const char*>(key.data()), key.bytes().size()}));
 }
 
-TEST_F(KeyFileTest, IsReadIntoLockedMemoryThatIsNotInACoreDump) {
+TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   if (!test::kAllMemoryMayBeRead) {
     GTEST_SKIP() << "a sanitizer objects to reading all memory";
   }
@@ -246,7 +246,7 @@ TEST_F(AuthorizedKeysTest, FindsKeysByKeyAndByNameUntilTheyAreRemoved) {
   EXPECT_EQ(keys.find(generate_key_pair().public_key), nullptr);
 }
 
-TEST_F(AuthorizedKeysTest, NothingChangesWhenAChangeIsRefused) {
+TEST_F(AuthorizedKeysTest, ARefusedChangeChangesNothing) {
   const AuthorizedKey key = key_called("worker");
   add(key);
   const std::string before = text();
@@ -261,7 +261,7 @@ TEST_F(AuthorizedKeysTest, NothingChangesWhenAChangeIsRefused) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1);
 }
 
-TEST_F(AuthorizedKeysTest, ManyAtOnceLoseNothing) {
+TEST_F(AuthorizedKeysTest, ConcurrentChangesLoseNothing) {
   constexpr int kAdders = 4;
   constexpr int kKeysOfEach = 25;
   std::vector<std::thread> adders;
@@ -278,7 +278,7 @@ TEST_F(AuthorizedKeysTest, ManyAtOnceLoseNothing) {
   EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(kAdders * kKeysOfEach));
 }
 
-TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedWhereEverybodyMayWriteOrReplaceIt) {
+TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedIfEveryUserMayWriteOrReplaceIt) {
   add(key_called("a"));
   chmod(path_.c_str(), 0640);
   add(key_called("b"));
@@ -294,7 +294,7 @@ TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedWhereEverybodyMayWriteOrRepla
   EXPECT_THAT(error_of(text()), AllOf(HasSubstr("chmod o-w"), HasSubstr(path_ + " has mode 0666")));
 }
 
-TEST_F(AuthorizedKeysTest, IsChangedWhereALinkLeads) {
+TEST_F(AuthorizedKeysTest, AChangeThroughALinkChangesItsTarget) {
   const std::string real = folder_.file("real.toml");
   std::ofstream{real};
   std::filesystem::create_symlink("real.toml", path_);
@@ -303,13 +303,13 @@ TEST_F(AuthorizedKeysTest, IsChangedWhereALinkLeads) {
   EXPECT_THAT(read_authorized_keys(real).all(), SizeIs(1));
 }
 
-TEST_F(AuthorizedKeysTest, NamesTheLineOfAnEntryThatIsWrongOrThereTwice) {
+TEST_F(AuthorizedKeysTest, ErrorsNameTheLineOfAnInvalidOrRepeatedEntry) {
   const AuthorizedKey a = key_called("a");
   AuthorizedKey same_key = a;
   same_key.name = "b";
   for (const auto& [text, line, says] : std::vector<std::array<std::string, 3>>{
            {entry(a) + entry(key_called("a")), "6", "already has a key called a"},
-           {entry(a) + entry(same_key), "6", "there already, called a"},
+           {entry(a) + entry(same_key), "6", "already has the public key"},
            {entry(a) + "expires = 3\n", "6", "unknown key `expires`"},
            {entry(a) + "[", "6", ""},
            {entry(key_called("s", Role::kServer)), "3", "`role`"},
@@ -347,7 +347,7 @@ TEST_F(KeyFolderTest, HasAServerAndOneListedKeyOfEachOtherRole) {
   }
 }
 
-TEST_F(KeyFolderTest, IsNotMadeOverFilesThatExistAndThenChangesNothing) {
+TEST_F(KeyFolderTest, IsNotCreatedOverExistingFilesAndChangesNothing) {
   std::filesystem::create_directory(keys_);
   std::ofstream(keys_ + "/worker.key") << "precious";
   EXPECT_THROW(make_key_folder(keys_), std::runtime_error);
@@ -360,7 +360,7 @@ TEST_F(KeyFolderTest, IsNotMadeOverFilesThatExistAndThenChangesNothing) {
   EXPECT_EQ(files(), 5);
 }
 
-TEST_F(KeyFolderTest, TakesFurtherKeysWithAFileOrOnlyTheirPublicHalf) {
+TEST_F(KeyFolderTest, FurtherKeysAreAddedWithAFileOrByTheirPublicKey) {
   make_key_folder(keys_);
   const AuthorizedKey alice = add_key(keys_, "alice", Role::kClient, std::nullopt);
   EXPECT_EQ(read_key_file(key_file_in(keys_, "alice")).pair.public_key, alice.public_key);
@@ -372,7 +372,7 @@ TEST_F(KeyFolderTest, TakesFurtherKeysWithAFileOrOnlyTheirPublicHalf) {
   EXPECT_EQ(listed.find(alice.public_key)->role, Role::kClient);
 }
 
-TEST_F(KeyFolderTest, ListsNoKeyWhoseFileCannotBeWrittenAndWritesNoneThatCannotBeListed) {
+TEST_F(KeyFolderTest, AKeyIsNeitherListedWithoutItsFileNorWrittenWithoutBeingListed) {
   make_key_folder(keys_);
   std::ofstream(keys_ + "/alice.key") << "precious";
   EXPECT_THROW(add_key(keys_, "alice", Role::kClient, std::nullopt), std::runtime_error);

@@ -86,7 +86,7 @@ class ConfigurationTest : public testing::Test {
   std::vector<std::string> variables_;
 };
 
-TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
+TEST_F(ConfigurationTest, FlagsOverrideTheEnvironmentWhichOverridesTheFile) {
   const std::string file = write(
       "db = \"file.db\"\nport = 1\nloud = true\n"
       "listen = [\"127.0.0.1\", \"::1\"]\n[limits]\nconnections = 3\n");
@@ -110,7 +110,7 @@ TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
   EXPECT_EQ(options_.listen, std::vector<std::string>{"::2"}) << "a flag replaces the list";
 }
 
-TEST_F(ConfigurationTest, TheFileIsThatOfTheFlagOrOfTheEnvironmentOrTheDefaultOne) {
+TEST_F(ConfigurationTest, TheFileComesFromTheFlagOrTheEnvironmentOrIsTheDefault) {
   write("port = 1\n", "default.toml");
   EXPECT_EQ(parse({}), std::nullopt);
   EXPECT_EQ(options_.port, 1);
@@ -124,7 +124,7 @@ TEST_F(ConfigurationTest, TheFileIsThatOfTheFlagOrOfTheEnvironmentOrTheDefaultOn
   expect_refused({}, "gone.toml");
 }
 
-TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
+TEST_F(ConfigurationTest, NoConfigIgnoresFilesAndEnvironment) {
   write("port = 1\n", "default.toml");
   set("TEST_PROGRAM_DB", "environment.db");
   set("TEST_KEYS", "a.key");
@@ -136,7 +136,7 @@ TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
                  "--config excludes --no-config");
 }
 
-TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
+TEST_F(ConfigurationTest, ReadingThePrintedSettingsGivesTheSameSettings) {
   EXPECT_EQ(parse({}), std::nullopt);
   EXPECT_EQ(parse({"--config", write(printed_)}), std::nullopt) << told_ << printed_;
   EXPECT_EQ(options_.db, "default.db");
@@ -156,7 +156,7 @@ TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
   EXPECT_EQ(options_.connections, 6);
 }
 
-TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
+TEST_F(ConfigurationTest, ErrorsInTheFileHaveTheirLine) {
   const auto refuse = [this](const std::string& text, const std::string& sentence) {
     const std::string file = write(text);
     expect_refused({"--config", file}, sentence);
@@ -167,7 +167,7 @@ TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
   refuse("port = 99999\n", "a.toml:1:1: --port: Value 99999 not in range 0 to 65535");
   refuse("port = true\n", "a.toml:1:1: --port: Value true not in range 0 to 65535");
   refuse("port = []\n", "a.toml:1:8: port = [] is not allowed");
-  refuse("port = [1, 2]\n", "a.toml:1:1: --port is given more than once");
+  refuse("port = [1, 2]\n", "a.toml:1:1: --port was given more than once");
   refuse("port = 1979-05-27\n", "a.toml:1:8: port = 1979-05-27 is not allowed");
   refuse("loud = \"perhaps\"\n", "a.toml:1:1: Could not convert: --loud = perhaps");
   refuse("loud = \n", "a.toml:1:");

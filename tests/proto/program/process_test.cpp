@@ -55,7 +55,7 @@ class NotifierTest : public testing::Test {
   Notifier::Clock::time_point now_;
 };
 
-TEST_F(NotifierTest, SendsReadinessAStatusOnceInOneLineAndAnEndWithTheTimeThatItMayTake) {
+TEST_F(NotifierTest, SendsReadinessEachStatusOnceAndStoppingWithItsLongestTime) {
   Notifier notifier;
   notifier.ready("clients at x");
   notifier.status("one\nREADY=1");
@@ -66,7 +66,7 @@ TEST_F(NotifierTest, SendsReadinessAStatusOnceInOneLineAndAnEndWithTheTimeThatIt
                          "STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"}));
 }
 
-TEST_F(NotifierTest, SaysThatItLivesAtHalfOfTheTimeAndOnlyWhenItTurns) {
+TEST_F(NotifierTest, FeedsTheWatchdogAtHalfOfItsTimeOnlyWhenCalled) {
   setenv("WATCHDOG_USEC", "1000000", 1);
   Notifier notifier;
   std::size_t said = 0;
@@ -104,7 +104,7 @@ std::pair<bool, bool> stops_with(pid_t parent) {
   return {(WEXITSTATUS(status) & 1) != 0, (WEXITSTATUS(status) & 2) != 0};
 }
 
-TEST(StopWithParent, TheSystemIsAskedForSigtermWhenTheParentEnds) {
+TEST(StopWithParent, TheProcessGetsSigtermWhenItsParentEnds) {
   EXPECT_EQ(stops_with(0), std::pair(true, false)) << "without the option";
   EXPECT_EQ(stops_with(getpid()), std::pair(true, true));
   EXPECT_EQ(stops_with(getppid()), std::pair(false, true)) << "it has ended";
@@ -122,7 +122,7 @@ TEST(StopSignals, TheFirstOfSeveralIsTheExitCode) {
   EXPECT_EQ(stop.exit_code(), 128 + SIGHUP);
 }
 
-TEST(StopSignals, AHangUpThatIsIgnoredStaysIgnored) {
+TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
   const auto before = std::signal(SIGHUP, SIG_IGN);
   {
     StopSignals stop;
@@ -132,7 +132,7 @@ TEST(StopSignals, AHangUpThatIsIgnoredStaysIgnored) {
   std::signal(SIGHUP, before);
 }
 
-TEST(StopSignals, AfterItSignalsArePassedOnButNotOneThatHasCome) {
+TEST(StopSignals, ItsEndRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
     raise(SIGTERM);  // would end this process below if it were left pending

@@ -19,7 +19,7 @@
 namespace oblique::protocol {
 namespace {
 
-TEST(AxisTest, ARangeHasBothEndsExactlyAndRisesBetweenThem) {
+TEST(AxisTest, ARangeHasExactEndsAndRisesBetweenThem) {
   const Axis axis = range("mu", 0.1, 0.1 + 1e-12, 1000);
   EXPECT_EQ(axis_value(axis, 0), axis.from());
   EXPECT_EQ(axis_value(axis, 999), axis.to());
@@ -29,7 +29,7 @@ TEST(AxisTest, ARangeHasBothEndsExactlyAndRisesBetweenThem) {
 }
 
 // Of 1,000 grids from 0 to 5 with steps of up to 50 units of their last decimal, and from 1e7 on.
-TEST(AxisTest, EveryValueOfADecimalGridIsTheNumberThatPeopleType) {
+TEST(AxisTest, EveryValueOfADecimalGridEqualsTheTypedNumber) {
   std::mt19937 random(1);
   const auto pick = [&](int from, int to) {
     return std::uniform_int_distribution<std::int64_t>(from, to)(random);
@@ -63,7 +63,7 @@ TEST(AxisTest, ARangeWhoseStepHasMoreDecimalsOrNoneIsRoundedOnce) {
   EXPECT_EQ(axis_value(range("mu", 0.0, 1.0 / 3.0, 3), 1), 1.0 / 6.0);
 }
 
-TEST(AxisTest, ALogarithmicRangeHasItsEndsAndTheNumbersThatPeopleType) {
+TEST(AxisTest, ALogarithmicRangeHasExactEndsAndDecimalValues) {
   const Axis decades = log_range("mu", 0.01, 100.0, 5);
   const Axis octaves = log_range("links", 1.0, 64.0, 7);
   for (std::uint64_t i = 0; i < 5; ++i) {
@@ -80,7 +80,7 @@ TEST(AxisTest, ALogarithmicRangeHasItsEndsAndTheNumbersThatPeopleType) {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-TEST(BlockKindsTest, AxesOfAZipGoSideBySideAndSingleValuesAreConstant) {
+TEST(BlockKindsTest, PointIOfAZipHasValueIOfEachAxisAndSingleValuesAreConstant) {
   const PointTable table(
       recipe_of_blocks({zipped({listed("k", {1e7, 2e7, 1e7}), listed("H", {0.3, 0.2, 0.3}),
                                 log_range("mu", 0.1, 10.0, 3), listed("e", {0.9})})}));
@@ -138,7 +138,7 @@ TEST(BlockKindsTest, ValuesOfAListAreDrawnWithEqualChances) {
               ElementsAre(testing::Pair(2, 100), testing::Pair(4, 100), testing::Pair(8, 100)));
 }
 
-TEST(BlockKindsTest, AnAxisFollowsFromOthersInAnyOrder) {
+TEST(BlockKindsTest, AnAxisMayBeComputedFromOthersInAnyOrder) {
   const PointTable table(
       recipe_of({{following("I", "A^2 / (4 * pi) * eta2"), listed("A", {1e-4, 2e-4}),
                   following("eta2", "1 + rho / 2700"), listed("H", {0.5, 0.6}),
@@ -155,7 +155,7 @@ TEST(BlockKindsTest, AnAxisFollowsFromOthersInAnyOrder) {
   }
 }
 
-TEST(BlockKindsTest, AModelThatFollowsFromThePointIsItsOwn) {
+TEST(BlockKindsTest, AModelThatDependsOnThePointIsDifferentForEachPoint) {
   const PointTable table(recipe_of({{following("k", "1e7 * H"), listed("H", {0.5, 0.6}),
                                      listed("mu", {0.1, 0.2}), listed("e", {1.0})}}));
   EXPECT_EQ(table.models(), 4U);
@@ -173,7 +173,7 @@ TEST(BlockKindsTest, SingleLengthsActAfterLinksAndLength) {
   EXPECT_THAT(table.model(6).lengths_m, ElementsAre(0.3, 0.2, 0.3));
 }
 
-TEST(BlockKindsTest, AnExpressionUsesTheLengthThatLinksMake) {
+TEST(BlockKindsTest, AnExpressionUsesTheLengthSetByLinks) {
   Recipe recipe = recipe_of({{listed("links", {2, 3}), following("tip_mass", "length2"),
                               listed("H", {0.2}), listed("mu", {0.4}), listed("e", {1.0})}});
   solver::ModelParameters base = solver::preset("paper");
@@ -256,7 +256,7 @@ TEST(FilterTest, UsesExpressionsTheModelAndPointsOfZipsAndSamples) {
               5.0);
 }
 
-TEST(JudgedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
+TEST(ValidatedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
   const Block beyond = zipped({listed("length", {0.1, 1.0}), listed("H", {0.5, 2.0}),
                                listed("mu", {0.4}), listed("e", {1.0})});
   Block reached = beyond;
@@ -269,8 +269,8 @@ TEST(JudgedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
            {beyond, {"point 0: H = 0.5", "length = 0.1"}},
            {reached, {}},
            {outside, {}},
-           {grid("sqrt(mu - 0.5) > 0.1"), {"point 0: where has no value"}},
-           {grid("mu > 2"), {"leaves no point in"}}}) {
+           {grid("sqrt(mu - 0.5) > 0.1"), {"point 0: where is not a number"}},
+           {grid("mu > 2"), {"leaves out all points"}}}) {
     const std::string fault = fault_of_points(block);
     EXPECT_EQ(fault.empty(), words.empty()) << fault;
     for (const char* word : words) {
@@ -279,7 +279,7 @@ TEST(JudgedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
   }
 }
 
-TEST(JudgedPointsTest, OfManyPointsSomeAtRandomAreJudgedAndTheOthersFailLater) {
+TEST(ValidatedPointsTest, OfManyPointsRandomOnesAreValidatedAndOthersFailLater) {
   constexpr std::uint64_t kMany = 100'000'001;
   EXPECT_THAT(fault_of_points(with_k("1e7 * (0.99 - mu)", kMany)), HasSubstr("k = "))
       << "one in a hundred";

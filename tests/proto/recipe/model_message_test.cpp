@@ -18,7 +18,7 @@ namespace {
 
 const std::vector<Axis> kPoint{listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})};
 
-TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedAndCanBeReadUnjudged) {
+TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedUnlessReadUnchecked) {
   EXPECT_THROW(from_message(ModelParameters{}), solver::InputError);
   ModelParameters message = to_message(unusual_model());
   message.set_spectral_radius(1.0);
@@ -31,7 +31,7 @@ TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedAndCanBeReadUnjudged) {
 
 // These texts stand in databases and names of studies. One that has to change needs another version
 // in its first word, and another schema.
-TEST(Canonical, TheTextOfAModelIsTheSameForEver) {
+TEST(Canonical, TheTextOfAModelNeverChanges) {
   EXPECT_EQ(canonical_model(solver::preset("paper")),
             "oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10 A=0.0005309 I=2.243e-08 rho=2700 g=9.81 "
             "elements_per_link=4 k=2.7e+07 eta2=1.2463 tip_mass=0 integrator=explicit "
@@ -125,7 +125,7 @@ TEST(ModelInput, IsItsPresetAndTheKeysThatOverrideIt) {
   EXPECT_EQ(ModelInput().model(), solver::preset("standard"));
 }
 
-TEST(ModelInput, NamesKeyAndValueThatNoModelHas) {
+TEST(ModelInput, ErrorsHaveTheKeyAndTheInvalidValue) {
   const struct {
     ModelInput model;
     const char* key;
@@ -137,8 +137,8 @@ TEST(ModelInput, NamesKeyAndValueThatNoModelHas) {
       {{.lengths_m = {{0.4, -0.3}}}, "lengths", "lengths = -0.3"},
       {{.lengths_m = std::vector<double>()}, "lengths", "lengths = []"},
       {{.lengths_m = std::vector(65, 0.1)}, "lengths", "from 1 to 64"},
-      {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths stands beside"},
-      {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths stands beside"},
+      {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths cannot be combined"},
+      {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths cannot be combined"},
   };
   for (const auto& [model, key, says] : wrong) {
     try {
@@ -151,7 +151,7 @@ TEST(ModelInput, NamesKeyAndValueThatNoModelHas) {
   }
 }
 
-TEST(StudyName, MayBeAnyTextThatPeopleCanReadAndShellsTake) {
+TEST(StudyName, MayBeAnyVisibleText) {
   for (const auto& name : {"paper"s, "μ and e, 2nd"s, "a-b"s, "参数"s, std::string(100, 'x')}) {
     EXPECT_EQ(study_name_error(name), "") << name;
   }
@@ -160,7 +160,7 @@ TEST(StudyName, MayBeAnyTextThatPeopleCanReadAndShellsTake) {
   }
 }
 
-TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
+TEST(StudyName, IsRefusedAndShownEscapedIfItHasInvisibleCharacters) {
   for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
                            "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
     const auto objection = study_name_error(name);
@@ -169,11 +169,11 @@ TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
   }
 }
 
-TEST(StudyPriority, IsWithinLimitsThatTheObjectionNames) {
+TEST(StudyPriority, IsWithinLimitsThatTheErrorNames) {
   for (const std::int64_t priority : {-1000, 0, 1000}) {
     EXPECT_EQ(priority_error(priority), "");
   }
-  EXPECT_EQ(priority_error(1001), "priority = 1001 is not allowed: -1000 to 1000 is");
+  EXPECT_EQ(priority_error(1001), "priority = 1001 is not allowed: it must be -1000 to 1000");
   EXPECT_NE(priority_error(-1001), "");
 }
 

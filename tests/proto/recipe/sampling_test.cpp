@@ -43,7 +43,7 @@ std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
 
 // Digests of what boost::random::sobol(32) of Boost 1.74 gives: it leaves out the origin, so its
 // point i is ours i + 1. The far ones are behind `seed(2^40 - 17)`.
-TEST(SobolTest, AllDimensionsAreThoseOfBoost) {
+TEST(SobolTest, AllDimensionsEqualThoseOfBoost) {
   EXPECT_EQ(digest_of_points(1, 4096),
             "9ec19155dfd8ef8b7ce1b7bd2e7c349bf4734b172ed36d96519d9b3f7f30f0dc");
   EXPECT_EQ(digest_of_points((std::uint64_t{1} << 40) - 16, 64),
@@ -53,7 +53,7 @@ TEST(SobolTest, AllDimensionsAreThoseOfBoost) {
 
 // Nested: digit k of the result is digit k of the value, changed or not by the digits before it
 // alone. So two values agree in as many first digits after as before, and in no more.
-TEST(OwenScramblingTest, ValuesShareAsManyFirstDigitsAfterAsBefore) {
+TEST(OwenScramblingTest, ScramblingKeepsTheNumberOfCommonLeadingDigits) {
   for (int shared = 0; shared < kSobolBits; ++shared) {
     const std::uint64_t value = 0x9e3779b97f4a7 ^ (std::uint64_t{1} << shared);
     const std::uint64_t other = value ^ (std::uint64_t{1} << (kSobolBits - 1 - shared));
@@ -77,7 +77,8 @@ TEST(SampleTest, ALatinHypercubeHasOnePointInEachStratumOfEachDimension) {
   }
 }
 
-TEST(SampleTest, AnyPointOfTheMostIsFoundAtOnceWithinTheOpenCubeAndDependsOnTheSeed) {
+TEST(SampleTest,
+     EachPointOfTheLargestSampleIsComputedDirectlyLiesInTheOpenCubeAndDependsOnTheSeed) {
   for (const auto kind : {SAMPLE_RANDOM, SAMPLE_LATIN_HYPERCUBE, SAMPLE_SOBOL}) {
     for (const std::uint64_t index : {std::uint64_t{0}, kMostPoints / 3, kMostPoints - 1}) {
       for (std::uint32_t d = 0; d < kSobolDimensions; ++d) {
@@ -92,7 +93,7 @@ TEST(SampleTest, AnyPointOfTheMostIsFoundAtOnceWithinTheOpenCubeAndDependsOnTheS
   }
 }
 
-TEST(SampleTest, RandomAndSobolPointsStayWhenTheCountGrowsAndThoseOfALatinHypercubeDoNot) {
+TEST(SampleTest, RandomAndSobolPointsKeepTheirValuesWhenTheCountGrowsUnlikeLatinHypercubes) {
   for (const auto kind : {SAMPLE_RANDOM, SAMPLE_LATIN_HYPERCUBE, SAMPLE_SOBOL}) {
     int same = 0;
     for (std::uint64_t i = 0; i < 100; ++i) {
@@ -162,7 +163,7 @@ TEST(NormalTest, QuantilesAreThoseOfTheTables) {
 }
 
 // An error of one part in 1e16 in z is one of z^2 such parts in p.
-TEST(NormalTest, QuantileAndPartBelowUndoEachOther) {
+TEST(NormalTest, QuantileAndProbabilityAreInverse) {
   for (double p = 1e-300; p < 0.5; p *= 1.7) {
     const double z = normal_quantile(p);
     EXPECT_NEAR(normal_part_below(z) / p, 1.0, 1e-15 * (2.0 + z * z)) << p;
@@ -171,7 +172,7 @@ TEST(NormalTest, QuantileAndPartBelowUndoEachOther) {
 
 // Mean and variance of a normal distribution that is cut off at a and b, in units of sd from the
 // mean: with Z = Phi(b) - Phi(a), (phi(a) - phi(b))/Z and 1 + (a phi(a) - b phi(b))/Z - mean^2.
-TEST(DistributionTest, ATruncatedNormalHasTheMomentsOfTheory) {
+TEST(DistributionTest, ATruncatedNormalHasTheTheoreticalMoments) {
   const auto phi = [](double z) {
     return std::isinf(z) ? 0.0 : std::exp(-z * z / 2.0) / std::sqrt(2.0 * std::acos(-1.0));
   };

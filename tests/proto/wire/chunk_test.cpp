@@ -50,7 +50,7 @@ TEST(Chunk, OfATableHasItsRows) {
   EXPECT_EQ(back.rows, whole.rows);
 }
 
-TEST(Chunk, ThatDoesNotFitTogetherIsNotSound) {
+TEST(Chunk, WithInconsistentCellsIsNotSound) {
   const auto broken = [](auto&& breaking) {
     QueryReply chunk = two_rows();
     breaking(chunk);

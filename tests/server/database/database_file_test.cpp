@@ -100,14 +100,14 @@ TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
               testing::ExitedWithCode(0), "");
 }
 
-TEST_F(ReadOnlyFolderTest, ADatabaseThatMayNotBeReadIsSaidToBeItsOwnersAlone) {
+TEST_F(ReadOnlyFolderTest, PermissionDeniedIsReportedWithTheRemedy) {
   const std::string file = file_in("alone");
   ::chmod(file.c_str(), ::geteuid() == 0 ? 0600 : 0);
   EXPECT_EXIT(as_stranger([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
-              "permission denied; a database is its owner's alone");
+              "permission denied. Only its owner can read");
 }
 
-TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
+TEST(FileSystemOf, AMissingPathHasTheFileSystemOfItsParent) {
   EXPECT_EQ(file_system_of("/dev/shm/none/oblique.db"), "tmpfs");
   EXPECT_EQ(file_system_of("/proc/self/oblique.db"), "proc");
   for (const char* type : {"nfs4", "cifs", "lustre", "fuse.sshfs", "fuse.gcsfuse"}) {

@@ -47,7 +47,7 @@ TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
   EXPECT_EQ(known.workers(0).solved_points(), 30U);
 }
 
-TEST_F(EventLoopTest, PointsThatAnotherStudyHasAreItsRows) {
+TEST_F(EventLoopTest, ResultsOfAnotherStudyAreReused) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   client.submit("a", 20);
@@ -65,7 +65,7 @@ TEST_F(EventLoopTest, PointsThatAnotherStudyHasAreItsRows) {
             protocol::Row{std::int64_t{20}});
 }
 
-TEST_F(EventLoopTest, ARestartedServerGoesOnWhereItWas) {
+TEST_F(EventLoopTest, ARestartedServerContinues) {
   {
     RunningServer server(path_);
     PretendedClient client(server.client_endpoint());
@@ -85,7 +85,7 @@ TEST_F(EventLoopTest, ARestartedServerGoesOnWhereItWas) {
   EXPECT_EQ(client.status("a").state(), "done");
 }
 
-TEST_F(EventLoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
+TEST_F(EventLoopTest, AStoppingServerNotifiesWorkersAndCommitsReceivedResults) {
   auto server = std::make_unique<RunningServer>(path_);
   PretendedClient client(server->client_endpoint());
   client.submit("a", 1000);
@@ -116,7 +116,7 @@ TEST_F(EventLoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).solved(), points_of(batch).size());
 }
 
-TEST_F(EventLoopTest, HostileFramesHarmNobody) {
+TEST_F(EventLoopTest, MaliciousFramesHarmNoOtherPeer) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   PretendedWorker worker(server.worker_endpoint());
@@ -137,7 +137,7 @@ TEST_F(EventLoopTest, HostileFramesHarmNobody) {
   EXPECT_EQ(client.status("a").state(), "done");
 }
 
-TEST_F(EventLoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
+TEST_F(EventLoopTest, ALongRecipeIsStoredAndLeasedWithoutDelayingOthers) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   client.submit("small", 10);
@@ -167,7 +167,7 @@ TEST_F(EventLoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
 /// Compares for hours without a look at the clock.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
-TEST_F(EventLoopTest, ALongQueryHoldsUpNothingElse) {
+TEST_F(EventLoopTest, ALongQueryDelaysNothingElse) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   PretendedClient other(server.client_endpoint());
@@ -192,7 +192,7 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
   EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
 }
 
-TEST_F(EventLoopTest, TheServerStopsWhateverQueriesDo) {
+TEST_F(EventLoopTest, RunningQueriesDoNotDelayAStop) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   client.start_query(kDeaf);
@@ -206,7 +206,7 @@ TEST_F(EventLoopTest, TheSecondServerOfADatabaseIsRefused) {
   EXPECT_THROW(RunningServer{path_}, StorageError);
 }
 
-TEST_F(EventLoopTest, ClientsAndWorkersGetToKnowWhoIsLetIn) {
+TEST_F(EventLoopTest, StatusShowsWhichPeersAreAdmitted) {
   for (const bool is_insecure : {false, true}) {
     RunningServer server(path_, {}, {}, {}, {.insecure = is_insecure});
     PretendedClient client(server.client_endpoint());
@@ -274,7 +274,7 @@ std::string repeated(const std::string& text, int times) {
   return all;
 }
 
-TEST_F(EventLoopTest, AClientThatReadsNothingFillsNoMemory) {
+TEST_F(EventLoopTest, AClientThatReadsNothingCannotExhaustMemory) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   constexpr int kStudies = 200;
@@ -294,7 +294,7 @@ TEST_F(EventLoopTest, AClientThatReadsNothingFillsNoMemory) {
   EXPECT_LT(resident_bytes(), before + with_shadows(100 * kMiB));
 }
 
-TEST_F(EventLoopTest, FloodsOfManyWorkersAndClientsKeepNobodyFromBeingServed) {
+TEST_F(EventLoopTest, FloodsOfWorkersAndClientsDoNotStarveOthers) {
   RunningServer server(path_);
   PretendedClient client(server.client_endpoint());
   client.submit("a", 2000);

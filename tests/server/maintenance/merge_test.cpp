@@ -106,7 +106,7 @@ class MergeTest : public StoreFixture {
   }
 };
 
-TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
+TEST_F(MergeTest, StudiesOfSeveralDatabasesAreMergedWithAllRows) {
   make("one", {{.study = "a", .end = 10}, {.study = "b", .end = 3, .worker = "other host"}});
   make("two", {{.study = "c", .end = 7, .failed = {2}}});
   EXPECT_EQ(merge("one").studies_added, 2U);
@@ -156,7 +156,7 @@ TEST_F(MergeTest, AServerMayUseTheSourceButNotTheTarget) {
   EXPECT_THROW(merge("one"), StorageError);
 }
 
-TEST_F(MergeTest, ARowOfTheTargetStaysAndThoseThatDifferAreCountedAndTheFirstOnesNamed) {
+TEST_F(MergeTest, RowsOfTheTargetAreKeptAndDifferencesAreCountedAndNamed) {
   make("all", {{.table = table_of(1000), .end = 900}});
   make("one", {{.table = table_of(1000), .end = 1000, .closure = 1e-12}});
   const std::string before = text("all", "SELECT quote(closure) FROM results WHERE point = 2");
@@ -168,7 +168,7 @@ TEST_F(MergeTest, ARowOfTheTargetStaysAndThoseThatDifferAreCountedAndTheFirstOne
   EXPECT_EQ(text("all", "SELECT quote(closure) FROM results WHERE point = 2"), before);
 }
 
-TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
+TEST_F(MergeTest, ASolvedRowReplacesAFailedOneButNotViceVersa) {
   make("all", {{.end = 10, .failed = {1, 2}}});
   make("one", {{.end = 10, .failed = {2, 3}}});
   const Merged merged = merge("one");
@@ -179,7 +179,7 @@ TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabaseUnlessAPrefixIsGiven) {
+TEST_F(MergeTest, ANameWithAnotherRecipeRefusesTheSourceUnlessAPrefixIsGiven) {
   make("all", {{.study = "a", .end = 1}});
   make("one", {{.study = "b", .end = 2}, {.study = "a", .table = table_of(11), .end = 5}});
   EXPECT_THAT(refusal("one"), AllOf(HasSubstr("a study called \"a\""), HasSubstr("block 1 differs"),
@@ -201,7 +201,7 @@ TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefused) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "1");
 }
 
-TEST_F(MergeTest, AnyFaultThatACheckFindsRefusesTheWholeDatabase) {
+TEST_F(MergeTest, ASourceWithAnyFaultIsRefused) {
   int number = 0;
   for (const char* change :
        {"UPDATE results SET fn_peak_N = 1 WHERE point = 2", "UPDATE models SET k = -1",
@@ -216,7 +216,7 @@ TEST_F(MergeTest, AnyFaultThatACheckFindsRefusesTheWholeDatabase) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
-TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
+TEST_F(MergeTest, TheSourceIsNotChangedAndItsStateIsCopied) {
   make("one", {{.end = 5}});
   by_hand(file("one"), "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
@@ -250,7 +250,7 @@ void kill_when_a_study_is_updated() {
   sqlite3_auto_extension(reinterpret_cast<void (*)()>(extension));
 }
 
-TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
+TEST_F(MergeTest, AKilledMergeChangesNothingAndCanBeRepeated) {
   make("all", {{.study = "before", .end = 5}});
   make("one", {{.table = table_of(20'000), .end = 20'000}});
   const pid_t child = fork();
@@ -268,7 +268,7 @@ TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
   EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging")) << "nor a copy of the source";
 }
 
-TEST_F(MergeTest, AStudyThatGrewInOneDatabaseIsUnitedWithWhatItWas) {
+TEST_F(MergeTest, AGrownStudyIsUnitedWithItsShorterVersion) {
   for (const bool source_grew : {true, false}) {
     const std::string name = source_grew ? "grown" : "shorter";
     make("all", {{.study = name, .table = source_grew ? table_of(10) : grown_table(), .end = 5}});

@@ -61,7 +61,7 @@ TEST(AddressToBindTest, WithoutKeysOrInsecureOnlyLoopbackIsAllowed) {
   EXPECT_THAT(address_to_bind({"*", "", true}), AnyOf("::", "0.0.0.0"));
 }
 
-TEST(AddressToBindTest, OtherTextAndKeysWithInsecureAreRefused) {
+TEST(AddressToBindTest, InvalidAddressesAndKeysWithInsecureAreRefused) {
   for (const char* address : {"example.org", "", "1.2.3", "127.0.0.1:7600", "[::1]"}) {
     EXPECT_THAT(address_or_error({address, "", true}), HasSubstr("is not an address"));
   }
@@ -156,13 +156,13 @@ TEST_F(AccessControlTest, ChangesOfTheListAreReadTwiceASecond) {
   EXPECT_FALSE(refresh(access));
 }
 
-TEST_F(AccessControlTest, AListThatIsBrokenOrGoneChangesNothingAndIsLoggedOnce) {
+TEST_F(AccessControlTest, AnInvalidOrMissingListChangesNothingAndIsLoggedOnce) {
   const auto key = add("w");
   AccessControl access = control();
   std::ofstream(list_, std::ios::app) << "[[key";
   take_log();
   EXPECT_FALSE(refresh(access));
-  EXPECT_THAT(take_log(), AllOf(HasSubstr(list_), HasSubstr("remain admitted")));
+  EXPECT_THAT(take_log(), AllOf(HasSubstr(list_), HasSubstr("stay the same")));
   EXPECT_FALSE(refresh(access));
   EXPECT_THAT(take_log(), IsEmpty());
   std::filesystem::remove(list_);
@@ -174,7 +174,7 @@ TEST_F(AccessControlTest, AListThatIsBrokenOrGoneChangesNothingAndIsLoggedOnce) 
   EXPECT_EQ(result_of(access, other), "other");
 }
 
-TEST_F(AccessControlTest, AnEmptiedListCountsFromTheFourthTimeAsAnEditorMayGoOnToWrite) {
+TEST_F(AccessControlTest, AnEmptyListAppliesFromItsFourthReadAsAnEditorMayBeWriting) {
   const auto key = add("w");
   AccessControl access = control();
   std::ofstream(list_, std::ios::trunc).close();
@@ -238,7 +238,7 @@ std::string address_of_peer(const Listener& listener, const std::string& from) {
   return listener.accept().address.text;
 }
 
-TEST(PeerAddressTest, IsWrittenAsInEndpoints) {
+TEST(PeerAddressTest, IsFormattedAsInEndpoints) {
   EXPECT_EQ(peer_address("::1", 7600).text, "[::1]:7600");
   EXPECT_EQ(peer_address("2001:0DB8::0:1", 65535).text, "[2001:db8::1]:65535");
   EXPECT_EQ(peer_address("::ffff:10.0.0.3", 4711).text, "10.0.0.3:4711");
@@ -263,7 +263,7 @@ TEST(ListenerTest, APeerOfTheSameFamilyHasItsAddress) {
   EXPECT_THAT(address_of_peer(*v6, "::1"), StartsWith("[::1]:"));
 }
 
-TEST(ListenerTest, AtTwoColonsPeersOfBothFamiliesAreAccepted) {
+TEST(ListenerTest, TheIpv6WildcardAcceptsBothFamilies) {
   const auto both = listening("::");
   if (!both) {
     GTEST_SKIP() << "this machine has no IPv6";
@@ -273,7 +273,7 @@ TEST(ListenerTest, AtTwoColonsPeersOfBothFamiliesAreAccepted) {
   EXPECT_THAT(address_of_peer(*both, "::ffff:127.0.0.1"), StartsWith("127.0.0.1:"));
 }
 
-TEST(ListenerTest, APortThatIsTakenAndAddressesThatAreNotNumericAreNamed) {
+TEST(ListenerTest, PortsInUseAndInvalidAddressesAreReported) {
   const auto error_of = [](const std::string& address, const std::string& port) -> std::string {
     try {
       const Listener listener(address, port);
@@ -284,8 +284,8 @@ TEST(ListenerTest, APortThatIsTakenAndAddressesThatAreNotNumericAreNamed) {
   };
   const Listener first("127.0.0.1", "*");
   const std::string port = first.endpoint().substr(first.endpoint().rfind(':') + 1);
-  EXPECT_THAT(error_of("127.0.0.1", port),
-              AllOf(HasSubstr("tcp://127.0.0.1:" + port), HasSubstr("does a server run already?")));
+  EXPECT_THAT(error_of("127.0.0.1", port), AllOf(HasSubstr("tcp://127.0.0.1:" + port),
+                                                 HasSubstr("another server may be running")));
   for (const char* const address : {"localhost", "::1::", "[::1", "::g"}) {
     EXPECT_THAT(error_of(address, port), HasSubstr(address));
   }

@@ -169,7 +169,7 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   EXPECT_LE(std::find(first, bodies.end(), "second") - first, 2);
 }
 
-TEST_F(NetworkTest, APeerWhoseMessageIsNotTakenIsNotRead) {
+TEST_F(NetworkTest, APeerWithAnUntakenMessageIsNotRead) {
   const auto flood = open_peer();
   const std::string frame = zmtp_frame(std::string(1 << 20, 'x'));
   std::size_t sent = 0;
@@ -183,7 +183,7 @@ TEST_F(NetworkTest, APeerWhoseMessageIsNotTakenIsNotRead) {
   EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
 }
 
-TEST_F(NetworkTest, WhatAPeerSentBeforeItLeftIsTakenAndItsEndIsReportedOnce) {
+TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndItIsReportedOnce) {
   const auto leaving = open_peer();
   leaving->send(zmtp_frame("first") + zmtp_frame("second") + zmtp_frame("last"));
   leaving->reset();
@@ -200,7 +200,7 @@ TEST_F(NetworkTest, WhatAPeerSentBeforeItLeftIsTakenAndItsEndIsReportedOnce) {
   EXPECT_EQ(disconnects[0].reason, "");
 }
 
-TEST_F(NetworkTest, MoreThanOneReadThatAPeerSentBeforeItLeftIsTaken) {
+TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   auto leaving = open_peer();
   std::size_t received = 0;  // what it left unread would cut off what it sends
   run_until([&] {
@@ -238,7 +238,7 @@ class PausingNetworkTest : public NetworkTest {
       : NetworkTest({.held_in_bytes = 3'000'000, .held_in_to_pause_bytes = kPause}) {}
 };
 
-TEST_F(PausingNetworkTest, PeersThatSendMoreThanIsTakenAreNotReadAndLoseNothing) {
+TEST_F(PausingNetworkTest, PeersThatSendTooFastAreNotReadAndLoseNothing) {
   constexpr std::size_t kMessage = 60'000;
   const auto peers = open_peers(40);
   for (const auto& peer : peers) {
@@ -287,7 +287,7 @@ TEST_F(TightNetworkTest, APeerThatReadsNothingIsBusyAndThenDisconnected) {
   EXPECT_EQ(network_.waiting_out_bytes(), 0U);
 }
 
-TEST_F(TightNetworkTest, APeerThatReadsAgainIsNoLongerBusy) {
+TEST_F(TightNetworkTest, ABusyPeerThatReadsAgainIsNoLongerBusy) {
   const auto slow = open_peer();
   const std::string identity = identity_of(*slow);
   while (network_.send(identity, reply_) != Delivery::kBusy) {
@@ -330,7 +330,7 @@ TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected)
   EXPECT_EQ(next().body, std::string(1000, 'm'));
 }
 
-TEST_F(TightNetworkTest, TheQuietestConnectionMakesRoomUnlessAllWereActiveJustNow) {
+TEST_F(TightNetworkTest, TheMostSilentConnectionMakesRoomUnlessAllAreActive) {
   const auto quiet = open_peer();
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
@@ -392,7 +392,7 @@ TEST_F(NetworkTest, RefusedHandshakesAreCountedAndLeaveNothingBehind) {
   EXPECT_THAT(disconnects[0].address, testing::StartsWith("127.0.0.1:"));
 }
 
-TEST_F(NetworkTest, APeerThatLeavesInItsGreetingUsesAnotherMechanismAndASilentOneIsNotRefused) {
+TEST_F(NetworkTest, APeerThatDisconnectsAtTheGreetingCountsAsOtherMechanismAndASilentOneDoesNot) {
   {
     RawPeer plain(network_.endpoint(keyed_));
     const RawPeer silent(network_.endpoint(keyed_));
@@ -428,7 +428,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   }
 }
 
-TEST_F(NetworkTest, ANameThatChangesInTheListCountsFromTheNextMessage) {
+TEST_F(NetworkTest, AChangedNameInTheListAppliesToTheNextMessage) {
   const auto worker = admitted();
   worker->tcp.send(worker->curve.sealed("first"));
   EXPECT_EQ(next(keyed_).key->name, "anna");
@@ -462,7 +462,7 @@ class CrowdTest : public NetworkTest {
   std::vector<std::unique_ptr<KeyedPeer>> crowd_ = keyed_peers(300);
 };
 
-TEST_F(CrowdTest, AllOfASlowCrowdAreAdmittedThoughItsLaterPartWaitsInTheSystem) {
+TEST_F(CrowdTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
   for (const auto& peer : crowd_) {
     peer->say_hello();
   }
@@ -476,7 +476,7 @@ TEST_F(CrowdTest, AllOfASlowCrowdAreAdmittedThoughItsLaterPartWaitsInTheSystem) 
   EXPECT_EQ(network_.connections(), crowd_.size());
 }
 
-TEST_F(CrowdTest, SilentPeersMakeRoomAfterAPartOfTheirTime) {
+TEST_F(CrowdTest, SilentPeersMakeRoomAfterAFractionOfTheirTime) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
   run_until([&] { return refused(RefusalCause::kBound) == kMost; });
   EXPECT_EQ(network_.connections(), kMost);
@@ -488,7 +488,7 @@ class CrowdOfOneAddressTest : public NetworkTest {
   CrowdOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMost, .handshakes_of_source = kMost}) {}
 };
 
-TEST_F(CrowdOfOneAddressTest, KeepsOutNobodyElseAndReplacesItsNewestThenItsOldestHandshakes) {
+TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
   const auto crowd = keyed_peers(100, kElsewhere);
   run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMost; });
   EXPECT_EQ(network_.connections(), kMost);
@@ -591,7 +591,7 @@ class LibzmqPeersTest : public NetworkTest {
   zmq::context_t context_;
 };
 
-TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
+TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysWithTheKeysName) {
   const auto worker = dealer(worker_, server_.public_key);
   worker->send("hello");
   const Incoming incoming = next(keyed_);
@@ -629,7 +629,7 @@ TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
   run_until([&] { return refused(RefusalCause::kOtherMechanism) == 2; });
 }
 
-TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAtOnceWithAllThatItSent) {
+TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAndDropsItsMessages) {
   const protocol::KeyPair other = protocol::generate_key_pair();
   authenticator_.add(other.public_key, "berta");
   const auto revoked = dealer(worker_, server_.public_key);

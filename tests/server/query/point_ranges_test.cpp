@@ -36,7 +36,7 @@ Ranges ranges(const std::string& condition) {
   return point_ranges(cube(), condition);
 }
 
-TEST(PointRanges, AnAxisIsRestrictedToOneValueMoreAtEachEnd) {
+TEST(PointRanges, RangesAreOneAxisValueWiderAtEachEnd) {
   EXPECT_EQ(ranges("H = 0.3"), (Ranges{{100, 399}}));
   EXPECT_EQ(ranges("H < 0.3"), (Ranges{{0, 399}}));
   EXPECT_EQ(ranges("H >= 0.8"), (Ranges{{600, 999}}));
@@ -65,7 +65,7 @@ TEST(PointRanges, OtherConditionsRestrictNothing) {
   }
 }
 
-TEST(PointRanges, OfHugeStudiesAreFew) {
+TEST(PointRanges, AreFewInHugeStudies) {
   const auto recipe = protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});
   EXPECT_EQ(points_in(point_ranges(recipe, "H = 0.1 AND mu = 0 AND e = 1")), 2U * 2 * 2);
@@ -231,7 +231,7 @@ std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
 
 using SameRows = StoreFixture;
 
-TEST_F(SameRows, APlanGivesTheRowsThatSqliteGivesWithoutIt) {
+TEST_F(SameRows, APlanReturnsTheSameRowsAsSqliteAlone) {
   constexpr std::uint64_t kStudies = 10;
   constexpr int kConditions = 60;
   Drawn drawn(7);

@@ -266,7 +266,7 @@ TEST_F(ServiceGrowthTest, AUsedNameIsRefusedAlsoWhileItIsBeingWritten) {
   submit("a");
   submit("b");
   rename("a", "b");
-  EXPECT_THAT(last_error(), HasSubstr("there is a study called \"b\" already"));
+  EXPECT_THAT(last_error(), HasSubstr("there is already a study called \"b\""));
   rename("a", "c");
   ports_.replies.clear();
   request(submit_request("c", 3));
@@ -274,8 +274,8 @@ TEST_F(ServiceGrowthTest, AUsedNameIsRefusedAlsoWhileItIsBeingWritten) {
   write_all();
   ASSERT_EQ(ports_.replies.size(), 3U);
   EXPECT_EQ(ports_.replies[0].change().study().name(), "c");
-  EXPECT_THAT(ports_.replies[1].error().message(), HasSubstr("there is a study called \"c\""));
-  EXPECT_THAT(ports_.replies[2].error().message(), HasSubstr("there is a study called \"c\""));
+  EXPECT_THAT(ports_.replies[1].error().message(), HasSubstr("already a study called \"c\""));
+  EXPECT_THAT(ports_.replies[2].error().message(), HasSubstr("already a study called \"c\""));
   rename("c", "");
   EXPECT_TRUE(last_reply().has_error());
   rename("c", "c");
@@ -377,7 +377,7 @@ TEST_F(ServiceKeysTest, AReaderMayAskAndChangesNothing) {
   }
   for (const ClientRequest& message : refused) {
     EXPECT_THAT(error_of(message, reader_),
-                AllOf(HasSubstr("\"onlooker\" is a reader's"), HasSubstr("change nothing")));
+                AllOf(HasSubstr("\"onlooker\" has the role reader"), HasSubstr("change nothing")));
   }
   EXPECT_EQ(status_of("a").state(), "running");
   ClientRequest query = client_request();
@@ -396,7 +396,7 @@ TEST_F(ServiceKeysTest, AStudyHasTheNameOfTheKeyThatFirstSubmittedIt) {
 
 TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
   EXPECT_THAT(error_of(submit_request("a", 1001)),
-              HasSubstr("0 points are open, and the server allows 1000 "
+              HasSubstr("0 points are open, and at most 1000 are allowed "
                         "(--limits-open-points)"));
   EXPECT_EQ(error_of(submit_request("a", 600)), "");
   EXPECT_THAT(error_of(submit_request("b", 401)), HasSubstr("open-points"));
@@ -404,7 +404,7 @@ TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
     EXPECT_EQ(error_of(submit_request(name, 1)), "") << name;
   }
   EXPECT_THAT(error_of(submit_request("f", 1)),
-              HasSubstr("5 studies are open, and the server allows 5:"));
+              HasSubstr("5 studies are open, and at most 5 are allowed:"));
   EXPECT_EQ(error_of(submit_request("a", 600)), "") << "it is open already";
 }
 

@@ -131,7 +131,7 @@ TEST_F(FloodedServiceTest, ChangesBeyondTheLimitAreRefusedUntilTheDiskTookOthers
   for (const char* name : {"a", "b", "c", "d"}) {
     request(submit_request(name));
   }
-  EXPECT_THAT(last_error(), HasSubstr("ask again later"));
+  EXPECT_THAT(last_error(), HasSubstr("try again later"));
   write_all();
   submit("d");
   EXPECT_TRUE(last_reply().has_submit());

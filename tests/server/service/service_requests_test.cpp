@@ -53,7 +53,7 @@ TEST_F(ServiceTest, LongRequestsThatWaitAreBounded) {
     service_->client_frame("client " + std::to_string(i), frame, now_);
   }
   EXPECT_EQ(ports_.checks.size(), limits::kWaitingCheckBytes / frame.size());
-  EXPECT_THAT(last_error(), HasSubstr("ask again later"));
+  EXPECT_THAT(last_error(), HasSubstr("try again later"));
   run_checks();
   request(long_submission("b", kLongRequest));
   EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
@@ -180,7 +180,7 @@ TEST_F(ServiceQueryTest, WhoSaysToHaveTakenWhatWasNotGivenLosesTheAnswer) {
   ask(7);
   give(0);
   want_more(7, UINT64_MAX);
-  EXPECT_THAT(last_error(), testing::HasSubstr("than was given"));
+  EXPECT_THAT(last_error(), testing::HasSubstr("than were sent"));
   EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
   EXPECT_TRUE(ports_.more.empty());
 }
@@ -480,20 +480,19 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
     return last_error();
   };
   EXPECT_THAT(with([](auto& trace) { trace.add_values(1.0); }), HasSubstr("other columns"));
-  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\5"); }),
-              HasSubstr("a state that no contact has"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\5"); }), HasSubstr("an unknown state"));
   EXPECT_THAT(with([](auto& trace) { trace.set_states("\4\2"); }),
-              HasSubstr("rows of the fall that were not requested"));
-  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\4"); }), HasSubstr("falls again"));
+              HasSubstr("rows of the fall, which were not requested"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\4"); }), HasSubstr("after the touch"));
   EXPECT_THAT(with([](auto& trace) { trace.set_values(0, std::nan("")); }),
               HasSubstr("not finite"));
   EXPECT_THAT(with([](auto& trace) { trace.mutable_result()->add_reals(1.0); }),
-              HasSubstr("sent no trace"));
+              HasSubstr("sent an invalid trace"));
   EXPECT_THAT(with([](auto& trace) {
                 trace.clear_values();
                 trace.clear_states();
               }),
-              HasSubstr("no instant"));
+              HasSubstr("no rows"));
   worker_sends(trace_of({}, ""));  // of no order
   ask(99, 60);
   worker_sends(trace_of(orders().back(), "\2"));
@@ -542,7 +541,7 @@ TEST_F(ServiceTraceTest, AStoppingServerTellsWorkersAndAnswersWhoeverWaitsOrCome
   }
   const auto sent = ports_.worker_messages.size();
   credit(1);
-  EXPECT_EQ(ports_.worker_messages.size(), sent) << "nothing is handed out";
+  EXPECT_EQ(ports_.worker_messages.size(), sent) << "no batch is sent";
 }
 
 }  // namespace

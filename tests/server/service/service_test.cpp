@@ -256,7 +256,7 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
     message.set_protocol_version(version);
     request(message);
     EXPECT_THAT(last_error(),
-                HasSubstr(version == 0 ? std::string("the port for clients")
+                HasSubstr(version == 0 ? std::string("this port is for clients")
                                        : fmt::format("{}, the client {}", own, version)));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);

@@ -233,7 +233,7 @@ TEST(Health, ReadinessNamesWhatIsMissing) {
   Snapshot stopping;
   stopping.is_stopping = true;
   EXPECT_EQ(readiness(stopping, kPlenty).status, 503U);
-  EXPECT_EQ(readiness({}, 1e6).body, "the database's disk has 1 MB left\n");
+  EXPECT_EQ(readiness({}, 1e6).body, "the disk of the database has 1 MB left\n");
 }
 
 WebSettings anywhere() {
@@ -291,7 +291,7 @@ TEST_F(WebTest, MetricsFollowTheServer) {
 
 TEST_F(WebTest, NamesItsPaths) {
   EXPECT_EQ(body_of(get(server_.http_url(), "/healthz")), "the server runs\n");
-  EXPECT_EQ(body_of(get_started("/readyz")), "the server takes work\n");
+  EXPECT_EQ(body_of(get_started("/readyz")), "the server accepts work\n");
   for (const std::string path : {"/metrics/", "/Metrics", "//metrics", "/../metrics", "*"}) {
     const std::string answer = get(server_.http_url(), path);
     EXPECT_EQ(status_of_answer(answer), 404) << path;

@@ -132,7 +132,7 @@ TEST_F(StudyFlowTest, ALateErrorAboutAQueryThatHasEndedDoesNotEndTheNext) {
   reply(first, chunk_of({}, true));
   EXPECT_FALSE(pending());
   const std::uint64_t second = requested().back().request_id();
-  reply(first, error_of("no answer to that request is under way"));
+  reply(first, error_of("no query of this connection has that request number"));
   EXPECT_FALSE(pending());
   reply(second, chunk_of({2}, true));
   EXPECT_EQ(pending()->body, "1 2 ");
