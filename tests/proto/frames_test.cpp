@@ -45,7 +45,7 @@ TEST(FramesTest, ATruncatedFrameIsNotTheWholeMessage) {
       EXPECT_NE(received.kind_case(), WorkerMessage::kResults) << length << " bytes";
     }
   }
-  // Only the empty frame is a message, one without a kind.
+  // Of the truncations only the empty frame is a message, one without a kind.
   EXPECT_EQ(refused, static_cast<int>(frame.size()) - 1);
 }
 

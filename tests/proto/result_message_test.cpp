@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
-/// A result whose every field differs from the others.
+/// A result in which all fields differ.
 solver::CaseResult distinct_result() {
   solver::CaseResult result{};
   result.fall_time_s = 0.43;

@@ -35,7 +35,7 @@ std::uint64_t seeds(int quick, int all) {
 /// forgets what it should have kept, as on Linux.
 class SimulationTest : public testing::TestWithParam<std::uint64_t> {};
 
-TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
+TEST_P(SimulationTest, EveryPointEndsWithOneRightRowDespiteFaults) {
   const std::uint64_t count = seeds(40, 250);
   SimulationSettings settings;
   settings.forgetful_syncs = GetParam() % 2 == 1;
@@ -61,7 +61,7 @@ TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
 
 INSTANTIATE_TEST_SUITE_P(Part, SimulationTest, testing::Range<std::uint64_t>(0, 8));
 
-TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
+TEST(StormsTest, NoPointFailsBecauseOfLostWorkersIfOneWorkerIsSound) {
   SimulationSettings settings;
   settings.storms = true;
   const std::uint64_t count = seeds(20, 200);
@@ -71,7 +71,7 @@ TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
   EXPECT_GT(all["vanished peers"], count / 2);
 }
 
-TEST(SeedTest, GivesTheSameRunAgain) {
+TEST(SeedTest, RepeatsARun) {
   EXPECT_EQ(simulate(7, {}), simulate(7, {}));
 }
 

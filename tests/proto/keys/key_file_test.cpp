@@ -152,7 +152,8 @@ TEST_F(KeyFileTest, ErrorsHaveFileLineAndKeyAndNoSecret) {
               AllOf(HasSubstr("none.key"), HasSubstr("No such file")));
 }
 
-/// A key file that another process has written, so that nothing of it is in this one's memory.
+/// A key file written by another process, so that this one has no other copy of the secret in
+/// memory.
 std::string file_of_another_process(const std::string& path) {
   const pid_t writer = fork();
   if (writer == 0) {
@@ -190,7 +191,8 @@ TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   expect_no_copy_in_a_core_dump(made.pair.secret_key);
   const KeyFile key = read_key_file(file_of_another_process(folder_.file("worker.key")));
   expect_no_copy_in_a_core_dump(key.pair.secret_key);
-  // Nor as text, of which freed memory keeps the end. What is searched for is not dumped either.
+  // Nor as text, whose end freed memory would keep. The searched bytes themselves are not dumped
+  // either.
   constexpr std::size_t kEnd = 24;
   SecretKey end;
   std::string text = z85(key.pair.secret_key.bytes());

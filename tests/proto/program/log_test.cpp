@@ -22,7 +22,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// What a program writes to its standard error.
+/// Captures standard error.
 class ProgramLogTest : public testing::Test {
  protected:
   ProgramLogTest() : before_(dup(STDERR_FILENO)) {

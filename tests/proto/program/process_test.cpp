@@ -22,7 +22,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A service manager's socket.
+/// Plays the service manager: receives datagrams on its socket.
 class NotifierTest : public testing::Test {
  protected:
   NotifierTest() {
@@ -38,8 +38,8 @@ class NotifierTest : public testing::Test {
     unsetenv("WATCHDOG_USEC");
   }
 
-  /// All that has come.
-  std::vector<std::string> heard() const {
+  /// All received datagrams.
+  std::vector<std::string> received() const {
     std::vector<std::string> all;
     std::array<char, 4096> bytes{};
     ssize_t got = 0;
@@ -61,9 +61,9 @@ TEST_F(NotifierTest, SendsReadinessEachStatusOnceAndStoppingWithItsLongestTime) 
   notifier.status("one\nREADY=1");
   notifier.status("one\nREADY=1");
   notifier.stopping("draining", 120s);
-  EXPECT_EQ(heard(), (std::vector<std::string>{
-                         "READY=1\nSTATUS=clients at x", "STATUS=one\\nREADY=1",
-                         "STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"}));
+  EXPECT_EQ(received(), (std::vector<std::string>{
+                            "READY=1\nSTATUS=clients at x", "STATUS=one\\nREADY=1",
+                            "STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"}));
 }
 
 TEST_F(NotifierTest, FeedsTheWatchdogAtHalfOfItsTimeOnlyWhenCalled) {
@@ -72,7 +72,7 @@ TEST_F(NotifierTest, FeedsTheWatchdogAtHalfOfItsTimeOnlyWhenCalled) {
   std::size_t said = 0;
   for (int turn = 0; turn < 100; ++turn, now_ += 100ms) {  // 10 s
     notifier.feed_watchdog(now_);
-    said += heard().size();
+    sent += received().size();
   }
   EXPECT_EQ(said, 20U);
 }
@@ -86,11 +86,11 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
     notifier.feed_watchdog(now_);
     notifier.stopping("stopping", 1s);
   }
-  EXPECT_TRUE(heard().empty());
+  EXPECT_TRUE(received().empty());
 }
 
-/// What `stop_with_parent` returns in a child process, and whether the child then gets SIGTERM for
-/// the end of its parent.
+/// Returns what `stop_with_parent` returns in a child process, and whether the child gets SIGTERM
+/// when its parent ends.
 std::pair<bool, bool> stops_with(pid_t parent) {
   const pid_t child = fork();
   if (child == 0) {
@@ -135,7 +135,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
 TEST(StopSignals, ItsEndRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
-    raise(SIGTERM);  // would end this process below if it were left pending
+    raise(SIGTERM);  // would end this process below if it stayed pending
   }
   sigset_t blocked;
   ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);

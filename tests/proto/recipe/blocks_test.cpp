@@ -28,7 +28,8 @@ TEST(AxisTest, ARangeHasExactEndsAndRisesBetweenThem) {
   }
 }
 
-// Of 1,000 grids from 0 to 5 with steps of up to 50 units of their last decimal, and from 1e7 on.
+// Tests 1,000 grids that start between 0 and 5, or at 1e7, with steps of up to 50 units of their
+// last decimal.
 TEST(AxisTest, EveryValueOfADecimalGridEqualsTheTypedNumber) {
   std::mt19937 random(1);
   const auto pick = [&](int from, int to) {

@@ -29,8 +29,8 @@ TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedUnlessReadUnchecked) {
   EXPECT_THROW(from_message_unchecked(message), solver::InputError) << "no model could hold it";
 }
 
-// These texts stand in databases and names of studies. One that has to change needs another version
-// in its first word, and another schema.
+// Databases and names of studies contain these texts. A changed text needs another version in its
+// first word, and another schema.
 TEST(Canonical, TheTextOfAModelNeverChanges) {
   EXPECT_EQ(canonical_model(solver::preset("paper")),
             "oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10 A=0.0005309 I=2.243e-08 rho=2700 g=9.81 "
@@ -100,7 +100,7 @@ TEST(Canonical, ModelErrorsBlocksAndTheOrderOfAxesCount) {
 
 TEST(Canonical, BlocksAreComparedAsTheyAreWritten) {
   const Recipe recipe = recipe_of({kPoint});
-  Recipe padded;  // a field that nobody knows
+  Recipe padded;  // an unknown field
   ASSERT_TRUE(padded.ParseFromString(recipe.SerializeAsString() + std::string("\x98\x06\x01", 3)));
   EXPECT_EQ(recipe_digest(padded), recipe_digest(recipe));
   const auto of = [](const Axis& mu) {

@@ -15,7 +15,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// A study with every feature: several blocks, listed and ranged axes, model axes in two of them.
+/// A study with every feature: several blocks, listed and ranged axes, model axes in two blocks.
 Recipe varied_recipe() {
   Recipe recipe = recipe_of({
       {listed("H", {0.96, 1.0, 1.04}), listed("mu", {0.4, 0.8}), range("e", 0.5, 1.0, 6)},
@@ -35,7 +35,7 @@ struct ExpectedPoint {
   double e_star;
 };
 
-/// Enumerates one block by walking its axes as nested loops, the first outermost.
+/// Enumerates the points of a block by nested loops over its axes, the first outermost.
 void enumerate(const Block& block, int depth, ExpectedPoint current,
                std::vector<ExpectedPoint>& points) {
   if (depth == block.axes_size()) {

@@ -1,4 +1,4 @@
-// Rows in chunks: what is written is read, and what does not fit together is found out.
+// Chunks: writing and reading, and detection of inconsistent ones.
 #include <cmath>
 #include <limits>
 

@@ -22,8 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A database that lies in a folder where nothing can be written. What it holds: two rows in the
-/// file and, with a log beside it, a third one there.
+/// A database in a read-only folder: two rows in the file and, if it has a log, a third one there.
 class ReadOnlyFolderTest : public StoreFixture {
  protected:
   ReadOnlyFolderTest() {
@@ -48,8 +47,8 @@ class ReadOnlyFolderTest : public StoreFixture {
     return folder_.file(name + "/some % results?.db");
   }
 
-  /// Runs `what` as a user who can write nowhere but in `out`: root could write in every folder.
-  /// Ends the process with 0 when `what` gives true.
+  /// Runs `what` in a child process as a user who can write only in `out`, because root could write
+  /// everywhere. The process ends with 0 if `what` returns true.
   void as_stranger(const std::function<bool()>& what) const {
     constexpr uid_t kNoProcess = 65534;
     if (::geteuid() == 0 && (::setgid(kNoProcess) != 0 || ::setuid(kNoProcess) != 0)) {

@@ -49,7 +49,7 @@ class MaintenanceTest : public StoreFixture {
  protected:
   MaintenanceTest() { commit({study_, worker(1), solved(study_, numbers(0, 5))}); }
 
-  /// The first page of a table.
+  /// The root page of a table.
   static std::int64_t page_of(const std::string& path, const std::string& table) {
     return std::stoll(
         rows(path, "SELECT rootpage FROM sqlite_schema WHERE name = '" + table + "'").at(0));
@@ -88,7 +88,7 @@ TEST_F(MaintenanceTest, OnlyOurDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) 
 
 class SalvageTest : public MaintenanceTest {
  protected:
-  /// Study, point and, by its checksum, all else of each row, in the order of the texts.
+  /// Study, point and checksum of each row, in the order of the texts.
   static std::vector<std::string> rows_of(const std::string& file) {
     return rows(file,
                 "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM results"
@@ -97,7 +97,7 @@ class SalvageTest : public MaintenanceTest {
 };
 
 TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) {
-  constexpr std::uint64_t kPoints = 1500;  // with some more the root of their tree splits
+  constexpr std::uint64_t kPoints = 1500;  // with more points the root of their tree splits
   const std::string whole = folder_.file("whole.db");
   const auto large = study_of(kPoints);
   Store(whole).commit(std::vector<Change>{large, worker(1), solved(large, numbers(0, kPoints)),
@@ -110,7 +110,7 @@ TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) 
   const struct {
     const char* what;
     std::function<void(const std::string&)> damage;
-    double least_share;  ///< of the rows. Upper pages of a tree are behind lower ones.
+    double least_share;  ///< least share of the rows. Inner pages of a tree come after its leaves.
   } cases[] = {{"one page of rows",
                 [&](const auto& file) {
                   overwrite_page(file, static_cast<std::int64_t>(size) / 2 / kPageBytes + 1);
@@ -216,7 +216,7 @@ TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
 }
 
 TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheErrorHasTheRemedy) {
-  close();  // all is in the one file now
+  close();  // all rows are in the database file
   overwrite_page(path_, page_of(path_, "studies"));
   EXPECT_FALSE(faults().empty());
   EXPECT_THROW(back_up(path_, copy_), StorageError);
@@ -389,7 +389,7 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   commit({solved(study_, numbers(5, 10))});
   close();
   EXPECT_TRUE(delete_study(path_, 1));
-  { const Store next(path_); }  // a start deletes what no row refers to
+  { const Store next(path_); }  // a start deletes orphaned rows
   for (const char* table :
        {"studies", "models", "workers", "results", "completed_ranges", "deletions"}) {
     EXPECT_EQ(number(std::string("SELECT count(*) FROM ") + table), 0) << table;
@@ -406,7 +406,7 @@ TEST_F(OfflineStudyTest, TheStoredRecipeCanBeReadWhileAServerWorks) {
 TEST_F(OfflineStudyTest, ATooLongRecipeIsNotParsed) {
   close();
   const std::string block =
-      study_.table->recipe().SerializeAsString();  // a longer recipe goes on so
+      study_.table->recipe().SerializeAsString();  // a longer recipe continues like this
   std::string bytes;
   while (bytes.size() <= protocol::kMaxFrameBytes) {
     bytes += block;

@@ -38,15 +38,15 @@ struct Part {
   std::string solver_version = "0.1";
   std::string worker = "host";
   std::vector<std::uint64_t> failed{};
-  double closure = 0.0;  ///< added to that of each result
+  double closure = 0.0;  ///< added to `closure` of each result
 };
 
-/// Databases that are made, and merged into the one called `all`.
+/// Makes databases and merges them into the one called `all`.
 class MergeTest : public StoreFixture {
  protected:
   std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
 
-  /// A database with these studies and results; some may be there already.
+  /// Makes a database with these studies and results, or adds them to it.
   void make(const std::string& name, const std::vector<Part>& parts) const {
     Store store(file(name));
     for (const Part& part : parts) {
@@ -233,7 +233,8 @@ TEST_F(MergeTest, TheSourceIsNotChangedAndItsStateIsCopied) {
             "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
-/// Makes each new connection kill the process when it updates a study, as after its last row.
+/// Makes each new connection kill the process when it updates a study, which happens after its last
+/// row.
 void kill_when_a_study_is_updated() {
   const auto watch = [](sqlite3* database) {
     sqlite3_update_hook(

@@ -1,4 +1,4 @@
-// Who may connect from where, and the addresses of ports and peers.
+// Admission of peers, and the addresses of ports and peers.
 #include "server/network/access.h"
 
 #include <cstdint>
@@ -79,7 +79,7 @@ class AccessControlTest : public testing::Test {
   }
   ~AccessControlTest() override { spdlog::set_default_logger(logger_); }
 
-  /// What was logged since the last call.
+  /// Log lines since the last call.
   std::string take_log() {
     const std::string text = log_.str();
     log_.str("");
@@ -94,7 +94,7 @@ class AccessControlTest : public testing::Test {
   }
   AccessControl control() const { return AccessControl({"127.0.0.1", server_key_, false}); }
   bool refresh(AccessControl& control) { return control.refresh(now_ms_ += 500); }
-  /// The name with which a key is admitted, or the cause of its refusal.
+  /// The name of an admitted key, or the cause of its refusal.
   static std::string result_of(const AccessControl& control, const protocol::CurveKey& key,
                                PortRole port = PortRole::kWorkers) {
     const AuthResult result = control.security(port)->authenticate(key);
@@ -216,7 +216,7 @@ PeerAddress peer_address(const std::string& address, int port = 1) {
   return PeerAddress(system_address(address, port));
 }
 
-/// Nothing where the machine has no IPv6.
+/// Nothing if the machine has no IPv6.
 std::optional<Listener> listening(const std::string& address) {
   try {
     return Listener(address, "*");

@@ -1,5 +1,4 @@
-// The network and its bounds: raw TCP connections without keys and with them, and sockets of
-// libzmq.
+// The network and its limits: raw TCP connections with and without keys, and sockets of libzmq.
 #include "server/network/network.h"
 
 #include <algorithm>
@@ -32,7 +31,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A TCP connection with the client's end of CURVE.
+/// A TCP connection with the client's side of CURVE.
 struct KeyedPeer {
   KeyedPeer(const std::string& endpoint, const CurveClient& keys, const char* source)
       : tcp(endpoint, source), curve(keys) {}
@@ -42,7 +41,7 @@ struct KeyedPeer {
   CurveClient curve;
 };
 
-/// A network with a port that needs keys and one that does not, driven by the test.
+/// A network with one port that needs keys and one that does not.
 class NetworkTest : public testing::Test {
  protected:
   explicit NetworkTest(NetworkLimits limits = {}) : network_(limits) {
@@ -51,7 +50,7 @@ class NetworkTest : public testing::Test {
     authenticator_.add(worker_.public_key, "anna");
   }
 
-  /// Runs the network until `done`; one that never gets there fails the test.
+  /// Runs the network until `done`; fails the test after a timeout.
   template <typename Done>
   void run_until(const Done& done) {
     const auto give_up = std::chrono::steady_clock::now() + test::kHangLimit;
@@ -81,7 +80,7 @@ class NetworkTest : public testing::Test {
 
   std::unique_ptr<RawPeer> open_peer() {
     auto peer = std::make_unique<RawPeer>(network_.endpoint(open_));
-    peer->shake_hands();
+    peer->complete_handshake();
     return peer;
   }
   std::vector<std::unique_ptr<RawPeer>> open_peers(std::size_t count) {
@@ -100,10 +99,10 @@ class NetworkTest : public testing::Test {
     std::ranges::generate(peers, [&] { return keyed_peer(worker_, server_.public_key, source); });
     return peers;
   }
-  /// Runs the network until the peer has received so many bytes, and returns them.
+  /// Runs the network until the peer has received that many bytes, and returns them.
   std::string received_by(KeyedPeer& peer, std::size_t bytes) {
     std::string received;
-    run_until([&] { return (received += peer.tcp.receive_what_is_there()).size() >= bytes; });
+    run_until([&] { return (received += peer.tcp.receive_available()).size() >= bytes; });
     return received;
   }
   void take_welcome(KeyedPeer& peer) {
@@ -121,7 +120,7 @@ class NetworkTest : public testing::Test {
     static_cast<void>(received_by(*peer, 1));
     return peer;
   }
-  /// The identity of a peer without a key that has sent a message, which is taken.
+  /// Takes a message of a peer without a key and returns the peer's identity.
   std::string identity_of(RawPeer& peer) {
     peer.send(zmtp_frame("hello"));
     return next().identity;
@@ -153,11 +152,11 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   }
   EXPECT_EQ(next().body, "flood");
   RawPeer modest(network_.endpoint(open_));
-  // In one packet, so that all of it has come when the server answers with its own READY.
+  // In one packet, so that everything has arrived when the server answers with READY.
   modest.send(zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("first") + zmtp_frame("second"));
   std::size_t received = 0;
   run_until([&] {
-    received += modest.receive_what_is_there().size();
+    received += modest.receive_available().size();
     return received > kGreetingBytes;
   });
   std::vector<std::string> bodies;
@@ -202,9 +201,9 @@ TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndItIsReportedOnce) {
 
 TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   auto leaving = open_peer();
-  std::size_t received = 0;  // what it left unread would cut off what it sends
+  std::size_t received = 0;  // unread input would reset the connection and lose its output
   run_until([&] {
-    received += leaving->receive_what_is_there().size();
+    received += leaving->receive_available().size();
     return received == kGreetingBytes + zmtp_ready("ROUTER").size();
   });
   const std::string body(40'000, 'x');
@@ -222,7 +221,7 @@ TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected
   RawPeer stranger(network_.endpoint(open_));
   stranger.send("GET / HTTP/1.1\r\n\r\n");
   RawPeer in_parts(network_.endpoint(open_));
-  in_parts.shake_hands();
+  in_parts.complete_handshake();
   in_parts.send(zmtp_frame("part", true));
   std::size_t ended = 0;
   run_until([&] { return (ended += network_.take_disconnects().size()) == 2; });
@@ -335,7 +334,7 @@ TEST_F(TightNetworkTest, TheMostSilentConnectionMakesRoomUnlessAllAreActive) {
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> at_work;
-  for (int i = 0; i < 3; ++i) {  // one after the other: handshakes make room first
+  for (int i = 0; i < 3; ++i) {  // one after another, because handshakes make room first
     at_work.push_back(open_peer());
     identity_of(*at_work.back());
   }
@@ -371,7 +370,7 @@ TEST_F(NetworkTest, RefusedHandshakesAreCountedAndLeaveNothingBehind) {
   for (std::size_t i = 0; i < kPeers; ++i) {
     peers.push_back(keyed_peer(stranger, i % 4 == 0 ? stranger.public_key : server_.public_key));
     if (i % 4 == 1) {
-      peers.back()->tcp.shake_hands();
+      peers.back()->tcp.complete_handshake();
     } else {
       peers.back()->say_hello();
     }
@@ -500,7 +499,7 @@ TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
   crowd[0]->say_hello();
   take_welcome(*crowd[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  const auto silent = keyed_peers(1, kElsewhere);  // `second` left room for it
+  const auto silent = keyed_peers(1, kElsewhere);  // `second` made room for it
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(crowd[0]->tcp.receive(), "") << "in the place of the oldest";
 }
@@ -515,7 +514,7 @@ TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
   for (auto& peer : peers) {
     peer = admitted();
   }
-  now_ms_ += 60'000;  // all of them are silent for long
+  now_ms_ += 60'000;  // all have been silent for long
   RawPeer newcomer(network_.endpoint(keyed_));
   run_until([&] { return refused(RefusalCause::kBound) == 1; });
   EXPECT_EQ(newcomer.receive(), "");
@@ -534,7 +533,7 @@ TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedWhateverItsStep) {
 
 // ---- Sockets of libzmq --------------------------------------------------------------------------
 
-/// A DEALER of libzmq, with keys if they are given, and a monitor of its handshakes.
+/// A DEALER of libzmq, with optional keys and a monitor of its handshakes.
 struct Dealer {
   Dealer(zmq::context_t& context, const std::string& endpoint,
          const protocol::KeyPair* own = nullptr, const protocol::CurveKey* server = nullptr)
@@ -556,7 +555,7 @@ struct Dealer {
     socket.connect(endpoint);
   }
   void send(const std::string& body) { socket.send(zmq::buffer(body), zmq::send_flags::dontwait); }
-  /// The kind and the value of the next failure of a handshake.
+  /// Kind and value of the next handshake failure.
   std::optional<std::pair<int, int>> failure() {
     zmq::message_t event;
     while (monitor.recv(event, zmq::recv_flags::dontwait)) {
@@ -581,7 +580,7 @@ class LibzmqPeersTest : public NetworkTest {
   std::unique_ptr<Dealer> dealer(const protocol::KeyPair& own, const protocol::CurveKey& server) {
     return std::make_unique<Dealer>(context_, network_.endpoint(keyed_), &own, &server);
   }
-  /// Runs the network until the socket reports that its handshake has failed, and how.
+  /// Runs the network until the socket reports a failed handshake, and returns how.
   std::pair<int, int> failure_of(Dealer& dealer) {
     std::optional<std::pair<int, int>> failure;
     run_until([&] { return (failure = dealer.failure()).has_value(); });
@@ -649,7 +648,8 @@ TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAndDropsItsMessages) {
   ASSERT_EQ(disconnects.size(), 1U);
   const bool one_is_revoked = from_one.key->name == "anna";
   EXPECT_EQ(disconnects[0].identity, (one_is_revoked ? from_one : from_other).identity);
-  EXPECT_EQ(failure_of(*revoked), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));  // and back
+  // it reconnects
+  EXPECT_EQ(failure_of(*revoked), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));
   staying->send("still there");
   EXPECT_EQ(next(keyed_).body, "still there");
 }

@@ -1,4 +1,4 @@
-// The protocol without keys, and with keys for a client that can send what no library sends.
+// The protocol without keys, and with keys and a client that can send what no library sends.
 #include "server/network/zmtp.h"
 
 #include <cstddef>
@@ -94,9 +94,9 @@ std::string flipped(std::string bytes, std::size_t at) {
   return bytes;
 }
 
-/// Both ends of a connection.
+/// Both sides of a connection.
 struct Link {
-  /// What the server answers to these bytes.
+  /// Returns the server's answer to these bytes.
   std::string send(std::string_view bytes) {
     zmtp.receive(bytes);
     while (zmtp.pending_step() != Zmtp::PendingStep::kNone) {
@@ -106,7 +106,7 @@ struct Link {
   }
   std::string hello_frame() { return command_frame("HELLO", client.hello()); }
   std::string initiate_frame() { return command_frame("INITIATE", client.initiate()); }
-  /// The server refuses these bytes with that answer, or without any.
+  /// Expects that the server refuses these bytes, with that answer or without one.
   void expect_refused(std::string_view bytes, const std::string& answer = error_frame("500")) {
     EXPECT_EQ(send(bytes), answer);
     EXPECT_THAT(zmtp.fault(), Not(IsEmpty()));
@@ -160,7 +160,7 @@ TEST_F(CurveTest, APeerWithAnAuthorizedKeyIsAdmittedAndTheServerProvesItsOwnKey)
   const std::string_view ready = std::string_view(answer).substr(2);
   const auto properties =
       CurveClient::opened(ready.substr(14), curve_nonce("CurveZMQREADY---", ready.substr(6, 8)),
-                          link.client.servers_brief, link.client.brief.secret_key);
+                          link.client.server_short_term, link.client.short_term.secret_key);
   EXPECT_EQ(properties, zmtp_properties("ROUTER"));
   EXPECT_TRUE(link.zmtp.is_open());
   EXPECT_EQ(link.zmtp.identity()->name, "anna");
@@ -171,7 +171,7 @@ TEST_F(CurveTest, TwoHandshakesWithTheSameClientKeysDiffer) {
   const CurveClient anna = client();
   const Link first = welcomed(anna);
   const Link second = welcomed(anna);
-  EXPECT_NE(first.client.servers_brief, second.client.servers_brief);
+  EXPECT_NE(first.client.server_short_term, second.client.server_short_term);
   EXPECT_NE(first.client.cookie, second.client.cookie);
 }
 
@@ -194,7 +194,7 @@ TEST_F(CurveTest, APeerThatDoesNotHoldItsKeyIsRefusedWhetherOrNotTheKeyIsListed)
   for (const protocol::KeyPair& shown : {own_, protocol::generate_key_pair()}) {
     std::vector<CurveClient> thieves(3, {shown, server_.public_key});
     thieves[0].vouching_secret = other.secret_key;
-    thieves[1].vouched_brief = other.public_key;
+    thieves[1].vouched_short_term = other.public_key;
     thieves[2].vouched_server = other.public_key;
     for (const CurveClient& client : thieves) {
       Link thief = welcomed(client);
@@ -206,10 +206,10 @@ TEST_F(CurveTest, APeerThatDoesNotHoldItsKeyIsRefusedWhetherOrNotTheKeyIsListed)
 }
 
 TEST_F(CurveTest, KeysOfSmallOrderAreRefused) {
-  // Points of small order: the shared secret is zero, whoever computes it.
+  // Points of small order: the shared secret is always zero.
   for (const std::uint8_t first : {std::uint8_t{0}, std::uint8_t{1}}) {
     Link link = greeted();
-    link.client.brief.public_key = {first};
+    link.client.short_term.public_key = {first};
     link.expect_refused(curve_greeting() + link.hello_frame());
   }
   CurveClient zero = client();
@@ -287,7 +287,7 @@ TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNobody) {
   for (std::size_t at = 0; at < kGreetingBytes; ++at) {
     Link link = greeted();
     const std::string answers = link.send(flipped(curve_greeting(), at) + link.hello_frame());
-    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // some bytes have no meaning
+    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // some bytes are ignored
     EXPECT_FALSE(link.zmtp.is_open()) << at;
   }
   const std::string hello = greeted().hello_frame();
@@ -331,7 +331,7 @@ TEST_F(CurveTest, AConnectionHasOneHandshake) {
 
 TEST_F(CurveTest, CommandsOutOfOrderAreRefused) {
   CurveClient anna = client();
-  anna.servers_brief = server_.public_key;  // without a WELCOME
+  anna.server_short_term = server_.public_key;  // without a WELCOME
   for (const std::string& bytes :
        {zmtp_ready("DEALER"), command_frame("WELCOME", std::string(160, 'w')),
         command_frame("INITIATE", std::string(300, 'i')), zmtp_ping(), anna.sealed("too early"),
@@ -346,11 +346,11 @@ TEST_F(CurveTest, CommandsOutOfOrderAreRefused) {
 
 TEST_F(CurveTest, CountersThatDoNotGrowEndTheConnection) {
   Link link = welcomed();
-  link.client.nonce = 1;  // HELLO's
+  link.client.nonce = 1;  // the counter of HELLO
   link.expect_refused(link.initiate_frame());
 
   Link opened = open();
-  opened.client.nonce = 2;  // INITIATE's
+  opened.client.nonce = 2;  // the counter of INITIATE
   opened.expect_refused(opened.client.sealed("with the counter of the handshake"), "");
 
   const auto ends_after_first_message = [&](const auto& second) {
@@ -429,11 +429,11 @@ TEST_F(CurveTest, AMessageWithAFlippedBitIsRefused) {
 
 TEST_F(CurveTest, MessagesOfTheServerHaveCountersThatGrow) {
   Link link = open();
-  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has the first one
+  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has the first counter
     std::string_view body = "reply";
     const std::string frame = link.zmtp.begin_message(body);
     EXPECT_THAT(body, IsEmpty());
-    EXPECT_EQ(frame[0], 0);  // libzmq takes the outer bit for the inner one
+    EXPECT_EQ(frame[0], 0);  // libzmq reads the outer bit as the inner one
     EXPECT_EQ(link.client.opened_message(frame.substr(2)), std::string("\0reply", 6));
     EXPECT_EQ(number_of(std::string_view(frame).substr(10, 8)), counter);
   }

@@ -28,8 +28,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// Study "a" has ten solved points, e = 1, H = 1, mu from 0 to 1; of the five of "it's" 0, 1 and 2
-/// are solved and 4 failed.
+/// Study "a" has ten solved points with e = 1, H = 1 and mu from 0 to 1. Of the five points of
+/// "it's" 0, 1 and 2 are solved and 4 failed.
 class PlanTest : public StoreFixture {
  protected:
   PlanTest() {
@@ -78,7 +78,7 @@ class PlanTest : public StoreFixture {
   std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
     return texts(plan(database_.get(), asked).sql);
   }
-  /// What SQLite does for a question.
+  /// SQLite's query plan for a question.
   std::string steps_of(const protocol::StudyQuery& asked) const {
     return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
                                                                  plan(database_.get(), asked).sql),
@@ -94,7 +94,7 @@ class PlanTest : public StoreFixture {
   PlannedColumn column(const std::string& select) const {
     return plan(database_.get(), question(select)).columns.at(0);
   }
-  /// The message of the error; empty: the query is right.
+  /// The error message; empty: the query is valid.
   std::string error(const protocol::StudyQuery& asked) const {
     try {
       plan(database_.get(), asked);
@@ -208,7 +208,7 @@ TEST_F(PlanTest, ElementsEqualThoseOfTheListsInTheView) {
   const auto expect_same = [&](const std::string& written, const std::string& sql) {
     const auto shown = texts("SELECT " + sql + " FROM runs WHERE study = 'a' ORDER BY point");
     EXPECT_EQ(texts(question(written)), shown) << written;
-    // With a column that only the view has.
+    // `links` is a column that only the view has.
     EXPECT_EQ(texts(question(written + ", links")), shown) << written;
   };
   for (const auto& [list, members] : lists) {
@@ -382,20 +382,20 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
 }
 
 TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedOnes) {
-  // SQLite 3.40 reads the neighbour of each of these.
+  // SQLite 3.40 reads a neighbouring double for each of these.
   for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
     EXPECT_EQ(number(typed), std::stod(typed));
     EXPECT_EQ(number(std::string("DISTINCT ") + typed), std::stod(typed));
   }
   EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
   EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
-  // True of one row if both numbers are the same.
+  // True for one row if both numbers are equal.
   const std::string is_it = "point = 3 AND 0.1166477 = 1166477 / 1e7";
   EXPECT_EQ(number(question("count(*)", "", is_it)), 9.0);
   EXPECT_EQ(number(question("point", "", "", is_it + " DESC")), 3.0);
 }
 
-/// The message about a text; empty: it may stand in a statement.
+/// The error message for a text; empty: it is allowed.
 std::string objection(const std::string& text) {
   try {
     check_sql_part("--where", text);

@@ -1,4 +1,4 @@
-// Queries in real reader processes, including statements that no thread could be stopped at.
+// Queries in real reader processes, including statements that cannot be interrupted.
 #include "server/query/query_pool.h"
 
 #include <fcntl.h>
@@ -37,10 +37,10 @@ using Kind = QueryReport::Kind;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-/// Compares for hours without checking for an interrupt.
+/// Compares bytes for hours without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
-/// Megabytes: more than a client is sent ahead.
+/// Some megabytes: more than is sent ahead.
 constexpr const char* kLong =
     "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 60000) "
     "SELECT i, hex(zeroblob(50)) FROM n";
@@ -62,7 +62,7 @@ class QueryPoolTest : public testing::Test {
   }
   void advance_ms(std::int64_t time_ms) {
     now_ms_ += time_ms;
-    pool().cancel(UINT64_MAX);  // no such query: the pool only looks at its clock
+    pool().cancel(UINT64_MAX);  // no such query: only makes the pool check its clock
   }
   std::uint64_t ask(const std::string& sql, const std::string& client = "") {
     QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
@@ -72,14 +72,14 @@ class QueryPoolTest : public testing::Test {
     return last_ticket_;
   }
 
-  /// What was reported of a query until now.
+  /// What was reported about a query so far.
   struct Answer {
     bool runs = false;
     bool ended = false;
     bool in_order = true;
     std::uint64_t chunks = 0;
     std::uint64_t rows = 0;
-    std::uint64_t largest = 0;     // bytes of a chunk
+    std::uint64_t largest = 0;     // size of the largest chunk
     std::int64_t last_number = 0;  // first column of the last row
     std::string error;
   };
@@ -114,7 +114,7 @@ class QueryPoolTest : public testing::Test {
     }
     return now;
   }
-  /// Makes a shell script the reader program.
+  /// Uses a shell script as the reader program.
   std::string use_script(const std::string& commands) {
     settings_.reader_program = folder_.file("reader");
     std::ofstream(settings_.reader_program) << "#!/bin/sh\n" << commands << '\n';
@@ -122,7 +122,7 @@ class QueryPoolTest : public testing::Test {
     return settings_.reader_program;
   }
   std::string error_of(const std::string& sql) { return take_all(ask(sql)).error; }
-  /// Of the only row.
+  /// The first value of the only row.
   std::int64_t number_of(const std::string& sql) {
     const Answer answer = take_all(ask(sql));
     EXPECT_EQ(answer.rows, 1U) << answer.error;
@@ -164,7 +164,7 @@ class QueryPoolTest : public testing::Test {
   std::condition_variable changed_;
   std::map<std::uint64_t, Answer> answers_;
   std::uint64_t last_ticket_ = 0;
-  std::optional<QueryPool> pool_;  // last: it reports to the others
+  std::optional<QueryPool> pool_;  // last: it uses the other members
 };
 
 TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledDuringItsStartRunsNoQuery) {
@@ -206,7 +206,7 @@ TEST_F(QueryPoolTest, AQueryIsKilledAtItsDeadline) {
 
 TEST_F(QueryPoolTest, QueriesThatNeedTooMuchMemoryFailWithThatReason) {
   EXPECT_THAT(error_of("SELECT hex(zeroblob(450000000))"), HasSubstr("exceeds the allowed 16 MiB"));
-  // To SQLite's printf a text over the limit is NULL.
+  // SQLite's printf returns NULL for a text over the limit.
   EXPECT_EQ(number_of("SELECT printf('%.*c', 900000000, 'x') IS NULL"), 1);
   const std::string megabytes =
       "(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000)"

@@ -51,8 +51,8 @@ TEST_F(ReaderTest, ValuesHaveTheirTypes) {
   using Integer = std::int64_t;
   const protocol::Row expected{Integer{1},        0.5, Text("\xc3\xa9"), std::monostate{},
                                Text("x'0AFF'"),
-                               Text("x'FF'"),      // no UTF-8
-                               Text("x'EDA080'"),  // no UTF-8
+                               Text("x'FF'"),      // not UTF-8
+                               Text("x'EDA080'"),  // not UTF-8
                                Integer{0},         // LIKE is case-sensitive
                                Integer{1}};
   EXPECT_EQ(reply.rows.at(0), expected);
@@ -151,12 +151,12 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
 }
 
-/// Study "a" has points 0 to 9, of which 5 is not solved yet, and rows of a fourth of a chunk.
+/// Study "a" has points 0 to 9; point 5 is not solved yet. A row is a quarter of a chunk.
 class AnswerTest : public StoreFixture {
  protected:
   AnswerTest() { commit({study_, worker(1), solved(study_, {0, 1, 2, 3, 4, 6, 7, 8, 9})}); }
 
-  /// Only full chunks, however slow the machine is.
+  /// Full chunks only, even on a slow machine.
   static QueryLimits full_chunks() {
     QueryLimits limits;
     limits.longest_chunk_ms = INT64_MAX;

@@ -15,7 +15,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-TEST_F(ServiceTest, APausedStudyHandsOutNothingUntilItIsResumed) {
+TEST_F(ServiceTest, APausedStudyIsNotLeasedUntilItIsResumed) {
   submit("a");
   request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
   EXPECT_FALSE(last_reply().has_change()) << "not durable yet";
@@ -28,7 +28,7 @@ TEST_F(ServiceTest, APausedStudyHandsOutNothingUntilItIsResumed) {
   EXPECT_TRUE(last_message().has_batch());
 }
 
-TEST_F(ServiceTest, ChangesThatAreThereAlreadyAreAnsweredAtOnce) {
+TEST_F(ServiceTest, ChangesWithoutEffectAreAnsweredAtOnce) {
   submit("a");
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(last_reply().change().study().state(), "running");
@@ -40,7 +40,7 @@ TEST_F(ServiceTest, ChangesThatAreThereAlreadyAreAnsweredAtOnce) {
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
+TEST_F(ServiceTest, RetriedPointsAreLeasedWhenTheirRowsAreDeleted) {
   submit("a", 1);
   hello_and_credit();
   answer_batch(0);
@@ -62,7 +62,7 @@ TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
   EXPECT_EQ(last_reply().change().study().state(), "done");
 }
 
-TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingMoreIsAcknowledgedAndEverybodyIsTold) {
+TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingIsAcknowledgedAndAllPeersAreNotified) {
   submit("a");
   hello_and_credit();
   ASSERT_TRUE(last_message().has_batch());
@@ -90,7 +90,7 @@ TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingMoreIsAcknowledgedAndEverybodyIs
   EXPECT_EQ(status_of("a").waits_for(), "the file was deleted");
 }
 
-TEST_F(ServiceTest, OfSeveralChangesEachWaitsForTheOutcomeOfTheOneBefore) {
+TEST_F(ServiceTest, EachChangeWaitsForThePreviousOne) {
   submit("a");
   for (const bool is_first_stored : {true, false}) {
     ports_.replies.clear();
@@ -123,7 +123,7 @@ TEST_F(ServiceTest, AStudyThatIsDoneWhileAPauseIsWrittenStaysDone) {
   EXPECT_EQ(status_of("a").state(), "done") << "points handed out before are still stored";
 }
 
-TEST_F(ServiceTest, ARefusedChangeLeavesTheStudyAsItWasAndInDoubt) {
+TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
   submit("a");
   for (const auto change : {protocol::STUDY_CHANGE_PAUSE, protocol::STUDY_CHANGE_CANCEL}) {
     request(change_request("a", change));
@@ -179,7 +179,7 @@ class ServiceGrowthTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedOnceTheyAreDurable) {
+TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedWhenTheyAreDurable) {
   submit("a", 10);
   grow("a", 10, 5);
   grow("a", 10, 5);  // another client
@@ -199,7 +199,7 @@ TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedOnceTheyAreDurable) {
   EXPECT_EQ(service_->scheduler().study(1).points, 15U);
 }
 
-TEST_F(ServiceGrowthTest, ADoneStudyRunsAgainAndItsWorkersGetTheFurtherPoints) {
+TEST_F(ServiceGrowthTest, ADoneStudyThatGrowsRunsAgain) {
   submit("a", 3);
   solve_everything();
   ASSERT_EQ(status_of("a").state(), "done");
@@ -262,7 +262,7 @@ TEST_F(ServiceGrowthTest, ARenamedStudyIsFoundByItsNewNameAndByItsNumber) {
   EXPECT_TRUE(last_reply().submit().created()) << "the old name is free";
 }
 
-TEST_F(ServiceGrowthTest, AUsedNameIsRefusedAlsoWhileItIsBeingWritten) {
+TEST_F(ServiceGrowthTest, ANameInUseIsRefusedEvenWhileItIsBeingWritten) {
   submit("a");
   submit("b");
   rename("a", "b");
@@ -282,7 +282,7 @@ TEST_F(ServiceGrowthTest, AUsedNameIsRefusedAlsoWhileItIsBeingWritten) {
   EXPECT_EQ(last_reply().change().study().name(), "c");
 }
 
-TEST_F(ServiceGrowthTest, ARefusedRenamingOrDeletionLeavesTheStudyAsItWas) {
+TEST_F(ServiceGrowthTest, ARefusedRenamingOrDeletionHasNoEffect) {
   submit("a");
   rename("a", "b");
   write_all("the disk is full");
@@ -367,7 +367,7 @@ class ServiceKeysTest : public ServiceTest {
   std::shared_ptr<const KeyIdentity> reader_ = holder_of("onlooker", protocol::Role::kReader);
 };
 
-TEST_F(ServiceKeysTest, AReaderMayAskAndChangesNothing) {
+TEST_F(ServiceKeysTest, AReaderMayReadButNotChange) {
   EXPECT_EQ(error_of(submit_request("a"), alice_), "");
   std::vector<ClientRequest> refused{submit_request("b"), long_submission("long", kLongRequest)};
   for (const auto change : {protocol::STUDY_CHANGE_CANCEL, protocol::STUDY_CHANGE_PAUSE,
@@ -394,7 +394,7 @@ TEST_F(ServiceKeysTest, AStudyHasTheNameOfTheKeyThatFirstSubmittedIt) {
   EXPECT_EQ(status_of("b").submitted_by(), "");
 }
 
-TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
+TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreLimited) {
   EXPECT_THAT(error_of(submit_request("a", 1001)),
               HasSubstr("0 points are open, and at most 1000 are allowed "
                         "(--limits-open-points)"));
@@ -408,7 +408,7 @@ TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
   EXPECT_EQ(error_of(submit_request("a", 600)), "") << "it is open already";
 }
 
-TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheBounds) {
+TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheLimits) {
   submit("a", 1000);
   EXPECT_EQ(error_of(cancel_request("a")), "");
   EXPECT_EQ(error_of(submit_request("b", 1000)), "");
@@ -419,7 +419,7 @@ TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheBounds) 
   EXPECT_EQ(status_of("a").state(), "cancelled");
 }
 
-TEST_F(ServiceKeysTest, QueriesOfAllConnectionsOfAKeyAreThoseOfOneClient) {
+TEST_F(ServiceKeysTest, AllConnectionsOfAKeyCountAsOneClient) {
   ClientRequest query = client_request();
   query.mutable_query()->set_sql("SELECT 1");
   send(query, "one", alice_);

@@ -24,7 +24,7 @@ using testing::HasSubstr;
 
 // ---- Checks ----
 
-TEST_F(ServiceTest, ALongRecipeIsJudgedElsewhereAndOthersAreAnsweredMeanwhile) {
+TEST_F(ServiceTest, ALongRecipeIsCheckedWithoutDelayingOthers) {
   request(long_submission("large", kLongRequest));
   ASSERT_EQ(ports_.checks.size(), 1U);
   EXPECT_TRUE(ports_.replies.empty());
@@ -47,7 +47,7 @@ TEST_F(ServiceTest, ALongRecipeWithAFaultIsRefusedWithTheReason) {
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, LongRequestsThatWaitAreBounded) {
+TEST_F(ServiceTest, WaitingLongRequestsAreLimited) {
   const std::string frame = protocol::encode(long_submission("a", std::size_t{10} << 20U));
   for (int i = 0; i < 12; ++i) {
     service_->client_frame("client " + std::to_string(i), frame, now_);
@@ -59,7 +59,7 @@ TEST_F(ServiceTest, LongRequestsThatWaitAreBounded) {
   EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
 }
 
-TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
+TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsNumber) {
   std::string frame = protocol::encode(long_submission("a", kLongRequest));
   frame.back() = '\x7f';
   frame += '\x7f';
@@ -102,7 +102,7 @@ class ServiceQueryTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
+TEST_F(ServiceQueryTest, AClientGetsStillWorkingEverySecondForItsQuery) {
   ask(7);
   pass(900);
   EXPECT_TRUE(ports_.replies.empty());
@@ -121,7 +121,7 @@ TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
   EXPECT_EQ(ports_.replies.size(), replies);
 }
 
-TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesOrIsGoneAreCancelledAndNobodyElses) {
+TEST_F(ServiceQueryTest, OnlyTheQueriesOfADisconnectedClientAreCancelled) {
   for (const bool leaves : {true, false}) {
     start({});
     ports_ = {};
@@ -143,7 +143,7 @@ TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesOrIsGoneAreCancelledAndNob
   }
 }
 
-TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndOneThatIsAskedTwiceUnderItsNumberRunsOnce) {
+TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndARepeatedOneRunsOnce) {
   ask(7);
   ask(7);
   EXPECT_EQ(ports_.queries.size(), 1U);
@@ -155,7 +155,7 @@ TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndOneThatIsAskedTwiceUnderItsN
   EXPECT_EQ(last_reply().request_id(), 8U);
 }
 
-TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReaders) {
+TEST_F(ServiceQueryTest, ChunksAreForwardedAndTheirConfirmationsPassedToTheReaders) {
   using Taken = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
   ask(7);
   give(0);
@@ -176,7 +176,7 @@ TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReader
   EXPECT_EQ(last_reply().request_id(), 7U);
 }
 
-TEST_F(ServiceQueryTest, WhoSaysToHaveTakenWhatWasNotGivenLosesTheAnswer) {
+TEST_F(ServiceQueryTest, ConfirmingUnsentChunksEndsTheAnswer) {
   ask(7);
   give(0);
   want_more(7, UINT64_MAX);
@@ -185,7 +185,7 @@ TEST_F(ServiceQueryTest, WhoSaysToHaveTakenWhatWasNotGivenLosesTheAnswer) {
   EXPECT_TRUE(ports_.more.empty());
 }
 
-TEST_F(ServiceQueryTest, AnswersOfOthersCanBeNeitherTakenNorEnded) {
+TEST_F(ServiceQueryTest, AnswersOfOtherClientsCanBeNeitherConfirmedNorEnded) {
   ask(7);
   give(0);
   want_more(7, 1, "another");
@@ -195,7 +195,7 @@ TEST_F(ServiceQueryTest, AnswersOfOthersCanBeNeitherTakenNorEnded) {
   EXPECT_TRUE(ports_.cancelled_queries.empty());
 }
 
-TEST_F(ServiceQueryTest, AnAnswerThatItsClientEndsIsCancelledWithoutAReply) {
+TEST_F(ServiceQueryTest, EndQueryCancelsTheAnswerWithoutAReply) {
   ask(7);
   give(0);
   end(7);
@@ -206,7 +206,7 @@ TEST_F(ServiceQueryTest, AnAnswerThatItsClientEndsIsCancelledWithoutAReply) {
   EXPECT_EQ(ports_.replies.size(), 1U);
 }
 
-TEST_F(ServiceQueryTest, NobodyIsToldToWaitWhileHeIsWaitedFor) {
+TEST_F(ServiceQueryTest, StillWorkingIsNotSentWhileTheClientIsSlow) {
   ask(7);
   for (std::uint64_t i = 0; i < kChunksAhead; ++i) {
     give(0);
@@ -292,7 +292,7 @@ class ServiceTraceTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheClient) {
+TEST_F(ServiceTraceTest, AWorkerSolvesATraceBesideItsBatchesAndTheClientGetsIt) {
   hello();
   credit(2);
   auto message = trace_request(7, 3);
@@ -315,7 +315,7 @@ TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheCli
   EXPECT_EQ(reply.outputs(), protocol::sent_outputs());
 }
 
-TEST_F(ServiceTraceTest, WhatThePointIsIsSaidWithoutAnyWorker) {
+TEST_F(ServiceTraceTest, TheInputsOfAPointNeedNoWorker) {
   auto message = trace_request(7, 99);
   message.mutable_trace()->set_only_point(true);
   send(message, "client");
@@ -324,7 +324,7 @@ TEST_F(ServiceTraceTest, WhatThePointIsIsSaidWithoutAnyWorker) {
   EXPECT_FALSE(last_reply().trace().has_trace());
 }
 
-TEST_F(ServiceTraceTest, WhatDoesNotExistIsNamed) {
+TEST_F(ServiceTraceTest, UnknownStudiesAndPointsAreNamed) {
   hello();
   send(trace_request(7, 0, "b"), "client");
   EXPECT_THAT(last_error(), HasSubstr("no study called \"b\""));
@@ -337,7 +337,7 @@ TEST_F(ServiceTraceTest, WhatDoesNotExistIsNamed) {
   EXPECT_TRUE(orders().empty());
 }
 
-TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainForItMayKill) {
+TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainBecauseItMayKillAWorker) {
   hello_and_credit();
   answer_batch(0);
   ask(7, 0);
@@ -373,7 +373,7 @@ TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
   EXPECT_THAT(last_error(), HasSubstr("no worker is connected"));
 }
 
-TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDoesNotTakeItIsReplacedOnce) {
+TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
   for (const bool is_lost : {true, false}) {
     hello("one");
     ask(7, 3);
@@ -411,7 +411,7 @@ TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
   EXPECT_TRUE(ports_.replies.empty());
 }
 
-TEST_F(ServiceTraceTest, AClientHearsEverySecondThatItsTraceWaitsOrIsSolved) {
+TEST_F(ServiceTraceTest, AClientGetsStillWorkingEverySecondForItsTrace) {
   hello();
   ask(7, 3);
   ask(7, 4, "another");
@@ -424,7 +424,7 @@ TEST_F(ServiceTraceTest, AClientHearsEverySecondThatItsTraceWaitsOrIsSolved) {
   EXPECT_EQ(cancels(), 1) << "no word of it could be delivered";
 }
 
-TEST_F(ServiceTraceTest, ATraceHasItsTime) {
+TEST_F(ServiceTraceTest, ATraceHasATimeLimit) {
   hello();
   auto message = trace_request(7, 3);
   message.mutable_trace()->set_time_limit_ms(500);
@@ -434,7 +434,7 @@ TEST_F(ServiceTraceTest, ATraceHasItsTime) {
   EXPECT_EQ(cancels(), 1);
 }
 
-TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
+TEST_F(ServiceTraceTest, RunningAndWaitingTracesAreLimited) {
   for (const char* worker : {"one", "two", "three"}) {
     hello(worker);
   }
@@ -446,7 +446,7 @@ TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
   EXPECT_EQ(orders().size(), limits::kRunningTraces);
 }
 
-TEST_F(ServiceTraceTest, ChecksOfPointsAreBoundedAlsoWhenTheirClientsAreGone) {
+TEST_F(ServiceTraceTest, ChecksOfPointsAreLimitedEvenIfTheirClientsAreGone) {
   StoredStudy study;
   study.study_id = 1;
   study.name = "a";
@@ -499,7 +499,7 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
   EXPECT_TRUE(last_reply().has_trace());
 }
 
-TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnAThreadOfItsOwn) {
+TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnTheCheckThread) {
   request(long_submission("long", kLongRequest));
   run_checks();
   write_all();
@@ -514,7 +514,7 @@ TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnAThreadOfItsOwn) {
   ASSERT_EQ(orders().size(), 1U);
 }
 
-TEST_F(ServiceTraceTest, AStoppingServerTellsWorkersAndAnswersWhoeverWaitsOrComes) {
+TEST_F(ServiceTraceTest, AStoppingServerNotifiesWorkersAndRefusesRequests) {
   hello();
   for (const bool is_stopped : {false, true}) {
     ports_.replies.clear();

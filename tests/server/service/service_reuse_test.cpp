@@ -93,7 +93,7 @@ TEST_F(ServiceReuseTest, NothingIsLookedUpWithoutAnyResultOrForARequestWithoutRe
   EXPECT_EQ(last_reply().submit().study_id(), kStudy);
 }
 
-TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
+TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsLeasedAndTheReplyWaits) {
   solve_some();
   request(reusing("b"));
   const std::size_t replies = ports_.replies.size();
@@ -126,7 +126,7 @@ TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
   EXPECT_TRUE(reply.reused().under_way());
 }
 
-TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShort) {
+TEST_F(ServiceReuseTest, ALookupIsCutShortAfterAMillionProbesOrALongTimeWithoutAResult) {
   for (const bool is_long : {false, true}) {
     start({});
     submit_study();
@@ -145,7 +145,7 @@ TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShor
   }
 }
 
-TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
+TEST_F(ServiceReuseTest, AFailedLookupIsCutShortAndTheStudyRuns) {
   submit_study();
   write_all("a page is damaged");
   EXPECT_EQ(ended(), kStudy);
@@ -174,7 +174,7 @@ TEST_F(ServiceReuseTest, AStudyDoesNotGrowDuringItsLookup) {
   EXPECT_THAT(last_error(), HasSubstr("cannot grow while results"));
 }
 
-TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
+TEST_F(ServiceReuseTest, ACancelledOrDeletedStudyIsNotLookedUpFurther) {
   for (const auto change : {protocol::STUDY_CHANGE_CANCEL, protocol::STUDY_CHANGE_DELETE}) {
     start({});
     submit_study();
@@ -189,14 +189,14 @@ TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
   }
 }
 
-TEST_F(ServiceReuseTest, AServerThatStopsLeavesTheRestToTheNextOne) {
+TEST_F(ServiceReuseTest, AStoppedLookupIsLeftToTheNextServer) {
   submit_study();
   service_->drain(now_);
   write_part(copies_of_a(IntervalSet(0, 4), 4));
   EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
-TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
+TEST_F(ServiceReuseTest, AServerContinuesAnUnfinishedLookup) {
   StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   source.completed = IntervalSet(0, 5);
   StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
@@ -232,7 +232,7 @@ class FilteredStudyTest : public ServiceTest {
   }
 };
 
-TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
+TEST_F(FilteredStudyTest, PointsAreValidatedOnTheCheckThread) {
   request(filtered_request("mu > 0.75"));
   EXPECT_THAT(ports_.replies, IsEmpty());
   ASSERT_EQ(ports_.checks.size(), 1U);
@@ -246,7 +246,7 @@ TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
   EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 
-TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
+TEST_F(FilteredStudyTest, TracesOfAFilteredStudyUseThePointNumbers) {
   submit_filtered();
   hello();
   const auto ask = [&](std::uint64_t point) {
@@ -263,7 +263,7 @@ TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
   EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
 }
 
-TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
+TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
   submit_filtered();
   hello_and_credit();
   while (last_message().has_batch()) {
@@ -276,7 +276,7 @@ TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
   EXPECT_EQ(status.left_out(), 8U);
 }
 
-TEST_F(FilteredStudyTest, RangesThatAreNoneEndTheConnectionOfTheirWorker) {
+TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
   submit_filtered();
   // After three lost workers the next one gets a probe: the first two are of its batch.
   const std::vector<std::vector<std::uint64_t>> wrong{

@@ -59,7 +59,7 @@ TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsAreOpenAfterTheNext
 }
 
 /// Random additions and removals of points and ranges.
-TEST_F(CompletedRangesTest, RandomChangesLeaveThePointsOfASetInTheFewestRanges) {
+TEST_F(CompletedRangesTest, RandomChangesGiveTheFewestRanges) {
   constexpr std::uint64_t kPoints = 60;
   const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
   create_tables(database.get());
@@ -131,7 +131,7 @@ TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
   EXPECT_THAT(ranges(), ElementsAre("3+4"));
 }
 
-TEST_F(CompletedRangesTest, APointThatHadARowAlreadyIsCompletedByItsResult) {
+TEST_F(CompletedRangesTest, AResultCompletesAPointThatAlreadyHasARow) {
   const auto study = study_of(10);
   commit({study, worker(1), solved(study, {3, 4})});
   by_hand("DELETE FROM completed_ranges");

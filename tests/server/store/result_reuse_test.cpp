@@ -77,7 +77,7 @@ TEST_F(SamePointsTest, SoundRowsAreCopiedAndCountedByTheirOrigin) {
   EXPECT_THAT(study.reused, ElementsAre(Pair("a", 10)));
 }
 
-TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInItsStudyItsPointAndWhereItCameFrom) {
+TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInStudyPointAndOrigin) {
   reused();
   std::vector<std::string> same;
   for (const std::string_view column : result_columns()) {
@@ -142,7 +142,7 @@ TEST_F(ResultReuseTest, PartsFollowEachOtherAndSkipCompletedPoints) {
   EXPECT_EQ(third.next_point, std::nullopt);
 }
 
-TEST_F(ResultReuseTest, AModelThatNoRowHasCostsOneProbe) {
+TEST_F(ResultReuseTest, AModelWithoutRowsCostsOneProbe) {
   const Table known = table_of(10);
   add(1, "a", known);
   solve(1, known);
@@ -199,7 +199,7 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
            std::bit_cast<std::uint64_t>(point.e_star)}};
 }
 
-TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
+TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
   std::mt19937 random(4711);
   std::map<Inputs, std::string> solved;  // by inputs the first row, as reused_from has it
   std::size_t reused = 0;

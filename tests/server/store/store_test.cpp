@@ -27,7 +27,7 @@ using testing::SizeIs;
 
 using StoreTest = StoreFixture;
 
-TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
+TEST_F(StoreTest, CommittedRowsAreThereAfterReopening) {
   auto study = study_of(10);
   study.submitted_by = "alice";
   commit({study, worker(1), solved(study, {0, 1, 5}), failed(study, {7})});
@@ -59,7 +59,7 @@ TEST_F(StoreTest, AnInterruptEndsALongStatement) {
               testing::ThrowsMessage<StorageError>(HasSubstr("interrupted")));
 }
 
-TEST_F(StoreTest, AnEmptyDatabaseHasAnIdentityAndCountsStarts) {
+TEST_F(StoreTest, AnEmptyDatabaseHasAnIdAndCountsStarts) {
   EXPECT_THAT(store().studies(), IsEmpty());
   EXPECT_EQ(store().last_study_id(), 0U);
   EXPECT_EQ(store().last_worker_id(), 0U);
@@ -153,7 +153,7 @@ TEST_F(StoreTest, ADatabaseInUseIsNotOpenedTwice) {
   EXPECT_THAT(refusal(), HasSubstr("already uses the database"));
 }
 
-TEST_F(StoreTest, OtherFilesAreRefusedByTheirKind) {
+TEST_F(StoreTest, OtherKindsOfFilesAreRefused) {
   std::ofstream(path_) << std::string(5000, 'x');
   EXPECT_THAT(refusal(), HasSubstr("is not a database"));
   EXPECT_EQ(std::filesystem::file_size(path_), 5000U);
@@ -169,7 +169,7 @@ TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
   EXPECT_THAT(refusal(), HasSubstr("another program (application id 0)"));
 }
 
-TEST_F(StoreTest, AStudyThatThisVersionDoesNotAcceptIsSkippedAndNamed) {
+TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
   commit({study_of(10, 1, "too elastic"), study_of(10, 2, "b"), study_of(3, 3, "c")});
   close();
   // Other versions may take an e that this one cannot solve.
@@ -195,7 +195,7 @@ TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check")));
 }
 
-TEST_F(StoreTest, ANumberIsNeverGivenToAnotherStudy) {
+TEST_F(StoreTest, AStudyNumberIsNeverReused) {
   const auto study = study_of(5, 2);
   commit({study, solved(study, {0}), study_of(5, 3, "b")});
   close();
@@ -269,7 +269,7 @@ TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndARightChecksu
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
+TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsAreDeletedInParts) {
   add_solved(1, table_of(100));
   add_solved(2, table_of(50));
   commit({DeleteStudy{1}});
@@ -328,7 +328,7 @@ TEST_F(StudyDeletionTest, ADeletionThatIsRolledBackDeletesNothing) {
   EXPECT_EQ(rows_in("results"), 6) << "later results are stored";
 }
 
-TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRowsAreGone) {
+TEST_F(StudyDeletionTest, OrphanedModelsAndWorkersAreDeletedAtAStartAfterTheRows) {
   add_solved(1, table_with_k(1e7, 20));
   add_solved(2, table_with_k(2e7, 20));
   add_solved(3, table_with_k(2e7, 20));
@@ -347,7 +347,7 @@ TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRows
       << "a model that was deleted comes again";
 }
 
-TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
+TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
   add_solved(1, table_of(2000));
   add_solved(2, table_of(2000));
   store().checkpoint_at(1);
@@ -384,7 +384,7 @@ class SchemaTest : public StoreFixture {
   }
 };
 
-TEST_F(SchemaTest, EachStartCreatesWhatWasDroppedOrReplacedAndOtherViewsStay) {
+TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
   by_hand("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
   const auto before = objects();
   ASSERT_EQ(before.size(), 9U);
@@ -406,7 +406,7 @@ TEST_F(SchemaTest, TriggersOfTheFileDoNotRunWithTheChangesOfAServer) {
   EXPECT_THAT(rows("SELECT priority FROM studies"), ElementsAre("7"));
 }
 
-TEST_F(SchemaTest, AFileWithATableInThePlaceOfAViewIsRefusedAndTheTableStays) {
+TEST_F(SchemaTest, AFileWithATableNamedLikeAViewIsRefusedUnchanged) {
   by_hand("DROP VIEW runs; CREATE TABLE runs (mine)");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
   EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
@@ -451,7 +451,7 @@ TEST_F(StoreFilesTest, ACommitDuringWhichTheFileIsDeletedIsNotAcknowledged) {
   EXPECT_THROW(add_result(0), StorageGone);
 }
 
-TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced) {
+TEST_F(StoreFilesTest, NothingIsAcknowledgedAfterTheFileIsDeletedRenamedOrReplaced) {
   const std::map<std::string, std::function<void()>> blows{
       {"the database is deleted", [&] { fs::remove(path_); }},
       {"it is renamed", [&] { fs::rename(path_, folder_.file("elsewhere.db")); }},
@@ -474,7 +474,7 @@ TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced)
   }
 }
 
-TEST_F(StoreFilesTest, ARenamedDatabaseGetsWhatWasAcknowledgedWhenItsServerEnds) {
+TEST_F(StoreFilesTest, ARenamedDatabaseGetsAllAcknowledgedChangesWhenItsServerEnds) {
   add_result(0);
   add_result(1);
   const std::string elsewhere = folder_.file("elsewhere.db");
@@ -486,7 +486,7 @@ TEST_F(StoreFilesTest, ARenamedDatabaseGetsWhatWasAcknowledgedWhenItsServerEnds)
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(StoreFilesTest, AReaderInTheMiddleOfAQueryKeepsTheLogAndOneThatOnlyWaitsDoesNot) {
+TEST_F(StoreFilesTest, ARunningQueryKeepsTheLogAndAnIdleReaderDoesNot) {
   add_result(0);
   EXPECT_EQ(rows_of_copy("before.db"), 0) << "it is in the log";
   const DatabaseHandle waits = open_database(path_, SQLITE_OPEN_READONLY);
@@ -505,7 +505,7 @@ TEST_F(StoreFilesTest, AReaderInTheMiddleOfAQueryKeepsTheLogAndOneThatOnlyWaitsD
   EXPECT_EQ(rows_of_copy("after.db"), 3);
 }
 
-TEST_F(StoreFilesTest, ANewDatabaseIsForItsOwnerAloneAndAnOldOneKeepsItsMode) {
+TEST_F(StoreFilesTest, OnlyItsOwnerMayReadANewDatabaseAndAnOldOneKeepsItsMode) {
   const auto mode_of = [](const std::string& path) {
     struct stat found {};
     EXPECT_EQ(::stat(path.c_str(), &found), 0) << path;

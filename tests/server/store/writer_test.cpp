@@ -122,7 +122,7 @@ TEST_F(GroupCommitTest, OneBadChangeDoesNotBlockTheOthers) {
   EXPECT_EQ(write(), (Reports{{Kind::kStored, 1}, {Kind::kRefused, 2}, {Kind::kStored, 3}}));
 }
 
-TEST_F(GroupCommitTest, ResultsWaitForAFullDiskOrMemoryAndAreWrittenWhenThereIsRoom) {
+TEST_F(GroupCommitTest, ResultsWaitWhileDiskOrMemoryIsFull) {
   for (const bool is_memory : {false, true}) {
     storage_.workers.clear();
     storage_.on_change = [is_memory](const Change&) {
@@ -139,7 +139,7 @@ TEST_F(GroupCommitTest, ResultsWaitForAFullDiskOrMemoryAndAreWrittenWhenThereIsR
   }
 }
 
-TEST_F(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
+TEST_F(GroupCommitTest, ALaterChangeDoesNotOvertakeAWaitingOneOfItsStudy) {
   storage_.on_change = [](const Change& change) {
     if (!std::holds_alternative<ForgetFailures>(change)) {
       throw StorageError("the disk is full");
@@ -175,7 +175,7 @@ TEST_F(GroupCommitTest, ALookupOfResultsIsTheLastChangeOfItsTransactionAndMayFai
   EXPECT_FALSE(commits_.is_faulty());
 }
 
-TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone) {
+TEST_F(GroupCommitTest, CommitsToADeletedFileAreNotReportedAsStored) {
   storage_.goes_in_commit = true;
   jobs_ = {kept(1), answered(2)};
   EXPECT_EQ(write(), (Reports{{Kind::kGone, 0}}));
@@ -185,7 +185,7 @@ TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone
   EXPECT_THAT(storage_.sizes, ElementsAre(2));
 }
 
-TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
+TEST_F(GroupCommitTest, EveryOperationDetectsAMissingFile) {
   using Way = std::function<void(GroupCommit&, std::vector<WriteReport>&)>;
   const std::vector<Way> ways{
       [](auto& commits, auto& reports) { reports = commits.maintain(); },
@@ -218,7 +218,7 @@ TEST_F(GroupCommitTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersAllowIt) {
   EXPECT_EQ(told(reports), (Reports{{Kind::kUnmerged, 0}})) << "reported once";
 }
 
-TEST_F(GroupCommitTest, AStepOfADeletionThatFailsIsRepeatedAndReportsNothing) {
+TEST_F(GroupCommitTest, AFailedDeletionStepIsRepeatedWithoutAReport) {
   EXPECT_FALSE(commits_.has_to_clear()) << "not before it is told";
   commits_.resume_deletions();
   storage_.parts_left = 2;
@@ -287,7 +287,7 @@ TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
   EXPECT_EQ(writer_.finish(), 1U) << "it is not durable";
 }
 
-TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsOneThatReadersKeep) {
+TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsFailure) {
   storage_.merged_at = 1'000'000;
   writer_.submit(kept(1));
   EXPECT_EQ(writer_.finish(), 0U);
@@ -295,7 +295,7 @@ TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsOneThatReadersK
   EXPECT_EQ(count(Kind::kUnmerged), 1U);
 }
 
-TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWithoutAny) {
+TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWhenIdle) {
   writer_.submit(kept(1));
   ASSERT_EQ(wait_for_ticket(1), Kind::kStored);
   storage_.parts_left = 300;

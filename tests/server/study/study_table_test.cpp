@@ -31,7 +31,7 @@ StudyTable stored(const protocol::Recipe& recipe, std::uint64_t points) {
   return StudyTable(recipe.SerializeAsString(), points);
 }
 
-TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
+TEST(StudyTable, GrowsByBlocksOnlyWhetherOrNotTheTablesAreMade) {
   protocol::Recipe before = recipe_of_mu(listed("mu", {0.1, 0.2}));
   protocol::Recipe longer = before;
   *longer.add_blocks() = recipe_of_mu(listed("mu", {0.3})).blocks(0);
@@ -60,7 +60,7 @@ TEST(StudyTable, DamagedBytesCannotBeCompared) {
   EXPECT_THROW(damaged.growth_to(validated(recipe_of_mu(listed("mu", {0.1})))), std::runtime_error);
 }
 
-TEST(StudyTable, ComparesWithoutMakingTheTableOfAStudyThatRests) {
+TEST(StudyTable, ComparesWithoutMakingReleasedTables) {
   const auto resting = stored(recipe_of_mu(range("mu", 0.1, 0.5, 5)), 5);
   (void)resting.growth_to(validated(recipe_of_mu(listed("mu", {1, 2, 3, 4, 5}))));
   EXPECT_FALSE(resting.is_made());
@@ -82,7 +82,7 @@ protocol::Recipe recipe_of_sample(protocol::SampleKind kind, std::uint64_t count
       {protocol::uniform("H", 0.3, 1.1), listed("mu", {0.4}), listed("e", {1.0})}, kind, count)});
 }
 
-TEST(RecipeGrowth, FewerBlocksAreShorterAndTheNumbersAreSaid) {
+TEST(RecipeGrowth, FewerBlocksAreShorterAndTheirNumbersAreNamed) {
   const Growth growth = growth_of(blocks_of({kFiveMus, kTwoMus}), blocks_of({kFiveMus}));
   EXPECT_EQ(growth.kind, Growth::Kind::kShorter);
   EXPECT_EQ(growth.difference, "stored 2 blocks, given 1");
@@ -104,7 +104,7 @@ TEST(RecipeGrowth, AxesInAnotherOrderDiffer) {
   EXPECT_EQ(growth_of(of(k, eta2), of(eta2, k)).kind, Growth::Kind::kOther);
 }
 
-TEST(RecipeGrowth, KeysOfTheModelAndTheChoiceOfErrorsAreNamed) {
+TEST(RecipeGrowth, DifferingModelKeysAndErrorsAreNamed) {
   auto given = blocks_of({kFiveMus, kTwoMus});
   auto model = solver::preset("paper");
   model.k_N_m = 1e7;

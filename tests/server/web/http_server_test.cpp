@@ -201,7 +201,7 @@ TEST(HttpServer, SurvivesAnyBytes) {
   EXPECT_EQ(body_of(get(server.url(), "/after")), "/after\n");
 }
 
-TEST(HttpServer, AnAddressWithItsShareOfConnectionsTakesNoneFromOthers) {
+TEST(HttpServer, AnAddressAtItsConnectionLimitDoesNotAffectOthers) {
   HttpLimits limits;
   limits.connections_of_one_address = 4;
   const EchoServer server(limits);
@@ -221,7 +221,7 @@ TEST(HttpServer, AnswersAgainWhenTooManyConnectionsHaveEnded) {
   }
 }
 
-TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
+TEST(HttpServer, AnIdleConnectionEnds) {
   HttpLimits limits;
   limits.idle = std::chrono::seconds(1);
   EchoServer server(limits);
@@ -236,7 +236,7 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   EXPECT_FALSE(quiet->has_news()) << "it takes all that there is";
 }
 
-TEST(HttpServer, APeerWithoutEndIsEnded) {
+TEST(HttpServer, ATooSlowTransferEnds) {
   HttpLimits limits;
   limits.idle = test::kHangLimit;
   EchoServer server(limits);
@@ -302,7 +302,7 @@ TEST(HttpServer, APendingAnswerDelaysNoOther) {
   }
 }
 
-TEST(HttpServer, StreamsAreBounded) {
+TEST(HttpServer, StreamsAreLimited) {
   HttpLimits limits;
   limits.streams = 2;
   EchoServer server(limits);
@@ -329,7 +329,7 @@ TEST(HttpServer, StopsWhileRequestsWait) {
   EXPECT_EQ(streaming->read_to_the_end(), "");
 }
 
-TEST(HttpServer, DoesNotListenElsewhereWithoutDescriptors) {
+TEST(HttpServer, FailsToListenWithoutDescriptors) {
   rlimit usual{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
   rlimit one = usual;
@@ -365,7 +365,7 @@ unsigned status_of(const std::string& method, const std::string& path, const Hea
   return refusal ? refusal->status : 200;
 }
 
-TEST(RequestRules, OnLoopbackOnlyNamesOfLoopbackAreAnswered) {
+TEST(RequestRules, OnLoopbackOnlyLoopbackNamesAreAccepted) {
   for (const auto host : protocol::split(
            "127.0.0.1:7602 localhost localhost:1 localhost: [::1]:7602 [::1] 127.8.9.10:80"
            " LOCALHOST:7602",
@@ -385,7 +385,7 @@ TEST(RequestRules, OnLoopbackOnlyNamesOfLoopbackAreAnswered) {
   }
 }
 
-TEST(RequestRules, BeyondLoopbackAnyAddressIsAnsweredAndOnlyNamesThatWereGiven) {
+TEST(RequestRules, BeyondLoopbackAnyAddressAndTheGivenNamesAreAccepted) {
   const OwnNames own{false, {"oblique.lab"}};
   for (const std::string host : {"10.1.2.3:7602", "[2001:db8::1]:7602", "127.0.0.1", "localhost",
                                  "oblique.lab:7602", "Oblique.Lab"}) {
@@ -415,7 +415,7 @@ void expect_statuses(const std::vector<RequestRow>& rows) {
   }
 }
 
-TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
+TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutALimit) {
   expect_statuses({
       {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
       {"HEAD", "/", {kHost}, 200},
@@ -435,7 +435,7 @@ TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
   }
 }
 
-TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
+TEST(RequestRules, RefuseRequestsOfOtherSites) {
   const Header same{"sec-fetch-site", "same-origin"};
   expect_statuses({
       {"POST", "/", {kHost, kOrigin}, 200},
@@ -461,7 +461,7 @@ TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
   }
 }
 
-TEST(RequestRules, OfOtherSitesOnlyAFollowedLinkToThePageIsAnswered) {
+TEST(RequestRules, OtherSitesMayOnlyLinkToThePage) {
   const Header cross{"sec-fetch-site", "cross-site"};
   const Header tab{"sec-fetch-mode", "navigate"};
   const Header page{"sec-fetch-dest", "document"};
@@ -512,7 +512,7 @@ WebSettings settings_of(const std::vector<std::string>& arguments) {
   return options.settings().value();
 }
 
-TEST(HttpOptions, OnlyTheDefaultAddressMayBeTakenAndNamesAreInLowerCase) {
+TEST(HttpOptions, OnlyTheDefaultAddressMayBeInUseAndNamesAreInLowerCase) {
   EXPECT_EQ(settings_of({}).address.address, "127.0.0.1");
   EXPECT_EQ(settings_of({}).address.port, "7602");
   EXPECT_TRUE(settings_of({}).may_be_missing);

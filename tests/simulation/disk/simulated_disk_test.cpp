@@ -60,7 +60,7 @@ bool live(SimulatedDisk& disk) {
   return !disk.died();
 }
 
-TEST(FailingSync, EndsTheServerAndLosesNoStudyWhenThePowerGoes) {
+TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
   std::uint64_t failures = 0;
   for (std::int64_t sync = 1;; ++sync) {
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
@@ -103,7 +103,7 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyWhenThePowerGoes) {
 
 class SimulatedDiskTest : public testing::TestWithParam<bool> {};
 
-TEST_P(SimulatedDiskTest, NoDeathInAnyOperationLosesWhatWasPromised) {
+TEST_P(SimulatedDiskTest, NoAcknowledgedChangeIsLostWhicheverOperationIsInterrupted) {
   const bool power_is_lost = GetParam();
   bool survived = false;
   std::uint64_t deaths = 0;

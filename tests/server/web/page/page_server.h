@@ -125,7 +125,7 @@ class PageStudyTest : public testing::Test {
     ASSERT_TRUE(client_.ask(request).has_submit());
   }
   void solve(std::uint64_t points, const std::set<std::uint64_t>& failing = {}) {
-    PretendedWorker worker(page_.server().worker_endpoint());
+    SimulatedWorker worker(page_.server().worker_endpoint());
     worker.fail(failing);
     worker.hello();
     worker.work(points);
@@ -154,7 +154,7 @@ class PageStudyTest : public testing::Test {
   }
 
   PageServer page_;
-  PretendedClient client_{page_.server().client_endpoint()};
+  SimulatedClient client_{page_.server().client_endpoint()};
 };
 
 }  // namespace oblique::server

@@ -138,7 +138,7 @@ TEST_F(StudyFlowTest, ALateErrorAboutAQueryThatHasEndedDoesNotEndTheNext) {
   EXPECT_EQ(pending()->body, "1 2 ");
 }
 
-TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
+TEST_F(StudyFlowTest, TheQueryOfADisconnectedClientEnds) {
   PendingAnswer pending = described();
   const ClientRequest query = requested().at(0);
   pending = nullptr;
@@ -199,13 +199,13 @@ TEST_F(StudyFlowTest, FewTracesAreRequestedOrSentAtATime) {
   EXPECT_EQ(requested().size(), 1U);
 }
 
-TEST_F(StudyFlowTest, AfterItsDeadlineTheAnswerSaysSo) {
+TEST_F(StudyFlowTest, AnAnswerAfterItsDeadlineIsAnError) {
   const PendingAnswer pending =
       study_flow(client_, 1, std::make_unique<Points>(), FlowClock::now());
   EXPECT_EQ(pending()->status, 503U);
 }
 
-TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
+TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItUnchanged) {
   for (const bool is_condition_wrong : {true, false}) {
     const PendingAnswer pending = described(1, "muu > 1");
     reply(requested().at(0).request_id(), error_of("wrong in the whole query"));
@@ -221,7 +221,7 @@ TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
   }
 }
 
-TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEndsUnlessItHasCome) {
+TEST_F(StudyFlowTest, ATraceWhoseBrowserDisconnectedEndsUnlessItIsComplete) {
   ClientRequest trace;
   trace.mutable_trace()->set_study("a");
   client_.ask(1, trace);
