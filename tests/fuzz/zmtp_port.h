@@ -31,7 +31,7 @@ inline std::string send(Zmtp& zmtp, std::string_view bytes) {
     }
   }
   if (zmtp.held_bytes() > kMuch) {
-    std::abort();  // no more can be held than has come
+    std::abort();  // the port must not store more than it received
   }
   return zmtp.take_answers();
 }

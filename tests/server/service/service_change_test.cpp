@@ -1,4 +1,4 @@
-// Changes of studies: pause, resume, retry, grow, rename, delete, and what keys may do.
+// Changes of studies (pause, resume, retry, grow, rename, delete) and rights of keys.
 #include <memory>
 #include <string>
 #include <utility>
@@ -96,7 +96,8 @@ TEST_F(ServiceTest, EachChangeWaitsForThePreviousOne) {
     ports_.replies.clear();
     request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
     request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
-    request(change_request("a", protocol::STUDY_CHANGE_CANCEL));  // a client that asks again
+    // a client that repeats its request
+    request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
     request(change_request("a", protocol::STUDY_CHANGE_RESUME));
     ASSERT_EQ(ports_.jobs.size(), 1U);
     write_all(is_first_stored ? "" : "disk full");
@@ -131,7 +132,7 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
     EXPECT_THAT(last_error(), HasSubstr("disk full"));
     EXPECT_EQ(status_of("a").state(), "running");
   }
-  // What the disk took of the refused ones could count after a crash.
+  // What the disk stored of the refused changes could count after a crash.
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(ports_.jobs.size(), 1U);
   write_all();
@@ -144,7 +145,7 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
 
 // ---- Growth, names, deletion ----
 
-/// `points` points, and behind them a block of `further`.
+/// `points` points, followed by a block of `further`.
 protocol::Recipe grown_recipe(std::uint64_t points, std::uint64_t further) {
   protocol::Recipe recipe = table_of(points)->recipe();
   *recipe.add_blocks() = table_of(further)->recipe().blocks(0);

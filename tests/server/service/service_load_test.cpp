@@ -1,4 +1,4 @@
-// What the service does when the disk or a peer does not keep up.
+// The service when the disk or a peer is slow.
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 class ServiceLoadTest : public ServiceTest {
  protected:
-  /// Begins anew with other settings, a study of 1000 points and a worker.
+  /// Starts again with other settings, a study of 1000 points and a worker.
   void begin(const ServiceSettings& settings) {
     start(settings);
     submit("a", 1000);
@@ -137,13 +137,13 @@ TEST_F(FloodedServiceTest, ChangesBeyondTheLimitAreRefusedUntilOthersAreStored) 
   EXPECT_TRUE(last_reply().has_submit());
 }
 
-// ---- Writes without an outcome ----
+// ---- Pending writes ----
 
 class WriteLedgerTest : public testing::Test {
  protected:
   static LedgerLimits small() { return {.bytes = 200, .writes = 24, .changes = 3}; }
 
-  /// A results message of so many bytes.
+  /// A Results message of that size.
   void write_results(std::size_t bytes) {
     AddResults change{};
     change.message_bytes = bytes;

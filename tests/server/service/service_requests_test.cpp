@@ -1,4 +1,4 @@
-// Requests that take long: recipes that are checked, queries and traces.
+// Long requests: checks of recipes, queries and traces.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -240,7 +240,7 @@ class ServiceTraceTest : public ServiceTest {
     send(trace_request(id, point), identity);
   }
 
-  /// Orders that workers were sent.
+  /// Trace orders sent to workers.
   std::vector<protocol::TraceOrder> orders() const {
     std::vector<protocol::TraceOrder> found;
     for (const ServerToWorker& message : ports_.worker_messages) {
@@ -354,7 +354,7 @@ TEST_F(ServiceTraceTest,
   worker_sends(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
-  // One that is too long is answered with what would fit.
+  // The reply to a too long trace has the `every` that would fit.
   ask(9, 3);
   trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
@@ -396,7 +396,7 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
 TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
   hello();
   ask(7, 3);
-  ask(7, 3);  // sent again
+  ask(7, 3);  // repeated
   end(8);
   end(7, "another");
   EXPECT_EQ(cancels(), 0);
@@ -493,7 +493,7 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
                 trace.clear_states();
               }),
               HasSubstr("no rows"));
-  worker_sends(trace_of({}, ""));  // of no order
+  worker_sends(trace_of({}, ""));  // belongs to no order
   ask(99, 60);
   worker_sends(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());
@@ -503,7 +503,7 @@ TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnTheCheckThread) {
   request(long_submission("long", kLongRequest));
   run_checks();
   write_all();
-  request(change_request("long", protocol::STUDY_CHANGE_CANCEL));  // its table is given up
+  request(change_request("long", protocol::STUDY_CHANGE_CANCEL));  // releases its table
   write_all();
   hello();
   ports_.replies.clear();

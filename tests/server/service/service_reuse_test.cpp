@@ -1,4 +1,4 @@
-// Results that a study reuses, and points that it leaves out.
+// Reused results and left-out points.
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -22,7 +22,7 @@ class ServiceReuseTest : public ServiceTest {
   static constexpr std::uint64_t kSource = 1;
   static constexpr std::uint64_t kStudy = 2;
 
-  /// Study 1, "a", is solved in part.
+  /// Study 1, "a", is partly solved.
   void solve_some() {
     request(submit_request("a"));
     write_all();
@@ -35,7 +35,7 @@ class ServiceReuseTest : public ServiceTest {
     message.mutable_submit()->set_no_reuse(false);
     return message;
   }
-  /// With ten points more.
+  /// The same with ten more points.
   ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
@@ -47,7 +47,7 @@ class ServiceReuseTest : public ServiceTest {
     request(reusing("b"));
     write_all();
   }
-  /// The first points of the parts that wait for the writer.
+  /// The first points of parts that wait for the writer.
   std::vector<std::uint64_t> parts() const {
     std::vector<std::uint64_t> firsts;
     for (const WriteJob& job : ports_.jobs) {
@@ -57,7 +57,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return firsts;
   }
-  /// The study of the end that waits for the writer; 0: none does.
+  /// The study whose EndReuse waits for the writer; 0: none.
   std::uint64_t ended() const {
     for (const WriteJob& job : ports_.jobs) {
       if (const auto* end = std::get_if<EndReuse>(&job.change)) {
@@ -66,7 +66,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return 0;
   }
-  /// Writes what waits; this came of the part that is among it.
+  /// Completes all waiting writes; a waiting part has this outcome.
   void write_part(const ReusedResults& outcome) {
     for (WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
@@ -135,7 +135,7 @@ TEST_F(ServiceReuseTest, ALookupIsCutShortAfterAMillionProbesOrALongTimeWithoutA
       write_part({{}, {}, is_long ? 1 : StudyChanges::kMaxProbesInVain / 2, next});
     };
     vain_part(1);
-    write_part(copies_of_a(IntervalSet(0, 1), 2));  // and both begin again
+    write_part(copies_of_a(IntervalSet(0, 1), 2));  // restarts both limits
     vain_part(3);
     EXPECT_THAT(parts(), ElementsAre(3));
     vain_part(4);

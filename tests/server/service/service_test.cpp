@@ -1,4 +1,4 @@
-// Studies and workers message by message: what is acknowledged when, and which peers are refused.
+// Studies and workers, message by message: acknowledgements and refused peers.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -124,7 +124,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
-  // Its end is noted in the database.
+  // The database records that the study is done.
   ASSERT_EQ(ports_.jobs.size(), 1U);
   EXPECT_EQ(std::get<SetStudyState>(ports_.jobs[0].change).state, StudyState::kDone);
 }
@@ -184,7 +184,7 @@ TEST_F(ServiceTest, StatusHasTheRateOfTheLastSeconds) {
   EXPECT_EQ(status.created_at(), "2023-11-14T22:13:20.123Z");
 }
 
-// ---- Peers of other versions, and those that do what no sound peer does ----
+// ---- Peers of other versions, and incorrect peers ----
 
 WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver_version) {
   WorkerMessage message;
@@ -376,7 +376,7 @@ class ProcessesTest : public ServiceTest {
     message.mutable_hello()->set_process_id(process_id);
     worker_says(message, identity);
   }
-  /// Three newcomers get batches and are gone.
+  /// Three new workers get batches and are lost.
   void let_newcomers_vanish() {
     for (const char* identity : {"x", "y", "z"}) {
       hello_as(identity, identity);

@@ -113,7 +113,8 @@ StudyTable table_of_models(std::uint64_t models, std::uint64_t points) {
 
 TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
   const AddStudy first{1, "a", table_of_models(11, 2), "now"};
-  const AddStudy second{2, "b", table_of_models(101, 2), "now"};  // of which eleven are the same
+  // eleven of its models are the same
+  const AddStudy second{2, "b", table_of_models(101, 2), "now"};
   commit({first, second, worker(1)});
   commit({solved(first, {8, 0, 2, 4, 6, 10})});
   commit({solved(second, {1, 20, 21, 40, 60, 200, 201})});
@@ -172,7 +173,7 @@ TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
 TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
   commit({study_of(10, 1, "too elastic"), study_of(10, 2, "b"), study_of(3, 3, "c")});
   close();
-  // Other versions may take an e that this one cannot solve.
+  // Other versions may accept an e that this one refuses.
   const protocol::Recipe recipe =
       protocol::recipe_of({{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, 10),
                             protocol::listed("e", {1e-4})}});
@@ -231,7 +232,7 @@ class StudyDeletionTest : public StoreFixture {
     close();
     store();
   }
-  /// A study called by its number, all of whose points are solved by the worker of that number.
+  /// A study named by its number, whose points are all solved by the worker of that number.
   void add_solved(std::uint64_t id, const Table& points) {
     const AddStudy study = study_of(points, id, "study " + std::to_string(id));
     commit({study, worker(id), solved(study, numbers(0, points->size()), id)});
@@ -244,7 +245,7 @@ class StudyDeletionTest : public StoreFixture {
   std::int64_t rows_in(const std::string& from) const {
     return number("SELECT count(*) FROM " + from);
   }
-  /// Number of steps until all is cleared away.
+  /// Number of steps until all rows are deleted.
   int clear_all(std::size_t most) {
     int steps = 1;
     while (store().clear_away(most) != ClearedAway::kAll) {
@@ -369,7 +370,7 @@ TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
 
 // ---- Tables, views and triggers -----------------------------------------------------------------
 
-/// A database with three solved points, and what other programs do to it.
+/// A database with three solved points, changed by other programs.
 class SchemaTest : public StoreFixture {
  protected:
   SchemaTest() {
@@ -430,7 +431,7 @@ class StoreFilesTest : public StoreFixture {
   static std::int64_t rows_of(const std::string& path) {
     return std::stoll(rows(path, "SELECT count(*) FROM results").at(0));
   }
-  /// Rows in the database file alone, without its log.
+  /// Number of rows in the database file, without its log.
   std::int64_t rows_of_copy(const std::string& name) {
     fs::copy_file(path_, folder_.file(name));
     return rows_of(folder_.file(name));
@@ -498,7 +499,7 @@ TEST_F(StoreFilesTest, ARunningQueryKeepsTheLogAndAnIdleReaderDoesNot) {
     add_result(1);
     EXPECT_FALSE(store().merge_log());
     EXPECT_GT(fs::file_size(path_ + "-wal"), 0U);
-    add_result(2);  // and it goes on
+    add_result(2);  // the server continues
   }
   EXPECT_TRUE(store().merge_log());
   EXPECT_EQ(fs::file_size(path_ + "-wal"), 0U);

@@ -25,7 +25,7 @@ using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 using Kind = WriteReport::Kind;
 
-/// A database that fails when a test says so.
+/// A database that fails on request.
 class TestStorage final : public Storage {
  public:
   void commit(std::span<const Change> changes) override {
@@ -65,7 +65,7 @@ class TestStorage final : public Storage {
     is_interrupted.notify_all();
   }
 
-  /// Called for each change of a commit, which fails when this throws.
+  /// Called for each change of a commit; an exception makes the commit fail.
   std::function<void(const Change&)> on_change = [this](const Change&) {
     if (is_full) {
       throw StorageError("the disk is full");
@@ -79,7 +79,7 @@ class TestStorage final : public Storage {
   std::atomic<int> parts_left = 0;
   std::atomic<bool> is_interrupted = false;
   std::vector<std::size_t> sizes;      ///< of the commits that succeeded
-  std::vector<std::uint64_t> workers;  ///< that were added
+  std::vector<std::uint64_t> workers;  ///< added workers
 };
 
 WriteJob kept(std::uint64_t ticket) {
@@ -94,7 +94,7 @@ WriteJob answered(std::uint64_t ticket, std::uint64_t study = 1) {
 /// Kinds and tickets of reports.
 using Reports = std::vector<std::pair<Kind, std::uint64_t>>;
 
-Reports told(const std::vector<WriteReport>& reports) {
+Reports kinds_and_tickets(const std::vector<WriteReport>& reports) {
   Reports found;
   for (const WriteReport& report : reports) {
     found.emplace_back(report.kind, report.ticket);
@@ -104,8 +104,7 @@ Reports told(const std::vector<WriteReport>& reports) {
 
 class GroupCommitTest : public testing::Test {
  protected:
-  /// Writes the jobs once.
-  Reports write() { return told(commits_.write(jobs_)); }
+  Reports write() { return kinds_and_tickets(commits_.write(jobs_)); }
 
   TestStorage storage_;
   GroupCommit commits_{storage_};
@@ -197,7 +196,7 @@ TEST_F(GroupCommitTest, EveryOperationDetectsAMissingFile) {
     commits.resume_deletions();
     std::vector<WriteReport> reports;
     way(commits, reports);
-    EXPECT_EQ(told(reports), (Reports{{Kind::kGone, 0}}));
+    EXPECT_EQ(kinds_and_tickets(reports), (Reports{{Kind::kGone, 0}}));
     EXPECT_TRUE(commits.is_gone());
     EXPECT_FALSE(commits.has_to_clear());
     EXPECT_THAT(commits.maintain(), IsEmpty()) << "reported once";
@@ -215,7 +214,7 @@ TEST_F(GroupCommitTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersAllowIt) {
     std::ranges::move(commits_.maintain(), std::back_inserter(reports));
   }
   EXPECT_EQ(storage_.merges, 8);
-  EXPECT_EQ(told(reports), (Reports{{Kind::kUnmerged, 0}})) << "reported once";
+  EXPECT_EQ(kinds_and_tickets(reports), (Reports{{Kind::kUnmerged, 0}})) << "reported once";
 }
 
 TEST_F(GroupCommitTest, AFailedDeletionStepIsRepeatedWithoutAReport) {

@@ -1,4 +1,4 @@
-// Over real sockets of the loopback device, with what sound and hostile peers send; and the rules
+// The HTTP server on loopback sockets, with correct and malicious peers; and the request rules
 // alone.
 #include "server/web/http/http_server.h"
 
@@ -36,8 +36,8 @@ using testing::Not;
 
 const std::string kEnd = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
-/// Repeats the path of a request; /large does so at length. /wait is answered after `open`, /wrong
-/// and /broken throw, /loud and /quiet are streams that always, or never, have more.
+/// Returns the path of a request; /large returns it many times. /wait is answered after `open`;
+/// /wrong and /broken throw; /loud is an endless stream and /quiet one without output.
 class EchoServer {
  public:
   explicit EchoServer(const HttpLimits& limits = {})
@@ -58,7 +58,7 @@ class EchoServer {
   /// Number of pending answers and streams.
   long in_progress() const { return token_.use_count() - 1; }
   static constexpr std::size_t kLargeBytes = 50'000'000;  // more than sockets buffer
-  /// Wakes the server, as its owner does regularly, until that many are in progress.
+  /// Wakes the server regularly, as its owner does, until that many are in progress.
   void wake_until_in_progress(long count) {
     while (in_progress() != count) {
       server_.wake();
@@ -97,7 +97,7 @@ class EchoServer {
   HttpServer server_;  // last: its thread uses the others
 };
 
-/// A peer that has requested a path, and read the head of the answer if it is a stream.
+/// A peer that has requested a path and, for a stream, read the head of the answer.
 std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
   auto peer = std::make_unique<RawHttp>(server.url());
   peer->send("GET " + path + kEnd);
@@ -278,7 +278,8 @@ TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
     closing.reset();
     server.wake_until_in_progress(1);
   }
-  for (const std::string path : {"/wait", "/quiet"}) {  // browsers may close their half first
+  // browsers may close their sending half first
+  for (const std::string path : {"/wait", "/quiet"}) {
     const auto halving = begin(server, path);
     server.wake_until_in_progress(2);
     ::shutdown(halving->number(), SHUT_WR);

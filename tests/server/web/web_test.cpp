@@ -25,7 +25,7 @@
 namespace oblique::server {
 namespace {
 
-/// Takes everything.
+/// Ports that accept everything.
 class TakingStorage final : public Storage {
  public:
   void commit(std::span<const Change> /*changes*/) override {}

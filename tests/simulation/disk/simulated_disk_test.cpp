@@ -1,4 +1,4 @@
-// The store on the simulated disk, without the rest of the world: every moment of a short life.
+// The store on the simulated disk alone, interrupted at every operation of a short run.
 #include "tests/simulation/disk/simulated_disk.h"
 
 #include <memory>
@@ -31,7 +31,7 @@ server::AddResults result(const server::AddStudy& study, std::uint64_t point) {
   return results;
 }
 
-/// Opens the store and makes the changes that it lacks.
+/// Opens the store and makes the missing changes.
 void solve_all(SimulatedDisk& disk) {
   disk.open();
   for (std::uint64_t id = 1; id <= 3; ++id) {
@@ -49,7 +49,7 @@ void solve_all(SimulatedDisk& disk) {
   }
 }
 
-/// Solves all and closes the store. False when the process died on the way.
+/// Solves all points and closes the store. False if the process died.
 bool live(SimulatedDisk& disk) {
   try {
     solve_all(disk);
@@ -87,14 +87,14 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
       }
       ++failures;
       EXPECT_TRUE(ended) << "sync " << sync << ", seed " << seed;
-      // A server that starts again builds on what it finds, and then the power goes.
+      // A restarted server continues from the contents, and then the power fails.
       const bool starts_again = seed % 2 == 0;
       if (starts_again) {
         disk.crash(false);
         ASSERT_NO_THROW(solve_all(disk)) << "sync " << sync << ", seed " << seed;
       }
       disk.crash(true);
-      // The model refuses what is not there any more and was promised.
+      // The model detects missing acknowledged changes.
       ASSERT_NO_THROW(disk.open()) << "sync " << sync << ", seed " << seed;
       disk.check_rows();
     }

@@ -38,7 +38,7 @@ TEST_F(PageStudyTest, ASliceComputesItsPointsFromTheRecipe) {
       EXPECT_EQ(values[row * 4 + column], force_of(row * 8 + column * 2 + 1)) << row << column;
     }
   }
-  // The other way round it is the same, transposed.
+  // With the axes exchanged the slice is transposed.
   const Numbers turned = slice_of("z=fn_peak_N&x=H&y=mu&at=e@1");
   EXPECT_EQ(turned.read<float>(56, 12)[1], values[4]);
   // A line has one row.
@@ -46,7 +46,7 @@ TEST_F(PageStudyTest, ASliceComputesItsPointsFromTheRecipe) {
   EXPECT_EQ(line.head["ny"], 1);
   EXPECT_EQ(line.head["y"], nullptr);
   EXPECT_EQ(line.read<float>(32, 4)[3], force_of(16 + 6));
-  // More cells than were requested are never sent.
+  // At most the requested number of cells is sent.
   const Numbers few = slice_of("z=fn_peak_N&x=mu&y=H&nx=2&ny=2&x0=1&at=e@0");
   EXPECT_EQ(few.head["x"]["all_lines"], false);
   EXPECT_EQ(few.head["x"]["first"], 1);
@@ -76,7 +76,7 @@ TEST_F(PageStudyTest, InADoneStudyPointsWithoutARowAreLeftOut) {
   sqlite3_busy_timeout(edited.get(), 10'000);
   const std::string slice = "/api/studies/1/slice?z=mode&x=mu&y=H&at=e@0";
   EXPECT_EQ(page_.numbers(slice).head["left_out"], 3);
-  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // as if its machine left it out
+  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // as if the worker left it out
   EXPECT_EQ(page_.numbers(slice).head["left_out"], 4);
   EXPECT_EQ(page_.numbers(slice).head["missing"], 0);
   EXPECT_EQ(page_.json("/api/studies/1/points/4")["left_out"], true);
@@ -101,7 +101,7 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyOpenOnes) {
                      {{protocol::range("H", 0.1, 1.0, 40), protocol::range("mu", 0.0, 2.0, 40),
                        protocol::range("e", 0.5, 1.0, 40)}}));
   solve(200);
-  std::set<std::uint64_t> solved;  // whole batches
+  std::set<std::uint64_t> solved;  // points of whole batches
   const json stored = page_.json("/api/studies/1/rows?select=point&limit=64000");
   for (const json& row : stored["rows"]) {
     solved.insert(row[0].get<std::uint64_t>());
@@ -243,7 +243,7 @@ TEST_F(PageStudyTest, AConditionFollowsTheQueryLanguage) {
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mode&where=1"), 400);
 }
 
-/// The query by which a slice of the study `grid` is read.
+/// The query for a slice of the study `grid`.
 protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& recipe) {
   ServiceClient client;
   const PendingAnswer pending = slice_answer(client, 1, fields);

@@ -1,4 +1,4 @@
-// Who may see and change what, and what the page requests of a whole server besides pictures.
+// Access to the page, and its requests to a whole server except for pictures.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -129,7 +129,7 @@ TEST_F(PageStudyTest, ATraceIsCancelledWhenItsBrowserDisconnects) {
   worker.hello();
   auto browser = page_.begin("/api/studies/1/points/3/trace");
   while (!worker.receive().has_trace_order()) {
-    // It was welcomed before.
+    // It got its Welcome before.
   }
   browser.reset();
   while (!worker.receive().has_trace_cancel()) {
@@ -206,7 +206,7 @@ TEST(PageToken, ATokenFileIsCreatedForItsOwnerAndReadAgain) {
 
 // ---- Studies, points and rows -------------------------------------------------------------------
 
-/// A study of these values, as the body of a check.
+/// A study with these values, as the body of a check.
 std::string body_with(const std::string& H, const std::string& others = "",
                       const std::string& model = "{}", const std::string& mu = R"("values":[1])",
                       const std::string& where = "") {

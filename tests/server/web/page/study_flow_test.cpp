@@ -1,4 +1,4 @@
-// Answers about a study, and the requests for them; the test plays the service.
+// Answers about a study and the requests for them; the test plays the service.
 #include "server/web/answers/study_answers.h"
 
 #include <cstdint>
@@ -53,7 +53,7 @@ class StudyFlowTest : public testing::Test {
     }
     return requests;
   }
-  /// Numbers of the requests that the service is told to end since the last call, in order.
+  /// Numbers of the requests that were ended since the last call, in order.
   std::vector<std::uint64_t> ended() {
     std::vector<std::uint64_t> numbers;
     for (const ClientRequest& request : requested()) {
