@@ -38,7 +38,7 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
 std::string rejection_reason(std::uint32_t status, const DealerSettings& settings) {
   constexpr std::uint32_t kNotAdmitted = 400;
   if (status != kNotAdmitted) {
-    return "the file has another public key of the server than its own, which its log shows at the "
+    return "the server's public key in that file is wrong; the server logs the right one at its "
            "start";
   }
   if ((settings.key->role == Role::kWorker) != settings.is_worker) {

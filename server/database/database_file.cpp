@@ -74,7 +74,7 @@ void check_path(const std::string& path) {
   struct stat about {};
   if (::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
     throw StorageError(path + " is " + protocol::kind_of_file(about.st_mode) +
-                       ": a database is a regular file");
+                       ": a database must be a regular file");
   }
 }
 

@@ -50,7 +50,7 @@ std::unique_ptr<Web> make_web(const LoopSettings& settings) {
     if (!settings.web->may_be_missing) {
       throw std::runtime_error(what);
     }
-    spdlog::warn("no metrics over HTTP: {}", what);
+    spdlog::warn("the server runs without HTTP: {}", what);
     return nullptr;
   }
 }

@@ -132,7 +132,7 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
   // Comes before authentication, so that a forged INITIATE does not reveal which keys are listed.
   if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, short_term_key,
                   own_short_term_secret)) {
-    return Refusal{RefusalCause::kFaulty, "it does not hold the key that it shows"};
+    return Refusal{RefusalCause::kFaulty, "it does not hold the secret half of its key"};
   }
   AuthResult result = security_.authenticate(key_);
   if (auto* const refusal = std::get_if<Refusal>(&result)) {

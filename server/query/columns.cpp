@@ -164,13 +164,13 @@ std::vector<Column> columns_and_functions() {
   auto columns = all_columns();
   for (const auto* list : solver::result_lists()) {
     const std::string_view member = list->members.back() == "major" ? "fn_N" : list->members.back();
-    columns.push_back({fmt::format("{}[0].{}", list->column, member), unit_of_member(member),
-                       "element", "",
-                       fmt::format("{} of the first element; -1 is the last{}. Members: {}", member,
-                                   list->column == "peaks" ? ", and ripples count: major_peak_1_N "
-                                                             "is the first peak that is none"
-                                                           : "",
-                                   fmt::join(list->members, ", "))});
+    columns.push_back(
+        {fmt::format("{}[0].{}", list->column, member), unit_of_member(member), "element", "",
+         fmt::format("{} of the first element, or with [-1] of the last{}. Members: {}", member,
+                     list->column == "peaks" ? ", and ripples count: major_peak_1_N "
+                                               "is the first peak that is none"
+                                             : "",
+                     fmt::join(list->members, ", "))});
     columns.push_back(
         {fmt::format("{}.count", list->column), "", "element", "", "number of elements"});
   }

@@ -55,8 +55,8 @@ struct Batch {
 /// are completed without a row.
 class StudyPoints {
  public:
-  /// `completed` contains the points that are already completed, `left_out` of them left out by a
-  /// filter. Does not make the table of a complete study.
+  /// `completed` contains the completed points, of which a filter leaves out `left_out`. Does not
+  /// make the table of a complete study.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 

@@ -78,7 +78,7 @@ class StoreModel {
     entries_.push_back({{changes.begin(), changes.end()}, false});
   }
 
-  /// A commit with a full sync of something that is not held against this model.
+  /// A commit with a full sync of something that this model does not contain.
   void synced() {
     synced_ = now_;
     entries_.clear();

@@ -318,7 +318,8 @@ std::string_view some_of(World& world, std::string_view bytes) {
 
 // ---- One file ----------------------------------------------------------------------------------
 
-/// Draws which steps reached the disk: the first ones and part of the next, or any of each sector.
+/// Draws which steps reached the disk: the first ones and part of the next, or any subset per
+/// sector.
 class SimulatedFile::Losses {
  public:
   Losses(World& world, const std::vector<Step>& steps)

@@ -87,7 +87,7 @@ TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
   expect_turned_away(key("worker"), "it is for workers, and this port is for clients");
   const std::string others = folder_.file("others");
   ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
-  expect_turned_away(others + "/client.key", "another public key of the server than its own");
+  expect_turned_away(others + "/client.key", "the server's public key in that file is wrong");
   ASSERT_EQ(change_keys({"add", "gone", "--role", "client"}).exit_code, 0);
   wait_until_said(server_->process(), "new: gone");
   ASSERT_EQ(change_keys({"revoke", "gone"}).exit_code, 0);
