@@ -152,7 +152,7 @@ void add_limits(CLI::App& app, LoopSettings& loop) {
   add("--limits-waiting-out-bytes", loop.network.waiting_out_bytes, kLongestMessage, kMostBytes,
       "End a connection with more unsent bytes than this");
   add("--limits-unstored-bytes", loop.service.ledger.bytes, 1U, kMostBytes,
-      "Stop reading from workers while more bytes of results than this are not stored");
+      "Stop reading from workers while more than this many bytes of results are unstored");
   add("--limits-running-queries", loop.queries.queue.readers, 1U, 256U,
       "Maximum number of queries that run at a time, each in its own process");
   constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 60U;

@@ -475,7 +475,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   release_if_answered(twin);
 }
 
-/// Whether the message leaves out points that are in no lease of the worker.
+/// Whether the message reports left-out points that are in no lease of the worker.
 bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   const auto lease = leases_.find(event.lease);
   if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {

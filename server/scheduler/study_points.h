@@ -168,7 +168,7 @@ class StudyPoints {
   LossLimits limits_;
   IntervalSet fresh_;
   std::uint64_t begun_until_ = 0;  // end of the last group of which points were leased
-  bool was_arranged_ = false;      // true also if the order stays that of the numbers
+  bool was_arranged_ = false;      // `arrange` was called, even if it changed nothing
   std::uint64_t falls_a_group_ = 1;
   std::array<Returned, 4> returned_;  // by suspicion
   IntervalSet leased_;
