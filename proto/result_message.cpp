@@ -22,7 +22,6 @@ using solver::Member;
 using solver::PhaseKind;
 using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
-/// Longest text in a result [bytes].
 constexpr std::size_t kLongestText = 65536;
 
 /// Scalars are sent by type. A missing scalar has a value that no result can have.
@@ -42,7 +41,6 @@ bool is_absent(const Member<T>& member, const T& value) {
   return member.may_be_absent && (value == absent<T>() || value != value);  // NaN differs from NaN
 }
 
-/// Appends the scalars of type T.
 template <class T, class Values>
 void add_scalars(const CaseResult& result, Values& values) {
   for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
@@ -131,7 +129,6 @@ void read_lists(const PointResult& message, CaseResult& result) {
   }
 }
 
-/// Why a number is invalid, or an empty text.
 std::string fault_of_number(std::string_view name, double number) {
   return std::abs(number) <= kLargestOutput
              ? ""
@@ -164,7 +161,6 @@ std::string fault_of_lists(const PointResult& message) {
   return are_peaks ? "" : "the worker sent the number of a major peak that does not exist";
 }
 
-/// The first fault of the scalars of type T, or an empty text.
 template <class T, class Values>
 std::string fault_of_scalars(const Values& values, const char* what) {
   int number = 0;

@@ -13,7 +13,6 @@
 namespace oblique::protocol {
 namespace {
 
-/// Whether the character would control a terminal or be invisible.
 bool is_control(char32_t code) {
   using Range = std::pair<char32_t, char32_t>;
   constexpr std::array<Range, 13> kControls{{

@@ -62,7 +62,6 @@ bool decode_z85(std::string_view text, CurveKey& key) {
   return true;
 }
 
-/// In the order of `Role`.
 constexpr std::array<std::string_view, 4> kRoles{"server", "client", "worker", "reader"};
 
 }  // namespace
@@ -136,7 +135,6 @@ constexpr std::string_view kNameRule =
 /// The fields of one table of a file. Errors never show a value, which may be a secret.
 class KeyFields {
  public:
-  /// Throws for a field that is not in `known`.
   KeyFields(const TomlReader& file, const toml::table& table, Fields known)
       : file_(file), table_(table) {
     file.refuse_unknown(table, known, "", "allowed are " + joined(known));
@@ -193,7 +191,6 @@ bool exists(const std::string& path) {
   return std::filesystem::exists(std::filesystem::symlink_status(path));
 }
 
-/// Opens the folder of a file.
 Descriptor opened_folder_of(const std::string& path) {
   const std::string folder = std::filesystem::absolute(path).parent_path();
   Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -215,7 +212,6 @@ void write_new_file(const std::string& path, std::string_view text) {
     ::unlink(path.c_str());
     fail_to("cannot write", path);
   }
-  // not every file system supports this
   static_cast<void>(::fsync(opened_folder_of(path).number()));
 }
 

@@ -93,7 +93,6 @@ std::string quoted(const std::string& text) {
 /// notes about an option.
 constexpr const char* kChoices = "choices";
 
-/// The words that complete a value, each quoted and after a space.
 std::string values_of(CLI::Option& option, const ValueWords& words) {
   std::vector<std::string> values;
   for (const std::string& key : {option.get_name(), option.get_type_name()}) {

@@ -41,7 +41,6 @@ std::string key_of(const CLI::Option& option) {
   return key;
 }
 
-/// Sets the values of an option. Throws CLI::ParseError.
 void set(CLI::Option& option, const std::vector<std::string>& values) {
   option.clear();
   option.add_result(values);
@@ -72,7 +71,6 @@ std::vector<std::string> typed_values(const TomlReader& file, std::string_view k
   return values;
 }
 
-/// Formats a value as TOML. Quoted text is valid for every option.
 std::string toml_value(const std::string& value) {
   static const std::regex kWithoutQuotes(R"(true|false|(0|[1-9]\d{0,17})(\.\d+)?)");
   return std::regex_match(value, kWithoutQuotes) ? value : toml_string(value);

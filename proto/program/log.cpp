@@ -23,7 +23,6 @@ namespace {
 
 enum class Form { kText, kJournal, kJson };
 
-/// Formats the message of a log line.
 class Message : public spdlog::custom_flag_formatter {
  public:
   explicit Message(Form form) : form_(form) {}

@@ -42,7 +42,6 @@ ParameterKey length_key() {
           }};
 }
 
-/// Every key, by its number.
 const std::vector<ParameterKey>& all_keys() {
   static const auto keys = []<std::size_t... links>(std::index_sequence<links...>) {
     const auto model = solver::model_keys();

@@ -26,7 +26,6 @@ double truth(const double* x, bool value) {
                                               : static_cast<double>(value);
 }
 
-/// A function for expressions. `compute` reads `arguments` values.
 struct Function {
   std::string_view name;
   std::size_t arguments;
@@ -95,7 +94,6 @@ bool begins_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
 }
 
-/// The name at the start of `text`, or an empty text.
 std::string_view name_at(std::string_view text) {
   if (text.empty() || !begins_name(text[0])) {
     return {};

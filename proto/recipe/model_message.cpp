@@ -47,7 +47,6 @@ constexpr std::array<Field, 12> kFields{{
 /// Maximum size of a recipe [bytes]; the frame for a worker also has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// Encodes a block for comparison.
 std::string comparable_bytes(Block block) {
   block.DiscardUnknownFields();
   return block.SerializeAsString();
@@ -62,7 +61,6 @@ Axis axis_of(const solver::ParameterKey& key) {
 constexpr std::array<std::string_view, 3> kDistributions{"uniform", "log-uniform", "normal"};
 constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
 
-/// The index of a name in `names`.
 int number_of_name(std::string_view name, std::span<const std::string_view> names,
                    std::string_view key) {
   const auto found = std::find(names.begin(), names.end(), name);

@@ -177,7 +177,6 @@ class PointTable::BlockPoints : public BlockPlace {
     std::optional<RangeValues> range = {};
     std::optional<sampling::Quantiles> quantiles = {};
   };
-  /// An expression, the axes that it reads, and the axis that it sets.
   struct Formula {
     expressions::Expression expression;
     std::vector<std::size_t> inputs;
@@ -250,7 +249,6 @@ class PointTable::BlockPoints : public BlockPlace {
                                               : points;
   }
 
-  /// Sorts the formulas so that each follows those that compute its inputs.
   void sort() {
     for (auto begin = formulas_.begin(); begin != formulas_.end(); ++begin) {
       const auto next = std::find_if(begin, formulas_.end(), [&](const Formula& formula) {

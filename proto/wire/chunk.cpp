@@ -14,7 +14,6 @@ void append(std::string& bytes, Number number) {
   bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
 }
 
-/// Removes a number from the beginning of `bytes`; false if there are too few.
 template <class Number>
 bool take(std::string_view& bytes, Number& number) {
   if (bytes.size() < sizeof number) {

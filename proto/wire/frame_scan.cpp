@@ -21,7 +21,6 @@ CodedInputStream stream_of(std::string_view bytes) {
                           static_cast<int>(bytes.size()));
 }
 
-/// Counts of the fields at a path of field numbers.
 struct Found {
   std::size_t fields = 0;
   std::size_t bytes = 0;  ///< of texts, packed lists and messages

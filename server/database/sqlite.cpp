@@ -21,7 +21,6 @@ constexpr const char* kWayOut =
     "--db "
     "FILE --salvage` saves all readable results; the other points are solved again";
 
-/// Throws the error for a statement that failed with this code.
 [[noreturn]] void fail(sqlite3* database, int code, std::string reason) {
   check_sync(database, code);
   if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
@@ -45,7 +44,6 @@ class Crc {
       used_ += size;
     }
   }
-  /// Adds a type and a word, least significant byte first.
   void add_word(char type, std::uint64_t word) {
     std::array<char, 9> bytes{type};
     for (std::size_t i = 1; i < bytes.size(); ++i) {

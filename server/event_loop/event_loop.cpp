@@ -181,7 +181,6 @@ void EventLoop::take_completions() {
   completions_.run();
 }
 
-/// True if more messages can be taken at once.
 bool EventLoop::take_worker_messages() {
   return take_messages(
       workers_, [this](const std::string& /*worker*/) { return service_->has_room(); },
@@ -190,8 +189,6 @@ bool EventLoop::take_worker_messages() {
       });
 }
 
-/// As for workers. A client that does not read its replies must do so before its next request is
-/// taken.
 bool EventLoop::take_client_messages() {
   return take_messages(
       clients_, [this](const std::string& client) { return !network_.is_busy(client); },

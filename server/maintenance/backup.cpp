@@ -129,7 +129,6 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
   return copied;
 }
 
-/// Copies the tables; each table follows those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies", .key = "study_id"}, saved);
   copy_rows(from, to, {.table = "models", .key = "model_id"}, saved);
@@ -169,7 +168,6 @@ void mend(sqlite3* database) {
   }
 }
 
-/// Throws StorageError unless the list of tables can be read.
 void check_is_salvageable(sqlite3* database, const std::string& path) {
   try {
     if (identify(database, path) != DatabaseKind::kEmpty) {
@@ -191,7 +189,6 @@ void copy_into(const DraftFile& draft, const std::string& from, const std::strin
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   copy_pages(source.get(), copy.get(), to);
-  // Makes the copy one file, without a log.
   execute(copy.get(), "PRAGMA journal_mode = DELETE");
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged and was not copied: " + faults.front());

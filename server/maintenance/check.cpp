@@ -91,7 +91,6 @@ class StudyCheck {
     }
   }
 
-  /// The table of the study, if its recipe can be read.
   StudyTable read_table() {
     StudyTable table(studies_.text(2), studies_.number(3));
     try {
@@ -102,7 +101,6 @@ class StudyCheck {
     return table;
   }
 
-  /// Returns the points that have a row.
   IntervalSet check_rows(const StudyTable& table) {
     constexpr int kNoChecksum = 5;
     constexpr int kFault = 6;

@@ -36,7 +36,6 @@ DatabaseHandle open_sound_source(const std::string& path) {
   return database;
 }
 
-/// A row of `studies`.
 struct StudyRow {
   std::uint64_t id;
   std::string name;
@@ -97,7 +96,6 @@ class SourceMerge {
   SourceMerge(sqlite3* database, sqlite3* source, const std::string& rename_prefix, Merged& merged)
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
-  /// Throws MergeRefused for a study that cannot be merged.
   void run() {
     // source studies by number in the target
     std::vector<std::pair<std::uint64_t, StudyRow>> places;

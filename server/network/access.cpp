@@ -24,7 +24,6 @@
 namespace oblique::server {
 namespace {
 
-/// Replaces "localhost" and "*" by numeric addresses.
 std::string numeric(const std::string& address) {
   if (address == "localhost") {
     return "127.0.0.1";
@@ -105,17 +104,13 @@ std::string address_to_bind(const AccessSettings& settings) {
 
 class KeyList {
  public:
-  /// Throws solver::InputError if the list cannot be read.
   explicit KeyList(std::string path) : path_(std::move(path)), keys_(read()) {}
 
-  /// Reads the file again; true if the keys have changed.
   bool reload();
-  /// Null if the key is not listed.
   std::shared_ptr<const KeyIdentity> find(const protocol::CurveKey& key) const {
     const auto found = keys_.find(key);
     return found == keys_.end() ? nullptr : found->second;
   }
-  /// A sentence part for the log.
   std::string text() const { return fmt::format("admits the {} keys of {}", keys_.size(), path_); }
 
  private:

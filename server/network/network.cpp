@@ -24,7 +24,6 @@ static_assert(CurveSession::kAddedBytes == protocol::kSealBytes);
 
 /// Numbers below this one are ports.
 constexpr std::uint64_t kFirstPeer = 16;
-/// Descriptors for the database, its readers and the log.
 constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
 constexpr std::size_t kReadBytes = 64 * 1024;
@@ -55,7 +54,6 @@ bool would_block() {
 
 // ---- One connection ---------------------------------------------------------------------------
 
-/// A TCP connection with its protocol state, unread input and unsent output.
 class Network::Connection {
  public:
   Connection(protocol::Descriptor socket, const PortSecurity* security)
@@ -107,7 +105,6 @@ class Network::Connection {
     zmtp_.run_step();
     send_answers();
   }
-  /// Sends the greeting and handshake answers.
   void send_answers() {
     const std::string answers = zmtp_.take_answers();
     if (can_send_ && !answers.empty()) {
@@ -132,7 +129,6 @@ class Network::Connection {
   std::size_t sent_ = 0;  // bytes of `out_` that were sent
 };
 
-/// Sends a message; keeps what the system does not accept.
 void Network::Connection::send(std::string_view body) {
   const bool is_waiting = unsent_bytes() > 0;
   out_ += zmtp_.begin_message(body);
@@ -639,7 +635,6 @@ void Network::end_largest() {
             "the unsent output of all connections exceeds its limit, and it has the most");
 }
 
-/// False if there is none.
 bool Network::end_oldest_handshake() {
   if (handshakes_.empty()) {
     return false;

@@ -34,7 +34,6 @@ std::string own_properties() {
   return "\x0bSocket-Type" + std::string("\0\0\0\x06", 4) + "ROUTER";
 }
 
-/// Why a peer with these properties is refused, or an empty text.
 std::string validate_properties(std::string_view properties) {
   constexpr std::size_t kLengthBytes = 4;
   constexpr std::array<std::string_view, 2> kAllowed{"DEALER", "ROUTER"};
@@ -202,7 +201,6 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
     return std::nullopt;
   }
   header.body_bytes = number_of(bytes.substr(1, header.bytes - 1));
-  // Encrypted messages may be commands.
   const bool is_message = !header.is_command || (curve_ && is_open());
   const std::uint64_t longest =
       is_message ? protocol::kMaxFrameBytes + (curve_ ? CurveSession::kAddedBytes : 0)
@@ -215,7 +213,6 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
   return header;
 }
 
-/// Takes a frame. True if the next one may be taken.
 bool Zmtp::take_frame() {
   const std::optional<Header> header = next_header();
   if (!header) {
@@ -270,7 +267,6 @@ void Zmtp::run_step() {
   advance();
 }
 
-/// Handles a command of the handshake.
 void Zmtp::take_command(std::string_view body) {
   const std::size_t name_bytes = body.empty() ? 0 : byte_at(body, 0);
   if (name_bytes == 0 || body.size() < 1 + name_bytes) {

@@ -40,7 +40,6 @@ struct Part {
   std::string written;
   std::string sql{};  ///< translated for SQLite
 };
-/// The clauses SELECT, WHERE, GROUP BY and ORDER BY.
 using Parts = std::array<Part, 4>;
 
 /// An element expression, which is replaced by SQL over a column: peaks[0].fn_N, peaks[0],
@@ -53,10 +52,8 @@ struct Element {
   std::string unit;
 };
 
-/// The list of phase ends in the table `results`.
 constexpr const char* kStoredPhases = "stored_phases";
 
-/// The index in "[2]" or "[-1]".
 int index_in(std::string_view list, std::string_view brackets) {
   const char* const end = brackets.data() + brackets.size() - 1;
   int index = 0;
@@ -86,7 +83,6 @@ std::string as_real(const std::string& sql) {
   return fmt::format("CAST({} AS REAL)", sql);
 }
 
-/// The element of list `tokens[0]` at index `tokens[1]`.
 Element indexed(SqlTokens tokens) {
   const std::string name(tokens[0].text);
   if (!is_list_column(name)) {
@@ -116,7 +112,6 @@ Element indexed(SqlTokens tokens) {
   return {4, is_phase ? kStoredPhases : name, unit.empty() ? sql : as_real(sql), unit};
 }
 
-/// The element expression at the start of `tokens`.
 Element element_at(SqlTokens tokens) {
   if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
     return {};
@@ -181,7 +176,6 @@ const SqlFunction* function_at(SqlTokens tokens, std::size_t i) {
   return found == functions.end() ? nullptr : &*found;
 }
 
-/// The tokens between the brackets of the call at token `i`.
 SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
   const std::size_t end = std::min(closing_bracket(tokens, i + 1), tokens.size());
   return tokens.subspan(i + 2, end - i - 2);
@@ -220,7 +214,6 @@ bool has_window(SqlTokens tokens) {
   return std::ranges::any_of(tokens, [](const SqlToken& token) { return is_word(token, "over"); });
 }
 
-/// The aliases, which follow AS.
 Names aliases_of(SqlTokens tokens) {
   Names aliases;
   for (std::size_t i = 1; i < tokens.size(); ++i) {
@@ -610,7 +603,6 @@ Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& n
           ranges.size() > 1};
 }
 
-/// The statement of the first clauses of a query.
 std::string statement_of(std::span<const Part> parts, const std::string& rows) {
   std::string sql = fmt::format("{} {} FROM {}", parts[0].keyword, parts[0].sql, rows);
   for (const Part& part : parts.subspan(1)) {

@@ -33,7 +33,6 @@
 namespace oblique::server {
 namespace {
 
-/// Pause of the thread after an exception.
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
 /// Marks a cancelled query, in place of a number of chunks.
@@ -345,7 +344,6 @@ void QueryPool::run() {
       std::this_thread::sleep_for(kRetryPause);
     }
   }
-  // Kill all processes before waiting for the first one.
   std::ranges::for_each(running_, &Running::kill);
   running_.clear();
 }
@@ -385,7 +383,6 @@ void QueryPool::take_requests() {
   }
 }
 
-/// Starts the next query that may run; false if there is none.
 bool QueryPool::start_next() {
   std::optional<QueryJob> job;
   {
@@ -439,7 +436,6 @@ bool QueryPool::goes_on(Running& query) {
   return error.empty();
 }
 
-/// The error for a deadline that has passed, or an empty text.
 std::string QueryPool::missed_deadline(const Running& query) const {
   const std::int64_t now_ms = settings_.now_ms();
   if (now_ms >= query.answer_ends_ms) {
@@ -455,7 +451,6 @@ std::string QueryPool::missed_deadline(const Running& query) const {
                                   : took_too_long(query.time_limit_ms);
 }
 
-/// Reports the last part of an answer.
 void QueryPool::end(std::uint64_t ticket, std::string reply) {
   forget(ticket);
   report_({QueryReport::Kind::kAnswered, ticket, std::move(reply)});

@@ -44,7 +44,6 @@ int authorize(void*, int action, const char*, const char* function, const char*,
   }
 }
 
-/// Adds the studies from which results were copied.
 void add_origins(Statement& origins, protocol::StudyStatus& status) {
   constexpr int kMaxNamed = 20;
   origins.bind(1, status.study_id());
@@ -126,7 +125,6 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   StatementHandle statement(raw, &sqlite3_finalize);
   const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
   const std::string reason = code == SQLITE_OK ? "" : sqlite3_errmsg(database);
-  // SQLite's message for a view
   if (primary == SQLITE_AUTH || reason.starts_with("cannot modify ")) {
     throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
   }
@@ -222,7 +220,6 @@ protocol::QueryReply Answer::next() {
   return chunk;
 }
 
-/// Steps to the next row; false after the last one.
 bool Answer::step() {
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_INTERRUPT) {
@@ -251,7 +248,6 @@ void Answer::copy_row() {
       default:
         copy_bytes(database_, statement_.get(), i, *rows_);
     }
-    // max_value_bytes limits each value.
     if (rows_->bytes() - before > limits_.max_row_bytes) {
       throw QueryError("one row has more than the " + std::to_string(limits_.max_row_bytes) +
                        " bytes of a reply, blobs counted twice: select less, for example with "

@@ -81,7 +81,6 @@ std::size_t number_length(std::string_view rest) {
   return end;
 }
 
-/// The first token of `rest`, which must not be empty.
 SqlToken first_token(std::string_view rest) {
   using Kind = SqlToken::Kind;
   check_beginning(rest);
@@ -108,7 +107,6 @@ SqlToken first_token(std::string_view rest) {
   return {Kind::kSign, rest.substr(0, is_pair ? 2 : 1)};
 }
 
-/// Whether a clause or statement begins at token `i`.
 bool begins_clause(SqlTokens tokens, std::size_t i) {
   constexpr std::array<std::string_view, 14> kWords{
       "select", "values", "with",   "from",  "where",  "group",     "having",
@@ -205,7 +203,6 @@ void median_final(sqlite3_context* context) {
   sqlite3_result_double(context, 0.5 * below + 0.5 * *middle);
 }
 
-/// Adds the first and the last argument as a pair.
 void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_value** arguments) {
   sqlite3_value* const x = arguments[0];
   sqlite3_value* const y = arguments[count_of_arguments - 1];

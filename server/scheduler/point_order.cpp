@@ -12,7 +12,6 @@
 namespace oblique::server {
 namespace {
 
-/// Consecutive points with the same fall.
 struct Piece {
   Interval points;
   std::uint64_t fall;  ///< number of the fall
@@ -105,7 +104,6 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
             [this](std::uint32_t a, std::uint32_t b) { return runs_[a].point < runs_[b].point; });
 }
 
-/// Appends these points to the order.
 void PointOrder::append(const Interval& points) {
   if (points.begin == points.end) {
     return;

@@ -18,7 +18,6 @@ namespace {
 /// server itself had not run, and messages of workers still wait to be read.
 constexpr std::int64_t kLongestTick_ms = 1000;
 
-/// Weight of the newest message in a worker's pace.
 constexpr double kPaceWeight = 0.5;
 /// Weight of all earlier messages in the pace of all workers.
 constexpr double kPaceFades = 0.98;

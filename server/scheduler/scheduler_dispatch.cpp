@@ -161,7 +161,6 @@ void Scheduler::stop_draining(WorkerId worker) {
   }
 }
 
-/// The size of the worker's next batch of the study.
 BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills_lanes) const {
   const auto known = worker.paces.find(id);
   const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
@@ -231,7 +230,6 @@ void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::ui
 
 LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
                          bool alone) {
-  // The study may have grown since its recipe was sent.
   const std::uint64_t numbers = studies_.at(study).points.size();
   if (std::exchange(worker.defined[study], numbers) != numbers) {
     effects_.emplace_back(DefineStudy{id, study});

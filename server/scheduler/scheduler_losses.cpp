@@ -101,7 +101,6 @@ void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   }
 }
 
-/// Updates the worker's process after a Results message.
 void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted) {
   WorkerProcess& process = processes_.at(worker.process);
   const bool was_proven = process.proven_since_ms.has_value();

@@ -27,7 +27,6 @@ std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_
 StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
                          const LossLimits& limits)
     : table_(std::move(table)), limits_(limits), completed_(std::move(completed)) {
-  // rows beyond the last point
   completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());
   left_out_ = std::min(left_out, completed_.size());  // an edited database may have a larger number
   fresh_.insert(0, size());
@@ -284,7 +283,6 @@ std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t
   if (!next || next->begin < run_end || next->begin - end > kNear) {
     return std::nullopt;
   }
-  // The points in between may be leased, or be leased later.
   const auto between = completed_.within(end, next->begin);
   const Interval group = order_.group_at(*table_.get(), next->begin);
   if (between.size() != 1 || !(between.front() == Interval{end, next->begin}) ||

@@ -34,7 +34,6 @@ void ClientHandler::frame(const std::string& identity, std::string_view frame, I
   answer({identity, read.request_id, holder}, read, frame, now);
 }
 
-/// Parses and checks the request on the check thread.
 void ClientHandler::check(const Client& client, std::string_view frame, Instant now) {
   std::size_t bytes = frame.size();
   std::size_t of_all = 0;

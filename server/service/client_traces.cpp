@@ -154,7 +154,6 @@ void ClientHandler::trace_received(WorkerId worker, protocol::Trace trace) {
     return;  // from an earlier session
   }
   orders_.erase(order);
-  // No request waits for a cancelled trace.
   if (const auto request = pending_.find(trace.trace_id()); request != pending_.end()) {
     TraceJob& job = *request->second.trace;
     job.worker.reset();
@@ -193,7 +192,6 @@ protocol::ClientReply ClientHandler::trace_reply(TraceJob& job, const WorkerReco
   return message;
 }
 
-/// Sends waiting orders to free workers, in order.
 void ClientHandler::dispatch_traces() {
   auto running = std::ranges::count_if(
       pending_, [](const auto& entry) { return entry.second.trace && entry.second.trace->worker; });

@@ -144,7 +144,6 @@ void Service::handle(const Event& event, Instant now, protocol::Results* results
   }
 }
 
-/// Handles events that occurred while messages were sent to workers.
 void Service::handle_worker_events(Instant now) {
   for (auto events = workers_.take_events(); !events.empty(); events = workers_.take_events()) {
     for (const Event& event : events) {
@@ -153,7 +152,6 @@ void Service::handle_worker_events(Instant now) {
   }
 }
 
-/// Turns results with wrong inputs into failures.
 void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
   // Nothing is stored for a study without open points, so its table is not made.
   if (!states_.contains(event.study) || !scheduler_.has_study(event.study) ||

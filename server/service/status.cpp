@@ -13,7 +13,6 @@
 namespace oblique::server {
 namespace {
 
-/// Why a running study makes no progress, or an empty text.
 std::string reason_to_wait(const Core& core, const StudyCounts& counts, const Reuse& reuse) {
   const WriteLedger& ledger = core.ledger;
   if (ledger.is_gone()) {

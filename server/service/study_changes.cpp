@@ -15,7 +15,6 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestShownName = 200;
-/// Replaces the state of a deleted study.
 constexpr const char* kDeletedState = "deleted";
 
 }  // namespace
@@ -271,7 +270,6 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
     case protocol::STUDY_CHANGE_CANCEL:
       return change_state(client, id, StudyState::kCancelled, reply, now);
     case protocol::STUDY_CHANGE_PAUSE:
-      // A cancelled study gets no leases either.
       return change_state(client, id,
                           core_.states.record(id).state == StudyState::kCancelled
                               ? StudyState::kCancelled

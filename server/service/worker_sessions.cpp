@@ -180,7 +180,6 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
       id, worker.row.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
 }
 
-/// Why the worker is refused, or an empty text.
 std::string WorkerSessions::refusal_reason(const protocol::WorkerHello& hello) const {
   std::string error = protocol::hello_error(hello);
   if (error.empty() && hello.solver_version() != settings_.solver_version) {

@@ -58,7 +58,6 @@ const Columns& columns() {
   return kColumns;
 }
 
-/// Appends a number with 8 significant digits.
 void append(std::string& text, double value) {
   constexpr int kDigits = 8;
   std::array<char, 32> digits;  // the longest number is -1.2345678e-308

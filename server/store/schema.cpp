@@ -21,7 +21,6 @@ std::string description(sqlite3* database, const std::string& table) {
   return text.step() ? text.text(0) : "";
 }
 
-/// Descriptions of the tables of this schema, by name.
 const std::map<std::string, std::string>& our_tables() {
   static const std::map<std::string, std::string> kTables = [] {
     const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);

@@ -1,4 +1,3 @@
-// Reads the studies and their progress when a server starts.
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -78,7 +77,6 @@ std::string study_error(const StoredStudy& study) {
   return {};
 }
 
-/// Reads the failed points of all studies.
 void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
   std::map<std::uint64_t, StoredStudy*> by_number;
   for (StoredStudy& study : studies) {

@@ -9,7 +9,6 @@
 namespace oblique::server {
 namespace {
 
-/// The file of the write-ahead log, or nullptr.
 sqlite3_file* file_of(sqlite3* database) {
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
@@ -36,7 +35,6 @@ int write_again(sqlite3_file* file) {
 WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
   sqlite3_busy_timeout(database_, kBusyTimeout_ms);
   sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  // Replaces SQLite's automatic checkpoints by a hook.
   sqlite3_wal_hook(
       database_,
       [](void* log, sqlite3*, const char*, int pages) {

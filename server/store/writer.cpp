@@ -16,7 +16,6 @@ namespace {
 /// Maximum number of jobs in one transaction; limits the wait for acknowledgements.
 constexpr std::size_t kLargestGroup = 256;
 
-/// Pause before another attempt after a fault.
 constexpr std::chrono::milliseconds kRetryPause{500};
 
 /// Interval between calls of `maintain` while no job waits.

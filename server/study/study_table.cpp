@@ -35,7 +35,6 @@ bool is_larger_sample(const Block& block, const Block& longer) {
   return protocol::is_same_block(block, shortened);
 }
 
-/// One line per difference in the model and in the request for estimated errors.
 std::vector<std::string> head_differences(const Recipe& stored, const Recipe& given) {
   std::vector<std::string> lines;
   const auto was = protocol::from_message_unchecked(stored.model());

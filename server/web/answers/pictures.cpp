@@ -29,13 +29,11 @@ namespace {
 using nlohmann::ordered_json;
 using protocol::AxisLayout;
 
-/// The bytes of numbers, for `numbers_answer`.
 template <typename Number>
 std::string bytes_of(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
-/// The value of a numeric cell.
 double real_of(const protocol::Cell& cell) {
   return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
 }
@@ -101,7 +99,6 @@ Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::strin
   const std::uint64_t steps = std::max<std::uint64_t>(shown - 1, 1);
   side.numbers.clear();
   for (std::uint64_t i = 0; i < shown; ++i) {
-    // Add half to round to the nearest value.
     side.numbers.push_back(side.first +
                            (shown > 1 ? (2 * i * steps_there + steps) / (2 * steps) : 0));
     side.values.push_back(protocol::axis_value(*axis.axis, side.numbers.back()));
@@ -361,7 +358,6 @@ std::string sql_number(double value) {
   return fmt::format("({:#})", std::clamp(value, -kMost, kMost));
 }
 
-/// The bins along one column.
 struct BinSide {
   std::string name;  ///< "x" or "y"
   PictureColumn column;
@@ -384,7 +380,6 @@ struct BinSide {
     return fmt::format("{} BETWEEN {} AND {}", column.name, sql_number(least - slack_below),
                        sql_number(most + slack_above));
   }
-  /// The SQL expression for the bin index of a row.
   std::string bin_sql() const {
     const double first = place_of(least);
     const double width = place_of(most) - first;

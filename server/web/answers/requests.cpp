@@ -76,13 +76,11 @@ std::string csv_line(const ordered_json& values) {
   return fields + "\r\n";
 }
 
-/// Streams the rows of a query, chunk by chunk.
 class RowStream {
  public:
   RowStream(std::shared_ptr<ServiceExchange> exchange, bool as_csv)
       : exchange_(std::move(exchange)), as_csv_(as_csv) {}
 
-  /// Handles the first chunk, which has the column names.
   void begin(const protocol::QueryReply& chunk) {
     const ordered_json columns(
         std::vector<std::string>(chunk.columns().begin(), chunk.columns().end()));
@@ -179,7 +177,6 @@ HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::Tr
                         numbers + states);
 }
 
-/// The consequence of a reply: the answer or the next request.
 using NextStep = std::variant<HttpAnswer, ClientRequest>;
 using OnReply = std::function<NextStep(const ClientReply&)>;
 

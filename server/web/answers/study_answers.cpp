@@ -250,7 +250,6 @@ class Flow {
     return find_recipe();
   }
 
-  /// Gets the recipe from the cache, or requests it if a slot is free.
   std::optional<HttpAnswer> find_recipe() {
     study_.table = service_.recipes().find(study_.id, points_);
     if (study_.table) {

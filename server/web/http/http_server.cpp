@@ -82,14 +82,12 @@ void add_headers(MHD_Response* response, const HttpAnswer& answer) {
 
 }  // namespace
 
-/// A request and its answer.
 struct HttpServer::Exchange {
   HttpRequest request;
   PendingAnswer pending = {};
   bool is_answered = false;
 };
 
-/// A streamed answer.
 struct HttpServer::Stream {
   Stream(HttpServer& of, MHD_Connection* to, HttpStream from)
       : server(of), connection(to), next(std::move(from)) {

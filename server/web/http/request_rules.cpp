@@ -20,7 +20,6 @@ bool is_own(const std::string& host, const OwnNames& own) {
          (own.is_loopback ? is_loopback(host).value_or(false) : is_loopback(host).has_value());
 }
 
-/// Whether a header is present exactly once, with this value.
 bool is(const HttpRequest& request, const std::string& header, std::string_view value) {
   const auto values = request.all(header);
   return values.size() == 1 && values.front() == value;

@@ -45,7 +45,6 @@ std::optional<StudyPath> parse_study_path(const std::string& path) {
   return parsed;
 }
 
-/// A change of a study, from the path.
 struct PathChange {
   std::uint64_t study;
   protocol::StudyChange change;
