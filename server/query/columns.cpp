@@ -167,8 +167,8 @@ std::vector<Column> columns_and_functions() {
     columns.push_back(
         {fmt::format("{}[0].{}", list->column, member), unit_of_member(member), "element", "",
          fmt::format("{} of the first element, or with [-1] of the last{}. Members: {}", member,
-                     list->column == "peaks" ? ", and ripples count: major_peak_1_N "
-                                               "is the first peak that is none"
+                     list->column == "peaks" ? "; ripples count too, and major_peak_1_N is the "
+                                               "first major peak"
                                              : "",
                      fmt::join(list->members, ", "))});
     columns.push_back(
