@@ -282,7 +282,7 @@ TEST_F(TightNetworkTest, APeerThatReadsNothingIsBusyAndThenDisconnected) {
   }
   EXPECT_TRUE(was_busy);
   EXPECT_EQ(delivery, Delivery::kGone);
-  EXPECT_THAT(network_.take_disconnects().at(0).reason, HasSubstr("unread"));
+  EXPECT_THAT(network_.take_disconnects().at(0).reason, HasSubstr("does not read"));
   EXPECT_EQ(network_.waiting_out_bytes(), 0U);
 }
 

@@ -75,7 +75,7 @@ TEST(ZmtpTest, ViolationsAreFaultsAtTheirFirstByte) {
            {zmtp_greeting() + std::string("\x04\x00", 2), "without a name"},
            {zmtp_greeting() + too_long_a_command, "65536 bytes; the limit is 4096"},
            {zmtp_greeting() + ready + zmtp_frame("part", true).substr(0, 1), "several frames"},
-           {zmtp_greeting() + ready + zmtp_ping().substr(0, 2), "heartbeats"}}) {
+           {zmtp_greeting() + ready + zmtp_ping().substr(0, 2), "heartbeat"}}) {
     Zmtp zmtp;
     zmtp.receive(bytes);
     EXPECT_THAT(zmtp.fault(), HasSubstr(fault)) << bytes;

@@ -275,7 +275,7 @@ TEST_F(ServiceGrowthTest, ANameInUseIsRefusedEvenWhileItIsBeingWritten) {
   write_all();
   ASSERT_EQ(ports_.replies.size(), 3U);
   EXPECT_EQ(ports_.replies[0].change().study().name(), "c");
-  EXPECT_THAT(ports_.replies[1].error().message(), HasSubstr("already a study called \"c\""));
+  EXPECT_THAT(ports_.replies[1].error().message(), HasSubstr("there is a study called \"c\""));
   EXPECT_THAT(ports_.replies[2].error().message(), HasSubstr("already a study called \"c\""));
   rename("c", "");
   EXPECT_TRUE(last_reply().has_error());

@@ -172,7 +172,7 @@ TEST_F(ServiceQueryTest, ChunksAreForwardedAndTheirConfirmationsPassedToTheReade
   answer_query(0, reply_of({}));
   EXPECT_EQ(ports_.replies.size(), 3U);
   want_more(7, 3);
-  EXPECT_THAT(last_error(), testing::HasSubstr("no answer"));
+  EXPECT_THAT(last_error(), testing::HasSubstr("no query"));
   EXPECT_EQ(last_reply().request_id(), 7U);
 }
 
@@ -189,7 +189,7 @@ TEST_F(ServiceQueryTest, AnswersOfOtherClientsCanBeNeitherConfirmedNorEnded) {
   ask(7);
   give(0);
   want_more(7, 1, "another");
-  EXPECT_THAT(last_error(), testing::HasSubstr("no answer"));
+  EXPECT_THAT(last_error(), testing::HasSubstr("no query"));
   end(7, "another");
   EXPECT_TRUE(ports_.more.empty());
   EXPECT_TRUE(ports_.cancelled_queries.empty());
@@ -386,7 +386,7 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
       hello("three");
     }
     is_lost ? goodbye("two") : worker_sends(declined(orders()[first + 1]), "two");
-    EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no worker"));
+    EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no connected worker"));
     EXPECT_EQ(orders().size(), first + 2);
     goodbye("three");
     ports_.replies.clear();
