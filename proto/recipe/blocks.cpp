@@ -351,8 +351,7 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   check_distribution_end(key, "from", drawn.has_from(), drawn.from(), from);
   check_distribution_end(key, "to", drawn.has_to(), drawn.to(), to);
   require(from < to,
-          "{} from {} to {}: `from` must be below `to`; swap them, or give a single value "
-          "alone",
+          "{} from {} to {}: `from` must be below `to`; swap them, or give a single value",
           key.name, from, to);
   require(!takes_whole_numbers(key, from, to), "{} must be {}: list the values to draw from",
           key.name, key.allowed);

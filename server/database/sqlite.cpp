@@ -125,7 +125,7 @@ DatabaseHandle open_database(const std::string& path, int flags) {
   if (sqlite3_create_function_v2(raw, "row_checksum", kAnyNumber,
                                  SQLITE_UTF8 | SQLITE_DETERMINISTIC, nullptr, row_checksum, nullptr,
                                  nullptr, nullptr) != SQLITE_OK) {
-    throw StorageError(std::string("no checksums can be computed: ") + sqlite3_errmsg(raw));
+    throw StorageError(std::string("cannot compute checksums: ") + sqlite3_errmsg(raw));
   }
   return database;
 }

@@ -230,7 +230,7 @@ class Flow {
       return error_;
     }
     if (!protocol::is_sound(reply.query())) {
-      throw std::runtime_error("a reader process of the server sent no valid answer");
+      throw std::runtime_error("a reader process of the server sent an invalid answer");
     }
     for (protocol::ChunkRows rows(reply.query()); rows.next();) {
       answer_->take_row(rows);

@@ -251,13 +251,14 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
        {0U, protocol::kProtocolVersion - 1, protocol::kProtocolVersion + 1, 77U}) {
     worker_says(hello_of(version, "1.0"));
     EXPECT_THAT(last_message().refused().reason(),
-                HasSubstr(fmt::format("{}, the worker {}", own, version)));
+                HasSubstr(fmt::format("{}, but the worker has version {}", own, version)));
     ClientRequest message = submit_request("a");
     message.set_protocol_version(version);
     request(message);
-    EXPECT_THAT(last_error(),
-                HasSubstr(version == 0 ? std::string("this port is for clients")
-                                       : fmt::format("{}, the client {}", own, version)));
+    EXPECT_THAT(
+        last_error(),
+        HasSubstr(version == 0 ? std::string("this port is for clients")
+                               : fmt::format("{}, but the client has version {}", own, version)));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
