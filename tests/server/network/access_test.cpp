@@ -65,7 +65,7 @@ TEST(AddressToBindTest, InvalidAddressesAndKeysWithInsecureAreRefused) {
   for (const char* address : {"example.org", "", "1.2.3", "127.0.0.1:7600", "[::1]"}) {
     EXPECT_THAT(address_or_error({address, "", true}), HasSubstr("is not an address"));
   }
-  EXPECT_THAT(address_or_error({"127.0.0.1", "server.key", true}), HasSubstr("exclude"));
+  EXPECT_THAT(address_or_error({"127.0.0.1", "server.key", true}), HasSubstr("cannot be combined"));
 }
 
 class AccessControlTest : public testing::Test {
