@@ -96,7 +96,7 @@ Configuration::Configuration(CLI::App& app, std::string prefix, const std::strin
   file->type_name("FILE")->default_str("")->configurable(false);
   app.add_flag("--no-config", without_places_, "Use neither a file nor environment variables")
       ->configurable(false)
-      ->leaves out(file);
+      ->excludes(file);
   app.add_flag("--print-config", print_,
                "Print the effective settings as a configuration file, and exit")
       ->configurable(false);
@@ -117,7 +117,7 @@ void Configuration::add_log_options(LogSettings& settings) {
       ->type_name("FORMAT");
   const std::string meaning = "Log warnings and errors only: --log-level warning";
   quiet_ = app_.add_flag("--quiet", meaning);
-  quiet_->configurable(false)->leaves out(level);
+  quiet_->configurable(false)->excludes(level);
 }
 
 std::optional<int> Configuration::parse(int argc, const char* const* argv) {

@@ -229,7 +229,7 @@ TEST(Health, ReadinessHasTheReason) {
   faulty.database_fault = "disk I/O error\n\x1b[2J";
   EXPECT_EQ(readiness(faulty, kPlenty).status, 503U);
   EXPECT_EQ(readiness(faulty, kPlenty).body,
-            "the database takes no results: disk I/O error\\n\\x1b[2J\n");
+            "the database accepts no results: disk I/O error\\n\\x1b[2J\n");
   Snapshot stopping;
   stopping.is_stopping = true;
   EXPECT_EQ(readiness(stopping, kPlenty).status, 503U);
