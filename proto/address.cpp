@@ -14,7 +14,7 @@ constexpr std::string_view kScheme = "tcp://";
 
 }  // namespace
 
-std::string objection_to_address(const std::string& url) {
+std::string address_error(const std::string& url) {
   constexpr int kHighestPort = 65535;
   if (!url.starts_with(kScheme)) {
     return {};
@@ -29,7 +29,7 @@ std::string objection_to_address(const std::string& url) {
   const bool has_brackets = url[kScheme.size()] == '[' && begin[-2] == ']';
   return host_of(url).find(':') == std::string::npos || has_brackets
              ? ""
-             : "an address of IPv6 stands in brackets, as tcp://[::1]:7601";
+             : "an IPv6 address must be in brackets, as tcp://[::1]:7601";
 }
 
 std::string host_of(const std::string& url) {

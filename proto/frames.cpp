@@ -8,13 +8,13 @@
 
 namespace oblique::protocol {
 
-std::string objection_to_version(std::uint32_t version, const std::string& who) {
-  return version == kProtocolVersion
-             ? ""
-             : fmt::format(
-                   "the server has protocol version {}, the {} {}: install the same "
-                   "release on both",
-                   kProtocolVersion, who, version);
+std::string version_error(std::uint32_t version, const std::string& who) {
+  return version == kProtocolVersion ? ""
+                                     : fmt::format(
+                                           "the server has protocol version {}, but the {} has "
+                                           "version {}: install the same "
+                                           "release on both",
+                                           kProtocolVersion, who, version);
 }
 
 std::string encode(const google::protobuf::MessageLite& message) {

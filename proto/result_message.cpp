@@ -22,10 +22,9 @@ using solver::Member;
 using solver::PhaseKind;
 using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
-/// Longest text that a result may have, in bytes.
 constexpr std::size_t kLongestText = 65536;
 
-/// Scalars travel by type. What a result lacks has a value that no result has.
+/// Scalars are sent by type. A missing scalar has a value that no result can have.
 template <class T>
 T absent() {
   if constexpr (std::is_same_v<T, double>) {
@@ -42,7 +41,6 @@ bool is_absent(const Member<T>& member, const T& value) {
   return member.may_be_absent && (value == absent<T>() || value != value);  // NaN differs from NaN
 }
 
-/// Appends the scalars of type T.
 template <class T, class Values>
 void add_scalars(const CaseResult& result, Values& values) {
   for_each_sent<T>([&](const ResultField&, const Member<T>& member) {
@@ -51,7 +49,7 @@ void add_scalars(const CaseResult& result, Values& values) {
   });
 }
 
-/// Reads the scalars of type T, as far as there are any.
+/// Reads the scalars of type T; `values` may be shorter than the list.
 template <class T, class Values>
 void read_scalars(const Values& values, CaseResult& result) {
   int i = 0;
@@ -63,7 +61,7 @@ void read_scalars(const Values& values, CaseResult& result) {
   });
 }
 
-/// How one of solver::result_lists() travels: some members of each element, one after another.
+/// How one of solver::result_lists() is sent: some members of each element, one after another.
 struct SentList {
   const Numbers& (PointResult::*numbers)() const;
   Numbers* (PointResult::*mutable_numbers)();
@@ -81,7 +79,7 @@ void read_peak(CaseResult& result, const double* x) {
   result.peaks.push_back({x[0], x[1], x[2], false});
 }
 
-/// A phase begins where that before it ends.
+/// A phase begins where the previous one ends.
 void read_phase(CaseResult& result, const double* end_s) {
   auto& phases = result.phases;
   const auto kind = phases.size() % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution;
@@ -131,7 +129,6 @@ void read_lists(const PointResult& message, CaseResult& result) {
   }
 }
 
-/// What is wrong with a number, or an empty text.
 std::string fault_of_number(std::string_view name, double number) {
   return std::abs(number) <= kLargestOutput
              ? ""
@@ -145,9 +142,9 @@ std::string fault_of_lists(const PointResult& message) {
     const std::string_view name = solver::result_lists()[i]->column;
     const Numbers& numbers = (message.*kLists[i].numbers)();
     const int elements = numbers.size() / kLists[i].members;
-    if (elements > kMostListElements) {
+    if (elements > kMaxListElements) {
       return fmt::format("the worker sent {} {}, and a result has at most {}", elements, name,
-                         kMostListElements);
+                         kMaxListElements);
     }
     if (numbers.size() % kLists[i].members != 0) {
       return fmt::format("the worker sent {} of the wrong length", name);
@@ -164,7 +161,6 @@ std::string fault_of_lists(const PointResult& message) {
   return are_peaks ? "" : "the worker sent the number of a major peak that does not exist";
 }
 
-/// The first fault of the scalars of type T, or an empty text.
 template <class T, class Values>
 std::string fault_of_scalars(const Values& values, const char* what) {
   int number = 0;
@@ -216,9 +212,9 @@ std::string fault_of(const PointResult& message) {
       std::any_of(message.texts().begin(), message.texts().end(), is_too_long)) {
     return "the worker sent a text that is too long";
   }
-  if (message.ByteSizeLong() > kMostResultBytes) {
+  if (message.ByteSizeLong() > kMaxResultBytes) {
     return fmt::format("the worker sent a result of {} bytes, and one has at most {}",
-                       message.ByteSizeLong(), kMostResultBytes);
+                       message.ByteSizeLong(), kMaxResultBytes);
   }
   if (!message.error().empty()) {
     return {};
@@ -243,28 +239,28 @@ std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, 
   if (std::any_of(states.begin(), states.end(), [](char state) {
         return static_cast<unsigned char>(state) >= solver::kTraceStates.size();
       })) {
-    return "it has a state that no contact has";
+    return "it has an unknown state";
   }
   const auto touch = states.find_first_not_of(static_cast<char>(solver::kFallingCode));
   if (touch != std::string::npos &&
       states.find(static_cast<char>(solver::kFallingCode), touch) != std::string::npos) {
-    return "it falls again after the touch";
+    return "it has rows of the fall after the touch";
   }
   if (!with_fall && touch != 0 && !states.empty()) {
-    return "it has rows of the fall that were not requested";
+    return "it has rows of the fall, which were not requested";
   }
   if (!std::all_of(trace.values().begin(), trace.values().end(),
                    [](double value) { return std::isfinite(value); })) {
     return "it has a value that is not finite";
   }
-  // Above 1, `every` says how a trace that is too long gets short enough.
+  // With `every` above 1 the trace is too long and has no rows.
   if (states.empty() && trace.result().error().empty() && trace.every() <= 1) {
-    return "it has no instant";
+    return "it has no rows";
   }
   return fault_of(trace.result());
 }
 
-void say_protocol(WorkerHello& hello) {
+void set_protocol(WorkerHello& hello) {
   hello.set_protocol_version(kProtocolVersion);
   hello.set_outputs(sent_outputs());
 }
@@ -280,13 +276,13 @@ std::string sent_outputs() {
   return names;
 }
 
-std::string objection_to_worker(const WorkerHello& hello) {
-  std::string objection = objection_to_version(hello.protocol_version(), "worker");
-  if (objection.empty() && hello.outputs() != sent_outputs()) {
-    return "its results have other outputs than those that are stored here: install the same "
+std::string hello_error(const WorkerHello& hello) {
+  std::string error = version_error(hello.protocol_version(), "worker");
+  if (error.empty() && hello.outputs() != sent_outputs()) {
+    return "its results have other outputs than this server stores: install the same "
            "release on both";
   }
-  return objection;
+  return error;
 }
 
 }  // namespace oblique::protocol

@@ -13,7 +13,6 @@
 namespace oblique::protocol {
 namespace {
 
-/// Whether a terminal would act on the character or show nothing.
 bool is_control(char32_t code) {
   using Range = std::pair<char32_t, char32_t>;
   constexpr std::array<Range, 13> kControls{{
@@ -28,7 +27,7 @@ bool is_control(char32_t code) {
       {0x2060, 0x206f},    // word joiner, invisible operators, isolates
       {0xfe00, 0xfe0f},    // variation selectors
       {0xfeff, 0xfeff},    // zero-width no-break space
-      {0xfffe, 0xffff},    // no characters, and not allowed in XML
+      {0xfffe, 0xffff},    // not characters, and not allowed in XML
       {0xe0000, 0xe0fff},  // tags, variation selectors
   }};
   return std::any_of(kControls.begin(), kControls.end(), [code](const Range& range) {
@@ -99,7 +98,7 @@ Character first_character(std::string_view text) {
     }
     code = (code << 6U) | (byte & 0x3fU);
   }
-  // Longer than need be, half of a pair of UTF-16, or above the last code point.
+  // Overlong, half of a UTF-16 pair, or above the last code point.
   constexpr std::array<char32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
   const bool is_sound =
       code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;
@@ -163,7 +162,7 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
       continue;
     }
     const std::size_t candidate_distance = distance(word, candidate);
-    // A candidate that shares no letter with the word is no suggestion.
+    // No suggestion if the words share no letter.
     if (candidate_distance < best_distance &&
         candidate_distance < std::max(word.size(), candidate.size())) {
       best_distance = candidate_distance;

@@ -14,7 +14,8 @@
 namespace oblique::protocol {
 namespace {
 
-/// A value as the file has it; in a list or table, nested ones only by their kind.
+/// A value as written in the file. Inside a list or table, nested lists and tables appear as their
+/// kind only.
 std::string element(const toml::node& node, bool is_nested) {
   std::vector<std::string> parts;
   if (is_nested && (node.is_array() || node.is_table())) {
@@ -66,19 +67,19 @@ std::string toml_string(std::string_view text) {
 }
 
 toml::table TomlReader::parse(std::string_view text) const {
-  constexpr std::size_t kLongestError = 150;  // a message of toml++ ends with a key
-  constexpr std::size_t kMostKeyParts = 100;
-  // Tables nest as deep as their keys have parts, and destroying them takes stack for each. Nothing
-  // is parsed: so many dots in a text without a comma or an equals sign count too.
+  constexpr std::size_t kLongestError = 150;  // messages of toml++ end with a key of any length
+  constexpr std::size_t kMaxKeyParts = 100;
+  // Tables nest as deep as their keys have parts, and their destructors recurse. This check runs
+  // before parsing, so dots in any text without a comma or an equals sign count too.
   std::size_t parts = 1;
   std::size_t line = 1;
   for (const char c : text) {
     line += c == '\n' ? 1 : 0;
     const bool is_end = std::string_view("=,[]{}\n").find(c) != std::string_view::npos;
     parts = is_end ? 1 : parts + (c == '.' ? 1 : 0);
-    if (parts > kMostKeyParts) {
+    if (parts > kMaxKeyParts) {
       throw solver::InputError(
-          {.text = fmt::format("more than {} parts with dots between them", kMostKeyParts),
+          {.text = fmt::format("more than {} parts with dots between them", kMaxKeyParts),
            .place = fmt::format("{}:{}", file_, line)});
     }
   }
@@ -106,7 +107,7 @@ double TomlReader::number(std::string_view key, const toml::node& node,
   require(node.is_number(), key, node, expected);
   const auto value = node.value<double>();
   if (!value) {
-    fail(node, fmt::format("{} = {} has more digits than a number here keeps: write it with an "
+    fail(node, fmt::format("{} = {} has more digits than a number can hold: write it with an "
                            "exponent, as 1e18",
                            key, shown(node)));
   }
@@ -119,7 +120,7 @@ std::string TomlReader::text(std::string_view key, const toml::node& node,
   return *node.value<std::string>();
 }
 
-bool TomlReader::yes(std::string_view key, const toml::node& node) const {
+bool TomlReader::boolean(std::string_view key, const toml::node& node) const {
   require(node.is_boolean(), key, node, "true or false");
   return *node.value<bool>();
 }

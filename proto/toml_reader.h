@@ -14,25 +14,24 @@ namespace oblique::protocol {
 /// "a table", "a list", "a string", "a boolean", "a number" or "a date or time".
 std::string kind_of(const toml::node& node);
 
-/// A value as the file has it, on one line and shortened for a message.
+/// A value as written in the file, on one line and shortened, for a message.
 std::string shown(const toml::node& node);
 
-/// A text as a string of TOML, in quotes.
 std::string toml_string(std::string_view text);
 
 /// Reads a TOML file: studies, keys and settings. Every error is a solver::InputError with the
 /// place "study.toml:3:6": file, line and column.
 class TomlReader {
  public:
-  /// `file` is the name that errors give.
+  /// `file` is the file name in error messages.
   explicit TomlReader(std::string file) : file_(std::move(file)) {}
 
   const std::string& file() const { return file_; }
 
-  /// The content of the file. Keys with more than 100 parts between dots are refused.
+  /// Parses the text of the file. Refuses keys with more than 100 parts between dots.
   toml::table parse(std::string_view text) const;
 
-  /// Throws the error `message` about the node or key `at`.
+  /// Throws an InputError with `message` and the place of the node or key `at`.
   template <typename At>
   [[noreturn]] void fail(const At& at, std::string_view message) const {
     throw solver::InputError({.text = std::string(message), .place = place(at.source())});
@@ -41,8 +40,8 @@ class TomlReader {
   /// "study.toml:3:6"
   std::string place(const toml::source_region& at) const;
 
-  /// Calls `work`. An InputError without a place gets that of its key in the table `at`, or else
-  /// that of `at`.
+  /// Calls `work`. Adds a place to an InputError without one: that of its key in the table `at`,
+  /// else that of `at`.
   template <typename Work>
   decltype(auto) located(const toml::node& at, Work work) const {
     try {
@@ -54,14 +53,15 @@ class TomlReader {
     }
   }
 
-  // The value of a node that must be of that type; `key` and `expected` are for the message.
+  // Return the value of a node and throw if it has another type. `key` and `expected` are for the
+  // message.
   double number(std::string_view key, const toml::node& node, std::string_view expected) const;
   std::string text(std::string_view key, const toml::node& node, std::string_view expected) const;
-  bool yes(std::string_view key, const toml::node& node) const;
+  bool boolean(std::string_view key, const toml::node& node) const;
   const toml::table& table(std::string_view key, const toml::node& node,
                            std::string_view expected) const;
 
-  /// Refuses a key of `table` that is not in `known`, as "`before`unknown key `muu` (did you mean
+  /// Throws for a key of `table` that is not in `known`: "`before`unknown key `muu` (did you mean
   /// `mu`?): `rule`".
   void refuse_unknown(const toml::table& table, std::span<const std::string_view> known,
                       std::string_view before, std::string_view rule) const;

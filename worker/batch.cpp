@@ -27,7 +27,7 @@ Batch::Range Batch::points_from(std::uint64_t position, std::uint64_t end) const
 std::uint64_t Batch::first_to_solve(std::uint64_t at, std::uint64_t end) const {
   while (points_->has_filter() && at < end) {
     const auto [first, past] = points_from(at, end);
-    const std::uint64_t found = points_->first_left_in(first, past);
+    const std::uint64_t found = points_->first_passing(first, past);
     at += found - first;
     if (found < past) {
       break;

@@ -400,7 +400,7 @@ void Conversation::report(Progress& progress) {
   results.set_busy_s(progress.results.empty() ? progress.busy_s : 0.0);
   // Without a lease the server does not accept points left out, and leases them again.
   for (std::size_t i = 0; has_lease && i < progress.left_out.size(); ++i) {
-    if (results.left_out_size() >= 2 * protocol::kMostLeftOutRanges) {
+    if (results.left_out_size() >= 2 * protocol::kMaxLeftOutRanges) {
       add_results(std::exchange(results, new_message()));
     }
     const Batch::Range& range = progress.left_out[i];
@@ -479,7 +479,7 @@ void Conversation::on(const protocol::TraceOrder& order) {
   }
   protocol::WorkerMessage message;
   message.mutable_trace()->set_trace_id(order.trace_id());
-  message.mutable_trace()->set_not_taken(true);
+  message.mutable_trace()->set_declined(true);
   send(std::move(message));
 }
 

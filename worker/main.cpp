@@ -122,7 +122,7 @@ int run_worker(Options options) {
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!oblique::protocol::stop_with_parent(options.parent)) {
-    spdlog::warn("the parent process ended before this one began");
+    spdlog::warn("the parent process ended before this one started");
     return oblique::protocol::kDone;
   }
   oblique::solver::FallCache falls(options.fall_memory_bytes != 0
@@ -131,7 +131,7 @@ int run_worker(Options options) {
                                              oblique::solver::kFallsPartOfMemory);
   settings.on_turn = [&](const std::string& status) {
     notifier.status(status);
-    notifier.turn(oblique::protocol::Notifier::Clock::now());
+    notifier.feed_watchdog(oblique::protocol::Notifier::Clock::now());
   };
   oblique::worker::Session session(
       settings,
@@ -216,7 +216,7 @@ int run_program(int argc, char** argv) {
   }
   if (const std::string error = set_exit(session.conversation.exit, options.idle_exit_s);
       !error.empty()) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), error);
+    return oblique::protocol::report_wrong_usage(app.get_name(), error);
   }
   session.host = host_name();
   if (session.name.empty()) {
@@ -229,7 +229,7 @@ int run_program(int argc, char** argv) {
     }
     return run_worker(std::move(options));
   } catch (const oblique::solver::InputError& error) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
+    return oblique::protocol::report_wrong_usage(app.get_name(), error.what());
   }
 }
 

@@ -39,7 +39,7 @@ std::string random_id() {
 
 protocol::WorkerHello hello_of(const SessionSettings& settings) {
   protocol::WorkerHello hello;
-  protocol::say_protocol(hello);
+  protocol::set_protocol(hello);
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
   hello.set_name(settings.name);

@@ -52,7 +52,7 @@ class Session {
   /// The socket of the present attempt.
   struct Link {
     Link(zmq::context_t& context, const protocol::DealerSettings& settings)
-        : socket(protocol::made_dealer(context, settings)),
+        : socket(protocol::make_dealer(context, settings)),
           monitor(context, socket, settings, true) {}
     zmq::socket_t socket;
     protocol::SocketMonitor monitor;

@@ -13,10 +13,10 @@
 namespace oblique::worker {
 namespace {
 
-protocol::Trace not_taken(std::uint64_t trace_id) {
+protocol::Trace declined(std::uint64_t trace_id) {
   protocol::Trace trace;
   trace.set_trace_id(trace_id);
-  trace.set_not_taken(true);
+  trace.set_declined(true);
   return trace;
 }
 

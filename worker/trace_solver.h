@@ -65,7 +65,7 @@ class TraceSolver {
   /// Without `solve` no order is taken. `has_trace` is called when a trace can be collected, also
   /// on the solving thread.
   TraceSolver(Solve solve, std::function<void()> has_trace,
-              std::size_t most_bytes = protocol::kMostTraceBytes);
+              std::size_t most_bytes = protocol::kMaxTraceBytes);
 
   /// While an order is being solved, others are answered as not taken.
   void take(const protocol::TraceOrder& order);

@@ -122,7 +122,7 @@ int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
         console, command,
         &command == &app && !other.empty()
             ? fmt::format("unknown command `{}` (did you mean `{}`?)", unexpected.front(), other)
-            : protocol::objection_of(app, command, error));
+            : protocol::parse_error_message(app, command, error));
   }
 }
 

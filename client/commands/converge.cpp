@@ -79,7 +79,7 @@ BothRefinements refined(Console& console, const std::vector<Level>& meshes,
 int converge(const ConvergeFlags& flags, Console& console) {
   const auto table = points_of_flags(flags.points, tip_reach(console));
   std::uint64_t points = 0;
-  for (std::uint64_t i = 0; (i = table.first_left_in(i, table.size())) < table.size(); ++i) {
+  for (std::uint64_t i = 0; (i = table.first_passing(i, table.size())) < table.size(); ++i) {
     ++points;
   }
   if (points != 1) {
@@ -94,7 +94,7 @@ int converge(const ConvergeFlags& flags, Console& console) {
         flags.halvings, kMostHalvings));
   }
   constexpr int kFinest = 32;
-  const auto given = table.point(table.first_left_in(0, table.size()));
+  const auto given = table.point(table.first_passing(0, table.size()));
   const auto model = table.model(given.model);
   const ContactPoint point{given.H_m, given.mu, given.e_star};
   const int finest = flags.finest == 0 ? std::max(kFinest, 4 * flags.coarsest) : flags.finest;

@@ -200,7 +200,7 @@ bool check_disk(Diagnosis& diagnosis, const std::string& file) {
     diagnosis.ok(kCheck, fmt::format("{} is writable and has {} free", folder.string(),
                                      format_bytes(space.available)));
   }
-  if (const auto objection = server::objection_to_shared_disk(path.string()); !objection.empty()) {
+  if (const auto objection = server::network_disk_error(path.string()); !objection.empty()) {
     diagnosis.warning(kCheck, objection);
   }
   return true;

@@ -62,7 +62,7 @@ std::optional<protocol::CurveKey> public_key_of(const std::string& text) {
   if (text.empty()) {
     return std::nullopt;
   }
-  const auto key = protocol::key_of_z85(text);
+  const auto key = protocol::parse_z85(text);
   if (!key) {
     throw solver::InputError(
         fmt::format("--public {} is no key: one has {} characters, as `public` in a key file",
@@ -130,7 +130,7 @@ int keygen(const KeysFlags& flags, Console& console) {
 int add(const KeysFlags& flags, Console& console) {
   const auto role = role_of(flags.role);
   const auto public_key = public_key_of(flags.public_key);
-  const std::string folder = protocol::key_folder_meant(flags.folder);
+  const std::string folder = protocol::find_key_folder(flags.folder);
   if (!public_key) {
     check_not_revoked(folder, flags.name);
   }
@@ -145,7 +145,7 @@ int list(const KeysFlags& flags, Console&) {
   const auto format = format_named(flags.format);
   protocol::Table table{.columns = {"name", "role", "public", "added_at"}};
   const auto keys = protocol::read_authorized_keys(
-      protocol::authorized_keys_in(protocol::key_folder_meant(flags.folder)));
+      protocol::authorized_keys_in(protocol::find_key_folder(flags.folder)));
   for (const auto& key : keys.all()) {
     table.rows.push_back(
         {key.name, std::string(name_of(key.role)), protocol::z85(key.public_key), key.added_at});
@@ -155,7 +155,7 @@ int list(const KeysFlags& flags, Console&) {
 }
 
 int revoke(const KeysFlags& flags, Console& console) {
-  const std::string folder = protocol::key_folder_meant(flags.folder);
+  const std::string folder = protocol::find_key_folder(flags.folder);
   const std::string path = protocol::authorized_keys_in(folder);
   protocol::change_authorized_keys(
       path, [&](protocol::AuthorizedKeys& keys) { keys.remove(flags.name); });

@@ -56,7 +56,7 @@ struct ShownPoint {
 /// What one block is.
 struct BlockReport {
   protocol::BlockPlace place;
-  protocol::PointsLeftIn left_in;
+  protocol::PassingPoints left_in;
   std::string made_of;
   ShownPoint first;
   ShownPoint last;
@@ -106,7 +106,7 @@ std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::Bl
                            std::uint64_t most) {
   const std::uint64_t last = place.first_point + place.points - 1;
   for (std::uint64_t back = 0; back < std::min(most, place.points); ++back) {
-    if (table.is_left_in(last - back)) {
+    if (table.passes_filter(last - back)) {
       return last - back;
     }
   }
@@ -114,12 +114,12 @@ std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::Bl
 }
 
 BlockReport report_of_block(const protocol::PointTable& table, int number,
-                            const protocol::PointsLeftIn& left_in) {
+                            const protocol::PassingPoints& left_in) {
   constexpr std::uint64_t kMostLooks = 100'000;
   const protocol::Block& block = table.recipe().blocks(number);
   const auto& place = table.block(static_cast<std::size_t>(number));
   const std::uint64_t end = place.first_point + std::min(kMostLooks, place.points);
-  const std::uint64_t first = table.first_left_in(place.first_point, end);
+  const std::uint64_t first = table.first_passing(place.first_point, end);
   return {place, left_in, made_of(block),
           shown_point(table, block, first < end ? first : place.first_point),
           shown_point(table, block, last_left_in(table, place, kMostLooks))};

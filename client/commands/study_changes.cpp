@@ -77,8 +77,7 @@ int describe(const ChangeFlags& flags, Console& console) {
 }
 
 int rename(const ChangeFlags& flags, Console& console) {
-  if (const auto objection = protocol::objection_to_study_name(flags.new_name);
-      !objection.empty()) {
+  if (const auto objection = protocol::study_name_error(flags.new_name); !objection.empty()) {
     throw solver::InputError(objection);
   }
   const std::string database = database_meant(flags.source);

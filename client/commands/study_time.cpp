@@ -52,7 +52,7 @@ std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::P
       const protocol::Point point = table.point(i);
       const ModelParameters model = table.model(point.model);
       const auto fall = falls.kept_fall(model);
-      if (fall && fall->fallen && table.is_left_in(i)) {
+      if (fall && fall->fallen && table.passes_filter(i)) {
         points.push_back(
             {solver::Finger(model, fall->fallen), i, {point.H_m, point.mu, point.e_star}});
       }

@@ -53,11 +53,11 @@ void print_submitted(Console& console, const Study& study, const protocol::Submi
       known += fmt::format("; its priority is now {}", *settings.priority);
     }
   }
-  if (const std::string taken = taken_over(reply.taken()); !taken.empty()) {
+  if (const std::string taken = taken_over(reply.reused()); !taken.empty()) {
     known += "; " + taken;
   }
   console.out() << fmt::format("{}: {} points, {} done{}", study.name, format_count(reply.points()),
-                               format_count(reply.settled()), known)
+                               format_count(reply.completed()), known)
                 << std::endl;
 }
 
@@ -83,8 +83,7 @@ int watch(Console& console, const SubmitFlags& flags, const Study& study, Connec
 }
 
 int submit(const SubmitFlags& flags, Console& console) {
-  if (const std::string objection =
-          protocol::objection_to_priority(flags.settings.priority.value_or(0));
+  if (const std::string objection = protocol::priority_error(flags.settings.priority.value_or(0));
       !objection.empty()) {
     throw solver::InputError("--priority: " + objection);
   }

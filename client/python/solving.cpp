@@ -236,7 +236,7 @@ std::vector<double> values_of(std::string_view key, const py::handle& array) {
 
 /// Adds a key: one number of the model to `model`; a number of a point, a text (expression) and an
 /// array with a value for each point to `axes`, which are by key_number.
-void add_key(protocol::WrittenModel& model, std::map<std::size_t, protocol::Axis>& axes,
+void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>& axes,
              const std::string& name, const py::handle& value) {
   const std::size_t number = protocol::key_number(name);
   protocol::Axis axis;
@@ -301,7 +301,7 @@ std::vector<double> lengths_of(const py::handle& value) {
 /// points, for an unknown key, with the nearest one, and for wrong combinations. A wrong value in
 /// an array makes a fault of its model, or fails when the point is solved.
 GivenPoints points_of(const py::dict& keys, std::size_t points) {
-  protocol::WrittenModel model;
+  protocol::ModelInput model;
   std::map<std::size_t, protocol::Axis> keyed_axes;
   if (!py::isinstance<py::str>(keys["preset"])) {
     throw InputError(fmt::format("preset = {} is not allowed: preset must be a name, as \"paper\"",
@@ -317,7 +317,7 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
       add_key(model, keyed_axes, name, value);
     }
     if (has_lengths && (name == "links" || name == "length")) {
-      throw InputError(std::string(protocol::WrittenModel::kLengthsStandAlone));
+      throw InputError(std::string(protocol::ModelInput::kLengthsConflict));
     }
   }
   const ModelParameters base = model.model();

@@ -65,7 +65,7 @@ class ServerRows : public RowStream {
 Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
     : settings_(std::move(settings)),
       keep_waiting_(std::move(keep_waiting)),
-      socket_(protocol::made_dealer(context_, dealer_settings(settings_))),
+      socket_(protocol::make_dealer(context_, dealer_settings(settings_))),
       monitor_(context_, socket_, dealer_settings(settings_)) {
   protocol::connect(socket_, dealer_settings(settings_));
 }
@@ -299,7 +299,7 @@ protocol::QueryReply Connection::next_rows() {
 protocol::QueryReply Connection::more_rows() {
   protocol::ClientRequest request;
   request.mutable_more_rows()->set_request_id(rows_->request_id);
-  request.mutable_more_rows()->set_taken(rows_->chunks);
+  request.mutable_more_rows()->set_received(rows_->chunks);
   send_about_rows(std::move(request));
   // Time in which this process was stopped, or its machine slept, does not count.
   constexpr std::chrono::milliseconds kLongestSlice{500};

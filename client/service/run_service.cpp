@@ -128,10 +128,10 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
     note_coarse_mesh(console.notes(), study.recipe);
   } else {
     console.notes() << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
-                                   format_count(submitted.settled()),
+                                   format_count(submitted.completed()),
                                    format_count(submitted.points()));
   }
-  if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
+  if (const std::string taken = taken_over(submitted.reused()); !taken.empty()) {
     console.notes() << fmt::format("\"{}\": {}\n", study.name, taken);
   }
   FollowedStudy followed(connection, study.name);

@@ -132,7 +132,7 @@ void warn_if_insecure(Console& console, const std::string& access, const std::st
   }
 }
 
-std::string taken_over(const protocol::TakenOver& taken) {
+std::string taken_over(const protocol::ReusedPoints& taken) {
   if (taken.points() == 0 && !taken.cut_short()) {
     return {};
   }
@@ -159,7 +159,7 @@ protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies) {
                                     "points_per_s", "created_at", "priority", "waits_for",
                                     "left_out"}};
   const bool any_taken = std::any_of(studies.begin(), studies.end(),
-                                     [](const auto& study) { return study.taken().points() > 0; });
+                                     [](const auto& study) { return study.reused().points() > 0; });
   if (any_taken) {
     table.columns.emplace_back("taken_over");
   }
@@ -176,7 +176,7 @@ protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies) {
     row.emplace_back(study.waits_for());
     row.emplace_back(static_cast<std::int64_t>(study.left_out()));
     if (any_taken) {
-      row.emplace_back(static_cast<std::int64_t>(study.taken().points()));
+      row.emplace_back(static_cast<std::int64_t>(study.reused().points()));
     }
   }
   return table;

@@ -68,7 +68,7 @@ int print_end(Console& console, const protocol::StudyStatus& status,
 void warn_if_insecure(Console& console, const std::string& access, const std::string& place);
 
 /// "12 points are taken over: 7 of a, 5 of b", or an empty text.
-std::string taken_over(const protocol::TakenOver& taken);
+std::string taken_over(const protocol::ReusedPoints& taken);
 
 /// Columns and rows of studies for `status` and `studies`.
 protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies);

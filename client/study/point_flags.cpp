@@ -168,7 +168,7 @@ protocol::Sample sample_of_flag(std::string_view text) {
                      "this is no sample: write kind:count:seed, as sobol:100000:1; kinds are "
                      "random, lhs and sobol, count and seed whole numbers");
   }
-  return protocol::written_sample(parts[0], *count, *seed);
+  return protocol::parse_sample(parts[0], *count, *seed);
 }
 
 std::string described(const ParameterKey& key) {
@@ -376,7 +376,7 @@ namespace {
 
 /// The recipe before its points are checked.
 protocol::Recipe written_recipe(const PointFlags& flags) {
-  protocol::WrittenModel model;
+  protocol::ModelInput model;
   model.preset = flags.preset;
   CsvFiles files(".");
   std::vector<protocol::Axis> axes;
@@ -475,7 +475,7 @@ Study study_of_flags(const StudyFlags& flags, const ReachCheck& check_reach) {
     study.name = name_of_recipe(study.recipe);
   }
   if (!flags.name.empty()) {
-    if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {
+    if (const auto objection = protocol::study_name_error(flags.name); !objection.empty()) {
       throw InputError({.text = objection, .key = "name", .place = "--name"});
     }
     study.name = flags.name;

@@ -48,7 +48,7 @@ solver::InputError Places::located(const solver::InputError& error) const {
 
 void check_points(const protocol::PointTable& table, const Places& places) {
   try {
-    table.judge_points();
+    table.validate_points();
   } catch (const solver::InputError& error) {
     throw places.located(error);
   }

@@ -30,7 +30,7 @@ struct Study {
   Places places = {};
 };
 
-/// Checks the values that only single points show (PointTable::judge_points). Throws
+/// Checks the values that only single points show (PointTable::validate_points). Throws
 /// solver::InputError with the place.
 void check_points(const protocol::PointTable& table, const Places& places);
 void check_points(const Study& study);

@@ -196,7 +196,7 @@ class BlockReader {
     const auto* zip = table_.get("zip");
     const auto* csv = table_.get("csv");
     const auto* sampled = table_.get("sample");
-    const bool is_zip = zip != nullptr ? file_.yes("zip", *zip) : csv != nullptr;
+    const bool is_zip = zip != nullptr ? file_.boolean("zip", *zip) : csv != nullptr;
     if (csv != nullptr && !is_zip) {
       file_.fail(*zip, "zip = false is not allowed with csv: the lines of a file are points");
     }
@@ -267,7 +267,7 @@ class BlockReader {
       file_.fail(node, fmt::format("sample = {} lacks `{}`: write {}", protocol::shown(parts),
                                    parts.contains("kind") ? "count" : "kind", kForm));
     }
-    return protocol::written_sample(
+    return protocol::parse_sample(
         file_.text("sample: kind", *parts.get("kind"), "random, lhs or sobol, in quotes"),
         whole("count"), parts.contains("seed") ? whole("seed") : protocol::kUsualSeed);
   }
@@ -328,7 +328,7 @@ std::string name_of(const protocol::TomlReader& file, const toml::table& top) {
   const auto* node = top.get("name");
   const std::string name = node != nullptr ? file.text("name", *node, "a string")
                                            : std::filesystem::path(file.file()).stem().string();
-  if (const auto objection = protocol::objection_to_study_name(name); !objection.empty()) {
+  if (const auto objection = protocol::study_name_error(name); !objection.empty()) {
     throw node != nullptr
         ? InputError("name", objection)
         : InputError({.text = "a study without `name` is called as its file: " + objection,
@@ -344,12 +344,12 @@ solver::ModelParameters model_of(const protocol::TomlReader& file, const toml::n
               "model is " + protocol::kind_of(node) + ": write [model], and the keys below it");
   }
   return file.located(node, [&] {
-    protocol::WrittenModel model;
+    protocol::ModelInput model;
     for (const auto& [written, value] : *table) {
       const std::string_view name = written.str();
-      if (name == protocol::WrittenModel::kPreset) {
+      if (name == protocol::ModelInput::kPreset) {
         model.preset = file.text(name, value, protocol::joined(solver::preset_names()));
-      } else if (name == protocol::WrittenModel::kLengths) {
+      } else if (name == protocol::ModelInput::kLengths) {
         ParameterKey key = protocol::model_key("length");
         key.name = name;
         constexpr std::string_view kForm = "a list of numbers, the lengths in m, one a link";
@@ -393,7 +393,7 @@ Study parse_study(std::string_view text, const std::string& name, const ReachChe
   return file.located(top, [&] {
     Study study{.name = name_of(file, top), .recipe = {}, .places = {file.file(), {}}};
     const auto* errors = top.get("errors");
-    study.recipe.set_errors(errors != nullptr && file.yes("errors", *errors));
+    study.recipe.set_errors(errors != nullptr && file.boolean("errors", *errors));
     const auto* model = top.get("model");
     *study.recipe.mutable_model() =
         protocol::to_message(model != nullptr ? model_of(file, *model) : solver::ModelParameters());

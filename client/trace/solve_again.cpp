@@ -143,7 +143,7 @@ PointSpec point_in(const std::string& database, const protocol::StudyStatus& stu
     throw std::runtime_error(fmt::format("the study \"{}\" has no point {}: its points are 0 to {}",
                                          study.name(), point, table.size() - 1));
   }
-  if (!table.is_left_in(point)) {
+  if (!table.passes_filter(point)) {
     throw std::runtime_error(
         fmt::format("point {} of the study \"{}\" is left out by its filter", point, study.name()));
   }

@@ -37,7 +37,7 @@ constexpr std::string_view kDigits =
 constexpr std::size_t kBytesOfGroup = 4;
 constexpr std::size_t kDigitsOfGroup = 5;
 
-/// False unless `text` stands for a key.
+/// False if `text` does not encode a key.
 bool decode_z85(std::string_view text, CurveKey& key) {
   if (text.size() != kKeyCharacters) {
     return false;
@@ -62,7 +62,6 @@ bool decode_z85(std::string_view text, CurveKey& key) {
   return true;
 }
 
-/// In the order of `Role`.
 constexpr std::array<std::string_view, 4> kRoles{"server", "client", "worker", "reader"};
 
 }  // namespace
@@ -82,12 +81,12 @@ SecretKey::SecretKey() {
     bytes_.reset(static_cast<CurveKey*>(sodium_malloc(sizeof(CurveKey))), sodium_free);
   }
   if (!bytes_) {
-    throw std::runtime_error("no keys can be used: the system gives no memory or random numbers");
+    throw std::runtime_error("cannot use keys: the system refuses locked memory or random numbers");
   }
   bytes_->fill(0);
 }
 
-KeyPair made_key_pair() {
+KeyPair generate_key_pair() {
   static_assert(std::tuple_size_v<CurveKey> == crypto_box_PUBLICKEYBYTES);
   static_assert(std::tuple_size_v<CurveKey> == crypto_box_SECRETKEYBYTES);
   KeyPair pair;
@@ -95,13 +94,13 @@ KeyPair made_key_pair() {
   return pair;
 }
 
-CurveKey public_half_of(const SecretKey& secret_key) {
+CurveKey public_key_of(const SecretKey& secret_key) {
   CurveKey public_key{};
   crypto_scalarmult_base(public_key.data(), secret_key.data());
   return public_key;
 }
 
-// Four bytes are one number, the first byte its highest, and so are five digits.
+// Four bytes and five digits each form one big-endian number.
 std::string z85(const CurveKey& key) {
   std::string text(kKeyCharacters, '0');
   for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
@@ -117,7 +116,7 @@ std::string z85(const CurveKey& key) {
   return text;
 }
 
-std::optional<CurveKey> key_of_z85(std::string_view text) {
+std::optional<CurveKey> parse_z85(std::string_view text) {
   CurveKey key{};
   return decode_z85(text, key) ? std::optional(key) : std::nullopt;
 }
@@ -136,7 +135,6 @@ constexpr std::string_view kNameRule =
 /// The fields of one table of a file. Errors never show a value, which may be a secret.
 class KeyFields {
  public:
-  /// Refuses fields other than the `known` ones.
   KeyFields(const TomlReader& file, const toml::table& table, Fields known)
       : file_(file), table_(table) {
     file.refuse_unknown(table, known, "", "allowed are " + joined(known));
@@ -160,10 +158,10 @@ class KeyFields {
     fail("role", R"(must be "server", "client", "worker" or "reader")");
   }
   CurveKey key(std::string_view field) const {
-    if (const auto key = key_of_z85(text(field))) {
+    if (const auto key = parse_z85(text(field))) {
       return *key;
     }
-    fail(field, "is no key: one has 40 characters, as `oblique keygen` writes them");
+    fail(field, "is not a key: a key has 40 characters, as written by `oblique keygen`");
   }
   std::string name() const {
     std::string name = text("name");
@@ -182,7 +180,7 @@ class KeyFields {
   throw std::runtime_error(fmt::format("{} {}: {}", what, path, std::strerror(errno)));
 }
 
-/// What the system knows about a file; all zero where there is none.
+/// Returns the status of a file, all zero if it does not exist.
 struct stat status_of(const std::string& path) {
   struct stat file {};
   static_cast<void>(::stat(path.c_str(), &file));
@@ -193,7 +191,6 @@ bool exists(const std::string& path) {
   return std::filesystem::exists(std::filesystem::symlink_status(path));
 }
 
-/// Opens the folder of a file.
 Descriptor opened_folder_of(const std::string& path) {
   const std::string folder = std::filesystem::absolute(path).parent_path();
   Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
@@ -203,34 +200,32 @@ Descriptor opened_folder_of(const std::string& path) {
   return opened;
 }
 
-/// Writes a new file of mode 0600 and flushes it to the disk with its name; removes it if that
-/// fails.
+/// Writes a new file of mode 0600 and syncs it and its folder; deletes the file on failure.
 void write_new_file(const std::string& path, std::string_view text) {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnersAlone));
   if (!file.is_open()) {
-    fail_to("cannot make", path);
+    fail_to("cannot create", path);
   }
   const ssize_t written = ::write(file.number(), text.data(), text.size());
   if (written != static_cast<ssize_t>(text.size()) || ::fsync(file.number()) != 0) {
     ::unlink(path.c_str());
     fail_to("cannot write", path);
   }
-  static_cast<void>(::fsync(opened_folder_of(path).number()));  // not every file system does that
+  static_cast<void>(::fsync(opened_folder_of(path).number()));
 }
 
-/// Refuses a file or folder whose mode has one of the bits `refused`.
+/// Throws if the mode of the file or folder has one of the bits `refused`.
 void refuse_mode(const std::string& path, mode_t refused, std::string_view risk,
                  std::string_view remedy) {
   if (const mode_t mode = status_of(path).st_mode; (mode & refused) != 0) {
-    throw solver::InputError(
-        fmt::format("{} has mode {:04o}: {}, so it is not used. Mend it with: chmod {} '{}'", path,
-                    mode & 07777U, risk, remedy, path));
+    throw solver::InputError(fmt::format("{} has mode {:04o}: {}. To use it: chmod {} '{}'", path,
+                                         mode & 07777U, risk, remedy, path));
   }
 }
 
-/// Takes the secret key out of a key file's text and leaves zeros there: a parser leaves copies of
-/// its text in memory. Nothing unless a line begins with `secret = "KEY"`.
+/// Returns the secret key and overwrites it with zeros in `text`, because a parser leaves copies of
+/// its text in memory. Returns nothing unless a line begins with `secret = "KEY"`.
 std::optional<SecretKey> take_secret(std::string& text) {
   const std::size_t line = text.starts_with("secret") ? 0 : text.find("\nsecret");
   const std::size_t quote = text.find_first_of("\"'", line);
@@ -246,7 +241,7 @@ std::optional<SecretKey> take_secret(std::string& text) {
 std::string text_of(const AuthorizedKeys& keys) {
   std::string text =
       "# Keys that oblique-server admits. `oblique keys add` and `oblique keys revoke` write this\n"
-      "# file anew, without other comments; a running server heeds every change of it.\n";
+      "# file and drop other comments. A running server applies each change within a second.\n";
   for (const AuthorizedKey& key : keys.all()) {
     text +=
         fmt::format("\n[[key]]\nname = \"{}\"\nrole = \"{}\"\npublic = \"{}\"\nadded_at = \"{}\"\n",
@@ -262,7 +257,7 @@ KeyFile read_key_file(const std::string& path) {
   const bool is_ours = about.st_uid == ::geteuid();
   if (S_ISREG(about.st_mode)) {
     refuse_mode(path, is_ours ? S_IRWXG | S_IRWXO : S_IRWXO,
-                "others than its owner can use the secret key in it", is_ours ? "600" : "o=");
+                "others than its owner can read the secret key in it", is_ours ? "600" : "o=");
   }
   std::string text = read_small_file(path, "the key file", kMostBytes);
   const std::optional<SecretKey> secret = take_secret(text);
@@ -278,8 +273,8 @@ KeyFile read_key_file(const std::string& path) {
     fields.fail("secret", "must begin its line, as secret = \"KEY\"");
   }
   key.pair.secret_key = *secret;
-  if (public_half_of(*secret) != key.pair.public_key) {
-    fields.fail("secret", "is not the other half of `public`");
+  if (public_key_of(*secret) != key.pair.public_key) {
+    fields.fail("secret", "does not belong to `public`");
   }
   if (key.role != Role::kServer) {
     key.server = fields.key("server");
@@ -292,12 +287,13 @@ void write_key_file(const std::string& path, const KeyFile& key) {
     std::string text = {};
     ~Wiped() { sodium_memzero(text.data(), text.size()); }
   };
-  constexpr std::size_t kLongest = 1024;  // growing would leave parts of the secret key behind
+  // a growing string would leave copies of the secret key in memory
+  constexpr std::size_t kLongest = 1024;
   const Wiped secret{z85(key.pair.secret_key.bytes())};
   Wiped file;
   file.text.reserve(kLongest);
   file.text += fmt::format(
-      "# A key of oblique: whoever can read this file can pass for its owner.\n"
+      "# A key of oblique: anyone who can read this file can act as its owner.\n"
       "role = \"{}\"\nname = \"{}\"\npublic = \"{}\"\nsecret = \"",
       name_of(key.role), key.name, z85(key.pair.public_key));
   (file.text += secret.text) += "\"\n";
@@ -329,10 +325,10 @@ void AuthorizedKeys::add(AuthorizedKey key) {
     throw solver::InputError(fmt::format("the name of a key {}", kNameRule));
   }
   if (find(key.name) != nullptr) {
-    throw solver::InputError(fmt::format("there is a key called {} already", key.name));
+    throw solver::InputError(fmt::format("the list already has a key called {}", key.name));
   }
   if (const auto* same = find(key.public_key)) {
-    throw solver::InputError(fmt::format("the public key {} is there already, called {}",
+    throw solver::InputError(fmt::format("the list already has the public key {}, called {}",
                                          z85(key.public_key), same->name));
   }
   keys_.push_back(std::move(key));
@@ -346,12 +342,12 @@ void AuthorizedKeys::remove(std::string_view name) {
   for (const AuthorizedKey& key : keys_) {
     names.emplace_back(key.name);
   }
-  throw solver::InputError(fmt::format("there is no key called {}{}; there are: {}", excerpt(name),
-                                       did_you_mean(name, names), joined(names)));
+  throw solver::InputError(fmt::format("there is no key called {}{}; the list has: {}",
+                                       excerpt(name), did_you_mean(name, names), joined(names)));
 }
 
 AuthorizedKeys read_authorized_keys(const std::string& path) {
-  constexpr std::string_view kRisk = "everybody could add a key";
+  constexpr std::string_view kRisk = "every user could add a key";
   const std::string folder = std::filesystem::absolute(path).parent_path();
   refuse_mode(path, S_IWOTH, kRisk, "o-w");
   if ((status_of(folder).st_mode & S_ISVTX) == 0) {
@@ -372,7 +368,7 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
     const KeyFields entry(file, *node.as_table(), kEntryFields);
     AuthorizedKey key{entry.name(), entry.role(), entry.key("public"), entry.text("added_at")};
     if (key.role == Role::kServer) {
-      entry.fail("role", R"(must be "client", "worker" or "reader": a server is no peer)");
+      entry.fail("role", R"(must be "client", "worker" or "reader")");
     }
     file.located(node, [&] { keys.add(std::move(key)); });
   }
@@ -381,7 +377,7 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
 
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change) {
-  // Of a link the file that it leads to is replaced: another one may lead there too.
+  // Replaces the target of a symbolic link, because other links may point to it.
   const std::string target = std::filesystem::weakly_canonical(path);
   const Descriptor folder = opened_folder_of(target);
   if (::flock(folder.number(), LOCK_EX) != 0) {
@@ -411,7 +407,7 @@ std::string authorized_keys_in(const std::string& folder) {
   return (std::filesystem::path(folder) / "authorized_keys.toml").string();
 }
 
-std::string key_folder_meant(const std::string& named) {
+std::string find_key_folder(const std::string& named) {
   const auto has_keys = [](const std::string& folder) {
     return exists(key_file_in(folder, "server"));
   };
@@ -419,7 +415,7 @@ std::string key_folder_meant(const std::string& named) {
   const std::string& folder = named.empty() ? found : named;
   if (!has_keys(folder)) {
     throw solver::InputError(
-        fmt::format("there is no {}: name the folder of the server's keys with --dir DIR",
+        fmt::format("there is no {}: give the folder of the server's keys with --dir DIR",
                     key_file_in(folder, "server")));
   }
   return folder;
@@ -428,7 +424,7 @@ std::string key_folder_meant(const std::string& named) {
 CurveKey make_key_folder(const std::string& folder) {
   constexpr mode_t kFolderMode = 0700;
   if (::mkdir(folder.c_str(), kFolderMode) != 0 && errno != EEXIST) {
-    fail_to("cannot make the folder", folder);
+    fail_to("cannot create the folder", folder);
   }
   std::vector<std::string> paths{authorized_keys_in(folder)};
   for (const std::string_view role : kRoles) {
@@ -436,10 +432,10 @@ CurveKey make_key_folder(const std::string& folder) {
   }
   for (const std::string& path : paths) {
     if (exists(path)) {
-      throw std::runtime_error(path + " is there already, and is never overwritten");
+      throw std::runtime_error(path + " exists, and is never overwritten");
     }
   }
-  const KeyPair server = made_key_pair();
+  const KeyPair server = generate_key_pair();
   write_key_file(key_file_in(folder, "server"), {Role::kServer, "server", server});
   for (const Role role : {Role::kClient, Role::kWorker, Role::kReader}) {
     add_key(folder, std::string(name_of(role)), role, std::nullopt);
@@ -450,7 +446,7 @@ CurveKey make_key_folder(const std::string& folder) {
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key) {
   const KeyFile server = read_key_file(key_file_in(folder, "server"));
-  const KeyPair pair = public_key ? KeyPair{*public_key, {}} : made_key_pair();
+  const KeyPair pair = public_key ? KeyPair{*public_key, {}} : generate_key_pair();
   AuthorizedKey added{name, role, pair.public_key,
                       fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))};
   change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {

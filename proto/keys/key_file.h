@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-// Files with keys (TOML, README.md). Errors in a file are solver::InputError with file, line and
-// key, and never show a secret.
+// Key files (TOML; README.md describes them). Errors are solver::InputError with file, line and
+// key, and never contain a secret.
 namespace oblique::protocol {
 
 /// One half of a CURVE key pair (Curve25519): 32 bytes.
@@ -20,11 +20,11 @@ using CurveKey = std::array<std::uint8_t, 32>;
 /// Characters of a key in files and in ZeroMQ's options (Z85, rfc.zeromq.org 32).
 inline constexpr std::size_t kKeyCharacters = 40;
 
-/// A secret key in memory that is locked (within RLIMIT_MEMLOCK), left out of core dumps and wiped
-/// at the end. Copies share that memory.
+/// A secret key in memory that is locked (within RLIMIT_MEMLOCK), excluded from core dumps, and
+/// wiped by the destructor. Copies share the memory.
 class SecretKey {
  public:
-  /// All zero. Throws std::runtime_error when the system gives no such memory.
+  /// All zero. Throws std::runtime_error if the system refuses such memory.
   SecretKey();
 
   const CurveKey& bytes() const { return *bytes_; }
@@ -37,9 +37,9 @@ class SecretKey {
 
 enum class Role {
   kServer,
-  kClient,  ///< may read and change everything at the port for clients
-  kWorker,  ///< may solve at the port for workers
-  kReader,  ///< may read at the port for clients, and change nothing
+  kClient,  ///< may read and change everything at the clients' port
+  kWorker,  ///< may solve points at the workers' port
+  kReader,  ///< may only read at the clients' port
 };
 
 /// "server", "client", "worker" or "reader".
@@ -51,32 +51,31 @@ struct KeyPair {
   SecretKey secret_key{};
 };
 
-/// A new random pair.
-KeyPair made_key_pair();
-CurveKey public_half_of(const SecretKey& secret_key);
+KeyPair generate_key_pair();
+CurveKey public_key_of(const SecretKey& secret_key);
 
-/// A key as 40 printable characters, none of which is a quote, a backslash or a space.
+/// Formats a key as 40 printable characters without quotes, backslashes or spaces.
 std::string z85(const CurveKey& key);
-/// None for a text that is no key.
-std::optional<CurveKey> key_of_z85(std::string_view text);
+/// Nothing for a text that is not a key.
+std::optional<CurveKey> parse_z85(std::string_view text);
 
 /// The content of the key file of a program.
 struct KeyFile {
   Role role = Role::kClient;
   std::string name;  ///< of the key, for people
   KeyPair pair;
-  std::optional<CurveKey> server = {};  ///< the server's public key; every role but the server's
-  std::string path = {};                ///< of the file that it was read from
+  /// the server's public key; absent in the server's own file
+  std::optional<CurveKey> server = {};
+  std::string path = {};  ///< file that it was read from
 };
 
-/// Throws solver::InputError unless the file is complete and private (README.md).
+/// Throws solver::InputError if the file is incomplete or readable by others (README.md).
 KeyFile read_key_file(const std::string& path);
 
-/// Writes a new file of mode 0600 and flushes it to the disk. Throws std::runtime_error, also when
-/// the file exists: it is never overwritten.
+/// Writes a new file of mode 0600 and syncs it. Throws std::runtime_error, also if the file exists.
 void write_key_file(const std::string& path, const KeyFile& key);
 
-/// Whether a key, and its file, can have this name.
+/// Whether the name is allowed for a key and its file.
 bool is_key_name(std::string_view name);
 
 /// A key that the server admits.
@@ -87,16 +86,16 @@ struct AuthorizedKey {
   std::string added_at;  ///< UTC, ISO 8601
 };
 
-/// The keys that a server admits. Names and keys are unique.
+/// The list of keys that a server admits. Names and keys are unique.
 class AuthorizedKeys {
  public:
-  /// Null for a key that is not admitted.
+  /// Null if the key is not in the list.
   const AuthorizedKey* find(const CurveKey& public_key) const;
   const AuthorizedKey* find(std::string_view name) const;
   /// In the order of the file.
   const std::vector<AuthorizedKey>& all() const { return keys_; }
 
-  /// Throws solver::InputError when the name or the key exists or the name is not allowed.
+  /// Throws solver::InputError if the name or key is in the list, or the name is not allowed.
   void add(AuthorizedKey key);
   /// Throws solver::InputError for an unknown name.
   void remove(std::string_view name);
@@ -105,32 +104,33 @@ class AuthorizedKeys {
   std::vector<AuthorizedKey> keys_;
 };
 
-/// Reads a list; an empty file is an empty list. Throws solver::InputError when any part of it is
-/// wrong, or when everybody may write it.
+/// Reads the list; an empty file is an empty list. Throws solver::InputError for a fault in the
+/// file, and if every user may write it.
 AuthorizedKeys read_authorized_keys(const std::string& path);
 
-/// Reads the list, calls `change` and replaces the file in one step, while no other process does
-/// the same. Creates a missing file. Throws as `read_authorized_keys` and `change`, and
-/// std::runtime_error when it cannot be written; then nothing has changed.
+/// Reads the list, calls `change` and atomically replaces the file, under a lock. Creates a missing
+/// file. Throws as `read_authorized_keys` and `change` do, and std::runtime_error if the file
+/// cannot be written; the file is then unchanged.
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change);
 
-// Paths of the files in a folder with the keys of a server.
+// Paths of files in a server's key folder.
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
 
-/// `named` or, if that is empty, the current folder or the `keys` in it. Throws solver::InputError
-/// for a folder without a server's key.
-std::string key_folder_meant(const std::string& named);
+/// Returns `named` or, if it is empty, the current folder or its subfolder `keys`. Throws
+/// solver::InputError if the folder has no server key.
+std::string find_key_folder(const std::string& named);
 
-/// Makes server.key, client.key, worker.key, reader.key and the list with the last three, and a
-/// missing folder with mode 0700. Returns the server's public key. Throws std::runtime_error when
-/// one of them exists, before it makes any, or cannot be made.
+/// Creates server.key, client.key, worker.key, reader.key and the list with the last three; creates
+/// a missing folder with mode 0700. Returns the server's public key. Throws std::runtime_error if a
+/// file exists (then creates none) or cannot be created.
 CurveKey make_key_folder(const std::string& folder);
 
-/// Lists `public_key`, or the key of a new pair, which is written to NAME.key first. Throws
-/// solver::InputError when name or key are listed already or the server's key cannot be read, and
-/// std::runtime_error when a file cannot be written or exists; then nothing is listed.
+/// Adds `public_key` to the list. Without one, creates a key pair, writes it to NAME.key and adds
+/// its public key. Throws solver::InputError if the name or key is in the list or the server's key
+/// cannot be read, and std::runtime_error if a file exists or cannot be written; the list is then
+/// unchanged.
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key);
 

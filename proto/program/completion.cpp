@@ -11,20 +11,20 @@
 namespace oblique::protocol {
 namespace {
 
-// NAME stands for the program, CASES for the words that are offered. A key of CASES is a verb, or a
-// verb and a flag that takes a value.
+// NAME is replaced by the name of the program and CASES by the words to offer. A key of CASES is a
+// command, or a command and a flag that takes a value.
 constexpr std::string_view kBothShells = R"(_NAME_offers() {
   case $1 in
 CASES    *) return 1 ;;
   esac
 }
-# Sets `verb` to the verb in the words.
-_NAME_verb() {
+# Sets `command` to the command in the words.
+_NAME_command() {
   local each
-  verb=''
+  command=''
   for each; do
-    if [[ $each != -* ]] && _NAME_offers "${verb:+$verb }$each"; then
-      verb=${verb:+$verb }$each
+    if [[ $each != -* ]] && _NAME_offers "${command:+$command }$each"; then
+      command=${command:+$command }$each
     fi
   done
 }
@@ -33,12 +33,12 @@ _NAME_verb() {
 constexpr std::string_view kBash =
     R"(# Completion of bash for NAME, as `NAME completion bash` prints it.
 BOTH_SHELLS_NAME() {
-  local word=${2-} verb before=${COMP_WORDS[COMP_CWORD - 1]} offers=()
-  _NAME_verb "${COMP_WORDS[@]:1:COMP_CWORD-1}"
+  local word=${2-} command before=${COMP_WORDS[COMP_CWORD - 1]} offers=()
+  _NAME_command "${COMP_WORDS[@]:1:COMP_CWORD-1}"
   # bash makes three words of --flag=value.
   [[ $before != '=' ]] || before=${COMP_WORDS[COMP_CWORD - 2]}
-  if [[ $before != --* ]] || ! _NAME_offers "${verb:+$verb }$before"; then
-    _NAME_offers "$verb"
+  if [[ $before != --* ]] || ! _NAME_offers "${command:+$command }$before"; then
+    _NAME_offers "$command"
     [[ $word == -* ]] || offers=("${offers[@]/#-*/}")
   fi
   # The last item of a list, or the last name of an expression.
@@ -51,18 +51,18 @@ complete -o default -F _NAME NAME
 constexpr std::string_view kZsh = R"(#compdef NAME
 # Completion of zsh for NAME, as `NAME completion zsh` prints it.
 BOTH_SHELLS_NAME() {
-  local verb before=$words[CURRENT-1]
+  local command before=$words[CURRENT-1]
   local -a offers
-  _NAME_verb "${(@)words[2,CURRENT-1]}"
+  _NAME_command "${(@)words[2,CURRENT-1]}"
   if [[ $PREFIX == --*=* ]]; then
     before=${PREFIX%%=*}
     compset -P '--*='
   fi
-  if [[ $before == --* ]] && _NAME_offers "${verb:+$verb }$before"; then
+  if [[ $before == --* ]] && _NAME_offers "${command:+$command }$before"; then
     # The last item of a list, or the last name of an expression.
     compset -P '*[ ,(]'
   else
-    _NAME_offers "$verb"
+    _NAME_offers "$command"
     if [[ $PREFIX == -* ]]; then
       offers=(${(M)offers:#-*})
     else
@@ -89,11 +89,10 @@ std::string quoted(const std::string& text) {
   return "'" + replaced(text, "'", R"('\'')") + "'";
 }
 
-/// The name of a check that is never active and that help does not show: CLI11 keeps no other notes
-/// with options.
+/// Name of a check that is never active and that help does not show. CLI11 has no other place for
+/// notes about an option.
 constexpr const char* kChoices = "choices";
 
-/// The words that complete a value, each in quotes and after a space.
 std::string values_of(CLI::Option& option, const ValueWords& words) {
   std::vector<std::string> values;
   for (const std::string& key : {option.get_name(), option.get_type_name()}) {
@@ -105,7 +104,7 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
     // The description of an inactive check is empty.
     values = CLI::detail::split(option.get_validator(kChoices)->active().get_description(), ' ');
     option.get_validator(kChoices)->active(false);
-  } catch (const CLI::OptionNotFound&) {  // no choices are noted
+  } catch (const CLI::OptionNotFound&) {  // the option has no choices
   }
   std::string offers;
   for (const std::string& value : values) {
@@ -114,19 +113,19 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
   return offers;
 }
 
-/// The cases of a verb, which is reached by the words `path`, and of its verbs.
-std::string cases_of(CLI::App& verb, const std::string& path, const ValueWords& words) {
+/// The cases of a command and its subcommands. `path` contains the words that lead to it.
+std::string cases_of(CLI::App& command, const std::string& path, const ValueWords& words) {
   std::string cases;
   std::string offers;
   const auto add_case = [&cases](const std::string& key, const std::string& values) {
     cases += "    " + quoted(key) + ") offers=(" + values + ") ;;\n";
   };
   const std::string before = path.empty() ? "" : path + ' ';
-  for (auto* each : verb.get_subcommands({})) {
+  for (auto* each : command.get_subcommands({})) {
     offers += ' ' + quoted(each->get_name());
     cases += cases_of(*each, before + each->get_name(), words);
   }
-  for (auto* option : verb.get_options()) {
+  for (auto* option : command.get_options()) {
     if (option->get_group().empty() || option->get_group() == kUnlisted) {
       continue;
     }
@@ -157,7 +156,7 @@ std::optional<int> print_completion(CLI::App& app, int argc, const char* const* 
   }
   const std::string_view shell = argc == 3 ? argv[2] : "";
   if (shell != "bash" && shell != "zsh") {
-    return tell_wrong_usage(app.get_name(), "write `completion bash` or `completion zsh`");
+    return report_wrong_usage(app.get_name(), "write `completion bash` or `completion zsh`");
   }
   const std::string script =
       replaced(std::string(shell == "zsh" ? kZsh : kBash), "BOTH_SHELLS", kBothShells);

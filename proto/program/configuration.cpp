@@ -27,27 +27,27 @@ namespace {
 constexpr std::array<std::string_view, 4> kLevels{"debug", "info", "warning", "error"};
 constexpr std::array<std::string_view, 2> kFormats{"text", "json"};
 
-/// Empty also for a variable that is set to nothing: containers and units set what they leave out.
+/// Returns the value of a variable; empty if it is not set. Containers and units set variables to
+/// empty texts to omit them.
 std::string variable(const std::string& name) {
   const char* const value = name.empty() ? nullptr : std::getenv(name.c_str());
   return value == nullptr ? "" : value;
 }
 
-/// "--worker-port" as a key: "worker_port".
+/// Turns "--worker-port" into the key "worker_port".
 std::string key_of(const CLI::Option& option) {
   std::string key = option.get_name().substr(2);
   std::replace(key.begin(), key.end(), '-', '_');
   return key;
 }
 
-/// Gives an option its values from a weaker place than the command line. Throws CLI::ParseError.
 void set(CLI::Option& option, const std::vector<std::string>& values) {
   option.clear();
   option.add_result(values);
   option.run_callback();
 }
 
-/// The values of a key as they would be typed.
+/// The values of a key as they would be typed on the command line.
 std::vector<std::string> typed_values(const TomlReader& file, std::string_view key,
                                       const toml::node& node) {
   std::vector<std::string> values;
@@ -71,14 +71,13 @@ std::vector<std::string> typed_values(const TomlReader& file, std::string_view k
   return values;
 }
 
-/// A value as TOML. Text in quotes is right for all options.
 std::string toml_value(const std::string& value) {
   static const std::regex kWithoutQuotes(R"(true|false|(0|[1-9]\d{0,17})(\.\d+)?)");
   return std::regex_match(value, kWithoutQuotes) ? value : toml_string(value);
 }
 
-/// The folder of settings of this installation: /etc/oblique of programs in /usr/bin,
-/// PREFIX/etc/oblique of those in PREFIX/bin.
+/// The configuration folder of this installation: /etc/oblique for programs in /usr/bin,
+/// PREFIX/etc/oblique for those in PREFIX/bin.
 std::filesystem::path configuration_folder() {
   std::error_code unknown;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
@@ -92,13 +91,14 @@ Configuration::Configuration(CLI::App& app, std::string prefix, const std::strin
     : app_(app), prefix_(std::move(prefix)), default_file_(configuration_folder() / name) {
   auto* file = app.add_option("--config", file_,
                               fmt::format("TOML file with settings; without this, the environment "
-                                          "variable {}CONFIG, or else {} when it exists",
+                                          "variable {}CONFIG, or else {} if it exists",
                                           prefix_, default_file_));
   file->type_name("FILE")->default_str("")->configurable(false);
   app.add_flag("--no-config", without_places_, "Use neither a file nor environment variables")
       ->configurable(false)
       ->excludes(file);
-  app.add_flag("--print-config", print_, "Print the effective settings as such a file, and exit")
+  app.add_flag("--print-config", print_,
+               "Print the effective settings as a configuration file, and exit")
       ->configurable(false);
 }
 
@@ -110,7 +110,7 @@ void Configuration::add_log_options(LogSettings& settings) {
     return note_choices(option->check(CLI::IsMember(names).description("")), choices);
   };
   auto* level = add("--log-level", settings.level, kLevels,
-                    "Lines of this level and above: debug, info, warning, error");
+                    "Lowest level that is logged: debug, info, warning or error");
   level->type_name("LEVEL");
   add("--log-format", settings.format, kFormats,
       "text, or json: one object a line with time, level, program and message")
@@ -124,7 +124,7 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
   for (CLI::Option* option : app_.get_options()) {
     if (option->get_configurable()) {
       settings_.push_back({option, key_of(*option), option->get_envname()});
-      option->envname("");  // CLI11 would give it precedence over the program's own variable
+      option->envname("");  // CLI11 would prefer it to the program's own variable
     }
   }
   app_.footer(fmt::format(
@@ -145,13 +145,12 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
     }
     return std::nullopt;
   } catch (const solver::InputError& error) {
-    return tell_wrong_usage(app_.get_name(), error.what());
+    return report_wrong_usage(app_.get_name(), error.what());
   } catch (const CLI::ParseError& error) {
-    return tell_wrong_usage(app_.get_name(), place + objection_of(app_, app_, error));
+    return report_wrong_usage(app_.get_name(), place + parse_error_message(app_, app_, error));
   }
 }
 
-/// The file to read; empty: none.
 std::string Configuration::file_to_read() const {
   const std::string path = file_.empty() ? variable(prefix_ + "CONFIG") : file_;
   std::error_code unknown;

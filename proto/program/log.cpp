@@ -23,7 +23,6 @@ namespace {
 
 enum class Form { kText, kJournal, kJson };
 
-/// The message of a line in the form of the log.
 class Message : public spdlog::custom_flag_formatter {
  public:
   explicit Message(Form form) : form_(form) {}
@@ -31,8 +30,7 @@ class Message : public spdlog::custom_flag_formatter {
   void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
               spdlog::memory_buf_t& line) override {
     const std::string text(message.payload.data(), message.payload.size());
-    // Of JSON, bytes that are no UTF-8 become U+FFFD, and all beyond ASCII is escaped, so that a
-    // line is one line for every reader.
+    // In JSON, bytes that are not UTF-8 become U+FFFD, and other characters than ASCII are escaped.
     const std::string shown =
         form_ == Form::kJson
             ? nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)
@@ -56,8 +54,8 @@ class Message : public spdlog::custom_flag_formatter {
   Form form_;
 };
 
-/// The variable JOURNAL_STREAM names the file that systemd made standard error. Programs inherit it
-/// also when their standard error was redirected since.
+/// JOURNAL_STREAM names the file that systemd opened as standard error. Programs inherit the
+/// variable even if their standard error was redirected, so the file is compared.
 bool journal_reads_standard_error() {
   const char* const stream = std::getenv("JOURNAL_STREAM");
   struct stat file {};

@@ -32,7 +32,6 @@ void check_call(bool is_done, const char* what) {
   }
 }
 
-/// Empty for a variable that is not set.
 std::string environment_value(const char* name) {
   const char* const value = std::getenv(name);
   return value == nullptr ? "" : value;
@@ -84,7 +83,7 @@ void survive_failed_writes() {
 
 void add_stop_with_parent(CLI::App& app, pid_t& parent) {
   app.add_option("--stop-with-parent", parent,
-                 "Stop when the parent process, which has this id, is gone")
+                 "Stop when the parent process, which has this ID, has ended")
       ->check(CLI::Range(pid_t{1}, std::numeric_limits<pid_t>::max()).description(""))
       ->type_name("PID")
       ->default_str("")
@@ -96,7 +95,7 @@ bool stop_with_parent(pid_t parent) {
     return true;
   }
   check_call(prctl(PR_SET_PDEATHSIG, SIGTERM) == 0, "cannot watch the parent process");
-  return getppid() == parent;  // the system does not report one that has ended already
+  return getppid() == parent;  // no signal follows if the parent ended before
 }
 
 Notifier::Notifier()
@@ -120,7 +119,7 @@ void Notifier::stopping(const std::string& sentence, std::chrono::milliseconds l
        "\nEXTEND_TIMEOUT_USEC=" + std::to_string(std::chrono::microseconds(longest).count()));
 }
 
-void Notifier::turn(Clock::time_point now) {
+void Notifier::feed_watchdog(Clock::time_point now) {
   if (heartbeat_.count() > 0 && now >= next_heartbeat_) {
     next_heartbeat_ = now + heartbeat_;
     send("WATCHDOG=1");

@@ -13,17 +13,17 @@
 namespace oblique::protocol {
 namespace {
 
-std::string objection_to_empty(const std::string& value) {
+std::string empty_value_error(const std::string& value) {
   return value.empty() ? "the value is empty" : "";
 }
 
-/// Names of the verbs of a verb or the program, and of its flags.
-std::vector<std::string> known_words(const CLI::App& verb) {
+/// Names of the flags and subcommands of `command`.
+std::vector<std::string> known_words(const CLI::App& command) {
   std::vector<std::string> words;
-  for (const auto* each : verb.get_subcommands([](const CLI::App*) { return true; })) {
+  for (const auto* each : command.get_subcommands([](const CLI::App*) { return true; })) {
     words.push_back(each->get_name());
   }
-  for (const auto* option : verb.get_options()) {
+  for (const auto* option : command.get_options()) {
     for (const auto& name : option->get_lnames()) {
       words.push_back("--" + name);
     }
@@ -35,13 +35,13 @@ std::vector<std::string> known_words(const CLI::App& verb) {
 
 void refuse_empty_values(CLI::App& app) {
   for (auto* option : app.get_options()) {
-    // An option that may stand without a value has none then.
+    // The value of an option may be optional.
     if (option->get_items_expected_min() > 0) {
-      option->check(objection_to_empty);
+      option->check(empty_value_error);
     }
   }
-  for (auto* verb : app.get_subcommands({})) {
-    refuse_empty_values(*verb);
+  for (auto* command : app.get_subcommands({})) {
+    refuse_empty_values(*command);
   }
 }
 
@@ -71,30 +71,32 @@ CLI::Validator whole_number_from(std::int64_t least) {
       "");
 }
 
-std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error) {
-  const auto words = known_words(verb);
+std::string parse_error_message(const CLI::App& app, const CLI::App& command,
+                                const CLI::ParseError& error) {
+  const auto words = known_words(command);
   const std::vector<std::string_view> candidates(words.begin(), words.end());
-  std::vector<std::string_view> verbs;
-  std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(verbs),
+  std::vector<std::string_view> commands;
+  std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(commands),
                [](std::string_view word) { return !word.starts_with("-"); });
-  // An unexpected word is more helpful than the missing verb or flag that it may be a slip of.
+  // Report an unknown word rather than the missing command or flag for which it may be a slip.
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
-    const bool is_verb = !verbs.empty() && !first.starts_with("-");
-    return std::string(is_verb ? "unknown command" : "unexpected") + " `" + excerpt(first) + "`" +
-           did_you_mean(first.substr(0, first.find('=')), candidates);
+    const bool is_command = !commands.empty() && !first.starts_with("-");
+    return std::string(is_command ? "unknown command" : "unexpected") + " `" + excerpt(first) +
+           "`" + did_you_mean(first.substr(0, first.find('=')), candidates);
   }
-  if (!verbs.empty() && verb.get_subcommands().empty() && error.get_name() == "RequiredError") {
-    return "a command is required; there are " + joined(verbs);
+  if (!commands.empty() && command.get_subcommands().empty() &&
+      error.get_name() == "RequiredError") {
+    return "a command is missing; the commands are " + joined(commands);
   }
   const std::string message = error.what();
   if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {
-    return message.substr(0, at) + " is given more than once: give it once";
+    return message.substr(0, at) + " was given more than once: give it once";
   }
   return message;
 }
 
-int tell_wrong_usage(const std::string& words, const std::string& message) {
+int report_wrong_usage(const std::string& words, const std::string& message) {
   std::cerr << words << ": " << visible_lines(message) << "\nTry `" << words << " --help`.\n";
   return kWrongUsage;
 }
@@ -108,7 +110,7 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       return app.exit(error, std::cout, std::cerr);
     }
-    return tell_wrong_usage(app.get_name(), objection_of(app, app, error));
+    return report_wrong_usage(app.get_name(), parse_error_message(app, app, error));
   }
 }
 

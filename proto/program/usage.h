@@ -12,49 +12,49 @@
 
 namespace oblique::protocol {
 
-// What the command lines of our programs share.
+// What the command lines of the three programs share.
 
 // Exit codes.
 inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kWrongUsage = 2;
 
-/// Makes an empty value of any option or argument of `app` and its verbs wrong usage: it may come
-/// from a shell variable that is not set. Call it after all options are added.
+/// Makes an empty value of any option or argument of `app` and its commands wrong usage: it may
+/// come from an unset shell variable. Call it after all options were added.
 void refuse_empty_values(CLI::App& app);
 
-/// A check for numbers from `least` to `largest`; NaN is refused.
+/// A check for numbers from `least` to `largest`; refuses NaN.
 CLI::Validator number_between(double least, double largest);
 
-/// A check for whole numbers of 64 bits that are at least `least`.
+/// A check for 64-bit whole numbers of at least `least`.
 CLI::Validator whole_number_from(std::int64_t least);
 
-/// Group of options that neither help nor completion lists.
+/// Group of options that help and completion omit.
 inline constexpr const char* kUnlisted = "Unlisted";
 
-/// Notes the values that an option may have, for completion; the reader of the value checks it.
-/// Returns `option`.
+/// Notes the allowed values of an option, for completion only. Returns `option`.
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
 
-/// The sentence for an error of the command line. An unexpected word gets the nearest name that
-/// `verb` (of `app`, or `app` itself) has.
-std::string objection_of(const CLI::App& app, const CLI::App& verb, const CLI::ParseError& error);
+/// The message for a command-line error. For an unknown word it suggests the nearest name of
+/// `command`, which is `app` or a command of it.
+std::string parse_error_message(const CLI::App& app, const CLI::App& command,
+                                const CLI::ParseError& error);
 
-/// Prints the message on standard error, as "oblique-server: ...", with the command for help.
-/// `words` are program and verb as typed. Returns kWrongUsage.
-int tell_wrong_usage(const std::string& words, const std::string& message);
+/// Prints "WORDS: MESSAGE" and how to get help to standard error. `words` are the program and
+/// command as typed. Returns kWrongUsage.
+int report_wrong_usage(const std::string& words, const std::string& message);
 
-/// Parses the command line of a program without verbs. Returns the exit code when the program is to
-/// end: 0 after --help and --version, kWrongUsage after an error, which it has printed.
+/// Parses the command line of a program without commands. Returns the exit code if the program must
+/// end: 0 after --help and --version, kWrongUsage after printing an error.
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv);
 
-/// Words that complete a value, by the name of its option ("--x") or of its type ("COLUMNS").
+/// Words that complete a value, by name of the option ("--x") or of its value type ("COLUMNS").
 using ValueWords = std::map<std::string, std::vector<std::string>>;
 
-/// Prints the completion script of `app` when the command line is `PROGRAM completion bash|zsh`,
-/// and returns the exit code. The script is static: it holds verbs, flags, the choices of flags
-/// (`note_choices`) and `words`, and offers file names for all other values. `app` must have all
-/// its verbs and options.
+/// If the command line is `PROGRAM completion bash|zsh`, prints the completion script of `app` and
+/// returns the exit code. The script is static: it contains commands, flags, choices
+/// (`note_choices`) and `words`, and offers file names for all other values. Call it after all
+/// commands and options were added.
 std::optional<int> print_completion(CLI::App& app, int argc, const char* const* argv,
                                     const ValueWords& words = {});
 

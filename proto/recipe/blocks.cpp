@@ -42,7 +42,6 @@ ParameterKey length_key() {
           }};
 }
 
-/// Every key, by its number.
 const std::vector<ParameterKey>& all_keys() {
   static const auto keys = []<std::size_t... links>(std::index_sequence<links...>) {
     const auto model = solver::model_keys();
@@ -193,11 +192,10 @@ std::span<const Axis* const> point_axes(const Block& block) {
   return {block.axes().data() + block.axes_size() - kPointKeyOrder.size(), kPointKeyOrder.size()};
 }
 
-void check_points(std::uint64_t points) {
+void check_point_count(std::uint64_t points) {
   if (points > kMaxPoints) {
     throw InputError(
-        fmt::format("the study has more than {} points, the most that are allowed: shorten an axis",
-                    kMaxPoints));
+        fmt::format("the study has more than {} points, the maximum: shorten an axis", kMaxPoints));
   }
 }
 
@@ -212,7 +210,7 @@ std::uint64_t points_of_block(const Block& block) {
       points = size > kMaxPoints / points ? kMaxPoints + 1 : points * size;
     }
   }
-  check_points(points);
+  check_point_count(points);
   return points;
 }
 
@@ -238,7 +236,7 @@ bool is_drawn(const Axis& axis) {
 }
 
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block) {
-  for (const bool are_single : {false, true}) {  // `links` and `length` first
+  for (const bool are_single : {false, true}) {  // `links` and `length` come first
     for (const Axis* axis : model_axes(block)) {
       const std::size_t number = key_number(axis->key());
       if (axis->expression().empty() && link_of_key(number).has_value() == are_single) {
@@ -287,9 +285,9 @@ void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   std::vector<double> values(axis.values().begin(), axis.values().end());
   std::sort(values.begin(), values.end());
   const auto twice = std::adjacent_find(values.begin(), values.end());
-  // In a zip a measured value may occur twice.
+  // In a zip, for example of measurements, a value may occur twice.
   require(twice == values.end() || kind == BlockKind::kZip,
-          "{} has {} twice: every value of a list must differ", key.name,
+          "{} has {} twice: the values of a list must differ", key.name,
           twice == values.end() ? 0.0 : *twice);
 }
 
@@ -299,32 +297,31 @@ bool takes_whole_numbers(const ParameterKey& key, double from, double to) {
 }
 
 void check_positive(const ParameterKey& key, double from) {
-  require(from > 0.0, "{} from {} is not allowed: the logarithm needs ends above 0", key.name,
-          from);
+  require(from > 0.0, "{} from {} is not allowed: logarithmic ends must be > 0", key.name, from);
 }
 
 void check_range(const ParameterKey& key, const Axis& axis) {
   check_ends(key, axis.from(), axis.to());
   require(axis.count() > 1 || axis.from() == axis.to(),
-          "{}: count = 1 is not allowed with two different ends, {} and {}: a range holds both "
-          "ends; give 2 or more, or the value alone",
+          "{}: count = 1 is not allowed with different ends {} and {}: a range contains both "
+          "ends; give count >= 2, or a single value",
           key.name, axis.from(), axis.to());
   require(axis.count() == 1 || axis.from() != axis.to(),
-          "{}: count = {} is not allowed with equal ends, {}: every value would be the same; give "
-          "the value alone",
+          "{}: count = {} is not allowed with equal ends {}: all values would be the same; give "
+          "a single value",
           key.name, axis.count(), axis.from());
   const RangeValues values(axis);
   if (axis.spacing() == SPACING_LOGARITHMIC) {
     check_positive(key, axis.from());
-    // Few sequences of whole numbers have equal ratios, so this soon finds a value that is not
-    // allowed.
+    // Few sequences of whole numbers have a constant ratio, so the loop soon finds a value that is
+    // not allowed.
     const bool takes_whole = takes_whole_numbers(key, axis.from(), axis.to());
     for (std::uint64_t i = 0; takes_whole && i < axis.count(); ++i) {
       solver::check_value(key, values.at(i));
     }
     return;
   }
-  // A key takes an interval or its whole numbers. If the second value is whole, all are.
+  // A key allows an interval or its whole numbers. If the second value is allowed, all are.
   solver::check_value(key, values.at(std::min<std::uint64_t>(1, axis.count() - 1)));
 }
 
@@ -333,11 +330,11 @@ void check_distribution_end(const ParameterKey& key, std::string_view name, bool
   if (is_given) {
     solver::check_value(key, given);
   } else {
-    require(
-        key.is_allowed(std::copysign(std::numeric_limits<double>::max(), bound)),
-        "{}: a normal distribution without `{}` has values that are not allowed, for {} must be "
-        "{}: cut it off with `{}`",
-        key.name, name, key.name, key.allowed, name);
+    require(key.is_allowed(std::copysign(std::numeric_limits<double>::max(), bound)),
+            "{}: a normal distribution without `{}` has values that are not allowed, because {} "
+            "must be "
+            "{}: truncate it with `{}`",
+            key.name, name, key.name, key.allowed, name);
   }
 }
 
@@ -347,17 +344,15 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   require(DistributionKind_IsValid(drawn.kind()), "{}: the kind of its distribution is unknown",
           key.name);
   require(is_normal || (drawn.has_from() && drawn.has_to()),
-          "{}: `{}` is missing: a uniform distribution has two ends", key.name,
+          "{}: `{}` is missing: a uniform distribution needs both ends", key.name,
           drawn.has_from() ? "to" : "from");
   const double from = smallest_value(axis);
   const double to = largest_value(axis);
   check_distribution_end(key, "from", drawn.has_from(), drawn.from(), from);
   check_distribution_end(key, "to", drawn.has_to(), drawn.to(), to);
-  require(
-      from < to,
-      "{} from {} to {}: a distribution must rise; swap `from` and `to`, or give a single value "
-      "alone",
-      key.name, from, to);
+  require(from < to,
+          "{} from {} to {}: `from` must be below `to`; swap them, or give a single value",
+          key.name, from, to);
   require(!takes_whole_numbers(key, from, to), "{} must be {}: list the values to draw from",
           key.name, key.allowed);
   if (drawn.kind() == DISTRIBUTION_LOG_UNIFORM) {
@@ -369,12 +364,12 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
     require(std::isfinite(drawn.sd()) && drawn.sd() > 0.0,
             "{}: sd = {} is not allowed: sd must be > 0", key.name, drawn.sd());
     require(std::isnormal(sampling::Quantiles(axis).part_left()),
-            "{}: from {} to {} nothing is left of a normal distribution of mean {} and sd {}",
+            "{0}: a normal distribution of mean {3} and sd {4} has no values from {1} to {2}",
             key.name, from, to, drawn.mean(), drawn.sd());
   }
 }
 
-/// Checks that the axis has one kind of values, and these.
+/// Checks that the axis has one kind of values, and checks these.
 void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   const std::array kinds{!axis.values().empty(), axis.count() > 0, axis.has_distribution(),
                          !axis.expression().empty()};
@@ -395,12 +390,12 @@ void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   }
 }
 
-/// Checks each axis alone, and that a block has each key once, and H, mu and e last.
+/// Checks each axis, and that the block has each key once, with H, mu and e at the end.
 void check_axes(const Block& block) {
   std::bitset<128> keys;
   for (const Axis& axis : block.axes()) {
     const std::size_t number = key_number(axis.key());
-    require(!keys.test(number), "{} appears twice: an axis is given once in a block", axis.key());
+    require(!keys.test(number), "{} appears twice: a block has each axis once", axis.key());
     keys.set(number);
     check_values(key_numbered(number), axis, block_kind(block));
   }
@@ -421,7 +416,7 @@ void check_single_lengths(const solver::ModelParameters& model, const Block& blo
   for (const Axis* axis : model_axes(block)) {
     const auto link = link_of_key(key_number(axis->key()));
     require(!link || *link < links,
-            "{} is not allowed: it is the length of link {}, and the model has {} of them",
+            "{} is not allowed: it is the length of link {}, and the model has {} links",
             axis->key(), link.value_or(0) + 1, links);
   }
 }
@@ -430,10 +425,11 @@ void check_zip(const Block& block) {
   const std::uint64_t points = points_of_block(block);
   for (const Axis& axis : block.axes()) {
     const std::uint64_t size = axis_size(axis);
-    require(size == 1 || size == points,
-            "{} has {} values and another axis {}: axes side by side have as many each, or one "
-            "value",
-            axis.key(), size, points);
+    require(
+        size == 1 || size == points,
+        "{} has {} values and another axis {}: with `zip` all axes have the same number, or one "
+        "value",
+        axis.key(), size, points);
   }
 }
 
@@ -449,9 +445,10 @@ void check_sample(const Block& block) {
   require(sample.count() > 0, "{}: count = 0 is not allowed: count must be at least 1", kKey);
   const auto drawn = std::count_if(block.axes().begin(), block.axes().end(), is_drawn);
   require(drawn > 0,
-          "{}: there is nothing to draw, for every axis has one value: give one from and to", kKey);
+          "{}: there is nothing to draw because every axis has one value: give one `from` and `to`",
+          kKey);
   require(sample.kind() != SAMPLE_SOBOL || drawn <= sampling::kSobolDimensions,
-          "{}: {} axes are drawn, and Sobol's sequence has {} dimensions: take lhs or random", kKey,
+          "{}: {} axes are drawn, and Sobol's sequence has {} dimensions: use lhs or random", kKey,
           drawn, sampling::kSobolDimensions);
 }
 
@@ -465,7 +462,7 @@ void check_reach(const solver::ModelParameters& model, const Block& block) {
 
 }  // namespace
 
-bool is_judged_by_points(const solver::ModelParameters& model, const Block& block) {
+bool needs_point_validation(const solver::ModelParameters& model, const Block& block) {
   const bool has_expressions = std::any_of(block.axes().begin(), block.axes().end(),
                                            [](const Axis& a) { return !a.expression().empty(); });
   if (has_expressions || !block.where().empty()) {
@@ -478,7 +475,7 @@ bool is_judged_by_points(const solver::ModelParameters& model, const Block& bloc
     check_reach(model, block);
     return false;
   } catch (const InputError&) {
-    return true;  // the point with the largest H may not be that with the shortest finger
+    return true;  // the point with the largest H may have a longer finger than the shortest one
   }
 }
 
@@ -490,7 +487,7 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
     check_zip(block);
   }
   check_single_lengths(model, block);
-  if (!is_judged_by_points(model, block)) {
+  if (!needs_point_validation(model, block)) {
     check_reach(model, block);
   }
 }
@@ -498,8 +495,7 @@ void check_block(const solver::ModelParameters& model, const Block& block) {
 void check_ends(const ParameterKey& key, double from, double to) {
   solver::check_value(key, from);
   solver::check_value(key, to);
-  require(from <= to, "{} from {} to {} is reversed: a range must rise; swap `from` and `to`",
-          key.name, from, to);
+  require(from <= to, "{} from {} to {} is reversed: swap `from` and `to`", key.name, from, to);
 }
 
 }  // namespace oblique::protocol

@@ -14,12 +14,12 @@
 
 namespace oblique::protocol {
 
-/// Most links of a model.
+/// Maximum number of links of a model.
 inline constexpr std::size_t kMostLinks = 64;
 
-/// The number of a key: those of a model in the order of listings, then the single lengths
-/// `length1`, `length2`, ..., then H, mu and e. Throws InputError for an unknown key, with the
-/// nearest and the list of all.
+/// Number of a key: first the keys of a model in the order of listings, then `length1`, `length2`,
+/// ..., then H, mu and e. Throws InputError for an unknown key, with the nearest one and a list of
+/// all.
 std::size_t key_number(std::string_view name);
 /// The key called `name`; throws as `key_number` does.
 const solver::ParameterKey& axis_key(std::string_view name);
@@ -27,13 +27,14 @@ bool is_axis_key(std::string_view name);
 
 const solver::ParameterKey& key_numbered(std::size_t number);
 
-/// Whether the key is H, mu or e, and not one of the model.
+/// Whether the key is H, mu or e; false for model keys.
 bool is_point_key(std::size_t number);
 
-/// The link, from 0, of a single length. Single lengths act on what `links` and `length` have made.
+/// The link, from 0, whose length the key sets; none for other keys. These keys are applied after
+/// `links` and `length`.
 std::optional<std::size_t> link_of_key(std::size_t number);
 
-/// Most points a study may have.
+/// Maximum number of points of a study.
 inline constexpr std::uint64_t kMaxPoints = 1'000'000'000'000;
 
 /// Every block ends with the point keys in this order.
@@ -70,7 +71,8 @@ class RangeValues {
   std::optional<Decimals> decimals_;
 };
 
-/// Bounds of the values of a list, range or distribution; those of a distribution may be infinite.
+/// Smallest and largest value of a list or range, or the ends of a distribution, which may be
+/// infinite.
 double smallest_value(const Axis& axis);
 double largest_value(const Axis& axis);
 
@@ -82,11 +84,11 @@ enum class BlockKind : std::uint8_t {
 };
 BlockKind block_kind(const Block& block);
 
-/// The axes of a checked block: those of the model, and then H, mu and e.
+/// The axes of a checked block: all except H, mu and e, and these three.
 std::span<const Axis* const> model_axes(const Block& block);
 std::span<const Axis* const> point_axes(const Block& block);
 
-/// Whether an axis of a sample is drawn: from a distribution, or from several values.
+/// Whether an axis of a sample is drawn: it has a distribution or several values.
 bool is_drawn(const Axis& axis);
 
 /// Number of points of a checked block, including those that its filter leaves out. Throws
@@ -94,46 +96,45 @@ bool is_drawn(const Axis& axis);
 std::uint64_t points_of_block(const Block& block);
 
 /// Throws solver::InputError above `kMaxPoints`.
-void check_points(std::uint64_t points);
+void check_point_count(std::uint64_t points);
 
-/// The place of an axis in its block. Point p of the block, a product or zip, has value number p /
-/// stride % values of the axis.
+/// The position of an axis in its block. In a product or zip, point p of the block has value number
+/// p / stride % values of the axis.
 struct AxisLayout {
   const Axis* axis;
   std::size_t key;       ///< `key_number` of its key
-  std::uint64_t values;  ///< number of values; expression: 1, drawn: 0
+  std::uint64_t values;  ///< number of values; 1 for an expression, 0 if drawn
   std::uint64_t stride;
 };
 
 /// The axes of a checked block, in their order.
 std::vector<AxisLayout> layout_of(const Block& block);
 
-/// The model of the shortest finger in the block, without expressions.
+/// The model of the shortest finger in the block, ignoring expressions.
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
 
-/// The tip of every finger drops by at least this part of the finger's length. Between this part
-/// and the whole length, the limit for H, only a computed fall shows whether the tip gets there.
+/// The tip of every finger can drop by at least this fraction of the finger's length. H must not
+/// exceed the length; between the two only a computed fall shows whether the tip reaches H.
 inline constexpr double kSurelyReached = 0.9;
 
-// The rules for studies. Parsers of files and flags call these functions, and the server calls them
-// again for a received study. Every InputError has the key.
+// Rules for studies. Parsers of files and flags check them, and the server checks them again. Every
+// InputError has the key.
 
-/// Throws InputError unless the ends of a range are allowed and rise.
+/// Throws InputError unless the ends of a range are allowed and from <= to.
 void check_ends(const solver::ParameterKey& key, double from, double to);
 
-/// Throws InputError, which names key, value and what is allowed, unless each axis of a block is a
-/// list, a rising range, an expression or, in a sample, a distribution, and each value is finite
-/// and in the key's domain; unless the axes are in order, each once, and fit the kind of the block,
-/// and no H is larger than the length of the shortest finger of the block. H is not compared with
-/// the length in blocks where this depends on the point (`is_judged_by_points`).
+/// Throws InputError, which names key, value and what is allowed, unless the block is valid. Each
+/// axis must be a list, a rising range, an expression or, in a sample, a distribution, with finite
+/// values in the key's domain. Each key occurs once and in order, and fits the kind of block. H
+/// must not exceed the length of the shortest finger of the block; where this depends on the point
+/// it is not checked (`needs_point_validation`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
-/// Whether some values, or whether H is within the finger's length, can be checked only point by
-/// point.
-bool is_judged_by_points(const solver::ModelParameters& model, const Block& block);
+/// Whether some values, or H against the finger's length, can only be checked point by point.
+bool needs_point_validation(const solver::ModelParameters& model, const Block& block);
 
-/// A block of the axes, sorted in the order of recipes: model keys as in listings, then H, mu and
-/// e. Does not check them. Keys must be known.
+/// Makes a block of axes with known keys, sorted in the order of recipes: model keys as in
+/// listings, H, mu and e. Does not check them.
 Block block_of(std::vector<Axis> axes);
 
 }  // namespace oblique::protocol

@@ -18,15 +18,14 @@ namespace {
 using solver::InputError;
 
 constexpr std::size_t kLongestQuoted = 40;
-constexpr const char* kComma = "`,` stands only between the arguments of a function";
+constexpr const char* kComma = "`,` is allowed only between the arguments of a function";
 
-/// NaN stays NaN, because an undefined condition must not count as false.
+/// Returns NaN if `x` contains NaN, because an undefined condition must not count as false.
 double truth(const double* x, bool value) {
   return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
                                               : static_cast<double>(value);
 }
 
-/// A function that an expression may call. `compute` reads as many values as `arguments`.
 struct Function {
   std::string_view name;
   std::size_t arguments;
@@ -60,7 +59,7 @@ constexpr std::array<Function, 22> kFunctions{{
                                                             : x[2]; }},
 }};
 
-/// From the weakest. `not` and signs precede one value.
+/// Precedence, weakest first. `not` and signs precede one value.
 enum Priority { kOr = 1, kAnd, kNot, kComparison, kSum, kProduct, kSign, kPower };
 
 struct Operator {
@@ -95,7 +94,6 @@ bool begins_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
 }
 
-/// The name at the start of `text`, or an empty text.
 std::string_view name_at(std::string_view text) {
   if (text.empty() || !begins_name(text[0])) {
     return {};
@@ -107,7 +105,7 @@ std::string_view name_at(std::string_view text) {
 
 }  // namespace
 
-/// Parses by precedence climbing. Each function appends the steps of the text that it reads.
+/// Parses by precedence climbing. Each function appends the steps for the text that it reads.
 class Expression::Parser {
  public:
   Parser(std::string_view text, Expression& to, const MeaningOf& meaning_of)
@@ -124,7 +122,7 @@ class Expression::Parser {
   }
 
  private:
-  /// The next character that is not a space, or 0 at the end.
+  /// The next character that is not a space; 0 at the end.
   char next() {
     rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size()));
     return rest_.empty() ? '\0' : rest_[0];
@@ -135,7 +133,7 @@ class Expression::Parser {
     return is_next;
   }
 
-  /// The operator that follows a value; null at a bracket, a comma or the end.
+  /// The operator after a value; null at a bracket, a comma or the end.
   const Operator* next_operator() {
     const char c = next();
     const std::string_view word = name_at(rest_);
@@ -148,19 +146,19 @@ class Expression::Parser {
     if (c == '\0' || c == ')' || c == ',') {
       return nullptr;
     }
-    throw InputError(c == '='   ? "`=` is no operator: `==` compares"
-                     : c == '?' ? "`?` means nothing in it: write if(e > 0.5, 0.4, 0.6) to choose"
+    throw InputError(c == '='   ? "`=` is not an operator: use `==` to compare"
+                     : c == '?' ? "`?` is not an operator: write if(e > 0.5, 0.4, 0.6)"
                                 : fmt::format("an operator is missing before {}", quoted_next()));
   }
 
-  /// Reads a value and all following operations that bind at least as strongly as `weakest`.
+  /// Reads a value and all operations after it that bind at least as strongly as `weakest`.
   void read_operations(int weakest) {
     read_value(weakest);
     bool is_compared = false;
     for (const Operator* op = next_operator(); op != nullptr && op->priority >= weakest;
          op = next_operator()) {
       if (op->priority == kComparison && is_compared) {
-        throw InputError("a comparison is of two values: write a < b && b < c");
+        throw InputError("a comparison has two values: write a < b && b < c");
       }
       is_compared = op->priority == kComparison;
       rest_.remove_prefix(op->sign.size());
@@ -184,7 +182,7 @@ class Expression::Parser {
       read_operations(kSign);
     } else if ((c == '!' && !rest_.starts_with("!=")) || word == "not") {
       if (weakest > kNot) {
-        throw InputError("`not` needs brackets where an operator stands before it");
+        throw InputError("`not` after an operator needs brackets");
       }
       rest_.remove_prefix(std::max<std::size_t>(word.size(), 1));
       read_operations(kNot);
@@ -197,7 +195,7 @@ class Expression::Parser {
     }
   }
 
-  /// The name or character that follows, for a message.
+  /// The next name or character, for a message.
   std::string quoted_next() const {
     const std::size_t bytes =
         std::max(name_at(rest_).size(), protocol::first_character(rest_).bytes);
@@ -215,11 +213,11 @@ class Expression::Parser {
     double value = 0.0;
     const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
     if (error != std::errc() || !std::isfinite(value)) {
-      throw InputError("it has a number that cannot be read");
+      throw InputError("it has an invalid number");
     }
     rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
     if (!rest_.empty() && (begins_name(rest_[0]) || is_digit(rest_[0]) || rest_[0] == '.')) {
-      throw InputError("a number runs into what follows it: put an operator or a space between");
+      throw InputError("an operator or a space is missing after a number");
     }
     to_.steps_.push_back({nullptr, 0, value});
   }
@@ -231,13 +229,13 @@ class Expression::Parser {
     if (take('(')) {
       if (function == kFunctions.end()) {
         const auto known = function_names();
-        throw InputError(fmt::format("there is no function `{}`{}; there are {}",
+        throw InputError(fmt::format("there is no function `{}`{}; the functions are {}",
                                      name.substr(0, kLongestQuoted),
                                      protocol::did_you_mean(name, known), protocol::joined(known)));
       }
       read_arguments(*function);
     } else if (function != kFunctions.end()) {
-      throw InputError(fmt::format("`{}` is a function: its arguments stand in brackets", name));
+      throw InputError(fmt::format("`{}` is a function: put its arguments in brackets", name));
     } else if (name == "pi") {
       to_.steps_.push_back({nullptr, 0, std::numbers::pi});
     } else {
@@ -276,7 +274,8 @@ std::vector<std::string_view> function_names() {
 
 Expression::Expression(std::string_view text, const MeaningOf& meaning_of) {
   if (text.size() > kLongestText) {
-    throw InputError(fmt::format("it has {} bytes, more than {}", text.size(), kLongestText));
+    throw InputError(
+        fmt::format("it has {} bytes, and at most {} are allowed", text.size(), kLongestText));
   }
   Parser(text, *this, meaning_of).read();
 }
@@ -295,7 +294,8 @@ double Expression::value_at(std::span<const double> values) const {
     ++end;
   }
   const double value = stack.front();
-  return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;  // without a sign
+  // a NaN without a sign
+  return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;
 }
 
 }  // namespace oblique::expressions

@@ -9,20 +9,20 @@
 
 namespace oblique::expressions {
 
-/// Longest text of an expression [bytes].
+/// Maximum length of an expression [bytes].
 inline constexpr std::size_t kLongestText = 1000;
 
 /// The functions that an expression may call.
 std::vector<std::string_view> function_names();
 
 /// An expression such as `A^2 / (4 * pi)` or `mu > 0.5 and not e == 1`, compiled to steps of a
-/// stack machine: numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not` (&& || !),
-/// brackets and functions.
+/// stack machine. It may contain numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not` (&&
+/// || !), brackets and functions.
 class Expression {
  public:
-  /// `meaning_of` is called for each name, in the order of the text, and returns the number of its
-  /// value in `value_at`, or a constant, or throws. Throws solver::InputError, which says what is
-  /// wrong and what is allowed but does not repeat the text.
+  /// `meaning_of` is called for each name, in the order of the text. It returns the index of the
+  /// name's value in `value_at`, or a constant, or throws. Throws solver::InputError, which states
+  /// the fault and what is allowed, without the text.
   using MeaningOf = std::function<std::variant<std::size_t, double>(std::string_view name)>;
   Expression(std::string_view text, const MeaningOf& meaning_of);
 
@@ -31,15 +31,15 @@ class Expression {
 
  private:
   class Parser;
-  /// Replaces the topmost `arguments` values of the stack by the result of `compute`; without
-  /// `compute`, pushes a constant, or the value of that number.
+  /// Replaces the top `arguments` values of the stack by the result of `compute`. Without `compute`
+  /// it pushes a constant, or the value with that index.
   struct Step {
     double (*compute)(const double* x) = nullptr;
     std::size_t arguments = 0;
     std::variant<std::size_t, double> pushed = 0.0;
   };
 
-  std::vector<Step> steps_;  ///< at most one for each byte of the text
+  std::vector<Step> steps_;  ///< at most one per byte of the text
 };
 
 }  // namespace oblique::expressions

@@ -28,7 +28,7 @@ using Model = solver::ModelParameters;
 using Message = ModelParameters;
 using Field = std::tuple<double Model::*, double (Message::*)() const, void (Message::*)(double)>;
 
-/// Numbers of a model, and their places in its message.
+/// Numeric members of a model, and their fields in the message.
 constexpr std::array<Field, 12> kFields{{
     {&Model::E_Pa, &Message::e_pa, &Message::set_e_pa},
     {&Model::A_m2, &Message::a_m2, &Message::set_a_m2},
@@ -44,10 +44,9 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-/// Most bytes of a recipe, so that the frame that brings it to a worker has room for other fields.
+/// Maximum size of a recipe [bytes]; the frame for a worker also has room for other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
-/// The bytes for comparison.
 std::string comparable_bytes(Block block) {
   block.DiscardUnknownFields();
   return block.SerializeAsString();
@@ -62,12 +61,11 @@ Axis axis_of(const solver::ParameterKey& key) {
 constexpr std::array<std::string_view, 3> kDistributions{"uniform", "log-uniform", "normal"};
 constexpr std::array<std::string_view, 3> kSamples{"random", "lhs", "sobol"};
 
-/// The index of a name in `names`.
 int number_of_name(std::string_view name, std::span<const std::string_view> names,
                    std::string_view key) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) {
-    throw InputError(key, fmt::format("the {} \"{}\" is not known{}: it must be one of {}", key,
+    throw InputError(key, fmt::format("unknown {} \"{}\"{}: it must be one of {}", key,
                                       excerpt(name), did_you_mean(name, names), joined(names)));
   }
   return static_cast<int>(found - names.begin());
@@ -86,8 +84,8 @@ ModelParameters to_message(const solver::ModelParameters& model) {
   return message;
 }
 
-solver::ModelParameters unjudged_from_message(const ModelParameters& message) {
-  // The struct has `int` and an enumeration, so the ranges are checked before the conversion.
+solver::ModelParameters from_message_unchecked(const ModelParameters& message) {
+  // The struct has `int` and an enumeration, so ranges are checked before the conversion.
   solver::check_value(model_key("elements_per_link"), message.elements_per_link());
   solver::check_value(model_key("integrator"), message.integrator());
   solver::ModelParameters model;
@@ -101,13 +99,13 @@ solver::ModelParameters unjudged_from_message(const ModelParameters& message) {
 }
 
 solver::ModelParameters from_message(const ModelParameters& message) {
-  solver::ModelParameters model = unjudged_from_message(message);
+  solver::ModelParameters model = from_message_unchecked(message);
   solver::validate(model);
   return model;
 }
 
 std::string canonical_model(const solver::ModelParameters& model) {
-  std::vector<std::string> lengths;  // + 0.0: both zeros have the same text
+  std::vector<std::string> lengths;  // + 0.0 gives both zeros the same text
   for (const double length_m : model.lengths_m) {
     lengths.push_back(exact_number(length_m + 0.0));
   }
@@ -129,7 +127,7 @@ bool is_same_block(const Block& a, const Block& b) {
 }
 
 std::string recipe_digest(const Recipe& recipe) {
-  std::string bytes = canonical_model(unjudged_from_message(recipe.model()));
+  std::string bytes = canonical_model(from_message_unchecked(recipe.model()));
   bytes += recipe.errors() ? " errors" : "";
   for (const Block& block : recipe.blocks()) {
     const std::string of_block = comparable_bytes(block);
@@ -143,15 +141,16 @@ void check_size(const Recipe& recipe) {
   const std::size_t bytes = recipe.ByteSizeLong();
   if (bytes > kLongestRecipe) {
     throw InputError(fmt::format(
-        "the recipe has {} bytes, more than the {} that a worker can be sent: write long lists of "
-        "values as ranges, or long columns of a CSV file as several studies; a value that is "
-        "listed takes 8 bytes",
+        "the recipe has {} bytes, and at most {} fit into a message to a worker: write long lists "
+        "of "
+        "values as ranges, or split long columns of a CSV file into several studies; a listed "
+        "value takes 8 bytes",
         bytes, kLongestRecipe));
   }
 }
 
 bool parse_recipe(std::string_view bytes, Recipe& recipe) {
-  return bytes.size() <= kLongestRecipe && is_of_a_recipes_shape(bytes) &&
+  return bytes.size() <= kLongestRecipe && is_unpadded_recipe(bytes) &&
          recipe.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
@@ -159,7 +158,7 @@ std::string sha256_of(std::string_view bytes) {
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
   crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(bytes.data()),
                      bytes.size());
-  std::string text(2 * digest.size() + 1, '\0');  // libsodium ends it with a zero
+  std::string text(2 * digest.size() + 1, '\0');  // libsodium appends a zero
   sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
   text.pop_back();
   return text;
@@ -206,12 +205,12 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
   const double tolerance = 1e-9 * std::max(1.0, steps);
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;
-    throw InputError(
-        key.name,
-        fmt::format("{}: step = {} does not lead from {} to {}: the value after {} would be {}; "
-                    "change `to` or the step, or give `count`",
-                    key.name, exact_number(step), exact_number(from), exact_number(to),
-                    solver::readable_number(below, 10), solver::readable_number(below + step, 10)));
+    throw InputError(key.name, fmt::format("{}: step = {} does not lead from {} to {}: the last "
+                                           "value before `to` is {} and the next {}; "
+                                           "change `to` or the step, or give `count`",
+                                           key.name, exact_number(step), exact_number(from),
+                                           exact_number(to), solver::readable_number(below, 10),
+                                           solver::readable_number(below + step, 10)));
   }
   return counted_axis(key, from, to, static_cast<std::int64_t>(whole_steps) + 1);
 }
@@ -228,7 +227,7 @@ Axis expressed_axis(const solver::ParameterKey& key, std::string_view text) {
   return axis;
 }
 
-Sample written_sample(std::string_view kind, std::int64_t count, std::int64_t seed) {
+Sample parse_sample(std::string_view kind, std::int64_t count, std::int64_t seed) {
   for (const auto& [name, value, least] : {std::tuple{"count", count, 1}, {"seed", seed, 0}}) {
     if (value < least) {
       throw InputError(
@@ -264,7 +263,7 @@ const solver::ParameterKey& model_key(std::string_view name) {
   if (const auto* key = solver::find_model_key(name)) {
     return *key;
   }
-  std::vector<std::string_view> known{WrittenModel::kPreset, WrittenModel::kLengths};
+  std::vector<std::string_view> known{ModelInput::kPreset, ModelInput::kLengths};
   for (const auto& key : solver::model_keys()) {
     known.push_back(key.name);
   }
@@ -272,14 +271,15 @@ const solver::ParameterKey& model_key(std::string_view name) {
       name, fmt::format("{} of a model: the keys are {}", unknown_key(name, known), joined(known)));
 }
 
-solver::ModelParameters WrittenModel::model() const {
+solver::ModelParameters ModelInput::model() const {
   solver::ModelParameters model = solver::preset(preset);
   if (lengths_m) {
     if (values.contains("links") || values.contains("length")) {
-      throw InputError(kLengths, std::string(kLengthsStandAlone));
+      throw InputError(kLengths, std::string(kLengthsConflict));
     }
     if (lengths_m->empty()) {
-      throw InputError(kLengths, "lengths = [] is not allowed: give the lengths in m, one a link");
+      throw InputError(kLengths,
+                       "lengths = [] is not allowed: give the lengths in m, one per link");
     }
     solver::ParameterKey key = model_key("length");
     key.name = kLengths;
@@ -291,7 +291,7 @@ solver::ModelParameters WrittenModel::model() const {
   for (const auto& [name, value] : values) {
     solver::check_value(model_key(name), value);
   }
-  // In the order of the listing: `links` must come before `length`.
+  // `links` must be applied before `length`, as in the listing.
   for (const auto& key : solver::model_keys()) {
     if (const auto value = values.find(key.name); value != values.end()) {
       key.set(model, value->second);
@@ -301,22 +301,22 @@ solver::ModelParameters WrittenModel::model() const {
   return model;
 }
 
-std::string objection_to_study_name(const std::string& name) {
+std::string study_name_error(const std::string& name) {
   constexpr std::size_t kMostBytes = 100;
   if (!name.empty() && name.size() <= kMostBytes && name.front() != '-' && is_visible(name)) {
     return {};
   }
   return fmt::format(
-      "name = \"{}\" is not allowed: a study's name has 1 to {} bytes of UTF-8, no control "
+      "name = \"{}\" is not allowed: the name of a study has 1 to {} bytes of UTF-8, no control "
       "characters, marks of writing direction or zero-width characters, and does not begin with "
       "'-'",
       visible(name.substr(0, kMostBytes)), kMostBytes);
 }
 
-std::string objection_to_priority(std::int64_t priority) {
+std::string priority_error(std::int64_t priority) {
   return priority >= -1000 && priority <= 1000
              ? ""
-             : fmt::format("priority = {} is not allowed: {} is", priority, kPriorities);
+             : fmt::format("priority = {} is not allowed: it must be {}", priority, kPriorities);
 }
 
 }  // namespace oblique::protocol

@@ -28,12 +28,11 @@ namespace {
 
 using solver::InputError;
 
-/// Rows and messages contain finite values only.
 double finite_or_0(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-/// The last of the sorted `places` whose `first` is at most `number`; there is one.
+/// The last of the sorted `places` whose `first` is at most `number`. There must be one.
 template <class Place, class Number>
 std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, const Number& first) {
   const auto next = std::upper_bound(
@@ -42,7 +41,7 @@ std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, con
   return static_cast<std::size_t>(next - places.begin()) - 1;
 }
 
-/// Calls `work`. An InputError that it throws gets the key and the expression.
+/// Calls `work` and adds the key and the expression to an InputError.
 template <typename Work>
 auto in_expression(std::string_view key, std::string_view text, Work work) {
   try {
@@ -53,7 +52,7 @@ auto in_expression(std::string_view key, std::string_view text, Work work) {
   }
 }
 
-/// Calls `act`. Its error gets the block's number, if the recipe has several.
+/// Calls `act` and adds the block's number to its error if the recipe has several blocks.
 template <typename Act>
 void in_block(const Recipe& recipe, std::size_t number, Act act) {
   try {
@@ -67,8 +66,8 @@ void in_block(const Recipe& recipe, std::size_t number, Act act) {
   }
 }
 
-/// Calls `act` with every number below `points`, or with `tries` random ones if there are more than
-/// `most`. Whether it was every number.
+/// Calls `act` with every number below `points`, or with `tries` random ones if `points` exceeds
+/// `most`. Returns whether it called all.
 template <typename Act>
 bool for_each_or_some(std::uint64_t points, std::uint64_t most, std::uint64_t tries,
                       std::uint64_t seed, Act act) {
@@ -81,11 +80,11 @@ bool for_each_or_some(std::uint64_t points, std::uint64_t most, std::uint64_t tr
 
 }  // namespace
 
-/// The points of one block of any kind, each computed from its number.
+/// Computes the points of one block of any kind from their numbers.
 class PointTable::BlockPoints : public BlockPlace {
  public:
-  /// `block` has passed `check_block` and outlives this. `base` has the values of keys that the
-  /// block does not have.
+  /// `block` must have passed `check_block` and outlive this. `base` has the values of keys that
+  /// the block lacks.
   BlockPoints(const solver::ModelParameters& base, const Block& block)
       : BlockPlace{.points = points_of_block(block)}, block_(&block) {
     std::uint32_t dimensions = 0;
@@ -114,7 +113,7 @@ class PointTable::BlockPoints : public BlockPlace {
   const Block& definition() const { return *block_; }
   std::uint64_t points_per_model() const { return points / models; }
 
-  /// The values of a point in the order of the axes. The functions below take them.
+  /// The values of a point in the order of the axes. The functions below take them as input.
   std::vector<double> values_at(std::uint64_t point) const {
     std::vector<double> values(sources_.size());
     for (std::size_t i = 0; i < sources_.size(); ++i) {
@@ -128,14 +127,15 @@ class PointTable::BlockPoints : public BlockPlace {
     return values;
   }
 
-  bool is_left_in(std::span<const double> values) const {
+  bool passes_filter(std::span<const double> values) const {
     const double kept = filter_ ? filter_->expression.value_at(values) : 1.0;
     return !std::isnan(kept) && kept != 0.0;
   }
 
   solver::ModelParameters model(solver::ModelParameters base,
                                 std::span<const double> values) const {
-    for (const bool are_single : {false, true}) {  // single lengths act on what `links` has made
+    // `links` and `length` come before single lengths
+    for (const bool are_single : {false, true}) {
       for (std::size_t i = sources_.size() - kPointKeyOrder.size(); i-- > 0;) {
         const std::size_t number = sources_[i].layout.key;
         const solver::ParameterKey& key = key_numbered(number);
@@ -148,13 +148,13 @@ class PointTable::BlockPoints : public BlockPlace {
     return base;
   }
 
-  /// Why the point cannot be solved, with the values; none if it can be.
+  /// Why the point cannot be solved, with its values; nothing if it can be.
   std::optional<InputError> fault(const solver::ModelParameters& base,
                                   std::span<const double> values) const {
     if (filter_ && std::isnan(filter_->expression.value_at(values))) {
-      return InputError("where", "where has no value: " + in_words(values));
+      return InputError("where", "where is not a number: " + in_words(values));
     }
-    if (!is_left_in(values)) {
+    if (!passes_filter(values)) {
       return std::nullopt;
     }
     try {
@@ -170,14 +170,13 @@ class PointTable::BlockPoints : public BlockPlace {
   }
 
  private:
-  /// Where the value of an axis comes from; a list has neither range nor quantiles.
+  /// Source of the values of an axis; a list has neither range nor quantiles.
   struct Source {
     AxisLayout layout;
     std::uint32_t dimension;  ///< dimension in the sample, if the axis is drawn
     std::optional<RangeValues> range = {};
     std::optional<sampling::Quantiles> quantiles = {};
   };
-  /// An expression, the axes that it uses, and the axis of the result.
   struct Formula {
     expressions::Expression expression;
     std::vector<std::size_t> inputs;
@@ -212,26 +211,27 @@ class PointTable::BlockPoints : public BlockPlace {
     const auto link = link_of_key(key);
     std::size_t axis = axis_of(key);
     if (axis == sources_.size() && link) {
-      axis = axis_of(key_number("length"));  // sets the length of every link
+      axis = axis_of(key_number("length"));  // `length` sets every link
     }
     if (axis < sources_.size()) {
       return axis;
     }
     if (link && axis_of(key_number("links")) < sources_.size()) {
-      return base.lengths_m.front();  // `links` makes all of them as long as the first
+      return base.lengths_m.front();  // `links` copies the first length to all links
     }
     if (link && *link >= base.lengths_m.size()) {
-      throw InputError(fmt::format("`{}` is the length of no link: the model has {}", name,
-                                   base.lengths_m.size()));
+      throw InputError(
+          fmt::format("`{}` is not a key: the model has {} links", name, base.lengths_m.size()));
     }
     return key_numbered(key).get(base);
   }
 
-  /// Number of points of each model: all if no model key varies, 1 if a model key depends on a
-  /// value that varies with the point, and in a product those of the axes of H, mu and e.
+  /// Number of consecutive points with the same model: all if no model key varies; 1 if a model key
+  /// depends on a value that varies from point to point; in a product the number of combinations of
+  /// H, mu and e.
   std::uint64_t counted_points_per_model() const {
     const bool is_product = block_kind(*block_) == BlockKind::kProduct;
-    std::vector<bool> varies;  // whether the axis varies within one combination of model axes
+    std::vector<bool> varies;  // whether the axis varies while the model axes stay fixed
     for (const Source& source : sources_) {
       varies.push_back(is_drawn(*source.layout.axis) &&
                        (!is_product || is_point_key(source.layout.key)));
@@ -249,7 +249,6 @@ class PointTable::BlockPoints : public BlockPlace {
                                               : points;
   }
 
-  /// Brings the formulas into an order in which each follows those that compute its inputs.
   void sort() {
     for (auto begin = formulas_.begin(); begin != formulas_.end(); ++begin) {
       const auto next = std::find_if(begin, formulas_.end(), [&](const Formula& formula) {
@@ -267,7 +266,7 @@ class PointTable::BlockPoints : public BlockPlace {
         throw InputError(
             circle.front(),
             fmt::format(
-                "{}: the expressions go round in a circle: one must follow from keys that do not",
+                "{}: the expressions depend on each other in a circle: compute one from other keys",
                 fmt::join(circle, ", ")));
       }
       std::rotate(begin, next, next + 1);
@@ -318,17 +317,17 @@ void PointTable::visit_values(const solver::ModelParameters& base, const Block& 
 PointTable::PointTable(Recipe recipe) : recipe_(std::make_unique<Recipe>(std::move(recipe))) {
   if (!recipe_->has_model()) {
     throw InputError(
-        "the recipe has no model: send all its parameters, for defaults change between versions");
+        "the recipe has no model: send all parameters, because defaults change between versions");
   }
   base_model_ = from_message(recipe_->model());
   if (recipe_->blocks().empty()) {
-    throw InputError("the study has no block: it needs at least one with H, mu and e");
+    throw InputError("the study has no block: give at least one with H, mu and e");
   }
-  if (static_cast<std::size_t>(recipe_->blocks_size()) > kMostBlocks) {
+  if (static_cast<std::size_t>(recipe_->blocks_size()) > kMaxBlocks) {
     throw InputError(
         fmt::format("the study has {} blocks, more than {}: write points that differ "
                     "in all values as a block with `zip`",
-                    recipe_->blocks_size(), kMostBlocks));
+                    recipe_->blocks_size(), kMaxBlocks));
   }
   for (const Block& block : recipe_->blocks()) {
     in_block(*recipe_, blocks_.size(), [&] { add_block(block); });
@@ -342,12 +341,12 @@ void PointTable::add_block(const Block& block) {
   check_block(base_model_, block);
   BlockPoints& added = blocks_.emplace_back(base_model_, block);
   expressions_ += added.expressions();
-  if (expressions_ > kMostExpressions) {
+  if (expressions_ > kMaxExpressions) {
     throw InputError(
-        fmt::format("the study has more than {} expressions and filters", kMostExpressions));
+        fmt::format("the study has more than {} expressions and filters", kMaxExpressions));
   }
-  check_points(points_ + added.points);
-  added.is_judged_by_points = is_judged_by_points(base_model_, block);
+  check_point_count(points_ + added.points);
+  added.needs_point_validation = needs_point_validation(base_model_, block);
   added.first_point = points_;
   const bool has_base_model = model_axes(block).empty();
   const bool is_known = has_base_model && !base_segments_.empty();
@@ -365,7 +364,7 @@ void PointTable::add_block(const Block& block) {
     }
   }
   has_filter_ = has_filter_ || !block.where().empty();
-  judged_blocks_ += added.is_judged_by_points ? 1 : 0;
+  blocks_to_validate_ += added.needs_point_validation ? 1 : 0;
   points_ += added.points;
 }
 
@@ -415,16 +414,16 @@ Segment PointTable::segment_at(std::uint64_t index) const {
   return {block.first_model + model, block.first_point + model * count, count};
 }
 
-bool PointTable::is_left_in(std::uint64_t index) const {
+bool PointTable::passes_filter(std::uint64_t index) const {
   if (!has_filter_) {
     return true;
   }
   const BlockPoints& block = blocks_[block_of_point(index)];
-  return block.is_left_in(block.values_at(index - block.first_point));
+  return block.passes_filter(block.values_at(index - block.first_point));
 }
 
-std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) const {
-  while (begin < end && !is_left_in(begin)) {
+std::uint64_t PointTable::first_passing(std::uint64_t begin, std::uint64_t end) const {
+  while (begin < end && !passes_filter(begin)) {
     ++begin;
   }
   return std::min(begin, end);
@@ -432,38 +431,39 @@ std::uint64_t PointTable::first_left_in(std::uint64_t begin, std::uint64_t end) 
 
 std::string PointTable::fault(std::uint64_t index) const {
   const BlockPoints& block = blocks_[block_of_point(index)];
-  const auto fault = block.is_judged_by_points
+  const auto fault = block.needs_point_validation
                          ? block.fault(base_model_, block.values_at(index - block.first_point))
                          : std::nullopt;
   return fault ? fault->what() : "";
 }
 
-void PointTable::judge_points() const {
-  const std::uint64_t most = kMostJudged / std::max<std::uint64_t>(judged_blocks_, 1);
+void PointTable::validate_points() const {
+  const std::uint64_t most = kMaxValidated / std::max<std::uint64_t>(blocks_to_validate_, 1);
   for (std::size_t number = 0; number < blocks_.size(); ++number) {
     const BlockPoints& block = blocks_[number];
     bool leaves_any_in = false;
-    const auto judge = [&](std::uint64_t i) {
+    const auto validate = [&](std::uint64_t i) {
       const auto values = block.values_at(i);
       if (const auto fault = block.fault(base_model_, values)) {
         throw InputError({.text = fault->fields().text,
                           .key = fault->fields().key,
                           .point = block.first_point + i});
       }
-      leaves_any_in = leaves_any_in || block.is_left_in(values);
+      leaves_any_in = leaves_any_in || block.passes_filter(values);
     };
     in_block(*recipe_, number, [&] {
-      if (block.is_judged_by_points && for_each_or_some(block.points, most, most, number, judge) &&
-          !leaves_any_in) {
+      if (block.needs_point_validation &&
+          for_each_or_some(block.points, most, most, number, validate) && !leaves_any_in) {
         in_expression("where", block.definition().where(),
-                      [] { throw InputError("it leaves no point in"); });
+                      [] { throw InputError("it leaves out all points"); });
       }
     });
   }
 }
 
 bool is_close(double value, double own) {
-  constexpr double kTolerance = 1e-12;  // relative; some thousand times the rounding of a double
+  // relative; about a thousand times the rounding error of a double
+  constexpr double kTolerance = 1e-12;
   return std::abs(value - own) <= kTolerance * std::abs(own);
 }
 
@@ -512,19 +512,19 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table) 
         {"mu", result.has_mu(), result.mu(), own.mu},
         {"e", result.has_e_star(), result.e_star(), own.e_star}}) {
     if (!is_sent || !is_close(value, expected)) {
-      return fmt::format("the worker solved it with {} = {:.17g}, and the study has {:.17g}", key,
+      return fmt::format("the worker solved it with {} = {:.17g}, but the study has {:.17g}", key,
                          value, expected);
     }
   }
-  // A result without a model is of a study that had one model when it was solved, but may have
-  // grown since.
+  // A result without a model was solved when the study had one model. The study may have grown
+  // since.
   bool has_model = !result.has_model() && own.model == 0;
   try {
-    has_model = has_model || (result.has_model() && is_close(unjudged_from_message(result.model()),
+    has_model = has_model || (result.has_model() && is_close(from_message_unchecked(result.model()),
                                                              table.model(own.model)));
   } catch (const InputError&) {  // a whole number outside the domain
   }
-  return has_model ? "" : "the worker solved it with another model than the study has";
+  return has_model ? "" : "the worker solved it with another model than that of the study";
 }
 
 Point inputs_of(const PointResult& result, const PointTable& table) {
@@ -535,53 +535,52 @@ Point inputs_of(const PointResult& result, const PointTable& table) {
 
 namespace {
 
-/// Average size of a result and of a model in a database (server/store/README.md).
+/// Average size [bytes] of a result and a model in a database (server/store/README.md).
 constexpr std::uint64_t kBytesAResult = 970;
 constexpr std::uint64_t kBytesAModel = 600;
 
-/// More points than the first are not counted, but estimated from as many random points as the
-/// second.
-constexpr std::uint64_t kMostCounted = 100'000;
-constexpr std::uint64_t kLooks = 10'000;
+/// Up to kMostCounted points are counted; above that numbers are estimated from kSampledPoints
+/// random points.
+constexpr std::uint64_t kMaxCounted = 100'000;
+constexpr std::uint64_t kSampledPoints = 10'000;
 
-/// For a block of the recipe.
-PointsLeftIn points_left_in(const PointTable& table, int block) {
+PassingPoints passing_points(const PointTable& table, int block) {
   const BlockPlace& place = table.block(static_cast<std::size_t>(block));
   if (table.recipe().blocks(block).where().empty()) {
     return {place.points, false};
   }
   std::uint64_t found = 0;
   const bool is_counted = for_each_or_some(
-      place.points, kMostCounted, kLooks, 2,
-      [&](std::uint64_t i) { found += table.is_left_in(place.first_point + i) ? 1U : 0U; });
-  const double share = static_cast<double>(found) / static_cast<double>(kLooks);
+      place.points, kMaxCounted, kSampledPoints, 2,
+      [&](std::uint64_t i) { found += table.passes_filter(place.first_point + i) ? 1U : 0U; });
+  const double share = static_cast<double>(found) / static_cast<double>(kSampledPoints);
   return {
       is_counted ? found : static_cast<std::uint64_t>(share * static_cast<double>(place.points)),
       !is_counted};
 }
 
-/// Points that filters keep: all of them, or at most `kLooks` at random.
+/// Points that pass the filters: all of them, or at most `kSampledPoints` random ones.
 std::vector<std::uint64_t> some_points(const PointTable& table) {
-  constexpr std::uint64_t kTries = 100 * kLooks;
-  const std::uint64_t most = table.size() <= kMostCounted ? kMostCounted : kLooks;
+  constexpr std::uint64_t kTries = 100 * kSampledPoints;
+  const std::uint64_t most = table.size() <= kMaxCounted ? kMaxCounted : kSampledPoints;
   std::vector<std::uint64_t> points;
-  for_each_or_some(table.size(), kMostCounted, kTries, 0, [&](std::uint64_t point) {
-    if (points.size() < most && table.is_left_in(point)) {
+  for_each_or_some(table.size(), kMaxCounted, kTries, 0, [&](std::uint64_t point) {
+    if (points.size() < most && table.passes_filter(point)) {
       points.push_back(point);
     }
   });
   if (points.empty()) {
-    points.push_back(0);  // the filter keeps few points or none
+    points.push_back(0);  // the filter includes few points or none
   }
   return points;
 }
 
-/// Counts the falls of the study, of which `some` are all points or random ones. If they are not
-/// all, the number is estimated (Good 1953): the share of points whose fall is among those of
-/// `some` is about that of the points of `some` whose fall occurs there twice.
+/// Counts the different falls of the study. `some` contains all points or random ones. In the
+/// second case the number is estimated (Good 1953): the share of points whose fall occurs in `some`
+/// is about the share of points of `some` whose fall occurs there at least twice.
 void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some, StudySize& size) {
-  std::unordered_map<std::uint64_t, std::uint64_t> met;  // number of points by hash of the fall
-  std::optional<std::uint64_t> model;                    // of the last point; `fall` is its fall
+  std::unordered_map<std::uint64_t, std::uint64_t> met;  // points by hash of their fall
+  std::optional<std::uint64_t> model;  // model of the last point; `fall` is its hash
   std::uint64_t fall = 0;
   for (const std::uint64_t point : some) {
     if (const auto next = table.point(point).model; next != model) {
@@ -591,7 +590,7 @@ void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some
     ++met[fall];
   }
   size.falls = met.size();
-  if (table.size() > kMostCounted) {
+  if (table.size() > kMaxCounted) {
     const auto once =
         std::count_if(met.begin(), met.end(), [](const auto& each) { return each.second == 1; });
     const double share_met = 1.0 - static_cast<double>(once) / static_cast<double>(some.size());
@@ -609,7 +608,7 @@ StudySize size_of(const PointTable& table) {
   StudySize size{};
   size.models = table.models();
   for (int i = 0; i < table.recipe().blocks_size(); ++i) {
-    const PointsLeftIn& left_in = size.blocks.emplace_back(points_left_in(table, i));
+    const PassingPoints& left_in = size.blocks.emplace_back(passing_points(table, i));
     size.points += left_in.points;
     size.points_estimated = size.points_estimated || left_in.estimated;
   }

@@ -15,7 +15,7 @@
 namespace oblique::sampling {
 namespace {
 
-/// A bijection of 64 bits in which every bit of the result depends on every bit of `z`.
+/// A bijection of 64-bit numbers in which every bit of the result depends on every bit of `z`.
 std::uint64_t mixed(std::uint64_t z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
   z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
@@ -23,7 +23,7 @@ std::uint64_t mixed(std::uint64_t z) {
 }
 
 /// A permutation of the numbers of `bits` bits: a Feistel network of two halves, which may differ
-/// in length. Each round changes one half by a hash of the other, so it can be undone.
+/// in length. Each round changes one half by a hash of the other, so it is invertible.
 std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   constexpr std::uint64_t kRounds = 8;
   const int low_bits = (bits + 1) / 2;
@@ -38,12 +38,12 @@ std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   return (high << low_bits) | low;
 }
 
-/// Image of `i` < `n` under a permutation of 0 ... n-1 that `key` chooses. Uses no list.
+/// Image of `i` < `n` under the permutation of 0 ... n-1 that `key` selects, without a list.
 std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
   if (n < 2) {
     return 0;
   }
-  // Walks along the cycle of `i` among all numbers of as many bits until it is back below n.
+  // Repeats the permutation of all numbers of as many bits until the result is below n.
   const auto bits = static_cast<int>(std::bit_width(n - 1));
   do {
     i = shuffled_bits(i, bits, key);
@@ -54,8 +54,8 @@ std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
 /// Direction numbers of one dimension, times 2^52.
 using Directions = std::array<std::uint64_t, kSobolBits>;
 
-/// v_k = a_1 v_(k-1) + ... + a_(s-1) v_(k-s+1) + v_(k-s) + v_(k-s) / 2^s, without carry, from the
-/// first s of them.
+/// Computes v_k = a_1 v_(k-1) + ... + a_(s-1) v_(k-s+1) + v_(k-s) + v_(k-s) / 2^s, without carry,
+/// from the first s numbers.
 constexpr Directions directions_of(const Direction& first) {
   Directions v{};
   const std::size_t s = first.s;
@@ -83,13 +83,13 @@ constexpr auto kDirections = [] {
   return all;
 }();
 
-/// The middle of interval `bits` of 2^`digits` equal ones. Exact for up to 52 digits, so neither 0
-/// nor 1.
+/// The middle of interval number `bits` of 2^`digits` equal intervals of (0, 1). Exact up to 52
+/// digits, so never 0 or 1.
 double middle(std::uint64_t bits, int digits) {
   return std::ldexp(static_cast<double>(bits) + 0.5, -digits);
 }
 
-/// (stratum + u) / count with u in (0, 1). u has so few digits that the sum is exact; so the
+/// (stratum + u) / count with u in (0, 1). u has few enough digits that the sum is exact, so the
 /// quotient is within the stratum and below 1.
 double stratified_fraction(std::uint64_t count, std::uint64_t key, std::uint64_t index) {
   const int digits = kSobolBits - static_cast<int>(std::bit_width(count));
@@ -114,13 +114,13 @@ std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension) {
 }
 
 std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key) {
-  // One hash has the flips of all digits of a tree of six levels, which has 63 nodes.
+  // One hash contains the flips for a tree of six levels, which has 63 nodes.
   constexpr int kLevels = 6;
   std::uint64_t scrambled = 0;
   for (int depth = 0; depth < kSobolBits; depth += kLevels) {
     const std::uint64_t root = (std::uint64_t{1} << depth) | (bits >> (kSobolBits - depth));
     const std::uint64_t flips = hashed(key, root);
-    std::uint64_t node = 1;  // in the tree: 1 at its root, then 2 and 3, 4 to 7, ...
+    std::uint64_t node = 1;  // 1 at the root of the tree, then 2 and 3, 4 to 7, ...
     const int levels = std::min(kLevels, kSobolBits - depth);
     for (int level = 0; level < levels; ++level) {
       const std::uint64_t digit = (bits >> (kSobolBits - 1 - depth - level)) & 1;

@@ -4,25 +4,26 @@
 
 #include "proto/oblique.pb.h"
 
-// Points of the unit cube, each a function of its number, and the values that axes draw with them.
+// Sample points in the unit cube, each computed from its number, and quantiles of the distributions
+// of axes.
 namespace oblique::sampling {
 
 inline constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 44;
 inline constexpr std::uint32_t kSobolDimensions = 32;
 inline constexpr int kSobolBits = 52;
 
-/// Coordinate `dimension` of point `index`, in (0, 1). By the kind of the sample: independent, one
-/// point in each of `count` equal strata (Latin hypercube), or Sobol's sequence with Owen's
-/// scrambling. Takes the same time for any index and count. Throws std::out_of_range for a
-/// dimension or point outside the sample.
+/// Coordinate `dimension` of point `index`, in (0, 1). Depending on the kind of the sample, points
+/// are independent, one per stratum of `count` equal strata (Latin hypercube), or Sobol's sequence
+/// with Owen's scrambling. The cost does not depend on index and count. Throws std::out_of_range
+/// for a dimension or point outside the sample.
 double fraction(const protocol::Sample& sample, std::uint32_t dimension, std::uint64_t index);
 
-/// Number `index` of the sequence of `key` by SplitMix64 (Steele, Lea and Flood, Fast splittable
-/// pseudorandom number generators, 2014), computed without the numbers before it.
+/// Element `index` of the SplitMix64 sequence of `key` (Steele, Lea and Flood, Fast splittable
+/// pseudorandom number generators, 2014), computed without its predecessors.
 std::uint64_t hashed(std::uint64_t key, std::uint64_t index);
 
-/// Value `index` < 2^52 of Sobol's sequence in one dimension, times 2^52, in the order of the Gray
-/// code. Throws std::out_of_range for a dimension of `kSobolDimensions` or more.
+/// Element `index` < 2^52 of Sobol's sequence in one dimension, times 2^52, in Gray code order.
+/// Throws std::out_of_range for a dimension of `kSobolDimensions` or more.
 std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension);
 
 /// `bits` after nested uniform scrambling (A. B. Owen, Randomly permuted (t,m,s)-nets and
@@ -30,17 +31,17 @@ std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension);
 /// every elementary interval of base 2 keeps its number of points.
 std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key);
 
-/// The quantiles of an axis with a distribution. Its kind, the order of its ends, mean and sd must
-/// have been checked. A normal distribution is truncated at its ends, if it has them.
+/// The quantiles of an axis with a checked distribution. A normal distribution is truncated at its
+/// ends if it has them.
 class Quantiles {
  public:
   explicit Quantiles(const protocol::Axis& axis);
 
-  /// The quantile of 0 < fraction < 1. It rises with `fraction` and is between the ends.
+  /// The quantile for 0 < fraction < 1. It rises with `fraction` and stays between the ends.
   double value_at(double fraction) const;
 
-  /// Part of the whole normal distribution between the ends; 1 for the other kinds. One that is not
-  /// a normal number has too few digits to draw from.
+  /// Probability of the normal distribution between the ends; 1 for the other kinds. A subnormal
+  /// value has too few digits to draw from.
   double part_left() const { return below_to_ - below_from_; }
 
  private:
@@ -49,8 +50,8 @@ class Quantiles {
   double sd_;
   double from_;
   double to_;
-  /// Part of the normal distribution below the ends; mirrored about the mean if more of the
-  /// interval is above it, because small parts have more digits.
+  /// Probability of the normal distribution below the ends. If more of the interval lies above the
+  /// mean it is mirrored about the mean, because small probabilities have more digits.
   double below_from_ = 0.0;
   double below_to_ = 1.0;
   bool is_mirrored_ = false;
@@ -59,7 +60,8 @@ class Quantiles {
 /// The quantile z of 0 < p < 1 in the standard normal distribution, to about 1e-15.
 double normal_quantile(double p);
 
-/// Part of the standard normal distribution below z, also far below the mean to about 1e-15.
+/// Probability of the standard normal distribution below z, to a relative error of about 1e-15 also
+/// far below the mean.
 double normal_part_below(double z);
 
 }  // namespace oblique::sampling

@@ -2,18 +2,18 @@
 
 namespace oblique::protocol {
 
-/// How a connection whose other end is gone without a word is found, by workers, clients and the
-/// server alike: by TCP, not by ZeroMQ's own heartbeats, for libzmq 4.3.4 ends its process when
-/// these fire for a connection that is read no more and whose peer has gone (`Assertion failed:
-/// !_io_error`).
+/// TCP keepalive, by which workers, clients and the server detect a dead connection. ZeroMQ's
+/// heartbeats are not used, because libzmq 4.3.4 aborts (`Assertion failed: !_io_error`) when one
+/// fires for a connection that is not read and whose peer has gone.
 struct KeepAlive {
-  int idle_s = 10;                 ///< silence before the first probe
-  int interval_s = 5;              ///< between probes
-  int probes = 3;                  ///< unanswered, that end the connection
-  int unacknowledged_ms = 20'000;  ///< what was sent and stays unacknowledged so long ends it too
+  int idle_s = 10;     ///< silence before the first probe
+  int interval_s = 5;  ///< time between probes
+  int probes = 3;      ///< number of unanswered probes that end the connection
+  /// sent data that stays unacknowledged for this time ends it too
+  int unacknowledged_ms = 20'000;
 };
 
-/// Bytes that keys add to each frame (CURVE's MESSAGE): sockets must take frames so much longer.
+/// Bytes that encryption adds to each frame (CURVE's MESSAGE), in addition to the largest frame.
 inline constexpr int kSealBytes = 33;
 
 }  // namespace oblique::protocol

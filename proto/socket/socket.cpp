@@ -15,16 +15,16 @@
 namespace oblique::protocol {
 namespace {
 
-[[noreturn]] void refuse(const DealerSettings& settings, const std::string& objection) {
-  throw solver::InputError("server = \"" + settings.url + "\" is not an address: " + objection +
+[[noreturn]] void refuse(const DealerSettings& settings, const std::string& error) {
+  throw solver::InputError("server = \"" + settings.url + "\" is not an address: " + error +
                            ", as in " + settings.example_url);
 }
 
 void set_keys(zmq::socket_t& socket, const KeyFile& key) {
   if (!key.server) {
     throw solver::InputError(
-        fmt::format("{} is the key of a server: programs that connect to one take their own, as "
-                    "`oblique keygen` makes them",
+        fmt::format("{} is the key of a server: give the program its own key, as "
+                    "`oblique keygen` creates it",
                     key.path));
   }
   socket.set(zmq::sockopt::curve_serverkey, z85(*key.server));
@@ -33,12 +33,12 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
              zmq::const_buffer(key.pair.secret_key.data(), key.pair.secret_key.bytes().size()));
 }
 
-/// Why a server that has keys rejected ours. It sends the same answer for unknown keys and for keys
-/// for its other port.
-std::string key_objection(std::uint32_t status, const DealerSettings& settings) {
+/// Why a server with keys rejected ours. It sends the same status for unknown keys and for keys for
+/// its other port.
+std::string rejection_reason(std::uint32_t status, const DealerSettings& settings) {
   constexpr std::uint32_t kNotAdmitted = 400;
   if (status != kNotAdmitted) {
-    return "the public key of the server in that file is not its own, which its log shows at the "
+    return "the server's public key in that file is wrong; the server logs the right one at its "
            "start";
   }
   if ((settings.key->role == Role::kWorker) != settings.is_worker) {
@@ -46,20 +46,20 @@ std::string key_objection(std::uint32_t status, const DealerSettings& settings) 
                               : "it is for workers, and this port is for clients";
   }
   return fmt::format(
-      "the key is not on the server's list, or was revoked, or this is not its port for {}. On the "
+      "the key is not in the server's list, or this is not its port for {}. On the "
       "server, `oblique keys list` shows the list and `oblique keys add` adds to it",
       settings.is_worker ? "workers (by default 7601)" : "clients (by default 7600)");
 }
 
 }  // namespace
 
-zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings) {
-  if (const auto objection = objection_to_address(settings.url); !objection.empty()) {
-    refuse(settings, objection);
+zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings) {
+  if (const auto error = address_error(settings.url); !error.empty()) {
+    refuse(settings, error);
   }
   constexpr KeepAlive kKeepAlive;
   constexpr int kQueuedMessages = 1000;
-  // The system would wait ever longer between its own attempts, up to a minute after the network is
+  // The system would double the pause between its own attempts, up to a minute after the network is
   // back.
   constexpr int kConnectTimeout_ms = 3000;
   zmq::socket_t socket(context, zmq::socket_type::dealer);
@@ -83,7 +83,7 @@ zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& setting
 }
 
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
-  // libzmq looks up addresses of one family only, as this option says.
+  // This option selects the only IP version that libzmq resolves.
   const auto [has_v4, has_v6] = families_of(host_of(settings.url));
   try {
     socket.set(zmq::sockopt::ipv6, has_v6 && (!has_v4 || attempt % 2 == 1));
@@ -102,7 +102,7 @@ SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,
   const auto name = [](int number) { return "inproc://connections-" + std::to_string(number); };
   int number = 0;
   while (zmq_socket_monitor(socket_.handle(), name(number).c_str(), events) != 0) {
-    if (zmq_errno() != EADDRINUSE) {  // the name of a socket that was closed just now
+    if (zmq_errno() != EADDRINUSE) {  // the previous socket of this name is still closing
       throw zmq::error_t();
     }
     ++number;
@@ -118,7 +118,7 @@ SocketMonitor::~SocketMonitor() {
 void SocketMonitor::take_events() {
   zmq::message_t frame;
   while (events_.recv(frame, zmq::recv_flags::dontwait)) {
-    // An event is two frames: its number and a value, and the address.
+    // An event has two frames: its number with a value, and the address.
     std::uint16_t event = 0;
     std::uint32_t value = 0;
     if (!frame.more() || frame.size() != sizeof event + sizeof value) {
@@ -158,8 +158,7 @@ std::optional<std::string> SocketMonitor::rejection() {
   const auto& key = settings_.key;
   if (failure_->event == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH && failure_->value == kTryLater) {
     return fmt::format(
-        "the server at {} has no room at present: it, or this key, has as many connections as it "
-        "may have",
+        "the server at {} has too many connections, in all or from this key: try again later",
         settings_.url);
   }
   const bool is_mismatch = failure_->value == ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH;
@@ -170,7 +169,7 @@ std::optional<std::string> SocketMonitor::rejection() {
   if (!key) {
     return fmt::format("the server at {} {}", settings_.url,
                        is_mismatch
-                           ? "requires a key, and none was given: name yours with --keys FILE or "
+                           ? "requires a key, and none was given: give yours with --keys FILE or "
                              "OBLIQUE_KEYS"
                            : "did not accept this program");
   }
@@ -180,7 +179,7 @@ std::optional<std::string> SocketMonitor::rejection() {
       is_mismatch
           ? "it has no keys. Start it with --keys, or leave out --keys and OBLIQUE_KEYS here "
             "to connect unencrypted"
-          : key_objection(failure_->value, settings_));
+          : rejection_reason(failure_->value, settings_));
 }
 
 }  // namespace oblique::protocol

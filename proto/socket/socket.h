@@ -10,61 +10,61 @@
 
 namespace oblique::protocol {
 
-/// What differs between the sockets of workers and clients.
+/// Settings of a socket, different for workers and clients.
 struct DealerSettings {
-  std::string url;             ///< as tcp://127.0.0.1:7600
-  std::string example_url;     ///< what an address looks like, for messages
-  int linger_ms = 0;           ///< how long unsent messages are still sent after closing
+  std::string url;             ///< such as tcp://127.0.0.1:7600
+  std::string example_url;     ///< an example of an address, for messages
+  int linger_ms = 0;           ///< time to send the remaining messages after closing
   int shortest_pause_ms = 20;  ///< between attempts to connect
   int longest_pause_ms = 1000;
-  bool queues_unconnected = true;  ///< takes messages while there is no connection
-  bool is_worker = false;  ///< it connects to the port for workers, else to that for clients
-  /// Its key, with the server's: everything is encrypted, and only that server is accepted. Empty:
-  /// plain text with a server that has no keys.
+  bool queues_unconnected = true;  ///< accepts messages while it is not connected
+  bool is_worker = false;          ///< it connects to the workers' port, else to the clients'
+  /// The socket's key and the server's public key. With a key the connection is encrypted and only
+  /// that server is accepted. Without one it is plain text.
   std::optional<KeyFile> key = {};
 };
 
-/// A DEALER socket with the options that all our sockets have (limits.h, the largest frame), which
-/// does not connect yet. Throws solver::InputError for a `url` that is no address, and for a key
-/// that is a server's.
-zmq::socket_t made_dealer(zmq::context_t& context, const DealerSettings& settings);
+/// Makes a DEALER socket with the options that all our sockets share (limits.h, the largest frame).
+/// It does not connect yet. Throws solver::InputError for an invalid `url` and for a server's key.
+zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings);
 
-/// Lets it connect, in the background, and again whenever a connection ends; a host's name is
-/// looked up each time. A name may have addresses of both families, and the server need not listen
-/// on both: each `attempt` tries the other one, IPv4 first. Throws solver::InputError as above.
+/// Starts to connect in the background, and again whenever a connection ends; a host name is
+/// resolved each time. A name may have IPv4 and IPv6 addresses, and the server may listen on one of
+/// them only: each `attempt` tries the other kind, IPv4 first. Throws solver::InputError as
+/// `make_dealer` does.
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt = 0);
 
-/// The connections of a socket of one peer: how often it was connected, and whether the other end
-/// rejected it. What a socket has handed to a connection is lost with that connection.
+/// Watches the connections of a socket with one peer: how often it was connected, and whether the
+/// peer rejected it. Messages that a socket has passed to a connection are lost with it.
 class SocketMonitor {
  public:
-  /// `socket`, which was made with `settings`, must not be connected yet, and it and `context` must
-  /// live as long. With `with_attempts`, call `attempts` often: libzmq waits while too many events
-  /// are not taken.
+  /// `socket` was made with `settings` and must not be connected yet. It and `context` must outlive
+  /// this. With `with_attempts`, call `attempts` often: libzmq blocks while too many events are
+  /// unread.
   SocketMonitor(zmq::context_t& context, zmq::socket_t& socket, DealerSettings settings,
                 bool with_attempts = false);
   ~SocketMonitor();
   SocketMonitor(const SocketMonitor&) = delete;
   SocketMonitor& operator=(const SocketMonitor&) = delete;
 
-  /// A ZeroMQ socket that is readable when something may have changed.
+  /// A ZeroMQ socket that is readable when the state may have changed.
   void* handle() { return events_.handle(); }
 
-  /// Connections made so far over which messages can pass, the present one included.
+  /// Number of connections so far, including the current one, that have completed their handshake.
   std::uint64_t connections();
-  /// Why the other end rejected the socket, and what to do; without a full stop. A rejected socket
-  /// does not try again: a new one must.
+  /// Why the peer rejected the socket, and the remedy, without a full stop. A rejected socket does
+  /// not connect again; make a new one.
   std::optional<std::string> rejection();
 
-  /// The attempts to connect, `with_attempts`.
+  /// Counts of attempts to connect, for `with_attempts`.
   struct Attempts {
-    bool was_accepted = false;  ///< something took a connection, whatever came over it
+    bool was_accepted = false;  ///< a TCP connection was accepted
     unsigned failed = 0;
   };
   Attempts attempts();
 
  private:
-  /// An event that ended a handshake, and its value.
+  /// The event that ended a handshake, and its value.
   struct Failure {
     std::uint16_t event;
     std::uint32_t value;

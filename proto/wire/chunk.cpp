@@ -14,7 +14,6 @@ void append(std::string& bytes, Number number) {
   bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
 }
 
-/// Moves a number from the beginning of `bytes`; false when these are too few.
 template <class Number>
 bool take(std::string_view& bytes, Number& number) {
   if (bytes.size() < sizeof number) {
@@ -25,7 +24,7 @@ bool take(std::string_view& bytes, Number& number) {
   return true;
 }
 
-/// Moves a cell from the beginning of `bytes`; false when there is no whole one.
+/// Removes a cell from the beginning of `bytes`; false if there is no complete one.
 bool take_cell(std::string_view& bytes, Cell& cell) {
   std::uint32_t length = 0;
   if (!take(bytes, cell.kind)) {
@@ -74,7 +73,7 @@ Value value_of(const Cell& cell) {
 bool is_sound(const QueryReply& chunk) {
   const auto columns = static_cast<std::uint64_t>(chunk.columns_size());
   std::string_view rest = chunk.cells();
-  if (columns == 0 || chunk.chunk_rows() > rest.size() / columns) {  // a cell has a byte at least
+  if (columns == 0 || chunk.chunk_rows() > rest.size() / columns) {  // a cell has at least one byte
     return chunk.chunk_rows() == 0 && rest.empty();
   }
   Cell cell;

@@ -10,13 +10,13 @@
 
 #include "proto/oblique.pb.h"
 
-// Rows of answers. A chunk is a QueryReply, which has them cell by cell.
+// Rows of an answer in chunks. A chunk is a QueryReply, whose cells follow each other.
 namespace oblique::protocol {
 
-/// Codes of kinds in QueryReply.cells.
+/// Codes in QueryReply.cells.
 enum class CellKind : char { kNull = 0, kInteger = 1, kReal = 2, kText = 3 };
 
-/// One value of a row. Only the member that belongs to its kind counts.
+/// One value of a row. Only the member of its kind is valid.
 struct Cell {
   CellKind kind = CellKind::kNull;
   std::int64_t integer = 0;
@@ -24,11 +24,11 @@ struct Cell {
   std::string_view text = {};
 };
 
-/// A value that owns its text; std::monostate is NULL.
+/// A value that owns its text; std::monostate stands for NULL.
 using Value = std::variant<std::monostate, std::int64_t, double, std::string>;
 using Row = std::vector<Value>;
 
-/// A short answer, or a table that this program makes.
+/// A short answer as a whole.
 struct Table {
   std::vector<std::string> columns;
   std::vector<Row> rows = {};
@@ -36,23 +36,23 @@ struct Table {
 
 Value value_of(const Cell& cell);
 
-/// Whether a chunk has the cells of as many rows as it says. Chunks from outside must pass this
-/// before anything else is done with them.
+/// Whether a chunk contains the cells of as many rows as it states. Check received chunks before
+/// any other use.
 bool is_sound(const QueryReply& chunk);
 
-/// The rows of a sound chunk, which must not change meanwhile.
+/// Iterates over the rows of a sound chunk, which must not change meanwhile.
 class ChunkRows {
  public:
   explicit ChunkRows(const QueryReply& chunk);
 
-  /// Goes to the next row, at first to the first one; false after the last.
+  /// Moves to the next row, at first to the first one; false after the last.
   bool next();
   std::size_t columns() const { return cells_.size(); }
   /// The value of a column in the current row.
   const Cell& cell(std::size_t column) const { return cells_[column]; }
 
  private:
-  std::string_view rest_;  ///< the cells of the rows to come
+  std::string_view rest_;  ///< cells that are not read yet
   std::vector<Cell> cells_;
   std::uint64_t rows_left_;
 };
@@ -67,13 +67,13 @@ class ChunkWriter {
   void real(double value) { cell({.kind = CellKind::kReal, .real = value}); }
   void text(std::string_view value) { cell({.kind = CellKind::kText, .text = value}); }
   void cell(const Cell& value);
-  /// Ends a row, which must have a value for each column.
+  /// Ends a row, which must have a value for every column.
   void end_row() { ++rows_; }
 
-  /// Bytes since the last `take`.
+  /// Size of the cells since the last `take` [bytes].
   std::uint64_t bytes() const { return cells_.size(); }
 
-  /// The rows since the last call. The caller numbers the chunk and marks the last one.
+  /// Returns the rows since the last call. The caller numbers the chunk and marks the last one.
   QueryReply take();
 
  private:
@@ -82,7 +82,7 @@ class ChunkWriter {
   std::uint64_t rows_ = 0;
 };
 
-/// The table as the first and last chunk of an answer.
+/// Encodes the table as an answer of one chunk.
 QueryReply chunk_of(const Table& table);
 
 /// Appends the rows of a sound chunk and sets the columns.

@@ -21,11 +21,10 @@ CodedInputStream stream_of(std::string_view bytes) {
                           static_cast<int>(bytes.size()));
 }
 
-/// The fields of a message at a path of field numbers.
 struct Found {
   std::size_t fields = 0;
   std::size_t bytes = 0;  ///< of texts, packed lists and messages
-  bool is_whole = true;   ///< every message on the path could be read to its end
+  bool is_whole = true;   ///< every message on the path is complete
 };
 
 Found find(std::string_view message, std::span<const int> path) {
@@ -56,9 +55,9 @@ Found find(std::string_view message, std::span<const int> path) {
   return found;
 }
 
-/// Whether the recipe at that path has room in its bytes for the axes that its blocks need.
+/// Whether the recipe at the path has enough bytes for the axes that its blocks need.
 bool has_room_for_axes(std::string_view message, std::vector<int> path) {
-  // The least that an axis takes is its key and a range from 0 to 0; a block has three.
+  // The smallest axis has a key and a range from 0 to 0. A block has at least three axes.
   constexpr std::size_t kLeastAxisBytes = 5;
   constexpr std::size_t kLeastBlockBytes = 3 * (2 + kLeastAxisBytes);
   path.push_back(Recipe::kBlocksFieldNumber);
@@ -71,7 +70,7 @@ bool has_room_for_axes(std::string_view message, std::vector<int> path) {
 
 }  // namespace
 
-bool is_of_a_workers_size(std::string_view frame) {
+bool is_worker_frame_within_limits(std::string_view frame) {
   if (frame.size() > kMaxFrameBytes) {
     return false;
   }
@@ -83,14 +82,14 @@ bool is_of_a_workers_size(std::string_view frame) {
   const std::array results{static_cast<int>(Message::kResultsFieldNumber),
                            static_cast<int>(Results::kResultsFieldNumber)};
   return frame.size() - rows <= kMaxWorkerFrameBytes &&
-         find(frame, results).fields <= kMostResultsAMessage;
+         find(frame, results).fields <= kMaxResultsAMessage;
 }
 
-bool is_of_a_recipes_shape(std::string_view recipe) {
+bool is_unpadded_recipe(std::string_view recipe) {
   return has_room_for_axes(recipe, {});
 }
 
-bool is_of_a_requests_shape(std::string_view frame) {
+bool is_unpadded_request(std::string_view frame) {
   return has_room_for_axes(frame,
                            {ClientRequest::kSubmitFieldNumber, SubmitRequest::kRecipeFieldNumber});
 }

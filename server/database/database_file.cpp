@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr mode_t kOwnerOnly = 0600;
 constexpr int kBusyTimeout_ms = 5000;
 
-/// The lock of a server: a byte that SQLite does not lock.
+/// The lock of a server, on a byte that SQLite does not lock.
 struct flock servers_lock() {
   struct flock lock {};
   lock.l_type = F_WRLCK;
@@ -40,7 +40,7 @@ struct flock servers_lock() {
   return lock;
 }
 
-/// The path as a URI of SQLite, in which only these letters have a meaning.
+/// Formats the path as a URI for SQLite; escapes all except these letters.
 std::string as_uri(const std::string& path) {
   std::string uri = "file:";
   for (const char letter : fs::absolute(path).string()) {
@@ -52,11 +52,11 @@ std::string as_uri(const std::string& path) {
   return uri;
 }
 
-/// Opens a database without files beside it.
+/// Opens a database without creating files beside it.
 DatabaseHandle open_alone(const std::string& path) {
   std::error_code none;
   const bool has_log = fs::file_size(path + "-wal", none) > 0 && !none;
-  // SQLite ignores the log of an immutable database. With a log, the database is opened without
+  // SQLite ignores the log of an immutable database. So a database with a log is opened without
   // locks and in exclusive mode, in which SQLite keeps the index of the log in memory.
   DatabaseHandle database =
       open_database(as_uri(path) + (has_log ? "?vfs=unix-none" : "?immutable=1"),
@@ -74,7 +74,7 @@ void check_path(const std::string& path) {
   struct stat about {};
   if (::stat(path.c_str(), &about) == 0 && !S_ISREG(about.st_mode)) {
     throw StorageError(path + " is " + protocol::kind_of_file(about.st_mode) +
-                       ": a database is a regular file");
+                       ": a database must be a regular file");
   }
 }
 
@@ -97,7 +97,7 @@ DatabaseHandle open_for_reading(const std::string& path) {
 DatabaseHandle open_stored(const std::string& path) {
   DatabaseHandle database = open_for_reading(path);
   if (identify(database.get(), path) == DatabaseKind::kEmpty) {
-    throw StorageError(path + " is empty: no study was ever stored in it");
+    throw StorageError(path + " is empty: it contains no study");
   }
   return database;
 }
@@ -116,7 +116,8 @@ std::string file_system_of(const std::string& path) {
                                             static_cast<int>(line.size())) != nullptr) {
     const std::string_view folder(mount.mnt_dir);
     const std::string prefix = std::string(folder) + (folder.ends_with('/') ? "" : "/");
-    if (place.starts_with(prefix) && prefix.size() >= nearest.size()) {  // the latest one counts
+    // the last mount at a path hides earlier ones
+    if (place.starts_with(prefix) && prefix.size() >= nearest.size()) {
       nearest = prefix;
       type = mount.mnt_type;
     }
@@ -127,7 +128,7 @@ std::string file_system_of(const std::string& path) {
 bool is_network_file_system(std::string_view type) {
   constexpr std::array<std::string_view, 8> kNetwork{"nfs",    "cifs", "smb",  "ceph",
                                                      "lustre", "afs",  "gpfs", "beegfs"};
-  // With FUSE the name of the program follows; most of them reach other machines.
+  // The type of a FUSE file system contains the program's name; most reach other machines.
   constexpr std::array<std::string_view, 6> kLocalFuse{
       "fuse.mergerfs", "fuse.ntfs", "fuse.exfat", "fuse.overlay", "fuse.fuse-", "fuse.gocrypt"};
   const auto begins_type = [type](std::string_view name) { return type.starts_with(name); };
@@ -135,22 +136,22 @@ bool is_network_file_system(std::string_view type) {
          (type.starts_with("fuse.") && std::ranges::none_of(kLocalFuse, begins_type));
 }
 
-std::string objection_to_shared_disk(const std::string& path) {
+std::string network_disk_error(const std::string& path) {
   const std::string type = file_system_of(path);
   if (!is_network_file_system(type)) {
     return {};
   }
   return fmt::format(
-      "{} is on a network file system ({}), where two machines could write at once and damage the "
-      "database: name a file on a local disk, or pass --allow-network-disk if no other machine "
-      "uses it",
+      "{} is on a network file system ({}), on which two machines could damage the "
+      "database: use a file on a local disk, or --allow-network-disk if no other machine "
+      "writes to it",
       path, type);
 }
 
 const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk) {
-  const std::string objection = objection_to_shared_disk(path);
-  if (!objection.empty() && !allows_network_disk) {
-    throw StorageError(objection);
+  const std::string error = network_disk_error(path);
+  if (!error.empty() && !allows_network_disk) {
+    throw StorageError(error);
   }
   return path;
 }
@@ -177,7 +178,7 @@ ServerFile::ServerFile(const std::string& path) : path_(fs::absolute(path).strin
     ::close(file_);
     throw StorageError(
         "another server, `oblique run` or `oblique view` already uses the database " + path +
-        ": wait for it, or name another database");
+        ": wait until it ends, or use another database");
   }
 }
 
@@ -191,12 +192,12 @@ void ServerFile::check() const {
   if (exists && found.st_dev == opened_.st_dev && found.st_ino == opened_.st_ino) {
     return;
   }
-  // Other errors, such as a folder without search permission, do not mean that the file is gone.
+  // Other errors, such as a folder without search permission, do not show that the file is gone.
   if (exists || errno == ENOENT || errno == ENOTDIR || errno == ESTALE) {
     throw StorageGone(fmt::format(
-        "the file {} was {} while the server worked on it: nothing more is stored, and the server "
-        "ends. Put the file back, or a copy, and start the server again; workers that still run "
-        "have kept what is not stored",
+        "the file {} was {} while the server used it. Nothing more is stored, and the server "
+        "ends. Restore the file or a copy and start the server again; running workers "
+        "have kept all results that are not stored",
         path_, exists ? "replaced" : "deleted or renamed"));
   }
 }

@@ -12,15 +12,15 @@ namespace oblique::server {
 namespace {
 
 constexpr const char* kAfterFailedSync =
-    " (fsync): nothing more is stored, and the server ends. Once the disk works, start the server "
-    "again; workers that still run have kept what is not stored";
+    " (fsync). Nothing more is stored, and the server ends. Once the disk works, start the server "
+    "again; running workers have kept all results that are not stored";
 
 constexpr const char* kWayOut =
-    ": the file is damaged. `oblique check --db FILE` says where, and `oblique backup SAVED.db "
+    ": the file is damaged. `oblique check --db FILE` lists the faults, and `oblique backup "
+    "SAVED.db "
     "--db "
-    "FILE --salvage` saves what can be read; points whose results are lost are then solved again";
+    "FILE --salvage` saves all readable results; the other points are solved again";
 
-/// Throws the exception for a statement that failed with this code.
 [[noreturn]] void fail(sqlite3* database, int code, std::string reason) {
   check_sync(database, code);
   if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
@@ -29,8 +29,8 @@ constexpr const char* kWayOut =
   throw StorageError("the database failed: " + reason);
 }
 
-/// The CRC-32 of bytes that are added in small pieces. zlib gets them together, because a call of
-/// it costs as much as some hundred bytes.
+/// Computes the CRC-32 of bytes that are added in small pieces. Buffers them, because a call of
+/// zlib costs as much as some hundred bytes.
 class Crc {
  public:
   void add(const void* bytes, std::size_t size) {
@@ -44,7 +44,6 @@ class Crc {
       used_ += size;
     }
   }
-  /// A type and a word, least significant byte first.
   void add_word(char type, std::uint64_t word) {
     std::array<char, 9> bytes{type};
     for (std::size_t i = 1; i < bytes.size(); ++i) {
@@ -60,7 +59,7 @@ class Crc {
         break;
       case SQLITE_FLOAT: {
         const double real = sqlite3_value_double(value);
-        // SQLite may store a zero without its sign.
+        // SQLite may drop the sign of a zero.
         add_word('r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
         break;
       }
@@ -102,20 +101,20 @@ void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
 void check_sync(sqlite3* database, int code) {
   if (code == SQLITE_IOERR_FSYNC || code == SQLITE_IOERR_DIR_FSYNC) {
     const char* path = sqlite3_db_filename(database, "main");
-    throw StorageGone(std::string("the disk failed to store what was written to ") +
+    throw StorageGone(std::string("the disk failed to store changes of ") +
                       (path != nullptr ? path : "the database") + kAfterFailedSync);
   }
 }
 
 DatabaseHandle open_database(const std::string& path, int flags) {
   sqlite3* raw = nullptr;
-  // One thread uses a connection at a time, so SQLite need not lock at every call.
+  // One thread at a time uses a connection, so SQLite need not lock.
   const int code = sqlite3_open_v2(path.c_str(), &raw,
                                    flags | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOMUTEX, nullptr);
   DatabaseHandle database(raw);
   if (code != SQLITE_OK && raw != nullptr && sqlite3_system_errno(raw) == EACCES) {
     throw StorageError("cannot open the database " + path +
-                       ": permission denied; a database is its owner's alone until `chmod` lets "
+                       ": permission denied. Only its owner can read a new database; `chmod` lets "
                        "others read it");
   }
   if (code != SQLITE_OK) {
@@ -126,7 +125,7 @@ DatabaseHandle open_database(const std::string& path, int flags) {
   if (sqlite3_create_function_v2(raw, "row_checksum", kAnyNumber,
                                  SQLITE_UTF8 | SQLITE_DETERMINISTIC, nullptr, row_checksum, nullptr,
                                  nullptr, nullptr) != SQLITE_OK) {
-    throw StorageError(std::string("no checksums can be computed: ") + sqlite3_errmsg(raw));
+    throw StorageError(std::string("cannot compute checksums: ") + sqlite3_errmsg(raw));
   }
   return database;
 }
@@ -213,7 +212,7 @@ Transaction::Transaction(sqlite3* database) : database_(database) {
 }
 
 Transaction::~Transaction() {
-  // SQLite itself may have rolled back already, as when the disk is full.
+  // SQLite may have rolled back already, for example on a full disk.
   if (open_ && sqlite3_get_autocommit(database_) == 0) {
     sqlite3_exec(database_, "ROLLBACK", nullptr, nullptr, nullptr);
   }
@@ -244,7 +243,7 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
   } catch (const StorageError&) {
     const int code = sqlite3_errcode(database);
     throw StorageError(code == SQLITE_NOTADB
-                           ? path + " is not a database: it is some other kind of file"
+                           ? path + " is not a database"
                            : "cannot read the database " + path + ": " + sqlite3_errmsg(database) +
                                  (code == SQLITE_CORRUPT ? kWayOut : ""));
   }

@@ -11,23 +11,23 @@
 
 namespace oblique::server {
 
-/// A database could not be opened, read or written. The message names the file or statement and
-/// what SQLite said.
+/// A database could not be opened, read or written. The message names the file or statement and has
+/// SQLite's reason.
 class StorageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The file of the database was deleted, renamed or replaced while it was open, or a sync failed:
-/// nothing can be stored until the program starts again. After a failed sync Linux marks the
-/// unwritten pages as clean, so that a second sync succeeds without having stored them.
+/// The database file was deleted, renamed or replaced while it was open, or a sync failed. Nothing
+/// can be stored until the program is restarted: after a failed sync Linux marks the unwritten
+/// pages as clean, so a second sync succeeds without having stored them.
 class StorageGone : public StorageError {
  public:
   using StorageError::StorageError;
 };
 
-/// Throws StorageGone, which names the file of the connection, if the extended result code is that
-/// of a failed fsync.
+/// Throws StorageGone, which names the file of the connection, if `code` is the extended result
+/// code of a failed fsync.
 void check_sync(sqlite3* database, int code);
 
 struct CloseDatabase {
@@ -65,7 +65,7 @@ class Statement {
   void bind(int index, Integer value) {
     check(sqlite3_bind_int64(statement_.get(), index, static_cast<std::int64_t>(value)));
   }
-  /// A text without a copy: it must stay in place until the statement is reset.
+  /// Binds a text without copying it; it must not change until the statement is reset.
   void bind_lasting(int index, std::string_view text);
   /// Binds the value of column `column` of `row`, with its type.
   void bind_column(int index, const Statement& row, int column);
@@ -77,16 +77,16 @@ class Statement {
     (bind(++index, values), ...);
   }
 
-  /// Advances: true when there is a row. Throws StorageError.
+  /// Advances to the next row; false after the last one. Throws StorageError.
   bool step();
-  /// Runs a statement without rows and makes it ready for the next bindings.
+  /// Runs a statement that returns no rows and makes it ready for the next bindings.
   void run();
-  /// Makes the statement ready to run again. Bindings are cleared.
+  /// Clears the bindings and makes the statement ready to run again.
   void reset();
 
   int columns() const { return sqlite3_column_count(statement_.get()); }
   bool is_null(int column) const { return type(column) == SQLITE_NULL; }
-  /// SQLITE_INTEGER and so on.
+  /// The type of a value, as SQLITE_INTEGER.
   int type(int column) const { return sqlite3_column_type(statement_.get(), column); }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
   std::uint64_t number(int column) const { return static_cast<std::uint64_t>(integer(column)); }
@@ -106,7 +106,8 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
 
-/// Runs one statement without rows, with these values bound to its parameters. Throws StorageError.
+/// Runs one statement that returns no rows, with these values bound to its parameters. Throws
+/// StorageError.
 template <class... Values>
 void execute_with(sqlite3* database, std::string_view sql, const Values&... values) {
   Statement statement(database, sql);
@@ -114,7 +115,7 @@ void execute_with(sqlite3* database, std::string_view sql, const Values&... valu
   statement.run();
 }
 
-/// A transaction that rolls back unless it was committed.
+/// A transaction, which the destructor rolls back unless it was committed.
 class Transaction {
  public:
   explicit Transaction(sqlite3* database);
@@ -122,7 +123,7 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  /// Throws StorageError; the transaction is rolled back then.
+  /// Throws StorageError after rolling back.
   void commit();
 
  private:
@@ -136,7 +137,7 @@ inline constexpr std::int32_t kSchemaVersion = 13;
 
 enum class DatabaseKind { kEmpty, kOurs };
 
-/// Whether an open database is empty or ours. Throws StorageError, which names the reason, for a
+/// Returns whether an open database is empty or ours. Throws StorageError, with the reason, for a
 /// foreign file or another schema. `path` is for the messages.
 DatabaseKind identify(sqlite3* database, const std::string& path);
 

@@ -17,13 +17,13 @@ namespace oblique::server {
 namespace {
 
 constexpr std::chrono::milliseconds kTick{100};
-/// At the end unsent output is still sent for this time.
+/// At the end, time to send remaining output.
 constexpr std::chrono::milliseconds kLinger{500};
-/// Longest time for the messages of one port in a turn.
+/// Longest time for the messages of one port in one turn of the loop.
 constexpr std::chrono::milliseconds kShareOfTurn{5};
-/// When the database is gone, peers can still ask for the reason for this time.
+/// Time in which peers can still query the reason after the database is gone.
 constexpr std::chrono::seconds kFarewell{3};
-/// At the end messages that have arrived are read for this time at most.
+/// At the end, longest time to read messages that have arrived.
 constexpr std::chrono::milliseconds kLongestLastRead{1000};
 
 Instant now() {
@@ -33,7 +33,8 @@ Instant now() {
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
-/// Null without HTTP, and with a logged reason when the address is not free and need not be.
+/// Null without HTTP. If the address is in use and the server may run without HTTP, logs the reason
+/// and returns null.
 std::unique_ptr<Web> make_web(const LoopSettings& settings) {
   if (!settings.web) {
     return nullptr;
@@ -45,11 +46,11 @@ std::unique_ptr<Web> make_web(const LoopSettings& settings) {
     return std::make_unique<Web>(std::move(web));
   } catch (const std::runtime_error& error) {
     const std::string what =
-        std::string(error.what()) + " (--http names another address, or \"off\")";
+        std::string(error.what()) + " (choose another address with --http, or --http off)";
     if (!settings.web->may_be_missing) {
       throw std::runtime_error(what);
     }
-    spdlog::warn("no metrics over HTTP: {}", what);
+    spdlog::warn("the server runs without HTTP: {}", what);
     return nullptr;
   }
 }
@@ -84,7 +85,7 @@ EventLoop::EventLoop(LoopSettings settings)
                                access_.security(AccessControl::PortRole::kClients))),
       web_(make_web(settings)) {
   if (store_.is_new()) {
-    spdlog::info("made the database {}: only its owner can read it (chmod lets others)",
+    spdlog::info("created the database {}: only its owner can read it (chmod lets others)",
                  settings.database);
   }
   ServiceSettings service = std::move(settings.service);
@@ -92,7 +93,7 @@ EventLoop::EventLoop(LoopSettings settings)
   service.clients.access = name_of(access_.mode());
   service.last_study_id = store_.last_study_id();
   service.last_worker_id = store_.last_worker_id();
-  // Above every number of an earlier run, whatever the clock shows.
+  // Above every number of an earlier run, even if the clock was set back.
   service.scheduler.first_lease_id = store_.count_start() << 40U;
   Ports& ports = *this;
   service_.emplace(service, ports, store_.studies(), now());
@@ -135,7 +136,7 @@ void EventLoop::log(Severity severity, const std::string& text) {
 // ---- The loop ----------------------------------------------------------------------------------
 
 LoopEnd EventLoop::run(int stop_fd, const std::function<void()>& take_stop) {
-  writer_.resume_deletions();  // from here on it alone uses the store
+  writer_.resume_deletions();  // from here on only the writer uses the store
   auto next_tick = Clock::now();
   std::array<pollfd, 4> items{{{network_.descriptor(), POLLIN, 0},
                                {web_ ? web_->descriptor() : -1, POLLIN, 0},
@@ -180,7 +181,6 @@ void EventLoop::take_completions() {
   completions_.run();
 }
 
-/// True when messages are left that could be taken at once.
 bool EventLoop::take_worker_messages() {
   return take_messages(
       workers_, [this](const std::string& /*worker*/) { return service_->has_room(); },
@@ -189,7 +189,6 @@ bool EventLoop::take_worker_messages() {
       });
 }
 
-/// The same. A client that does not read its replies must do so before its next request is taken.
 bool EventLoop::take_client_messages() {
   return take_messages(
       clients_, [this](const std::string& client) { return !network_.is_busy(client); },
@@ -223,7 +222,6 @@ void EventLoop::note_disconnects() {
   }
 }
 
-/// Reads the list of authorized keys again.
 void EventLoop::check_access() {
   if (access_.refresh(now().steady_ms)) {
     network_.admission_changed();
@@ -242,7 +240,7 @@ void EventLoop::report(LoopState::Stage stage) const {
 
 // ---- The end -----------------------------------------------------------------------------------
 
-/// Whether the loop goes on after a request to stop.
+/// Returns whether the loop continues after a request to stop.
 bool EventLoop::begin_drain(const std::function<void()>& take_stop) {
   if (drain_until_ || drain_.count() == 0 || !take_stop) {
     return false;
@@ -250,8 +248,8 @@ bool EventLoop::begin_drain(const std::function<void()>& take_stop) {
   take_stop();
   drain_until_ = Clock::now() + drain_;
   spdlog::info(
-      "draining: nothing more is handed out; waits up to {} s for {} batches that are with "
-      "workers. A second signal ends it at once",
+      "draining: no further batches are sent; waiting up to {} s for {} batches of "
+      "workers. A second signal stops the server at once",
       std::chrono::duration<double>(drain_).count(), service_->scheduler().leases());
   service_->drain(now());
   return true;
@@ -261,10 +259,11 @@ bool EventLoop::is_drained() const {
   const bool is_complete = drain_until_ && service_->is_drained();
   const bool is_late = drain_until_ && Clock::now() >= *drain_until_;
   if (is_complete) {
-    spdlog::info("drained: all that was handed out is stored or given back");
+    spdlog::info("drained: all batches are stored or given back");
   } else if (is_late) {
-    spdlog::warn("not drained in time: {} batches are with workers, who deliver them later",
-                 service_->scheduler().leases());
+    spdlog::warn(
+        "not drained in time: {} batches are still with workers, which will deliver them later",
+        service_->scheduler().leases());
   }
   return is_complete || is_late;
 }
@@ -290,13 +289,13 @@ LoopEnd EventLoop::finish() {
   network_.flush(kLinger);
   wait_for_readers();
   if (lost > 0) {
-    spdlog::error("{} changes could not be made durable and were not acknowledged", lost);
+    spdlog::error("{} changes could not be stored and were not acknowledged", lost);
   }
   return {lost, service_->storage_is_gone()};
 }
 
-/// libzmq drops what a client has not read when the connection ends: clients that got a reply at
-/// the end have time to read it, and most of them disconnect then.
+/// libzmq drops unread messages when a connection ends. Clients that got a reply at the end have
+/// time to read it; most then disconnect.
 void EventLoop::wait_for_readers() {
   const auto until = Clock::now() + kLinger;
   const auto is_there = [this](const auto& client) { return network_.is_connected(client); };

@@ -29,7 +29,8 @@
 
 namespace oblique::server {
 
-/// Work that other threads leave for the event loop, which a descriptor wakes.
+/// Queue of functions that other threads want to run on the event loop. A descriptor wakes the
+/// loop.
 class CompletionQueue {
  public:
   using Completion = std::function<void()>;
@@ -40,7 +41,7 @@ class CompletionQueue {
     completions_.push_back(std::move(completion));
     woken_.wake();
   }
-  /// Called by the loop: runs everything that was put before.
+  /// Called by the loop: runs all queued functions.
   void run() {
     woken_.clear();
     std::vector<Completion> completions;
@@ -52,7 +53,7 @@ class CompletionQueue {
       completion();
     }
   }
-  /// Readable when there is something to run.
+  /// Readable when the queue is not empty.
   int descriptor() const { return woken_.descriptor(); }
 
  private:
@@ -61,11 +62,11 @@ class CompletionQueue {
   std::vector<Completion> completions_;  // guarded by mutex_
 };
 
-/// Runs checks that take long, in order, on a thread of its own. How many wait is bounded by those
-/// who submit them. The destructor drops the checks that wait, and waits for the one that runs.
+/// Runs long checks one after another on a thread of its own. Callers bound the number that wait.
+/// The destructor drops waiting checks and waits for the running one.
 class CheckThread {
  public:
-  /// `done` is called on the thread after each check.
+  /// `done` is called on this thread after each check.
   explicit CheckThread(std::function<void(Ports::Completion)> done)
       : done_(std::move(done)), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
@@ -94,7 +95,7 @@ class CheckThread {
   std::jthread thread_;               // last: it uses the other members
 };
 
-/// The state of the loop, as the service manager gets it.
+/// The state of the loop, for the service manager.
 struct LoopState {
   enum class Stage { kRuns, kDrains, kEnds };
   Stage stage;
@@ -103,47 +104,47 @@ struct LoopState {
 };
 
 struct LoopSettings {
-  std::string database;              ///< file
-  bool allow_network_disk = false;   ///< the file may lie on a network file system
+  std::string database;              ///< path of the file
+  bool allow_network_disk = false;   ///< allows a file on a network file system
   AccessSettings access;             ///< of both ports
-  std::string worker_port = "7601";  ///< "*": the system picks one
+  std::string worker_port = "7601";  ///< "*": chosen by the system
   std::string client_port = "7600";
   QueryPoolSettings queries;
   NetworkLimits network;
-  std::optional<WebSettings> web;  ///< database and solver version are those of the server
-  /// On a request to stop, time to wait for results under way; 0: none.
+  std::optional<WebSettings> web;  ///< database and solver version are set from the server's
+  /// Time to wait for running batches on a request to stop; 0: none.
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once as the loop ends.
   std::function<void(const LoopState&)> on_turn = [](const LoopState&) {};
-  ServiceSettings service;  ///< solver_version must be set; the rest from the database
+  ServiceSettings service;  ///< solver_version must be set; the rest comes from the database
 };
 
-/// What the loop ended with.
+/// Result of a run of the loop.
 struct LoopEnd {
-  std::size_t lost_writes;  ///< changes that could not be made durable
-  bool lost_database;       ///< it was deleted or replaced, and so the server ended
+  std::size_t lost_writes;  ///< changes that could not be stored
+  bool lost_database;       ///< the file was deleted or replaced
 };
 
-/// The server: one loop that passes what comes from network, HTTP, writer, query pool and check
-/// thread to the service. Logs to spdlog's default logger.
+/// The server: a loop that passes input from network, HTTP, writer, query pool and check thread to
+/// the service. Logs to spdlog's default logger.
 class EventLoop final : private Ports {
  public:
   /// Opens the database and binds both ports. Throws StorageError, also for a file on a network
-  /// file system, solver::InputError for an address that may not be listened on, and
-  /// std::runtime_error for one that cannot.
+  /// file system; solver::InputError for an address that is not allowed; std::runtime_error for a
+  /// port that cannot be bound.
   explicit EventLoop(LoopSettings settings);
 
-  /// As ZeroMQ endpoints with the ports that are really used.
+  /// ZeroMQ endpoints with the ports in use.
   std::string client_endpoint() const { return network_.endpoint(clients_); }
   std::string worker_endpoint() const { return network_.endpoint(workers_); }
-  /// As http://127.0.0.1:7602; empty: without HTTP.
+  /// Such as http://127.0.0.1:7602; empty: without HTTP.
   std::string http_url() const { return web_ ? web_->url() : std::string(); }
   /// The address of the page with its token; empty: without HTTP.
   std::string page_url() const { return web_ ? web_->page_url() : std::string(); }
 
-  /// Runs until `stop_fd` becomes readable or the database is gone; then notifies the workers,
-  /// stores and acknowledges what was received and returns. With `drain` it first waits for results
-  /// under way. `take_stop` then reads `stop_fd`, so that a second signal ends the wait.
+  /// Runs until `stop_fd` becomes readable or the database is gone. Then notifies workers, stores
+  /// and acknowledges received results, and returns. With `drain` it first waits for running
+  /// batches; `take_stop` must read `stop_fd`, so that a second signal ends the wait.
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop = {});
 
  private:
@@ -158,7 +159,9 @@ class EventLoop final : private Ports {
   void add_peers(protocol::WorkersReply& reply) const override;
   void write(WriteJob job) override { writer_.submit(std::move(job)); }
   bool query(QueryJob job) override { return queries_.submit(std::move(job)); }
-  void more_rows(std::uint64_t query, std::uint64_t taken) override { queries_.more(query, taken); }
+  void more_rows(std::uint64_t query, std::uint64_t received) override {
+    queries_.more(query, received);
+  }
   void cancel_query(std::uint64_t ticket) override { queries_.cancel(ticket); }
   void run_check(Check check) override { checks_.submit(std::move(check)); }
   void log(Severity severity, const std::string& text) override;
@@ -180,7 +183,7 @@ class EventLoop final : private Ports {
 
   const std::chrono::milliseconds drain_;
   const std::function<void(const LoopState&)> on_turn_;
-  std::optional<Clock::time_point> drain_until_;  ///< none: it does not drain
+  std::optional<Clock::time_point> drain_until_;  ///< none: not draining
   AccessControl access_;
   Store store_;
   CompletionQueue completions_;
@@ -192,7 +195,7 @@ class EventLoop final : private Ports {
   Network::Port clients_;
   std::unique_ptr<Web> web_;
   bool is_ending_ = false;
-  std::vector<std::string> last_answered_;  ///< clients that were sent something at the end
+  std::vector<std::string> last_answered_;  ///< clients that got a message at the end
   std::optional<Service> service_;
 };
 

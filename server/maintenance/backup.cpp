@@ -19,7 +19,7 @@ namespace {
 
 void check_is_new(const std::string& path) {
   if (std::filesystem::exists(path)) {
-    throw StorageError(path + " exists already: name a file that does not");
+    throw StorageError(path + " exists: choose another name");
   }
 }
 
@@ -28,7 +28,7 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
   if (backup == nullptr) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
   }
-  // All pages in one step, so that the copy has one state of the source even if a server writes.
+  // Copies all pages in one step, so that the copy has one state even while a server writes.
   const int step = sqlite3_backup_step(backup, -1);
   const int end = sqlite3_backup_finish(backup);
   if (step != SQLITE_DONE || end != SQLITE_OK) {
@@ -48,17 +48,17 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   return found;
 }
 
-/// Rows of one table that have ascending integer keys.
+/// A table with ascending integer keys, of which some or all rows are copied.
 struct KeyedRows {
   std::string table;
   std::string key;
-  std::string condition = "1";    ///< which rows are copied, in SQL
-  std::string is_sound = "1";     ///< false for a damaged row, in SQL
-  std::int64_t before_first = 0;  ///< smaller than every key
+  std::string condition = "1";    ///< SQL condition for the rows to copy
+  std::string is_sound = "1";     ///< SQL condition for an undamaged row
+  std::int64_t before_first = 0;  ///< any number below all keys
 };
 
-/// Inserts the columns of a row after the first two. False when the row violates the schema, so it
-/// is damaged. Throws std::runtime_error when the copy cannot be written.
+/// Inserts the columns of a row after the first two. False if the row violates the schema and so is
+/// damaged. Throws std::runtime_error if the copy cannot be written.
 bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   for (int column = 2; column < row.columns(); ++column) {
     insert.bind_column(column - 1, row, column);
@@ -69,18 +69,18 @@ bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   } catch (const StorageError&) {
     const auto code = static_cast<unsigned>(sqlite3_errcode(to)) & 0xffU;
     if (code != SQLITE_CONSTRAINT && code != SQLITE_MISMATCH) {
-      throw std::runtime_error("the copy cannot be written: is there room on its disk?");
+      throw std::runtime_error("the copy cannot be written: is its disk full?");
     }
     insert.reset();
     return false;
   }
 }
 
-/// Copies the readable rows in the order of their keys and returns their number. After an
-/// unreadable place it searches for the next readable row in growing leaps, so that a long place
-/// costs few attempts and a short one few readable rows.
+/// Copies the readable rows by ascending key and returns their number. After an unreadable row it
+/// looks for the next readable one in growing steps, so that a long gap costs few attempts and a
+/// short gap few readable rows.
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
-  // Larger than every key that is used, so that no row can follow.
+  // Larger than every key in use.
   constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
   const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
   const std::vector<std::string> found = texts(from, columns_sql);
@@ -88,7 +88,7 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
     return 0;  // the table is lost
   }
   std::vector<std::string> columns;
-  std::vector<std::string> lost;  // columns, and with them the checksum over them
+  std::vector<std::string> lost;  // lost columns; the row then has no checksum
   for (const std::string& column : texts(to, columns_sql)) {
     (std::ranges::count(found, column) > 0 ? columns : lost).push_back(column);
   }
@@ -129,12 +129,11 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
   return copied;
 }
 
-/// Copies the tables, each after those that it refers to.
 void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies", .key = "study_id"}, saved);
   copy_rows(from, to, {.table = "models", .key = "model_id"}, saved);
   copy_rows(from, to, {.table = "workers", .key = "worker_id"}, saved);
-  // Rows of lost studies are not copied, because they have no meaning without the recipe.
+  // Skips rows of lost studies, which have no meaning without the recipe.
   for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
               {.table = "results",
@@ -146,16 +145,16 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   }
 }
 
-/// Removes or repairs references to rows that were lost, and counts completed points. Studies and
-/// models with a damaged value stay without a checksum; `check` compares rows with their recipes.
+/// Removes or repairs references to lost rows, and counts completed points. Studies and models with
+/// a damaged value stay without a checksum; `check` compares their rows with the recipes.
 void mend(sqlite3* database) {
   execute(database, fmt::format("UPDATE studies SET checksum = NULL WHERE checksum <> {};"
                                 "UPDATE models SET checksum = NULL WHERE checksum <> {};",
                                 kStudyChecksum, model_checksum_sql()));
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
-          // Rows keep the number of a lost worker, so that their checksums stay right. If all other
-          // workers have one solver version, it is used for the lost worker too.
+          // Rows keep the number of a lost worker, so that their checksums stay right. A lost
+          // worker gets the solver version of all other workers if they have only one.
           "INSERT INTO workers"
           " (worker_id, name, threads, solver_version, instruction_set, joined_at)"
           " SELECT DISTINCT worker_id, 'lost with a damaged file', 1,"
@@ -169,7 +168,6 @@ void mend(sqlite3* database) {
   }
 }
 
-/// Throws StorageError unless the list of tables can be read.
 void check_is_salvageable(sqlite3* database, const std::string& path) {
   try {
     if (identify(database, path) != DatabaseKind::kEmpty) {
@@ -179,9 +177,9 @@ void check_is_salvageable(sqlite3* database, const std::string& path) {
     if ((static_cast<unsigned>(sqlite3_errcode(database)) & 0xffU) != SQLITE_CORRUPT) {
       throw;
     }
-    throw StorageError(path + " has a damaged list of tables: nothing can be salvaged");
+    throw StorageError(path + " has a damaged list of tables, so nothing can be salvaged");
   }
-  throw StorageError(path + " is empty: no study was ever stored in it");
+  throw StorageError(path + " is empty: it contains no study");
 }
 
 }  // namespace
@@ -191,10 +189,9 @@ void copy_into(const DraftFile& draft, const std::string& from, const std::strin
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   copy_pages(source.get(), copy.get(), to);
-  // So that the copy is one file, without a log.
   execute(copy.get(), "PRAGMA journal_mode = DELETE");
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
-    throw StorageError(from + " is damaged, and so would be the copy: " + faults.front());
+    throw StorageError(from + " is damaged and was not copied: " + faults.front());
   }
 }
 
@@ -208,7 +205,7 @@ void back_up(const std::string& from, const std::string& to) {
 Salvaged salvage(const std::string& from, const std::string& to) {
   check_is_new(to);
   const DatabaseHandle source = open_for_reading(from);
-  // So that SQLite reads a file that is shorter than its first page says.
+  // Lets SQLite read a file that is shorter than its header states.
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_is_salvageable(source.get(), from);
   const DraftFile draft(to + ".part");

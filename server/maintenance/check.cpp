@@ -20,20 +20,19 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kMostOfAKind = 20;
+constexpr std::size_t kMaxOfAKind = 20;
 
-/// Appends the first column of the first kMostOfAKind rows.
 void append(std::vector<std::string>& to, sqlite3* database, const std::string& sql) {
   Statement rows(database, sql);
-  for (std::size_t i = 0; i < kMostOfAKind && rows.step(); ++i) {
+  for (std::size_t i = 0; i < kMaxOfAKind && rows.step(); ++i) {
     to.push_back(rows.text(0));
   }
 }
 
-/// The columns that `recipe_fault` reads. A row must begin with them.
+/// The columns that `recipe_fault` reads, which must be the first ones of a row.
 constexpr const char* kRecipeColumns = "point, model_id, H, mu, e";
 
-/// Checks studies one after the other, each with all its rows in one pass.
+/// Checks studies one after another, each with all its rows in one pass.
 class StudyCheck {
  public:
   StudyCheck(sqlite3* database, Diagnosis& found)
@@ -58,20 +57,20 @@ class StudyCheck {
     while (studies_.step()) {
       name_ = studies_.text(1);
       if (studies_.integer(7) != 0) {
-        add_fault("its number, recipe or size is not the one that was stored");
+        add_fault("its number, recipe or size was changed after it was stored");
       }
       check_terms();
       const StudyTable table = read_table();
       check_completed(table, check_rows(table));
     }
     for (const auto* faults : {&study_faults_, &row_faults_}) {
-      const auto count = static_cast<std::ptrdiff_t>(std::min(faults->size(), kMostOfAKind));
+      const auto count = static_cast<std::ptrdiff_t>(std::min(faults->size(), kMaxOfAKind));
       found_.faults.insert(found_.faults.end(), faults->begin(), faults->begin() + count);
     }
     if (without_checksum_ > 0) {
-      found_.remarks.push_back(
-          fmt::format("{} of {} results have no checksum: a flipped bit in them may not be found",
-                      without_checksum_, all_rows_));
+      found_.remarks.push_back(fmt::format(
+          "{} of {} results have no checksum, so a flipped bit in them may not be found",
+          without_checksum_, all_rows_));
     }
   }
 
@@ -80,21 +79,18 @@ class StudyCheck {
     study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
   }
 
-  /// Checks for values that no server stores; they could keep a server from starting, or could not
-  /// be shown.
+  /// Checks for values that a server never stores; they could prevent a start or a display.
   void check_terms() {
     constexpr std::int64_t kLongestTime = 64;
-    for (const std::string& objection :
-         {protocol::objection_to_study_name(name_),
-          protocol::objection_to_priority(studies_.integer(5)),
+    for (const std::string& error :
+         {protocol::study_name_error(name_), protocol::priority_error(studies_.integer(5)),
           std::string(studies_.integer(6) > kLongestTime ? "its times are not valid" : "")}) {
-      if (!objection.empty()) {
-        add_fault(objection);
+      if (!error.empty()) {
+        add_fault(error);
       }
     }
   }
 
-  /// The table of the study; its points are computed if the recipe can be read.
   StudyTable read_table() {
     StudyTable table(studies_.text(2), studies_.number(3));
     try {
@@ -105,7 +101,6 @@ class StudyCheck {
     return table;
   }
 
-  /// Returns the points that have a row.
   IntervalSet check_rows(const StudyTable& table) {
     constexpr int kNoChecksum = 5;
     constexpr int kFault = 6;
@@ -120,7 +115,7 @@ class StudyCheck {
       if (fault.empty() && table.is_made()) {
         fault = recipe_fault(*table.get());
       }
-      if (!fault.empty() && row_faults_.size() < kMostOfAKind) {
+      if (!fault.empty() && row_faults_.size() < kMaxOfAKind) {
         row_faults_.push_back(
             fmt::format("study {}, point {}: {}", name_, rows_.integer(0), fault));
       }
@@ -130,11 +125,11 @@ class StudyCheck {
   }
 
   /// The first difference between the current row and the recipe, as a part of a sentence; empty if
-  /// they agree. Compares the point, H, mu, e and the model, with the tolerance for values that
-  /// another machine computed (is_close of proto/recipe/point_table.h). Fast for rows in the order
-  /// of their points.
+  /// they agree. Compares point, H, mu, e and model, with the tolerance of is_close
+  /// (proto/recipe/point_table.h) for values that another machine computed. Fast for rows in the
+  /// order of their points.
   std::string recipe_fault(const protocol::PointTable& table) {
-    if (rows_.number(0) >= table.size()) {  // negative numbers are large
+    if (rows_.number(0) >= table.size()) {  // a negative number becomes a large one
       return "the study has no such point";
     }
     const protocol::Point point = table.point(rows_.number(0));
@@ -142,7 +137,7 @@ class StudyCheck {
     for (const auto& [key, value] :
          {std::pair("H", point.H_m), {"mu", point.mu}, {"e", point.e_star}}) {
       if (!protocol::is_close(rows_.real(column), value)) {
-        return fmt::format("{} is {:.17g}, and {:.17g} in the recipe", key, rows_.real(column),
+        return fmt::format("{} is {:.17g}, but the recipe has {:.17g}", key, rows_.real(column),
                            value);
       }
       ++column;
@@ -150,7 +145,7 @@ class StudyCheck {
     const std::pair models{point.model, rows_.integer(1)};
     if (models != equal_models_) {
       if (!is_model(rows_.integer(1), table.model(point.model))) {
-        return "its model is not that of the recipe";
+        return "its model differs from that of the recipe";
       }
       equal_models_ = models;
     }
@@ -165,16 +160,15 @@ class StudyCheck {
   }
 
   /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can
-  /// make a point completed without a row. A study that is not counted became done before another
-  /// program deleted rows.
+  /// complete a point without a row. In a study with `counted` = 0 another program deleted rows, so
+  /// its ranges and state may be outdated.
   void check_completed(const StudyTable& table, const IntervalSet& rows) {
     const bool is_counted = studies_.integer(9) != 0;
     const IntervalSet completed =
         is_counted ? completed_points(database_, studies_.number(0)) : rows;
     if (!is_counted) {
       found_.remarks.push_back(fmt::format(
-          "study {}: another program deleted results; they are counted when a server starts",
-          name_));
+          "study {}: another program deleted results; the next server counts them again", name_));
     }
     IntervalSet without_row = completed;
     rows.for_each([&](const Interval& range) { without_row.erase(range.begin, range.end); });
@@ -183,7 +177,7 @@ class StudyCheck {
         (!without_row.empty() && !has_filter) ||
         (is_counted && without_row.size() != studies_.number(8))) {
       add_fault(fmt::format(
-          "completed_ranges has {} points and results {}, and they are not the same. UPDATE "
+          "completed_ranges has {} points and results has {}, and they differ. UPDATE "
           "studies SET counted = 0 WHERE study_id = {} makes the next server count them",
           completed.size(), rows.size(), studies_.integer(0)));
     }
@@ -200,8 +194,9 @@ class StudyCheck {
   Statement studies_;
   Statement rows_;
   Statement definition_;
-  std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};  // of the recipe, and its row
-  std::string name_;                                            // of the current study
+  // model number in the recipe, and number of its row
+  std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};
+  std::string name_;  // of the current study
   std::vector<std::string> study_faults_;
   std::vector<std::string> row_faults_;
   std::uint64_t all_rows_ = 0;
@@ -226,22 +221,22 @@ std::string row_fault_sql() {
     lists.push_back(fmt::format("json_valid(coalesce({}, '[]'))", list->column));
   }
   return fmt::format(
-      "CASE WHEN checksum <> {} THEN 'its row is not the one that was stored'"
+      "CASE WHEN checksum <> {} THEN 'its row was changed after it was stored'"
       " WHEN NOT ({}) THEN 'one of its lists cannot be read'"
-      " WHEN error IS NULL AND ({} IS NULL) THEN 'it is solved, and outputs are missing'"
+      " WHEN error IS NULL AND ({} IS NULL) THEN 'it is solved, but outputs are missing'"
       " WHEN error IS NOT NULL AND coalesce({}) IS NOT NULL"
-      " THEN 'it is failed, and has outputs' END",
+      " THEN 'it failed, but has outputs' END",
       result_checksum_sql(), fmt::join(lists, " AND "),
       fmt::join(required_outputs(), " IS NULL OR "), fmt::join(output_columns(), ", "));
 }
 
 Diagnosis diagnose_contents(sqlite3* database) {
   Diagnosis found;
-  // A table with another definition could compute values without end.
+  // The definition of a table could contain endless computations.
   for (const std::string& table : differing_tables(database)) {
     found.faults.push_back(fmt::format(
-        "the table {} is missing or has other columns, and no server starts on this file: `oblique "
-        "backup --salvage` makes a file with all rows that can be read",
+        "the table {} is missing or has other columns, so no server can use this file: `oblique "
+        "backup --salvage` makes a file with all readable rows",
         table));
   }
   if (!found.faults.empty()) {
@@ -255,7 +250,7 @@ Diagnosis diagnose_contents(sqlite3* database) {
                        table));
   }
   append(found.faults, database,
-         fmt::format("SELECT 'model ' || model_id || ': it is not the one that was stored'"
+         fmt::format("SELECT 'model ' || model_id || ': it was changed after it was stored'"
                      " FROM models WHERE checksum <> {}",
                      model_checksum_sql()));
   append(found.remarks, database,
@@ -269,7 +264,7 @@ Diagnosis diagnose(const std::string& path) {
   const DatabaseHandle opened = open_stored(path);
   sqlite3* database = opened.get();
   if (auto faults = faults_of_pages(database); !faults.empty()) {
-    return {std::move(faults), {}};  // damaged pages make every other answer meaningless
+    return {std::move(faults), {}};  // damaged pages make other checks meaningless
   }
   execute(database, "BEGIN");  // so that rows and counts agree while a server writes
   return diagnose_contents(database);

@@ -21,22 +21,21 @@
 namespace oblique::server {
 namespace {
 
-/// Opens the copy of a source. Throws StorageError for tables of another definition and for damaged
+/// Opens the copy of a source. Throws StorageError for tables with other columns and for damaged
 /// rows.
 DatabaseHandle open_sound_source(const std::string& path) {
-  // A value that a server stores was part of one message, so it cannot be longer.
+  // A stored value was part of one message, so it cannot be longer.
   constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
   DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
   sqlite3_limit(database.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
   if (const auto faults = diagnose_contents(database.get()).faults; !faults.empty()) {
     throw StorageError(faults.front() +
-                       ": `oblique check` names all faults, and `oblique backup --salvage` makes a "
+                       ": `oblique check` lists all faults, and `oblique backup --salvage` makes a "
                        "file that can be merged");
   }
   return database;
 }
 
-/// A row of `studies`.
 struct StudyRow {
   std::uint64_t id;
   std::string name;
@@ -49,10 +48,10 @@ StudyRow study_in(const Statement& row) {
   return {row.number(0), row.text(1), StudyTable(row.text(2), row.number(3))};
 }
 
-// Parameters of the statements on rows: ?1 the study's number in the source, ?2 in the target.
+// Parameters of the statements below: ?1 the study's number in the source, ?2 in the target.
 
-/// Selects the points that are solved in both with different outputs. The time that the solver took
-/// is not compared.
+/// Selects points that are solved in both databases with different outputs, except the solver's
+/// time.
 std::string differing_sql() {
   const auto outputs = [](const char* table) {
     std::string names;
@@ -90,16 +89,16 @@ std::string insert_sql() {
       fmt::join(result_columns(), ", "), fmt::join(values, ", "));
 }
 
-/// Merges one source, in a transaction of the caller.
+/// Merges one source within a transaction of the caller.
 class SourceMerge {
  public:
-  /// `database` is the connection to the target, to which `source` is attached.
+  /// `database` is the connection to the target, to which `source` was attached.
   SourceMerge(sqlite3* database, sqlite3* source, const std::string& rename_prefix, Merged& merged)
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
-  /// Throws MergeRefused for a study that has no place in the target.
   void run() {
-    std::vector<std::pair<std::uint64_t, StudyRow>> places;  // of studies of the source
+    // source studies by number in the target
+    std::vector<std::pair<std::uint64_t, StudyRow>> places;
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
     while (list.step()) {
       const StudyRow study = study_in(list);
@@ -117,8 +116,9 @@ class SourceMerge {
   }
 
  private:
-  /// The study of the target for `study`: tries its own name, then the name with the prefix. A free
-  /// name becomes a new study; a study of the same or a longer or shorter recipe is united with it.
+  /// Returns the number of the target's study for `study`. Tries the study's own name, then the
+  /// name with the prefix. Creates a study if the name is free; unites the studies if one recipe
+  /// begins with the other.
   StudyRow place_of(const StudyRow& study) {
     std::string conflict;
     for (const std::string& name : {study.name, rename_prefix_ + study.name}) {
@@ -137,14 +137,15 @@ class SourceMerge {
                              growth.difference);
     }
     std::ranges::replace(conflict, '\n', ';');
-    throw MergeRefused(conflict + (rename_prefix_.empty()
-                                       ? ". --rename-prefix PREFIX gives such studies other names"
-                                       : ". Another --rename-prefix gives other names"));
+    throw MergeRefused(conflict +
+                       (rename_prefix_.empty()
+                            ? ". Use --rename-prefix PREFIX to give such studies other names"
+                            : ". Use another --rename-prefix"));
   }
 
   StudyRow add(const StudyRow& study, const std::string& name) {
-    if (const std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
-      throw MergeRefused(objection);
+    if (const std::string error = protocol::study_name_error(name); !error.empty()) {
+      throw MergeRefused(error);
     }
     ++merged_.studies_added;
     execute_with(
@@ -174,7 +175,7 @@ class SourceMerge {
     return {known.id, known.name, study.table};
   }
 
-  /// Results of a study come from one solver version.
+  /// All results of a study must come from one solver version.
   void refuse_other_version(std::uint64_t source_id, const StudyRow& known) const {
     Statement other(database_,
                     "SELECT theirs.solver_version, ours.solver_version"
@@ -186,14 +187,14 @@ class SourceMerge {
     other.bind_all(known.id, source_id);
     if (other.step()) {
       throw MergeRefused(fmt::format(
-          "its results of study {} come from solver version {}, and those of the target from {}: "
-          "`oblique rename` gives one of the studies another name",
+          "its results of study {} come from solver version {}, those of the target from {}: "
+          "rename one of the studies (`oblique rename`)",
           known.name, other.text(0), other.text(1)));
     }
   }
 
-  /// Copies the models and workers that the target lacks, and makes the temporary tables
-  /// `model_map` and `worker_map` from numbers of the source to those of the target.
+  /// Copies missing models and workers, and makes the temporary tables `model_map` and `worker_map`
+  /// from numbers in the source to numbers in the target.
   void copy_models_and_workers() const {
     const auto copy = [&](const std::string& name, const std::string& columns,
                           const std::string& identity) {
@@ -227,23 +228,22 @@ class SourceMerge {
   }
 
   void note_differing(Statement& differing, const std::string& study) {
-    constexpr std::size_t kMostRemarks = 10;
+    constexpr std::size_t kMaxRemarks = 10;
     while (differing.step()) {
-      if (++merged_.results_differing <= kMostRemarks) {
+      if (++merged_.results_differing <= kMaxRemarks) {
         merged_.remarks.push_back(fmt::format("study {}, point {}: the solved outputs differ",
                                               study, differing.number(0)));
       }
     }
   }
 
-  /// Unites the completed points.
   void finish(std::uint64_t source_id, const StudyRow& target) {
     CompletedRanges ranges(database_);
     completed_points(source_, source_id).for_each([&](const Interval& points) {
       ranges.add(target.id, points);
     });
     ranges.flush();
-    // Another program deleted rows of the source, so its ranges are not those of its rows.
+    // If another program deleted rows of the source, its ranges do not match its rows.
     execute_with(database_,
                  "UPDATE main.studies SET counted = 0 WHERE study_id = ?1 AND EXISTS"
                  " (SELECT 1 FROM source.studies WHERE study_id = ?2 AND NOT counted)",
@@ -271,7 +271,7 @@ Merged Merger::merge(const std::string& source, const std::string& rename_prefix
       sqlite3_exec(database, "DETACH source", nullptr, nullptr, nullptr);
     };
     const std::unique_ptr<sqlite3, decltype(detach)> attached(target_.connection(), detach);
-    // Changed pages beyond the cache are written to the log.
+    // SQLite writes changed pages beyond this cache to the log.
     execute(target_.connection(), "PRAGMA main.cache_size = -65536");
     target_.write([&] {
       SourceMerge(target_.connection(), opened.get(), rename_prefix, merged).run();

@@ -9,13 +9,12 @@
 namespace oblique::server {
 namespace {
 
-/// The recipe of a study. Throws StudyRefused when there is no such study.
 std::string recipe_bytes(const std::string& path, std::uint64_t study_id) {
   const DatabaseHandle database = open_stored(path);
   Statement find(database.get(), "SELECT recipe FROM studies WHERE study_id = ?");
   find.bind_all(study_id);
   if (!find.step()) {
-    throw StudyRefused(fmt::format("the study is no longer in {}", path));
+    throw StudyRefused(fmt::format("the study is not in {}", path));
   }
   return find.text(0);
 }
@@ -23,16 +22,16 @@ std::string recipe_bytes(const std::string& path, std::uint64_t study_id) {
 }  // namespace
 
 void rename_study(const std::string& path, std::uint64_t study_id, const std::string& name) {
-  if (const std::string objection = protocol::objection_to_study_name(name); !objection.empty()) {
-    throw StudyRefused(objection);
+  if (const std::string error = protocol::study_name_error(name); !error.empty()) {
+    throw StudyRefused(error);
   }
   (void)recipe_bytes(path, study_id);
   Store store(path);
   Statement find(store.connection(), "SELECT 1 FROM studies WHERE name = ?");
   find.bind_all(name);
   if (find.step()) {
-    throw StudyRefused(fmt::format(
-        "there is a study called \"{}\" in {} already: choose another name", name, path));
+    throw StudyRefused(
+        fmt::format("{1} already has a study called \"{0}\": choose another name", name, path));
   }
   find.reset();
   const Change change = RenameStudy{study_id, name};
@@ -57,7 +56,7 @@ protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id) 
   protocol::Recipe recipe;
   if (!protocol::parse_recipe(recipe_bytes(path, study_id), recipe)) {
     throw StorageError(fmt::format(
-        "the recipe of the study cannot be read: `oblique check --db {}` names all faults", path));
+        "the recipe of the study cannot be read: `oblique check --db {}` lists all faults", path));
   }
   return recipe;
 }

@@ -24,7 +24,6 @@
 namespace oblique::server {
 namespace {
 
-/// "localhost" and "*" as numeric addresses; other text is unchanged.
 std::string numeric(const std::string& address) {
   if (address == "localhost") {
     return "127.0.0.1";
@@ -47,8 +46,8 @@ protocol::KeyPair read_server_key(const std::string& path) {
   protocol::KeyFile key = protocol::read_key_file(path);
   if (key.role != protocol::Role::kServer) {
     throw solver::InputError(fmt::format(
-        "{} is the key of a {}: a server needs its own, as DIR/server.key of `oblique keygen DIR`, "
-        "by --keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS",
+        "{} is the key of a {}: give a server key, as DIR/server.key of `oblique keygen DIR`, "
+        "with --keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS",
         path, name_of(key.role)));
   }
   return std::move(key.pair);
@@ -56,7 +55,8 @@ protocol::KeyPair read_server_key(const std::string& path) {
 
 using Keys = std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>>;
 
-/// The names of those `keys` that `others` lack or list otherwise, after `title`; else empty.
+/// The names of `keys` that are missing in `others` or differ there, after `title`; empty if there
+/// are none.
 std::string names_of_others(const char* title, const Keys& keys, const Keys& others) {
   std::string names;
   for (const auto& [key, identity] : keys) {
@@ -79,22 +79,24 @@ std::string_view name_of(AccessMode mode) {
 std::string address_to_bind(const AccessSettings& settings) {
   if (!settings.keys.empty() && settings.insecure) {
     throw solver::InputError(
-        "--keys and --insecure exclude each other: with --keys every peer needs a key, with "
+        "--keys and --insecure cannot be combined: with --keys every peer needs a key, with "
         "--insecure none does");
   }
   std::string address = numeric(settings.listen);
   const std::optional<bool> is_local = is_loopback(address);
   if (!is_local) {
-    throw solver::InputError(fmt::format(
-        "--listen {} is not an address: give a numeric one of this machine, as 127.0.0.1 or ::1, "
-        "or * for all of them",
-        protocol::visible(settings.listen)));
+    throw solver::InputError(
+        fmt::format("--listen {} is not an address: give a numeric address of this machine, as "
+                    "127.0.0.1 or ::1, "
+                    "or * for all",
+                    protocol::visible(settings.listen)));
   }
   if (!*is_local && mode_of(settings) == AccessMode::kLoopback) {
     throw solver::InputError(fmt::format(
         "--listen {} is refused: other machines can reach that address, and there are no keys. "
-        "Make keys with `oblique keygen DIR` and give --keys DIR/server.key, or give --insecure to "
-        "admit every peer; without either, only loopback is allowed, as 127.0.0.1 or ::1",
+        "Create keys with `oblique keygen DIR` and give --keys DIR/server.key, or give --insecure "
+        "to "
+        "admit every peer. Otherwise only loopback is allowed, as 127.0.0.1 or ::1",
         settings.listen));
   }
   return address;
@@ -102,17 +104,13 @@ std::string address_to_bind(const AccessSettings& settings) {
 
 class KeyList {
  public:
-  /// Throws solver::InputError when the list cannot be read.
   explicit KeyList(std::string path) : path_(std::move(path)), keys_(read()) {}
 
-  /// Reads the file again. True if the keys have changed.
   bool reload();
-  /// Null if the key is not listed.
   std::shared_ptr<const KeyIdentity> find(const protocol::CurveKey& key) const {
     const auto found = keys_.find(key);
     return found == keys_.end() ? nullptr : found->second;
   }
-  /// For the log.
   std::string text() const { return fmt::format("admits the {} keys of {}", keys_.size(), path_); }
 
  private:
@@ -128,16 +126,16 @@ class KeyList {
 
   std::string path_;
   Keys keys_;
-  std::optional<std::string> file_;  // as it was read the last time
-  int empty_reads_ = 0;              // in a row
-  std::string fault_;  // why the list could not be read the last time; empty if it could
+  std::optional<std::string> file_;  // content at the last read
+  int empty_reads_ = 0;              // number of empty reads in a row
+  std::string fault_;                // why the last read failed; empty if it did not
 };
 
 bool KeyList::reload() {
   constexpr int kEmptyReads = 4;
   constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
   try {
-    // Thousands of keys take long to parse.
+    // Parse only a changed file, because thousands of keys take long.
     std::optional file = protocol::read_small_file(path_, "the list of keys", kMostBytes);
     if (file == file_ && empty_reads_ == 0 && fault_.empty()) {
       return false;
@@ -146,7 +144,7 @@ bool KeyList::reload() {
     Keys keys = read();
     empty_reads_ = keys.empty() ? empty_reads_ + 1 : 0;
     if (keys.empty() && empty_reads_ < kEmptyReads) {
-      return false;  // an editor may have emptied the file before it writes
+      return false;  // an editor may empty the file before it writes
     }
     const bool had_fault = !std::exchange(fault_, {}).empty();
     keys.swap(keys_);
@@ -158,7 +156,7 @@ bool KeyList::reload() {
     return !changes.empty();
   } catch (const solver::InputError& error) {
     if (std::exchange(fault_, error.what()) != error.what()) {
-      spdlog::warn("keys that were listed before remain admitted: {}", fault_);
+      spdlog::warn("the admitted keys stay the same, because the list cannot be used: {}", fault_);
     }
     return false;
   }
@@ -189,7 +187,7 @@ std::optional<PortSecurity> AccessControl::security(PortRole port) const {
         if (is_worker != (port == PortRole::kWorkers)) {
           return Refusal{
               RefusalCause::kOtherRole,
-              fmt::format("its key \"{}\" has the role {}, and this port is for {}", identity->name,
+              fmt::format("its key \"{}\" has the role {}, but this port is for {}", identity->name,
                           name_of(identity->role), is_worker ? "clients" : "workers")};
         }
         return identity;
@@ -204,7 +202,7 @@ bool AccessControl::refresh(std::int64_t now_ms) {
     spdlog::warn(
         "INSECURE: every machine that reaches {} can submit, cancel and read studies and store "
         "false results, and all traffic is plain text, because the server was started with "
-        "--insecure. `oblique keygen` makes keys",
+        "--insecure. `oblique keygen` creates keys",
         address_);
   }
   if (!list_ || now_ms < next_refresh_ms_) {

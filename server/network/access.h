@@ -13,24 +13,24 @@ namespace oblique::server {
 struct AccessSettings {
   std::string listen = "127.0.0.1";  ///< numeric address, "localhost", or "*": all addresses
   std::string keys = {};             ///< the server's key file; empty: none
-  bool insecure = false;             ///< admits every peer, at any address
+  bool insecure = false;             ///< admits every peer at any address
 };
 
-/// What restricts access to the ports.
+/// Who may connect to the ports.
 enum class AccessMode {
-  kLoopback,  ///< peers of this machine only, without keys
-  kKeys,      ///< peers with a listed key
-  kInsecure,  ///< nothing
+  kLoopback,  ///< only peers on this machine, without keys
+  kKeys,      ///< only peers with a listed key
+  kInsecure,  ///< every peer
 };
 /// "loopback", "keys" or "insecure".
 std::string_view name_of(AccessMode mode);
 
-/// The numeric address to bind; for "*" it is "::", which includes IPv4, if the system has IPv6.
-/// Throws solver::InputError, saying what is allowed, for text that is not an address, for an
-/// address beyond loopback without keys and `insecure`, and for keys together with `insecure`.
+/// The numeric address to bind; "*" becomes "::", which includes IPv4, if the system has IPv6.
+/// Throws solver::InputError for text that is not an address, for an address other than loopback
+/// without keys and `insecure`, and for keys together with `insecure`.
 std::string address_to_bind(const AccessSettings& settings);
 
-/// The authorized keys, as they are in their file now.
+/// The current authorized keys.
 class KeyList;
 
 /// Where the server listens and which keys it admits. Logs to spdlog's default logger.
@@ -43,13 +43,13 @@ class AccessControl {
   const std::string& address() const { return address_; }
   AccessMode mode() const { return mode_; }
   enum class PortRole { kClients, kWorkers };
-  /// For `Network::listen`. Nothing without keys.
+  /// For `Network::listen`. Nothing if the server has no keys.
   std::optional<PortSecurity> security(PortRole port) const;
 
-  /// To be called often, with milliseconds of a monotonic clock. Twice a second it reads the list
-  /// of keys again; a list that cannot be read, as in the middle of an edit, changes nothing, and
-  /// an empty one counts from its fourth time. True if the admitted keys have changed. Without any
-  /// protection it logs a warning every ten minutes.
+  /// To be called often with milliseconds of a monotonic clock. Reads the list of keys twice a
+  /// second; true if the admitted keys have changed. A list that cannot be read, as during an edit,
+  /// changes nothing; an empty one applies from its fourth read. Without any protection logs a
+  /// warning every ten minutes.
   bool refresh(std::int64_t now_ms);
 
  private:

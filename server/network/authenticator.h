@@ -15,31 +15,31 @@ namespace oblique::server {
 /// Why a peer is not admitted, or is disconnected.
 enum class RefusalCause : std::size_t {
   kUnknownKey,      ///< its key is not listed
-  kRevokedKey,      ///< its key was removed from the list while it was connected
+  kRevokedKey,      ///< its key was removed from the list during the connection
   kOtherRole,       ///< its key is for the other port
   kWrongServerKey,  ///< it uses a public key that is not the server's
-  kOtherMechanism,  ///< it has no key where one is needed, or one where none is
-  kBound,           ///< there are too many connections or handshakes
-  kTooSlow,         ///< it does not finish its handshake
-  kFaulty,          ///< it breaks the protocol
+  kOtherMechanism,  ///< it has no key but needs one, or has one and the server has none
+  kBound,           ///< too many connections or handshakes
+  kTooSlow,         ///< it does not finish its handshake in time
+  kFaulty,          ///< it violates the protocol
 };
 inline constexpr std::size_t kRefusalCauses = 8;
 
-/// As "unknown key": for logs, tables and labels.
+/// Such as "unknown key", for logs, tables and labels.
 inline std::string_view name_of(RefusalCause cause) {
   constexpr std::array<std::string_view, kRefusalCauses> kNames{
       "unknown key",      "revoked key",     "key of another role",
-      "wrong server key", "other mechanism", "more than may be",
+      "wrong server key", "other mechanism", "limit reached",
       "too slow",         "faulty"};
   return kNames.at(static_cast<std::size_t>(cause));
 }
 
 struct Refusal {
   RefusalCause cause = RefusalCause::kFaulty;
-  std::string reason;  ///< for people, as "its key is not authorized"
+  std::string reason;  ///< a sentence part, as "its key is not authorized"
 };
 
-/// The name and role with which a public key is listed.
+/// Name and role of a listed key.
 struct KeyIdentity {
   std::string name;
   protocol::Role role;
@@ -47,20 +47,20 @@ struct KeyIdentity {
   bool operator==(const KeyIdentity&) const = default;
 };
 
-/// What became of a message to a peer.
+/// Outcome of sending a message to a peer.
 enum class Delivery {
-  kSent,  ///< it is on its way
-  kBusy,  ///< the same, but so much waits to go out that the peer should get no further work yet
-  kGone,  ///< there is no such peer any more
+  kSent,  ///< it was sent or queued
+  kBusy,  ///< as kSent, but the peer should get no more work until it reads its output
+  kGone,  ///< the peer has disconnected
 };
 
 using AuthResult = std::variant<std::shared_ptr<const KeyIdentity>, Refusal>;
 
-/// Decides whether a key is admitted. Called on the event loop, and only for a key that the peer
-/// has proved to hold.
+/// Decides whether a key is admitted. Called on the event loop, only for a key that the peer has
+/// proved to hold.
 using Authenticate = std::function<AuthResult(const protocol::CurveKey& public_key)>;
 
-/// What a port with keys needs.
+/// Settings of a port with keys.
 struct PortSecurity {
   protocol::KeyPair server;
   Authenticate authenticate;

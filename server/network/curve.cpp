@@ -6,7 +6,7 @@
 namespace oblique::server {
 namespace {
 
-// HELLO without its name.
+// Parts of HELLO after its name.
 constexpr std::size_t kPaddingAt = 2;
 constexpr std::size_t kPeersKeyAt = 74;
 constexpr std::size_t kHelloCounterAt = 106;
@@ -18,7 +18,7 @@ constexpr std::size_t kCookieTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kCookieBytes = kRandomNonceBytes + kMacBytes + kCookieTextBytes;
 constexpr std::size_t kWelcomeTextBytes = kKeyBytes + kCookieBytes;
 
-// INITIATE without its name, and the text of its box.
+// Parts of INITIATE after its name, and of the text in its box.
 constexpr std::size_t kInitiateBoxAt = kCookieBytes + kCounterBytes;
 constexpr std::size_t kVouchTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kVouchBytes = kRandomNonceBytes + kMacBytes + kVouchTextBytes;
@@ -79,7 +79,7 @@ CurveHandshake::Outcome CurveHandshake::take_hello(std::string_view hello) {
   return welcome(peers_key, hello_key);
 }
 
-/// WELCOME without its name: a new key of the server for this connection, and the cookie.
+/// The data of WELCOME: a new server key for this connection, and the cookie.
 std::string CurveHandshake::welcome(std::string_view peers_key,
                                     const Secret<kKeyBytes>& hello_key) {
   protocol::CurveKey own_public;
@@ -115,24 +115,24 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
           curve_nonce("COOKIE--", initiate.substr(0, kRandomNonceBytes)).data(),
           cookie_key_.data()) == 0;
   cookie_key_.wipe();
-  const std::uint8_t* const brief_key = cookie.data();
-  const std::uint8_t* const own_brief_secret = cookie.data() + kKeyBytes;
+  const std::uint8_t* const short_term_key = cookie.data();
+  const std::uint8_t* const own_short_term_secret = cookie.data() + kKeyBytes;
   const std::string_view counter = initiate.substr(kCookieBytes, kCounterBytes);
   const std::string_view box = initiate.substr(kInitiateBoxAt);
   std::string text(box.size() - kMacBytes, '\0');
   Secret<kKeyBytes> shared;
   if (!is_own_cookie || number_of(counter) <= hello_counter_ ||
-      crypto_box_beforenm(shared.data(), brief_key, own_brief_secret) != 0 ||
+      crypto_box_beforenm(shared.data(), short_term_key, own_short_term_secret) != 0 ||
       crypto_box_open_easy_afternm(raw(text.data()), raw(box), box.size(),
                                    curve_nonce("CurveZMQINITIATE", counter).data(),
                                    shared.data()) != 0) {
     return foreign;
   }
   std::memcpy(key_.data(), text.data(), kKeyBytes);
-  // Before the key is authenticated: a forged INITIATE must not reveal which keys are listed.
-  if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, brief_key,
-                  own_brief_secret)) {
-    return Refusal{RefusalCause::kFaulty, "it does not hold the key that it shows"};
+  // Comes before authentication, so that a forged INITIATE does not reveal which keys are listed.
+  if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, short_term_key,
+                  own_short_term_secret)) {
+    return Refusal{RefusalCause::kFaulty, "it does not hold the secret half of its key"};
   }
   AuthResult result = security_.authenticate(key_);
   if (auto* const refusal = std::get_if<Refusal>(&result)) {
@@ -143,16 +143,16 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
   return text.substr(kPropertiesAt);
 }
 
-/// Whether the vouch proves that the peer holds `client_key`, in this handshake with this server.
+/// Whether the vouch proves that the peer holds `client_key` in this handshake with this server.
 bool CurveHandshake::is_vouched(std::string_view vouch, const protocol::CurveKey& client_key,
-                                const std::uint8_t* brief_key,
-                                const std::uint8_t* own_brief_secret) const {
+                                const std::uint8_t* short_term_key,
+                                const std::uint8_t* own_short_term_secret) const {
   Secret<kVouchTextBytes> text;
   const CurveNonce nonce = curve_nonce("VOUCH---", vouch.substr(0, kRandomNonceBytes));
   return crypto_box_open_easy(text.data(), raw(vouch.substr(kRandomNonceBytes)),
                               kVouchBytes - kRandomNonceBytes, nonce.data(), client_key.data(),
-                              own_brief_secret) == 0 &&
-         sodium_memcmp(text.data(), brief_key, kKeyBytes) == 0 &&
+                              own_short_term_secret) == 0 &&
+         sodium_memcmp(text.data(), short_term_key, kKeyBytes) == 0 &&
          sodium_memcmp(text.data() + kKeyBytes, security_.server.public_key.data(), kKeyBytes) == 0;
 }
 
@@ -179,7 +179,7 @@ void CurveSession::seal(std::string_view body, std::string& out) {
   out += kMessageName;
   out += counter;
   const std::size_t mac_at = out.size();
-  out.append(kMacBytes + 1, '\0');  // flags: neither more frames nor a command
+  out.append(kMacBytes + 1, '\0');  // flags: a single frame, not a command
   out += body;
   std::uint8_t* const mac = raw(out.data() + mac_at);
   crypto_box_detached_afternm(mac + kMacBytes, mac, mac + kMacBytes, body.size() + 1, nonce.data(),

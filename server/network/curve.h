@@ -15,16 +15,16 @@
 
 #include "server/network/authenticator.h"
 
-// The server's end of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium: commands and frames
-// as bytes, no socket.
+// The server's side of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium. Handles bytes of
+// commands and frames; has no socket.
 namespace oblique::server {
 
 inline constexpr std::size_t kKeyBytes = std::tuple_size_v<protocol::CurveKey>;
 inline constexpr std::size_t kMacBytes = crypto_box_MACBYTES;
-inline constexpr std::size_t kCounterBytes = 8;       ///< of a nonce that counts
-inline constexpr std::size_t kRandomNonceBytes = 16;  ///< of a nonce that is random
+inline constexpr std::size_t kCounterBytes = 8;       ///< of a nonce with a counter
+inline constexpr std::size_t kRandomNonceBytes = 16;  ///< of a random nonce
 
-// Bytes as libsodium takes them.
+// Bytes as the type that libsodium uses.
 inline const std::uint8_t* raw(std::string_view bytes) {
   return reinterpret_cast<const std::uint8_t*>(bytes.data());
 }
@@ -57,8 +57,8 @@ inline std::string big_endian_of(std::uint64_t value) {
   return bytes;
 }
 
-/// Secret bytes of one connection, wiped at the end. They are not locked in memory: thousands of
-/// connections would exceed the system's limit.
+/// Secret bytes of one connection, wiped by the destructor. They are not locked in memory, because
+/// thousands of connections would exceed the system's limit.
 template <std::size_t kBytes>
 class Secret {
  public:
@@ -75,7 +75,7 @@ class Secret {
   std::array<std::uint8_t, kBytes> bytes_{};
 };
 
-/// Encrypts and decrypts after the handshake. The counters of each direction only grow, so that no
+/// Encrypts and decrypts after the handshake. The counters of both directions only grow, so no
 /// message is accepted twice or out of order.
 class CurveSession {
  public:
@@ -85,11 +85,12 @@ class CurveSession {
   CurveSession(const Secret<kKeyBytes>& shared_key, std::uint64_t received_counter)
       : key_(shared_key), received_counter_(received_counter) {}
 
-  /// READY without its name, with these properties. Called once, before any other function.
+  /// The data of READY with these properties. To be called once, before all other functions.
   std::string ready(std::string_view properties);
   /// Appends a MESSAGE with that body to `out`.
   void seal(std::string_view body, std::string& out);
-  /// The body of a MESSAGE. Nothing unless it is from this peer, new, and a message of one frame.
+  /// Decrypts the body of a MESSAGE. Nothing unless it comes from this peer, is new, and has a
+  /// single frame.
   std::optional<std::string> open(std::string_view message);
 
  private:
@@ -98,19 +99,20 @@ class CurveSession {
   std::uint64_t sent_counter_ = 0;
 };
 
-/// The server's side of one handshake, which takes one HELLO and then one INITIATE. Between them it
-/// stores only the key of its cookie; the cookie carries all other state. So a command that was
-/// recorded on one connection is refused on another.
+/// The server's side of one handshake: one HELLO, then one INITIATE. In between it stores only the
+/// key of its cookie, which contains all other state. So a command that was recorded on one
+/// connection is refused on another.
 class CurveHandshake {
  public:
   /// `security` must outlive this.
   explicit CurveHandshake(const PortSecurity& security) : security_(security) {}
 
-  /// For HELLO the data of WELCOME; for INITIATE the peer's properties; or why it is refused.
+  /// The data of WELCOME after HELLO, the peer's properties after INITIATE, or the reason for a
+  /// refusal.
   using Outcome = std::variant<std::string, Refusal>;
-  /// Takes a command's name and the data after it. Costs about 0.1 ms.
+  /// Handles a command: its name and data. Takes about 0.1 ms.
   Outcome take(std::string_view command, std::string_view data);
-  /// The peer has proved to hold an admitted key. The functions below need it.
+  /// Whether the peer has proved to hold an admitted key. Call the functions below only then.
   bool is_done() const { return session_.has_value(); }
   const std::shared_ptr<const KeyIdentity>& identity() const { return identity_; }
   const protocol::CurveKey& key() const { return key_; }
@@ -123,7 +125,8 @@ class CurveHandshake {
   Outcome take_initiate(std::string_view initiate);
   std::string welcome(std::string_view peers_key, const Secret<kKeyBytes>& hello_key);
   bool is_vouched(std::string_view vouch, const protocol::CurveKey& client_key,
-                  const std::uint8_t* brief_key, const std::uint8_t* own_brief_secret) const;
+                  const std::uint8_t* short_term_key,
+                  const std::uint8_t* own_short_term_secret) const;
 
   const PortSecurity& security_;
   Step next_ = Step::kHello;
@@ -134,9 +137,9 @@ class CurveHandshake {
   std::optional<CurveSession> session_;
 };
 
-/// The text of ERROR: "400" if the key is not admitted, "500" if the peer has a wrong public key of
-/// the server or breaks the protocol, "300" if it may try later. Sockets of libzmq 4.3.4 report
-/// these three to their programs, and nothing longer.
+/// The code in an ERROR command: "400" if the key is not admitted, "500" if the peer has a wrong
+/// server key or violates the protocol, "300" if it may try later. libzmq 4.3.4 reports only
+/// three-digit codes to programs.
 std::string_view error_code(RefusalCause cause);
 
 }  // namespace oblique::server

@@ -84,7 +84,7 @@ Listener::Listener(const std::string& address, const std::string& port) {
     const int error = errno;
     throw std::runtime_error(
         fmt::format("cannot listen on tcp://{}: {}{}", PeerAddress(own).text, std::strerror(error),
-                    error == EADDRINUSE ? ": does a server run already?" : ""));
+                    error == EADDRINUSE ? ": another server may be running" : ""));
   }
   endpoint_ = "tcp://" + PeerAddress(own).text;
 }

@@ -22,27 +22,27 @@ namespace {
 
 static_assert(CurveSession::kAddedBytes == protocol::kSealBytes);
 
-/// Smaller numbers are of ports.
+/// Numbers below this one are ports.
 constexpr std::uint64_t kFirstPeer = 16;
-/// For the database, its readers and the log.
 constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
 constexpr std::size_t kReadBytes = 64 * 1024;
 constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
 
-// Handshakes with keys. A step costs as much as hundreds of messages.
+// Limits of handshakes with keys, of which a step costs as much as hundreds of messages.
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
-constexpr std::size_t kMostPendingSteps = 64;
-/// Parts of `handshake_ms`, after which the oldest makes room for another, or, of one source, one
-/// of the newest. With half of the first, thousands of handshakes of one busy process fail.
+constexpr std::size_t kMaxPendingSteps = 64;
+/// Fractions of `handshake_ms` after which the oldest handshake, or one of the newest from one
+/// source, makes room for another. At half of the first value thousands of handshakes of a busy
+/// process fail.
 constexpr std::int64_t kPartOfOldest = 10;
 constexpr std::int64_t kPartOfNewest = 100;
 
-constexpr const char* kLeavesTooMuchUnread = "it leaves too much unread";
+constexpr const char* kLeavesTooMuchUnread = "it does not read its output";
 
 void set_option(int socket, int level, int option, int value) {
-  // This may fail for a peer that has left, which reading reports.
+  // Fails for a peer that has disconnected, which reading reports.
   static_cast<void>(setsockopt(socket, level, option, &value, sizeof value));
 }
 
@@ -54,7 +54,6 @@ bool would_block() {
 
 // ---- One connection ---------------------------------------------------------------------------
 
-/// A TCP connection with its protocol: input that was not taken and output that was not sent.
 class Network::Connection {
  public:
   Connection(protocol::Descriptor socket, const PortSecurity* security)
@@ -72,17 +71,17 @@ class Network::Connection {
   const Zmtp& zmtp() const { return zmtp_; }
   int descriptor() const { return socket_.number(); }
   std::size_t unsent_bytes() const { return out_.size() - sent_; }
-  /// False once the peer accepts no more output. Its input may still be read.
+  /// Whether output can be sent. If not, its input may still be read.
   bool can_send() const { return can_send_; }
   bool has_pending_handshake() const {
     return zmtp_.pending_step() == Zmtp::PendingStep::kHandshake;
   }
-  /// A message, or a sealed frame that may be one.
+  /// Whether it has a message, or an encrypted frame that may contain one.
   bool has_input_to_take() const {
     return zmtp_.has_message() || zmtp_.pending_step() == Zmtp::PendingStep::kSealedFrame;
   }
 
-  /// Reads once. False when the connection has ended.
+  /// Reads once; false if the connection has ended.
   bool read() {
     std::array<char, kReadBytes> bytes;
     const std::size_t most = zmtp_.is_open() ? bytes.size() : kReadInHandshake_bytes;
@@ -106,7 +105,6 @@ class Network::Connection {
     zmtp_.run_step();
     send_answers();
   }
-  /// Sends what the protocol itself has to say, at first the greeting.
   void send_answers() {
     const std::string answers = zmtp_.take_answers();
     if (can_send_ && !answers.empty()) {
@@ -128,10 +126,9 @@ class Network::Connection {
   bool can_send_ = true;
   Zmtp zmtp_;
   std::string out_;
-  std::size_t sent_ = 0;  // of `out_`
+  std::size_t sent_ = 0;  // bytes of `out_` that were sent
 };
 
-/// Sends a message as far as the system takes it, and keeps the rest.
 void Network::Connection::send(std::string_view body) {
   const bool is_waiting = unsent_bytes() > 0;
   out_ += zmtp_.begin_message(body);
@@ -182,11 +179,11 @@ struct Network::Peer {
   Port port;
   std::int64_t since_ms;
   std::int64_t last_input_ms;
-  bool is_queued = false;  // in its port's queue or in `pending_steps_`
+  bool is_queued = false;  // is in its port's queue or in `pending_steps_`
   bool is_paused = false;
   bool is_in_handshake = true;
   std::uint32_t watched_events = 0;  // 0: not in the epoll set
-  std::size_t held_in_bytes = 0;     // as counted in the sums
+  std::size_t held_in_bytes = 0;     // as counted in the totals
   std::size_t waiting_out_bytes = 0;
   std::shared_ptr<const KeyIdentity> key;
 };
@@ -263,12 +260,13 @@ bool Network::has_more() const {
 // ---- New connections --------------------------------------------------------------------------
 
 void Network::accept_all(Port port) {
-  constexpr std::size_t kMostAtATime = 64;
-  // No more than can be admitted in a turn: a crowd, as after a restart, waits in the system.
-  const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMostAtATime;
+  constexpr std::size_t kMaxAtATime = 64;
+  // Accepts no more than can be handled in one turn; a burst of connections, as after a restart,
+  // waits in the system.
+  const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMaxAtATime;
   std::size_t taken = 0;
   for (std::size_t i = 0;
-       i < kMostAtATime && taken < most && pending_steps_.size() < kMostPendingSteps; ++i) {
+       i < kMaxAtATime && taken < most && pending_steps_.size() < kMaxPendingSteps; ++i) {
     if (must_newcomers_wait()) {
       set_accepting(port, false);
       return;
@@ -292,17 +290,18 @@ void Network::accept_all(Port port) {
     handshakes_.insert(number);
     handshakes_of_[peer->address.source].insert(number);
     peer->connection.send_answers();
-    settle(number, *peer);
+    update(number, *peer);
   }
 }
 
-/// There are as many handshakes as may be, and the oldest has not had its time. It is not ended: it
-/// would come again at once, and nobody of a slow crowd would ever be admitted.
+/// True if the number of handshakes is at its limit and the oldest has not had its minimum time.
+/// Ending it would be no use: it would reconnect at once, and among many slow peers none would ever
+/// be admitted.
 bool Network::must_newcomers_wait() const {
-  return handshakes_.size() >= limits_.handshakes && !has_had(*handshakes_.begin(), kPartOfOldest);
+  return handshakes_.size() >= limits_.handshakes && !has_used(*handshakes_.begin(), kPartOfOldest);
 }
 
-bool Network::has_had(Number handshake, std::int64_t part) const {
+bool Network::has_used(Number handshake, std::int64_t part) const {
   return now_ms_ - peers_.at(handshake)->since_ms >= limits_.handshake_ms / part;
 }
 
@@ -312,7 +311,7 @@ void Network::set_accepting(Port port, bool is_accepting) {
   epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
 }
 
-/// Ends connections where one more would exceed a bound. False if the new one is to be refused.
+/// Ends a connection if one more would exceed a limit. False if the new one must be refused.
 bool Network::make_room(Port port, const PeerAddress& address) {
   if (ports_[port].security && !make_room_at_source(address)) {
     return false;
@@ -323,10 +322,10 @@ bool Network::make_room(Port port, const PeerAddress& address) {
   return peers_.size() < limits_.connections || make_room_for_connection(port);
 }
 
-/// Of one source. A newcomer does not wait in the system, where it would keep those of other
-/// sources waiting. The oldest handshake is ended once it has had its time, else one of the newest:
-/// most finish even if all are slow, and a fast peer is soon admitted beside many that never
-/// finish.
+/// Applies the limit for one source address. A new connection does not wait in the system, where it
+/// would delay other sources. Ends the oldest handshake if it has had its minimum time, else one of
+/// the newest: so most handshakes of slow peers finish, and a fast peer is soon admitted among many
+/// that never finish.
 bool Network::make_room_at_source(const PeerAddress& address) {
   constexpr std::size_t kPartForNewest = 8;
   const auto found = handshakes_of_.find(address.source);
@@ -337,17 +336,17 @@ bool Network::make_room_at_source(const PeerAddress& address) {
   const auto newest = static_cast<std::ptrdiff_t>(handshakes.size() / kPartForNewest);
   const Number oldest = *handshakes.begin();
   const Number one_of_newest = *std::prev(handshakes.end(), newest + 1);
-  const bool is_oldest_due = has_had(oldest, kPartOfOldest);
-  if (!is_oldest_due && !has_had(one_of_newest, kPartOfNewest)) {
+  const bool is_oldest_due = has_used(oldest, kPartOfOldest);
+  if (!is_oldest_due && !has_used(one_of_newest, kPartOfNewest)) {
     return false;
   }
-  end(is_oldest_due ? oldest : one_of_newest, "too many handshakes of its address are under way",
+  end(is_oldest_due ? oldest : one_of_newest, "too many handshakes from its address",
       RefusalCause::kBound);
   return true;
 }
 
-/// Ends the oldest handshake; without keys, if there is none, the connection that was silent for
-/// longest. A peer with a key never makes room. False if no connection may be ended.
+/// Ends the oldest handshake. If there is none, ends the connection that was silent for longest, at
+/// a port without keys. False if no connection may be ended.
 bool Network::make_room_for_connection(Port port) {
   if (end_oldest_handshake()) {
     return true;
@@ -362,7 +361,7 @@ bool Network::make_room_for_connection(Port port) {
   if (quietest == peers_.end() || now_ms_ - quietest->second->last_input_ms < limits_.active_ms) {
     return false;
   }
-  end(quietest->first, "there are too many connections, and it was silent for longest");
+  end(quietest->first, "too many connections, and it was silent for longest");
   return true;
 }
 
@@ -398,13 +397,13 @@ void Network::serve(Number number, std::uint32_t events) {
       return;
     }
   }
-  settle(number, peer);
+  update(number, peer);
   if (peer.waiting_out_bytes > limits_.waiting_out_bytes) {
     end(number, kLeavesTooMuchUnread);
   }
 }
 
-/// Runs some of the pending steps, so that peers that are connected are served in between.
+/// Runs a few pending steps, so that connected peers are served in between.
 void Network::run_handshakes() {
   for (std::size_t steps = 0; steps < kStepsATurn && !pending_steps_.empty();) {
     const Number number = pending_steps_.front();
@@ -418,13 +417,13 @@ void Network::run_handshakes() {
     peer.is_queued = false;
     peer.connection.run_step();
     if (examine(number, peer)) {
-      settle(number, peer);
+      update(number, peer);
     }
   }
 }
 
-/// After input: notices that a handshake is done and ends a connection with a fault. False if the
-/// connection was ended.
+/// Handles a finished handshake, and ends a connection with a fault. False if the connection was
+/// ended.
 bool Network::examine(Number number, Peer& peer) {
   const Zmtp& zmtp = peer.connection.zmtp();
   if (peer.is_in_handshake && zmtp.is_open()) {
@@ -450,12 +449,12 @@ void Network::handshake_ended(Number number, Peer& peer) {
   }
 }
 
-/// After any change of a peer: updates the sums, its place in a queue and the awaited events. The
-/// input of a peer whose message waits is watched until the system reports some: most messages are
-/// taken before, and two system calls are saved.
-void Network::settle(Number number, Peer& peer) {
+/// To be called after any change of a peer. Updates the totals, its place in a queue and the
+/// awaited events. Input of a peer with a waiting message is watched only after the system has
+/// reported some: most messages are taken before, which saves two system calls.
+void Network::update(Number number, Peer& peer) {
   const Connection& connection = peer.connection;
-  count(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
+  update_sums(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
   if (!peer.is_queued && connection.has_input_to_take()) {
     ports_[peer.port].queue.push_back(number);
     peer.is_queued = true;
@@ -466,7 +465,7 @@ void Network::settle(Number number, Peer& peer) {
   watch(number, peer, peer.wanted_events() | (peer.watched_events & EPOLLIN));
 }
 
-void Network::count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
+void Network::update_sums(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes) {
   held_in_bytes_ += held_in_bytes - peer.held_in_bytes;
   ports_[peer.port].held_in_bytes += held_in_bytes - peer.held_in_bytes;
   waiting_out_bytes_ += waiting_out_bytes - peer.waiting_out_bytes;
@@ -474,8 +473,8 @@ void Network::count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_o
   peer.waiting_out_bytes = waiting_out_bytes;
 }
 
-/// A hung-up connection is reported again and again while it is in the set, so a peer of which no
-/// event is wanted is taken out.
+/// Sets the events to watch. A peer without any is removed from the epoll set, which would report a
+/// closed connection again and again.
 void Network::watch(Number number, Peer& peer, std::uint32_t events) {
   if (events == peer.watched_events) {
     return;
@@ -496,7 +495,7 @@ void Network::read_paused_again() {
     for (const Number number : std::exchange(port.paused, {})) {
       if (const auto found = peers_.find(number); found != peers_.end()) {
         found->second->is_paused = false;
-        settle(number, *found->second);
+        update(number, *found->second);
       }
     }
   }
@@ -535,7 +534,7 @@ std::optional<Incoming> Network::next(Port port, const MayTake& may_take) {
     }
     peer.is_queued = false;
     if (examine(number, peer)) {
-      settle(number, peer);
+      update(number, peer);
     }
     if (incoming) {
       return incoming;
@@ -553,7 +552,7 @@ Delivery Network::send(const std::string& identity, std::string_view body) {
   }
   const Number number = std::stoull(identity);
   peer->connection.send(body);
-  settle(number, *peer);
+  update(number, *peer);
   if (peer->waiting_out_bytes > limits_.waiting_out_bytes) {
     end(number, kLeavesTooMuchUnread);
     return Delivery::kGone;
@@ -598,26 +597,27 @@ void Network::end(Number number, const std::string& reason, std::optional<Refusa
   }
   disconnects_.push_back(
       {std::to_string(number), reason, cause, reason.empty() ? "" : peer.address.text});
-  count(peer, 0, 0);
+  update_sums(peer, 0, 0);
   --ports_[peer.port].connections;
   handshake_ended(number, peer);
   peers_.erase(found);
 }
 
-/// A peer that sees another mechanism than its own in the server's greeting leaves without a
-/// message, often in the middle of its own greeting.
+/// A peer that finds another mechanism in the server's greeting disconnects without a message,
+/// often in the middle of its own greeting.
 void Network::end_peer_that_left(Number number, const Peer& peer) {
   if (peer.connection.zmtp().is_greeting()) {
     end(number,
-        "it left at the server's greeting: it may have no key while this server requires one, or "
-        "use one while this server runs without keys",
+        "it disconnected at the server's greeting: it may have no key while this server needs one, "
+        "or "
+        "have one while this server runs without keys",
         RefusalCause::kOtherMechanism);
   } else {
     end(number, "");
   }
 }
 
-/// Ends the connections that hold most, until the sums of all are within their bounds.
+/// Ends the connections with the most memory until the totals are within their limits.
 void Network::end_largest() {
   const auto end_while = [this](const std::size_t& sum, std::size_t bound, std::size_t Peer::*bytes,
                                 const char* reason) {
@@ -630,17 +630,16 @@ void Network::end_largest() {
     }
   };
   end_while(held_in_bytes_, limits_.held_in_bytes, &Peer::held_in_bytes,
-            "all connections together hold too much, and it holds most");
+            "the input of all connections exceeds its limit, and it has the most");
   end_while(waiting_out_bytes_, limits_.all_waiting_out_bytes, &Peer::waiting_out_bytes,
-            "all connections together leave too much unread, and it leaves most");
+            "the unsent output of all connections exceeds its limit, and it has the most");
 }
 
-/// False if none is under way.
 bool Network::end_oldest_handshake() {
   if (handshakes_.empty()) {
     return false;
   }
-  end(*handshakes_.begin(), "there are too many connections, and its handshake is the oldest",
+  end(*handshakes_.begin(), "too many connections, and its handshake is the oldest",
       RefusalCause::kBound);
   return true;
 }

@@ -22,47 +22,48 @@
 
 namespace oblique::server {
 
-/// Bounds on what peers can make the server hold; proto/protocol.md lists them.
+/// Limits on memory and connections that peers can use; proto/protocol.md lists them.
 struct NetworkLimits {
   std::size_t connections =
-      limits::kConnections;  ///< at all ports; fewer if the system allows fewer
-  /// Messages of all peers that are incomplete or were not taken. One peer has at most one message.
+      limits::kConnections;  ///< at all ports; fewer if the system allows only fewer
+  /// Total size of messages that are incomplete or not taken yet. One peer has at most one message.
   std::size_t held_in_bytes = limits::kHeldInBytes;
-  /// While a port's messages take this much and one of them waits to be taken, its peers are not
-  /// read: peers that send faster than results are stored wait, and lose no connection.
+  /// Above this size of a port's messages its peers are not read while one of the messages waits.
+  /// So peers that send faster than results are stored wait, and keep their connections.
   std::size_t held_in_to_pause_bytes = limits::kHeldInToPauseBytes;
   /// A peer with more unsent output than this is busy.
   std::size_t busy_bytes = limits::kBusyBytes;
-  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;         ///< unsent output of one peer
-  std::size_t all_waiting_out_bytes = limits::kAllWaitingOutBytes;  ///< of all peers
-  std::int64_t handshake_ms = 10'000;                               ///< for one handshake
-  /// A connection with input this recent is not ended to make room for a new one.
+  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;  ///< for unsent output of one peer
+  std::size_t all_waiting_out_bytes = limits::kAllWaitingOutBytes;  ///< for that of all peers
+  std::int64_t handshake_ms = 10'000;                               ///< longest handshake
+  /// A connection with input in this time is not ended to make room for a new one.
   std::int64_t active_ms = 5000;
-  /// Handshakes at a time. At the limit the oldest is ended once it has had a tenth of
+  /// Number of handshakes at a time. At the limit the oldest is ended after a tenth of
   /// `handshake_ms`.
   std::size_t handshakes = limits::kHandshakes;
-  /// Of these, from one source address at a port with keys.
+  /// Number of these from one source address at a port with keys.
   std::size_t handshakes_of_source = limits::kHandshakesOfSource;
 };
 
 struct Incoming {
   std::string identity;  ///< of the connection; never reused
   std::string body;
-  /// With which name and role the peer's key is listed. Null at a port without keys.
+  /// Name and role of the peer's key. Null at a port without keys.
   std::shared_ptr<const KeyIdentity> key = {};
 };
 
 struct Disconnect {
   std::string identity;
-  std::string reason;                        ///< why the server ended it; empty: the peer left
-  std::optional<RefusalCause> refused = {};  ///< not admitted, or its key no longer is
-  std::string address = {};                  ///< as 10.0.0.3:4711; empty without a reason
+  std::string reason;  ///< why the server ended it; empty: the peer disconnected
+  /// set if the peer was not admitted, or its key was revoked
+  std::optional<RefusalCause> refused = {};
+  std::string address = {};  ///< such as 10.0.0.3:4711; empty without a reason
 };
 
-/// The server's ports and their connections, with bounds on all that peers can make it hold. A peer
-/// that sends faster than it is served is not read, so that TCP slows it down. Peers of a port take
-/// turns, message by message; a few handshakes with keys are run in each turn. It has no thread and
-/// never waits, except in `flush`. Times are milliseconds of a monotonic clock.
+/// The server's ports and connections, with limits on everything that peers can make it store. A
+/// peer that sends faster than it is served is not read, so TCP slows it down. Peers of a port take
+/// turns, message by message; each turn also runs a few handshake steps. It has no thread and
+/// blocks only in `flush`. Times are milliseconds of a monotonic clock.
 class Network {
  public:
   explicit Network(NetworkLimits limits);
@@ -71,7 +72,7 @@ class Network {
   Network& operator=(const Network&) = delete;
 
   using Port = std::size_t;
-  /// Opens a port and returns its number, from 0 up. With `security` peers need keys (CURVE);
+  /// Opens a port and returns its number, counted from 0. With `security` peers need keys (CURVE);
   /// without it all are admitted (NULL). Throws std::runtime_error if it cannot listen.
   Port listen(const std::string& address, const std::string& port,
               const std::optional<PortSecurity>& security = std::nullopt);
@@ -79,29 +80,29 @@ class Network {
 
   /// Readable when `collect` has work.
   int descriptor() const { return epoll_.number(); }
-  /// Accepts connections, reads, sends and ends connections, as far as possible without waiting.
+  /// Accepts, reads, sends and ends connections as far as possible without blocking.
   void collect(std::int64_t now_ms);
-  /// `collect` has more work, though `descriptor` may not be readable.
+  /// Whether `collect` has more work although `descriptor` may not be readable.
   bool has_more() const;
 
-  /// Whether the next message of that connection may be taken now.
+  /// Whether the next message of that connection may be taken.
   using MayTake = std::function<bool(const std::string& identity)>;
-  /// The next message at that port, of the peer whose turn it is.
+  /// Takes the next message at a port, from the peer whose turn it is.
   std::optional<Incoming> next(Port port, const MayTake& may_take);
 
-  /// Sends a message, or keeps what the system does not take. A peer that leaves too much unread is
-  /// disconnected.
+  /// Sends a message; keeps what the system does not accept. A peer that leaves too much output
+  /// unread is disconnected.
   Delivery send(const std::string& identity, std::string_view body);
-  /// Its unsent output exceeds `busy_bytes`.
+  /// Whether its unsent output exceeds `busy_bytes`.
   bool is_busy(const std::string& identity) const;
   bool is_connected(const std::string& identity) const { return find(identity) != nullptr; }
-  /// It has sent something that was not taken, or a message is coming in.
+  /// Whether it has a message that was not taken or is incomplete.
   bool has_unread_input(const std::string& identity) const;
-  /// Sends unsent output, for at most this long.
+  /// Sends unsent output for at most this time.
   void flush(std::chrono::milliseconds longest);
 
-  /// Authenticates all connected peers again, and ends the connections whose keys are no longer
-  /// admitted; what they have sent is dropped.
+  /// Authenticates all connected peers again. Ends connections whose keys are no longer admitted,
+  /// and drops their input.
   void admission_changed();
 
   /// Connections that ended since the last call.
@@ -110,11 +111,11 @@ class Network {
   std::size_t connections(Port port) const {
     return port < ports_.size() ? ports_[port].connections : 0;
   }
-  /// Memory for messages that are incomplete or were not taken.
+  /// Memory of messages that are incomplete or not taken [bytes].
   std::size_t held_in_bytes() const { return held_in_bytes_; }
-  /// Unsent output of all peers.
+  /// Unsent output of all peers [bytes].
   std::size_t waiting_out_bytes() const { return waiting_out_bytes_; }
-  /// Peers that were refused since the start, by cause.
+  /// Number of refused peers since the start, by cause.
   const std::array<std::uint64_t, kRefusalCauses>& refusals() const { return refusals_; }
 
  private:
@@ -123,10 +124,10 @@ class Network {
     std::unique_ptr<Listener> listener;
     std::unique_ptr<PortSecurity> security;
     std::size_t connections = 0;
-    std::deque<Number> queue{};     // peers with a message, in turn
-    std::size_t held_in_bytes = 0;  // of its peers
+    std::deque<Number> queue{};     // peers with a message, in order of their turns
+    std::size_t held_in_bytes = 0;  // total of its peers
     std::vector<Number> paused{};   // peers that are not read while the port is full
-    bool is_accepting = true;       // else new connections wait in the system
+    bool is_accepting = true;       // if false, new connections wait in the system
   };
   class Connection;
   struct Peer;
@@ -138,14 +139,14 @@ class Network {
   bool make_room_at_source(const PeerAddress& address);
   bool make_room_for_connection(Port port);
   bool end_oldest_handshake();
-  bool has_had(Number handshake, std::int64_t part) const;
+  bool has_used(Number handshake, std::int64_t part) const;
 
   void serve(Number number, std::uint32_t events);
   void run_handshakes();
   bool examine(Number number, Peer& peer);
   void handshake_ended(Number number, Peer& peer);
-  void settle(Number number, Peer& peer);
-  void count(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes);
+  void update(Number number, Peer& peer);
+  void update_sums(Peer& peer, std::size_t held_in_bytes, std::size_t waiting_out_bytes);
   void watch(Number number, Peer& peer, std::uint32_t events);
   bool is_full(const OpenPort& port) const {
     return !port.queue.empty() && port.held_in_bytes >= limits_.held_in_to_pause_bytes;
@@ -164,11 +165,11 @@ class Network {
   std::vector<OpenPort> ports_;
   std::unordered_map<Number, std::unique_ptr<Peer>> peers_;
   Number last_number_;
-  std::deque<Number> pending_steps_;  // peers with a step of a handshake to run, in turn
-  std::set<Number> handshakes_;       // peers whose handshake is not done, the oldest first
+  std::deque<Number> pending_steps_;  // peers with a handshake step to run, in order of their turns
+  std::set<Number> handshakes_;       // peers with an unfinished handshake, the oldest first
   std::map<std::string, std::set<Number>> handshakes_of_;
   std::size_t held_in_bytes_ = 0;
-  std::int64_t now_ms_ = 0;  // of the last `collect`
+  std::int64_t now_ms_ = 0;  // time of the last `collect`
   std::size_t waiting_out_bytes_ = 0;
   std::vector<Disconnect> disconnects_;
   std::array<std::uint64_t, kRefusalCauses> refusals_{};

@@ -14,7 +14,7 @@ constexpr std::size_t kMechanismBytes = 20;
 constexpr std::size_t kAsServerAt = 32;
 constexpr unsigned char kMajorVersion = 3;
 constexpr std::size_t kLongestShortFrame = 255;
-/// A normal READY has about 50 bytes, an INITIATE 300, and up to 255 more with an identity.
+/// A normal READY has about 50 bytes and an INITIATE 300, plus up to 255 for an identity.
 constexpr std::uint64_t kLongestCommand = 4096;
 constexpr const char* kCutOff = "its properties are cut off";
 
@@ -29,12 +29,11 @@ std::string header_of(std::size_t body_bytes, unsigned flags) {
   return static_cast<char>(flags | kFrameLong) + big_endian_of(body_bytes);
 }
 
-/// The server's properties in READY.
+/// Properties that the server sends in READY.
 std::string own_properties() {
   return "\x0bSocket-Type" + std::string("\0\0\0\x06", 4) + "ROUTER";
 }
 
-/// Why a peer with these properties is refused; empty if it is not.
 std::string validate_properties(std::string_view properties) {
   constexpr std::size_t kLengthBytes = 4;
   constexpr std::array<std::string_view, 2> kAllowed{"DEALER", "ROUTER"};
@@ -57,7 +56,7 @@ std::string validate_properties(std::string_view properties) {
     properties.remove_prefix(value_bytes);
   }
   return std::find(kAllowed.begin(), kAllowed.end(), socket_type) == kAllowed.end()
-             ? "its socket is not of a type that works with a ROUTER"
+             ? "its socket type cannot connect to a ROUTER"
              : "";
 }
 
@@ -150,7 +149,7 @@ void Zmtp::advance() {
   }
 }
 
-/// True when it has come whole. A wrong byte is a fault at once.
+/// True if it is complete. A wrong byte is a fault at once.
 bool Zmtp::take_greeting() {
   const std::string_view bytes = pending();
   const auto is_wrong = [&](std::size_t at, auto&& is_right) {
@@ -167,8 +166,8 @@ bool Zmtp::take_greeting() {
   }
   const std::string own = greeting_of(curve_ ? "CURVE" : "NULL");
   if (bytes.substr(kMechanismAt, kMechanismBytes) != own.substr(kMechanismAt, kMechanismBytes)) {
-    fail(curve_ ? "it has no key, and this server requires one"
-                : "it uses a key, and this server runs without keys",
+    fail(curve_ ? "it has no key, but this server needs one"
+                : "it has a key, but this server runs without keys",
          RefusalCause::kOtherMechanism);
     return false;
   }
@@ -202,7 +201,6 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
     return std::nullopt;
   }
   header.body_bytes = number_of(bytes.substr(1, header.bytes - 1));
-  // An encrypted message may come as a command.
   const bool is_message = !header.is_command || (curve_ && is_open());
   const std::uint64_t longest =
       is_message ? protocol::kMaxFrameBytes + (curve_ ? CurveSession::kAddedBytes : 0)
@@ -215,7 +213,6 @@ std::optional<Zmtp::Header> Zmtp::next_header() {
   return header;
 }
 
-/// True when a frame was taken and the next one may be.
 bool Zmtp::take_frame() {
   const std::optional<Header> header = next_header();
   if (!header) {
@@ -226,7 +223,7 @@ bool Zmtp::take_frame() {
     return false;
   }
   if (header->is_command && is_open() && !curve_) {
-    fail("it sends a command after the handshake, as ZMTP heartbeats are");
+    fail("it sends a command (for example a ZMTP heartbeat) after the handshake");
     return false;
   }
   if (pending().size() - header->bytes < header->body_bytes) {
@@ -260,7 +257,8 @@ void Zmtp::run_step() {
     message_ = curve_->session().open(body);
     if (!message_) {
       fail(
-          "it sends a frame that is not encrypted with its keys, is not new, or is no message of "
+          "it sends a frame that is not encrypted with its keys, is a repetition, or is not a "
+          "message of "
           "one frame");
     }
   }
@@ -269,7 +267,6 @@ void Zmtp::run_step() {
   advance();
 }
 
-/// A command of the handshake.
 void Zmtp::take_command(std::string_view body) {
   const std::size_t name_bytes = body.empty() ? 0 : byte_at(body, 0);
   if (name_bytes == 0 || body.size() < 1 + name_bytes) {
@@ -294,7 +291,7 @@ void Zmtp::take_command(std::string_view body) {
   }
 }
 
-/// Opens the connection. False if the properties are refused.
+/// Opens the connection; false if the properties are refused.
 bool Zmtp::take_properties(std::string_view properties) {
   std::string fault = validate_properties(properties);
   if (!fault.empty()) {

@@ -20,55 +20,55 @@ inline constexpr std::size_t kGreetingBytes = 64;
 
 /// The server's greeting, for the mechanism "NULL" or "CURVE".
 std::string greeting_of(std::string_view mechanism);
-/// The header of a message of one frame.
+/// Header of a message of one frame.
 std::string message_header(std::size_t body_bytes);
-/// A command as a frame.
+/// Encodes a command as a frame.
 std::string command_frame(std::string_view name, std::string_view data);
 
-/// The server's end of one ZMTP 3 connection (rfc.zeromq.org 23 and 37), mechanism NULL or CURVE,
-/// as a ROUTER socket would act, without a socket: bytes go in, messages and answers come out.
-/// Holds one whole message or one incomplete frame, besides what the last `receive` brought.
-/// Messages of several frames and commands after the handshake, heartbeats too, are faults: no peer
-/// of ours sends them.
+/// The server's side of one ZMTP 3 connection (rfc.zeromq.org 23 and 37) with mechanism NULL or
+/// CURVE, as a ROUTER socket. It has no socket: bytes go in, messages and answers come out. Stores
+/// at most one complete message or one incomplete frame, besides the bytes of the last `receive`.
+/// Messages of several frames and commands after the handshake, such as heartbeats, are faults,
+/// because our peers never send them.
 class Zmtp {
  public:
   /// With `security` the mechanism is CURVE, and `security` must outlive this; else it is NULL.
   explicit Zmtp(const PortSecurity* security = nullptr);
 
-  /// Takes bytes as they come from the peer.
+  /// Adds bytes that were received from the peer.
   void receive(std::string_view bytes);
 
-  /// A whole message has come. What follows it is not examined before it is taken.
+  /// Whether a complete message waits. Later bytes are not examined until it is taken.
   bool has_message() const { return message_.has_value(); }
-  /// Only with `has_message`.
+  /// Call it only if `has_message`.
   std::string take_message();
 
-  /// Costly work waits until the caller runs it: a step of a handshake with keys, about 0.1 ms, or
-  /// the decryption of a frame, about 1 ns a byte. What follows is not examined before.
+  /// Expensive work that waits until the caller runs it: a handshake step, about 0.1 ms, or the
+  /// decryption of a frame, about 1 ns a byte. Later bytes are not examined before.
   enum class PendingStep { kNone, kHandshake, kSealedFrame };
   PendingStep pending_step() const { return pending_step_; }
-  /// Without a pending step it does nothing.
+  /// Runs the pending step, if there is one.
   void run_step();
 
-  /// Greeting and answers of the handshake since the last call.
+  /// Returns greeting and handshake answers since the last call.
   std::string take_answers();
-  /// Begins a message to the peer, once the connection is open: returns what is sent before `body`.
-  /// With keys that is the whole encrypted frame, and `body` becomes empty. Frames must be sent in
-  /// the order in which they were begun.
+  /// Begins a message to the peer on an open connection. Returns the bytes to send before `body`.
+  /// With keys these are the whole encrypted frame, and `body` becomes empty. Frames must be sent
+  /// in the order of these calls.
   std::string begin_message(std::string_view& body);
 
-  /// The handshake is done.
+  /// Whether the handshake is done.
   bool is_open() const { return state_ == State::kOpen; }
-  /// Part of the peer's greeting has come.
+  /// Whether part of the peer's greeting was received.
   bool is_greeting() const { return state_ == State::kGreeting && !pending().empty(); }
-  /// With which name and role the peer's key is listed. Null without keys, and before it is open.
+  /// Name and role of the peer's key. Null without keys and before the connection is open.
   std::shared_ptr<const KeyIdentity> identity() const;
-  /// The peer's key. Only with an identity.
+  /// The peer's key. Call it only if it has an identity.
   const protocol::CurveKey& key() const { return curve_->key(); }
-  /// Why the connection must be ended; empty if it need not.
+  /// Why the connection must be ended; empty if it must not.
   const std::string& fault() const { return fault_.reason; }
   RefusalCause cause() const { return fault_.cause; }
-  /// Memory for bytes and messages that were not taken.
+  /// Memory of bytes and messages that were not taken [bytes].
   std::size_t held_bytes() const {
     return buffer_.capacity() + (message_ ? message_->capacity() : 0);
   }
@@ -89,8 +89,8 @@ class Zmtp {
   std::unique_ptr<CurveHandshake> curve_;
   State state_ = State::kGreeting;
   std::string buffer_;
-  std::size_t begin_ = 0;  // of the bytes in the buffer that were not examined
-  PendingStep pending_step_ = PendingStep::kNone;  // of the frame at `begin_`
+  std::size_t begin_ = 0;                          // start of the unexamined bytes in the buffer
+  PendingStep pending_step_ = PendingStep::kNone;  // step for the frame at `begin_`
   std::optional<std::string> message_;
   std::string answers_;
   Refusal fault_;

@@ -1,4 +1,4 @@
-// oblique-server: command line, signals and exit codes around the loop.
+// oblique-server: command line, signals and exit codes around the event loop.
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -42,10 +42,9 @@ using oblique::server::LoopSettings;
 using oblique::server::LoopState;
 
 constexpr const char* kProgram = "oblique-server";
-/// The last commit may take so long on a slow disk.
+/// Longest time of the last commit on a slow disk.
 constexpr std::chrono::seconds kLongestEnd{60};
 
-/// The options of the command line.
 struct Options {
   LoopSettings loop;
   std::uint16_t worker_port = 7601;
@@ -56,23 +55,23 @@ struct Options {
   oblique::protocol::LogSettings log;
 };
 
-/// A connection takes a descriptor, and systems give few to begin with.
+/// Raises the limit of descriptors, because each connection needs one and the default is low.
 void take_all_descriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
     limit.rlim_cur = limit.rlim_max;
-    // Otherwise there are fewer connections.
+    // On failure fewer connections are possible.
     static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
   }
 }
 
-/// Empty for −1 and for a descriptor that is open, else what is wrong with it.
-std::string objection_to_descriptor(const std::string& text) {
+/// Why the text is not -1 or an open descriptor, or an empty text.
+std::string descriptor_error(const std::string& text) {
   int fd = -1;
   const bool is_number = CLI::detail::lexical_cast(text, fd);
   return is_number && (fd == -1 || fcntl(fd, F_GETFD) != -1)
              ? ""
-             : "\"" + text + "\" is no open file descriptor";
+             : "\"" + text + "\" is not an open file descriptor";
 }
 
 /// Writes the endpoints as one line of JSON to the descriptor of --ready-fd.
@@ -97,14 +96,14 @@ void notify(Notifier& notifier, const LoopState& state, std::chrono::millisecond
       notifier.status(fmt::format("{} workers", state.workers));
       break;
     case LoopState::Stage::kDrains:
-      notifier.stopping(fmt::format("draining: {} batches are with workers", state.leases),
+      notifier.stopping(fmt::format("draining: waiting for {} batches of workers", state.leases),
                         drain + kLongestEnd);
       break;
     case LoopState::Stage::kEnds:
       notifier.stopping("stopping", kLongestEnd);
       break;
   }
-  notifier.turn(Notifier::Clock::now());
+  notifier.feed_watchdog(Notifier::Clock::now());
 }
 
 int run(LoopSettings settings, int ready_fd, pid_t parent) {
@@ -112,7 +111,7 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
   oblique::protocol::StopSignals stop;  // before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!oblique::protocol::stop_with_parent(parent)) {
-    spdlog::warn("the parent process was gone before this one began");
+    spdlog::warn("the parent process ended before this one started");
     return oblique::protocol::kDone;
   }
   take_all_descriptors();
@@ -127,7 +126,7 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
     write_endpoints(ready_fd, loop);
   }
   if (!loop.page_url().empty() && ::isatty(STDERR_FILENO) == 1) {
-    // Not in the log: whoever has it may change studies.
+    // Not logged, because the URL lets its reader change studies.
     std::cerr << "The page of this server: " << loop.page_url() << "\n";
   }
   notifier.ready(fmt::format("clients at {}", loop.client_endpoint()));
@@ -136,9 +135,9 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
                                                     : oblique::protocol::kFailed;
 }
 
-/// The bounds that people may set; server/study/limits.h has their defaults and all others.
+/// The limits that users may set; server/study/limits.h has their defaults and all other limits.
 void add_limits(CLI::App& app, LoopSettings& loop) {
-  constexpr std::size_t kMost = 1'000'000;  // of things that are counted
+  constexpr std::size_t kMost = 1'000'000;  // for counts
   constexpr std::size_t kLongestMessage = oblique::protocol::kMaxFrameBytes;
   constexpr std::size_t kMostBytes = std::size_t{1} << 40U;
   const auto add = [&app](const char* name, auto& value, auto least, auto largest,
@@ -148,52 +147,54 @@ void add_limits(CLI::App& app, LoopSettings& loop) {
         ->check(CLI::Range(static_cast<Number>(least), static_cast<Number>(largest)))
         ->group("Limits");
   };
-  add("--limits-connections", loop.network.connections, 2U, kMost, "Connections at all ports");
+  add("--limits-connections", loop.network.connections, 2U, kMost,
+      "Maximum number of connections at both ports");
   add("--limits-waiting-out-bytes", loop.network.waiting_out_bytes, kLongestMessage, kMostBytes,
       "End a connection with more unsent bytes than this");
   add("--limits-unstored-bytes", loop.service.ledger.bytes, 1U, kMostBytes,
-      "Stop reading from workers with more bytes of results than this that are not stored yet");
+      "Stop reading from workers while more than this many bytes of results are unstored");
   add("--limits-running-queries", loop.queries.queue.readers, 1U, 256U,
-      "Queries that run at a time, each in a process of its own");
+      "Maximum number of queries that run at a time, each in its own process");
   constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 60U;
   add("--limits-open-points", loop.service.bounds.points, 1U, kMostPoints,
-      "Points of all studies that are neither done nor cancelled");
+      "Maximum number of points of all studies that are neither done nor cancelled");
   add("--limits-credit", loop.service.scheduler.max_credit, 1U, 65'536U,
-      "Batches that a worker may request at a time");
+      "Maximum number of batches that a worker may request at a time");
 }
 
 void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Options& options) {
   LoopSettings& loop = options.loop;
   app.set_version_flag("--version", "oblique-server " + oblique::protocol::version_and_commit());
   app.option_defaults()->always_capture_default();
-  app.add_option("--db", loop.database, "Database file; made when it is not there")
+  app.add_option("--db", loop.database, "Database file; created if it does not exist")
       ->type_name("FILE");
   app.add_flag("--allow-network-disk", loop.allow_network_disk,
-               "Take a database on a network file system, where a second machine could damage it");
+               "Allow a database on a network file system, where a second machine could damage it");
   app.add_option("--listen", loop.access.listen,
-                 "Address to listen on, * for all; beyond loopback only with --keys or --insecure")
+                 "Address to listen on, * for all; others than loopback need --keys or --insecure")
       ->type_name("ADDRESS");
   app.add_option("--keys", loop.access.keys,
-                 "Key file of the server, as `oblique keygen` makes it; the list of keys to let "
-                 "in, authorized_keys.toml, lies beside it")
+                 "Key file of the server, from `oblique keygen`; the list of admitted keys, "
+                 "authorized_keys.toml, must be in the same folder")
       ->type_name("FILE")
       ->envname("OBLIQUE_KEYS");
-  app.add_flag("--insecure", loop.access.insecure, "Let in whoever reaches the ports, unencrypted");
+  app.add_flag("--insecure", loop.access.insecure,
+               "Admit every peer that reaches the ports, unencrypted");
   constexpr double kLargestPort = 65535;
   const CLI::Validator port = oblique::protocol::number_between(0, kLargestPort);
-  app.add_option("--worker-port", options.worker_port, "Port for workers; 0: the system picks one")
+  app.add_option("--worker-port", options.worker_port, "Port for workers; 0: chosen by the system")
       ->check(port);
-  app.add_option("--client-port", options.client_port, "Port for clients; 0: the system picks one")
+  app.add_option("--client-port", options.client_port, "Port for clients; 0: chosen by the system")
       ->check(port);
   app.add_option("--ready-fd", options.ready_fd,
-                 "File descriptor that gets one line of JSON with both endpoints "
-                 "once the server can be used; -1: none")
-      ->check(objection_to_descriptor)
+                 "File descriptor to which the server writes one line of JSON with both endpoints "
+                 "when it is ready; -1: none")
+      ->check(descriptor_error)
       ->configurable(false);
   options.http.add_to(app);
   app.add_option("--only-study", loop.service.only_study,
-                 "Hand out points of this study alone; others of the database wait. "
-                 "Empty: of all studies")
+                 "Send batches of this study only; other studies wait. "
+                 "Empty: all studies")
       ->type_name("NAME")
       ->configurable(false);
   constexpr double kLongestDrain_s = 1e6;
@@ -206,8 +207,8 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
   add_limits(app, loop);
 }
 
-/// Completes the options. Returns the exit code if the server is not to run: the options are wrong,
-/// which is printed, or only to be printed.
+/// Completes the options. Returns the exit code if the server must not run: after printing an
+/// error, or for --print-config.
 std::optional<int> finish_options(const CLI::App& app, const Configuration& configuration,
                                   Options& options) {
   LoopSettings& loop = options.loop;
@@ -219,7 +220,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
     (void)oblique::server::address_to_bind(loop.access);
     loop.web = options.http.settings();
   } catch (const std::runtime_error& error) {
-    return oblique::protocol::tell_wrong_usage(app.get_name(), error.what());
+    return oblique::protocol::report_wrong_usage(app.get_name(), error.what());
   }
   if (configuration.is_to_be_printed()) {
     std::cout << configuration.printed();
@@ -244,7 +245,7 @@ int main(int argc, char** argv) {
   oblique::protocol::silence_protobuf();
   oblique::protocol::set_up_log(kProgram);
   CLI::App app{
-      "Hands out the points of studies to workers and keeps the results.\n"
+      "Distributes the points of studies to workers and stores the results.\n"
       "Example: oblique-server --db oblique.db",
       kProgram};
   Options options;

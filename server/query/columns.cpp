@@ -30,21 +30,22 @@ std::vector<Column> row_columns() {
       {"worker_id", "", "row", "", "number of the worker that solved it", CellKind::kInteger, true},
       {"worker_name", "", "row", "", "that worker's name"},
       {"instruction_set", "", "row", "", "vector instructions that it used"},
-      {"attempt", "", "row", "", "number of the lease under which it was solved",
+      {"attempt", "", "row", "", "number of times that the point was leased until it was solved",
        CellKind::kInteger, true},
       {"solved_at", "", "row", "", "when the result arrived (UTC)", CellKind::kText, true},
       {"reused_from", "", "row", "",
-       "STUDY/POINT, as named then, of which this result is a copy; NULL: solved for this point",
+       "STUDY/POINT that this result was copied from, by its name then; NULL: not a copy",
        CellKind::kText, true},
   };
 }
 
-/// Whether the view `runs` shows the list in another form than the table `results` has.
+/// Whether the view `runs` shows the list in another form than the table `results`.
 bool is_remade_by_view(const solver::ResultList& list) {
   return list.column == "phases" || list.column == "ft_peaks";
 }
 
-/// An SQL expression over the columns of `runs` for the list `part`. Numbers keep their digits.
+/// An SQL expression over the columns of `runs` for the list `part`, with all digits of its
+/// numbers.
 std::string list_sql(const solver::ListPart& part) {
   const std::string list = fmt::format("runs.{}", part.list->column);
   if (part.member.empty()) {
@@ -106,7 +107,7 @@ void add_outputs(std::vector<Column>& columns) {
                                        : field.sent_with != solver::SentWith::kWorker,
                        part != nullptr ? list_sql(*part) : std::string()});
   }
-  // Lists that `solve --json` shows in another form.
+  // Lists in another form than in `solve --json`.
   for (const auto* list : solver::result_lists()) {
     if (solver::find_result_column(list->column) == nullptr) {
       columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
@@ -115,10 +116,10 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-/// Whether a key has more than one value over the points of a recipe. A key that only some of the
-/// blocks have varies, and so does a key with an expression or a distribution.
+/// Whether a key may have more than one value over the points of a recipe: if only some blocks have
+/// it, or it has several values, an expression or a distribution.
 bool varies(const protocol::Recipe& recipe, std::string_view key) {
-  std::optional<std::string> first;  // the axis of the first block; empty: it has none
+  std::optional<std::string> first;  // the axis of the first block; empty: no axis
   for (const auto& block : recipe.blocks()) {
     const auto axis = std::ranges::find(block.axes(), key, &protocol::Axis::key);
     const bool has_axis = axis != block.axes().end();
@@ -163,13 +164,13 @@ std::vector<Column> columns_and_functions() {
   auto columns = all_columns();
   for (const auto* list : solver::result_lists()) {
     const std::string_view member = list->members.back() == "major" ? "fn_N" : list->members.back();
-    columns.push_back({fmt::format("{}[0].{}", list->column, member), unit_of_member(member),
-                       "element", "",
-                       fmt::format("{} of the first element; -1 is the last{}. Members: {}", member,
-                                   list->column == "peaks" ? ", and ripples count: major_peak_1_N "
-                                                             "is the first peak that is none"
-                                                           : "",
-                                   fmt::join(list->members, ", "))});
+    columns.push_back(
+        {fmt::format("{}[0].{}", list->column, member), unit_of_member(member), "element", "",
+         fmt::format("{} of the first element, or with [-1] of the last{}. Members: {}", member,
+                     list->column == "peaks" ? "; ripples count too, and major_peak_1_N is the "
+                                               "first major peak"
+                                             : "",
+                     fmt::join(list->members, ", "))});
     columns.push_back(
         {fmt::format("{}.count", list->column), "", "element", "", "number of elements"});
   }

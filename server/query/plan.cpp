@@ -33,44 +33,41 @@ namespace {
 using solver::InputError;
 using Names = std::set<std::string, std::less<>>;
 
-/// A part of a query and the keyword before it.
+/// A clause of a query with its keyword.
 struct Part {
   const char* flag;
   const char* keyword;
   std::string written;
-  std::string sql{};  ///< as SQLite reads it
+  std::string sql{};  ///< translated for SQLite
 };
-/// What is selected, the condition, the group and the order, as in a SELECT.
 using Parts = std::array<Part, 4>;
 
-/// Tokens that are replaced by an expression over a column: peaks[0].fn_N, peaks[0],
-/// fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from 0, as `seq` of the views
-/// does; -1 is the last. An element that a list lacks is NULL.
+/// An element expression, which is replaced by SQL over a column: peaks[0].fn_N, peaks[0],
+/// fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from 0, like `seq` in the
+/// views; -1 is the last one. A missing element is NULL.
 struct Element {
-  std::size_t tokens = 0;  ///< number of its tokens; 0: no element
+  std::size_t tokens = 0;  ///< number of its tokens; 0: not an element expression
   std::string column;
   std::string sql;
   std::string unit;
 };
 
-/// The list of the ends of phases as the table `results` has it.
 constexpr const char* kStoredPhases = "stored_phases";
 
-/// The index in "[2]" or "[-1]".
 int index_in(std::string_view list, std::string_view brackets) {
   const char* const end = brackets.data() + brackets.size() - 1;
   int index = 0;
   const auto [read, error] = std::from_chars(brackets.data() + 1, end, index);
   if (error != std::errc() || read != end) {
     throw InputError(fmt::format(
-        "{}{} is not allowed: in brackets stands a whole number, from 0, or -1 for the last", list,
+        "{}{} is not allowed: write a whole number in brackets, from 0, or -1 for the last", list,
         brackets));
   }
   return index;
 }
 
-/// Kind, beginning or end of phase `index`: compression comes first, then the kinds alternate, and
-/// each phase begins at the end of the previous one. Much faster than a list made by the view.
+/// SQL for kind, start or end of phase `index`: compression comes first, kinds alternate, and each
+/// phase starts at the end of the previous one. Much faster than the list of the view.
 std::string phase_sql(int index, std::size_t member) {
   const std::string count = fmt::format("json_array_length({})", kStoredPhases);
   const std::string i = index < 0 ? fmt::format("({} - {})", count, -index) : std::to_string(index);
@@ -81,18 +78,17 @@ std::string phase_sql(int index, std::size_t member) {
   return fmt::format("CASE WHEN {0} BETWEEN 0 AND {1} - 1 THEN {2} END", i, count, value);
 }
 
-/// `sql` as a real number: a whole number in JSON would divide as an integer.
+/// Casts to a real number, because JSON's whole numbers would be divided as integers.
 std::string as_real(const std::string& sql) {
   return fmt::format("CAST({} AS REAL)", sql);
 }
 
-/// The element of list `tokens[0]` at the index `tokens[1]`.
 Element indexed(SqlTokens tokens) {
   const std::string name(tokens[0].text);
   if (!is_list_column(name)) {
     throw InputError(fmt::format(
-        "{0}{1} is not allowed: {0} is no list; `oblique columns` lists elements of lists", name,
-        tokens[1].text));
+        "{0}{1} is not allowed: {0} is not a list; see `oblique columns` for elements of lists",
+        name, tokens[1].text));
   }
   const int index = index_in(name, tokens[1].text);
   const std::string path = fmt::format("$[{}{}]", index < 0 ? "#" : "", index);
@@ -116,12 +112,11 @@ Element indexed(SqlTokens tokens) {
   return {4, is_phase ? kStoredPhases : name, unit.empty() ? sql : as_real(sql), unit};
 }
 
-/// The element at the beginning of `tokens`.
 Element element_at(SqlTokens tokens) {
   if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
     return {};
   }
-  // After a space SQL reads brackets as an alias, which would silently be the whole list.
+  // After a space SQL takes brackets for an alias and would return the whole list.
   const bool touches = tokens[0].text.end() == tokens[1].text.begin();
   if (tokens[1].text.front() == '[' && (touches || is_list_column(tokens[0].text))) {
     return indexed(tokens);
@@ -137,19 +132,20 @@ Element element_at(SqlTokens tokens) {
   if (tokens.size() < 4 || !tokens[1].is_sign("(") || !tokens[3].is_sign(")") ||
       tokens[2].text.front() != '\'') {
     throw InputError(
-        "count_mode() takes one mode in single quotes, ripples merged, as count_mode('SC SR')");
+        "count_mode() needs one mode in single quotes, with ripples merged, as count_mode('SC "
+        "SR')");
   }
   return {
       4, "major_mode", fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-/// Whether SQLite 3.40 might read a number as another double than the nearest one.
+/// Whether SQLite 3.40 may not read the number as the nearest double.
 bool is_decimal(const SqlToken& token) {
   return token.kind == SqlToken::Kind::kLiteral && decimal_number(token.text) &&
          token.text.find_first_of(".eE") != std::string_view::npos;
 }
 
-/// `tokens` as SQLite reads them. Adds the columns that they name, and all other names, to `names`.
+/// Translates `tokens` for SQLite. Adds the columns and other names in them to `names`.
 std::string in_sqlite(SqlTokens tokens, Names& names) {
   std::string result;
   const char* copied = text_over(tokens).data();
@@ -180,14 +176,13 @@ const SqlFunction* function_at(SqlTokens tokens, std::size_t i) {
   return found == functions.end() ? nullptr : &*found;
 }
 
-/// The tokens between the brackets of a call at token `i`.
 SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
   const std::size_t end = std::min(closing_bracket(tokens, i + 1), tokens.size());
   return tokens.subspan(i + 2, end - i - 2);
 }
 
-/// Whether a function that aggregates rows is called at token `i`. min and max with several
-/// arguments do not aggregate.
+/// Whether an aggregate function is called at token `i`. min and max with several arguments do not
+/// aggregate.
 bool is_aggregate(SqlTokens tokens, std::size_t i) {
   const SqlFunction* const function = function_at(tokens, i);
   const bool compares = function != nullptr && (function->name == "min" || function->name == "max");
@@ -195,8 +190,8 @@ bool is_aggregate(SqlTokens tokens, std::size_t i) {
          (!compares || sql_items(arguments_of(tokens, i)).size() == 1);
 }
 
-/// The first token outside subqueries for whose number `is_it` is true; the number of all tokens if
-/// there is none.
+/// The index of the first token outside subqueries for which `is_it` is true; the number of tokens
+/// if there is none.
 template <class Predicate>
 std::size_t find_outside_subqueries(SqlTokens tokens, const Predicate& is_it) {
   for (std::size_t i = 0; i < tokens.size(); ++i) {
@@ -219,7 +214,6 @@ bool has_window(SqlTokens tokens) {
   return std::ranges::any_of(tokens, [](const SqlToken& token) { return is_word(token, "over"); });
 }
 
-/// The names that AS gives.
 Names aliases_of(SqlTokens tokens) {
   Names aliases;
   for (std::size_t i = 1; i < tokens.size(); ++i) {
@@ -230,8 +224,8 @@ Names aliases_of(SqlTokens tokens) {
   return aliases;
 }
 
-/// Throws InputError for a name that is no column, but that SQL, which does not distinguish case,
-/// would take for one. Names of functions, after AS and in `free` may be any.
+/// Throws InputError for a name that differs from a column only by case, because SQL ignores case.
+/// Names of functions, aliases and names in `free` are not checked.
 void check_letter_case(const Part& part, const Names& free) {
   const auto tokens = sql_tokens(part.written);
   for (std::size_t i = 0; i < tokens.size(); ++i) {
@@ -246,14 +240,15 @@ void check_letter_case(const Part& part, const Names& free) {
     if (column != all_columns().end() && find_column(name) == nullptr && !free.contains(name)) {
       throw InputError(
           not_allowed(part.flag, part.written,
-                      fmt::format("{0} is no column, and SQL would take it for {1}: write {1}{2}",
-                                  name, column->name, name == "E" ? ", or E_Pa" : "")));
+                      fmt::format("{0} is not a column, and SQL ignores case: write {1}{2}", name,
+                                  column->name, name == "E" ? ", or E_Pa" : "")));
     }
   }
 }
 
-/// Throws InputError for an item of a grouped row (or of the one row of all points) that has no
-/// aggregate, but a column that is not in --group: SQL would take its value from any point.
+/// Throws InputError if an item of a grouped row contains no aggregate but a column that is not in
+/// --group: SQL would take its value from an arbitrary point. Also applies to the single row of an
+/// aggregate without groups.
 void check_grouped(const Part& select, const Part& group) {
   const auto selected = sql_tokens(select.written);
   if (has_window(selected) || (group.written.empty() && !has_aggregate(selected))) {
@@ -273,17 +268,16 @@ void check_grouped(const Part& select, const Part& group) {
     if (is_all || (column < item.size() && !has_key_as_alias && !has_aggregate(item))) {
       throw InputError(not_allowed(
           select.flag, select.written,
-          fmt::format(
-              "{0} has many values in {1}; use an aggregate, as avg({0}), or add it to "
-              "--group",
-              is_all ? "*" : item[column].text,
-              keys.empty() ? "the one row that an aggregate makes of all points" : "a group")));
+          fmt::format("{0} has many values in {1}: use an aggregate, as avg({0}), or add it to "
+                      "--group",
+                      is_all ? "*" : item[column].text,
+                      keys.empty() ? "the one row of all points" : "a group")));
     }
   }
 }
 
-/// The unit of a column, of an element, or of a function of one of these that keeps the unit. Empty
-/// for a pure number, a text, and other expressions.
+/// The unit of a column, an element, or a function that keeps the unit of its argument. Empty for
+/// pure numbers, texts and other expressions.
 std::string unit_of(SqlTokens tokens) {
   if (tokens.size() > 2 && is_word(tokens[tokens.size() - 2], "as")) {
     tokens = tokens.first(tokens.size() - 2);
@@ -301,7 +295,7 @@ std::string unit_of(SqlTokens tokens) {
                                                : std::string();
 }
 
-/// The names of all columns: those of the view `runs` in its order, then those that it lacks.
+/// The names of all columns: those of the view `runs` in its order, then the others.
 std::vector<std::string> names_of_star(sqlite3* database) {
   std::vector<std::string> names;
   const StatementHandle view = prepare_query(database, "SELECT * FROM runs");
@@ -319,7 +313,7 @@ std::vector<std::string> names_of_star(sqlite3* database) {
   return names;
 }
 
-/// The selected columns, and the SQL expression of each. `*` becomes all columns.
+/// The selected columns, and the SQL expression for each. Expands `*` to all columns.
 std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns(sqlite3* database,
                                                                                  SqlTokens tokens,
                                                                                  Names& names) {
@@ -345,12 +339,13 @@ std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns
 using Ranges = std::vector<PointRange>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// More ranges are merged into one, because the statement would be long and slow to start.
-constexpr std::size_t kMostRanges = 20'000;
-/// Conditions in more nested brackets than this are ignored.
+/// More ranges than this are merged into one, because the statement would be long and slow to
+/// prepare.
+constexpr std::size_t kMaxRanges = 20'000;
+/// Conditions nested more deeply are ignored.
 constexpr int kDeepest = 50;
 
-/// The range from the first point of `ranges`, which are not empty, to the last.
+/// The range from the first point of `ranges` to the last. `ranges` must not be empty.
 Ranges hull(const Ranges& ranges) {
   return {{ranges.front().first, ranges.back().last}};
 }
@@ -359,10 +354,10 @@ struct Interval {
   double low = -kInfinity;
   double high = kInfinity;
 };
-/// The interval of each column that a condition restricts.
+/// The allowed interval of each restricted column.
 using Intervals = std::map<std::string, Interval, std::less<>>;
 
-/// The number in `tokens`, with or without a sign; none if they are not a plain number.
+/// The number in `tokens`, with an optional sign; none if they are not a single number.
 std::optional<double> number_in(SqlTokens tokens) {
   const bool is_negative = !tokens.empty() && tokens[0].is_sign("-");
   if (is_negative || (!tokens.empty() && tokens[0].is_sign("+"))) {
@@ -381,7 +376,8 @@ void restrict_column(Intervals& intervals, SqlTokens column, std::optional<doubl
   }
 }
 
-/// Reads `column BETWEEN number AND number`, `column < number` and so on. Ignores other conditions.
+/// Applies `column BETWEEN number AND number`, `column < number` and so on. Ignores other
+/// conditions.
 void add_condition(Intervals& intervals, SqlTokens tokens) {
   if (tokens.size() > 2 && is_word(tokens[1], "between")) {
     const auto middle =
@@ -407,7 +403,7 @@ void add_condition(Intervals& intervals, SqlTokens tokens) {
   }
 }
 
-/// The conditions that `tokens` join with AND; all of `tokens` if it cannot separate them.
+/// Splits `tokens` at AND into conditions; returns `tokens` as a whole if it cannot.
 std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   const bool is_in_brackets =
       !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;
@@ -439,7 +435,7 @@ std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   return conjuncts;
 }
 
-/// Whether only failed points meet the condition, because it requires `error IS NOT NULL`.
+/// Whether only failed points can meet the condition, because it requires `error IS NOT NULL`.
 bool requires_failure(std::string_view condition) {
   constexpr std::array<std::string_view, 4> kWords{"error", "is", "not", "null"};
   const auto tokens = sql_tokens(condition);
@@ -448,16 +444,16 @@ bool requires_failure(std::string_view condition) {
   });
 }
 
-/// The interval to which an axis is restricted; nullptr: none, or the column depends on other axes.
+/// The interval of an axis; nullptr if it is not restricted or its column depends on other axes.
 const Interval* interval_of(const protocol::Axis& axis, const Intervals& intervals) {
   const auto found = intervals.find(column_of_key(axis.key()));
-  // `length` is changed by axes of single lengths too, and `integrator` is a text.
+  // Axes of single lengths change `length` too, and `integrator` is a text.
   const bool is_own = protocol::has_own_values(axis) && !axis.key().starts_with("length") &&
                       axis.key() != "integrator";
   return found == intervals.end() || !is_own ? nullptr : &found->second;
 }
 
-/// Index of the first value of a range that is at least `value`, or the number of values.
+/// Index of the first value of a range of at least `value`; the number of values if there is none.
 std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
   std::uint64_t first = 0;
   for (std::uint64_t end = axis.count(); first < end;) {
@@ -471,8 +467,8 @@ std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
   return first;
 }
 
-/// Numbers of the first and the last value of an axis in `interval`; for a range of values one more
-/// at each end. None if no value is in the interval.
+/// Indices of the first and last value of an axis in `interval`, or none; for a range one value
+/// wider at each end.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
   if (axis.count() > 0) {
     if (interval.low > interval.high) {
@@ -492,7 +488,8 @@ std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval&
   return found;
 }
 
-/// Ranges of a block's points, numbered from 0. A product is built from its fastest axis outwards.
+/// Ranges of a block's points, counted from 0. Builds those of a product from its fastest axis
+/// outwards.
 Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   const std::uint64_t points = protocol::points_of_block(block);
   if (points == 0) {
@@ -501,7 +498,7 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   if (block.has_sample() || block.zip()) {
     return {{0, points - 1}};
   }
-  Ranges ranges{{0, 0}};  // of the axes from `a` on
+  Ranges ranges{{0, 0}};  // ranges over the axes from `a` on
   std::uint64_t stride = 1;
   for (int a = block.axes_size(); a-- > 0;) {
     const protocol::Axis& axis = block.axes(a);
@@ -514,7 +511,7 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
     }
     const PointRange all = hull(ranges).front();
     const bool is_whole = ranges.size() == 1 && all == PointRange{0, stride - 1};
-    if (is_whole || numbers->last - numbers->first >= kMostRanges / ranges.size()) {
+    if (is_whole || numbers->last - numbers->first >= kMaxRanges / ranges.size()) {
       ranges = {{numbers->first * stride + all.first, numbers->last * stride + all.last}};
     } else {
       Ranges copies;
@@ -534,7 +531,7 @@ struct QueriedStudy {
   std::string name;
   std::int64_t study_id = 0;
   std::uint64_t points = 0;
-  protocol::Recipe recipe{};  ///< without blocks if it cannot be read
+  protocol::Recipe recipe{};  ///< without blocks if the stored bytes are invalid
 };
 
 QueriedStudy find_study(sqlite3* database, const std::string& name) {
@@ -550,14 +547,14 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   return found;
 }
 
-/// The rows of a study as a table, of points that contain all that meet a condition.
+/// SQL for the rows of a study, of a set of points that contains all that meet a condition.
 struct Rows {
   std::string sql;
-  bool are_sorted = false;  ///< rows come by rising point without ORDER BY
+  bool are_sorted = false;  ///< rows are in order of points without ORDER BY
 };
 
 /// The rows with the columns in `names`. They come from the table `results` if it has all of these,
-/// because looking up the model and worker of each row is slow. No condition of the user can reach
+/// because a lookup of model and worker for each row is slow. No condition of the user can reach
 /// another study.
 Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& names) {
   std::string selected = "runs.point AS point";
@@ -581,13 +578,13 @@ Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& n
   std::string join;
   std::string condition;
   if (study.recipe.blocks().empty() || points_in(ranges) == study.points) {
-    condition = "1";  // a range would keep SQLite from looking up points that the user names
+    condition = "1";  // a range would keep SQLite from looking up points that the condition names
   } else if (ranges.size() < 2) {
     condition = ranges.empty()
                     ? "0"
                     : fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
   } else {
-    // SQLite reads a JSON list faster than it compiles VALUES. It reads the ranges of a cross join
+    // SQLite reads a JSON list faster than it compiles VALUES. For a cross join it reads the ranges
     // one after another, and the rows of each by their key.
     for (const PointRange& range : ranges) {
       join += fmt::format("{}\"{}\":{}", join.empty() ? "" : ",", range.first, range.last);
@@ -606,7 +603,6 @@ Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& n
           ranges.size() > 1};
 }
 
-/// The statement of the first of the parts of a query.
 std::string statement_of(std::span<const Part> parts, const std::string& rows) {
   std::string sql = fmt::format("{} {} FROM {}", parts[0].keyword, parts[0].sql, rows);
   for (const Part& part : parts.subspan(1)) {
@@ -615,24 +611,24 @@ std::string statement_of(std::span<const Part> parts, const std::string& rows) {
   return sql;
 }
 
-/// A hint about a column or function that SQLite did not find; empty for other messages.
+/// A hint for a column or function that SQLite did not find; empty for other messages.
 std::string name_hint(const std::string& message) {
   const auto colon = message.rfind(": ");
   if (!message.starts_with("no such ") || colon == std::string::npos) {
     return {};
   }
-  std::vector<std::string_view> names;  // without brackets
+  std::vector<std::string_view> names;  // names without brackets
   const auto columns = columns_and_functions();
   for (const Column& column : columns) {
     names.push_back(std::string_view(column.name).substr(0, column.name.find('(')));
   }
   return protocol::did_you_mean(message.substr(colon + 2), names) +
-         "; `oblique columns` lists columns and functions, and a text stands in single quotes";
+         "; `oblique columns` lists columns and functions; write texts in single quotes";
 }
 
-/// Throws InputError for a statement that SQLite refuses. Names the flag of the first part without
-/// which SQLite takes it: a message about the whole statement may quote what the user did not
-/// write.
+/// Throws InputError for a statement that SQLite refuses. Names the first clause with which SQLite
+/// refuses it, because SQLite's message about the whole statement may quote text that the user did
+/// not write.
 [[noreturn]] void refuse(sqlite3* database, const Parts& parts, const std::string& rows) {
   for (std::size_t count = 1; count <= parts.size(); ++count) {
     const Part& last = parts[count - 1];
@@ -646,8 +642,8 @@ std::string name_hint(const std::string& message) {
   throw InputError("the query is too long");
 }
 
-/// The parts of `question`, with default columns if it selects none. Throws InputError, which names
-/// the flag.
+/// The clauses of `question`, with default columns if it selects none. Throws InputError, which
+/// names the flag.
 Parts parts_of(const protocol::StudyQuery& question, const protocol::Recipe& recipe) {
   std::string select = fmt::format("{}", fmt::join(question.select(), ", "));
   if (select.empty()) {
@@ -684,7 +680,7 @@ std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string
         ranges.push_back({points + range.first, points + range.last});
       }
     }
-    if (ranges.size() > kMostRanges) {
+    if (ranges.size() > kMaxRanges) {
       ranges = hull(ranges);
     }
     points += protocol::points_of_block(block);
@@ -701,10 +697,10 @@ std::uint64_t points_in(const std::vector<PointRange>& ranges) {
 }
 
 std::string no_such_study(sqlite3* database, const std::string& name) {
-  constexpr std::size_t kMostCompared = 10'000;
+  constexpr std::size_t kMaxCompared = 10'000;
   Statement list(database, "SELECT name FROM studies");
   std::vector<std::string> names;
-  while (names.size() < kMostCompared && list.step()) {
+  while (names.size() < kMaxCompared && list.step()) {
     names.push_back(list.text(0));
   }
   return fmt::format(
@@ -718,7 +714,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   auto& [select, where, group, order] = parts;
   const auto tokens = sql_tokens(select.written);
   for (const Part& part : parts) {
-    // SQL looks for a name of the order among the aliases first.
+    // SQL resolves names in ORDER BY as aliases first.
     check_letter_case(part, &part == &order ? aliases_of(tokens) : Names());
   }
   check_grouped(select, group);
@@ -744,7 +740,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   } catch (const StatementError&) {
     refuse(database, parts, rows.sql);
   }
-  // SQLite names a column by its alias or else by its text, which may have been replaced.
+  // SQLite names a column by its alias or else its text, which may have been replaced.
   for (std::size_t i = 0; i < plan.columns.size(); ++i) {
     const char* name = sqlite3_column_name(plan.statement.get(), static_cast<int>(i));
     if (name != nullptr && name != columns_sql[i]) {

@@ -33,15 +33,15 @@
 namespace oblique::server {
 namespace {
 
-/// Pause after a turn of the thread that threw.
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
-/// Number of chunks that marks a cancelled query.
+/// Marks a cancelled query, in place of a number of chunks.
 constexpr std::uint64_t kCancelled = UINT64_MAX;
 
 // ---- The reader process -------------------------------------------------------------------------
 
-/// Bytes of address space of this process now. Sanitizers reserve much more than the memory in use.
+/// Size of the address space of this process [bytes]. Sanitizers reserve much more than the memory
+/// in use.
 rlim_t mapped_bytes() {
   std::ifstream sizes("/proc/self/statm");
   rlim_t pages = 0;
@@ -58,17 +58,18 @@ void limit(Resource resource, rlim_t most) {
 void confine() {
   constexpr std::int64_t kHeapBytes = 256 << 20U;  // for SQLite, which sorts and groups in memory
   constexpr rlim_t kOwnBytes = 512U << 20U;        // for the answer
-  constexpr rlim_t kLargestFile = 64U << 20U;      // SQLite may create the log's index (-shm)
-  constexpr int kNiceness = 5;  // a lower priority than that of server and workers
+  // for the log's index (-shm), which SQLite may create
+  constexpr rlim_t kLargestFile = 64U << 20U;
+  constexpr int kNiceness = 5;  // lower priority than server and workers
   check_call(prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, "prctl");
-  // A write beyond the largest file becomes an error instead of a signal.
+  // A write beyond the size limit returns an error instead of raising a signal.
   std::signal(SIGXFSZ, SIG_IGN);
   limit(RLIMIT_AS, mapped_bytes() + static_cast<rlim_t>(kHeapBytes) + kOwnBytes);
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);
   sqlite3_hard_heap_limit64(kHeapBytes);
-  // If the next two calls are not allowed, the reader runs without their effect. The kernel kills
-  // this process first when memory runs out.
+  // If the next two calls fail, the reader runs without their effect. The kernel kills this process
+  // first when memory runs out.
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
   std::ofstream("/proc/self/oom_score_adj") << "1000";
 }
@@ -79,7 +80,7 @@ bool server_is_gone() {
   return ::poll(&answer, 1, 0) > 0;
 }
 
-/// Blocks until the server has read the frame. A signal ends the process when the server is gone.
+/// Sends a frame and blocks until the server has read it. Ends the process if the server is gone.
 void send_frame(const std::string& reply, bool is_last) {
   const FrameHead head{static_cast<std::uint32_t>(reply.size()), is_last ? 1U : 0U};
   std::string frame(reinterpret_cast<const char*>(&head), sizeof head);
@@ -94,7 +95,7 @@ void send_frame(const std::string& reply, bool is_last) {
 void send_answer(const std::string& path, const protocol::QueryRequest& request) {
   Reader reader(path);
   QueryLimits limits;
-  limits.time_limit_ms = 0;  // the server kills this process at the deadline
+  limits.time_limit_ms = 0;  // the server enforces the deadline
   Answer answer = reader.answer(request, limits);
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();
@@ -118,7 +119,7 @@ std::string encoded_error(const std::string& message, bool wrong_request) {
   constexpr std::size_t kLongestError = 4000;
   protocol::ClientReply reply;
   reply.mutable_error()->set_wrong_request(wrong_request);
-  // SQLite's message may contain any bytes of the statement.
+  // SQLite's message may quote any bytes of the statement.
   reply.mutable_error()->set_message(protocol::shortened(
       protocol::is_utf8(message) ? message : hexadecimal(message), kLongestError));
   return protocol::encode(reply);
@@ -128,7 +129,7 @@ int run_reader_program(const std::string& path) {
   try {
     protocol::silence_protobuf();
     confine();
-    // A server that was killed before the call of `confine` causes no signal to this process.
+    // If the server was killed before `confine`, no signal follows.
     if (server_is_gone()) {
       return 0;
     }
@@ -137,7 +138,7 @@ int run_reader_program(const std::string& path) {
     try {
       send_answer(path, request);
     } catch (const std::bad_alloc&) {
-      send_frame(encoded_error("the answer needs more memory than a query may have"), true);
+      send_frame(encoded_error("the query needs more memory than is allowed"), true);
     } catch (const std::exception& error) {
       const bool is_wrong = dynamic_cast<const StatementError*>(&error) != nullptr ||
                             dynamic_cast<const solver::InputError*>(&error) != nullptr;
@@ -177,7 +178,7 @@ std::optional<QueryJob> QueryQueue::start_next() {
   QueryJob job = std::move(*next);
   waiting_.erase(next);
   running_.emplace(job.ticket, job.client);
-  // The other clients come before the next query of this one.
+  // Moves this client's other queries behind those of all others.
   std::stable_partition(waiting_.begin(), waiting_.end(),
                         [&](const QueryJob& each) { return each.client != job.client; });
   return job;
@@ -219,8 +220,8 @@ pid_t start_reader(const std::string& program, const std::string& path, int requ
   return pid;
 }
 
-/// A query and the process that answers it, which is killed when this is destroyed and when the
-/// thread that created this ends.
+/// A running query and its process. The process is killed when this object is destroyed, and when
+/// the thread that created it ends.
 struct QueryPool::Running {
   Running(const std::string& program, const std::string& path, const QueryJob& job)
       : ticket(job.ticket), time_limit_ms(time_limit_of(job.request)) {
@@ -244,7 +245,7 @@ struct QueryPool::Running {
   Running& operator=(const Running&) = delete;
 
   void kill() const { ::kill(pid, SIGKILL); }
-  bool waits_for_client() const { return given >= taken + kChunksAhead; }
+  bool waits_for_client() const { return given >= received_chunks + kChunksAhead; }
 
   struct Frame {
     std::string reply;
@@ -274,14 +275,14 @@ struct QueryPool::Running {
 
   std::uint64_t ticket;
   std::int64_t time_limit_ms;
-  std::int64_t deadline_ms = 0;     ///< for the next chunk, or for the client to take one
-  std::int64_t answer_ends_ms = 0;  ///< deadline of the whole answer
-  std::uint64_t given = 0;          ///< chunks reported
-  std::uint64_t taken = 0;          ///< chunks taken by the client
+  std::int64_t deadline_ms = 0;       ///< for the next chunk, or for the client to read one
+  std::int64_t answer_ends_ms = 0;    ///< deadline for the whole answer
+  std::uint64_t given = 0;            ///< number of reported chunks
+  std::uint64_t received_chunks = 0;  ///< number of chunks that the client has received
   pid_t pid = -1;
   protocol::Descriptor answer;
-  std::string received;    ///< bytes of frames that were not returned yet
-  bool is_broken = false;  ///< the process has ended or sent a frame that is too long
+  std::string received;    ///< bytes of incomplete frames
+  bool is_broken = false;  ///< the process has ended or sent too long a frame
 };
 
 QueryPool::QueryPool(std::string database, QueryPoolSettings settings, Report report)
@@ -304,10 +305,10 @@ bool QueryPool::submit(QueryJob job) {
   return true;
 }
 
-void QueryPool::more(std::uint64_t ticket, std::uint64_t taken) {
+void QueryPool::more(std::uint64_t ticket, std::uint64_t received_chunks) {
   const std::lock_guard lock(mutex_);
-  std::uint64_t& known = taken_[ticket];
-  known = std::max(known, taken);
+  std::uint64_t& known = received_chunks_[ticket];
+  known = std::max(known, received_chunks);
   woken_.wake();
 }
 
@@ -339,16 +340,15 @@ void QueryPool::run() {
       }
       wait();
     } catch (const std::exception&) {
-      // For example std::bad_alloc. The next turn continues.
+      // For example std::bad_alloc; the next turn continues.
       std::this_thread::sleep_for(kRetryPause);
     }
   }
-  // Kills all processes before it waits for the first one.
   std::ranges::for_each(running_, &Running::kill);
   running_.clear();
 }
 
-/// Waits for input from a process, a call from another thread, or a deadline.
+/// Waits for output of a process, a call from another thread, or a deadline.
 void QueryPool::wait() {
   std::vector<pollfd> items{{woken_.descriptor(), POLLIN, 0}};
   const std::int64_t now_ms = settings_.now_ms();
@@ -365,25 +365,24 @@ void QueryPool::wait() {
 }
 
 void QueryPool::take_requests() {
-  std::map<std::uint64_t, std::uint64_t> taken;
+  std::map<std::uint64_t, std::uint64_t> received_chunks;
   {
     const std::lock_guard lock(mutex_);
-    taken = std::exchange(taken_, {});
+    received_chunks = std::exchange(received_chunks_, {});
   }
-  for (const auto& request : taken) {
+  for (const auto& request : received_chunks) {
     const auto query = std::ranges::find(running_, request.first, &Running::ticket);
     if (request.second == kCancelled) {
       forget(request.first);
       running_.erase(query, query == running_.end() ? query : std::next(query));
-    } else if (query != running_.end() && request.second > query->taken) {
+    } else if (query != running_.end() && request.second > query->received_chunks) {
       const bool waited = query->waits_for_client();
-      query->taken = request.second;
+      query->received_chunks = request.second;
       query->deadline_ms = waited ? settings_.now_ms() + query->time_limit_ms : query->deadline_ms;
     }
   }
 }
 
-/// Starts the next query that may run. False: there is none.
 bool QueryPool::start_next() {
   std::optional<QueryJob> job;
   {
@@ -401,20 +400,21 @@ bool QueryPool::start_next() {
   } catch (const std::exception& error) {
     std::erase_if(running_, [&](const Running& query) { return query.ticket == job->ticket; });
     end(job->ticket,
-        encoded_error(std::string("no process can be started for the query: ") + error.what()));
+        encoded_error(std::string("cannot start a process for the query: ") + error.what()));
   }
   return true;
 }
 
-/// Reports the received frames, up to kChunksAhead more than the client has taken. False when the
+/// Reports received frames, up to kChunksAhead more than the client has received. False if the
 /// query has ended.
 bool QueryPool::goes_on(Running& query) {
   while (!query.waits_for_client()) {
     auto frame = query.next_frame();
     if (query.is_broken) {
       end(query.ticket,
-          encoded_error("the process that ran the query has ended: it may have needed more memory "
-                        "than there is"));
+          encoded_error(
+              "the process of the query ended unexpectedly: it may have needed more memory "
+              "than is available"));
       return false;
     }
     if (!frame) {
@@ -436,23 +436,21 @@ bool QueryPool::goes_on(Running& query) {
   return error.empty();
 }
 
-/// Which deadline has passed; empty: none.
 std::string QueryPool::missed_deadline(const Running& query) const {
   const std::int64_t now_ms = settings_.now_ms();
   if (now_ms >= query.answer_ends_ms) {
-    return "the answer took more than " + std::to_string(settings_.longest_answer_ms / 1000) +
-           " s in all: narrow it, as with WHERE or LIMIT, or read the file with --db";
+    return "the whole answer took more than " + std::to_string(settings_.longest_answer_ms / 1000) +
+           " s: select less, for example with WHERE or LIMIT, or read the file with --db";
   }
   if (now_ms < query.deadline_ms) {
     return {};
   }
-  return query.waits_for_client()
-             ? "the answer was ended in the middle: its client took no rows for " +
-                   std::to_string(settings_.patience_ms / 1000) + " s. Write it to a file first"
-             : took_too_long(query.time_limit_ms);
+  return query.waits_for_client() ? "the answer is incomplete: the client read no rows for " +
+                                        std::to_string(settings_.patience_ms / 1000) +
+                                        " s. Write the answer to a file first"
+                                  : took_too_long(query.time_limit_ms);
 }
 
-/// Reports the last part of an answer.
 void QueryPool::end(std::uint64_t ticket, std::string reply) {
   forget(ticket);
   report_({QueryReport::Kind::kAnswered, ticket, std::move(reply)});

@@ -17,9 +17,9 @@
 namespace oblique::server {
 namespace {
 
-constexpr const char* kOnlyReads = "this only reads";
+constexpr const char* kOnlyReads = "only reading is allowed";
 
-/// False for functions that reach out of the database, use addresses of this process, run SQL, or
+/// False for functions that reach outside the database, use addresses of this process, run SQL, or
 /// belong to virtual tables that our databases do not have.
 bool is_harmless_function(std::string_view name) {
   constexpr std::array<std::string_view, 16> kOthers{
@@ -30,7 +30,7 @@ bool is_harmless_function(std::string_view name) {
   return std::ranges::find(kOthers, name) == kOthers.end();
 }
 
-/// SQLite's authorizer: allows only reading and computing. Applies inside views too.
+/// SQLite's authorizer, which also applies inside views: allows only reading and computing.
 int authorize(void*, int action, const char*, const char* function, const char*, const char*) {
   switch (action) {
     case SQLITE_SELECT:
@@ -44,14 +44,13 @@ int authorize(void*, int action, const char*, const char* function, const char*,
   }
 }
 
-/// Adds from which studies the results of a study were copied.
-void add_taken(Statement& origins, protocol::StudyStatus& status) {
-  constexpr int kMostNamed = 20;
+void add_origins(Statement& origins, protocol::StudyStatus& status) {
+  constexpr int kMaxNamed = 20;
   origins.bind(1, status.study_id());
   while (origins.step()) {
-    auto& taken = *status.mutable_taken();
+    auto& taken = *status.mutable_reused();
     taken.set_points(taken.points() + origins.number(1));
-    if (taken.from_size() < kMostNamed) {
+    if (taken.from_size() < kMaxNamed) {
       auto& from = *taken.add_from();
       from.set_study(origins.text(0));
       from.set_points(origins.number(1));
@@ -64,7 +63,7 @@ std::int64_t steady_ms() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
 }
 
-/// Copies a text or blob; bytes that are not UTF-8 as x'0F..'.
+/// Copies a text or blob; writes bytes that are not UTF-8 as x'0F..'.
 void copy_bytes(sqlite3* database, sqlite3_stmt* statement, int column,
                 protocol::ChunkWriter& rows) {
   const bool is_text = sqlite3_column_type(statement, column) == SQLITE_TEXT;
@@ -92,15 +91,14 @@ std::int64_t time_limit_of(const protocol::QueryRequest& request) {
 
 std::string took_too_long(std::int64_t time_limit_ms) {
   return fmt::format(
-      "the query took too long (more than {} s): narrow it, as with WHERE or LIMIT, or give it "
+      "the query took more than {} s: select less, for example with WHERE or LIMIT, or give it "
       "more time with --timeout",
       static_cast<double>(time_limit_ms) / 1000.0);
 }
 
 void restrict_to_reading(sqlite3* database) {
   execute(database, "PRAGMA temp_store = MEMORY; PRAGMA case_sensitive_like = ON");
-  // The schema stays trusted: SQLite 3.40 treats json_extract, which our views use, as unsafe.
-  // Without DQS_DML an unknown name in double quotes is an error instead of a text.
+  // Leave the schema trusted: SQLite 3.40 treats json_extract, which our views use, as unsafe.
   constexpr std::array<std::pair<int, int>, 5> kSwitches{
       {{SQLITE_DBCONFIG_DEFENSIVE, 1},
        {SQLITE_DBCONFIG_DQS_DML, 0},
@@ -110,7 +108,7 @@ void restrict_to_reading(sqlite3* database) {
   for (const auto& [name, value] : kSwitches) {
     sqlite3_db_config(database, name, value, nullptr);
   }
-  // SQLite creates these virtual tables at their first use, which would be refused later.
+  // SQLite creates these virtual tables at their first use, which the authorizer would refuse.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
   add_functions(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
@@ -127,7 +125,7 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   StatementHandle statement(raw, &sqlite3_finalize);
   const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
   const std::string reason = code == SQLITE_OK ? "" : sqlite3_errmsg(database);
-  if (primary == SQLITE_AUTH || reason.starts_with("cannot modify ")) {  // the latter of a view
+  if (primary == SQLITE_AUTH || reason.starts_with("cannot modify ")) {
     throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
   }
   if (primary == SQLITE_ERROR) {
@@ -137,18 +135,18 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
     throw failure(database, code);
   }
   if (statement == nullptr) {
-    throw StatementError("there is no statement");
+    throw StatementError("the statement is empty");
   }
   if (std::string_view(tail).find_first_not_of(" \t\r\n;") != std::string_view::npos) {
-    throw StatementError("one statement at a time: something follows the first");
+    throw StatementError("only one statement is allowed, but more text follows it");
   }
   if (sqlite3_stmt_readonly(raw) == 0) {
     throw StatementError(kOnlyReads);
   }
   if (sqlite3_bind_parameter_count(raw) > 0) {
     throw StatementError(
-        "the statement has a parameter (?, :x, @x or $x), which has no value: write the value "
-        "itself, a text in single quotes");
+        "the statement has a parameter (?, :x, @x or $x): write the value "
+        "itself, texts in single quotes");
   }
   return statement;
 }
@@ -159,12 +157,11 @@ QueryError failure(sqlite3* database, int code) {
       const std::int64_t limit = sqlite3_hard_heap_limit64(-1);
       return QueryError("the query needs more memory than " +
                         (limit > 0 ? fmt::format("the {} MiB allowed", limit >> 20U) : "there is") +
-                        ": sort, group or gather less, as with WHERE or LIMIT");
+                        ": sort or group less, for example with WHERE or LIMIT");
     }
     case SQLITE_TOOBIG:
-      return QueryError(
-          fmt::format("a text, a blob or a row of the query has more than the {} MiB allowed",
-                      sqlite3_limit(database, SQLITE_LIMIT_LENGTH, -1) >> 20));
+      return QueryError(fmt::format("a text, blob or row of the query exceeds the allowed {} MiB",
+                                    sqlite3_limit(database, SQLITE_LIMIT_LENGTH, -1) >> 20));
     default:
       return QueryError(std::string("the query failed: ") + sqlite3_errmsg(database));
   }
@@ -223,7 +220,6 @@ protocol::QueryReply Answer::next() {
   return chunk;
 }
 
-/// Steps to the next row. False after the last.
 bool Answer::step() {
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_INTERRUPT) {
@@ -252,10 +248,9 @@ void Answer::copy_row() {
       default:
         copy_bytes(database_, statement_.get(), i, *rows_);
     }
-    // Each value is bounded by max_value_bytes.
     if (rows_->bytes() - before > limits_.max_row_bytes) {
-      throw QueryError("one row alone has more than the " + std::to_string(limits_.max_row_bytes) +
-                       " bytes of a reply, blobs counted twice: select less of it, as with "
+      throw QueryError("one row has more than the " + std::to_string(limits_.max_row_bytes) +
+                       " bytes of a reply, blobs counted twice: select less, for example with "
                        "substr() or length()");
     }
   }
@@ -272,7 +267,7 @@ std::string hexadecimal(std::string_view bytes) {
 
 Reader::Reader(const std::string& path) : database_(open_stored(path)) {
   restrict_to_reading(database_.get());
-  constexpr int kInstructionsPerCheck = 10'000;  // of SQLite's virtual machine
+  constexpr int kInstructionsPerCheck = 10'000;  // instructions of SQLite's virtual machine
   const auto is_over = [](void* time) {
     const auto* limit = static_cast<const TimeLimit*>(time);
     return limit->is_interrupted || steady_ms() > limit->end_ms ? 1 : 0;
@@ -299,7 +294,7 @@ Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& 
 
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
   time_.end_ms = INT64_MAX;
-  // Counts come from `completed_ranges` and indices where possible, so that rows need not be read.
+  // Counts come from `completed_ranges` and indices if possible, which avoids reading rows.
   Statement list(database_.get(),
                  "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
                  " CASE s.counted WHEN 1 THEN (SELECT coalesce(sum(c.points), 0) FROM"
@@ -324,7 +319,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     const std::uint64_t completed = list.number(5);
     status.set_study_id(list.number(0));
     status.set_name(list.text(1));
-    // A server that was killed may not have stored that the study is done.
+    // A server that was killed may not have stored the state "done".
     status.set_state(completed == list.number(3) ? "done" : list.text(2));
     status.set_points(list.number(3));
     status.set_created_at(list.text(4));
@@ -334,7 +329,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     status.set_priority(static_cast<std::int32_t>(list.integer(7)));
     status.set_submitted_by(list.text(8));
     status.set_solver_version(list.text(9));
-    add_taken(origins, status);
+    add_origins(origins, status);
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {

@@ -34,7 +34,8 @@ bool continues_name(char c) {
   return begins_name(c) || is_digit(c) || c == '$';
 }
 
-/// Refuses comments, parameters and what else would end or change the statement around a text.
+/// Throws for comments, parameters and anything else that would end or change the statement around
+/// a text.
 void check_beginning(std::string_view rest) {
   constexpr std::string_view kParameters = "?:@$#";
   if (rest.starts_with("--") || rest.starts_with("/*")) {
@@ -46,7 +47,7 @@ void check_beginning(std::string_view rest) {
   if (rest.front() == ';') {
     throw InputError("it has a semicolon");
   }
-  if (rest.starts_with("\xEF\xBB\xBF")) {  // which SQLite would read as a space
+  if (rest.starts_with("\xEF\xBB\xBF")) {  // which SQLite would treat as a space
     throw InputError("it has a byte-order mark");
   }
   if (rest.front() == '\0') {
@@ -54,8 +55,8 @@ void check_beginning(std::string_view rest) {
   }
 }
 
-/// Length of a quoted text at the beginning of `rest`, whose quote opens at `open`. A doubled quote
-/// inside is one quote.
+/// Length of a quoted text at the start of `rest`, whose quote opens at `open`. A doubled quote
+/// inside stands for one.
 std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   std::size_t end = open;
   do {
@@ -68,8 +69,8 @@ std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   return end;
 }
 
-/// Length of a number: 1, 1.5, .5, 1e-5, 0x1F. Letters directly after it are included, so that
-/// SQLite refuses them.
+/// Length of a number: 1, 1.5, .5, 1e-5, 0x1F. Includes letters directly after it, so that SQLite
+/// refuses them.
 std::size_t number_length(std::string_view rest) {
   std::size_t end = 0;
   while (end < rest.size() && (continues_name(rest[end]) || rest[end] == '.')) {
@@ -80,7 +81,6 @@ std::size_t number_length(std::string_view rest) {
   return end;
 }
 
-/// The token at the beginning of `rest`, which is not empty.
 SqlToken first_token(std::string_view rest) {
   using Kind = SqlToken::Kind;
   check_beginning(rest);
@@ -107,7 +107,6 @@ SqlToken first_token(std::string_view rest) {
   return {Kind::kSign, rest.substr(0, is_pair ? 2 : 1)};
 }
 
-/// Whether another clause or statement begins with token `i`.
 bool begins_clause(SqlTokens tokens, std::size_t i) {
   constexpr std::array<std::string_view, 14> kWords{
       "select", "values", "with",   "from",  "where",  "group",     "having",
@@ -128,7 +127,7 @@ void check_tokens(SqlTokens tokens) {
       ++depth;
     } else if (tokens[i].is_sign(")")) {
       if (depth-- == 0) {
-        throw InputError("a bracket is closed that was not opened");
+        throw InputError("a closing bracket has no opening one");
       }
     } else if (depth == 0 && begins_clause(tokens, i)) {
       throw InputError(fmt::format("it has {} outside brackets", tokens[i].text));
@@ -141,8 +140,8 @@ void check_tokens(SqlTokens tokens) {
 
 // ---- Functions ----------------------------------------------------------------------------------
 
-/// Means, sums of squared differences from them and the sum of their products, without cancellation
-/// (Welford 1962).
+/// Means of x and y, sums of squared differences from the means, and sum of their products,
+/// computed without cancellation (Welford 1962).
 struct Moments {
   std::uint64_t count;
   double mean_x;
@@ -152,8 +151,9 @@ struct Moments {
   double products;
 };
 
-/// The object that SQLite keeps for the group, at first with zeros; nullptr ends the statement,
-/// because there is no memory. With `bytes` 0 it is not created, and nullptr: the group has no row.
+/// The object that SQLite keeps for the group, initially zeros. nullptr if memory runs out, which
+/// ends the statement. With `bytes` 0 the object is not created, and nullptr means a group without
+/// rows.
 template <class T>
 T* state_of(sqlite3_context* context,
             int bytes = sizeof(T)) {  // NOLINT(bugprone-sizeof-expression): T may be a pointer
@@ -168,12 +168,12 @@ T* state_of(sqlite3_context* context,
 bool is_number(sqlite3_context* context, sqlite3_value* value) {
   const int type = sqlite3_value_type(value);
   if (type == SQLITE_TEXT || type == SQLITE_BLOB) {
-    sqlite3_result_error(context, "median, stddev and corr take numbers", -1);
+    sqlite3_result_error(context, "median, stddev and corr need numbers", -1);
   }
   return type == SQLITE_INTEGER || type == SQLITE_FLOAT;
 }
 
-/// The numbers of a group; SQLite keeps a pointer to them.
+/// The numbers of a group, to which SQLite keeps a pointer.
 using Numbers = std::vector<double>;
 
 void median_step(sqlite3_context* context, int, sqlite3_value** arguments) {
@@ -189,7 +189,7 @@ void median_step(sqlite3_context* context, int, sqlite3_value** arguments) {
   }
 }
 
-/// Returns the median. SQLite also calls this when the statement fails.
+/// Returns the median. SQLite also calls this if the statement fails.
 void median_final(sqlite3_context* context) {
   auto** const state = state_of<Numbers*>(context, 0);
   const std::unique_ptr<Numbers> numbers(state == nullptr ? nullptr : *state);
@@ -203,7 +203,6 @@ void median_final(sqlite3_context* context) {
   sqlite3_result_double(context, 0.5 * below + 0.5 * *middle);
 }
 
-/// Adds the pair of the first and the last argument.
 void moments_step(sqlite3_context* context, int count_of_arguments, sqlite3_value** arguments) {
   sqlite3_value* const x = arguments[0];
   sqlite3_value* const y = arguments[count_of_arguments - 1];
@@ -247,25 +246,25 @@ void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
   if (const auto number = decimal_number(text == nullptr ? "" : text)) {
     sqlite3_result_double(context, *number);
   } else {
-    sqlite3_result_error(context, "nearest_double takes a number as text", -1);
+    sqlite3_result_error(context, "nearest_double needs a number as text", -1);
   }
 }
 
 constexpr std::array<SqlFunction, 15> kFunctions{{
-    {"median", "median(x)",
-     "the middle value; half way between the two middle ones of an even number", true, true},
+    {"median", "median(x)", "the middle value, or the mean of the two middle ones", true, true},
     {"stddev", "stddev(x)", "standard deviation of a sample (n - 1)", true, true},
     {"corr", "corr(x, y)",
      "Pearson's correlation of two columns, from -1 to 1; rows with a NULL are left out", true},
     {"count_mode", "count_mode('SC SR')",
-     "points whose major_mode is that; of others count(*) FILTER (WHERE e = 1)", true},
-    {"avg", "avg(x)", "mean of the points, or of each group of --group", true, true},
-    {"min", "min(x)", "least of them", true, true},
-    {"max", "max(x)", "largest of them", true, true},
-    {"sum", "sum(x)", "their sum", true, true},
+     "number of points with this major_mode; for other conditions: count(*) FILTER (WHERE e = 1)",
+     true},
+    {"avg", "avg(x)", "mean of all points, or of each group of --group", true, true},
+    {"min", "min(x)", "smallest value", true, true},
+    {"max", "max(x)", "largest value", true, true},
+    {"sum", "sum(x)", "sum", true, true},
     {"count", "count(*)", "number of points", true},
-    {"round", "round(x, n)", "one value to n decimals", false, true},
-    {"abs", "abs(x)", "of one value", false, true},
+    {"round", "round(x, n)", "value rounded to n decimals", false, true},
+    {"abs", "abs(x)", "absolute value", false, true},
     {"total", "", "", true, true},
     {"group_concat", "", "", true},
     {"json_group_array", "", "", true},
@@ -336,7 +335,7 @@ std::string sql_text(std::string_view text) {
 
 std::string not_allowed(std::string_view flag, std::string_view text, std::string_view why) {
   constexpr std::size_t kLongest = 200;
-  // The message of an exception ends at a zero byte.
+  // Messages of exceptions end at a zero byte.
   const std::string printable(text.substr(0, text.find('\0')));
   const std::string shown = protocol::shortened(printable, kLongest);
   return fmt::format("{} \"{}{}\" is not allowed: {}", flag, shown,

@@ -14,50 +14,52 @@ namespace oblique::server {
 
 using StudyId = std::uint64_t;
 using WorkerId = std::uint64_t;
-/// Number of a worker process, for as long as the scheduler runs.
+/// Number of a worker process, unique while the scheduler runs.
 using ProcessNumber = std::uint64_t;
 
-/// Stands for no process: the loss cannot be taken back.
-constexpr ProcessNumber kNobody = 0;
+/// No process: such a loss cannot be taken back.
+constexpr ProcessNumber kNoProcess = 0;
 
 /// A lease that ended without an answer to its points.
 struct Loss {
-  ProcessNumber process;  ///< that was lost; kNobody if it ended the lease and lives on
-  /// The process had solved points before, and held this one point and nothing else.
+  /// process that was lost; kNoProcess if the worker ended the lease and is still connected
+  ProcessNumber process;
+  /// The process had solved points before, and held only this point.
   bool alone;
 
   bool operator==(const Loss&) const = default;
 };
 
-/// How suspect points are after losses. A later one includes the earlier ones.
-enum class Standing : std::uint8_t {
-  kSound,     ///< handed out with others, in batches of any size
-  kSuspect,   ///< in several losses: to a worker that holds nothing else
-  kAccused,   ///< a single point that cost a worker which held nothing else
-  kCondemned  ///< cost so many of those that it fails, unless one of them comes back
+/// Suspicion against points after losses. Each level includes the conditions of the lower ones.
+enum class Suspicion : std::uint8_t {
+  kSound,    ///< leased with others, in batches of any size
+  kSuspect,  ///< part of several losses: leased to a worker that holds nothing else
+  kRisky,    ///< a single point that a worker held alone when it was lost
+  kFailing   ///< lost so many workers alone that it fails, unless one of them returns
 };
 
 struct LossLimits {
-  std::uint32_t suspect_after = 2;    ///< losses of distinct processes
-  std::uint32_t condemned_after = 3;  ///< losses of processes that held nothing else
+  std::uint32_t suspect_after = 2;  ///< losses of different processes
+  std::uint32_t failing_after = 3;  ///< losses of processes that held only this point
 };
 
-/// The losses that a range of points was in, each process once.
+/// The losses that a range of points was part of, each process once.
 class LossHistory {
  public:
-  /// Losses of kNobody are counted each time.
+  /// Losses of kNoProcess count each time.
   void add(const Loss& loss) {
-    constexpr std::size_t kMostNoted = 16;  // further losses change nothing unless alone
+    constexpr std::size_t kMaxNoted = 16;  // more losses matter only if `alone`
     const auto known = std::ranges::find(losses_, loss.process, &Loss::process);
-    if (loss.process != kNobody && known != losses_.end()) {
+    if (loss.process != kNoProcess && known != losses_.end()) {
       known->alone = known->alone || loss.alone;
-    } else if (loss.alone || losses_.size() < kMostNoted) {
+    } else if (loss.alone || losses_.size() < kMaxNoted) {
       losses_.push_back(loss);
     }
   }
-  /// The process came back, so these points did not kill it. Returns whether it was in the history.
+  /// Removes the losses of a process that returned, so these points did not kill it. Returns
+  /// whether there were any.
   bool take_back(ProcessNumber process) {
-    return process != kNobody &&
+    return process != kNoProcess &&
            std::erase_if(losses_, [&](const Loss& loss) { return loss.process == process; }) > 0;
   }
 
@@ -65,11 +67,11 @@ class LossHistory {
   std::uint32_t alone() const {
     return static_cast<std::uint32_t>(std::ranges::count(losses_, true, &Loss::alone));
   }
-  Standing standing(const LossLimits& limits) const {
+  Suspicion suspicion(const LossLimits& limits) const {
     if (alone() > 0) {
-      return alone() >= limits.condemned_after ? Standing::kCondemned : Standing::kAccused;
+      return alone() >= limits.failing_after ? Suspicion::kFailing : Suspicion::kRisky;
     }
-    return losses_.size() >= limits.suspect_after ? Standing::kSuspect : Standing::kSound;
+    return losses_.size() >= limits.suspect_after ? Suspicion::kSuspect : Suspicion::kSound;
   }
 
   bool operator==(const LossHistory&) const = default;
@@ -78,48 +80,49 @@ class LossHistory {
   std::vector<Loss> losses_;
 };
 
-/// What is known of one worker process. Each of its connections is a worker of its own.
+/// A worker process. Each of its connections is a worker of its own.
 struct WorkerProcess {
-  std::string id{};              ///< as it says itself; empty when it says none
-  std::set<WorkerId> workers{};  ///< that are connected
-  /// Since when it has solved points that were handed to it; nothing: not yet.
+  std::string id{};              ///< from WorkerHello; empty if it has none
+  std::set<WorkerId> workers{};  ///< its connections
+  /// When it first solved leased points; nothing: not yet.
   std::optional<std::int64_t> proven_since_ms{};
   std::uint32_t lost_in_a_row = 0;   ///< losses since it last solved something
-  std::uint64_t losses = 0;          ///< leases of it that ended without an answer
-  std::set<StudyId> in_histories{};  ///< studies with points whose history it may be in
+  std::uint64_t losses = 0;          ///< its leases that ended without an answer
+  std::set<StudyId> in_histories{};  ///< studies with points whose history may contain it
 };
 
-/// The processes behind the workers, including processes that are gone and may come back.
+/// The processes of the workers, including absent ones that may return.
 class WorkerProcesses {
  public:
-  /// Of the processes that are gone the latest `most_absent` are remembered.
+  /// Keeps the latest `most_absent` absent processes.
   explicit WorkerProcesses(std::size_t most_absent) : most_absent_(most_absent) {}
 
-  /// A connection of the process `id`; an empty one is a process of its own. Returns its number.
+  /// Adds a connection of the process `id` and returns the process's number. An empty `id` is a new
+  /// process.
   ProcessNumber join(const std::string& id, WorkerId worker);
-  /// The connection ended. The process may be forgotten.
+  /// Removes a connection. The process may be forgotten.
   void leave(ProcessNumber number, WorkerId worker);
 
-  /// No points of that study are in any history any more.
+  /// Removes a study whose points are in no history any more.
   void forget_study(StudyId study);
 
-  /// Throws std::out_of_range for one that is not remembered.
+  /// Throws std::out_of_range for a process that was forgotten.
   WorkerProcess& at(ProcessNumber number) { return processes_.at(number); }
   const WorkerProcess& at(ProcessNumber number) const { return processes_.at(number); }
   std::size_t size() const { return processes_.size(); }
 
-  /// Throws std::logic_error unless exactly the processes that should be are remembered, with
-  /// `workers` connections in all.
+  /// Throws std::logic_error unless exactly the expected processes are kept, with `workers`
+  /// connections in all.
   void check_invariants(std::size_t workers) const;
 
  private:
   void forget(ProcessNumber number);
 
   std::size_t most_absent_;
-  ProcessNumber last_number_ = kNobody;
+  ProcessNumber last_number_ = kNoProcess;
   std::map<ProcessNumber, WorkerProcess> processes_;
   std::map<std::string, ProcessNumber> numbers_;  // by id
-  std::deque<ProcessNumber> absent_;              // the one that left first in front
+  std::deque<ProcessNumber> absent_;              // the earliest first
 };
 
 }  // namespace oblique::server

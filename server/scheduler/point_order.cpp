@@ -12,13 +12,12 @@
 namespace oblique::server {
 namespace {
 
-/// Points of one fall that follow each other.
 struct Piece {
   Interval points;
-  std::uint64_t fall;  ///< number of its fall
+  std::uint64_t fall;  ///< number of the fall
 };
 
-/// The points from a number on, as pieces, and the first open point of each fall.
+/// The points from a number on as pieces, and the first open point of each fall.
 struct Falls {
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
@@ -44,10 +43,10 @@ struct Falls {
   bool is_open(std::uint64_t fall) const { return heads[fall] != kNone; }
 
   std::vector<Piece> pieces;
-  std::vector<std::uint64_t> heads;  ///< by fall; kNone: it has no open point
+  std::vector<std::uint64_t> heads;  ///< first open point by fall; kNone: none
 };
 
-/// Whether points of the block may share a fall and lie apart: not if each has its own.
+/// Whether points of the block with the same fall may be apart. Not if each point has its own fall.
 bool may_share_falls(const protocol::Block& block) {
   const auto axes = protocol::model_axes(block);
   return std::none_of(axes.begin(), axes.end(), [](const protocol::Axis* axis) {
@@ -61,22 +60,22 @@ bool may_share_falls(const protocol::Block& block) {
 void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
                          const IntervalSet& open, std::uint64_t falls_a_group) {
   const auto& blocks = table.recipe().blocks();
-  if (first != end_ || table.models() > kMostModels ||
+  if (first != end_ || table.models() > kMaxModels ||
       std::none_of(blocks.begin(), blocks.end(), may_share_falls)) {
     return;
   }
   Falls falls(table, first, open);
   if (falls.pieces.size() == falls.heads.size()) {
-    return;  // no fall lies apart
+    return;  // no fall is apart
   }
-  // Falls with open points come first, and pieces of one fall follow each other.
+  // Sorts falls with open points to the front; pieces of one fall follow each other.
   std::ranges::stable_sort(falls.pieces, {}, [&](const Piece& piece) {
     return std::pair(!falls.is_open(piece.fall), piece.fall);
   });
   end_ = first;
   for (auto begin = falls.pieces.cbegin(); begin != falls.pieces.cend();) {
     groups_.push_back(end_);
-    std::uint64_t number = 0;  // of falls in the group
+    std::uint64_t number = 0;  // number of falls in the group
     auto end = begin;
     for (; end != falls.pieces.cend(); ++end) {
       if (end != begin && end->fall == std::prev(end)->fall) {
@@ -84,7 +83,7 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
       }
       const std::uint64_t head = falls.heads[end->fall];
       if (head == Falls::kNone) {
-        continue;  // the last group has these, too
+        continue;  // these belong to the last group
       }
       if (number == falls_a_group) {
         break;
@@ -105,7 +104,6 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
             [this](std::uint32_t a, std::uint32_t b) { return runs_[a].point < runs_[b].point; });
 }
 
-/// Gives these points the places behind the last one.
 void PointOrder::append(const Interval& points) {
   if (points.begin == points.end) {
     return;
@@ -176,7 +174,7 @@ IntervalSet PointOrder::places(const IntervalSet& points) const {
       at += count;
     }
   });
-  std::ranges::sort(parts, {}, &Interval::begin);  // so that each is inserted behind the last
+  std::ranges::sort(parts, {}, &Interval::begin);  // so that each insertion is at the end
   IntervalSet places;
   places.insert(parts);
   return places;

@@ -8,36 +8,37 @@
 
 namespace oblique::server {
 
-/// The order in which the points of a study are handed out. A *place* is a position in it, from 0.
+/// The order in which the points of a study are leased. A *place* is a position in this order, from
+/// 0.
 ///
-/// Places are point numbers, unless points that share a fall lie apart and `arrange` was called.
-/// Then falls are put into groups that a worker solves side by side. Of a group come first one
-/// point of each fall, so that the first batch has all falls, and then the other points, fall by
-/// fall. Costs 20 bytes a run of points that share a model and lie together.
+/// Places equal point numbers until `arrange` is called for a study whose falls are apart. It puts
+/// falls into groups that a worker solves side by side. A group begins with one point of each fall,
+/// so that the first batch contains all falls; its other points follow, fall by fall. Needs 20
+/// bytes for each run of adjacent points with the same model.
 class PointOrder {
  public:
-  /// A study with more models stays in the order of its numbers: finding their falls takes about
-  /// a microsecond a model.
-  static constexpr std::uint64_t kMostModels = 1'000'000;
+  /// A study with more models keeps the order of its numbers, because finding their falls takes
+  /// about a microsecond a model.
+  static constexpr std::uint64_t kMaxModels = 1'000'000;
 
-  /// Brings the points from `first` on, which is 0 or where the arranged ones end, into order if
-  /// falls lie apart. `open` are points that may be handed out: a group has `falls_a_group` falls
-  /// that have some, the last one fewer.
+  /// Orders the points from `first` on if their falls are apart. `first` is 0 or the end of the
+  /// ordered points. `open` contains the points that may be leased. A group has `falls_a_group`
+  /// falls with open points, the last one fewer.
   void arrange(const protocol::PointTable& table, std::uint64_t first, const IntervalSet& open,
                std::uint64_t falls_a_group);
   bool is_arranged() const { return end_ > 0; }
 
   std::uint64_t place(std::uint64_t point) const;
   std::uint64_t point(std::uint64_t place) const;
-  /// The points of these places, in order of the places; neighbours are merged.
+  /// The points at these places, in order of the places, with neighbours merged.
   std::vector<Interval> points(const Interval& places) const;
   /// The places of these points.
   IntervalSet places(const IntervalSet& points) const;
-  /// The places around `place` of one group or, if they are not arranged, of one model.
+  /// The places of the group around `place`; without groups, of the points with the same model.
   Interval group_at(const protocol::PointTable& table, std::uint64_t place) const;
 
  private:
-  /// Points that follow each other and have places that do; up to the place of the next run.
+  /// Consecutive points at consecutive places, up to the place of the next run.
   struct Run {
     std::uint64_t place;
     std::uint64_t point;
@@ -47,9 +48,9 @@ class PointOrder {
   std::size_t run_of_place(std::uint64_t place) const;
 
   std::vector<Run> runs_;                ///< by place
-  std::vector<std::uint32_t> by_point_;  ///< the runs in the order of their points
-  std::vector<std::uint64_t> groups_;    ///< where the places of each group begin
-  std::uint64_t end_ = 0;                ///< places from here on are point numbers
+  std::vector<std::uint32_t> by_point_;  ///< indices of runs in the order of points
+  std::vector<std::uint64_t> groups_;    ///< first place of each group
+  std::uint64_t end_ = 0;                ///< places from here on equal point numbers
 };
 
 }  // namespace oblique::server

@@ -14,15 +14,14 @@
 namespace oblique::server {
 namespace {
 
-/// Longest gap between two ticks that counts as silence of the workers. In a longer one it was the
-/// server that did not run, and the workers' messages still wait to be read.
+/// Longest time between two ticks that counts as silence of the workers. After a longer one the
+/// server itself had not run, and messages of workers still wait to be read.
 constexpr std::int64_t kLongestTick_ms = 1000;
 
-/// Weight of the newest message in a worker's pace.
 constexpr double kPaceWeight = 0.5;
 /// Weight of all earlier messages in the pace of all workers.
 constexpr double kPaceFades = 0.98;
-/// Longer times a point are not believed.
+/// Longer times per point are treated as this one.
 constexpr double kLongestPoint_s = 86'400.0;
 
 }  // namespace
@@ -38,7 +37,7 @@ std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   return std::exchange(effects_, {});
 }
 
-/// Events of unknown studies and workers are ignored where the handler needs a known one.
+/// Ignores an event of an unknown study or worker if its handler needs a known one.
 template <typename Kind>
 void Scheduler::pass(const Kind& event) {
   if constexpr (requires(Study & study) { on(study, event); }) {
@@ -104,7 +103,7 @@ void Scheduler::on(Study& study, const StudyCancelled& event) {
   study.points.rest(false);
 }
 
-/// All leases end, and workers that have the study drop it. No point counts as lost.
+/// Ends all leases and makes workers drop the study. No point counts as lost.
 void Scheduler::withdraw(StudyId study) {
   for (const LeaseId lease : std::set<LeaseId>(studies_.at(study).leases)) {
     end_lease(lease, std::nullopt);
@@ -136,7 +135,8 @@ void Scheduler::on(Study& study, const PriorityChanged& event) {
 }
 
 void Scheduler::on(Study& study, const FailuresForgotten& event) {
-  // The lease that a point failed in may still run. It must not hold the point beside a new lease.
+  // The lease in which a point failed may still run. It must not contain the point when that gets a
+  // new lease.
   const IntervalSet places = study.points.order().places(event.points);
   for (const LeaseId id : std::set<LeaseId>(study.leases)) {
     const Lease& lease = leases_.at(id);
@@ -179,25 +179,25 @@ void Scheduler::on(const StudyRemoved& event) {
   for (auto& [id, worker] : workers_) {
     worker.paces.erase(event.study);
   }
-  condemned_.erase(event.study);
+  failing_.erase(event.study);
   processes_.forget_study(event.study);
   if (study->second.rank) {
     free_.erase(*study->second.rank);
   }
   suspects_.erase(event.study);
   studies_.erase(study);
-  ready_workers_.unpark_all();  // suspect points of it may have kept some from others
+  ready_workers_.unpark_all();  // its suspect points may have kept workers from other points
 }
 
-/// A study that opens begins level with the one of its priority that is served least, so that it
-/// neither waits for nor catches up with what went before.
+/// Gives a study that opens the smallest `served` of its priority, so that it neither waits for
+/// others nor catches up with them.
 void Scheduler::level(Study& study) const {
   const std::int64_t rank = -std::int64_t{study.priority};
   const auto least = free_.lower_bound({rank, 0.0, 0});
   study.served = least != free_.end() && std::get<0>(*least) == rank ? std::get<1>(*least) : 0.0;
 }
 
-/// The study has no results, or of the solver version of the workers.
+/// Whether the study has no results, or results of the server's solver version.
 bool Scheduler::is_current(const Study& study) const {
   return study.solver_version.empty() || study.solver_version == solver_version_;
 }
@@ -227,7 +227,7 @@ void Scheduler::requeue(StudyId id) {
   }
   const bool has_suspect = is_open(study) && study.has_suspect();
   const bool changes_suspect = has_suspect ? suspects_.insert(id).second : suspects_.erase(id) > 0;
-  if ((rank && !had_free) || changes_suspect) {  // suspect points stop some workers
+  if ((rank && !had_free) || changes_suspect) {  // some workers must wait for suspect points
     ready_workers_.unpark_all();
   }
 }
@@ -276,7 +276,7 @@ void Scheduler::on(Worker& worker, const CreditGiven& event) {
 }
 
 void Scheduler::on(Worker& worker, const HeartbeatReceived& event) {
-  // A lease that the worker still does not name when a batch must long have reached it never did.
+  // A lease that the worker does not name after this time never reached it.
   const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
   if (worker.probe != 0 && !held.contains(worker.probe) &&
       now_ms_ - *worker.probed_ms > settings_.lost_after_ms) {
@@ -325,14 +325,14 @@ void Scheduler::on(const Tick&) {
   const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
   last_tick_ms_ = now_ms_;
   ready_workers_.unpark_all();  // time has passed
-  fail_condemned();
+  fail_due_points();
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
     if (gap_ms > kLongestTick_ms) {
       worker.last_heard_ms = std::min(now_ms_, worker.last_heard_ms + gap_ms - kLongestTick_ms);
       worker.stored_ms = std::min(now_ms_, worker.stored_ms + gap_ms - kLongestTick_ms);
     }
-    if (held_) {  // results may wait to be taken
+    if (held_) {  // results may still wait to be read
       worker.stored_ms = now_ms_;
     }
     if (now_ms_ - worker.last_heard_ms > settings_.lost_after_ms) {
@@ -393,10 +393,11 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   Study& study = studies_.at(lease.study);
   study.leases.erase(id);
   const std::vector<Interval> held = open_places(lease);
-  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {  // it holds the same
+  // its twin holds the same points
+  if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
     if (loss && !held.empty()) {
-      // What killed one worker may kill the other: that must not be forgotten.
+      // What killed one worker may kill the other, so keep the history.
       note_process(lease.study, loss->process);
       twin->second.batch.losses.add({loss->process, false});
     }
@@ -418,7 +419,7 @@ std::vector<Interval> Scheduler::open_places(const Lease& lease) const {
       .within(lease.batch.first_place, lease.batch.end());
 }
 
-/// A batch whose points were all answered by others is nobody's work any more.
+/// Releases a batch whose points were all answered by other workers.
 void Scheduler::release_if_answered(LeaseId id) {
   const auto lease = leases_.find(id);
   if (lease != leases_.end() && !has_open_points(lease->second)) {
@@ -428,10 +429,10 @@ void Scheduler::release_if_answered(LeaseId id) {
 }
 
 void Scheduler::on(Worker& worker, const ResultsReceived& event) {
-  if (names_other_points(event)) {
+  if (reports_foreign_points(event)) {
     remove_worker(event.worker, WorkerEnd::kLost);
-    effects_.emplace_back(
-        DropWorker{event.worker, "it says that a filter leaves out points which it was not given"});
+    effects_.emplace_back(DropWorker{
+        event.worker, "it reports that a filter leaves out points which it did not lease"});
     return;
   }
   StoreResults store{event.worker, event.study, event.sequence, {}};
@@ -445,7 +446,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
     if (!store.accepted.empty() && study->second.solver_version.empty()) {
       study->second.solver_version = solver_version_;
     }
-    // Of a lease that has ended since others name them again.
+    // The points of a lease that has ended are reported again by another worker.
     if (worker.leases.contains(event.lease)) {
       store.left_out = study->second.points.receive(event.left_out);
     }
@@ -453,7 +454,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
       worker.stored_ms = now_ms_;
     }
     requeue(event.study);
-    learn_pace(worker, event);
+    update_pace(worker, event);
   }
   note_answers(worker, event, !store.accepted.empty());
   effects_.emplace_back(std::move(store));
@@ -466,22 +467,22 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   if (event.batch_done) {
     const bool is_solved = is_proven(worker) && !has_open_points(lease->second);
     worker.solved_batches += is_solved ? 1U : 0U;
-    // Points of a finished batch that got no answer count as lost, or a worker that never answers
-    // them would take them for ever.
-    end_lease(event.lease, Loss{kNobody, is_proven(worker) && worker.leases.size() == 1});
+    // Points without an answer in a finished batch count as lost. Otherwise a worker that never
+    // answers them would get them again and again.
+    end_lease(event.lease, Loss{kNoProcess, is_proven(worker) && worker.leases.size() == 1});
   }
   release_if_answered(twin);
 }
 
-/// A lease of the worker does not have all the points that the message says a filter leaves out.
-bool Scheduler::names_other_points(const ResultsReceived& event) const {
+/// Whether the message reports left-out points that are in no lease of the worker.
+bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   const auto lease = leases_.find(event.lease);
   if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {
     return false;
   }
   const StudyPoints& points = studies_.at(lease->second.study).points;
   const Batch& batch = lease->second.batch;
-  // So many are not even looked up: that could take long.
+  // Such a number is refused without a lookup, which could take long.
   if (event.left_out.size() > batch.points || lease->second.study != event.study ||
       !points.may_leave_out(event.left_out)) {
     return true;
@@ -490,15 +491,15 @@ bool Scheduler::names_other_points(const ResultsReceived& event) const {
   return places.front().begin < batch.first_place || places.back().end > batch.end();
 }
 
-void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
+void Scheduler::update_pace(Worker& worker, const ResultsReceived& event) {
   const auto solved = static_cast<double>(event.outcomes.size());
   const double points = solved + static_cast<double>(event.left_out.size());
   if (points == 0.0 || !std::isfinite(event.busy_s) || event.busy_s <= 0.0 ||
       event.busy_s / points > kLongestPoint_s) {
     return;
   }
-  // Time and points by themselves: the first points of a model come with its fall, which says
-  // little of those that follow.
+  // Averages time and points separately: the first points of a model include its fall and do not
+  // show how long later ones take.
   const auto learn = [&event](double& busy_s, double& number, double newest) {
     const double weight = number > 0.0 ? kPaceWeight : 1.0;
     busy_s += weight * (event.busy_s - busy_s);
@@ -506,7 +507,7 @@ void Scheduler::learn_pace(Worker& worker, const ResultsReceived& event) {
   };
   Pace& known = worker.paces[event.study];
   learn(known.busy_s, known.points, points);
-  // A message that only names left-out points says nothing of the time that a solved one takes.
+  // A message with left-out points only does not show how long a point takes.
   if (solved > 0.0) {
     learn(known.solved_busy_s, known.solved, solved);
     pace_s_ = kPaceFades * pace_s_ + event.busy_s;

@@ -20,32 +20,32 @@
 
 namespace oblique::server {
 
-/// A study as others see it.
+/// Counts of the points of a study.
 struct StudyCounts {
   std::uint64_t points;
-  std::uint64_t completed;  ///< also those that failed or are left out
+  std::uint64_t completed;  ///< including failed and left-out points
   std::uint64_t failed;
-  std::uint64_t left_out;  ///< by a filter, as far as workers have reported it
+  std::uint64_t left_out;  ///< left out by a filter, as far as workers have reported
   std::uint64_t leased;
   bool cancelled;
   std::string solver_version;  ///< of its results; empty without results
-  bool is_of_other_solver;     ///< points are open, and the server has another version
+  bool is_of_other_solver;     ///< it has open points, but the server has another version
 
   std::uint64_t open() const { return points - completed; }
   std::uint64_t solved() const { return completed - std::min(completed, failed + left_out); }
 };
 
-/// What a worker does; of several the first that is true.
+/// State of a worker: the first of these that applies.
 enum class WorkerState {
-  kSilent,    ///< no message for 1.5 s: heartbeats come every 900 ms
-  kSetAside,  ///< it gets nothing until it has solved a probe
-  kBusy,      ///< it does not read what it is sent
+  kSilent,    ///< no message for 1.5 s; heartbeats come every 900 ms
+  kSetAside,  ///< it gets no batch until it has solved a probe
+  kBusy,      ///< it does not read its messages
   kWorking,   ///< it holds a batch or a probe
   kIdle,
 };
 inline constexpr std::array kWorkerStates{"silent", "set aside", "busy", "working", "idle"};
 
-/// The workers of one state.
+/// Number of workers in one state, and of their threads.
 struct WorkerGroup {
   std::uint64_t workers = 0;
   std::uint64_t threads = 0;
@@ -57,19 +57,19 @@ struct WorkerCounts {
   std::uint64_t solved_points;
   std::int64_t silent_ms;
   std::uint64_t losses;  ///< leases of its process that ended without an answer
-  bool is_proven;        ///< its process has solved points that were handed to it
+  bool is_proven;        ///< its process has solved leased points
   bool is_set_aside;
   WorkerState state;
 };
 
-/// The workers with credit, first come first served. A worker for which there was nothing is
-/// parked: it keeps its place and is skipped until something changes for it, so that an event costs
-/// what it changes, however many workers wait.
+/// The workers with credit, first come first served. A worker without suitable points is parked: it
+/// keeps its place and is skipped until something changes for it. So the cost of an event depends
+/// on what it changes, not on the number of waiting workers.
 class ReadyQueue {
  public:
   using ByPlace = std::map<std::uint64_t, WorkerId>;
 
-  /// At the end, unless it is in the queue already.
+  /// Appends a worker that is not in the queue.
   void add(WorkerId worker) {
     if (places_.emplace(worker, last_place_ + 1).second) {
       active_.emplace(++last_place_, worker);
@@ -88,7 +88,7 @@ class ReadyQueue {
 
   bool contains(WorkerId worker) const { return places_.contains(worker); }
   std::size_t size() const { return places_.size(); }
-  /// In the order in which they are served.
+  /// In order of service.
   const ByPlace& active() const { return active_; }
   const ByPlace& parked() const { return parked_; }
 
@@ -105,48 +105,48 @@ class ReadyQueue {
   std::uint64_t last_place_ = 0;
 };
 
-/// Decides who solves which points: (state, event, now) -> effects. No I/O, no clock, no thread, no
-/// randomness; README.md has the table of states and events. Not thread-safe.
+/// Decides which worker solves which points: (state, event, now) -> effects. Without I/O, clock,
+/// thread and randomness; README.md has the table of states and events. Not thread-safe.
 class Scheduler {
  public:
-  /// `solver_version` is that of the server and all its workers. A study whose results have another
-  /// version is not handed out.
+  /// `solver_version` is that of the server and all its workers. A study with results of another
+  /// version is not leased.
   explicit Scheduler(const SchedulerSettings& settings, std::string solver_version = {})
       : settings_(settings), solver_version_(std::move(solver_version)) {}
 
-  /// Takes one event at `now_ms` (any steady clock that never runs backwards) and returns what is
-  /// to be done, in order. Events of unknown workers and studies have no effect but the answers
-  /// that the table names.
+  /// Handles one event at `now_ms` (of a clock that never runs backwards) and returns the effects
+  /// in order. Events of unknown workers and studies have only the effects in the table of
+  /// README.md.
   std::vector<Effect> handle(const Event& event, std::int64_t now_ms);
 
-  bool knows_worker(WorkerId worker) const { return workers_.contains(worker); }
-  bool knows_study(StudyId study) const { return studies_.contains(study); }
+  bool has_worker(WorkerId worker) const { return workers_.contains(worker); }
+  bool has_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
-  /// How often dispatch has examined a worker, which is what dispatch costs.
+  /// Number of workers that dispatch has examined so far: the cost of dispatch.
   std::uint64_t examined_workers() const { return examined_workers_; }
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
-  /// No worker gets points before it has solved a probe; true without workers.
+  /// Whether every worker must solve a probe before it gets points; true without workers.
   bool sets_all_aside() const;
-  /// All workers, by WorkerState.
+  /// Workers by WorkerState.
   WorkerGroups groups(std::int64_t now_ms) const;
-  /// Batches that are at workers.
+  /// Number of leased batches.
   std::size_t leases() const { return leases_.size(); }
-  /// Time of a thread that a point takes, over the last results, in s; 0: not known.
+  /// Thread time per point over the last results [s]; 0: unknown.
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
-  /// Since its last message. Throws std::out_of_range for an unknown worker.
+  /// Time since its last message [ms]. Throws std::out_of_range for an unknown worker.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
 
-  /// Throws std::logic_error when the state contradicts itself: a point in two places or in none, a
-  /// lease without worker or study, a leased point without lease, two leases of one point
-  /// that are not twins.
+  /// Throws std::logic_error if the state contradicts itself: a point in two places or in none, a
+  /// lease without worker or study, a leased point without lease, two leases of one point that are
+  /// not twins.
   void check_invariants() const;
 
  private:
-  /// The order in which studies get batches: minus the priority, served, number.
+  /// Order in which studies get batches: minus the priority, `served`, number.
   using Rank = std::tuple<std::int64_t, double, StudyId>;
   struct Study {
     StudyPoints points;
@@ -155,35 +155,35 @@ class Scheduler {
     bool paused;
     bool finished;
     std::int32_t priority = 0;
-    /// Batches handed out since the study was last open; long ones count for more.
+    /// Number of batches leased since the study was last open; long ones count more.
     double served = 0.0;
-    std::string solver_version{};  ///< of its results and leases; empty while there are none
+    std::string solver_version{};  ///< of its results and leases; empty: none
     std::set<LeaseId> leases{};
     bool held = false;
-    std::optional<Rank> rank{};  ///< in `free_`
+    std::optional<Rank> rank{};  ///< its entry in `free_`
 
     bool has_suspect() const {
-      return points.has(Standing::kSuspect) || points.has(Standing::kAccused);
+      return points.has(Suspicion::kSuspect) || points.has(Suspicion::kRisky);
     }
   };
   struct Lease {
     WorkerId worker;
     StudyId study;
     Batch batch;
-    bool alone;  ///< of suspect points: its worker gets nothing beside it
+    bool alone;  ///< has suspect points, so its worker gets nothing else
     std::int64_t granted_ms;
-    LeaseId twin = 0;  ///< of another worker, for what is left of the same batch; 0: none
+    LeaseId twin = 0;  ///< lease of another worker for the rest of the same batch; 0: none
   };
-  /// How a worker gets on with a study.
+  /// Pace of a worker in a study.
   struct Pace {
-    double busy_s = 0.0;  ///< of a thread, for so many points: the last messages, weighted
+    double busy_s = 0.0;  ///< thread time for `points`, weighted to the last messages
     double points = 0.0;
-    /// The same of messages with solved points: these alone, and the time of the whole message.
+    /// As `busy_s`, over messages with solved points; `solved` counts only these points.
     double solved_busy_s = 0.0;
     double solved = 0.0;
-    std::uint64_t last_batch_points = 0;  ///< that it was fit for
-    std::uint64_t last_end = 0;           ///< place; 0: it had no batch
-    std::uint64_t held_points = 0;        ///< of its leases
+    std::uint64_t last_batch_points = 0;  ///< size that its pace allowed
+    std::uint64_t last_end = 0;           ///< place; 0: no batch yet
+    std::uint64_t held_points = 0;        ///< points in its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
     double s_per_solved() const { return solved > 0.0 ? solved_busy_s / solved : 0.0; }
@@ -191,16 +191,16 @@ class Scheduler {
   struct Worker {
     std::uint32_t threads;
     std::uint32_t credit = 0;
-    bool is_busy = false;  ///< gets nothing
-    ProcessNumber process = kNobody;
-    LeaseId probe = 0;                        ///< that it has, and then nothing else; 0: none
+    bool is_busy = false;  ///< gets no batches
+    ProcessNumber process = kNoProcess;
+    LeaseId probe = 0;                        ///< its probe, which it then holds alone; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
     std::int64_t last_heard_ms;
-    std::int64_t stored_ms = 0;      ///< when it last stored a point, or began to hold batches
-    std::size_t solved_batches = 0;  ///< since it joined or stalled
+    std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold batches
+    std::size_t solved_batches = 0;  ///< batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    std::map<StudyId, std::uint64_t> defined;  ///< with so many points, as it was told
+    std::map<StudyId, std::uint64_t> defined;  ///< number of points in the recipe that was sent
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;
@@ -231,16 +231,16 @@ class Scheduler {
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
   void withdraw(StudyId id);
-  /// `loss`: who went with it without an answer; nothing: its points are given back.
+  /// `loss`: the process that was lost; nothing: its points are given back.
   void end_lease(LeaseId lease, const std::optional<Loss>& loss);
-  /// Places of its batch whose points have no answer yet.
+  /// Places of its batch without an answer.
   std::vector<Interval> open_places(const Lease& lease) const;
   bool has_open_points(const Lease& lease) const { return !open_places(lease).empty(); }
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
-  bool names_other_points(const ResultsReceived& event) const;
-  void learn_pace(Worker& worker, const ResultsReceived& event);
-  /// The fastest workers' time of a thread for a point, by study; 0: unknown.
+  bool reports_foreign_points(const ResultsReceived& event) const;
+  void update_pace(Worker& worker, const ResultsReceived& event);
+  /// The shortest thread time per point of any worker, by study; 0: unknown.
   using FastestPaces = std::map<StudyId, double>;
   double fastest_pace(StudyId id, FastestPaces& known) const;
   void end_stalled();
@@ -258,7 +258,7 @@ class Scheduler {
   void note_end(const Worker& worker, WorkerEnd how);
   void note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted);
   void take_back_losses(ProcessNumber process);
-  void fail_condemned();
+  void fail_due_points();
   bool is_proven(const Worker& worker) const;
   bool is_set_aside(const Worker& worker) const;
   bool is_longest_proven(const Worker& worker) const;
@@ -269,14 +269,14 @@ class Scheduler {
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
   void serve_suspect(WorkerId id, Worker& worker, StudyId study);
-  std::optional<Standing> suspect_for(const StudyPoints& points, const Worker& worker) const;
+  std::optional<Suspicion> suspect_for(const StudyPoints& points, const Worker& worker) const;
   bool may_hold_more(const Worker& worker) const;
   void duplicate_stragglers();
   bool is_straggling(const Lease& lease, FastestPaces& paces) const;
   bool is_current(const Study& study) const;
   StudyId next_suspect_study(const Worker& worker) const;
   void stop_draining(WorkerId worker);
-  BatchSize portion_for(const Worker& worker, StudyId study, bool fills_lanes) const;
+  BatchSize batch_size_for(const Worker& worker, StudyId study, bool fills_lanes) const;
   void fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
   void use_credit(WorkerId id, Worker& worker);
@@ -285,23 +285,25 @@ class Scheduler {
   SchedulerSettings settings_;
   std::string solver_version_;
   WorkerProcesses processes_{settings_.most_absent_processes};
-  std::deque<std::int64_t> vanished_ms_;  // when the last newcomers vanished with points
+  // times at which the last new processes were lost with points
+  std::deque<std::int64_t> vanished_ms_;
   std::map<StudyId, Study> studies_;
-  std::set<Rank> free_;          // studies with free points to hand out, the next one first
-  std::set<StudyId> suspects_;   // those with suspect points to hand out
-  std::set<StudyId> condemned_;  // those with condemned points
+  std::set<Rank> free_;         // studies with free points to lease, the next one first
+  std::set<StudyId> suspects_;  // studies with suspect points to lease
+  std::set<StudyId> failing_;   // studies with failing points
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
-  ReadyQueue ready_workers_;  // with credit
-  WorkerId draining_ = 0;     // gets nothing until it holds nothing, then suspect points; 0: none
+  ReadyQueue ready_workers_;  // workers with credit
+  // worker that gets nothing until it is empty, then suspect points; 0: none
+  WorkerId draining_ = 0;
   std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;
   bool held_ = false;
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
-  Effects effects_;      // of the event being handled
-  double pace_s_ = 0.0;  // of threads, for these points; what is longer ago counts less
+  Effects effects_;      // effects of the current event
+  double pace_s_ = 0.0;  // thread time for `pace_points_`, weighted to the last results
   double pace_points_ = 0.0;
 };
 

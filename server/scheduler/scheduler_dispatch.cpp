@@ -1,4 +1,4 @@
-// The part of the scheduler that decides who gets what next.
+// Dispatch: chooses the next batch of each worker.
 #include <algorithm>
 #include <cstdint>
 #include <optional>
@@ -20,7 +20,7 @@ void Scheduler::dispatch() {
   }
 }
 
-/// The worker gets a batch or a probe: it waits for the next one behind all others.
+/// Uses one credit for a batch or probe; the worker moves to the end of the queue.
 void Scheduler::use_credit(WorkerId id, Worker& worker) {
   worker.credit -= std::min(worker.credit, 1U);
   ready_workers_.remove(id);
@@ -29,7 +29,7 @@ void Scheduler::use_credit(WorkerId id, Worker& worker) {
   }
 }
 
-/// The worker reads what it is sent, holds nothing that must be alone, and solves what it gets.
+/// Whether the worker reads its messages, holds nothing that must be alone, and solves its batches.
 bool Scheduler::may_hold_more(const Worker& worker) const {
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
   return !worker.is_busy && !holds_suspect && worker.probe == 0 &&
@@ -47,7 +47,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (suspect_study == 0) {
     stop_draining(id);
   } else if (!is_proven(worker)) {
-    // It may have nothing else by which to show that it is fit for them.
+    // It may need a probe to become proven for them.
     if (worker.leases.empty() && free_.empty()) {
       return probe(id, worker);
     }
@@ -55,7 +55,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     serve_suspect(id, worker, suspect_study);
     return true;
   } else if (draining_ == id || draining_ == 0) {
-    // Suspect points wait for one worker to empty, the others go on.
+    // Suspect points wait until one worker is empty; the others continue.
     draining_ = id;
     return false;
   }
@@ -63,9 +63,9 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     return false;
   }
   const StudyId study = std::get<StudyId>(*free_.begin());
-  const BatchSize wanted = portion_for(worker, study, true);
+  const BatchSize wanted = batch_size_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
-  // A batch that ended early with its run of points says nothing of the worker's capacity.
+  // A batch that ended early at the end of a run does not show the worker's capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
   return true;
@@ -74,13 +74,13 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
 void Scheduler::serve_suspect(WorkerId id, Worker& worker, StudyId study) {
   StudyPoints& points = studies_.at(study).points;
   stop_draining(id);
-  // The sooner these are known to be sound, the better: its lanes may stay empty.
-  const BatchSize wanted = portion_for(worker, study, false);
+  // Lanes may stay empty, because a quick answer matters more.
+  const BatchSize wanted = batch_size_for(worker, study, false);
   grant(id, worker, study, *points.take(*suspect_for(points, worker), wanted), true);
 }
 
-/// With nothing else to hand out, what is left of batches that take too long goes to idle workers
-/// too. The first answer wins.
+/// Without other points to lease, gives the rest of slow batches to idle workers too. The first
+/// answer wins.
 void Scheduler::duplicate_stragglers() {
   const auto is_old = [this](const Lease& lease) {
     return now_ms_ - lease.granted_ms >= settings_.straggler_after_ms;
@@ -98,11 +98,11 @@ void Scheduler::duplicate_stragglers() {
       }
     }
   }
-  for (const WorkerId id : set_aside) {  // once they solve a probe, they may help too
+  for (const WorkerId id : set_aside) {  // they may help after solving a probe
     probe(id, workers_.at(id));
   }
   FastestPaces paces;
-  // Leases are numbered as they are granted: the oldest comes first.
+  // Lease numbers ascend, so the oldest comes first.
   for (auto entry = leases_.begin(); entry != leases_.end() && is_old(entry->second); ++entry) {
     Lease& lease = entry->second;
     const auto helper = std::find_if(helpers.begin(), helpers.end(),
@@ -126,7 +126,7 @@ bool Scheduler::is_straggling(const Lease& lease, FastestPaces& paces) const {
   }
   const Worker& holder = workers_.at(lease.worker);
   if (leases_.at(*holder.leases.begin()).granted_ms < lease.granted_ms) {
-    return true;  // it waits behind another batch of its worker
+    return true;  // it waits for another batch of its worker
   }
   const double expected_ms = 1e3 * fastest_pace(lease.study, paces) *
                              static_cast<double>(lease.batch.points) / holder.threads;
@@ -140,29 +140,28 @@ StudyId Scheduler::next_suspect_study(const Worker& worker) const {
   return found == suspects_.end() ? 0 : *found;
 }
 
-/// Which of the study's suspect points the worker may get. For accused ones the worker is wanted
-/// that is least likely to be lost for a reason of its own. A newcomer gets none, but is told so
-/// here, that it may be probed.
-std::optional<Standing> Scheduler::suspect_for(const StudyPoints& points,
-                                               const Worker& worker) const {
-  if (points.has(Standing::kAccused) &&
+/// The suspicion of the points that the worker may get, or nothing. Risky points go to the worker
+/// that is least likely to be lost for other reasons. A new worker gets none, but a result here
+/// allows a probe.
+std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
+                                                const Worker& worker) const {
+  if (points.has(Suspicion::kRisky) &&
       (!is_proven(worker) ||
-       now_ms_ - points.returned_ms(Standing::kAccused) >= settings_.longest_proven_within_ms ||
+       now_ms_ - points.returned_ms(Suspicion::kRisky) >= settings_.longest_proven_within_ms ||
        is_longest_proven(worker))) {
-    return Standing::kAccused;
+    return Suspicion::kRisky;
   }
-  return points.has(Standing::kSuspect) ? std::optional(Standing::kSuspect) : std::nullopt;
+  return points.has(Suspicion::kSuspect) ? std::optional(Suspicion::kSuspect) : std::nullopt;
 }
 
 void Scheduler::stop_draining(WorkerId worker) {
   if (draining_ == worker) {
     draining_ = 0;
-    ready_workers_.unpark_all();  // another one may have to
+    ready_workers_.unpark_all();  // another worker may have to drain
   }
 }
 
-/// How many points the worker should get of the study.
-BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_lanes) const {
+BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills_lanes) const {
   const auto known = worker.paces.find(id);
   const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
   std::uint64_t points = settings_.first_batch_points * worker.threads;
@@ -176,7 +175,7 @@ BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_la
     fewest =
         static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / settings_.batch_target_s);
   }
-  if (studies_.at(id).points.has_filter()) {  // it may leave in all of the next batch
+  if (studies_.at(id).points.has_filter()) {  // it may include all points of the next batch
     const double in_time =
         pace.s_per_solved() > 0.0
             ? settings_.lanes_batch_s * worker.threads / pace.s_per_solved()
@@ -197,16 +196,16 @@ BatchSize Scheduler::portion_for(const Worker& worker, StudyId id, bool fills_la
   return wanted;
 }
 
-/// More points, or models, where a batch would leave lanes empty and take nearly as long.
+/// Adds points or models to a batch that would leave lanes empty and would take nearly as long.
 void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);
   const bool has_models = points.has_models();
   if (!has_models && pace.s_per_point() * lanes <= settings_.batch_target_s) {
-    return;  // of quick points of one model a batch has enough
+    return;  // the batch has enough quick points of one model
   }
-  // Not more than its part of all that is open, of which it may hold something already: at the end
-  // of a study every worker has a part.
+  // At most its share of all open points, including those that it holds, so that all workers have
+  // points at the end of a study.
   const std::uint64_t open = points.free() + points.leased();
   const std::uint64_t all_threads = std::max<std::uint64_t>(threads_, 1);
   const std::uint64_t part = (open * threads + all_threads - 1) / all_threads;
@@ -231,7 +230,6 @@ void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::ui
 
 LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch& batch,
                          bool alone) {
-  // A study may have grown since the worker was told of it.
   const std::uint64_t numbers = studies_.at(study).points.size();
   if (std::exchange(worker.defined[study], numbers) != numbers) {
     effects_.emplace_back(DefineStudy{id, study});
@@ -239,7 +237,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   Study& served = studies_.at(study);
   Pace& pace = worker.paces[study];
   const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
-  // Whatever a worker says of its pace, no batch is to make its study wait for ever.
+  // No reported pace may give a batch a duration without limit.
   const double counted_s = std::clamp(takes_s, settings_.batch_target_s,
                                       settings_.lanes_batch_s + settings_.batch_target_s);
   served.served += counted_s / settings_.batch_target_s;

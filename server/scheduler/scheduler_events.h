@@ -11,57 +11,59 @@
 #include "server/study/limits.h"
 #include "server/study/study_table.h"
 
-// The events that the scheduler handles and the effects that it requests.
+// Events that the scheduler handles, and effects that it returns.
 namespace oblique::server {
 
 using LeaseId = std::uint64_t;
 
 struct SchedulerSettings {
-  /// A worker silent for longer is lost: three missed heartbeats, noticed within 3 s.
+  /// A worker is lost after this silence: three missed heartbeats, noticed within 3 s.
   std::int64_t lost_after_ms = 2800;
-  double batch_target_s = 0.1;                ///< duration of a batch once a worker's pace is known
-  std::uint64_t first_batch_points = 4;       ///< a thread, for a worker of unknown pace
-  std::uint64_t largest_batch_points = 4096;  ///< a thread
-  /// Points, or falls of models, that a thread solves side by side in nearly the time of one. A
-  /// batch has at least so many a thread,
+  double batch_target_s = 0.1;           ///< target duration of a batch at a worker's known pace
+  std::uint64_t first_batch_points = 4;  ///< per thread, while a worker's pace is unknown
+  std::uint64_t largest_batch_points = 4096;  ///< per thread
+  /// Number of points, or falls of models, that a thread solves side by side in nearly the time of
+  /// one. A batch has at least this number per thread,
   std::uint64_t lanes = 8;
-  double lanes_batch_s = 10.0;  ///< unless its points would take longer than this,
+  double lanes_batch_s = 10.0;  ///< unless its points would take longer than this
   double models_batch_s = 1.0;  ///< or its models longer than this.
-  std::uint64_t growth = 4;     ///< largest factor between a worker's successive batches
-  /// While free points last, so many more batches are left for each thread: batches shrink toward
-  /// the end of a study and all workers finish together.
+  std::uint64_t growth = 4;     ///< largest growth factor from one batch of a worker to the next
+  /// Number of further batches left for each thread while free points last. So batches shrink
+  /// toward the end of a study and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
-  double shortest_batch_s = 0.01;  ///< transport costs more than shorter batches gain
-  /// With nothing else to hand out, a batch that takes this long, and `straggler_factor` times as
-  /// long as expected, is also given to a second worker. Batches that lost a worker are not.
+  double shortest_batch_s = 0.01;  ///< for shorter batches transport would cost more than they gain
+  /// Without other points to lease, a batch that takes this long, and `straggler_factor` times as
+  /// long as expected, is also given to a second worker. Not batches that lost a worker.
   std::int64_t straggler_after_ms = 1000;
   double straggler_factor = 4.0;
   LossLimits loss_limits{};
   std::uint64_t suspect_parts = 8;  ///< number of parts into which a suspect interval is split
-  /// A condemned point fails unless a process that it cost says hello again within this time.
+  /// A failing point fails after this time unless a process that was lost with it returns.
   std::int64_t return_within_ms = 10'000;
-  /// An accused point is kept for the longest proven worker for so long.
+  /// A risky point is reserved for the longest proven worker for this time.
   std::int64_t longest_proven_within_ms = 10'000;
-  /// A process that was lost so often in a row is set aside until it has solved a probe.
+  /// A process is set aside after this number of losses in a row, until it has solved a probe.
   std::uint32_t set_aside_after = 3;
-  /// So is every newcomer while so many of them vanished with points in this time.
+  /// Every new process is set aside while this number of new processes were lost with points within
+  /// `newcomers_watched_ms`.
   std::size_t vanished_newcomers = 3;
   std::int64_t newcomers_watched_ms = 60'000;
-  std::int64_t probe_interval_ms = 1000;  ///< between two probes of one worker
-  /// A worker holds at most so many batches more than it has solved since it joined or stalled.
+  std::int64_t probe_interval_ms = 1000;  ///< time between two probes of one worker
+  /// A worker holds at most this number of batches more than it has solved since it joined or
+  /// stalled.
   std::size_t newcomer_batches = 2;
-  /// A worker that stores nothing for so many times the expected duration of its longest batch has
-  /// stalled, within these limits; its batches go to others.
+  /// A worker has stalled if it stores nothing for this multiple of the expected duration of its
+  /// longest batch, within the limits below; its batches go to others.
   double stall_factor = 10.0;
   std::int64_t shortest_stall_ms = 60'000;
   std::int64_t longest_stall_ms = 3'600'000;
-  std::size_t most_absent_processes = 4096;    ///< that are gone and remembered
+  std::size_t most_absent_processes = 4096;    ///< absent processes that are kept
   std::uint32_t max_credit = limits::kCredit;  ///< batches
-  /// Points a thread in a batch of a filtered study before the worker has solved one: the filter
-  /// may keep all of them.
+  /// Points per thread in a batch of a filtered study before the worker has solved one, because the
+  /// filter may include all of them.
   std::uint64_t unsolved_batch_points = 256;
-  /// A restarted server numbers leases above all earlier ones, so that results of an earlier run
-  /// never end a lease of this one.
+  /// First lease number. A restarted server starts above all earlier ones, so that results of an
+  /// earlier run never end a lease of this one.
   LeaseId first_lease_id = 1;
 };
 
@@ -85,12 +87,12 @@ struct StudyAdded {
   bool held = false;
   std::uint64_t left_out = 0;  ///< number of completed points that a filter leaves out
 };
-/// A held study is not handed out, whatever else happens to it.
+/// A held study gets no leases, whatever its state.
 struct StudyHeld {
   StudyId study;
   bool held;
 };
-/// It is durable that these points have rows copied from other studies.
+/// Rows of these points, copied from other studies, are durable.
 struct PointsReused {
   StudyId study;
   IntervalSet points;
@@ -103,7 +105,7 @@ struct StudyCancelled {
 struct StudyPaused {
   StudyId study;
 };
-/// A cancelled or paused study goes on.
+/// A cancelled or paused study continues.
 struct StudyReopened {
   StudyId study;
 };
@@ -111,12 +113,12 @@ struct PriorityChanged {
   StudyId study;
   std::int32_t priority = 0;
 };
-/// It is durable that these failed points have no row any more.
+/// The deletion of the rows of these failed points is durable.
 struct FailuresForgotten {
   StudyId study;
   IntervalSet points;
 };
-/// It is durable that the study has further points after its earlier ones, and runs.
+/// Further points of the study are durable, and it runs.
 struct StudyGrown {
   StudyId study;
   StudyTable table;  ///< of all its points
@@ -130,7 +132,7 @@ struct StudyRemoved {
 struct WorkerJoined {
   WorkerId worker;
   std::uint32_t threads;
-  std::string process{};  ///< an earlier connection of this process has ended; empty: unknown
+  std::string process{};  ///< its earlier connection has ended; empty: unknown
 };
 struct CreditGiven {
   WorkerId worker;
@@ -154,7 +156,7 @@ struct ResultsStored {
   std::vector<PointOutcome> outcomes;
   IntervalSet left_out{};
 };
-/// The worker lives and holds these leases.
+/// The worker is alive and holds these leases.
 struct HeartbeatReceived {
   WorkerId worker;
   std::vector<LeaseId> leases;
@@ -168,18 +170,19 @@ struct BatchesReturned {
 struct WorkerLeft {
   WorkerId worker;
 };
-/// A message could not be sent to the worker, or it violates the protocol.
+/// A message could not be sent to the worker, or the worker violates the protocol.
 struct WorkerUnreachable {
   WorkerId worker;
   std::string reason = "its connection is gone";
-  std::vector<LeaseId> unsent{};  ///< batches that were not sent, so their points are not suspect
+  /// leases whose batch was not sent, so their points are not suspect
+  std::vector<LeaseId> unsent{};
 };
-/// A busy worker does not read what it is sent and gets no batch. No sign of life.
+/// A busy worker does not read its messages and gets no batch. Does not count as a sign of life.
 struct WorkerBusy {
   WorkerId worker;
   bool is_busy;
 };
-/// While held (the disk does not take results), no batch goes out.
+/// While held, because the disk does not accept results, no batch is sent.
 struct DispatchHeld {
   bool held;
 };
@@ -194,7 +197,7 @@ using Event =
 
 // ---- Effects ----------------------------------------------------------------------------------
 
-/// Send the recipe: a batch of the study, or of points that it has grown by, follows.
+/// Send the recipe, because a batch of the study or of its new points follows.
 struct DefineStudy {
   WorkerId worker;
   StudyId study;
@@ -202,15 +205,15 @@ struct DefineStudy {
 struct SendBatch {
   WorkerId worker;
   StudyId study;
-  std::vector<Interval> points;  ///< in the order in which they are to be solved
+  std::vector<Interval> points;  ///< in the order in which to solve them
   std::uint32_t attempt;
   LeaseId lease;
 
   std::uint64_t first_point() const { return points.front().begin; }
   std::uint64_t count() const { return size_of(points); }
 };
-/// Store these results, then feed ResultsStored. One for each Results message, even with nothing
-/// to store: the acknowledgement follows all commits before it.
+/// Store these results, then feed ResultsStored. One for each Results message, even if there is
+/// nothing to store, because its acknowledgement follows all earlier commits.
 struct StoreResults {
   WorkerId worker;
   StudyId study;
@@ -218,7 +221,7 @@ struct StoreResults {
   std::vector<std::size_t> accepted;  ///< indices into the event's outcomes
   IntervalSet left_out{};             ///< points that a filter leaves out
 };
-/// Store that the point failed, then feed ResultsStored (worker 0).
+/// Store the failure of the point, then feed ResultsStored (worker 0).
 struct StoreFailure {
   StudyId study;
   std::uint64_t point;
@@ -230,22 +233,22 @@ struct AcknowledgeResults {
   WorkerId worker;
   std::uint64_t sequence;
 };
-/// Send an easy point of kProbeStudy, whose result is not stored.
+/// Send an easy point of kProbeStudy. Its result is not stored.
 struct SendProbe {
   WorkerId worker;
   LeaseId lease;
 };
-/// The worker should drop the study.
+/// Make the worker drop the study.
 struct WithdrawStudy {
   WorkerId worker;
   StudyId study;
 };
-/// The worker should drop the rest of the batch: its points are answered or given to others.
+/// Make the worker drop the rest of the batch: its points have answers or are leased to others.
 struct ReleaseBatch {
   WorkerId worker;
   LeaseId lease;
 };
-/// The worker is lost; it is unknown from now on.
+/// The worker was lost and removed.
 struct DropWorker {
   WorkerId worker;
   std::string reason;

@@ -1,4 +1,4 @@
-// What must hold of the scheduler's state between two events.
+// Invariants of the scheduler's state between two events.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -25,18 +25,19 @@ void Scheduler::check_invariants() const {
   std::size_t with_free = 0;
   for (const auto& [id, study] : studies_) {
     study.points.check_invariants();
-    require(study.finished == study.points.is_complete(), "a study is finished and is not");
+    require(study.finished == study.points.is_complete(),
+            "the flag `finished` of a study is wrong");
     require(study.failed + study.points.left_out() <= study.points.completed(),
             "more points failed or are left out than were completed");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
     require(study.rank == rank_of(id, study) && (!study.rank || free_.contains(*study.rank)) &&
                 suspects_.contains(id) == (is_open(study) && study.has_suspect()),
-            "a study is not where it belongs in the queue");
-    require(condemned_.contains(id) || !study.points.has(Standing::kCondemned),
-            "a condemned point is forgotten");
+            "the place of a study in the queue is wrong");
+    require(failing_.contains(id) || !study.points.has(Suspicion::kFailing),
+            "a study with failing points is missing from `failing_`");
     with_free += study.rank ? 1U : 0U;
   }
-  require(with_free == free_.size(), "a study that is gone is in the queue");
+  require(with_free == free_.size(), "the queue contains a removed study");
   std::uint64_t threads = 0;
   std::size_t leases = 0;
   for (const auto& [id, worker] : workers_) {
@@ -45,15 +46,15 @@ void Scheduler::check_invariants() const {
       held[leases_.at(lease).study] += leases_.at(lease).batch.points;
     }
     for (const auto& [study, pace] : worker.paces) {
-      require(pace.held_points == held[study], "points that a worker holds are miscounted");
+      require(pace.held_points == held[study], "the number of points that a worker holds is wrong");
     }
     require(ready_workers_.contains(id) == (worker.credit > 0),
-            "a worker with credit is not in the queue, or one without is");
+            "the queue does not contain exactly the workers with credit");
     threads += worker.threads;
     leases += worker.leases.size();
   }
-  require(ready_workers_.size() <= workers_.size(), "a worker that is gone is in the queue");
-  require(draining_ == 0 || workers_.contains(draining_), "a worker that is gone drains");
+  require(ready_workers_.size() <= workers_.size(), "the queue contains a removed worker");
+  require(draining_ == 0 || workers_.contains(draining_), "a removed worker drains");
   require(threads == threads_, "the number of threads is wrong");
   require(leases == leases_.size(), "a worker holds a lease that does not exist");
 }
@@ -67,10 +68,10 @@ void Scheduler::check_leases() const {
             "a lease has no worker");
     require(studies_.contains(lease.study), "a lease has no study");
     require(!lease.alone || (worker->second.leases.size() == 1 && is_proven(worker->second)),
-            "suspect points are not alone with a proven worker");
+            "a lease of suspect points is not alone at a proven worker");
     require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
             "a lease is malformed");
-    // Between the points of a batch, and of one that is answered, there may be completed ones.
+    // A batch, also an answered one, may contain completed points of others.
     IntervalSet& covered = under_lease[lease.study];
     for (const Interval& held : open_places(lease)) {
       require(lease.twin != 0 || covered.within(held.begin, held.end).empty(),
@@ -79,12 +80,12 @@ void Scheduler::check_leases() const {
     }
     require(lease.twin == 0 || (leases_.contains(lease.twin) && leases_.at(lease.twin).twin == id &&
                                 leases_.at(lease.twin).worker != lease.worker),
-            "a batch's second lease is not one");
+            "the twin of a lease does not refer back to it");
     require(is_current(studies_.at(lease.study)), "a study of another solver version is leased");
     leases_of[lease.study].insert(id);
   }
   for (const auto& [id, study] : studies_) {
-    require(study.leases == leases_of[id], "a study has other leases than it should");
+    require(study.leases == leases_of[id], "the leases of a study are wrong");
     require(study.points.leased_set() == under_lease[id], "a leased point has no lease");
   }
 }
@@ -93,14 +94,15 @@ void Scheduler::check_losses() const {
   processes_.check_invariants(workers_.size());
   for (const auto& [id, worker] : workers_) {
     const WorkerProcess& process = processes_.at(worker.process);
-    require(process.workers.contains(id), "a worker is not known as one of its process");
+    require(process.workers.contains(id), "a worker is missing from its process");
     require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
     require(worker.leases.size() <= settings_.newcomer_batches + worker.solved_batches,
-            "a worker has more batches than it has earned");
+            "a worker holds more batches than its solved ones allow");
     require(worker.solved_batches == 0 || process.proven_since_ms,
-            "a worker that is not proven has solved batches");
+            "a worker has solved batches but is not proven");
   }
-  require(vanished_ms_.size() <= settings_.vanished_newcomers, "too many newcomers are noted");
+  require(vanished_ms_.size() <= settings_.vanished_newcomers,
+          "too many losses of new processes are recorded");
 }
 
 void WorkerProcesses::check_invariants(std::size_t workers) const {
@@ -110,14 +112,15 @@ void WorkerProcesses::check_invariants(std::size_t workers) const {
     const auto by_id = numbers_.find(process.id);
     require(process.id.empty() ? !process.workers.empty()
                                : by_id != numbers_.end() && by_id->second == number,
-            "a worker process cannot be found");
+            "a worker process is missing from the index");
     connected += process.workers.size();
     absent += process.workers.empty() ? 1U : 0U;
     require(!process.workers.empty() || std::ranges::count(absent_, number) == 1,
-            "an absent process is not remembered once");
+            "an absent process is not listed exactly once");
   }
-  require(connected == workers, "a process has workers that are not there");
-  require(absent == absent_.size() && absent <= most_absent_, "the wrong processes are remembered");
+  require(connected == workers, "a process has unknown workers");
+  require(absent == absent_.size() && absent <= most_absent_,
+          "the list of absent processes is wrong");
 }
 
 }  // namespace oblique::server

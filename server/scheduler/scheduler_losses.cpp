@@ -1,5 +1,4 @@
-// The part of the scheduler that weighs lost workers: what it makes of the points that they held,
-// and of the workers themselves.
+// Lost workers: consequences for their points and their processes.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -13,7 +12,7 @@
 namespace oblique::server {
 namespace {
 
-/// The interval in up to `parts` parts of nearly one size.
+/// Splits the interval into up to `parts` parts of nearly equal size.
 std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
   const std::uint64_t size = (interval.end - interval.begin + parts - 1) / parts;
   std::vector<Interval> all;
@@ -27,31 +26,32 @@ std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
 
 // ---- Points -----------------------------------------------------------------------------------
 
-/// The process was lost with points of that study, and may come back.
+/// Records that the process was lost with points of that study and may return.
 void Scheduler::note_process(StudyId study, ProcessNumber process) {
-  if (process != kNobody) {
+  if (process != kNoProcess) {
     processes_.at(process).in_histories.insert(study);
   }
 }
 
-/// The lease ended without an answer to the points at `held`.
+/// Handles a lease that ended without an answer to the points at `held`.
 void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss) {
   StudyPoints& points = studies_.at(lease.study).points;
   loss.alone = loss.alone && size_of(held) == 1;
   LossHistory losses = lease.batch.losses;
   losses.add(loss);
-  const Standing standing = losses.standing(settings_.loss_limits);
-  // The parts are suspect too: those without the killer are solved, the other is split again.
-  const std::uint64_t parts = standing == Standing::kSound ? 1 : settings_.suspect_parts;
+  const Suspicion suspicion = losses.suspicion(settings_.loss_limits);
+  // The parts are suspect too. Those without the harmful point get solved; the other is split
+  // again.
+  const std::uint64_t parts = suspicion == Suspicion::kSound ? 1 : settings_.suspect_parts;
   for (const Interval& interval : held) {
     points.give_back(split(interval, parts), lease.batch.attempts + 1, losses, now_ms_);
   }
-  if (standing == Standing::kCondemned) {
-    condemned_.insert(lease.study);
+  if (suspicion == Suspicion::kFailing) {
+    failing_.insert(lease.study);
   }
 }
 
-/// The process lives: it was not killed by the points that it held when it was lost.
+/// The process is alive, so the points that it held when it was lost did not kill it.
 void Scheduler::take_back_losses(ProcessNumber number) {
   const std::set<StudyId> in_histories = std::exchange(processes_.at(number).in_histories, {});
   for (const StudyId study : in_histories) {
@@ -63,27 +63,27 @@ void Scheduler::take_back_losses(ProcessNumber number) {
   }
 }
 
-/// None of the processes that these points cost came back.
-void Scheduler::fail_condemned() {
-  for (const StudyId id : std::set<StudyId>(condemned_)) {
+/// Fails points for which no lost process has returned in time.
+void Scheduler::fail_due_points() {
+  for (const StudyId id : std::set<StudyId>(failing_)) {
     StudyPoints& points = studies_.at(id).points;
     for (const auto& [point, attempts, alone] :
-         points.fail_condemned(now_ms_ - settings_.return_within_ms)) {
+         points.take_due_failures(now_ms_ - settings_.return_within_ms)) {
       effects_.emplace_back(StoreFailure{
           id, point, attempts,
           "no answer: " + std::to_string(attempts) + " leases of this point ended without one, " +
               std::to_string(alone) +
-              " of them because the worker was lost or gave up while it held nothing else"});
+              " of them because the worker was lost or gave up while it held only this point"});
     }
-    if (!points.has(Standing::kCondemned)) {
-      condemned_.erase(id);
+    if (!points.has(Suspicion::kFailing)) {
+      failing_.erase(id);
     }
   }
 }
 
 // ---- Workers ----------------------------------------------------------------------------------
 
-/// What its end, with the leases that it still has, says of the worker's process.
+/// Updates the worker's process at its end, with the leases that it still holds.
 void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   if (worker.leases.empty()) {
     return;
@@ -101,7 +101,6 @@ void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   }
 }
 
-/// What the message says of the worker's process.
 void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted) {
   WorkerProcess& process = processes_.at(worker.process);
   const bool was_proven = process.proven_since_ms.has_value();
@@ -137,9 +136,9 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   }
 }
 
-/// Gives the batches of workers that store nothing to others. Whether such a worker is slow or
-/// never solves anything cannot be told: nothing counts as lost, what it sends later is stored, and
-/// it gets points again once it has solved something.
+/// Gives the batches of stalled workers to others. A stalled worker may be slow or may never solve
+/// anything, so nothing counts as lost, its late results are stored, and it gets points again after
+/// it has solved something.
 void Scheduler::end_stalled() {
   FastestPaces paces;
   bool any_stalled = false;
@@ -179,12 +178,12 @@ double Scheduler::fastest_pace(StudyId id, FastestPaces& known) const {
   return fastest->second;
 }
 
-/// How long the worker may store nothing.
+/// How long the worker may store nothing before it counts as stalled.
 std::int64_t Scheduler::longest_stall_ms(const Worker& worker, FastestPaces& paces) const {
   double longest_s = 0.0;
   for (const LeaseId id : worker.leases) {
     const Lease& lease = leases_.at(id);
-    // A thread solves its lanes side by side, and one point alone takes as long.
+    // A thread solves its lanes side by side, and a single point takes as long.
     const double points = std::max(static_cast<double>(lease.batch.points) / worker.threads,
                                    static_cast<double>(settings_.lanes));
     longest_s = std::max(longest_s, fastest_pace(lease.study, paces) * points);
@@ -198,7 +197,7 @@ bool Scheduler::is_proven(const Worker& worker) const {
   return processes_.at(worker.process).proven_since_ms.has_value();
 }
 
-/// It was lost again and again, or it is new in a time when those that are vanish.
+/// Whether its process was lost repeatedly, or is new while new processes are being lost.
 bool Scheduler::is_set_aside(const Worker& worker) const {
   const WorkerProcess& process = processes_.at(worker.process);
   return process.lost_in_a_row >= settings_.set_aside_after ||
@@ -206,7 +205,7 @@ bool Scheduler::is_set_aside(const Worker& worker) const {
           now_ms_ - vanished_ms_.front() <= settings_.newcomers_watched_ms);
 }
 
-/// Of the workers that are not set aside none has been proven for longer.
+/// Whether no other worker that is not set aside has been proven for longer.
 bool Scheduler::is_longest_proven(const Worker& worker) const {
   const auto since_ms = processes_.at(worker.process).proven_since_ms;
   return since_ms && std::ranges::none_of(workers_, [&](const auto& entry) {
@@ -215,7 +214,7 @@ bool Scheduler::is_longest_proven(const Worker& worker) const {
          });
 }
 
-/// Hands the worker a point that all sound workers solve, if it was not just given one.
+/// Sends a probe, an easy point, unless the worker got one recently.
 bool Scheduler::probe(WorkerId id, Worker& worker) {
   if (!worker.leases.empty() ||
       (worker.probed_ms && now_ms_ - *worker.probed_ms < settings_.probe_interval_ms)) {

@@ -9,8 +9,8 @@
 namespace oblique::server {
 namespace {
 
-/// The end of a group near `end`, at most `most`: workers that share a group both solve its falls.
-/// A group with too many points is shared.
+/// The end of a group near `end`, at most `most`, because two workers that share a group both solve
+/// its falls. A group with too many points is shared.
 std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_t end,
                           std::uint64_t most) {
   if (cut.begin > first && 2 * (cut.begin - first) >= end - first) {
@@ -27,8 +27,8 @@ std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_
 StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
                          const LossLimits& limits)
     : table_(std::move(table)), limits_(limits), completed_(std::move(completed)) {
-  completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());  // rows of other points
-  left_out_ = std::min(left_out, completed_.size());  // a database that was edited may say more
+  completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());
+  left_out_ = std::min(left_out, completed_.size());  // an edited database may have a larger number
   fresh_.insert(0, size());
   completed_.for_each(
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
@@ -50,7 +50,7 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
   }
   for (Returned& intervals : returned_) {
     for (const auto& [first, returned] : std::exchange(intervals, {})) {
-      const History& history = returned;  // a lambda cannot capture a structured binding
+      const History& history = returned;  // Clang cannot capture a structured binding
       order_.places(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
         History& part = intervals.emplace(interval.begin, history).first->second;
         part.end = interval.end;
@@ -61,7 +61,7 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
 
 void StudyPoints::rest(bool has_leases) {
   table_.release();
-  if (is_complete() && !has_leases) {  // the places of all points are all points
+  if (is_complete() && !has_leases) {  // without order, places equal points
     order_ = {};
     was_arranged_ = false;
     begun_until_ = 0;
@@ -70,7 +70,7 @@ void StudyPoints::rest(bool has_leases) {
 
 void StudyPoints::give_back(std::span<const Interval> parts, std::uint32_t attempts,
                             const LossHistory& losses, std::int64_t now_ms) {
-  Returned& intervals = returned(losses.standing(limits_));
+  Returned& intervals = returned(losses.suspicion(limits_));
   for (const Interval& part : parts) {
     for (const Interval& interval : leased_.within(part.begin, part.end)) {
       intervals.emplace(interval.begin, History{interval.end, attempts, losses, now_ms});
@@ -92,7 +92,7 @@ void StudyPoints::take_back_losses(ProcessNumber process) {
     }
   }
   for (auto& [first, history] : cleared) {
-    returned(history.losses.standing(limits_)).emplace(first, history);
+    returned(history.losses.suspicion(limits_)).emplace(first, history);
   }
 }
 
@@ -173,7 +173,7 @@ std::uint64_t StudyPoints::complete_reused(const IntervalSet& points) {
   return places.size();
 }
 
-/// Takes those of these places that are neither committing nor completed out of where they are.
+/// Removes those of these places that are neither committing nor completed from their sets.
 IntervalSet StudyPoints::extract(const IntervalSet& places) {
   IntervalSet extracted;
   places.for_each([&](const Interval& range) {
@@ -188,7 +188,7 @@ IntervalSet StudyPoints::extract(const IntervalSet& places) {
   return extracted;
 }
 
-/// The parts of the intervals that lie in the range, which they lose.
+/// Removes the parts of the intervals that lie in the range, and returns them.
 std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Interval& range) {
   std::vector<Interval> parts;
   auto interval = intervals.upper_bound(range.begin);
@@ -234,7 +234,7 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
   const std::uint64_t room = free.end - free.begin;
   const std::uint64_t most = free.begin + std::min(std::max(points, wanted.most_points), room);
   std::uint64_t end = free.begin + std::min(points, room);
-  // `groups` whole ones, as far as there is room.
+  // At least `groups` whole groups, if there is room.
   std::uint64_t groups_end = group.end;
   for (std::uint64_t groups = 1; groups < wanted.groups && groups_end < most; ++groups) {
     const std::uint64_t next = order.group_at(table, groups_end).end;
@@ -251,8 +251,8 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
 
 std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   arrange(wanted.falls);
-  if (has(Standing::kSound)) {
-    return take(Standing::kSound, wanted);
+  if (has(Suspicion::kSound)) {
+    return take(Suspicion::kSound, wanted);
   }
   const auto free = next_fresh(wanted.follows);
   if (!free) {
@@ -272,10 +272,10 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
 }
 
-/// The next fresh points for a batch that ends at `end`, has `leased` points and wants `enough`:
-/// those behind a few completed ones, as where a finer grid has reused a coarser one. Not what
-/// is left of the run up to `run_end`, where the batch was cut, and not those of a group of which
-/// there is no room for all points.
+/// The next fresh points for a batch that ends at `end`, has `leased` points and wants `enough`.
+/// They are behind a few completed ones, as where a finer grid has reused a coarser one. Excludes
+/// the rest of the run up to `run_end`, where the batch was cut, and a group whose points do not
+/// all fit.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
                                                 std::uint64_t enough, std::uint64_t leased) const {
   constexpr std::uint64_t kNear = 64;
@@ -283,7 +283,6 @@ std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t
   if (!next || next->begin < run_end || next->begin - end > kNear) {
     return std::nullopt;
   }
-  // Others may have the points between, or get them.
   const auto between = completed_.within(end, next->begin);
   const Interval group = order_.group_at(*table_.get(), next->begin);
   if (between.size() != 1 || !(between.front() == Interval{end, next->begin}) ||
@@ -293,7 +292,7 @@ std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t
   return next;
 }
 
-/// Leases fresh points from the beginning of `free` on. Returns where they end.
+/// Leases fresh points from the start of `free`. Returns where they end.
 std::uint64_t StudyPoints::lease_fresh(const Interval& free, const BatchSize& wanted) {
   const std::uint64_t end = end_of_batch(*table_.get(), order_, free, wanted);
   fresh_.erase(free.begin, end);
@@ -317,13 +316,13 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   if (!order_.is_arranged()) {
     return fresh_.front();
   }
-  // The worker that began the group goes on with its first falls, this one takes its last.
+  // The worker that began the group continues with its first falls; this one gets its last falls.
   const Interval last = fresh_.back();
   return Interval{last.begin + (last.end - last.begin) / 2, last.end};
 }
 
-std::optional<Batch> StudyPoints::take(Standing standing, const BatchSize& wanted) {
-  Returned& intervals = returned(standing);
+std::optional<Batch> StudyPoints::take(Suspicion suspicion, const BatchSize& wanted) {
+  Returned& intervals = returned(suspicion);
   if (intervals.empty()) {
     return std::nullopt;
   }
@@ -338,9 +337,9 @@ std::optional<Batch> StudyPoints::take(Standing standing, const BatchSize& wante
   return Batch{first, end - first, history.attempts, history.losses};
 }
 
-std::vector<StudyPoints::Failure> StudyPoints::fail_condemned(std::int64_t until_ms) {
+std::vector<StudyPoints::Failure> StudyPoints::take_due_failures(std::int64_t until_ms) {
   std::vector<Failure> failures;
-  Returned& condemned = returned(Standing::kCondemned);
+  Returned& condemned = returned(Suspicion::kFailing);
   for (auto entry = condemned.begin(); entry != condemned.end();) {
     const auto& [place, history] = *entry;
     if (history.returned_ms > until_ms) {
@@ -361,7 +360,7 @@ void StudyPoints::check_invariants() const {
   std::uint64_t came_back = 0;
   const auto add = [&](const Interval& interval) {
     if (interval.begin >= interval.end) {
-      throw std::logic_error("a study holds an empty interval of points");
+      throw std::logic_error("a study contains an empty interval of points");
     }
     all.insert(interval.begin, interval.end);
     numbers += interval.end - interval.begin;
@@ -369,21 +368,21 @@ void StudyPoints::check_invariants() const {
   for (const auto* set : {&fresh_, &leased_, &committing_, &completed_}) {
     set->for_each(add);
   }
-  for (const Standing standing :
-       {Standing::kSound, Standing::kSuspect, Standing::kAccused, Standing::kCondemned}) {
-    for (const auto& [first, history] : returned(standing)) {
+  for (const Suspicion suspicion :
+       {Suspicion::kSound, Suspicion::kSuspect, Suspicion::kRisky, Suspicion::kFailing}) {
+    for (const auto& [first, history] : returned(suspicion)) {
       add({first, history.end});
       came_back += history.end - first;
-      if (history.losses.standing(limits_) != standing) {
-        throw std::logic_error("returned points are in the place of another standing");
+      if (history.losses.suspicion(limits_) != suspicion) {
+        throw std::logic_error("returned points are listed under another suspicion");
       }
     }
   }
   if (numbers != all.size() || !(all == IntervalSet(0, size()))) {
-    throw std::logic_error("a point of a study is in no place or in two");
+    throw std::logic_error("a point of a study is in no set or in two");
   }
   if (came_back != returned_points_) {
-    throw std::logic_error("returned points are miscounted");
+    throw std::logic_error("the number of returned points is wrong");
   }
   if (left_out_ > completed_.size()) {
     throw std::logic_error("a filter leaves out more points than are completed");

@@ -15,127 +15,126 @@
 
 namespace oblique::server {
 
-/// How many points a worker wants under one lease.
+/// The size of a batch that a worker wants.
 struct BatchSize {
-  std::uint64_t points;           ///< about as many: the batch ends with a group if one ends near
-  std::uint64_t groups = 1;       ///< at least as many groups, if `most_points` has room for them
-  std::uint64_t most_points = 0;  ///< limit for one whole group more, or for `groups`; 0: `points`
-  /// Falls that the worker solves side by side: the size of groups if the study is arranged now. 0:
-  /// it must not be, for leases are of places.
+  std::uint64_t points;           ///< target number; the batch ends with a group if one ends nearby
+  std::uint64_t groups = 1;       ///< minimum number of groups, if `most_points` allows
+  std::uint64_t most_points = 0;  ///< maximum number, to complete a group or `groups`; 0: `points`
+  /// Number of falls that the worker solves side by side: the size of groups if the study is
+  /// arranged now. 0: it must not be arranged, because leases refer to places.
   std::uint64_t falls = 0;
-  /// The place at which the worker's last batch ended. The rest of that batch's last group, whose
-  /// falls the worker has solved, comes first.
+  /// The place at which the worker's last batch ended. The rest of that batch's last group comes
+  /// first, because the worker has solved its falls.
   std::optional<std::uint64_t> follows{};
 };
 
-/// The place at which the batch that begins with the places `free` ends. A batch has one point at
-/// least, and one at most when one is wanted.
+/// The place at which a batch from the start of `free` ends. It has at least one point, and exactly
+/// one if one is wanted.
 std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& order,
                            const Interval& free, const BatchSize& wanted);
 
-/// Points that are handed out together, under one lease: a run of places (PointOrder), without some
-/// that were completed before.
+/// Points that are leased together: a run of places (PointOrder), except those of points that were
+/// completed before.
 struct Batch {
   std::uint64_t first_place;
   std::uint64_t count;
-  std::uint32_t attempts;        ///< how often these points had been leased before
-  LossHistory losses;            ///< of the leases before
-  std::uint64_t points = count;  ///< the number of these places whose points are handed out
+  std::uint32_t attempts;        ///< how often these points were leased before
+  LossHistory losses;            ///< losses of earlier leases
+  std::uint64_t points = count;  ///< number of leased points at these places
 
   std::uint64_t end() const { return first_place + count; }
 };
 
-/// Where the points of one study stand. Every point is in exactly one place: fresh (never leased by
-/// this run of the server), returned with one of the four standings that its losses give it,
-/// leased, committing (its result is on the way to the disk) or completed. The cost grows with the
-/// number of intervals, not of points. Intervals, here and in Batch, are of places: the first lease
-/// brings the points into an order in which those that share a fall follow each other.
+/// The state of each point of a study. Every point is in exactly one set: fresh (never leased by
+/// this run of the server), returned (with one of four levels of suspicion from its losses),
+/// leased, committing (its result is being written) or completed. The cost depends on the number of
+/// intervals, not of points. Intervals, here and in Batch, consist of places: the first lease
+/// orders the points so that those with the same fall follow each other.
 ///
-/// Points that a filter leaves out are handed out as all others. The worker names them, and they
+/// Points that a filter leaves out are leased like all others. The worker reports them, and they
 /// are completed without a row.
 class StudyPoints {
  public:
-  /// `completed` are the points that are completed already, `left_out` of them by a filter. Of a
-  /// study that is complete the table is not made.
+  /// `completed` contains the completed points, of which a filter leaves out `left_out`. Does not
+  /// make the table of a complete study.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 
   std::uint64_t size() const { return table_.size(); }
-  /// Whether they have several models; the table is made when there is none.
+  /// Whether the points have several models. Makes the table if necessary.
   bool has_models() const { return table_->models() > 1; }
-  /// Nothing is handed out for a while: the table is forgotten until something is, and the order
-  /// of a complete study of which there are no leases.
+  /// Releases the table until the next lease, and the order of a complete study without leases.
   void rest(bool has_leases);
-  /// Points and places, as they are now.
+  /// The current mapping between points and places.
   const PointOrder& order() const { return order_; }
 
-  /// Takes points out of the returned sound ones or, when there are none, the fresh ones: those
-  /// that are left of the group that `wanted` follows, then groups of which nothing was leased yet,
-  /// then the second half of what is left of the last. Nothing when there are none.
+  /// Leases returned sound points or, if there are none, fresh ones: first the rest of the group
+  /// that `wanted` follows, then groups that were not begun, then the second half of the rest of
+  /// the last group. Nothing if there are none.
   std::optional<Batch> take(const BatchSize& wanted);
-  /// The same out of the returned ones of that standing.
-  std::optional<Batch> take(Standing standing, const BatchSize& wanted);
-  /// A point that fails, and why.
+  /// Leases returned points of that suspicion.
+  std::optional<Batch> take(Suspicion suspicion, const BatchSize& wanted);
+  /// A point that fails, with the reason.
   struct Failure {
     std::uint64_t point;
     std::uint32_t attempts;
-    std::uint32_t alone;  ///< losses of workers that held nothing else
+    std::uint32_t alone;  ///< losses of workers that held only this point
   };
-  /// The points that were condemned at `until_ms` or before. Their failures are committing now.
-  std::vector<Failure> fail_condemned(std::int64_t until_ms);
+  /// Returns the points that reached kFailing at `until_ms` or before, and moves them to
+  /// committing.
+  std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
-  /// The points at the places `parts`, in order, that are still leased are returned at `now_ms`,
-  /// with the history given. Those between the parts stay where they are.
+  /// Returns the points at the places `parts`, in order, that are still leased, with the given
+  /// history, at `now_ms`. Points between the parts do not change.
   void give_back(std::span<const Interval> parts, std::uint32_t attempts, const LossHistory& losses,
                  std::int64_t now_ms);
 
-  /// The losses of returned points that went with this process are taken back.
+  /// Removes the losses of this process from the histories of returned points.
   void take_back_losses(ProcessNumber process);
 
-  /// The result of a point came in: false when the point was received before or is not of this
-  /// study, else it is now committing.
+  /// Moves a point whose result was received to committing. False if it was received before or is
+  /// not in the study.
   bool receive(std::uint64_t point);
 
-  /// The same of points that a filter leaves out. Returns those that are committing now.
+  /// The same for left-out points. Returns those that are committing now.
   IntervalSet receive(const IntervalSet& left_out);
 
-  /// The result of a committing point is durable. False when the point was not committing.
+  /// Completes a point whose result is durable. False if it was not committing.
   bool complete(std::uint64_t point);
-  /// It is durable that a filter leaves these points out, as far as they are committing.
+  /// Completes those of these left-out points that are committing.
   void complete(const IntervalSet& left_out);
 
-  /// The study has got points behind those that it had, which are those of `table` too: they are
-  /// fresh.
+  /// Appends fresh points to the study; `table` contains all points.
   void grow(StudyTable table);
 
-  /// Those of these points that are not completed, nor on their way, have a row from elsewhere and
-  /// are completed. Returns how many they were.
+  /// Completes those of these points that are neither completed nor committing, because they have a
+  /// reused row. Returns their number.
   std::uint64_t complete_reused(const IntervalSet& points);
 
-  /// The completed ones among these points become fresh. Returns how many they were.
+  /// Makes the completed ones of these points fresh. Returns their number.
   std::uint64_t reopen(const IntervalSet& points);
 
-  bool has_free() const { return has(Standing::kSound) || !fresh_.empty(); }
+  bool has_free() const { return has(Suspicion::kSound) || !fresh_.empty(); }
   bool has_filter() const { return table_->has_filter(); }
-  /// Whether all of them are points of the study in blocks with a filter.
+  /// Whether all of these points are in blocks with a filter.
   bool may_leave_out(const IntervalSet& points) const;
-  /// Returned points of that standing.
-  bool has(Standing standing) const { return !returned(standing).empty(); }
-  /// When the next points to be leased of that standing came back. There must be one.
-  std::int64_t returned_ms(Standing standing) const {
-    return returned(standing).begin()->second.returned_ms;
+  /// Whether there are returned points of that suspicion.
+  bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
+  /// When the next points of that suspicion were returned. There must be one.
+  std::int64_t returned_ms(Suspicion suspicion) const {
+    return returned(suspicion).begin()->second.returned_ms;
   }
   bool is_complete() const { return completed() >= size(); }
-  /// Some point has a result, durable or on its way. That a filter leaves a point out is none.
+  /// Whether some point has a result, durable or being written. Left-out points have none.
   bool has_results() const {
     return completed() + committing_.size() > left_out_ + committing_left_out_;
   }
 
   std::uint64_t free() const { return fresh_.size() + returned_points_; }
   std::uint64_t completed() const { return completed_.size(); }
-  std::uint64_t left_out() const { return left_out_; }  ///< among the completed ones
+  std::uint64_t left_out() const { return left_out_; }  ///< left out by a filter; all completed
   std::uint64_t leased() const { return leased_.size(); }
-  /// Places.
+  /// The leased places.
   const IntervalSet& leased_set() const { return leased_; }
 
   /// Throws std::logic_error unless every point is in exactly one place.
@@ -148,11 +147,13 @@ class StudyPoints {
     LossHistory losses;
     std::int64_t returned_ms;
   };
-  using Returned = std::map<std::uint64_t, History>;  // by first point
+  using Returned = std::map<std::uint64_t, History>;  // by first place
 
-  Returned& returned(Standing standing) { return returned_.at(static_cast<std::size_t>(standing)); }
-  const Returned& returned(Standing standing) const {
-    return returned_.at(static_cast<std::size_t>(standing));
+  Returned& returned(Suspicion suspicion) {
+    return returned_.at(static_cast<std::size_t>(suspicion));
+  }
+  const Returned& returned(Suspicion suspicion) const {
+    return returned_.at(static_cast<std::size_t>(suspicion));
   }
   void arrange(std::uint64_t falls_a_group);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
@@ -166,16 +167,16 @@ class StudyPoints {
   PointOrder order_;
   LossLimits limits_;
   IntervalSet fresh_;
-  std::uint64_t begun_until_ = 0;  // of all groups before, points were leased
-  bool was_arranged_ = false;      // or stays as it is numbered
+  std::uint64_t begun_until_ = 0;  // end of the last group of which points were leased
+  bool was_arranged_ = false;      // `arrange` was called, even if it changed nothing
   std::uint64_t falls_a_group_ = 1;
-  std::array<Returned, 4> returned_;  // by standing
+  std::array<Returned, 4> returned_;  // by suspicion
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet completed_;
-  std::uint64_t left_out_;  // among the completed ones
+  std::uint64_t left_out_;  // number of completed points that a filter leaves out
   std::uint64_t committing_left_out_ = 0;
-  std::uint64_t returned_points_ = 0;  // of any standing
+  std::uint64_t returned_points_ = 0;  // of any suspicion
 };
 
 }  // namespace oblique::server

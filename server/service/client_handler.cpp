@@ -15,7 +15,7 @@
 namespace oblique::server {
 namespace {
 
-/// Studies or workers in a reply; 0 requested: as many as allowed.
+/// Number of studies or workers in a reply; 0 requested: the maximum.
 int page_size(std::uint32_t requested) {
   return static_cast<int>(requested == 0 ? limits::kListed : std::min(requested, limits::kListed));
 }
@@ -34,7 +34,6 @@ void ClientHandler::frame(const std::string& identity, std::string_view frame, I
   answer({identity, read.request_id, holder}, read, frame, now);
 }
 
-/// Has the request read on the check thread.
 void ClientHandler::check(const Client& client, std::string_view frame, Instant now) {
   std::size_t bytes = frame.size();
   std::size_t of_all = 0;
@@ -43,7 +42,7 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
       continue;
     }
     if (client.request_id != 0 && request.client == client) {
-      return;  // it is sent again because the answer takes long
+      return;  // repeated by the client because the answer takes long
     }
     ++of_all;
     bytes += request.frame->size();
@@ -53,7 +52,7 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     return;
   }
   if (of_all >= limits::kWaitingChecks || bytes > limits::kWaitingCheckBytes) {
-    core_.ports.reply_error(client, "too many long requests wait already: ask again later");
+    core_.ports.reply_error(client, "too many long requests are waiting: try again later");
     return;
   }
   const std::uint64_t ticket = ++last_ticket_;
@@ -66,7 +65,7 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     ReadRequest read;
     try {
       read = read_request(*locked);
-    } catch (const std::exception&) {  // there is not enough memory
+    } catch (const std::exception&) {  // out of memory
       read.request_id = protocol::request_id_of(*locked);
     }
     return [this, ticket, read = std::move(read)](Instant then) { checked(ticket, read, then); };
@@ -85,19 +84,19 @@ void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Insta
   answer({waiting.identity, read.request_id, waiting.holder}, read, {}, now);
 }
 
-/// Why the request is refused whatever it asks for; empty: it is not.
-std::string ClientHandler::objection_to(const Client& client, const ReadRequest& read) {
+/// Why the request is refused whatever its kind, or an empty text.
+std::string ClientHandler::request_error(const Client& client, const ReadRequest& read) {
   const protocol::ClientRequest& request = read.request;
   const WriteLedger& ledger = core_.ledger;
   if (!read.is_readable) {
     log_.bad_frame("a client");
-    return "the request cannot be read";
+    return "the request is not a valid message";
   }
   if (request.protocol_version() == 0) {
     log_.bad_frame("a client");
-    return "this is the port for clients; workers connect to the other one";
+    return "this port is for clients: connect workers to the other port";
   }
-  if (std::string reason = protocol::objection_to_version(request.protocol_version(), "client");
+  if (std::string reason = protocol::version_error(request.protocol_version(), "client");
       !reason.empty()) {
     return reason;
   }
@@ -107,35 +106,37 @@ std::string ClientHandler::objection_to(const Client& client, const ReadRequest&
   if (request.has_submit() || request.has_change()) {
     if (client.is_reader()) {
       return fmt::format(
-          "the key \"{}\" is a reader's: it may look at studies, workers and results, and change "
+          "the key \"{}\" has the role reader: it may read studies, workers and results, and "
+          "change "
           "nothing",
           client.key());
     }
     if (!ledger.has_room_for_changes()) {
-      return "too many changes wait for the disk already: ask again later";
+      return "too many changes are waiting for the disk: try again later";
     }
     if (ledger.is_slow()) {
       return fmt::format(
-          "the change was not stored: the database stored nothing for over {} s. Its disk is slow "
-          "or the file is damaged (`oblique check` examines it). Ask again later",
+          "the change was not stored, because the database has stored nothing for over {} s. Its "
+          "disk is slow "
+          "or the file is damaged (see `oblique check`). Try again later",
           WriteLedger::kSlowAfter_s);
     }
   }
   if (request.has_submit() && (stopping_ || draining_)) {
-    return stopping_ ? "the server is stopping: submit again when it is back"
-                     : "the server is draining, that is, it waits for results under way and then "
-                       "stops: submit again when it is back";
+    return stopping_ ? "the server is stopping: submit again after its restart"
+                     : "the server is draining: it waits for running batches and then "
+                       "stops. Submit again after its restart";
   }
   return {};
 }
 
 void ClientHandler::answer(const Client& client, const ReadRequest& read, std::string_view frame,
                            Instant now) {
-  if (const std::string reason = objection_to(client, read); !reason.empty()) {
+  if (const std::string reason = request_error(client, read); !reason.empty()) {
     core_.ports.reply_error(client, reason);
     return;
   }
-  if (read.needs_judging) {
+  if (read.needs_point_validation) {
     return check(client, frame, now);
   }
   const protocol::ClientRequest& request = read.request;
@@ -161,7 +162,7 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, std::s
       return end_query(client, request.end_query().request_id());
     case Kind::KIND_NOT_SET:
       log_.bad_frame("a client");
-      core_.ports.reply_error(client, "the server does not know this kind of request");
+      core_.ports.reply_error(client, "unknown kind of request");
       break;
   }
 }
@@ -171,13 +172,13 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, std::s
 void ClientHandler::query(const Client& client, const protocol::QueryRequest& request,
                           Instant now) {
   if (find(client.identity, client.request_id) != pending_.end()) {
-    return;  // it is sent again because the answer takes long
+    return;  // repeated by the client because the answer takes long
   }
   const std::uint64_t ticket = ++last_ticket_;
   if (stopping_) {
     core_.ports.reply_error(client, kStopping);
   } else if (!core_.ports.query({ticket, client.share(), request})) {
-    core_.ports.reply_error(client, "too many queries wait already: ask again later");
+    core_.ports.reply_error(client, "too many queries are waiting: try again later");
   } else {
     add(ticket, client, now);
   }
@@ -193,13 +194,13 @@ void ClientHandler::more_rows(const Client& client, const protocol::MoreRows& re
   const Client asker{client.identity, request.request_id(), client.holder};
   const auto found = find(asker.identity, asker.request_id);
   if (found == pending_.end() || !found->second.is_query()) {
-    core_.ports.reply_error(asker, "no answer to that request is under way");
-  } else if (request.taken() > found->second.sent) {
+    core_.ports.reply_error(asker, "no query of this connection has that request number");
+  } else if (request.received() > found->second.sent) {
     cancel(found);
-    core_.ports.reply_error(asker, "more of the answer was taken than was given");
-  } else if (request.taken() > found->second.received) {
-    found->second.received = request.taken();
-    core_.ports.more_rows(found->first, request.taken());
+    core_.ports.reply_error(asker, "the request confirms more chunks than were sent");
+  } else if (request.received() > found->second.received) {
+    found->second.received = request.received();
+    core_.ports.more_rows(found->first, request.received());
   }
 }
 
@@ -221,7 +222,7 @@ void ClientHandler::query_report(QueryReport report) {
   }
   protocol::ClientReply number;
   number.set_request_id(query.client.request_id);
-  // Encoded messages one after another are, decoded, one message with all their fields.
+  // Concatenated encoded messages decode to one message with all their fields.
   const bool is_there =
       core_.ports.to_client(query.client.identity, protocol::encode(number) + report.reply);
   ++query.sent;
@@ -246,7 +247,7 @@ ClientHandler::PendingRequests::iterator ClientHandler::cancel(PendingRequests::
     core_.ports.cancel_query(request->first);
   }
   if (const auto& job = request->second.trace; job && job->worker) {
-    // It need not continue. It is free for another order once it has answered.
+    // The worker need not continue; it gets another order after it has answered.
     protocol::ServerToWorker message;
     message.mutable_trace_cancel()->set_trace_id(request->first);
     core_.workers.send(*job->worker, message);
@@ -275,7 +276,7 @@ QueryCounts ClientHandler::query_counts() const {
 protocol::StudyStatus ClientHandler::status_of(StudyId id, Instant now) const {
   protocol::StudyStatus status = study_status(id, core_, now);
   if (draining_ && status.state() == state_name(StudyState::kRunning)) {
-    status.set_waits_for("the server, which is draining, to be started again");
+    status.set_waits_for("the restart of the server, which is draining");
   }
   return status;
 }
@@ -319,7 +320,7 @@ void ClientHandler::status(const Client& client, const protocol::StatusRequest& 
   core_.ports.reply(client, std::move(reply));
 }
 
-/// The recipe is sent as it is stored.
+/// Sends the recipe as stored, without parsing it.
 void ClientHandler::describe(const Client& client, const protocol::DescribeRequest& request) {
   if (const auto known = find_study(client, request.study())) {
     protocol::ClientReply number;
@@ -364,10 +365,10 @@ void ClientHandler::tick(Instant now) {
     Pending& request = entry->second;
     const bool runs = request.runs || (request.trace && request.trace->worker);
     if (request.trace && now.steady_ms >= request.trace->deadline_ms) {
-      entry = refuse(entry, runs ? "the trace took too long: `oblique trace --timeout SECONDS` "
-                                   "gives it more time"
-                                 : "no worker was free to solve the trace in the time it had: "
-                                   "`oblique trace --timeout SECONDS` gives it more");
+      entry = refuse(entry, runs ? "the trace took too long: use `oblique trace --timeout SECONDS` "
+                                   "for more time"
+                                 : "no worker was free to solve the trace in time: "
+                                   "use `oblique trace --timeout SECONDS` for more time");
       continue;
     }
     bool is_there = true;

@@ -19,11 +19,10 @@
 namespace oblique::server {
 
 struct ClientHandlerSettings {
-  /// Interval of the messages that a request waits or runs. A failure to send one shows that the
-  /// client is gone.
+  /// Interval of StillWorking messages. If one cannot be sent, the client is gone.
   std::int64_t still_working_every_ms = 1000;
-  std::string access = "loopback";  ///< as StatusReply.access
-  std::string version{};            ///< as StatusReply.version
+  std::string access = "loopback";  ///< value of StatusReply.access
+  std::string version{};            ///< value of StatusReply.version
 };
 
 struct QueryCounts {
@@ -31,53 +30,53 @@ struct QueryCounts {
   std::uint64_t running = 0;
 };
 
-/// Handles the requests of clients: answers those about the status, and passes changes, queries and
-/// traces on. Frames may be malicious. Not thread-safe.
+/// Handles requests of clients: answers those about status, and passes on changes, queries and
+/// traces. Frames may be malicious. Not thread-safe.
 class ClientHandler {
  public:
   ClientHandler(ClientHandlerSettings settings, const Core& core, PeerLog& log,
                 StudyChanges& changes)
       : settings_(std::move(settings)), core_(core), log_(log), changes_(changes) {}
 
-  /// `holder`: of the client's key; null without keys.
+  /// `holder`: the client's key; null without keys.
   void frame(const std::string& identity, std::string_view frame, Instant now,
              const std::shared_ptr<const KeyIdentity>& holder);
   void query_report(QueryReport report);
   void trace_received(WorkerId worker, protocol::Trace trace);
-  /// For any reason. The sessions must have forgotten the worker.
+  /// A worker left for any reason; WorkerSessions must already have removed it.
   void worker_left(WorkerId worker);
-  /// The connection of that client is gone, and all its requests were taken.
+  /// The client has disconnected, and all its requests were handled.
   void client_left(std::string_view identity);
   /// To be called several times a second.
   void tick(Instant now);
-  /// The server will stop: no further study is accepted.
+  /// No further study is accepted, because the server will stop.
   void drain() { draining_ = true; }
-  /// The server stops: pending and later requests get an error.
+  /// Pending and later requests get an error, because the server stops.
   void stop();
 
   QueryCounts query_counts() const;
 
  private:
-  /// A trace that a worker is to solve beside its batches.
+  /// A trace that a worker solves in addition to its batches.
   struct TraceJob {
     bool only_point;
     std::int64_t deadline_ms;
     protocol::TraceOrder order{};
-    protocol::TraceReply reply{};       ///< without the trace
-    bool is_ready = false;              ///< the point is known
-    std::optional<WorkerId> worker{};   ///< that solves it
-    std::set<WorkerId> not_taken_by{};  ///< workers
+    protocol::TraceReply reply{};      ///< all fields but the trace
+    bool is_ready = false;             ///< the inputs of the point are known
+    std::optional<WorkerId> worker{};  ///< worker that solves it
+    std::set<WorkerId> declined_by{};  ///< workers that declined it
     bool has_lost_worker = false;
   };
   /// A request that waits for the check thread, the query pool or a worker.
   struct Pending {
     Client client;
-    std::int64_t next_sign_ms;                   ///< when the client gets the next such message
-    std::shared_ptr<const std::string> frame{};  ///< of a check
+    std::int64_t next_sign_ms;                   ///< time of the next StillWorking
+    std::shared_ptr<const std::string> frame{};  ///< frame to check
     std::optional<TraceJob> trace{};
     bool runs = false;
-    std::uint64_t sent = 0;      ///< chunks of the answer
-    std::uint64_t received = 0;  ///< by the client
+    std::uint64_t sent = 0;      ///< number of chunks sent
+    std::uint64_t received = 0;  ///< number of chunks that the client has received
 
     bool is_query() const { return frame == nullptr && !trace; }
   };
@@ -85,8 +84,8 @@ class ClientHandler {
 
   void check(const Client& client, std::string_view frame, Instant now);
   void checked(std::uint64_t ticket, const ReadRequest& read, Instant now);
-  std::string objection_to(const Client& client, const ReadRequest& read);
-  /// `read` is that of `frame`, which may have to be checked.
+  std::string request_error(const Client& client, const ReadRequest& read);
+  /// Answers the request `read` from `frame`, or has it checked first.
   void answer(const Client& client, const ReadRequest& read, std::string_view frame, Instant now);
   void query(const Client& client, const protocol::QueryRequest& request, Instant now);
   void more_rows(const Client& client, const protocol::MoreRows& request);
@@ -96,13 +95,13 @@ class ClientHandler {
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void trace(const Client& client, const protocol::TraceRequest& request, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
-  /// The durable study of that number, or, if that is 0, name. Without one the client gets an
-  /// error.
+  /// The durable study of that number or, if that is 0, of that name. If there is none the client
+  /// gets an error.
   std::optional<StudyId> find_study(const Client& client, const std::string& name, StudyId id = 0);
-  /// The query or trace of that number.
+  /// The query or trace with that request number.
   PendingRequests::iterator find(std::string_view identity, std::uint64_t request_id);
   Pending& add(std::uint64_t ticket, const Client& client, Instant now);
-  /// Both return the next request.
+  /// Remove a request and return the next one.
   PendingRequests::iterator cancel(PendingRequests::iterator request);
   PendingRequests::iterator refuse(PendingRequests::iterator request, const std::string& reason);
   static protocol::ClientReply find_point(const StudyTable& study, bool is_table_made,
@@ -119,8 +118,9 @@ class ClientHandler {
   StudyChanges& changes_;
   PendingRequests pending_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  std::size_t point_checks_ = 0;              // of traces, those of clients that are gone included
-  std::map<WorkerId, std::uint64_t> orders_;  // of traces that workers have not answered: tickets
+  std::size_t point_checks_ = 0;  // running checks of traces, also for clients that are gone
+  // tickets of trace orders without an answer, by worker
+  std::map<WorkerId, std::uint64_t> orders_;
   bool stopping_ = false;
   bool draining_ = false;
 };

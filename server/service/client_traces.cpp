@@ -1,4 +1,4 @@
-// Requests for traces: which point, which worker.
+// Requests for traces: finds the point and a worker.
 
 #include <algorithm>
 #include <cstddef>
@@ -32,7 +32,7 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
     return;
   }
   if (find(client.identity, client.request_id) != pending_.end()) {
-    return;  // it is sent again because the answer takes long
+    return;  // repeated by the client because the answer takes long
   }
   const auto waiting = static_cast<std::size_t>(std::ranges::count_if(
       pending_, [](const auto& entry) { return entry.second.trace.has_value(); }));
@@ -43,7 +43,7 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
       waiting >= limits::kWaitingTraces || (!is_quick && point_checks_ >= limits::kWaitingTraces);
   if (stopping_ || is_full) {
     core_.ports.reply_error(client, stopping_ ? kStopping
-                                              : "too many traces are waited for already: ask again "
+                                              : "too many traces are waiting: try again "
                                                 "later");
     return;
   }
@@ -73,22 +73,22 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
   });
 }
 
-/// The trace reply without the trace, or an error. May run on the check thread unless the table is
-/// made.
+/// The reply without the trace, or an error. May run on the check thread unless the table is
+/// already made.
 protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is_table_made,
                                                 std::uint64_t point) {
   try {
-    // A copy of the recipe's bytes has a table of its own.
+    // A table of its own, from a copy of the recipe's bytes.
     const auto table =
         is_table_made ? study.get() : StudyTable(study.recipe_bytes(), study.size()).get();
-    const std::string objection =
-        point >= table->size() ? fmt::format("the study has no point {}: its points are 0 to {}",
-                                             point, table->size() - 1)
-        : !table->is_left_in(point)
-            ? fmt::format("point {} is left out by the study's filter", point)
-            : table->fault(point);
-    if (!objection.empty()) {
-      return error_reply(objection);
+    const std::string error = point >= table->size()
+                                  ? fmt::format("the study has no point {}: its points are 0 to {}",
+                                                point, table->size() - 1)
+                              : !table->passes_filter(point)
+                                  ? fmt::format("point {} is left out by the study's filter", point)
+                                  : table->fault(point);
+    if (!error.empty()) {
+      return error_reply(error);
     }
     protocol::ClientReply reply;
     protocol::TraceReply& fields = *reply.mutable_trace();
@@ -118,8 +118,8 @@ void ClientHandler::point_found(std::uint64_t ticket, protocol::ClientReply foun
     pending_.erase(request);
   } else if (core_.workers.all().empty()) {
     refuse(request,
-           "no worker is connected to solve it: start an `oblique-worker`, or solve it without one "
-           "by `oblique trace --local`");
+           "no worker is connected: start an `oblique-worker`, or solve the trace here "
+           "with `oblique trace --local`");
   } else {
     job.reply.MergeFrom(found.trace());
     *job.order.mutable_model() = job.reply.model();
@@ -142,7 +142,7 @@ void ClientHandler::worker_left(WorkerId worker) {
   job.worker.reset();
   if (std::exchange(job.has_lost_worker, true)) {
     refuse(request,
-           "two workers were lost while they solved this point, so no other worker gets it");
+           "two workers were lost while they solved this point, so it is not sent to a third");
   }
   dispatch_traces();
 }
@@ -151,15 +151,14 @@ void ClientHandler::trace_received(WorkerId worker, protocol::Trace trace) {
   const WorkerRecord* const record = core_.workers.find(worker);
   const auto order = orders_.find(worker);
   if (record == nullptr || order == orders_.end() || order->second != trace.trace_id()) {
-    return;  // of an earlier session
+    return;  // from an earlier session
   }
   orders_.erase(order);
-  // Of a cancelled one nothing waits.
   if (const auto request = pending_.find(trace.trace_id()); request != pending_.end()) {
     TraceJob& job = *request->second.trace;
     job.worker.reset();
-    if (trace.not_taken()) {
-      job.not_taken_by.insert(worker);
+    if (trace.declined()) {
+      job.declined_by.insert(worker);
     } else {
       core_.ports.reply(request->second.client, trace_reply(job, *record, std::move(trace)));
       pending_.erase(request);
@@ -180,7 +179,7 @@ protocol::ClientReply ClientHandler::trace_reply(TraceJob& job, const WorkerReco
                           job.order.model().elements_per_link(), job.order.shape());
   const std::string fault = protocol::fault_of_trace(trace, shape, job.order.fall());
   if (!fault.empty()) {
-    return error_reply(fmt::format("worker {} sent no trace: {}", worker.row.name, fault));
+    return error_reply(fmt::format("worker {} sent an invalid trace: {}", worker.row.name, fault));
   }
   protocol::ClientReply message;
   protocol::TraceReply& fields = *message.mutable_trace();
@@ -193,7 +192,6 @@ protocol::ClientReply ClientHandler::trace_reply(TraceJob& job, const WorkerReco
   return message;
 }
 
-/// Sends waiting orders to free workers, in turn.
 void ClientHandler::dispatch_traces() {
   auto running = std::ranges::count_if(
       pending_, [](const auto& entry) { return entry.second.trace && entry.second.trace->worker; });
@@ -205,7 +203,7 @@ void ClientHandler::dispatch_traces() {
     }
     const std::optional<WorkerId> free = free_worker(*job);
     if (!free) {
-      refuse(request, "no worker is connected any more that could solve it");
+      refuse(request, "no connected worker can solve it");
     } else if (*free != 0 && running < static_cast<std::ptrdiff_t>(limits::kRunningTraces)) {
       job->worker = free;
       orders_[*free] = request->first;
@@ -217,11 +215,11 @@ void ClientHandler::dispatch_traces() {
   }
 }
 
-/// A worker that is free; 0: all are busy; nothing: none takes the job.
+/// A free worker; 0: all are busy; nothing: no connected worker accepts the job.
 std::optional<WorkerId> ClientHandler::free_worker(const TraceJob& job) const {
   std::optional<WorkerId> free;
   for (const auto& [id, worker] : core_.workers.all()) {
-    if (!job.not_taken_by.contains(id)) {
+    if (!job.declined_by.contains(id)) {
       free = 0;
       if (!orders_.contains(id) && !worker.is_busy) {
         return id;

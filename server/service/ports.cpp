@@ -28,7 +28,7 @@ bool Ports::reply_error(const Client& client, const std::string& message) {
 }
 
 bool Ports::reply_still_working(const Client& client, bool runs) {
-  // No request has this number: clients that do not know the message ignore it.
+  // No request has this number, so clients without this message ignore it.
   constexpr std::uint64_t kNoRequest = UINT64_MAX;
   protocol::ClientReply message;
   message.mutable_still_working()->set_request_id(client.request_id);
@@ -56,8 +56,7 @@ void PeerLog::write_of_stranger(const std::string& text) {
 
 void PeerLog::bad_frame(std::string_view sender) {
   ++bad_frames_;
-  write_of_stranger(
-      fmt::format("{} sent a frame that is no message ({} of them so far)", sender, bad_frames_));
+  write_of_stranger(fmt::format("{} sent an invalid frame ({} so far)", sender, bad_frames_));
 }
 
 void PeerLog::tick(std::int64_t now_ms) {

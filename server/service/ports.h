@@ -13,7 +13,7 @@
 
 namespace oblique::server {
 
-/// A moment by two clocks.
+/// A time on two clocks.
 struct Instant {
   std::int64_t steady_ms;  ///< never runs backwards
   std::int64_t utc_ms;     ///< since 1970
@@ -24,26 +24,26 @@ std::string iso_8601(Instant now);
 
 /// A client that waits for the reply to a request.
 struct Client {
-  std::string identity;  ///< of its connection
+  std::string identity;  ///< its connection
   std::uint64_t request_id;
-  std::shared_ptr<const KeyIdentity> holder = {};  ///< null: there are no keys
+  std::shared_ptr<const KeyIdentity> holder = {};  ///< its key; null without keys
 
-  /// Name of its key; empty: without keys.
+  /// Name of its key; empty without keys.
   std::string key() const { return holder == nullptr ? std::string() : holder->name; }
   bool is_reader() const { return holder != nullptr && holder->role == protocol::Role::kReader; }
-  /// What takes turns with other clients: the key, or without keys the connection.
+  /// The unit of fair sharing: the key or, without keys, the connection.
   std::string share() const { return holder == nullptr ? identity : "key " + holder->name; }
 
   bool operator==(const Client&) const = default;
 };
 
-/// The reply to requests of clients that end with the server.
-inline constexpr const char* kStopping = "the server is stopping: ask again when it runs";
+/// The reply to requests that a stopping server no longer handles.
+inline constexpr const char* kStopping = "the server is stopping: try again after its restart";
 
 enum class Severity { kInfo, kWarning, kError };
 
-/// Network, writer, query pool, check thread and log as the service uses them. The event loop
-/// implements them; tests and the simulation replace them. No function blocks or calls the service.
+/// Interface of the service to network, writer, query pool, check thread and log. The event loop
+/// implements it; tests and the simulation replace it. No function blocks or calls the service.
 class Ports {
  public:
   /// Called on the service's thread with the result of a check.
@@ -55,22 +55,22 @@ class Ports {
 
   // ---- Network. Frames are encoded messages.
   virtual Delivery to_worker(const std::string& identity, const std::string& frame) = 0;
-  /// More output waits for that worker than should.
+  /// Whether more output waits for that worker than allowed.
   virtual bool is_busy(const std::string& identity) const = 0;
-  /// Input of that worker was received and not yet taken.
+  /// Whether input of that worker was received but not yet read.
   virtual bool has_unread_input(const std::string& /*identity*/) const { return false; }
-  /// False when the client is gone; the reply is dropped then.
+  /// False if the client is gone; the reply is then dropped.
   virtual bool to_client(const std::string& identity, const std::string& frame) = 0;
-  /// Adds the keys that are connected, and how many peers were refused.
+  /// Adds the connected keys, and the number of refused peers.
   virtual void add_peers(protocol::WorkersReply& /*reply*/) const {}
 
   // ---- Other threads.
   /// `Service::written` is called with the outcome.
   virtual void write(WriteJob job) = 0;
-  /// `Service::query_report` is called with the answer. False when too many queries wait.
+  /// `Service::query_report` is called with the answer. False if too many queries wait.
   virtual bool query(QueryJob job) = 0;
-  /// The client has taken so many chunks of its answer.
-  virtual void more_rows(std::uint64_t ticket, std::uint64_t taken) = 0;
+  /// The client has received this number of chunks of its answer.
+  virtual void more_rows(std::uint64_t ticket, std::uint64_t received) = 0;
   virtual void cancel_query(std::uint64_t ticket) = 0;
   virtual void run_check(Check check) = 0;
 
@@ -80,23 +80,24 @@ class Ports {
   /// Sets the number of the request in `reply`.
   bool reply(const Client& client, protocol::ClientReply reply);
   bool reply_error(const Client& client, const std::string& message);
-  /// The request of the client waits, or is being worked on. False when the client is gone.
+  /// Reports to the client that its request waits or runs. False if the client is gone.
   bool reply_still_working(const Client& client, bool runs);
 };
 
 protocol::ClientReply error_reply(const std::string& message);
 
-/// Log lines that peers can cause at any rate: at most 20 in 10 s, then the number of the others.
+/// Log lines that peers can cause at any rate: writes at most 20 in 10 s, then the number of the
+/// others.
 class PeerLog {
  public:
   explicit PeerLog(Ports& ports) : ports_(ports) {}
 
-  /// A line about a worker that was admitted.
+  /// Writes a line about an admitted worker.
   void write(Severity severity, const std::string& text);
-  /// A line about a stranger, as a refused connection. Counted apart, so that strangers cannot
-  /// suppress lines about workers.
+  /// Writes a line about a stranger, such as a refused connection. Strangers have a limit of their
+  /// own, so they cannot suppress lines about workers.
   void write_of_stranger(const std::string& text);
-  /// No sound peer sends such a frame.
+  /// Counts and logs an invalid frame, which correct peers never send.
   void bad_frame(std::string_view sender);
   /// To be called several times a second.
   void tick(std::int64_t now_ms);
@@ -108,7 +109,7 @@ class PeerLog {
   Ports& ports_;
   std::uint64_t bad_frames_ = 0;
   std::int64_t span_began_ms_ = 0;
-  // Lines since then, written or left out.
+  // Lines since then, including suppressed ones.
   std::uint64_t lines_ = 0;
   std::uint64_t stranger_lines_ = 0;
 };

@@ -48,7 +48,7 @@ void Service::restore(StoredStudy study, const std::string& only_study, Instant 
   const StudyId id = study.study_id;
   states_.restore(study, now.steady_ms);
   const bool is_excluded = !only_study.empty() && study.name != only_study;
-  const bool looks_up = study.reuses && !is_excluded;  // the lookup had not ended
+  const bool looks_up = study.reuses && !is_excluded;  // its lookup has not ended
   feed(StudyAdded{id, study.table, std::move(study.completed), study.failures.size(),
                   study.state == StudyState::kCancelled,
                   study.state == StudyState::kPaused || is_excluded, study.priority,
@@ -144,7 +144,6 @@ void Service::handle(const Event& event, Instant now, protocol::Results* results
   }
 }
 
-/// The events that were found while messages were sent to workers.
 void Service::handle_worker_events(Instant now) {
   for (auto events = workers_.take_events(); !events.empty(); events = workers_.take_events()) {
     for (const Event& event : events) {
@@ -153,10 +152,9 @@ void Service::handle_worker_events(Instant now) {
   }
 }
 
-/// Results whose inputs are not those of their points become failures.
 void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
-  // Of a study without open points nothing is stored, and its table need not be made.
-  if (!states_.contains(event.study) || !scheduler_.knows_study(event.study) ||
+  // Nothing is stored for a study without open points, so its table is not made.
+  if (!states_.contains(event.study) || !scheduler_.has_study(event.study) ||
       scheduler_.study(event.study).open() == 0) {
     return;
   }
@@ -186,7 +184,7 @@ void Service::store(const StoreResults& effect, protocol::Results& message, Inst
   WorkerRecord& worker = *workers_.find(effect.worker);
   const bool has_rows = !effect.accepted.empty() && states_.contains(effect.study);
   if (has_rows && !std::exchange(worker.has_row, true)) {
-    // A worker that only comes and goes gets no row.
+    // A worker without results gets no row.
     ledger_.write(worker.row);
   }
   AddResults change{effect.study,
@@ -231,7 +229,7 @@ void Service::write_results(AddResults change, ResultsStored event) {
 void Service::results_stored(const ResultsStored& event, Instant now) {
   const StudyId id = event.study;
   if (!states_.contains(id)) {
-    feed(event, now);  // the study was deleted, and the database dropped these
+    feed(event, now);  // the study was deleted, so the database dropped these
     return;
   }
   std::uint64_t solved = 0;
@@ -261,11 +259,11 @@ void Service::written(const WriteReport& report, Instant now) {
       ledger_.end(report.ticket, report.error, now);
       break;
     case WriteReport::Kind::kFault:
-      ports_.log(Severity::kError, "results wait, nothing is handed out: " + report.error);
+      ports_.log(Severity::kError, "results are waiting and no batches are sent: " + report.error);
       ledger_.set_fault(report.error);
       break;
     case WriteReport::Kind::kRecovered:
-      ports_.log(Severity::kInfo, "the database takes results again");
+      ports_.log(Severity::kInfo, "the database accepts results again");
       ledger_.set_fault({});
       break;
     case WriteReport::Kind::kGone:
@@ -276,10 +274,11 @@ void Service::written(const WriteReport& report, Instant now) {
       break;
     case WriteReport::Kind::kUnmerged:
       ports_.log(Severity::kWarning,
-                 fmt::format("the write-ahead log, the file beside the database that ends in -wal, "
-                             "is not yet merged into it: {}. Until then a copy needs both files; "
-                             "`oblique backup` makes one that is whole",
-                             report.error));
+                 fmt::format(
+                     "the write-ahead log (the file beside the database that ends in -wal) "
+                     "is not merged into the database yet: {}. Until then a copy needs both files; "
+                     "`oblique backup` makes a complete one",
+                     report.error));
       break;
   }
   hold_or_release_batches(now);

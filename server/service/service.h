@@ -25,51 +25,51 @@ struct ServiceSettings : WorkerSessionSettings {
   ClientHandlerSettings clients;
   StudyBounds bounds;
   std::uint64_t last_study_id = 0;
-  /// Only points of this study are handed out. Empty: of all.
+  /// Only points of this study are leased. Empty: of all.
   std::string only_study{};
 };
 
-/// Points that were stored since the service began.
+/// Number of points that were stored since the service began.
 struct StoredPoints {
   std::uint64_t solved = 0;
   std::uint64_t failed = 0;
 };
 
-/// The dispatcher between message handlers, scheduler and writer. It has no sockets, clock or
-/// thread, so that tests drive it message by message. Not thread-safe.
+/// Dispatcher between message handlers, scheduler and writer. It has no sockets, clock or thread,
+/// so tests drive it message by message. Not thread-safe.
 class Service {
  public:
-  /// `ports` must outlive the service. `studies` are those of the database.
+  /// `ports` must outlive the service. `studies` come from the database.
   Service(const ServiceSettings& settings, Ports& ports, std::vector<StoredStudy> studies,
           Instant now);
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// `holder`: of the peer's key; null without keys.
+  /// `holder`: the peer's key; null without keys.
   void worker_frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::shared_ptr<const KeyIdentity>& holder = nullptr);
   void client_frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     clients_.frame(identity, frame, now, holder);
   }
-  /// The connection of that client is gone.
+  /// The client has disconnected.
   void client_left(std::string_view identity) { clients_.client_left(identity); }
-  /// At most 20 such lines in 10 s.
+  /// Logs at most 20 such lines in 10 s.
   void log_stranger(const std::string& text) { peer_log_.write_of_stranger(text); }
   void written(const WriteReport& report, Instant now);
   void query_report(QueryReport report) { clients_.query_report(std::move(report)); }
   /// To be called several times a second.
   void tick(Instant now);
-  /// Hands out nothing and accepts no study any more; results are stored as before.
+  /// Stops sending batches and accepting studies; results are still stored.
   void drain(Instant now);
-  /// No batch is with a worker, and no write is under way.
+  /// Whether no batch is leased and no write is pending.
   bool is_drained() const { return scheduler_.leases() == 0 && ledger_.is_empty(); }
-  /// Tells workers and clients that the server stops. Results are still stored.
+  /// Notifies workers and clients that the server stops. Results are still stored.
   void stop(Instant now);
 
-  /// Whether messages of workers should be read now. Otherwise none counts as silent.
+  /// Whether messages of workers should be read now. If not, no worker counts as silent.
   bool has_room() const { return ledger_.has_room(); }
-  /// Nothing more can be stored, and the server should end.
+  /// Whether nothing more can be stored, so the server should end.
   bool storage_is_gone() const { return ledger_.is_gone(); }
   bool is_stopping() const { return stopping_ || draining_; }
 
@@ -84,9 +84,10 @@ class Service {
   std::vector<protocol::WorkerStatus> worker_statuses(std::size_t most, Instant now) const;
 
  private:
-  /// Passes an event to the scheduler, and then those that its effects cause.
+  /// Passes an event to the scheduler, carries out the effects, and passes on the events that these
+  /// cause.
   void feed(const Event& event, Instant now);
-  /// `results`: the worker's message of a ResultsReceived.
+  /// `results`: the message behind a ResultsReceived.
   void handle(const Event& event, Instant now, protocol::Results* results = nullptr);
   void handle_worker_events(Instant now);
   void fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const;
@@ -111,7 +112,7 @@ class Service {
   StoredPoints stored_points_;
   bool stopping_ = false;
   bool draining_ = false;
-  bool holds_batches_ = false;  // as the scheduler knows
+  bool holds_batches_ = false;  // the last DispatchHeld
 };
 
 }  // namespace oblique::server

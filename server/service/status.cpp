@@ -13,24 +13,23 @@
 namespace oblique::server {
 namespace {
 
-/// Why a running study makes no progress; empty: it does.
 std::string reason_to_wait(const Core& core, const StudyCounts& counts, const Reuse& reuse) {
   const WriteLedger& ledger = core.ledger;
   if (ledger.is_gone()) {
     return ledger.fault();
   }
   if (!ledger.fault().empty()) {
-    return "the database, which takes no results: " + ledger.fault();
+    return "the database, which accepts no results: " + ledger.fault();
   }
   if (ledger.is_slow()) {
-    return fmt::format("the database, which stored nothing for over {} s",
+    return fmt::format("the database, which has stored nothing for over {} s",
                        WriteLedger::kSlowAfter_s);
   }
   if (reuse.lookup) {
-    return fmt::format("the lookup of results of other studies, {} reused so far", reuse.points);
+    return fmt::format("the lookup of results of other studies ({} reused so far)", reuse.points);
   }
   if (counts.is_of_other_solver) {
-    return fmt::format("a server with solver version {}, that of its results",
+    return fmt::format("a server with solver version {}, which solved its results",
                        counts.solver_version);
   }
   if (counts.leased == 0 && core.scheduler.sets_all_aside()) {
@@ -64,14 +63,14 @@ protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now) {
     }
   }
   if (record.reuse.points > 0 || record.reuse.lookup || record.reuse.cut_short) {
-    *status.mutable_taken() = reuse_status(record.reuse);
+    *status.mutable_reused() = reuse_status(record.reuse);
   }
   return status;
 }
 
-protocol::TakenOver reuse_status(const Reuse& reuse) {
-  constexpr std::size_t kMostOrigins = 20;
-  protocol::TakenOver message;
+protocol::ReusedPoints reuse_status(const Reuse& reuse) {
+  constexpr std::size_t kMaxOrigins = 20;
+  protocol::ReusedPoints message;
   message.set_points(reuse.points);
   message.set_under_way(reuse.lookup.has_value());
   message.set_cut_short(reuse.cut_short);
@@ -79,7 +78,7 @@ protocol::TakenOver reuse_status(const Reuse& reuse) {
                                                              reuse.origins.end());
   std::ranges::stable_sort(origins, std::ranges::greater(),
                            [](const auto& origin) { return origin.second; });
-  origins.resize(std::min(origins.size(), kMostOrigins));
+  origins.resize(std::min(origins.size(), kMaxOrigins));
   for (const auto& [study, points] : origins) {
     auto& origin = *message.add_from();
     origin.set_study(study);

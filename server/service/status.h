@@ -20,7 +20,7 @@ class PointRates {
  public:
   using Id = std::uint64_t;
 
-  /// Points were completed. None was between `since_ms` and the first call for this ID.
+  /// Adds completed points. `since_ms`: the start of the first interval of this ID.
   void add(Id id, std::uint64_t points, std::int64_t since_ms, std::int64_t now_ms) {
     Recent& recent = recent_.try_emplace(id, Recent{since_ms}).first->second;
     if (recent.points.empty() || now_ms - recent.points.back().at_ms >= kResolution_ms) {
@@ -32,7 +32,7 @@ class PointRates {
     }
   }
   void forget(Id id) { recent_.erase(id); }
-  /// Frees IDs without recent points. To be called now and then.
+  /// Removes IDs without recent points. To be called now and then.
   void forget_old(std::int64_t now_ms) {
     std::erase_if(recent_, [now_ms](const auto& entry) {
       return now_ms - entry.second.points.back().at_ms >= kSpan_ms;
@@ -43,7 +43,7 @@ class PointRates {
     const auto found = recent_.find(id);
     return found == recent_.end() ? 0.0 : rate_of(found->second, now_ms);
   }
-  /// The sum of all.
+  /// The sum over all IDs.
   double points_per_s(std::int64_t now_ms) const {
     double sum = 0.0;
     for (const auto& [id, recent] : recent_) {
@@ -76,7 +76,7 @@ class PointRates {
   std::map<Id, Recent> recent_;
 };
 
-/// The parts of the service that its handlers share.
+/// Parts of the service that its handlers share.
 struct Core {
   Ports& ports;
   Scheduler& scheduler;
@@ -90,12 +90,12 @@ struct Core {
   std::function<void(const Event&, Instant)> feed;
 };
 
-// The status of studies and workers as clients and the page get it.
+// Status of studies and workers as messages for clients and the page.
 
 /// Throws std::out_of_range for a study that is not durable.
 protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now);
-/// Empty without anything to report.
-protocol::TakenOver reuse_status(const Reuse& reuse);
+/// Empty if there is nothing to report.
+protocol::ReusedPoints reuse_status(const Reuse& reuse);
 protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now);
 
 }  // namespace oblique::server

@@ -15,7 +15,6 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestShownName = 200;
-/// In place of the state of a study that was deleted.
 constexpr const char* kDeletedState = "deleted";
 
 }  // namespace
@@ -23,21 +22,21 @@ constexpr const char* kDeletedState = "deleted";
 std::string unknown_study(const std::string& name, const StudyStates& states) {
   const std::string nearest = states.nearest(name);
   const std::string shown = protocol::shortened(name, kLongestShownName);
-  if (!name.empty() && nearest == name) {  // the request had a number, too
-    return fmt::format(
-        "study name \"{}\" and study number do not match: `oblique studies` lists all", shown);
+  if (!name.empty() && nearest == name) {  // the request also had a study number
+    return fmt::format("study name \"{}\" and study number do not match: see `oblique studies`",
+                       shown);
   }
-  return fmt::format("there is no study called \"{}\"{}: `oblique studies` lists all", shown,
+  return fmt::format("there is no study called \"{}\"{}: see `oblique studies`", shown,
                      nearest.empty() ? "" : fmt::format(" (did you mean `{}`?)", nearest));
 }
 
 // ---- Reading -----------------------------------------------------------------------------------
 
-ReadRequest read_request(std::string_view frame, bool judges) {
+ReadRequest read_request(std::string_view frame, bool validates_points) {
   ReadRequest read;
-  // Padding cannot make much of a shorter frame.
+  // A short frame cannot contain much padding.
   read.is_readable =
-      (frame.size() <= limits::kLongestInlineRequest || protocol::is_of_a_requests_shape(frame)) &&
+      (frame.size() <= limits::kLongestInlineRequest || protocol::is_unpadded_request(frame)) &&
       protocol::decode(frame, read.request);
   read.request_id = read.is_readable ? read.request.request_id() : protocol::request_id_of(frame);
   if (!read.is_readable || !read.request.has_submit()) {
@@ -47,13 +46,13 @@ ReadRequest read_request(std::string_view frame, bool judges) {
     protocol::Recipe& recipe = *read.request.mutable_submit()->mutable_recipe();
     protocol::check_size(recipe);
     auto table = std::make_shared<const protocol::PointTable>(std::move(recipe));
-    read.needs_judging = table->needs_judging() && !judges;
-    if (judges) {
-      table->judge_points();
+    read.needs_point_validation = table->has_points_to_validate() && !validates_points;
+    if (validates_points) {
+      table->validate_points();
     }
     read.table = std::move(table);
   } catch (const solver::InputError& error) {
-    read.objection = error.what();
+    read.recipe_error = error.what();
   }
   read.request.mutable_submit()->clear_recipe();
   return read;
@@ -61,7 +60,7 @@ ReadRequest read_request(std::string_view frame, bool judges) {
 
 // ---- Writing -----------------------------------------------------------------------------------
 
-/// Writes the change. A refusal is the reply to the client, after `on_refused`.
+/// Writes the change. A refusal calls `on_refused` and is the reply to the client.
 void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored,
                          std::function<void()> on_refused) {
   pending_[id];
@@ -83,7 +82,7 @@ void StudyChanges::write(const Client& client, StudyId id, Change change, OnStor
         on_refused();
         const bool is_kept = core_.states.contains(id);
         core_.ports.reply_error(client,
-                                (is_kept ? "the change was not stored, the study is as before: "
+                                (is_kept ? "the change was not stored and the study is unchanged: "
                                          : "the study was not stored: ") +
                                     error);
         if (is_kept) {
@@ -96,15 +95,15 @@ void StudyChanges::write(const Client& client, StudyId id, Change change, OnStor
       });
 }
 
-/// Whether the request waits until the change of the study that is being written has an outcome. It
-/// is handled again then.
+/// Defers the request if a change of the study is being written; it is handled after that. Returns
+/// whether it was deferred or refused.
 bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(Instant)> request) {
   const auto pending = pending_.find(id);
   if (pending == pending_.end()) {
     return false;
   }
   if (pending->second.deferred.size() >= limits::kDeferredRequests) {
-    core_.ports.reply_error(client, "too many changes of that study wait already: ask again later");
+    core_.ports.reply_error(client, "too many changes of that study are waiting: try again later");
   } else {
     pending->second.deferred.push_back(std::move(request));
   }
@@ -119,8 +118,8 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   const std::int32_t priority = request.has_priority() ? request.priority()
                                 : known                ? core_.states.record(*known).priority
                                                        : 0;
-  for (const std::string& reason : {protocol::objection_to_study_name(request.name()),
-                                    protocol::objection_to_priority(priority), read.objection}) {
+  for (const std::string& reason : {protocol::study_name_error(request.name()),
+                                    protocol::priority_error(priority), read.recipe_error}) {
     if (!reason.empty()) {
       core_.ports.reply_error(client, reason);
       return;
@@ -134,11 +133,11 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
     return;
   }
   const StudyRecord& study = core_.states.record(*known);
-  Growth growth{Growth::Kind::kOther, "the stored one cannot be read"};
+  Growth growth{Growth::Kind::kOther, "the stored recipe cannot be read"};
   try {
     growth = study.table.growth_to(read.table);
   } catch (const std::runtime_error&) {
-    // Only another version can read it.
+    // The stored recipe may be of another version.
   }
   if (growth.kind != Growth::Kind::kSame) {
     grow(client, *known, read, growth, priority, now);
@@ -163,7 +162,7 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
     StudyRecord& study = core_.states.record(id);
     study.is_durable = true;
     study.since_ms = then.steady_ms;
-    log(id, fmt::format("of {} points begins", study.table.size()));
+    log(id, fmt::format("starts with {} points", study.table.size()));
     StudyAdded event{id, study.table, {}, 0, false, false, study.priority};
     event.held = reuses;
     core_.feed(event, then);
@@ -178,7 +177,8 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
         on_stored, [this, id] { core_.states.remove(id); });
 }
 
-/// The submitted recipe is not that of the study: appends its further points, or refuses it.
+/// Handles a submitted recipe that differs from the stored one: appends its further points, or
+/// refuses it.
 void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
                         const Growth& growth, std::int32_t priority, Instant now) {
   const StudyRecord& study = core_.states.record(id);
@@ -187,17 +187,18 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
     core_.ports.reply_error(
         client,
         fmt::format("there is a study called \"{}\" with {}. A study may grow by blocks "
-                    "behind those that it has, and never change:\n{}\n"
-                    "Give this one another name (--name), or use another database (--db)",
+                    "after its existing ones, but not change:\n{}\n"
+                    "Choose another name (--name) or another database (--db)",
                     study.name,
                     growth.kind == Growth::Kind::kShorter ? "more points" : "another recipe",
                     growth.difference));
     return;
   }
   if (study.reuse.lookup) {
-    core_.ports.reply_error(client,
-                            "the study cannot grow while results of other studies are looked up "
-                            "for it: submit again when `oblique status` shows that this has ended");
+    core_.ports.reply_error(
+        client,
+        "the study cannot grow while results of other studies are being looked up "
+        "for it: submit again when `oblique status` no longer shows the lookup");
     return;
   }
   const bool is_open = core_.states.is_open(id);
@@ -269,7 +270,6 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
     case protocol::STUDY_CHANGE_CANCEL:
       return change_state(client, id, StudyState::kCancelled, reply, now);
     case protocol::STUDY_CHANGE_PAUSE:
-      // Nothing of a cancelled study is handed out either.
       return change_state(client, id,
                           core_.states.record(id).state == StudyState::kCancelled
                               ? StudyState::kCancelled
@@ -284,12 +284,12 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
     case protocol::STUDY_CHANGE_DELETE:
       return remove(client, id);
     default:
-      core_.ports.reply_error(client, "the server does not know this change of a study");
+      core_.ports.reply_error(client, "unknown kind of change");
       break;
   }
 }
 
-/// The reply is sent at once if the study has the state already.
+/// Replies at once if the study already has the state.
 void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted,
                                 const OnStored& reply, Instant now) {
   if (!core_.states.needs_write(id, wanted)) {
@@ -302,7 +302,7 @@ void StudyChanges::change_state(const Client& client, StudyId id, StudyState wan
   const auto on_stored = [this, id, wanted, reply](Instant then) {
     core_.states.set_state(id, wanted);
     if (wanted == StudyState::kRunning) {
-      log(id, "goes on");
+      log(id, "resumes");
       core_.feed(StudyReopened{id}, then);
     } else {
       log(id, fmt::format("is {}", state_name(wanted)));
@@ -331,7 +331,7 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
   }
   write(client, id, ForgetFailures{id, failures, iso_8601(now)},
         [this, client, id, failures](Instant then) {
-          core_.rates.forget(id);  // fewer points are completed now
+          core_.rates.forget(id);  // the number of completed points falls
           StudyRecord& study = core_.states.record(id);
           failures.for_each(
               [&](const Interval& gone) { study.failures.erase(gone.begin, gone.end); });
@@ -339,7 +339,7 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
           if (study.state == StudyState::kDone) {
             core_.states.reopen(id);
           }
-          log(id, fmt::format("tries its failed points again: {}", failures.size()));
+          log(id, fmt::format("solves {} failed points again", failures.size()));
           core_.feed(FailuresForgotten{id, failures}, then);
           reply_changed(client, study_status(id, core_, then), failures.size());
         });
@@ -349,7 +349,7 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
                           Instant now) {
   const std::string& name = request.new_name();
   const auto owner = core_.states.find(name);
-  if (const std::string reason = protocol::objection_to_study_name(name); !reason.empty()) {
+  if (const std::string reason = protocol::study_name_error(name); !reason.empty()) {
     core_.ports.reply_error(client, reason);
   } else if (owner == id) {
     reply_changed(client, study_status(id, core_, now));
@@ -357,14 +357,14 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
     if (!defers(client, *owner,
                 [this, client, request](Instant then) { change(client, request, then); })) {
       core_.ports.reply_error(
-          client, fmt::format("there is a study called \"{}\" already: choose another name", name));
+          client, fmt::format("there is already a study called \"{}\": choose another name", name));
     }
   } else {
     core_.states.reserve(id, name);
     write(
         client, id, RenameStudy{id, name},
         [this, client, id, name](Instant then) {
-          log(id, fmt::format("is called {} from now on", name));
+          log(id, fmt::format("was renamed to {}", name));
           core_.states.rename(id, name);
           reply_changed(client, study_status(id, core_, then));
         },
@@ -376,7 +376,7 @@ void StudyChanges::remove(const Client& client, StudyId id) {
   write(client, id, DeleteStudy{id}, [this, client, id](Instant then) {
     protocol::StudyStatus last = study_status(id, core_, then);
     last.set_state(kDeletedState);
-    log(id, "is deleted");
+    log(id, "was deleted");
     core_.rates.forget(id);
     core_.states.remove(id);
     release_replies(then);
@@ -397,7 +397,8 @@ void StudyChanges::finish(StudyId id, Instant now) {
 
 // ---- Bounds and replies ------------------------------------------------------------------------
 
-/// Whether so many further studies and points may be open; otherwise the client gets the bound.
+/// Whether the limits allow this number of further studies and points. If not, the client gets an
+/// error.
 bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::uint64_t points) {
   const auto fits = [&](const char* what, std::uint64_t open, std::uint64_t more,
                         std::uint64_t most, const char* option = "") {
@@ -406,7 +407,7 @@ bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::ui
     }
     core_.ports.reply_error(
         client,
-        fmt::format("{} {} are open, and the server allows {}{}: wait until some studies are "
+        fmt::format("{} {} are open, and at most {} are allowed{}: wait until some studies are "
                     "done, or cancel some",
                     open, what, most, option));
     return false;
@@ -424,7 +425,7 @@ StudyChanges::OnStored StudyChanges::submitted_reply(const Client& client, Study
   return [this, client, id](Instant now) { reply_submitted(client, id, {}, now); };
 }
 
-/// While results of other studies are looked up the reply waits for them, but not long.
+/// Sends the reply when the lookup of reusable results has ended, or after a short wait.
 void StudyChanges::reply_submitted(const Client& client, StudyId id, protocol::SubmitReply reply,
                                    Instant now) {
   constexpr std::int64_t kLongestWait_ms = 1500;
@@ -435,7 +436,7 @@ void StudyChanges::reply_submitted(const Client& client, StudyId id, protocol::S
 void StudyChanges::release_replies(Instant now) {
   std::erase_if(held_, [&](const HeldReply& held) {
     if (!core_.states.contains(held.study)) {
-      core_.ports.reply_error(held.client, "the study was deleted meanwhile");
+      core_.ports.reply_error(held.client, "the study was deleted before the reply");
       return true;
     }
     const Reuse& reuse = core_.states.record(held.study).reuse;
@@ -448,8 +449,8 @@ void StudyChanges::release_replies(Instant now) {
     fields = held.reply;
     fields.set_study_id(held.study);
     fields.set_points(counts.points);
-    fields.set_settled(counts.completed);
-    *fields.mutable_taken() = reuse_status(reuse);
+    fields.set_completed(counts.completed);
+    *fields.mutable_reused() = reuse_status(reuse);
     core_.ports.reply(held.client, std::move(message));
     return true;
   });
@@ -484,7 +485,7 @@ void StudyChanges::write_part(StudyId id, std::uint64_t first_point) {
         ReuseResults{id, study.table.get(), first_point, core_.solver_version, outcome},
         [this, id, outcome](Instant now) { part_stored(id, *outcome, now); },
         [this, id](const std::string& error, Instant /*now*/) { part_refused(id, error); });
-  } catch (const std::runtime_error& error) {  // only another version can read the recipe
+  } catch (const std::runtime_error& error) {  // the recipe may be of another version
     log(id, fmt::format("reuses no results: {}", error.what()));
     write_end(id);
   }
@@ -492,7 +493,7 @@ void StudyChanges::write_part(StudyId id, std::uint64_t first_point) {
 
 void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant now) {
   if (!core_.states.contains(id)) {
-    return;  // it was deleted
+    return;  // the study was deleted
   }
   Reuse& reuse = core_.states.record(id).reuse;
   reuse.add(part.origins);
@@ -506,7 +507,7 @@ void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant no
     return;
   }
   const bool goes_on = part.next_point && core_.states.record(id).state != StudyState::kCancelled;
-  reuse.cut_short = goes_on && (reuse.lookup->probes_in_vain >= kMostProbesInVain ||
+  reuse.cut_short = goes_on && (reuse.lookup->probes_in_vain >= kMaxProbesInVain ||
                                 now.steady_ms - reuse.lookup->last_result_ms >= kLongestInVain_ms);
   if (goes_on && !reuse.cut_short) {
     write_part(id, *part.next_point);
@@ -515,12 +516,12 @@ void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant no
   }
 }
 
-/// The points that the lookup has not found are solved.
+/// After an error the remaining points are solved.
 void StudyChanges::part_refused(StudyId id, const std::string& error) {
   if (core_.ledger.is_gone() || !core_.states.contains(id)) {
     return;
   }
-  log(id, fmt::format("reuses no more results of other studies: {}", error));
+  log(id, fmt::format("stops reusing results of other studies: {}", error));
   core_.states.record(id).reuse.cut_short = true;
   write_end(id);
 }

@@ -15,62 +15,62 @@
 
 namespace oblique::server {
 
-/// A parsed request of a client and, if it submits a study, the table of its recipe.
+/// A parsed request of a client and, for a submission, the table of its recipe.
 struct ReadRequest {
-  bool is_readable = false;         ///< otherwise only the number counts
-  std::uint64_t request_id = 0;     ///< 0: it cannot be read
-  protocol::ClientRequest request;  ///< its recipe is moved into the table
-  StudyTable table;                 ///< of a recipe without faults
-  std::string objection;            ///< what is wrong with the recipe; empty: nothing
-  bool needs_judging = false;       ///< the points of the recipe were not checked and must be
+  bool is_readable = false;             ///< if false, only the number is valid
+  std::uint64_t request_id = 0;         ///< 0: it cannot be read
+  protocol::ClientRequest request;      ///< without the recipe, which is in the table
+  StudyTable table;                     ///< set if the recipe is valid
+  std::string recipe_error;             ///< why the recipe is invalid; empty: it is valid
+  bool needs_point_validation = false;  ///< the points of the recipe must still be validated
 };
 
-/// Parses one frame. Time and memory are proportional to its bytes: a long one that is padded with
-/// empty messages is not parsed. With `judges` the points of a recipe are checked too
-/// (PointTable::judge_points), which may take a second.
-ReadRequest read_request(std::string_view frame, bool judges = true);
+/// Parses one frame. Time and memory are proportional to its size: a long frame that is padded with
+/// empty messages is not parsed. With `validates_points` also calls PointTable::validate_points,
+/// which may take a second.
+ReadRequest read_request(std::string_view frame, bool validates_points = true);
 
-/// Bounds on the studies that are neither done nor cancelled, and on their points.
+/// Limits on studies that are neither done nor cancelled, and on their points.
 struct StudyBounds {
   std::uint64_t studies = limits::kOpenStudies;
   std::uint64_t points = limits::kOpenPoints;
 };
 
-/// The requests that change a study: submit, grow, pause, resume, cancel, retry, rename, delete.
-/// A change takes effect, and the client gets its reply, when it is durable. While one change of a
-/// study is being written, later requests for that study wait. Not thread-safe.
+/// Requests that change a study: submit, grow, pause, resume, cancel, retry, rename, delete. A
+/// change takes effect, and the client gets its reply, when it is durable. Meanwhile later requests
+/// for that study wait. Not thread-safe.
 class StudyChanges {
  public:
-  /// `last_study_id` is the last one of the database.
+  /// `last_study_id` is the highest number in the database.
   StudyChanges(std::uint64_t last_study_id, const StudyBounds& bounds, const Core& core)
       : last_study_id_(last_study_id), bounds_(bounds), core_(core) {}
 
-  /// `read` has a recipe without faults.
+  /// Handles a submission with a valid recipe.
   void submit(const Client& client, const ReadRequest& read, Instant now);
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
-  /// All points that the study had are completed.
+  /// All points that the study had before a pending growth are completed.
   void finish(StudyId id, Instant now);
-  /// Sends the replies to submissions whose lookup of reused results has ended, or takes long, or
-  /// whose study is gone.
+  /// Sends replies to submissions whose lookup of reusable results has ended, takes long, or whose
+  /// study is gone.
   void release_replies(Instant now);
 
-  /// A lookup of results ends early after so many probes, or so long, without one.
-  static constexpr std::uint64_t kMostProbesInVain = 1'000'000;
+  /// A lookup ends early after this number of probes, or this time, without a result.
+  static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
-  /// Looks up results of other studies for all open points, part by part. The scheduler must hold
-  /// the study. The lookup of a cancelled study ends with the part that is being written.
+  /// Looks up results of other studies for all open points, in parts. The scheduler must hold the
+  /// study. If the study is cancelled, the lookup ends with the part that is being written.
   void look_up(StudyId id, Instant now);
-  /// Starts no further part of any lookup. The next server continues.
+  /// Stops all lookups after their current part; the next server continues them.
   void stop_lookups() { lookups_stop_ = true; }
 
  private:
   /// A change of a study that is being written.
   struct Pending {
-    bool grows = false;        ///< further points are being written
-    bool is_complete = false;  ///< the points of before are completed meanwhile
-    std::vector<std::function<void(Instant)>> deferred{};  ///< later requests
+    bool grows = false;        ///< it adds points
+    bool is_complete = false;  ///< all earlier points were completed meanwhile
+    std::vector<std::function<void(Instant)>> deferred{};  ///< later requests for the study
   };
-  /// A reply to a submission, which may wait until results are reused.
+  /// A reply to a submission that waits for the lookup of results.
   struct HeldReply {
     StudyId study;
     Client client;
@@ -115,7 +115,7 @@ class StudyChanges {
   bool lookups_stop_ = false;
 };
 
-/// The error for a name that no study has.
+/// The error message for an unknown study.
 std::string unknown_study(const std::string& name, const StudyStates& states);
 
 }  // namespace oblique::server

@@ -68,8 +68,8 @@ std::optional<StudyId> StudyStates::find_durable(std::string_view name, StudyId 
 }
 
 std::string StudyStates::nearest(std::string_view name) const {
-  constexpr std::size_t kMostCompared = 10'000;
-  if (ids_.size() > kMostCompared) {
+  constexpr std::size_t kMaxCompared = 10'000;
+  if (ids_.size() > kMaxCompared) {
     return {};
   }
   std::vector<std::string_view> names;

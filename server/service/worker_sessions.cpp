@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kLongestWorkerText = 256;
 constexpr std::uint32_t kMostThreads = 4096;
 
-/// A text of a peer, without control characters and shortened, for logs and tables.
+/// Escapes and shortens a text from a peer, for logs and tables.
 std::string plain(const std::string& text) {
   std::string kept = protocol::shortened(text, kLongestWorkerText);
   std::replace_if(
@@ -28,11 +28,11 @@ std::string plain(const std::string& text) {
   return kept;
 }
 
-/// The points that a filter leaves out; nothing if the message has no valid ranges.
+/// The left-out points in a message; nothing if its ranges are invalid.
 std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   IntervalSet points;
   if (message.left_out_size() % 2 != 0 ||
-      message.left_out_size() > 2 * protocol::kMostLeftOutRanges) {
+      message.left_out_size() > 2 * protocol::kMaxLeftOutRanges) {
     return std::nullopt;
   }
   for (int i = 0; i < message.left_out_size(); i += 2) {
@@ -46,7 +46,7 @@ std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   return points;
 }
 
-/// A recipe of one point that every sound worker solves in a moment.
+/// A recipe of one point that is solved quickly.
 protocol::Recipe probe_recipe() {
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
@@ -68,15 +68,15 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
   WorkerInput input;
   const auto known = ids_.find(identity);
   protocol::WorkerMessage message;
-  const bool is_small = protocol::is_of_a_workers_size(frame);  // checked before it is parsed
+  const bool is_small = protocol::is_worker_frame_within_limits(frame);  // checked before parsing
   const bool is_read = is_small && protocol::decode(frame, message);
   const int lease_count =
       message.heartbeat().lease_ids_size() + message.give_back().lease_ids_size();
-  if (!is_small || lease_count > protocol::kMostLeasesAHeartbeat) {
+  if (!is_small || lease_count > protocol::kMaxLeasesAHeartbeat) {
     if (known == ids_.end()) {
       log_.bad_frame("a worker");
     } else {
-      give_up(known->second, "it sends more in one message than workers do", input);
+      disconnect(known->second, "it sent a message that exceeds the limits for workers", input);
     }
     return input;
   }
@@ -119,7 +119,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       break;
     }
     case Kind::kTrace:
-      input.events.emplace_back(CreditGiven{worker, 0});  // it lives
+      input.events.emplace_back(CreditGiven{worker, 0});  // a sign of life
       input.trace_of = worker;
       input.trace = std::move(*message.mutable_trace());
       break;
@@ -138,17 +138,17 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
 void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHello& hello,
                            Instant now, const std::string& key, WorkerInput& input) {
   if (ledger_.is_gone() || !ledger_.has_room()) {
-    return;  // the worker repeats it
+    return;  // the worker will repeat it
   }
   if (const auto known = ids_.find(identity); known != ids_.end()) {
     const WorkerId old = known->second;
-    forget(old);  // it begins anew, and what it held is free again
+    forget(old);  // the session starts again, and its leases end
     input.events.emplace_back(WorkerLeft{old});
   }
   protocol::ServerToWorker reply;
-  if (const std::string objection = objection_to(hello); !objection.empty()) {
-    log_.write(Severity::kWarning, fmt::format("a worker is refused: {}", objection));
-    reply.mutable_refused()->set_reason(objection);
+  if (const std::string error = refusal_reason(hello); !error.empty()) {
+    log_.write(Severity::kWarning, fmt::format("a worker is refused: {}", error));
+    reply.mutable_refused()->set_reason(error);
     ports_.to_worker(identity, protocol::encode(reply));
     return;
   }
@@ -180,25 +180,24 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
       id, worker.row.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
 }
 
-/// Why the worker is refused; empty: it is not.
-std::string WorkerSessions::objection_to(const protocol::WorkerHello& hello) const {
-  std::string objection = protocol::objection_to_worker(hello);
-  if (objection.empty() && hello.solver_version() != settings_.solver_version) {
-    objection = fmt::format(
-        "its solver has version {}, the server's {}: results of a study must come from one "
-        "version; install the server's release of oblique there",
+std::string WorkerSessions::refusal_reason(const protocol::WorkerHello& hello) const {
+  std::string error = protocol::hello_error(hello);
+  if (error.empty() && hello.solver_version() != settings_.solver_version) {
+    error = fmt::format(
+        "its solver has version {}, the server's has {}, and results of a study must come from one "
+        "version: install the server's release of oblique there",
         plain(hello.solver_version()), settings_.solver_version);
   }
-  return objection;
+  return error;
 }
 
 void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerInput& input) {
   if (ledger_.is_gone()) {
-    return;  // not acknowledged: the worker keeps them
+    return;  // the worker keeps results that are not acknowledged
   }
   std::optional<IntervalSet> left_out = left_out_of(message);
   if (!left_out) {
-    give_up(worker, "it sends ranges of points that are none", input);
+    disconnect(worker, "it sent invalid ranges of points", input);
     return;
   }
   ResultsReceived event{worker,
@@ -220,8 +219,8 @@ void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerI
   input.results = std::move(message);
 }
 
-/// Disconnects the worker. A sound one joins again and delivers the results that it has kept.
-void WorkerSessions::give_up(WorkerId worker, const std::string& why, WorkerInput& input) {
+/// Disconnects the worker. A correct worker reconnects and delivers its results.
+void WorkerSessions::disconnect(WorkerId worker, const std::string& why, WorkerInput& input) {
   log_.bad_frame("a worker");
   protocol::ServerToWorker again;
   again.mutable_hello_again();
@@ -255,12 +254,12 @@ void WorkerSessions::tick(const Silence& silent_ms, Instant now) {
     }
     const bool is_silent = silent_ms(id) > late_ms;
     if (is_silent || now.steady_ms - worker.last_sent_ms > late_ms) {
-      // Sending shows at once that the connection of a killed process is gone. And a worker whose
-      // messages wait here must get a sign of life.
+      // Sending detects at once that the connection of a killed process is gone. It is also a sign
+      // of life for workers whose messages wait here.
       send(id, sign);
     }
     if (is_silent && (!ledger_.has_room() || ports_.has_unread_input(worker.identity))) {
-      events_.emplace_back(CreditGiven{id, 0});  // it is not silent: its messages are not read
+      events_.emplace_back(CreditGiven{id, 0});  // not silent, because its messages are not read
     }
     if (worker.is_busy && !ports_.is_busy(worker.identity)) {
       worker.is_busy = false;
@@ -357,7 +356,7 @@ void WorkerSessions::send_stopping(WorkerId worker) {
   send(worker, message);
 }
 
-/// `lease`: of the batch in the frame; 0: none. A worker that is gone or busy becomes an event.
+/// `lease`: that of a batch in the frame; 0: none. A worker that is gone or busy causes an event.
 void WorkerSessions::send_frame(WorkerId worker, const std::string& frame, LeaseId lease) {
   const auto known = workers_.find(worker);
   if (known == workers_.end()) {

@@ -19,36 +19,36 @@ namespace oblique::server {
 
 struct WorkerSessionSettings {
   std::uint32_t heartbeat_interval_ms = 900;
-  std::string solver_version;  ///< workers with another one are refused
+  std::string solver_version;  ///< workers with another version are refused
   std::string database_id;
-  std::uint64_t last_worker_id = 0;  ///< in the database
+  std::uint64_t last_worker_id = 0;  ///< highest number in the database
 };
 
-/// A connected worker, as it describes itself.
+/// A connected worker, from its WorkerHello.
 struct WorkerRecord {
   std::string identity;
-  AddWorker row;                  ///< stored with its first result
-  std::string key;                ///< its name; empty: without keys
-  std::string host;               ///< its machine
-  std::int64_t last_sent_ms = 0;  ///< when it was sent something, to a tick
-  bool was_sent = false;          ///< something since the last tick
-  bool is_busy = false;           ///< it does not read what it is sent, as the scheduler knows
-  bool has_row = false;           ///< in the database
+  AddWorker row;                  ///< its row, stored with its first result
+  std::string key;                ///< name of its key; empty without keys
+  std::string host;               ///< name of its machine
+  std::int64_t last_sent_ms = 0;  ///< time of the last message to it, up to one tick late
+  bool was_sent = false;          ///< a message was sent since the last tick
+  bool is_busy = false;           ///< the last WorkerBusy event
+  bool has_row = false;           ///< whether the database has a row for it
 };
 
-/// What a frame of a worker comes to.
+/// Content of a worker's frame.
 struct WorkerInput {
-  std::vector<Event> events;  ///< for the scheduler, in order
-  protocol::Results results;  ///< of a ResultsReceived among them
+  std::vector<Event> events;  ///< events for the scheduler, in order
+  protocol::Results results;  ///< the message behind a ResultsReceived
   WorkerId trace_of = 0;      ///< worker that sent `trace`; 0: none
   protocol::Trace trace;
 };
 
-/// The connections with workers: turns their messages into events, and effects into messages.
-/// Refuses what no sound worker sends. Frames may be malicious. Not thread-safe.
+/// Sessions of connected workers: turns their messages into events, and effects into messages.
+/// Refuses messages that correct workers never send. Frames may be malicious. Not thread-safe.
 class WorkerSessions {
  public:
-  /// `lost_after_ms` is the scheduler's.
+  /// `lost_after_ms` must equal the scheduler's.
   WorkerSessions(WorkerSessionSettings settings, std::int64_t lost_after_ms, Ports& ports,
                  PeerLog& log, const WriteLedger& ledger)
       : settings_(std::move(settings)),
@@ -57,34 +57,35 @@ class WorkerSessions {
         log_(log),
         ledger_(ledger) {}
 
-  /// `key`: name of the worker's; empty without keys.
+  /// `key`: name of the worker's key; empty without keys.
   WorkerInput frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::string& key = {});
 
-  // Messages to workers; those that are gone are ignored.
+  // Messages to workers; workers that are gone are ignored.
   void send(const SendBatch& batch);
   void send(const SendProbe& probe);
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
-  /// `lease`: of the batch in the message; 0: none.
+  /// `lease`: that of a batch in the message; 0: none.
   void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0) {
     send_frame(worker, protocol::encode(message), lease);
   }
-  /// Sends the recipe as it is stored, because encoding a long one for each worker takes long.
+  /// Sends the stored bytes of the recipe, because encoding a long recipe for each worker takes
+  /// long.
   void define(const DefineStudy& define, const std::string& recipe_bytes);
   void notify_all(const std::string& text);
-  /// Tells all workers, and those that join later, that the server stops.
+  /// Notifies all workers, and those that join later, that the server stops.
   void stop();
 
   void drop(const DropWorker& drop);
 
   /// Time since the last message of a worker, in ms.
   using Silence = std::function<std::int64_t(WorkerId)>;
-  /// Sends a sign of life to workers whose heartbeat is late, and to those that were sent nothing
+  /// Sends a HeartbeatReply to workers whose heartbeat is late, and to those that got no message
   /// for as long. To be called several times a second.
   void tick(const Silence& silent_ms, Instant now);
-  /// Events that were found while messages were sent: workers that are unreachable or busy.
+  /// Events that occurred while messages were sent: unreachable or busy workers.
   std::vector<Event> take_events();
 
   /// Null for an unknown worker.
@@ -94,9 +95,9 @@ class WorkerSessions {
  private:
   void hello(const std::string& identity, const protocol::WorkerHello& hello, Instant now,
              const std::string& key, WorkerInput& input);
-  std::string objection_to(const protocol::WorkerHello& hello) const;
+  std::string refusal_reason(const protocol::WorkerHello& hello) const;
   void results(WorkerId worker, protocol::Results results, WorkerInput& input);
-  void give_up(WorkerId worker, const std::string& why, WorkerInput& input);
+  void disconnect(WorkerId worker, const std::string& why, WorkerInput& input);
   void send_stopping(WorkerId worker);
   void forget(WorkerId worker);
   void send_frame(WorkerId worker, const std::string& frame, LeaseId lease = 0);

@@ -14,18 +14,19 @@
 namespace oblique::server {
 
 struct LedgerLimits {
-  /// Bytes of results that wait for the disk. Above it no message of a worker is read; above a
-  /// quarter no batch is sent, until half of that is stored.
+  /// Size of unstored results [bytes]. Above it no message of a worker is read. Above a quarter of
+  /// it no batch is sent until half of that quarter is stored.
   std::size_t bytes = limits::kUnstoredBytes;
-  /// The same for their number, so that small messages are bounded, too.
+  /// The same for their number, which limits small messages too.
   std::size_t writes = limits::kUnstoredWrites;
-  /// Changes of clients, and bytes of their recipes. Above it no change is accepted.
+  /// Number of unstored changes of clients, and size of their recipes. Above it no change is
+  /// accepted.
   std::size_t changes = limits::kUnstoredChanges;
   std::size_t bytes_of_changes = limits::kUnstoredBytesOfChanges;
 };
 
-/// The writes whose outcome is not known yet: what follows from each, their size, and whether the
-/// database accepts any. Not thread-safe.
+/// Pending writes: their size, the callbacks for their outcome, and whether the database accepts
+/// any. Not thread-safe.
 class WriteLedger {
  public:
   using OnStored = std::function<void(Instant)>;
@@ -34,33 +35,33 @@ class WriteLedger {
   WriteLedger(const LedgerLimits& limits, Ports& ports) : limits_(limits), ports_(ports) {}
 
   /// Writes a change and calls `on_stored` when it is durable. With `on_refused` a failure is
-  /// reported at once, because a client waits; without it the change is tried until it is durable.
+  /// reported at once, because a client waits; without it the write is repeated until it succeeds.
   void write(Change change, OnStored on_stored = {}, OnRefused on_refused = {});
-  /// The outcome of a write, which was stored without an `error`. Unknown tickets are ignored.
+  /// Handles the outcome of a write; it was stored if there is no `error`. Ignores unknown tickets.
   void end(std::uint64_t ticket, const std::optional<std::string>& error, Instant now);
-  /// The database is gone: refuses all writes, in order.
+  /// Refuses all pending writes, in order, because the database is gone.
   void abandon(const std::string& error, Instant now);
 
-  /// The database accepts no changes, as `error` says; empty: it does again.
+  /// Sets why the database accepts no changes; empty: it accepts them again.
   void set_fault(const std::string& error) { fault_ = error; }
 
   /// To be called several times a second.
   void tick(std::int64_t now_ms);
-  /// Nothing was stored for `kSlowAfter_s`, and the database has not reported why.
+  /// Whether nothing was stored for `kSlowAfter_s` without a fault of the database.
   bool is_slow() const { return is_slow_ && fault_.empty(); }
   static constexpr std::int64_t kSlowAfter_s = 5;
 
-  /// Why the database accepts no changes; empty: it does.
+  /// Why the database accepts no changes, or an empty text.
   const std::string& fault() const { return fault_; }
-  /// The file is gone; nothing more can be stored.
+  /// Whether the file is gone, so that nothing more can be stored.
   bool is_gone() const { return is_gone_; }
   bool is_empty() const { return writes_.empty(); }
-  /// Of results.
+  /// Size of pending results [bytes].
   std::size_t bytes() const { return results_.bytes; }
 
-  /// No batch should be sent: the database accepts nothing, or is far behind.
+  /// Whether no batch should be sent, because the database accepts nothing or is far behind.
   bool holds_batches() const { return !fault_.empty() || is_behind_; }
-  /// Whether further messages of workers should be taken.
+  /// Whether further messages of workers should be read.
   bool has_room() const {
     return results_.bytes < limits_.bytes && results_.writes < limits_.writes;
   }
@@ -79,7 +80,7 @@ class WriteLedger {
     std::size_t writes = 0;
     std::size_t bytes = 0;
   };
-  /// Of the kind of that write.
+  /// The total to which the write counts.
   Load& load_of(const Write& write) { return write.on_refused ? changes_ : results_; }
   void weigh();
 
@@ -87,12 +88,12 @@ class WriteLedger {
   Ports& ports_;
   std::map<std::uint64_t, Write> writes_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  Load results_;  // and all else that no client waits for
-  Load changes_;  // of clients
+  Load results_;  // results, and all other writes without a waiting client
+  Load changes_;  // changes requested by clients
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;
-  std::uint64_t oldest_ = 0;  // ticket at the last tick; 0: none
+  std::uint64_t oldest_ = 0;  // oldest ticket at the last tick; 0: none
   std::int64_t oldest_since_ms_ = 0;
   bool is_slow_ = false;
 };

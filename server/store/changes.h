@@ -35,8 +35,8 @@ constexpr const char* state_name(StudyState state) {
   return "";
 }
 
-// Changes of the database. Instants are UTC in ISO 8601. `kNeedsFullSync`: the change must survive
-// a loss of power. Results need not, because they can be solved again.
+// Changes to the database. Times are UTC in ISO 8601. A change with `kNeedsFullSync` must survive a
+// power failure; results need not, because they can be solved again.
 
 struct AddStudy {
   static constexpr bool kNeedsFullSync = true;
@@ -45,8 +45,8 @@ struct AddStudy {
   StudyTable table;
   std::string created_at;
   std::int32_t priority = 0;
-  std::string submitted_by = {};  ///< name of the key; empty: without keys
-  bool reuses = false;            ///< look up results of other studies
+  std::string submitted_by = {};  ///< name of the submitter's key; empty without keys
+  bool reuses = false;            ///< results of other studies are looked up
 };
 
 struct SetPriority {
@@ -55,7 +55,7 @@ struct SetPriority {
   std::int32_t priority = 0;
 };
 
-/// Deletes the rows of the failed ones among these points. A study that was done runs again.
+/// Deletes the rows of those of these points that failed. A done study runs again.
 struct ForgetFailures {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
@@ -72,7 +72,7 @@ struct SetStudyState {
 
 struct AddWorker {
   static constexpr bool kNeedsFullSync = false;
-  static constexpr std::uint64_t study_id = 0;  ///< of no study
+  static constexpr std::uint64_t study_id = 0;  ///< belongs to no study
   std::uint64_t worker_id;
   std::string name;
   std::uint32_t threads;
@@ -81,42 +81,43 @@ struct AddWorker {
   std::string joined_at;
 };
 
-/// Adds results of one study. A point that has a row already keeps it.
+/// Adds results of one study. A point that already has a row keeps it.
 struct AddResults {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
-  std::uint64_t worker_id;  ///< 0: the server itself failed the points
+  std::uint64_t worker_id;  ///< 0: the server failed the points
   std::string solver_version;
   std::string instruction_set;
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  IntervalSet left_out{};         ///< points that the filter leaves out: completed without a row
-  std::size_t message_bytes = 0;  ///< of the worker's message
+  IntervalSet left_out{};         ///< left-out points, which are completed without a row
+  std::size_t message_bytes = 0;  ///< size of the worker's message
 };
 
 /// Appends points to a study, which then runs with this priority.
 struct GrowStudy {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
-  StudyTable table;  ///< all points, the earlier ones included
+  StudyTable table;  ///< all points, including the earlier ones
   std::int32_t priority = 0;
   std::string changed_at;
   bool reuses = false;  ///< as in AddStudy
 };
 
-/// The outcome of a ReuseResults, valid once the change is durable.
+/// Outcome of a ReuseResults, valid when the change is durable.
 struct ReusedResults {
   IntervalSet points;                              ///< points that got a row
-  std::map<std::string, std::uint64_t> origins{};  ///< number of copies by name of the source study
+  std::map<std::string, std::uint64_t> origins{};  ///< number of copies by source study
   std::uint64_t probes = 0;                        ///< number of lookups
-  std::optional<std::uint64_t> next_point = {};    ///< first point of the next part; none: end
+  /// first point of the next part; none: the lookup is complete
+  std::optional<std::uint64_t> next_point = {};
 };
 
-/// Looks up one part of the study's open points, from `first_point` on, among the solved points of
-/// other studies, and copies the rows that it finds. A row is copied only if it is of
-/// `solver_version` and both studies request estimated errors or neither does.
+/// Looks up one part of the study's open points, from `first_point` on, among solved points of
+/// other studies, and copies the rows that it finds. Copies only rows of `solver_version`, and only
+/// if both studies request estimated errors or neither does.
 struct ReuseResults {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
@@ -138,8 +139,8 @@ struct RenameStudy {
   std::string name;
 };
 
-/// Deletes a study: its name becomes free, and later results of it are dropped. Its rows are
-/// deleted in parts by `Storage::clear_away`.
+/// Deletes a study: frees its name and drops later results. `Storage::clear_away` deletes its rows
+/// in parts.
 struct DeleteStudy {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
@@ -153,7 +154,7 @@ inline std::uint64_t study_of(const Change& change) {
   return std::visit([](const auto& kind) { return kind.study_id; }, change);
 }
 
-/// Size of the message or recipe in a change that has one.
+/// Size of the message or recipe in a change; 0 if it has none.
 inline std::size_t bytes_of(const Change& change) {
   return std::visit(
       [](const auto& kind) -> std::size_t {
@@ -172,34 +173,34 @@ inline bool needs_full_sync(const Change& change) {
   return std::visit([](const auto& kind) { return kind.kNeedsFullSync; }, change);
 }
 
-/// The outcome of one step of deleting the rows of deleted studies.
+/// Outcome of one step of deleting the rows of deleted studies.
 enum class ClearedAway {
-  kAll,       ///< no such row is left
-  kPart,      ///< more rows may be left
-  kMustWait,  ///< nothing was deleted, because readers keep the write-ahead log long; try later
+  kAll,   ///< no such rows are left
+  kPart,  ///< more rows may be left
+  /// nothing was deleted, because readers keep the write-ahead log long; try again later
+  kMustWait,
 };
 
-/// The database as the writer uses it. Tests replace it by one that fails.
+/// Interface of the writer to the database. Tests replace it.
 class Storage {
  public:
   virtual ~Storage() = default;
 
-  /// Writes all changes, in order, in one transaction, and makes it durable. Throws StorageError if
-  /// none was stored, and StorageGone if that is unknown: nothing can be stored any more.
+  /// Writes all changes, in order, in one durable transaction. Throws StorageError if none was
+  /// stored, and StorageGone if that is unknown, so that nothing can be stored any more.
   virtual void commit(std::span<const Change> changes) = 0;
 
-  /// Throws StorageGone when the file at the path of the database was deleted or replaced.
+  /// Throws StorageGone if the file at the database's path was deleted or replaced.
   virtual void check() {}
 
   /// Deletes at most `most` rows of deleted studies in one transaction. Throws as `commit` does.
   virtual ClearedAway clear_away(std::size_t /*most*/) { return ClearedAway::kAll; }
 
-  /// Moves the write-ahead log into the database and empties it, so that this one file holds
-  /// everything. False when a reader prevents it. Throws StorageError.
+  /// Moves the write-ahead log into the database and empties it, so that one file contains
+  /// everything. False if a reader prevents it. Throws StorageError.
   virtual bool merge_log() { return true; }
 
-  /// Ends the current statement, and every later one that takes long, with a StorageError. May be
-  /// called from any thread.
+  /// Makes the current statement, and every later long one, fail with a StorageError. Thread-safe.
   virtual void interrupt() {}
 };
 

@@ -25,7 +25,7 @@ IntervalSet completed_points(sqlite3* database, std::uint64_t study_id) {
 }
 
 void count_completed_points(sqlite3* database) {
-  // Consecutive points have the same difference of point and row number.
+  // Consecutive points have the same difference between point and row number.
   execute(database, R"sql(
     DELETE FROM completed_ranges WHERE study_id IN (SELECT study_id FROM studies WHERE NOT counted);
     INSERT INTO completed_ranges (study_id, first_point, points)
@@ -46,7 +46,7 @@ void update_counts_and_state(sqlite3* database, std::uint64_t study_id) {
        {"UPDATE main.studies SET left_out = " + completed +
             " - (SELECT count(*) FROM main.results WHERE study_id = ?1) WHERE study_id = ?1",
         std::string("DELETE FROM main.reused_points WHERE study_id = ?1"),
-        // `reused_from` is STUDY/POINT, and the name of a study may contain slashes.
+        // The name of a study in `reused_from` (STUDY/POINT) may contain slashes.
         std::string("INSERT INTO main.reused_points (study_id, source, points) SELECT ?1,"
                     " substr(reused_from, 1, length(rtrim(reused_from, '0123456789')) - 1) AS src,"
                     " count(*) FROM main.results WHERE study_id = ?1 AND reused_from IS NOT NULL"
@@ -71,7 +71,6 @@ CompletedRanges::CompletedRanges(sqlite3* database)
                 " RETURNING first_point + points"),
       put_(database, "INSERT OR REPLACE INTO completed_ranges VALUES (?, ?, ?)") {}
 
-/// The last range that begins at or before the point.
 std::optional<Interval> CompletedRanges::range_before(std::uint64_t study_id, std::uint64_t point) {
   std::optional<Interval> range;
   before_.bind_all(study_id, point);

@@ -9,44 +9,45 @@
 
 namespace oblique::server {
 
-/// The completed points of a study, read from `completed_ranges`. Throws StorageError.
+/// Reads the completed points of a study. Throws StorageError.
 IntervalSet completed_points(sqlite3* database, std::uint64_t study_id);
 
-/// Computes the completed points of each study with `counted` = 0 again: the points with a row.
-/// Points that the filter leaves out are open then, and a worker examines them again. To be called
-/// in a transaction. Throws StorageError.
+/// Recomputes the completed points of each study with `counted` = 0 as the points with a row.
+/// Left-out points become open and a worker examines them again. To be called in a transaction.
+/// Throws StorageError.
 void count_completed_points(sqlite3* database);
 
 /// Computes `left_out` and `reused_points` of a study from its rows and completed ranges. Sets its
-/// state to done if all points are completed, and from done to running if not. Throws StorageError.
+/// state to done if all points are completed, and from done to running otherwise. Throws
+/// StorageError.
 void update_counts_and_state(sqlite3* database, std::uint64_t study_id);
 
-/// Maintains the table `completed_ranges`: the completed points of each study as ranges, so that a
-/// start need not read all rows. Each transaction that inserts or deletes rows must update it. When
-/// another program deletes rows, a trigger sets `studies.counted` to 0.
+/// Maintains the table `completed_ranges`, which contains the completed points of each study as
+/// ranges, so that a start need not read all rows. Each transaction that inserts or deletes rows
+/// must update it. If another program deletes rows, a trigger sets `studies.counted` to 0.
 ///
-/// Writing a range costs three statements, whatever its length. Adjacent ranges are merged.
+/// Writing a range takes three statements, whatever its length. Adjacent ranges are merged.
 ///
 /// The connection must outlive this. All members throw StorageError.
 class CompletedRanges {
  public:
   explicit CompletedRanges(sqlite3* database);
 
-  /// Marks points as completed. `flush` writes them.
+  /// Adds completed points; `flush` writes them.
   void add(std::uint64_t study_id, const Interval& points) {
     gathered_[study_id].insert(points.begin, points.end);
   }
   void add(std::uint64_t study_id, std::uint64_t point) { add(study_id, {point, point + 1}); }
-  /// Writes what was added.
+  /// Writes the added points.
   void flush();
-  /// Drops what was added, because its transaction was rolled back.
+  /// Drops the added points after a rollback.
   void forget() { gathered_.clear(); }
 
-  /// The written ranges of a study that overlap `points`, uncut.
+  /// The stored ranges of a study that overlap `points`, uncut.
   IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
   /// The points in `points` that are neither completed nor added.
   IntervalSet open_points(std::uint64_t study_id, const IntervalSet& points);
-  /// Opens these points again.
+  /// Removes completed points.
   void remove(std::uint64_t study_id, const IntervalSet& points);
 
  private:

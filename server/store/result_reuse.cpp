@@ -1,4 +1,4 @@
-// Looks up the open points of a study among the solved points of other studies, by the index
+// Looks up open points of a study among the solved points of other studies, by the index
 // `solved_points`, and copies the rows that it finds.
 #include <algorithm>
 #include <string>
@@ -14,11 +14,11 @@
 namespace oblique::server {
 namespace {
 
-/// Most point numbers and most lookups of one change: about 50 ms of the writer if all find a row.
+/// Maximum number of points and of lookups in one change: about 50 ms if all have a result.
 constexpr std::uint64_t kPart = 4096;
 
-/// Selects the first solved row of another study with these inputs, and the name of that study. The
-/// row has a right checksum, so it was not edited by hand.
+/// Selects the first solved row of another study with these inputs and a correct checksum, and the
+/// name of that study.
 std::string find_sql() {
   return fmt::format(
       "SELECT r.study_id, r.point, s.name FROM results AS r INDEXED BY solved_points"
@@ -29,7 +29,7 @@ std::string find_sql() {
       fmt::join(result_columns(), ", r."));
 }
 
-/// Copies a row, except its study ?1, its point ?2 and `reused_from` ?3.
+/// Copies a row, with study ?1, point ?2 and `reused_from` ?3.
 std::string copy_sql() {
   std::vector<std::string> copied;
   for (const std::string_view column : result_columns()) {
@@ -44,7 +44,6 @@ std::string copy_sql() {
       fmt::join(result_columns(), ", "), fmt::join(copied, ", "));
 }
 
-/// The lookups of one change.
 class Lookup {
  public:
   Lookup(sqlite3* database, const ReuseResults& change, ModelRows& models)
@@ -54,7 +53,7 @@ class Lookup {
         find_(database, find_sql()),
         copy_(database, copy_sql()) {}
 
-  /// Looks up the points of [first, last) that are not completed. Returns where it ended.
+  /// Looks up the open points in [first, last). Returns where it ended.
   std::uint64_t run(std::uint64_t first, std::uint64_t last, const IntervalSet& completed) {
     const protocol::PointTable& table = *change_.table;
     std::uint64_t& probes = change_.outcome->probes;
@@ -63,14 +62,15 @@ class Lookup {
       const protocol::Segment segment = table.segment_at(point);
       const std::uint64_t segment_end = segment.first_point + segment.count;
       const std::int64_t model_id = stored_model(segment.model);
-      if (model_id == 0) {  // no row has that model
+      if (model_id == 0) {  // the model has no rows
         ++probes;
         point = segment_end;
         continue;
       }
       for (const std::uint64_t end = std::min(segment_end, last); point < end && probes < kPart;
            ++point) {
-        if (!completed.contains(point) && table.is_left_in(point) && table.fault(point).empty()) {
+        if (!completed.contains(point) && table.passes_filter(point) &&
+            table.fault(point).empty()) {
           copy_to(point, model_id);
         }
       }
@@ -112,14 +112,15 @@ class Lookup {
   ModelRows& models_;
   Statement find_;
   Statement copy_;
-  std::unordered_map<std::uint64_t, std::int64_t> model_ids_;  // by model number; 0: no row
+  // row of `models` by model number; 0: none
+  std::unordered_map<std::uint64_t, std::int64_t> model_ids_;
 };
 
 }  // namespace
 
 void Store::add(const ReuseResults& change) {
   ReusedResults& outcome = *change.outcome;
-  outcome = {};  // an earlier attempt at this change may have failed
+  outcome = {};  // an earlier attempt may have failed
   if (!has_study(change.study_id)) {
     return;
   }

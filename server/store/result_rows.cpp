@@ -58,17 +58,16 @@ const Columns& columns() {
   return kColumns;
 }
 
-/// Appends a number with 8 significant digits.
 void append(std::string& text, double value) {
   constexpr int kDigits = 8;
-  std::array<char, 32> digits;  // the longest: -1.2345678e-308
+  std::array<char, 32> digits;  // the longest number is -1.2345678e-308
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
                                  std::chars_format::general, kDigits)
                        .ptr;
   text.append(digits.data(), end);
 }
 
-/// Writes a JSON array with an array of numbers for each element of the list.
+/// Appends a JSON array that contains an array of numbers for each element of the list.
 template <class List, class Numbers>
 void write_json(std::string& text, const List& list, const Numbers& numbers_of) {
   text = "[";
@@ -83,8 +82,8 @@ void write_json(std::string& text, const List& list, const Numbers& numbers_of) 
   text += ']';
 }
 
-/// A statement with a parameter for each column, which adds the checksum. It does nothing if the
-/// table has a row of this key.
+/// An INSERT statement with a parameter for each column, which also computes the checksum. It does
+/// nothing if a row with this key exists.
 std::string insert_sql(std::string_view table, std::span<const std::string_view> columns,
                        std::string_view key) {
   std::string marks;
@@ -131,7 +130,7 @@ std::string model_checksum_sql() {
 }
 
 ResultInsert::ResultInsert(sqlite3* database)
-    // A point that has a row keeps it; any other conflict is an error.
+    // A point that has a row keeps it; other conflicts are errors.
     : insert_(database, insert_sql("results", result_columns(), "study_id, point")) {}
 
 void ResultInsert::run(const AddResults& change, const protocol::PointResult& result,
@@ -155,7 +154,7 @@ void ResultInsert::run(const AddResults& change, const protocol::PointResult& re
   }
   put(change.attempt);
   put(change.solved_at);
-  insert_.run();  // parameters without a value are NULL
+  insert_.run();  // unbound parameters are NULL
 }
 
 void ResultInsert::put_outputs(const solver::CaseResult& result) {

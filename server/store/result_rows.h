@@ -16,29 +16,29 @@
 // Rows of the tables `results` and `models`.
 namespace oblique::server {
 
-/// The columns of `results`, except `status`, which SQLite computes, and the checksum.
+/// The columns of `results`, except `status`, which SQLite computes, and `checksum`.
 std::span<const std::string_view> result_columns();
-/// The columns that come from the solver. They are NULL in a failed row.
+/// The columns with outputs of the solver, which are NULL in a failed row.
 std::span<const std::string_view> output_columns();
-/// The outputs that every solved row has.
+/// The outputs that every solved row must have.
 std::span<const std::string_view> required_outputs();
-/// The columns of `models`, except the number and the checksum.
+/// The columns of `models`, except number and checksum.
 std::span<const std::string_view> model_columns();
 
-/// SQL expressions for the checksum of a row, over the columns of the table.
+/// SQL expressions for the checksum of a row, over the columns of its table.
 std::string result_checksum_sql();
 std::string model_checksum_sql();
 inline constexpr const char* kStudyChecksum =
     "row_checksum(study_id, recipe, points, errors, created_at)";
 
-/// Inserts rows into `results`, with their checksums.
+/// Inserts rows with checksums into `results`.
 class ResultInsert {
  public:
   /// The connection must outlive this.
   explicit ResultInsert(sqlite3* database);
 
-  /// Inserts the row of a result of `change` unless its point has one. `inputs` are those with
-  /// which it was solved. Throws StorageError, also for a row that breaks a rule of the table.
+  /// Inserts a result of `change`, solved with `inputs`, unless its point has a row. Throws
+  /// StorageError, also for a row that violates a constraint of the table.
   void run(const AddResults& change, const protocol::PointResult& result,
            const protocol::Point& inputs, std::int64_t model_id);
 
@@ -51,20 +51,20 @@ class ResultInsert {
   void put_lists(const solver::CaseResult& result);
 
   Statement insert_;
-  solver::CaseResult outputs_;        // kept to reuse its memory
-  int next_ = 0;                      // number of the next parameter
-  std::array<std::string, 5> lists_;  // texts of the lists; kept to reuse their memory
+  solver::CaseResult outputs_;        // a member to reuse its memory
+  int next_ = 0;                      // index of the next parameter
+  std::array<std::string, 5> lists_;  // texts of the lists; a member to reuse their memory
 };
 
-/// The rows of `models`, found by the model's canonical text (proto/recipe/model_message.h).
+/// Finds and inserts rows of `models` by the model's canonical text (proto/recipe/model_message.h).
 class ModelRows {
  public:
   /// The connection must outlive this.
   explicit ModelRows(sqlite3* database);
 
-  /// The number of the model's row; 0: there is none. Throws StorageError.
+  /// The number of the model's row; 0 if there is none. Throws StorageError.
   std::int64_t find(const solver::ModelParameters& model);
-  /// The same; inserts the row if there is none.
+  /// The same, but inserts a missing row.
   std::int64_t find_or_insert(const solver::ModelParameters& model);
 
  private:

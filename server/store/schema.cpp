@@ -10,7 +10,7 @@
 namespace oblique::server {
 namespace {
 
-/// What SQLite reports of a table: its kind and its columns, except defaults and checks.
+/// SQLite's description of a table: its kind and columns, without defaults and checks.
 std::string description(sqlite3* database, const std::string& table) {
   Statement text(database,
                  "SELECT (SELECT type || wr || strict FROM pragma_table_list"
@@ -21,7 +21,6 @@ std::string description(sqlite3* database, const std::string& table) {
   return text.step() ? text.text(0) : "";
 }
 
-/// The tables of this schema by name, with their descriptions.
 const std::map<std::string, std::string>& our_tables() {
   static const std::map<std::string, std::string> kTables = [] {
     const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);

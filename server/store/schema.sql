@@ -2,10 +2,10 @@
 -- the columns; times count from touch unless a name says otherwise. PRAGMA application_id identifies the
 -- program, PRAGMA user_version is the number of this schema.
 
--- One row. Workers compare database_id with that of the database for which they keep results.
+-- One row. Workers compare database_id with that of the database that their results are for.
 CREATE TABLE about (
   database_id TEXT NOT NULL,              -- random, set when the file is created
-  starts      INTEGER NOT NULL DEFAULT 0, -- how often a server has opened the file
+  starts      INTEGER NOT NULL DEFAULT 0, -- number of times that a server has opened the file
   has_orphans INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
 ) STRICT;
 
@@ -13,16 +13,16 @@ CREATE TABLE studies (
   study_id     INTEGER PRIMARY KEY AUTOINCREMENT CHECK (study_id BETWEEN 1 AND 1000000000000), -- number of the study; never reused
   name         TEXT NOT NULL UNIQUE, -- name of the study
   recipe       BLOB NOT NULL,        -- oblique.protocol.Recipe, serialised: point i is a function of it
-  points       INTEGER NOT NULL CHECK (points > 0), -- number of point numbers, filtered ones included
+  points       INTEGER NOT NULL CHECK (points > 0), -- number of points, including those that `where` leaves out
   errors       INTEGER NOT NULL,     -- 1: the recipe requests estimated errors
   state        TEXT NOT NULL CHECK (state IN ('running', 'paused', 'cancelled', 'done')), -- running, paused, cancelled or done
   created_at   TEXT NOT NULL,        -- UTC, ISO 8601
   changed_at   TEXT NOT NULL,        -- when `state` was last set
   priority     INTEGER NOT NULL DEFAULT 0, -- studies of a higher priority come first
   submitted_by TEXT,                 -- name of the key that first submitted it; NULL: without keys
-  counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, `completed_ranges` must be made again
+  counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, so `completed_ranges` must be computed again
   left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` leaves out
-  reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results in other studies has not ended
+  reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results of other studies has not ended
   checksum     INTEGER               -- CRC-32 of study_id, recipe, points, errors and created_at; NULL after a change by hand
 ) STRICT;
 
@@ -85,19 +85,19 @@ CREATE TABLE results (
   slide_error REAL, impulse_n_error REAL, impulse_t_error REAL, v_out_error REAL,
   dt_s REAL, steps INTEGER, wall_s REAL,
   peaks            TEXT,          -- [[t_s, fn_N, ft_N, major], ...]
-  ft_peaks         TEXT,          -- [[t_s, ft_N], ...]; NULL of a solved point: t_s and ft_N of `peaks`
-  phases           TEXT,          -- [t1_s, ...]: end of each phase; compression first, then in turn
+  ft_peaks         TEXT,          -- [[t_s, ft_N], ...]; NULL in a solved row: equal to t_s and ft_N in `peaks`
+  phases           TEXT,          -- [t1_s, ...]: end of each phase; compression first, then alternating
   stick_intervals  TEXT,          -- [[t0_s, t1_s], ...]
   reaction_peaks   TEXT,          -- [[t_s, force_N], ...]: pin first, then the joints
   worker_id        INTEGER REFERENCES workers (worker_id), -- number of the worker; NULL: the server failed the point
-  attempt          INTEGER NOT NULL, -- number of the lease under which it was solved
+  attempt          INTEGER NOT NULL, -- number of times that the point was leased until it was solved
   solved_at        TEXT NOT NULL, -- UTC, ISO 8601
-  reused_from      TEXT,          -- STUDY/POINT, as named when it was copied, of which this is a copy; NULL: solved for this point
+  reused_from      TEXT,          -- STUDY/POINT that this result was copied from, by its name then; NULL: not a copy
   checksum         INTEGER,       -- CRC-32 of the other columns; NULL after a change by hand
   PRIMARY KEY (study_id, point)
 ) STRICT, WITHOUT ROWID;
 
--- Points that are completed, as ranges: those that have a row, and those that `where` leaves out.
+-- Completed points as ranges: points with a row, and points that `where` leaves out.
 CREATE TABLE completed_ranges (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study
   first_point INTEGER NOT NULL, -- first point of the range
@@ -105,15 +105,15 @@ CREATE TABLE completed_ranges (
   PRIMARY KEY (study_id, first_point)
 ) STRICT, WITHOUT ROWID;
 
--- Number of results that a study has copied from another one.
+-- Number of results that a study has copied from each other study.
 CREATE TABLE reused_points (
   study_id    INTEGER NOT NULL REFERENCES studies (study_id), -- number of the study that has the copies
-  source      TEXT NOT NULL,    -- name of the other study when they were copied
+  source      TEXT NOT NULL,    -- name of the other study at the time of the copy
   points      INTEGER NOT NULL, -- number of copies
   PRIMARY KEY (study_id, source)
 ) STRICT, WITHOUT ROWID;
 
--- Deleted studies that may still have rows. The server deletes these in small parts, and then the entry here.
+-- Deleted studies that may still have rows. The server deletes the rows in small parts, then this entry.
 CREATE TABLE deletions (
   study_id    INTEGER PRIMARY KEY -- number of the study
 ) STRICT;

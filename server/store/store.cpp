@@ -11,7 +11,7 @@
 namespace oblique::server {
 namespace {
 
-constexpr std::size_t kMostCachedModels = 65536;
+constexpr std::size_t kMaxCachedModels = 65536;
 /// Instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
 constexpr int kStepsBetweenInterrupts = 1000;
 
@@ -26,12 +26,12 @@ Store::Store(const std::string& path)
         return static_cast<std::atomic<bool>*>(interrupted)->load() ? 1 : 0;
       },
       &interrupted_);
-  // Those of other programs might never end. Our trigger is for other programs only.
+  // Triggers of other programs might never end, and ours is for other programs only.
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  // Overwriting deleted rows with zeros would write many pages.
+  // Do not overwrite deleted rows with zeros, which would write many pages.
   execute(database, "PRAGMA secure_delete = OFF");
-  // Applies to a new file only. Rows waste less space in pages of this size than in others.
+  // For a new file only: rows waste less space in pages of this size.
   execute(database, "PRAGMA page_size = 8192");
   log_ = std::make_unique<WriteAheadLog>(database);
   const DatabaseKind kind = identify(database, path);
@@ -46,7 +46,7 @@ Store::Store(const std::string& path)
   }
   prepare_schema(path);
   if (kind == DatabaseKind::kEmpty) {
-    log_->merge();  // a new file is a complete database from the start
+    log_->merge();  // makes a new file a complete database
   }
   in_transaction(true, [this] {
     count_completed_points(database_.get());
@@ -60,8 +60,8 @@ Store::Store(const std::string& path)
 void Store::prepare_schema(const std::string& path) {
   if (const auto tables = differing_tables(database_.get()); !tables.empty()) {
     throw StorageError(fmt::format(
-        "{} lacks the table {} or has it with other columns: `oblique backup SAVED.db --db {} "
-        "--salvage` makes a file with all rows that can be read",
+        "in {} the table {} is missing or has other columns: `oblique backup SAVED.db --db {} "
+        "--salvage` makes a file with all readable rows",
         path, fmt::join(tables, " and "), path));
   }
   try {
@@ -83,8 +83,8 @@ Store::~Store() {
       log_->delete_on_close();
     }
   } catch (const StorageGone&) {
-    // Another file is at the path. Our log must not remain beside it, so it is merged into the file
-    // that this process has open.
+    // Another file is at the path. Our log must not remain beside it, so it is merged into the open
+    // file.
     try {
       if (!sync_failed_) {
         log_->merge();
@@ -130,7 +130,7 @@ void Store::commit(std::span<const Change> changes) {
     ranges_->forget();
     throw;
   }
-  file_.check();  // throws if the transaction went into a file that is no longer at the path
+  file_.check();  // throws if the transaction was written to a file that is no longer at the path
   guard_syncs([this] { log_->shorten(); });
 }
 
@@ -172,7 +172,7 @@ ClearedAway Store::clear_away(std::size_t most) {
     return static_cast<std::size_t>(sqlite3_changes(database_.get()));
   };
   std::size_t results = 0;
-  // Without a sync: rows that a loss of power restores are deleted again.
+  // No sync is needed: rows that reappear after a power failure are deleted again.
   in_transaction(false, [&] {
     results = delete_some(
         "DELETE FROM results WHERE study_id = ?1 AND point IN"
@@ -192,7 +192,7 @@ ClearedAway Store::clear_away(std::size_t most) {
 }
 
 /// Deletes models and workers without rows, once all rows of deleted studies are gone. Reads all
-/// rows of the file then. Done at a start only, before any model or worker is in use.
+/// rows of the file. Called only at a start, before any model or worker is in use.
 void Store::remove_orphans() {
   if (number("SELECT has_orphans AND NOT EXISTS (SELECT 1 FROM deletions) FROM about") == 0) {
     return;
@@ -289,7 +289,7 @@ void Store::add(const AddResults& change) {
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point inputs = protocol::inputs_of(result, *change.table);
     statements_->add_result.run(change, result, inputs, stored_model(change, inputs.model));
-    ranges_->add(change.study_id, result.point());  // also if it already had a row
+    ranges_->add(change.study_id, result.point());  // also if the point already had a row
   }
   if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
       !left_out.empty()) {
@@ -299,7 +299,7 @@ void Store::add(const AddResults& change) {
   }
 }
 
-/// False for a deleted study, of which late results may arrive.
+/// False for a deleted study, whose late results may arrive.
 bool Store::has_study(std::uint64_t study_id) {
   Statement& find = statements_->find_study;
   find.bind(1, study_id);
@@ -308,9 +308,9 @@ bool Store::has_study(std::uint64_t study_id) {
   return found;
 }
 
-/// The row of `models` that has model number `model` of the study. Inserts it if there is none.
+/// The number of the row of `models` for model number `model` of the study. Inserts a missing row.
 std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
-  if (models_.size() >= kMostCachedModels) {
+  if (models_.size() >= kMaxCachedModels) {
     models_.clear();
   }
   const auto [known, is_new] = models_.emplace(std::pair{change.study_id, model}, 0);

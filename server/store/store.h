@@ -26,23 +26,23 @@ struct StoredStudy {
   StudyState state;
   std::string created_at;
   std::int32_t priority = 0;
-  std::string solver_version;  ///< of its results; empty: there are none
+  std::string solver_version;  ///< of its results; empty: none
   IntervalSet completed;
   IntervalSet failures;        ///< completed points that failed
-  std::string submitted_by{};  ///< name of the key; empty: without keys
-  bool reuses = false;         ///< the lookup of results in other studies has not ended
+  std::string submitted_by{};  ///< name of the submitter's key; empty without keys
+  bool reuses = false;         ///< the lookup of results of other studies has not ended
   std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out
   std::map<std::string, std::uint64_t> reused{};  ///< number of reused results by source study
 };
 
-/// The SQLite database (schema.sql), opened for writing. Only one Store can have a file open; other
-/// programs can read it. A new file has mode 0600. Results are committed without a sync, so a loss
-/// of power can undo the last ones, which are then solved again; other changes are synced.
+/// The SQLite database (schema.sql), opened for writing. A file can be open in one Store only;
+/// other programs can read it. A new file has mode 0600. Results are committed without a sync, so a
+/// power failure can undo the last ones, which are then solved again. Other changes are synced.
 class Store final : public Storage {
  public:
-  /// Opens the database at `path`, or creates it. Throws StorageError for a directory, for a file
-  /// that has another format or schema, is damaged or cannot be written, and for one that another
-  /// server has open.
+  /// Opens or creates the database at `path`. Throws StorageError for a directory, for a file of
+  /// another format or schema, for a file that is damaged or cannot be written, and for one that
+  /// another server has open.
   explicit Store(const std::string& path);
   ~Store() override;
 
@@ -51,34 +51,32 @@ class Store final : public Storage {
   bool merge_log() override;
   void interrupt() override { interrupted_ = true; }
   ClearedAway clear_away(std::size_t most) override;
-  /// Number of rows that `clear_away` has deleted.
+  /// Number of rows deleted by `clear_away`.
   std::uint64_t cleared_rows() const { return cleared_rows_; }
 
-  /// Runs `work` in a transaction of its own, which is made durable; rolls it back if `work`
-  /// throws. Throws as `commit` does.
+  /// Runs `work` in a durable transaction; rolls back if `work` throws. Throws as `commit` does.
   void write(const std::function<void()>& work);
-  /// The connection, for programs that change the file without a server. Triggers and views of the
-  /// file are disabled in it.
+  /// The connection, for programs that change the file without a server. Triggers and views are
+  /// disabled in it.
   sqlite3* connection() const { return database_.get(); }
 
   /// Whether the file was created.
   bool is_new() const { return file_.is_new(); }
 
-  /// Sets the length of the write-ahead log [pages] from which on it is copied into the database.
+  /// Sets the length of the write-ahead log [pages] above which it is copied into the database.
   void checkpoint_at(int pages) { log_->shorten_at(pages); }
 
   /// All studies in the order of their numbers, with their completed points. Throws StorageError,
-  /// also for a study whose number, recipe or size is not the one that was stored.
+  /// also for a study whose number, recipe or size was changed after it was stored.
   std::vector<StoredStudy> studies();
-  /// A sentence about each study that `studies` skipped because this version does not accept it.
+  /// A sentence about each study that `studies` skipped because this version refuses it.
   const std::vector<std::string>& skipped() const { return skipped_; }
 
-  /// Highest number given to a study or worker so far; 0 when there is none. Throws StorageError.
+  /// Highest number of a study or worker so far; 0: none. Throws StorageError.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
 
-  /// Adds a start of a server to the count, durably. Returns the number of starts, this one
-  /// included.
+  /// Increments the number of server starts, durably, and returns it.
   std::uint64_t count_start();
 
   /// A random text that was set when the file was created.
@@ -99,7 +97,7 @@ class Store final : public Storage {
   void add(const AddWorker& change);
   void add(const AddResults& change);
   void prepare_schema(const std::string& path);
-  /// Runs `work` and records a failed sync.
+  /// Runs `work` and records whether a sync failed.
   void guard_syncs(const std::function<void()>& work);
   void in_transaction(bool full_sync, const std::function<void()>& work);
   void remove_orphans();
@@ -113,7 +111,8 @@ class Store final : public Storage {
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<CompletedRanges> ranges_;
-  // Cache: rows of `models` by study and model number. Cleared when large or a transaction fails.
+  // Cache of row numbers of `models`, by study and model number. Cleared if it is large or a
+  // transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> models_;
   std::uint64_t cleared_rows_ = 0;
   bool full_sync_ = true;

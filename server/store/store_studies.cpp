@@ -1,4 +1,3 @@
-// Reads the studies and their progress from the database at a start.
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -45,26 +44,26 @@ StoredStudy study_in(const Statement& row) {
   return study;
 }
 
-/// Throws StorageError for a study whose points may not be those of its rows.
+/// Throws StorageError if a study was changed so that its rows may belong to other points.
 void check_studies(sqlite3* database) {
   Statement wrong(database, fmt::format("SELECT study_id, name FROM studies WHERE checksum <> {}",
                                         kStudyChecksum));
   if (wrong.step()) {
     throw StorageError(fmt::format(
-        "study {0} (\"{1}\") was changed by another program or is damaged: its number, recipe or "
-        "size is not the one that was stored, so its results may belong to other points. `oblique "
-        "check --db FILE` names all faults. With no server running, restore the old values with "
+        "study {0} (\"{1}\") is damaged or was changed by another program: its number, recipe or "
+        "size differs from the stored one, so its results may belong to other points. `oblique "
+        "check --db FILE` lists all faults. While no server runs, restore the old values with "
         "sqlite3, delete the study (`oblique delete`), or keep the change (UPDATE studies SET "
         "checksum = NULL WHERE study_id = {0})",
         wrong.integer(0), protocol::visible(wrong.text(1))));
   }
 }
 
-/// Why this version does not accept the study, or an empty text. Throws StorageError for a recipe
-/// that cannot be read.
-std::string objection_to(const StoredStudy& study) {
-  if (!protocol::is_utf8(study.name)) {  // messages contain UTF-8 only
-    return "its name is not UTF-8; rename it with sqlite3 while no server runs";
+/// Why this version refuses the study, or an empty text. Throws StorageError for a recipe that
+/// cannot be read.
+std::string study_error(const StoredStudy& study) {
+  if (!protocol::is_utf8(study.name)) {  // messages must be UTF-8
+    return "its name is not UTF-8: rename it with sqlite3 while no server runs";
   }
   try {
     (void)study.table.get();
@@ -72,13 +71,12 @@ std::string objection_to(const StoredStudy& study) {
     return reason.what();
   } catch (const std::runtime_error& reason) {
     throw StorageError(fmt::format(
-        "the recipe of study {} cannot be read: {}. `oblique check --db FILE` names all faults",
+        "the recipe of study {} cannot be read: {}. `oblique check --db FILE` lists all faults",
         study.name, reason.what()));
   }
   return {};
 }
 
-/// Reads the failed points of all studies.
 void read_failures(sqlite3* database, std::vector<StoredStudy>& studies) {
   std::map<std::uint64_t, StoredStudy*> by_number;
   for (StoredStudy& study : studies) {
@@ -112,10 +110,10 @@ std::vector<StoredStudy> Store::studies() {
     }
     reused.reset();
     const bool is_open = study.completed.size() < study.table.size();
-    const std::string objection = objection_to(study);
-    if (!objection.empty() && (is_open || !protocol::is_utf8(study.name))) {
+    const std::string error = study_error(study);
+    if (!error.empty() && (is_open || !protocol::is_utf8(study.name))) {
       skipped_.push_back(fmt::format("study {} (\"{}\") is skipped: {}", study.study_id,
-                                     protocol::visible(study.name), objection));
+                                     protocol::visible(study.name), error));
       continue;
     }
     if (!is_open || study.state != StudyState::kRunning) {
@@ -148,7 +146,7 @@ std::uint64_t Store::count_start() {
 std::string Store::database_id() {
   Statement statement(database_.get(), "SELECT database_id FROM about");
   if (!statement.step()) {
-    throw StorageError("the database has lost its identity: the table about is empty");
+    throw StorageError("the database has no ID: the table about is empty");
   }
   return statement.text(0);
 }

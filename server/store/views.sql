@@ -1,10 +1,10 @@
--- Indices, the trigger and the views, created again at each start of a server. Views that users add stay.
+-- Indices, the trigger and the views, recreated when a server starts. Views of users are kept.
 
 CREATE INDEX IF NOT EXISTS failed_points ON results (study_id, point) WHERE error IS NOT NULL;
--- For the lookup of equal points whose results another study reuses.
+-- For the lookup of results that another study can reuse.
 CREATE INDEX IF NOT EXISTS solved_points ON results (model_id, H, mu, e) WHERE error IS NULL;
 
--- Makes the next start of a server count the study's rows again after rows were deleted by hand.
+-- After rows were deleted by hand, makes the next server count the study's rows again.
 DROP TRIGGER IF EXISTS row_deleted;
 CREATE TRIGGER row_deleted AFTER DELETE ON results
 WHEN (SELECT counted FROM studies WHERE study_id = OLD.study_id)
@@ -12,7 +12,7 @@ BEGIN
   UPDATE studies SET counted = 0 WHERE study_id = OLD.study_id;
 END;
 
--- JSON writes a whole number without a point; the casts keep it from becoming an integer in SQL.
+-- JSON writes whole numbers without a point; the casts keep them real numbers in SQL.
 DROP VIEW IF EXISTS peaks;
 CREATE VIEW peaks AS
 SELECT r.study_id, r.point, p.key AS seq, CAST(p.value ->> 0 AS REAL) AS t_s, CAST(p.value ->> 1 AS REAL) AS fn_N,
@@ -37,8 +37,8 @@ CREATE VIEW reaction_peaks AS
 SELECT r.study_id, r.point, f.key AS seq, CAST(f.value ->> 0 AS REAL) AS t_s, CAST(f.value ->> 1 AS REAL) AS force_N
 FROM results AS r, json_each(r.reaction_peaks) AS f;
 
--- Study name, results, all lists, worker and model side by side. Young's modulus is E_Pa here, because column
--- names do not distinguish E from e.
+-- Study name, results, all lists, worker and model in one row. Young's modulus is called E_Pa,
+-- because column names do not distinguish E from e.
 DROP VIEW IF EXISTS runs;
 CREATE VIEW runs AS
 SELECT s.name AS study, r.study_id, r.point, r.H, r.mu, r.e, r.status, r.error, r.fall_time_s, r.impact_x_m,

@@ -9,14 +9,13 @@
 namespace oblique::server {
 namespace {
 
-/// The file of the write-ahead log; nullptr while there is none.
 sqlite3_file* file_of(sqlite3* database) {
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
-  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // without: not open
+  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // otherwise it is not open
 }
 
-/// Writes every byte of the file again, unchanged, and syncs it. Returns SQLite's result code.
+/// Rewrites every byte of the file unchanged and syncs it. Returns SQLite's result code.
 int write_again(sqlite3_file* file) {
   std::vector<char> bytes(std::size_t{1} << 16U);
   sqlite3_int64 size = 0;
@@ -36,7 +35,6 @@ int write_again(sqlite3_file* file) {
 WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
   sqlite3_busy_timeout(database_, kBusyTimeout_ms);
   sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  // A hook replaces SQLite's automatic checkpoints.
   sqlite3_wal_hook(
       database_,
       [](void* log, sqlite3*, const char*, int pages) {
@@ -47,11 +45,11 @@ WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
 }
 
 void WriteAheadLog::rewrite() {
-  const Transaction transaction(database_);  // keeps other programs from writing
+  const Transaction transaction(database_);  // locks out other writers
   sqlite3_file* file = file_of(database_);
   const int code = file != nullptr ? write_again(file) : SQLITE_OK;
   if (code != SQLITE_OK) {
-    throw StorageError("the write-ahead log cannot be written again at the start: " +
+    throw StorageError("the write-ahead log cannot be rewritten at the start: " +
                        std::string(sqlite3_errstr(code)));
   }
 }
@@ -69,12 +67,12 @@ void WriteAheadLog::shorten() {
   int in_log = 0;
   int copied = 0;
   if (checkpoint(SQLITE_CHECKPOINT_PASSIVE, &in_log, &copied) == SQLITE_OK && in_log == copied) {
-    pages_ = 0;  // the next commit begins the log anew
+    pages_ = 0;  // the next commit starts the log again
   }
 }
 
 bool WriteAheadLog::merge() {
-  // Without a timeout, because results would wait for a slow reader.
+  // No timeout, because results would wait for a slow reader.
   sqlite3_busy_timeout(database_, 0);
   const int code = checkpoint(SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   sqlite3_busy_timeout(database_, kBusyTimeout_ms);

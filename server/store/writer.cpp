@@ -13,24 +13,24 @@
 namespace oblique::server {
 namespace {
 
-/// Most jobs in one transaction, so that acknowledgements do not wait long.
+/// Maximum number of jobs in one transaction; limits the wait for acknowledgements.
 constexpr std::size_t kLargestGroup = 256;
 
-/// Pause before another attempt to write after a fault.
 constexpr std::chrono::milliseconds kRetryPause{500};
 
-/// Interval of the calls of `tend` while no job waits.
+/// Interval between calls of `maintain` while no job waits.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
-/// Number of rows of deleted studies that are deleted at a time (about 10 ms). Waiting jobs are
-/// written in between. After a step that failed or must wait there is a pause.
+/// Number of rows of deleted studies per step (about 10 ms). Waiting jobs are written between
+/// steps; a pause follows a step that failed or must wait.
 constexpr std::size_t kRowsAtOnce = 1000;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
-/// Attempts to merge a log that readers hold before a report.
+/// Number of attempts to merge a log that readers hold before this is reported.
 constexpr int kQuietTries = 5;
 
-/// Attempts to merge the log at the end, and the pause between them: three seconds in all.
+/// Number of attempts to merge the log at the end, and the pause between them: three seconds in
+/// all.
 constexpr int kLastTries = 15;
 constexpr std::chrono::milliseconds kLastPause{200};
 
@@ -88,7 +88,7 @@ std::size_t Writer::finish() {
 }
 
 void Writer::run() {
-  std::deque<WriteJob> jobs;  // taken from the queue, not yet durable
+  std::deque<WriteJob> jobs;  // removed from the queue, not yet durable
   while (true) {
     bool last_round = false;
     {
@@ -110,7 +110,7 @@ void Writer::run() {
     const bool was_faulty = commits_.is_faulty();
     auto reports = !jobs.empty() ? write(jobs)
                    : may_clear() ? std::vector<WriteReport>()
-                                 : commits_.tend();
+                                 : commits_.maintain();
     if (may_clear() && !last_round && !commits_.clear(kRowsAtOnce, reports)) {
       clears_from_ = std::chrono::steady_clock::now() + kClearPause;
     }
@@ -149,7 +149,7 @@ CommitCounts Writer::commits() const {
 
 void Writer::merge_before_the_end() {
   if (commits_.is_faulty()) {
-    return;  // the waiting jobs are lost, which is reported
+    return;  // the loss of the waiting jobs is reported
   }
   std::vector<WriteReport> reports;
   bool merged = false;
@@ -175,7 +175,7 @@ std::vector<WriteReport> GroupCommit::write(std::deque<WriteJob>& jobs) {
   return reports;
 }
 
-std::vector<WriteReport> GroupCommit::tend() {
+std::vector<WriteReport> GroupCommit::maintain() {
   std::vector<WriteReport> reports;
   if (gone_) {
     return reports;
@@ -200,7 +200,7 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const std::exception&) {
-    // For example a full disk, which the next commit reports. The deletion is tried again.
+    // For example a full disk, which the next commit reports. The next step tries again.
   }
   return false;
 }
@@ -208,12 +208,12 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
 bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   try {
     to_be_merged_ = !storage_.merge_log();
-    why_unmerged_ = to_be_merged_ ? "another program is in the middle of reading" : "";
+    why_unmerged_ = to_be_merged_ ? "another program is reading the database" : "";
     return !to_be_merged_;
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const StorageError& error) {
-    why_unmerged_ = error.what();  // nothing is lost: the log is still there
+    why_unmerged_ = error.what();  // nothing is lost, because the log remains
   }
   return false;
 }
@@ -239,7 +239,7 @@ void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& 
 
 bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::size_t size = 0;
-  // A lookup takes as long as thousands of results, so a group ends with the first one.
+  // A group ends with the first lookup, which takes as long as thousands of results.
   for (bool has_lookup = false; size < std::min(jobs.size(), kLargestGroup) && !has_lookup;
        ++size) {
     has_lookup = std::holds_alternative<ReuseResults>(jobs[size].change);
@@ -262,7 +262,7 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
     return true;
   } catch (const std::exception&) {  // std::bad_alloc included
     put_back();
-    return false;  // `write_singly` finds which one failed
+    return false;  // `write_singly` finds the failing job
   }
   note_committed(changes);
   if (std::exchange(faulty_, false)) {
@@ -277,15 +277,15 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
 
 void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::deque<WriteJob> kept;
-  std::set<std::uint64_t> waiting;  // studies that have a waiting job
+  std::set<std::uint64_t> waiting;  // studies with a waiting job
   std::string fault;
   const auto keep = [&](WriteJob& job) {
     waiting.insert(study_of(job.change));
     kept.push_back(std::move(job));
   };
   for (WriteJob& job : jobs) {
-    // Once a job waits, later jobs that can wait are not tried, and neither is any change of its
-    // study: "done, then retried" must not become "retried, then done".
+    // After a waiting job, later jobs that can wait are not tried, nor any change of its study,
+    // because "done, then retried" must not become "retried, then done".
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

@@ -19,10 +19,10 @@
 
 namespace oblique::server {
 
-/// Counts observed amounts by class of size. Not thread-safe.
+/// Counts observed values in bins. Not thread-safe.
 class Histogram {
  public:
-  /// `bounds` ascend. Each is the largest amount of its class; larger amounts are the last class.
+  /// `bounds` ascend. Each is the largest value of its bin; larger values are in one more bin.
   explicit Histogram(std::vector<double> bounds)
       : bounds_(std::move(bounds)), counts_(bounds_.size() + 1) {}
 
@@ -33,7 +33,7 @@ class Histogram {
   }
 
   const std::vector<double>& bounds() const { return bounds_; }
-  /// Number of amounts by class; there is one more class than bounds.
+  /// Number of values per bin; one more than bounds.
   const std::vector<std::uint64_t>& counts() const { return counts_; }
   double sum() const { return sum_; }
 
@@ -43,25 +43,25 @@ class Histogram {
   double sum_ = 0.0;
 };
 
-/// A change that waits to be written.
 struct WriteJob {
   std::uint64_t ticket;
   Change change;
-  /// Whether a failure is reported at once, because a client waits for the answer. Otherwise the
-  /// change is tried again until it is durable.
+  /// Whether a failure is reported at once, because a client waits. Otherwise the change is
+  /// repeated until it succeeds.
   bool answer_failure;
 };
 
-/// The outcome of a job, or a change of the state of the database.
+/// The outcome of a job, or a change of the database's state.
 struct WriteReport {
   enum class Kind {
-    kStored,     ///< the job with this ticket is durable
-    kRefused,    ///< the job failed and was dropped; `error` says why
-    kFault,      ///< the database accepts no changes; jobs wait. Reported once
+    kStored,     ///< the job is durable
+    kRefused,    ///< the job failed and was dropped; `error` has the reason
+    kFault,      ///< the database accepts no changes, so jobs wait; reported once
     kRecovered,  ///< it accepts changes again
-    kGone,       ///< the file is gone or a sync failed; nothing more is written. Reported once
-    kUnmerged,  ///< the log cannot be merged; `error` says why. Once per finished study, and at the
-                ///< end
+    kGone,       ///< the file is gone or a sync failed; nothing more is written; reported once
+    /// the log cannot be merged; `error` has the reason; reported once per finished study and at
+    /// the end
+    kUnmerged,
   };
   Kind kind;
   std::uint64_t ticket = 0;
@@ -74,38 +74,38 @@ struct CommitCounts {
   Histogram rows{{1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16'384.0, 65'536.0}};  ///< results
 };
 
-/// Writes jobs in groups, one transaction each. It has no thread or clock of its own.
+/// Writes jobs in groups, one transaction each. Has no thread or clock.
 class GroupCommit {
  public:
   /// `storage` must outlive this.
   explicit GroupCommit(Storage& storage) : storage_(storage) {}
 
-  /// Writes the first jobs as one transaction and removes those that are durable or refused. If the
+  /// Writes the first jobs in one transaction and removes those that are durable or refused. If the
   /// transaction fails, each job gets its own, so that one bad change does not block the others.
-  /// Changes of one study keep their order.
+  /// Keeps the order of changes of one study.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
-  /// Number of results that this object has made durable.
+  /// Number of results made durable so far.
   std::uint64_t rows() const { return rows_; }
-  /// Whether the last write left jobs that the database did not accept.
+  /// Whether the database did not accept all jobs of the last write.
   bool is_faulty() const { return faulty_; }
-  /// Whether nothing is written any more, as after WriteReport::Kind::kGone.
+  /// Whether nothing more is written, as after WriteReport::Kind::kGone.
   bool is_gone() const { return gone_; }
 
-  /// To be called at a start: an earlier process may have left rows of deleted studies.
+  /// To be called at a start, because an earlier process may have left rows of deleted studies.
   void resume_deletions() { clears_ = true; }
   /// Whether rows of deleted studies may be left.
   bool has_to_clear() const { return clears_ && !gone_; }
-  /// Deletes at most `most` of these rows. False when the next call should wait.
+  /// Deletes at most `most` of these rows. False if the next call should wait.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
-  /// To be called regularly while no job waits: checks the file of the database, and merges its log
-  /// once a study is done.
-  std::vector<WriteReport> tend();
+  /// To be called regularly while no job waits. Checks the file of the database, and merges its log
+  /// after a study is done.
+  std::vector<WriteReport> maintain();
 
-  /// Merges the log. False when it was not merged; check `is_gone` before another attempt.
+  /// Merges the log. False if it was not merged; then check `is_gone` before another attempt.
   bool merge(std::vector<WriteReport>& reports);
-  /// A report that the last `merge` failed.
+  /// The report of a failed `merge`.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
 
  private:
@@ -120,36 +120,36 @@ class GroupCommit {
   bool faulty_ = false;
   bool gone_ = false;
   bool clears_ = false;        // rows of deleted studies may be left
-  bool to_be_merged_ = false;  // a study is done
-  int tries_ = 0;              // attempts to merge since then
+  bool to_be_merged_ = false;  // a study is done, so the log should be merged
+  int tries_ = 0;              // number of attempts to merge since then
   std::string why_unmerged_;
 };
 
-/// The thread that writes the database. Jobs that wait are committed together, in order.
+/// The thread that writes the database. Commits waiting jobs together, in order.
 class Writer {
  public:
   using Report = std::function<void(std::vector<WriteReport>)>;
 
-  /// `report` is called on the writer's thread, after each commit. `storage` must outlive the
-  /// writer. `finish` interrupts a step that takes longer than `longest_last_step`.
+  /// `report` is called on the writer's thread after each commit. `storage` must outlive this.
+  /// `finish` interrupts a step that takes longer than `longest_last_step`.
   Writer(Storage& storage, Report report,
          std::chrono::milliseconds longest_last_step = std::chrono::seconds(5));
-  /// Stops without waiting for jobs that keep failing.
+  /// Stops, without waiting for jobs that keep failing.
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
   void submit(WriteJob job);
 
-  /// Continues deletions that an earlier process left. To be called when no other thread uses the
+  /// Continues deletions that an earlier process left. Call it when no other thread uses the
   /// storage any more.
   void resume_deletions();
 
   /// Writes the waiting jobs, merges the log and ends the thread; interrupts statements that take
-  /// too long. Returns the number of jobs that could not be made durable.
+  /// too long. Returns the number of jobs that were not stored.
   std::size_t finish();
 
-  /// May be called from any thread.
+  /// Thread-safe.
   CommitCounts commits() const;
 
  private:
@@ -167,7 +167,7 @@ class Writer {
   std::deque<WriteJob> queue_;  // guarded by mutex_
   bool finishing_ = false;      // guarded by mutex_
   bool resumes_ = false;        // guarded by mutex_
-  std::uint64_t steps_ = 0;     // steps begun by the thread; guarded by mutex_
+  std::uint64_t steps_ = 0;     // steps started by the thread; guarded by mutex_
   bool has_ended_ = false;      // the thread has ended; guarded by mutex_
   std::condition_variable ended_;
   CommitCounts counts_;        // guarded by mutex_

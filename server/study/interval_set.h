@@ -15,7 +15,7 @@ struct Interval {
   bool operator==(const Interval&) const = default;
 };
 
-/// Number of points of intervals that do not overlap.
+/// Number of points of disjoint intervals.
 inline std::uint64_t size_of(const std::vector<Interval>& intervals) {
   std::uint64_t points = 0;
   for (const Interval& interval : intervals) {
@@ -24,15 +24,15 @@ inline std::uint64_t size_of(const std::vector<Interval>& intervals) {
   return points;
 }
 
-/// A set of points as disjoint intervals that do not touch. Its cost grows with the number of
+/// A set of points as disjoint intervals with gaps between them. Its cost depends on the number of
 /// intervals, not of points.
 class IntervalSet {
  public:
   IntervalSet() = default;
-  /// The one interval [begin, end); empty when begin == end.
+  /// The interval [begin, end); empty if begin == end.
   IntervalSet(std::uint64_t begin, std::uint64_t end) { insert(begin, end); }
 
-  /// Adds [begin, end); parts of it may already be in the set. Does nothing when begin >= end.
+  /// Adds [begin, end), which may overlap the set. Does nothing if begin >= end.
   void insert(std::uint64_t begin, std::uint64_t end);
   void insert(std::uint64_t point) { insert(point, point + 1); }
   void insert(const std::vector<Interval>& intervals) {
@@ -41,7 +41,7 @@ class IntervalSet {
     }
   }
 
-  /// Removes [begin, end); parts of it may be missing from the set.
+  /// Removes [begin, end), of which parts may be missing.
   void erase(std::uint64_t begin, std::uint64_t end);
   void erase(std::uint64_t point) { erase(point, point + 1); }
 
@@ -60,8 +60,8 @@ class IntervalSet {
   /// The highest interval. The set must not be empty.
   Interval back() const { return {ends_.rbegin()->first, ends_.rbegin()->second}; }
 
-  /// The first interval that ends above `point`, cut to begin at `point` or later; none if there is
-  /// no such interval.
+  /// The first interval that ends after `point`, without its part before `point`; none if there is
+  /// none.
   std::optional<Interval> first_from(std::uint64_t point) const;
 
   /// The parts of the set that lie in [begin, end), in order.

@@ -19,12 +19,12 @@ using protocol::Recipe;
 Recipe parsed(const std::string& bytes) {
   Recipe recipe;
   if (!protocol::parse_recipe(bytes, recipe)) {
-    throw std::runtime_error("its bytes are damaged, or more than a recipe may have");
+    throw std::runtime_error("its bytes are damaged or too many");
   }
   return recipe;
 }
 
-/// Whether `longer` is `block` with a larger sample, whose first points are those of `block`.
+/// Whether `longer` is `block` with a larger sample that contains the same first points.
 bool is_larger_sample(const Block& block, const Block& longer) {
   if (!block.has_sample() || block.sample().kind() == protocol::SAMPLE_LATIN_HYPERCUBE ||
       longer.sample().count() <= block.sample().count()) {
@@ -35,11 +35,10 @@ bool is_larger_sample(const Block& block, const Block& longer) {
   return protocol::is_same_block(block, shortened);
 }
 
-/// One line for each difference in the model and in the request for estimated errors.
 std::vector<std::string> head_differences(const Recipe& stored, const Recipe& given) {
   std::vector<std::string> lines;
-  const auto was = protocol::unjudged_from_message(stored.model());
-  const auto is = protocol::unjudged_from_message(given.model());
+  const auto was = protocol::from_message_unchecked(stored.model());
+  const auto is = protocol::from_message_unchecked(given.model());
   for (const solver::ParameterKey& key : solver::model_keys()) {
     if (key.get(was) != key.get(is)) {
       lines.push_back(fmt::format("model, {}: stored {}, given {}", key.name,

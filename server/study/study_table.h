@@ -13,44 +13,42 @@ namespace oblique::server {
 struct Growth {
   enum class Kind {
     kSame,     ///< the same model and blocks
-    kLonger,   ///< the given one begins with the stored one: the study may grow
-    kShorter,  ///< the stored one begins with the given one
+    kLonger,   ///< the given recipe begins with the stored one: the study may grow
+    kShorter,  ///< the stored recipe begins with the given one
     kOther,
   };
   Kind kind;
-  /// The differences, one per line, if the given recipe is shorter or another one.
+  /// The differences, one per line, for kShorter and kOther.
   std::string difference;
 };
 
-/// Compares two checked recipes block by block, as they are written. A study can grow by more
-/// blocks at the end, or by a larger count of its last block's sample unless that is a Latin
-/// hypercube.
+/// Compares two checked recipes block by block, as they are written. A study can grow by blocks at
+/// the end, or by a larger count of its last block's sample unless that is a Latin hypercube.
 Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given);
 
 /// The recipe of a study in the server: its bytes, and the table of its points, which is made when
-/// needed and can be released. A study that is paused or done needs memory for its bytes only.
-/// Copies share the table. Not thread-safe except `size` and `recipe_bytes`; other threads may use
-/// the table that `get` returned.
+/// needed and can be released. A paused or done study needs memory for its bytes only. Copies share
+/// the table. Not thread-safe except `size` and `recipe_bytes`; other threads may use the table
+/// that `get` returned.
 class StudyTable {
  public:
   StudyTable() = default;
-  /// From the table of a recipe that passed `judge_points`.
-  StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: as good as the other
-  /// From the bytes of a stored recipe, which was judged before, and its number of points.
+  /// From the table of a recipe that passed `validate_points`.
+  StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: implicit on purpose
+  /// From the bytes and the number of points of a stored recipe, which was validated before.
   StudyTable(std::string recipe_bytes, std::uint64_t points);
 
-  /// Number of points, including those that filters leave out.
+  /// Number of points, including left-out ones.
   std::uint64_t size() const { return shared_->points; }
-  /// oblique.protocol.Recipe, serialised.
+  /// Encoded oblique.protocol.Recipe.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
 
-  /// How the recipe of `other` relates to this one. The time is proportional to their sizes. Throws
-  /// std::runtime_error when one of them cannot be read.
+  /// How the recipe of `other` relates to this one, in time proportional to their sizes. Throws
+  /// std::runtime_error if one of them cannot be read.
   Growth growth_to(const StudyTable& other) const;
 
-  /// The table, which is made if it does not exist. Throws solver::InputError for a recipe that
-  /// this version does not accept, and std::runtime_error for bytes that are not a recipe of `size`
-  /// points.
+  /// The table; makes it if necessary. Throws solver::InputError for a recipe that this version
+  /// refuses, and std::runtime_error for bytes that are not a recipe of `size` points.
   const std::shared_ptr<const protocol::PointTable>& get() const;
   const protocol::PointTable* operator->() const { return get().get(); }
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::int64_t kSnapshotInterval_ms = 500;
 constexpr std::int64_t kLongestTurn_ms = 5000;
-/// With less room than this a server is not ready; 80 000 results take it.
+/// With less free space than this the server is not ready; 80 000 results need it.
 constexpr double kLeastFree_bytes = 64.0 * 1024 * 1024;
 
 std::int64_t steady_ms() {
@@ -33,18 +33,18 @@ void HttpOptions::add_to(CLI::App& app) {
   address_option_ =
       app.add_option("--http", address_,
                      "Address and port of the page, metrics and health over HTTP; port 0: "
-                     "the system picks one; off: none")
+                     "chosen by the system; off: no HTTP")
           ->type_name("ADDRESS:PORT");
-  app.add_option(
-         "--http-name", names_,
-         "Host name of this server besides numeric addresses and localhost; may be repeated")
+  app.add_option("--http-name", names_,
+                 "Further host name of this server, besides numeric addresses and localhost; may "
+                 "be repeated")
       ->type_name("HOST");
   app.add_flag("--http-read-without-token", shows_without_token_,
-               "Show the page to everybody who reaches the address; changes still need the token");
+               "Show the page without a token; changes still need it");
   app.add_option(
          "--http-token-file", token_file_,
-         "File with the token of the page, 32 to 128 letters and digits, made if it does not "
-         "exist; without it a token is drawn at each start")
+         "File with the token of the page, 32 to 128 letters and digits, created if it does not "
+         "exist; without it each start creates a random token")
       ->type_name("FILE");
 }
 
@@ -54,7 +54,7 @@ std::optional<WebSettings> HttpOptions::settings() const {
     const std::string lower = CLI::detail::to_lower(name);
     if (lower.empty() || host_without_port(lower) != lower) {
       throw std::runtime_error(
-          fmt::format("--http-name {} is no host name, as oblique.example.org without a port",
+          fmt::format("--http-name {} is not a host name, as oblique.example.org, without a port",
                       protocol::visible(name)));
     }
     settings.names.insert(lower);
@@ -68,7 +68,7 @@ std::optional<WebSettings> HttpOptions::settings() const {
   if (!token_file_.empty()) {
     settings.page.token = PageToken::from_file(token_file_);
   }
-  // A second server on a machine goes on without the default port, which the first one has.
+  // A second server on a machine runs without HTTP if the first one uses the default port.
   settings.may_be_missing = address_option_->count() == 0;
   return settings;
 }
@@ -85,19 +85,19 @@ HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms) {
 
 HttpAnswer readiness(const Snapshot& snapshot, double free_bytes) {
   if (snapshot.is_stopping) {
-    return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE, "the server stops and hands out nothing");
+    return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE, "the server is stopping and sends no batches");
   }
   if (!snapshot.database_fault.empty()) {
     return text_answer(
         MHD_HTTP_SERVICE_UNAVAILABLE,
-        "the database takes no results: " + protocol::visible(snapshot.database_fault));
+        "the database accepts no results: " + protocol::visible(snapshot.database_fault));
   }
   if (free_bytes < kLeastFree_bytes) {
     return text_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
-                       fmt::format("the database's disk has {} MB left",
+                       fmt::format("the disk of the database has {} MB left",
                                    solver::fixed_number(1e-6 * free_bytes, 0)));
   }
-  return text_answer(MHD_HTTP_OK, "the server takes work");
+  return text_answer(MHD_HTTP_OK, "the server accepts work");
 }
 
 Web::Web(WebSettings settings)
@@ -130,7 +130,9 @@ HttpOutcome Web::answer(const HttpRequest& request) {
   }
   const std::string& path = request.path;
   if (path != "/healthz" && path != "/readyz" && path != "/metrics") {
-    return text_answer(MHD_HTTP_NOT_FOUND, "there are a page at /, /metrics, /healthz and /readyz");
+    return text_answer(
+        MHD_HTTP_NOT_FOUND,
+        "unknown path: this server has the page at /, /metrics, /healthz and /readyz");
   }
   const auto snapshot = snapshots_.latest();
   HttpAnswer alive = health(snapshot ? snapshot->made_ms : started_ms_, steady_ms());

@@ -20,22 +20,22 @@ namespace oblique::server {
 
 struct WebSettings {
   HttpAddress address;
-  /// If the address is taken the server goes on without HTTP.
+  /// If the address is in use, the server runs without HTTP.
   bool may_be_missing = false;
-  std::set<std::string> names;  ///< Host names besides addresses and localhost; in lower case
+  std::set<std::string> names;  ///< host names besides addresses and localhost, in lower case
   HttpLimits limits;
-  std::string database;  ///< file
+  std::string database;  ///< path of the database file
   PageSettings page;
   std::string solver_version;
 };
 
-/// The flags of what is shown over HTTP, and to whom.
+/// The flags for HTTP.
 class HttpOptions {
  public:
-  /// This must outlive the parsing.
+  /// This object must outlive the parsing.
   void add_to(CLI::App& app);
-  /// Of the parsed flags; nothing: no HTTP. Throws std::runtime_error for an invalid address or
-  /// name.
+  /// The settings from the parsed flags; nothing: no HTTP. Throws std::runtime_error for an invalid
+  /// address or name.
   std::optional<WebSettings> settings() const;
 
  private:
@@ -46,28 +46,28 @@ class HttpOptions {
   const CLI::Option* address_option_ = nullptr;
 };
 
-/// The server over HTTP: metrics and health for machines, and the page for people. The event loop
-/// publishes a snapshot twice a second and is not asked for anything else, except by requests to
-/// the service.
+/// HTTP interface of the server: metrics and health for machines, and the page for people. The
+/// event loop publishes a snapshot twice a second and handles requests to the service; it does
+/// nothing else for HTTP.
 class Web {
  public:
-  /// Answers from now on. Throws std::runtime_error, naming the address, if it cannot.
+  /// Starts to answer. Throws std::runtime_error with the address on failure.
   explicit Web(WebSettings settings);
 
-  /// As http://127.0.0.1:7602.
+  /// Such as http://127.0.0.1:7602.
   std::string url() const { return http_.url(); }
-  /// The same with the token that lets a browser in.
+  /// The same with the token for the page.
   std::string page_url() const { return url() + "/?token=" + page_.token().text(); }
 
   // ---- Called by the event loop.
-  /// Whether the page is that client of the service.
+  /// Whether the page is the client with that identity.
   static bool is_client(const std::string& identity) {
     return identity == ServiceClient::kIdentity;
   }
   /// Readable when the page has requests.
   int descriptor() const { return service_.descriptor(); }
   std::vector<std::string> take_requests() { return service_.take(); }
-  /// Takes the frame of a reply to the page; true.
+  /// Passes an encoded reply to the page. Returns true.
   bool put_reply(const std::string& frame);
   /// To be called several times a second.
   void tick(const SnapshotSources& sources, std::int64_t now_ms);
@@ -84,11 +84,11 @@ class Web {
   HttpServer http_;  // last: its thread uses the other members
 };
 
-/// Whether the event loop runs: 200 if the latest snapshot, or the start, is recent enough.
+/// Health: 200 if the latest snapshot, or the start, is recent enough, so the event loop runs.
 HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms);
 
-/// Whether the server takes work: 200 unless it stops, the database takes no results, or its disk
-/// is almost full.
+/// Readiness: 200 unless the server is stopping, the database accepts no results, or its disk is
+/// almost full.
 HttpAnswer readiness(const Snapshot& snapshot, double free_bytes);
 
 }  // namespace oblique::server

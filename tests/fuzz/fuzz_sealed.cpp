@@ -15,8 +15,8 @@ void require(bool is_so) {
   }
 }
 
-/// Sends one MESSAGE. The piece has its flags and its body; with the highest bit of the flags the
-/// box is changed on its way. Only an unchanged message of one frame may come out.
+/// Sends one MESSAGE with flags and body from the piece. If the highest bit of the flags is set,
+/// the box is changed in transit. Only an unchanged message of one frame may come out.
 void send_frame(Zmtp& zmtp, CurveClient& client, std::string_view piece) {
   constexpr unsigned kIsChanged = 0x80;
   constexpr std::size_t kMuch = std::size_t{1} << 20U;
@@ -35,7 +35,7 @@ void send_frame(Zmtp& zmtp, CurveClient& client, std::string_view piece) {
 }  // namespace
 }  // namespace oblique::server
 
-/// Frames that a peer sends after its handshake.
+/// Frames of a peer after its handshake.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace oblique::server;
   static const KeyedPort port;

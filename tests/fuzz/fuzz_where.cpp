@@ -18,7 +18,7 @@ namespace {
 
 using oblique::server::Change;
 
-/// A database of ours with a study of points that have no rows, whose file is gone once it is open.
+/// A database with a study without rows; its file is deleted after it is opened.
 struct Opened {
   oblique::server::Reader reader;
   oblique::server::DatabaseHandle database;
@@ -40,7 +40,7 @@ Opened& opened() {
   return files;
 }
 
-/// Whether the command line takes `condition`.
+/// Whether the command line accepts `condition`.
 bool is_taken(const std::string& condition) {
   try {
     oblique::server::check_sql_part("--where", condition);
@@ -50,7 +50,7 @@ bool is_taken(const std::string& condition) {
   }
 }
 
-/// A condition that is taken cannot reach beyond its brackets: whatever it says, there is no row.
+/// An accepted condition cannot reach beyond its brackets, so there is never a row.
 void expect_no_row(oblique::server::Reader& database, const std::string& condition) {
   const auto reply =
       database.query("SELECT 1 FROM (SELECT 1 AS point, 0.4 AS mu, 0.9 AS e) WHERE (" + condition +
@@ -61,7 +61,7 @@ void expect_no_row(oblique::server::Reader& database, const std::string& conditi
   }
 }
 
-/// The same as a part of a question, another one by its length: a plan or an InputError.
+/// Uses the text as a part of a query, selected by its length: gives a plan or an InputError.
 void ask(sqlite3* database, const std::string& text) {
   constexpr std::size_t kParts = 4;
   oblique::protocol::StudyQuery question;
@@ -89,8 +89,7 @@ void ask(sqlite3* database, const std::string& text) {
 
 }  // namespace
 
-/// A condition on results, as users write it behind --where: an answer or a QueryError, and never a
-/// change of the database.
+/// A condition as after --where gives an answer or a QueryError, and never changes the database.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Opened& files = opened();
   const std::string condition(reinterpret_cast<const char*>(data), size);

@@ -12,11 +12,11 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
   return 0;
 }
 
-/// Frames of a server to a worker: of each piece the first byte says how long it is.
+/// Frames of a server to a worker; the first byte of each piece is its length.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view input(reinterpret_cast<const char*>(data), size);
   oblique::protocol::WorkerHello hello;
-  oblique::protocol::say_protocol(hello);
+  oblique::protocol::set_protocol(hello);
   oblique::worker::Conversation conversation(hello, {});
   std::int64_t now_ms = 0;
   conversation.start(now_ms);

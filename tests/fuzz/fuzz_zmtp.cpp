@@ -15,7 +15,7 @@ void send_pieces(Zmtp& zmtp, std::string_view input) {
   }
 }
 
-/// A valid INITIATE with the changes that the input makes: it must not be admitted.
+/// A valid INITIATE changed by the input must not be admitted.
 void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   be_welcomed(zmtp, client);
   const std::string sound = client.initiate();
@@ -30,7 +30,7 @@ void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   }
 }
 
-/// The input as properties in a valid INITIATE.
+/// Uses the input as properties in a valid INITIATE.
 void send_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   constexpr std::size_t kMost = 3500;
   be_welcomed(zmtp, client);

@@ -14,8 +14,8 @@ namespace oblique::server {
 
 /// A port with keys, and a peer that is admitted there.
 struct KeyedPort {
-  protocol::KeyPair server = protocol::made_key_pair();
-  protocol::KeyPair own = protocol::made_key_pair();
+  protocol::KeyPair server = protocol::generate_key_pair();
+  protocol::KeyPair own = protocol::generate_key_pair();
   ListAuthenticator authenticator;
   PortSecurity security{server, authenticator};
   KeyedPort() { authenticator.add(own.public_key, "fuzz"); }
@@ -31,7 +31,7 @@ inline std::string send(Zmtp& zmtp, std::string_view bytes) {
     }
   }
   if (zmtp.held_bytes() > kMuch) {
-    std::abort();  // no more can be held than has come
+    std::abort();  // the port must not store more than it received
   }
   return zmtp.take_answers();
 }

@@ -34,7 +34,7 @@ TEST(FramesTest, AMessageComesBackFromItsFrame) {
   EXPECT_EQ(received.SerializeAsString(), sent.SerializeAsString());
 }
 
-TEST(FramesTest, ATruncatedFrameIsNeverTakenForTheWholeMessage) {
+TEST(FramesTest, ATruncatedFrameIsNotTheWholeMessage) {
   const std::string frame = encode(results_message());
   int refused = 0;
   for (std::size_t length = 0; length < frame.size(); ++length) {
@@ -45,16 +45,16 @@ TEST(FramesTest, ATruncatedFrameIsNeverTakenForTheWholeMessage) {
       EXPECT_NE(received.kind_case(), WorkerMessage::kResults) << length << " bytes";
     }
   }
-  // Only the empty frame is a message, one without a kind.
+  // Of the truncations only the empty frame is a message, one without a kind.
   EXPECT_EQ(refused, static_cast<int>(frame.size()) - 1);
 }
 
-TEST(FramesTest, TextIsForeign) {
+TEST(FramesTest, TextIsNoMessage) {
   WorkerMessage received;
   EXPECT_FALSE(decode("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", received));
 }
 
-TEST(FramesTest, AMessageAroundAnEncodedRecipeIsThatOfTheRecipe) {
+TEST(FramesTest, EncodingAroundAnEncodedRecipeEqualsEncodingTheWholeMessage) {
   StudyDefinition message;
   message.set_study_id(300);
   const StudyDefinition rest = message;
@@ -73,7 +73,7 @@ TEST(FramesTest, TextThatIsNotUtf8IsRefused) {
   EXPECT_FALSE(decode(frame, received));
 }
 
-TEST(FramesTest, TheLongestFrameIsReadAndNoLongerOne) {
+TEST(FramesTest, TheLongestFrameIsReadAndALongerOneIsNot) {
   constexpr std::size_t kHead = 5;  // a tag, and a length of four bytes
   Notice notice;
   notice.set_text(std::string(kMaxFrameBytes - kHead, 'x'));
@@ -103,40 +103,40 @@ ClientRequest submission() {
   return request;
 }
 
-TEST(FrameScanTest, WhatASoundWorkerSendsPasses) {
-  EXPECT_TRUE(is_of_a_workers_size(results_of(1000)));
-  EXPECT_TRUE(is_of_a_workers_size(""));
+TEST(FrameScanTest, FramesOfCorrectWorkersPass) {
+  EXPECT_TRUE(is_worker_frame_within_limits(results_of(1000)));
+  EXPECT_TRUE(is_worker_frame_within_limits(""));
   WorkerMessage long_text;
   auto& result = *long_text.mutable_results()->add_results();
   result.add_texts(std::string(1 << 20, 'S'));
-  EXPECT_TRUE(is_of_a_workers_size(encode(long_text)));
+  EXPECT_TRUE(is_worker_frame_within_limits(encode(long_text)));
 }
 
-TEST(FrameScanTest, MoreResultsThanAMessageHoldsAreTooMany) {
-  EXPECT_TRUE(is_of_a_workers_size(results_of(kMostResultsAMessage)));
-  EXPECT_FALSE(is_of_a_workers_size(results_of(kMostResultsAMessage + 1)));
+TEST(FrameScanTest, AMessageWithTooManyResultsIsRefused) {
+  EXPECT_TRUE(is_worker_frame_within_limits(results_of(kMaxResultsAMessage)));
+  EXPECT_FALSE(is_worker_frame_within_limits(results_of(kMaxResultsAMessage + 1)));
 }
 
-TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedButForTheRowsOfATrace) {
-  EXPECT_FALSE(is_of_a_workers_size(std::string(kMaxWorkerFrameBytes + 1, '\xff')));
+TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedUnlessItIsATrace) {
+  EXPECT_FALSE(is_worker_frame_within_limits(std::string(kMaxWorkerFrameBytes + 1, '\xff')));
   WorkerMessage message;
   Trace& trace = *message.mutable_trace();
   trace.mutable_values()->Resize(static_cast<int>(kMaxFrameBytes / sizeof(double)) - 100'000, 1.0);
-  EXPECT_TRUE(is_of_a_workers_size(encode(message)));
+  EXPECT_TRUE(is_worker_frame_within_limits(encode(message)));
   trace.mutable_values()->Resize(static_cast<int>(kMaxFrameBytes / sizeof(double)), 1.0);
-  EXPECT_FALSE(is_of_a_workers_size(encode(message))) << "longer than any frame";
+  EXPECT_FALSE(is_worker_frame_within_limits(encode(message))) << "longer than any frame";
   trace.clear_values();
   while (trace.ByteSizeLong() <= kMaxWorkerFrameBytes) {
     trace.mutable_result()->add_texts(std::string(100'000, 'S'));
   }
-  EXPECT_FALSE(is_of_a_workers_size(encode(message))) << "these are no rows";
+  EXPECT_FALSE(is_worker_frame_within_limits(encode(message))) << "these are no rows";
 }
 
 TEST(FrameScanTest, ARecipeWithRoomForItsAxesPasses) {
-  EXPECT_TRUE(is_of_a_requests_shape(encode(submission())));
+  EXPECT_TRUE(is_unpadded_request(encode(submission())));
   ClientRequest query;
   query.mutable_query()->set_sql("SELECT 1");
-  EXPECT_TRUE(is_of_a_requests_shape(encode(query)));
+  EXPECT_TRUE(is_unpadded_request(encode(query)));
 }
 
 TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
@@ -146,18 +146,18 @@ TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
     blocks.mutable_submit()->mutable_recipe()->add_blocks();
     axes.mutable_submit()->mutable_recipe()->mutable_blocks(0)->add_axes();
   }
-  EXPECT_FALSE(is_of_a_requests_shape(encode(blocks)));
-  EXPECT_FALSE(is_of_a_requests_shape(encode(axes)));
-  EXPECT_FALSE(is_of_a_requests_shape(std::string("\x1a\x7f", 2))) << "cut off";
+  EXPECT_FALSE(is_unpadded_request(encode(blocks)));
+  EXPECT_FALSE(is_unpadded_request(encode(axes)));
+  EXPECT_FALSE(is_unpadded_request(std::string("\x1a\x7f", 2))) << "cut off";
 }
 
-TEST(FrameScanTest, TheRecipeOfAFileIsJudgedAsThatOfARequest) {
+TEST(FrameScanTest, ARecipeInAFileIsCheckedLikeOneInARequest) {
   Recipe recipe = submission().submit().recipe();
-  EXPECT_TRUE(is_of_a_recipes_shape(recipe.SerializeAsString()));
+  EXPECT_TRUE(is_unpadded_recipe(recipe.SerializeAsString()));
   for (int i = 0; i < 20; ++i) {
     recipe.add_blocks();
   }
-  EXPECT_FALSE(is_of_a_recipes_shape(recipe.SerializeAsString()));
+  EXPECT_FALSE(is_unpadded_recipe(recipe.SerializeAsString()));
 }
 
 TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
@@ -168,13 +168,13 @@ TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
   EXPECT_EQ(request_id_of("\xff\xff"), 0U);
 }
 
-TEST(FrameScanTest, NoTruncationOrForeignByteIsReadBeyondTheEnd) {
+TEST(FrameScanTest, TruncatedAndForeignFramesAreNotReadBeyondTheirEnd) {
   const std::string frame = encode(submission());
   for (std::size_t length = 0; length <= frame.size(); ++length) {
     for (const char foreign : {'\x00', '\x0f', '\x7f', '\xff'}) {
       const std::string cut = frame.substr(0, length) + foreign;
-      (void)is_of_a_requests_shape(cut);
-      (void)is_of_a_workers_size(cut);
+      (void)is_unpadded_request(cut);
+      (void)is_worker_frame_within_limits(cut);
       EXPECT_TRUE(request_id_of(cut) == 77U || length < 5) << length;
     }
   }

@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
-/// A result whose every field differs from the others.
+/// A result in which all fields differ.
 solver::CaseResult distinct_result() {
   solver::CaseResult result{};
   result.fall_time_s = 0.43;
@@ -72,7 +72,7 @@ TEST(PointResultTest, AResultComesBackFromItsFrame) {
   EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "every other member";
 }
 
-TEST(PointResultTest, WhatAResultLacksStaysAbsent) {
+TEST(PointResultTest, MissingOutputsStayMissing) {
   auto lacking = distinct_result();
   lacking.margin.reset();
   lacking.margin_event.reset();
@@ -94,7 +94,7 @@ TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
   EXPECT_EQ(fault_of(failed_point(7, "")), "");
 }
 
-TEST(PointResultTest, ANumberThatCannotBeStoredIsFoundWhereverItIs) {
+TEST(PointResultTest, ANumberThatCannotBeStoredIsDetectedInEveryField) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const PointResult sound = to_message(0, distinct_result());
   for (const auto& [number, says] : {std::pair{kNotANumber, "is not a finite number"},
@@ -139,7 +139,7 @@ TEST(PointResultTest, AListHasAtMost4096ElementsAndAResultAMebibyte) {
   EXPECT_THAT(fault_of(failed), HasSubstr("and one has at most 1048576"));
 }
 
-TEST(PointResultTest, WhatIsNoResultIsRefused) {
+TEST(PointResultTest, InvalidResultsAreRefused) {
   const PointResult sound = to_message(0, distinct_result());
   PointResult shorter = sound;
   shorter.mutable_reals()->RemoveLast();

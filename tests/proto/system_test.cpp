@@ -36,14 +36,14 @@ class SmallFile : public testing::Test {
   std::string file_ = folder_.file("a");
 };
 
-TEST_F(SmallFile, IsReadWholeAndTheNullDeviceIsEmpty) {
+TEST_F(SmallFile, IsReadCompletelyAndTheNullDeviceIsEmpty) {
   const std::string text("ten\nbyt\0es", 10);
   std::ofstream(file_) << text;
   EXPECT_EQ(read_small_file(file_, "the list", 10), text);
   EXPECT_EQ(read_small_file("/dev/null", "the list", 10), "");
 }
 
-TEST_F(SmallFile, ThatIsMissingTooLongOrNotRegularIsRefusedWithoutWaiting) {
+TEST_F(SmallFile, IsRefusedWithoutBlockingIfMissingTooLongOrNotRegular) {
   EXPECT_THAT(objection_to(file_), HasSubstr("No such file"));
   EXPECT_THAT(objection_to("/dev/zero"), HasSubstr("it is a device, "));
   EXPECT_THAT(objection_to(folder_.path().string()), HasSubstr("it is a directory, "));
@@ -55,7 +55,7 @@ TEST_F(SmallFile, ThatIsMissingTooLongOrNotRegularIsRefusedWithoutWaiting) {
               HasSubstr("it is a pipe, and must be a regular file of at most 10 bytes"));
 }
 
-TEST(MemoryLimit, IsTheTightestOfTheGroupsFromTheProcessUpwards) {
+TEST(MemoryLimit, IsTheSmallestOfTheProcessGroupAndItsParents) {
   const test::TemporaryFolder folder;
   std::filesystem::create_directories(folder.path() / "a" / "b");
   std::ofstream(folder.file("a/memory.max")) << "500000000\n";
@@ -65,17 +65,17 @@ TEST(MemoryLimit, IsTheTightestOfTheGroupsFromTheProcessUpwards) {
   EXPECT_FALSE(memory_limit_bytes(root, "0::/\n"));
 }
 
-TEST(Address, IsObjectedToUnlessItHasAPortThatExistsAndBracketsAroundIpv6) {
+TEST(Address, NeedsAValidPortAndBracketsAroundIpv6) {
   for (const char* url : {"tcp://127.0.0.1:7600", "tcp://host:1", "tcp://[::1]:65535",
                           "ipc:///tmp/x", "inproc://x"}) {
-    EXPECT_EQ(objection_to_address(url), "") << url;
+    EXPECT_EQ(address_error(url), "") << url;
   }
   for (const char* url : {"tcp://127.0.0.1:0", "tcp://127.0.0.1:65536", "tcp://127.0.0.1:76x",
                           "tcp://127.0.0.1:", "tcp://127.0.0.1", "tcp://", "tcp://127.0.0.1:-1",
                           "tcp://127.0.0.1:99999999999999999999"}) {
-    EXPECT_NE(objection_to_address(url).find("port"), std::string::npos) << url;
+    EXPECT_NE(address_error(url).find("port"), std::string::npos) << url;
   }
-  EXPECT_NE(objection_to_address("tcp://::1:7601").find("brackets"), std::string::npos);
+  EXPECT_NE(address_error("tcp://::1:7601").find("brackets"), std::string::npos);
 }
 
 TEST(Address, NamesAHost) {
@@ -87,7 +87,7 @@ TEST(Address, NamesAHost) {
   }
 }
 
-TEST(Address, IsOfTheFamilyThatItIsWrittenIn) {
+TEST(Address, HasTheFamilyOfItsNotation) {
   const Families v4 = families_of("192.0.2.1");
   EXPECT_TRUE(v4.has_v4);
   EXPECT_FALSE(v4.has_v6);

@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::string_literals;
 
-TEST(VisibleText, WritesOutWhatSteersATerminalForgesALineOrIsNotSeen) {
+TEST(VisibleText, EscapesTextThatControlsATerminalForgesALineOrIsInvisible) {
   for (const auto& [text, shown] : std::vector<std::pair<std::string, std::string>>{
            {"\x1b[2Jx", "\\x1b[2Jx"},
            {"a\0b"s, "a\\x00b"},
@@ -24,7 +24,7 @@ TEST(VisibleText, WritesOutWhatSteersATerminalForgesALineOrIsNotSeen) {
            {"\u200e\u200f\u061c\u2028\u2029", "\\u200e\\u200f\\u061c\\u2028\\u2029"},
            {"\u00ad\u200b\u200c\u2060\ufeff", "\\u00ad\\u200b\\u200c\\u2060\\ufeff"},
            {"\ufe0f\U000e0041", "\\ufe0f\\ue0041"},
-           // Bytes that are not UTF-8: foreign, cut off, too long, half a pair, too large.
+           // Bytes that are not UTF-8: foreign, truncated, overlong, half a pair, too large.
            {"a\xff\xfe", "a\\xff\\xfe"},
            {"\xe2\x80", "\\xe2\\x80"},
            {"\xc0\x9b", "\\xc0\\x9b"},
@@ -38,7 +38,7 @@ TEST(VisibleText, WritesOutWhatSteersATerminalForgesALineOrIsNotSeen) {
   EXPECT_EQ(visible_lines("one\ntwo\x1b\r\n"), "one\ntwo\\x1b\\r\n") << "line breaks are kept";
 }
 
-TEST(VisibleText, LeavesAllOtherTextAlone) {
+TEST(VisibleText, LeavesOtherTextUnchanged) {
   for (const char* text : {"", "plain", "μ > 0.5, Größe, 参数, 🙂",
                            "\u00a0\u2027\u202f\u2070", "back\\slash \\x1b", "\U0010ffff"}) {
     EXPECT_EQ(visible(text), text);
@@ -47,7 +47,7 @@ TEST(VisibleText, LeavesAllOtherTextAlone) {
   EXPECT_FALSE(is_utf8("a\xc3") || is_utf8("\xed\xa0\x80"));
 }
 
-TEST(Excerpt, HasAtMostSoManyBytesOfWholeCharacters) {
+TEST(Excerpt, HasWholeCharactersWithinTheLimit) {
   EXPECT_EQ(excerpt("four", 4), "four");
   EXPECT_EQ(excerpt("fivex", 4), "five...");
   EXPECT_EQ(excerpt("a\x1b[2J", 4), "a\\x1...");
@@ -58,7 +58,7 @@ TEST(Excerpt, HasAtMostSoManyBytesOfWholeCharacters) {
 
 constexpr std::array<std::string_view, 5> kNames{"mu", "e", "H", "tip_mass", "elements_per_link"};
 
-TEST(Suggestion, FindsTheNameThatAMistypedWordIsNearTo) {
+TEST(Suggestion, FindsTheNameNearestToAMistypedWord) {
   for (const auto& [word, name] : std::vector<std::pair<std::string_view, std::string_view>>{
            {"tip_mas", "tip_mass"},
            {"elements-per-link", "elements_per_link"},

@@ -28,7 +28,7 @@ std::string parse_error(const std::string& text) {
   return error_of([&] { (void)reader().parse(text); });
 }
 
-TEST(TomlReader, NamesThePlaceOfTextThatIsNoToml) {
+TEST(TomlReader, ErrorsHaveThePlaceOfInvalidToml) {
   EXPECT_THAT(parse_error("x = 1\ny =\n"), StartsWith("a.toml:2:"));
   EXPECT_THAT(parse_error("x = \"a\n"), StartsWith("a.toml:1:"));
 }
@@ -49,11 +49,11 @@ TEST(TomlReader, RefusesKeysThatNestDeeply) {
   EXPECT_EQ(parse_error(numbers + "]\n"), "nothing was thrown");
 }
 
-TEST(TomlReader, SaysWhatAValueIsAndMustBe) {
+TEST(TomlReader, ErrorsNameTheKindOfAValueAndTheExpectedOne) {
   const auto top = reader().parse("x = \"text\"\ny = [1, 2.5]\n");
   EXPECT_EQ(error_of([&] { (void)reader().number("x", *top.get("x"), "a number"); }),
             "a.toml:1:5: x = 'text' is a string: it must be a number");
-  EXPECT_EQ(error_of([&] { (void)reader().yes("y", *top.get("y")); }),
+  EXPECT_EQ(error_of([&] { (void)reader().boolean("y", *top.get("y")); }),
             "a.toml:2:5: y = [1, 2.5] is a list: it must be true or false");
 }
 

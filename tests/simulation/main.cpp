@@ -1,4 +1,5 @@
-// simulate FIRST COUNT [storms | forgetful]: runs that many seeds and names those that fail.
+// simulate FIRST COUNT [storms | forgetful]: runs COUNT seeds from FIRST on and prints those that
+// fail.
 #include <cstdint>
 #include <exception>
 #include <iostream>

@@ -33,8 +33,7 @@ inline double marked_H(std::uint64_t mark) {
   return 1.0 + static_cast<double>(mark) * kMarkInH;
 }
 
-/// The made-up answer to a point; whoever checks it knows that it is of this study, by its mark,
-/// and point.
+/// An invented result for a point. Its values identify study (by its mark) and point.
 inline protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) {
   solver::CaseResult result{};
   result.duration_s = static_cast<double>(mark);
@@ -42,13 +41,12 @@ inline protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) 
   return protocol::to_message(point, result);
 }
 
-/// The real conversation of a worker around a pretended solver. It can be killed, stopped for a
-/// while, or told to end; it always starts again.
+/// The real conversation of a worker with a simulated solver. It can be killed, frozen or stopped,
+/// and is always restarted.
 class SimulatedWorker {
  public:
-  /// `peer` is its number in the network. A model's first point takes some of them longer than the
-  /// others. One that `leaves` has now and then a time by which it
-  /// is gone; another one comes then.
+  /// `peer` is its number in the network. For some workers the first point of a model takes longer.
+  /// One that `leaves` sometimes has a time limit, after which another worker starts.
   SimulatedWorker(World& world, Network& network, std::uint64_t peer, bool leaves)
       : world_(world),
         network_(network),
@@ -57,8 +55,8 @@ class SimulatedWorker {
         ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)),
         ms_per_fall_(world.chance(0.3) ? world.between(5, 50) : 0) {}
 
-  /// The process, if there is one, dies; another one starts after a while. The first one starts so
-  /// too.
+  /// Kills the process, if there is one, and starts another one after a while. Also starts the
+  /// first one.
   void restart(std::int64_t away_ms) {
     ++life_;
     ++sockets_;
@@ -76,7 +74,7 @@ class SimulatedWorker {
       }
     });
   }
-  /// The process stands still for a while, as after SIGSTOP.
+  /// Freezes the process for a while, as SIGSTOP does.
   void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   void stop() {
     if (conversation_) {
@@ -84,7 +82,7 @@ class SimulatedWorker {
     }
   }
 
-  /// The results of that message of the socket, or nullptr.
+  /// The results in that message of the socket, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const {
     const auto found = sent_.find({link, sequence});
     return found == sent_.end() ? nullptr : &found->second;
@@ -94,11 +92,11 @@ class SimulatedWorker {
  private:
   struct Work {
     worker::Batch batch;
-    std::uint64_t solved;  ///< positions
+    std::uint64_t solved;  ///< number of positions
   };
   void start() {
     protocol::WorkerHello hello;
-    protocol::say_protocol(hello);
+    protocol::set_protocol(hello);
     hello.set_solver_version("1");
     hello.set_threads(1);
     ++life_;
@@ -111,7 +109,7 @@ class SimulatedWorker {
     conversation_.emplace(hello, settings);
     apply(conversation_->start(world_.now_ms()));
   }
-  /// Runs `what` of this process life now, or when it is no longer frozen.
+  /// Runs `what` if this process is still the same, as soon as it is not frozen.
   void when_awake(std::function<void()> what) {
     if (world_.now_ms() >= frozen_until_ms_) {
       what();
@@ -228,7 +226,7 @@ class SimulatedWorker {
     all.push_back(std::move(progress));
     apply(conversation_->on_progress(std::move(all), world_.now_ms()));
   }
-  /// The position of the next point that the study's filter leaves in, or the end of the batch.
+  /// The position of the next point that passes the study's filter, or the end of the batch.
   static std::uint64_t next_position(const Work& work) {
     return work.batch.first_to_solve(work.solved, work.batch.size());
   }
@@ -248,23 +246,23 @@ class SimulatedWorker {
   bool leaves_;
   std::int64_t ms_per_point_;
   std::int64_t ms_per_fall_;
-  std::int64_t busy_ms_ = 0;                                // with the next point
-  std::pair<std::uint64_t, std::uint64_t> fallen_model_{};  // study and model solved last
+  std::int64_t busy_ms_ = 0;                                // time spent on the next point
+  std::pair<std::uint64_t, std::uint64_t> fallen_model_{};  // study and model that were solved last
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;
   std::deque<Work> batches_;
   bool solving_ = false;
   std::int64_t frozen_until_ms_ = 0;
   std::int64_t planned_time_ms_ = -1;
-  std::uint64_t life_ = 0;     // counts processes: what an earlier one planned does not happen
-  std::uint64_t sockets_ = 0;  // counts sockets: what waits in an earlier one is gone
+  std::uint64_t life_ = 0;     // counts processes; plans of earlier ones are dropped
+  std::uint64_t sockets_ = 0;  // counts sockets; messages of earlier ones are dropped
   std::map<std::pair<Network::LinkId, std::uint64_t>, protocol::Results> sent_;
 };
 
 using server::StudyState;
 
-/// A recipe of `points` points, all with this H. Each `points_a_model` of them share a model; the
-/// last model has the rest. Every third model has the same fall, so points of one fall lie apart.
+/// A recipe of `points` points with this H. Models have `points_a_model` points each, the last one
+/// the rest. Every third model has the same fall, so points with the same fall are apart.
 inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model,
                                          double H) {
   using protocol::listed;
@@ -287,8 +285,8 @@ inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t poi
   return protocol::recipe_of(blocks);
 }
 
-/// The same with a filter in every block that leaves out points here and there; nothing if one
-/// leaves none in.
+/// The same with a filter in each block that leaves out some points; nothing if some filter would
+/// leave out all.
 inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe recipe,
                                                                    const char* filter) {
   for (protocol::Block& block : *recipe.mutable_blocks()) {
@@ -296,16 +294,15 @@ inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Rec
   }
   try {
     protocol::PointTable table(std::move(recipe));
-    table.judge_points();
+    table.validate_points();
     return table;
   } catch (const solver::InputError&) {
     return std::nullopt;
   }
 }
 
-/// Submits one study, again and again until it is acknowledged, cancels it now and then and goes on
-/// with it. While faults happen it sometimes appends points to it, gives it another name, or
-/// deletes it and begins anew under its name.
+/// Submits one study until it is acknowledged, sometimes cancels and continues it. During faults it
+/// sometimes appends points, renames the study, or deletes it and starts a new one with its name.
 class SimulatedClient {
  public:
   /// `peer` is its number in the network. `mark` tells the answers of its study from others
@@ -316,7 +313,7 @@ class SimulatedClient {
       : world_(world), network_(network), peer_(peer), name_(std::move(name)), mark_(mark) {
     set_recipe(points);
   }
-  static constexpr std::uint64_t kClients = 8;  ///< at most
+  static constexpr std::uint64_t kClients = 8;  ///< maximum number of clients
 
   void start() {
     connect();
@@ -329,24 +326,22 @@ class SimulatedClient {
 
   const std::string& name() const { return name_; }
   std::uint64_t points() const { return points_; }
-  /// Of these, how many filters leave in.
+  /// Number of points that pass the filters.
   std::uint64_t left_in() const { return left_in_; }
   std::uint64_t mark() const { return mark_; }
-  /// A submission was acknowledged at some time.
+  /// Whether a submission was acknowledged.
   bool was_acknowledged() const { return acknowledged_; }
-  /// Throws Violation when a server found that state of the study and the client was told another
-  /// one and has not asked for this one since.
+  /// Throws Violation if a server restored this state of the study, but another one was
+  /// acknowledged and this one not requested since.
   void check_found(server::StudyState state) const {
     if (possible_ && state != StudyState::kDone && !possible_->contains(state)) {
       throw Violation("an acknowledged change of " + name_ + " was forgotten: it is " +
                       server::state_name(state));
     }
   }
-  /// The last thing that was acknowledged is a submission.
-  bool wants_results() const {
-    return acknowledged_ && intent_ == Intent::kSubmit && settled_request_;
-  }
-  /// How often it did so.
+  /// Whether the last acknowledged request is a submission.
+  bool wants_results() const { return acknowledged_ && intent_ == Intent::kSubmit && is_answered_; }
+  /// Number of deletions.
   std::uint64_t growths = 0;
   std::uint64_t renamings = 0;
   std::uint64_t deletions = 0;
@@ -355,12 +350,12 @@ class SimulatedClient {
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
   void connect() {
-    // A late request of a closed socket would undo what was asked since.
+    // A late request from a closed socket would undo later changes.
     network_.close(link_, false);
     link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
   }
-  /// A recipe of its own, of so many points, of which a filter may leave out some; behind the one
-  /// that is there, if any.
+  /// A new recipe with that number of points, of which a filter may leave out some; appended to the
+  /// present one, if any.
   void set_recipe(std::uint64_t points) {
     points_ += points;
     const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
@@ -369,12 +364,12 @@ class SimulatedClient {
                                              : static_cast<std::uint64_t>(world_.between(2, 40));
     const protocol::Recipe recipe = recipe_of_models(points, points_a_model, marked_H(mark_));
     if (world_.chance(0.4)) {
-      const char* filter = world_.chance(0.3) ? "sin(1234.5 * mu + k) > 0.9"  // a few are left in
+      const char* filter = world_.chance(0.3) ? "sin(1234.5 * mu + k) > 0.9"  // few points pass
                                               : "sin(1234.5 * mu + k) > -0.3";
       if (const auto table = filtered_here_and_there(recipe, filter)) {
         recipe_.mutable_blocks()->MergeFrom(table->recipe().blocks());
         for (std::uint64_t point = 0; point < points; ++point) {
-          left_in_ += table->is_left_in(point) ? 1U : 0U;
+          left_in_ += table->passes_filter(point) ? 1U : 0U;
         }
         return;
       }
@@ -386,7 +381,7 @@ class SimulatedClient {
     appended_ = static_cast<std::uint64_t>(world_.between(1, 60));
     set_recipe(appended_);
   }
-  /// The study was deleted: another one under its name.
+  /// The study was deleted: starts another one with its name.
   void begin_anew() {
     acknowledged_ = false;
     study_id_ = 0;
@@ -397,7 +392,7 @@ class SimulatedClient {
     set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
   }
   void ask() {
-    if (settled_request_) {
+    if (is_answered_) {
       return;
     }
     protocol::ClientRequest request;
@@ -419,17 +414,17 @@ class SimulatedClient {
     } else {
       expect(protocol::STUDY_CHANGE_RESUME);
       request.mutable_submit()->set_name(name_);
-      // The model of the store holds what workers solved, not copies.
+      // The store's model contains solved results, not copies.
       request.mutable_submit()->set_no_reuse(true);
       if (world_.chance(0.3)) {
-        // Submitting again with another priority changes it, durably before it is acknowledged.
+        // Submitting with another priority changes it; the change is durable before the reply.
         request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
       }
       *request.mutable_submit()->mutable_recipe() = recipe_;
     }
     network_.send(link_, protocol::encode(request), false);
     world_.after(2000, [this, number = request_] {
-      if (number == request_ && !settled_request_) {
+      if (number == request_ && !is_answered_) {
         connect();
         ask();
       }
@@ -437,16 +432,16 @@ class SimulatedClient {
   }
   void answered(const std::string& frame) {
     protocol::ClientReply reply;
-    if (!protocol::decode(frame, reply) || reply.request_id() != request_ || settled_request_) {
+    if (!protocol::decode(frame, reply) || reply.request_id() != request_ || is_answered_) {
       return;
     }
     if (reply.has_error()) {
       if (acknowledged_ && reply.error().message().find("not stored") == std::string::npos) {
         throw Violation("an acknowledged study is refused: " + reply.error().message());
       }
-      return;  // asked again later
+      return;  // will be repeated
     }
-    settled_request_ = true;
+    is_answered_ = true;
     if (reply.has_submit()) {
       if (acknowledged_ && reply.submit().created()) {
         throw Violation("an acknowledged study was forgotten");
@@ -478,7 +473,7 @@ class SimulatedClient {
     for (const StudyState state :
          {StudyState::kRunning, StudyState::kPaused, StudyState::kCancelled}) {
       if (told == server::state_name(state)) {
-        // It may be that of another one of these changes, still on its way.
+        // The state may come from another of these changes that is still pending.
         possible_ = asked_.size() > 1 ? std::nullopt : std::optional(std::set{state});
         return;
       }
@@ -486,9 +481,9 @@ class SimulatedClient {
     possible_.reset();
   }
   void change_mind() {
-    // Once faults end the study is submitted for the last time.
+    // After the end of faults the study is submitted for the last time.
     const bool last = !world_.faults;
-    if (settled_request_ && (!last || intent_ != Intent::kSubmit)) {
+    if (is_answered_ && (!last || intent_ != Intent::kSubmit)) {
       const bool is_free = !last && intent_ == Intent::kSubmit && acknowledged_;
       intent_ = Intent::kSubmit;
       appended_ = 0;
@@ -506,12 +501,12 @@ class SimulatedClient {
         grow();
         ++growths;
       }
-      settled_request_ = false;
+      is_answered_ = false;
       asked_.clear();
       ++request_;
       ask();
     }
-    if (!last || !settled_request_ || intent_ != Intent::kSubmit) {
+    if (!last || !is_answered_ || intent_ != Intent::kSubmit) {
       world_.after(world_.between(500, 4000), [this] { change_mind(); });
     }
   }
@@ -529,20 +524,21 @@ class SimulatedClient {
   std::uint64_t peer_;
   std::string name_;
   std::uint64_t points_ = 0;
-  std::uint64_t left_in_ = 0;  // of these, by filters
+  std::uint64_t left_in_ = 0;  // number of points that pass filters
   std::uint64_t mark_;
-  std::uint64_t study_id_ = 0;  // as it was acknowledged
+  std::uint64_t study_id_ = 0;  // from the acknowledgement
   std::string new_name_;
-  std::uint64_t appended_ = 0;  // by the request
+  std::uint64_t appended_ = 0;  // number of points that the request appends
   protocol::Recipe recipe_ = protocol::recipe_of({});
   Network::LinkId link_ = 0;
   std::uint64_t request_ = 0;
   bool acknowledged_ = false;
-  Intent intent_ = Intent::kSubmit;        // of the request
-  bool settled_request_ = false;           // it was answered
-  std::set<protocol::StudyChange> asked_;  // by this request, which changes when it is repeated
-  /// States in which the study can be, besides done: the one last acknowledged, and those asked for
-  /// since. Nothing when all are possible.
+  Intent intent_ = Intent::kSubmit;  // intent of the request
+  bool is_answered_ = false;         // whether it was answered
+  // changes sent with this request, which may change when it is repeated
+  std::set<protocol::StudyChange> asked_;
+  /// Possible states of the study besides done: the last acknowledged one and those requested
+  /// since. Nothing if all are possible.
   std::optional<std::set<server::StudyState>> possible_;
 };
 

@@ -18,16 +18,16 @@ namespace oblique::simulation {
 /// moment, stopped in an orderly way or for a while, and starts again from what the disk has.
 class SimulatedServer final : public server::Ports {
  public:
-  /// Called with each acknowledgement before it is sent: its results must be durable.
+  /// Called before each acknowledgement is sent; its results must be durable.
   using OnAcknowledged = std::function<void(const std::string& identity, std::uint64_t sequence)>;
 
-  /// Called with what a server that starts found.
+  /// Called with the studies that a starting server restored.
   using OnStarted = std::function<void(const Found& found)>;
 
   SimulatedServer(World& world, SimulatedDisk& disk, std::uint32_t max_losses)
       : world_(world), disk_(disk), max_losses_(max_losses) {}
 
-  /// Tries until the disk lets it.
+  /// Tries to start until the disk allows it.
   void start() {
     ++life_;
     Found found;
@@ -43,8 +43,8 @@ class SimulatedServer final : public server::Ports {
     }
     on_started(found);
     server::ServiceSettings settings;
-    settings.scheduler.loss_limits.condemned_after = max_losses_;
-    // As server/event_loop/event_loop.cpp does.
+    settings.scheduler.loss_limits.failing_after = max_losses_;
+    // As in server/event_loop/event_loop.cpp.
     settings.scheduler.first_lease_id = found.starts << 40U;
     settings.solver_version = "1";
     settings.database_id = "disk";
@@ -63,7 +63,7 @@ class SimulatedServer final : public server::Ports {
     disk_.crash(power_is_lost);
     end();
   }
-  /// An orderly end, as after SIGTERM; another one starts after a while.
+  /// Ends normally, as after SIGTERM; another server starts after a while.
   void stop() {
     service_->stop(now());
     while (!jobs_.empty() && !disk_.died()) {
@@ -84,10 +84,10 @@ class SimulatedServer final : public server::Ports {
     }
     end();
   }
-  /// The process stands still for a while, as after SIGSTOP.
+  /// Freezes the process for a while, as SIGSTOP does.
   void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   bool runs() const { return service_.has_value(); }
-  /// Nothing of deleted studies is left.
+  /// Whether no rows of deleted studies are left.
   bool has_cleared() const { return commits_.has_value() && !commits_->has_to_clear(); }
   const server::Service& service() const { return *service_; }
 
@@ -129,13 +129,13 @@ class SimulatedServer final : public server::Ports {
   OnAcknowledged on_acknowledged;
   OnStarted on_started;
   std::uint64_t crashes = 0;
-  std::uint64_t power_losses = 0;      // of these
-  std::uint64_t deaths_in_writes = 0;  // of the crashes
-  std::uint64_t failed_syncs = 0;      // of the crashes
+  std::uint64_t power_losses = 0;      // number of these with a power failure
+  std::uint64_t deaths_in_writes = 0;  // number of crashes in a write
+  std::uint64_t failed_syncs = 0;      // number of crashes after a failed sync
 
  private:
   server::Instant now() const { return {world_.now_ms(), world_.utc_ms()}; }
-  /// Runs `what` of this process life after so long, or when it is no longer frozen.
+  /// Runs `what` after a delay if this process is still the same, as soon as it is not frozen.
   void after(std::int64_t delay_ms, std::function<void()> what) {
     world_.after(delay_ms, [this, life = life_, what = std::move(what)] {
       if (life != life_) {
@@ -177,7 +177,7 @@ class SimulatedServer final : public server::Ports {
     clients->break_links();
     after(world_.faults ? world_.between(1, 5000) : 10, [this] { start(); });
   }
-  /// The process died while it wrote, or must end because a sync failed. False: neither.
+  /// Whether the process died in a write or must end after a failed sync.
   bool ends() {
     const bool sync_failed = commits_->is_gone();
     if (!disk_.died() && !sync_failed) {
@@ -196,8 +196,7 @@ class SimulatedServer final : public server::Ports {
     if (ends()) {
       return;
     }
-    if (world_.faults &&
-        world_.chance(0.003)) {  // after the commit and before its reports are read
+    if (world_.faults && world_.chance(0.003)) {  // after the commit, before its reports are read
       crash(world_.chance(0.4));
       return;
     }
@@ -210,11 +209,11 @@ class SimulatedServer final : public server::Ports {
       writing_ = true;
       after(commits_->is_faulty() ? 500 : 1, [this] { write_group(); });
     } else if (jobs_.empty()) {
-      commits_->tend();
+      commits_->maintain();
       ends();
     }
   }
-  /// As the writer does, between groups, in steps of some rows.
+  /// As the writer: between groups, in steps of some rows.
   void clear_some() {
     if (clearing_ || !commits_->has_to_clear()) {
       return;
@@ -246,10 +245,10 @@ class SimulatedServer final : public server::Ports {
   std::optional<server::GroupCommit> commits_;
   std::deque<server::WriteJob> jobs_;
   bool writing_ = false;
-  bool clearing_ = false;  // a step is to come
+  bool clearing_ = false;  // a step is planned
   std::int64_t frozen_until_ms_ = 0;
-  std::deque<std::function<void()>> held_;  // frames that came meanwhile, in order
-  std::uint64_t life_ = 0;  // counts starts: what an earlier life planned does not happen
+  std::deque<std::function<void()>> held_;  // frames received meanwhile, in order
+  std::uint64_t life_ = 0;                  // counts starts; plans of earlier processes are dropped
 };
 
 }  // namespace oblique::simulation

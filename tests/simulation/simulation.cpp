@@ -24,7 +24,7 @@ class Simulation {
       : settings_(settings),
         world_(seed),
         disk_(world_),
-        // Random crashes hit innocent points too, so that blame is tried in runs of its own.
+        // Random crashes also hit sound points, so failures of points are tested in separate runs.
         server_(world_, disk_, settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
@@ -101,7 +101,7 @@ class Simulation {
     });
   }
 
-  /// One of a storm. Nothing of it happens to the first worker but that its connection is cut.
+  /// One fault of a storm. To the first worker only disconnections happen.
   void blow() {
     const std::int64_t last = static_cast<std::int64_t>(workers_.size()) - 1;
     SimulatedWorker& victim = *workers_[static_cast<std::size_t>(world_.between(1, last))];
@@ -125,10 +125,10 @@ class Simulation {
     }
   }
 
-  /// A peer that says that it is a worker, requests many batches and vanishes, under a name of its
-  /// own.
+  /// A peer that joins as a worker, requests many batches and disappears, each time under a new
+  /// name.
   void come_and_vanish() {
-    constexpr std::uint64_t kFirstPeer = 1000;  // in the network, above all workers
+    constexpr std::uint64_t kFirstPeer = 1000;  // numbers in the network above all workers
     ++came_;
     const auto has_points = std::make_shared<bool>(false);
     const auto link = workers_network_.open(kFirstPeer + came_, [has_points](const auto& frame) {
@@ -137,7 +137,7 @@ class Simulation {
                                     message.batch().study_id() != 0);
     });
     protocol::WorkerMessage hello;
-    protocol::say_protocol(*hello.mutable_hello());
+    protocol::set_protocol(*hello.mutable_hello());
     hello.mutable_hello()->set_solver_version("1");
     hello.mutable_hello()->set_threads(1);
     hello.mutable_hello()->set_process_id("vanishing " + std::to_string(came_));
@@ -166,7 +166,7 @@ class Simulation {
           .part(std::move(parted), world_.between(500, 15'000));
       ++outcome_["partitions"];
     } else if (kind == 7) {
-      // By hours, either way, and sometimes by the moment that a server was away.
+      // By hours in both directions, and sometimes by the time that a server was down.
       world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
                                           : world_.between(-20'000'000, 20'000'000));
       ++outcome_["clock jumps"];
@@ -342,8 +342,8 @@ class Simulation {
   Network clients_network_;
   std::vector<std::unique_ptr<SimulatedClient>> clients_;
   std::vector<std::unique_ptr<SimulatedWorker>> workers_;
-  std::uint64_t came_ = 0;      // peers to vanish
-  std::uint64_t vanished_ = 0;  // of these, with a batch of a study
+  std::uint64_t came_ = 0;      // peers that disappear
+  std::uint64_t vanished_ = 0;  // of these, peers with a batch of a study
   SimulationOutcome outcome_;
 };
 

@@ -12,7 +12,7 @@
 namespace oblique::simulation {
 namespace {
 
-/// Runs seeds and names the first that fails. `simulate SEED 1` runs it again.
+/// Runs seeds and prints the first that fails. `simulate SEED 1` repeats it.
 SimulationOutcome simulate_seeds(std::uint64_t first, std::uint64_t count,
                                  const SimulationSettings& settings) {
   SimulationOutcome all;
@@ -31,11 +31,11 @@ std::uint64_t seeds(int quick, int all) {
   return static_cast<std::uint64_t>(test::amount(quick, all));
 }
 
-/// Seeds in parts, which CTest runs beside each other; in every second part a sync that fails
-/// forgets what it should have kept, as on Linux.
+/// Seeds in parts that CTest runs in parallel. In every second part a failed sync loses its data,
+/// as on Linux.
 class SimulationTest : public testing::TestWithParam<std::uint64_t> {};
 
-TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
+TEST_P(SimulationTest, EveryPointEndsWithOneRightRowDespiteFaults) {
   const std::uint64_t count = seeds(40, 250);
   SimulationSettings settings;
   settings.forgetful_syncs = GetParam() % 2 == 1;
@@ -61,7 +61,7 @@ TEST_P(SimulationTest, EveryPointEndsWithOneRightRowWhateverBreaks) {
 
 INSTANTIATE_TEST_SUITE_P(Part, SimulationTest, testing::Range<std::uint64_t>(0, 8));
 
-TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
+TEST(StormsTest, NoPointFailsBecauseOfLostWorkersIfOneWorkerIsSound) {
   SimulationSettings settings;
   settings.storms = true;
   const std::uint64_t count = seeds(20, 200);
@@ -71,7 +71,7 @@ TEST(StormsTest, NoPointFailsForWorkersThatAreLostBesideASoundOne) {
   EXPECT_GT(all["vanished peers"], count / 2);
 }
 
-TEST(SeedTest, GivesTheSameRunAgain) {
+TEST(SeedTest, RepeatsARun) {
   EXPECT_EQ(simulate(7, {}), simulate(7, {}));
 }
 

@@ -13,21 +13,21 @@
 
 namespace oblique::simulation {
 
-/// What the simulated parties did must not happen.
+/// A simulated program did something that must not happen.
 class Violation : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// One clock, one source of chance and one list of what is to come. Everything follows from the
-/// seed, so that a failing run can be had again.
+/// The clock, the random numbers and the list of future events. Everything follows from the seed,
+/// so that a failing run can be repeated.
 class World {
  public:
   explicit World(std::uint64_t seed) : random_(seed) {}
 
-  /// The clock that never runs backwards.
+  /// The steady clock.
   std::int64_t now_ms() const { return now_ms_; }
-  /// The clock that people set.
+  /// The system clock, which may jump.
   std::int64_t utc_ms() const { return utc_at_zero_ms_ + now_ms_; }
   void set_clock(std::int64_t forward_ms) { utc_at_zero_ms_ += forward_ms; }
 
@@ -35,7 +35,8 @@ class World {
     to_come_.emplace(std::pair{now_ms_ + delay_ms, next_++}, std::move(what));
   }
 
-  /// Runs what is to come until `until_ms` or until `done` says so; `checks` runs after each event.
+  /// Runs future events until `until_ms` or until `done` returns true; calls `checks` after each
+  /// event.
   void run(std::int64_t until_ms, const std::function<bool()>& done,
            const std::function<void()>& checks) {
     while (!to_come_.empty() && to_come_.begin()->first.first <= until_ms && !done()) {
@@ -49,12 +50,12 @@ class World {
   bool chance(double probability) {
     return static_cast<double>(random_() >> 11U) * 0x1p-53 < probability;
   }
-  /// A whole number from `low` to `high`, both included.
+  /// A random whole number from `low` to `high`, both inclusive.
   std::int64_t between(std::int64_t low, std::int64_t high) {
     return low + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(high - low + 1));
   }
 
-  /// Whether faults happen still.
+  /// Whether faults still happen.
   bool faults = true;
 
  private:
@@ -65,11 +66,11 @@ class World {
   std::map<std::pair<std::int64_t, std::uint64_t>, std::function<void()>> to_come_;
 };
 
-/// Connections as sockets with TCP below give them: in order and whole until they break, when
-/// everything on the way is lost, and the peer comes back under another identity. Half-open
-/// connections swallow what is sent before they break. A partition separates several peers from the
-/// server: what is sent waits, as TCP sends it again and again, until the partition ends or the
-/// connections break. Beyond TCP, results may be doubled or overtaken on request of the sender.
+/// Simulated connections of ZeroMQ sockets over TCP: messages arrive in order and complete until
+/// the connection breaks. Then all messages in transit are lost, and the peer returns with another
+/// identity. Half-open connections lose messages before they break. A partition separates several
+/// peers from the server: messages wait, as TCP repeats them, until the partition ends or the
+/// connections break. On request of the sender, results may also be duplicated or reordered.
 class Network {
  public:
   using ToServer = std::function<void(const std::string& identity, const std::string& frame)>;
@@ -78,7 +79,7 @@ class Network {
 
   Network(World& world, ToServer to_server) : world_(world), to_server_(std::move(to_server)) {}
 
-  /// A new socket of that peer; what the server sends goes to `to_peer`.
+  /// Opens a new socket of that peer; `to_peer` receives the server's messages.
   LinkId open(std::uint64_t peer, ToPeer to_peer) {
     const LinkId id = ++last_link_;
     links_.emplace(id, Link{new_identity(id), peer, std::move(to_peer), 0, 0, false, false, 0});
@@ -89,7 +90,7 @@ class Network {
     return id;
   }
 
-  /// The socket is closed: what comes for it is lost. What it sent still arrives when `linger`.
+  /// Closes the socket: messages to it are lost. With `linger` its own messages still arrive.
   void close(LinkId id, bool linger) {
     links_.erase(id);
     if (!linger) {
@@ -97,7 +98,7 @@ class Network {
     }
   }
 
-  /// `loosely`: may be doubled or overtaken.
+  /// `loosely`: may be duplicated or reordered.
   void send(LinkId id, const std::string& frame, bool loosely) {
     const auto found = links_.find(id);
     if (found == links_.end() || found->second.cut_up) {
@@ -116,14 +117,14 @@ class Network {
     if (loosely && world_.faults && world_.chance(0.05)) {
       world_.after(delay_ms() + world_.between(0, 300), deliver);
       if (world_.chance(0.5)) {
-        return;  // overtaken only
+        return;  // only reordered
       }
     }
     link.last_up_ms = std::max(link.last_up_ms, world_.now_ms() + delay_ms());
     world_.after(link.last_up_ms - world_.now_ms(), deliver);
   }
 
-  /// False when no connection has that identity.
+  /// False if no connection has that identity.
   bool send_to(const std::string& identity, const std::string& frame) {
     const LinkId id = link_of(identity);
     const auto found = links_.find(id);
@@ -132,7 +133,7 @@ class Network {
     }
     Link& link = found->second;
     if (link.cut_down) {
-      return true;  // nobody knows yet
+      return true;  // the server has not noticed yet
     }
     wait_for_partition(link);
     link.last_down_ms = std::max(link.last_down_ms, world_.now_ms() + delay_ms());
@@ -145,8 +146,7 @@ class Network {
     return true;
   }
 
-  /// Nothing passes between these peers and the server for so long. Connections that stand still
-  /// for too long break.
+  /// Separates these peers from the server for this time. Connections that stall too long break.
   void part(std::set<std::uint64_t> peers, std::int64_t duration_ms) {
     parted_ = std::move(peers);
     parted_until_ms_ = world_.now_ms() + duration_ms;
@@ -160,8 +160,7 @@ class Network {
     });
   }
 
-  /// The connections of that peer break, or all, as when the server dies; the sockets connect
-  /// again.
+  /// Breaks the connections of that peer, or all, as when the server dies; the sockets reconnect.
   void break_links(std::optional<std::uint64_t> peer = std::nullopt) {
     for (auto& [id, link] : links_) {
       if (!peer || link.peer == *peer) {
@@ -185,7 +184,7 @@ class Network {
   }
 
  private:
-  /// A connection on which nothing arrives for so long is given up.
+  /// A connection without input for this time breaks.
   static constexpr std::int64_t kPatience_ms = 10'000;
 
   struct Link {
@@ -196,7 +195,7 @@ class Network {
     std::int64_t last_down_ms;
     bool cut_up;
     bool cut_down;
-    std::uint64_t breaks;  // how often it broke: what was sent before is lost
+    std::uint64_t breaks;  // number of breaks; earlier messages are lost
   };
 
   std::string new_identity(LinkId id) {
@@ -245,8 +244,8 @@ class Network {
   ToServer to_server_;
   std::map<LinkId, Link> links_;
   std::map<std::string, LinkId> identities_;
-  std::set<LinkId> silenced_;       // closed, and nothing of them arrives
-  std::set<std::uint64_t> parted_;  // peers, until that time
+  std::set<LinkId> silenced_;       // closed sockets whose messages do not arrive
+  std::set<std::uint64_t> parted_;  // end of the partition by peer
   std::int64_t parted_until_ms_ = 0;
   LinkId last_link_ = 0;
   std::uint64_t last_identity_ = 0;

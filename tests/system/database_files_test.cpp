@@ -1,4 +1,4 @@
-// What becomes of a database that is taken away under its server, or that others read while its
+// A database that is deleted or replaced while its server runs, or that others read while the
 // server ends.
 #include <chrono>
 #include <csignal>
@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A connection of another program that reads.
+/// A reading connection of another program.
 class OtherReader {
  public:
   explicit OtherReader(const std::string& file) {
@@ -31,7 +31,7 @@ class OtherReader {
   OtherReader(const OtherReader&) = delete;
   OtherReader& operator=(const OtherReader&) = delete;
 
-  /// Stays in the middle of a query; false when there is no row.
+  /// Starts a query and does not finish it; false if there is no row.
   bool read_one() { return sqlite3_step(statement_) == SQLITE_ROW; }
   void finish_query() { sqlite3_reset(statement_); }
 
@@ -60,7 +60,7 @@ class DatabaseFilesTest : public ::testing::Test {
   Database database_{file_};
 };
 
-TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedSaysSoAndEndsWithOne) {
+TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedReportsThisAndExitsWith1) {
   Server server(folder_, file_);
   Worker worker(folder_, server.worker_url());
   submit_to(server);
@@ -71,7 +71,7 @@ TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedSaysSoAndEndsWithOne) {
   EXPECT_TRUE(is_running(worker.pid())) << "it keeps what is not stored";
 }
 
-TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsAndSaysSo) {
+TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsWithThatReason) {
   const std::string other = folder_.file("other.db");
   ASSERT_EQ(run_oblique(folder_, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                                   "--db", other})
@@ -124,7 +124,7 @@ TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsOnceAStudyIsDoneWhileItsServerRu
   EXPECT_EQ(Database(folder_.file("copy.db")).rows(), kManyPoints);
 }
 
-TEST_F(DatabaseFilesTest, AServerThatEndsUnderALongQueryOfAnotherProgramSaysWhereRowsAre) {
+TEST_F(DatabaseFilesTest, AServerThatEndsDuringALongQueryReportsThatRowsAreInTheLog) {
   Server server(folder_, file_);
   Worker worker(folder_, server.worker_url());
   submit_to(server);
@@ -138,7 +138,7 @@ TEST_F(DatabaseFilesTest, AServerThatEndsUnderALongQueryOfAnotherProgramSaysWher
   EXPECT_TRUE(contains(server.process().err(), "oblique backup")) << server.process().err();
 }
 
-TEST_F(DatabaseFilesTest, OneThatAServerWorksOnIsMergedFromAndNotInto) {
+TEST_F(DatabaseFilesTest, ADatabaseInUseMayBeASourceButNotTheTargetOfAMerge) {
   const Server server(folder_, file_);
   submit_to(server);
   const Outcome from = run_oblique(folder_, {"merge", file_, "--db", folder_.file("all.db")});
@@ -150,7 +150,7 @@ TEST_F(DatabaseFilesTest, OneThatAServerWorksOnIsMergedFromAndNotInto) {
   EXPECT_TRUE(contains(into.err, "another server")) << into.err;
 }
 
-TEST_F(DatabaseFilesTest, OneIsNotMergedIntoItselfByWhateverName) {
+TEST_F(DatabaseFilesTest, ADatabaseIsNotMergedIntoItselfUnderAnyName) {
   { const Server server(folder_, file_); }
   fs::create_hard_link(file_, folder_.file("other name.db"));
   const Outcome ran = run_oblique(folder_, {"merge", folder_.file("other name.db"), "--db", file_});

@@ -1,4 +1,4 @@
-// Statements that would run for hours, asked of a real server.
+// Statements that would run for hours, sent to a real server.
 #include <csignal>
 #include <deque>
 #include <string>
@@ -11,7 +11,7 @@
 namespace oblique::test {
 namespace {
 
-/// Compares for hours without a look at the clock.
+/// Compares bytes for hours without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 class QueryAttackTest : public testing::Test {
@@ -39,7 +39,7 @@ class QueryAttackTest : public testing::Test {
   std::deque<Process> attackers_;
 };
 
-TEST_F(QueryAttackTest, QuickQuestionsWaitForMoreSlowOnesThanThereAreReadersUntilTheirDeadline) {
+TEST_F(QueryAttackTest, QuickQueriesWaitForSlowOnesUntilTheirDeadline) {
   for (int i = 0; i < 6; ++i) {
     attack(kDeaf, "2");
   }
@@ -51,7 +51,7 @@ TEST_F(QueryAttackTest, QuickQuestionsWaitForMoreSlowOnesThanThereAreReadersUnti
   }
 }
 
-TEST_F(QueryAttackTest, AKilledServerTakesItsReadersAlong) {
+TEST_F(QueryAttackTest, ReadersEndWithAKilledServer) {
   attack(kDeaf);
   wait_for_readers(1);
   const auto readers = children_of(server_.process().pid());

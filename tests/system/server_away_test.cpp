@@ -1,4 +1,4 @@
-// What people see who watch a study while its server comes and goes.
+// Watching a study while its server stops and starts.
 #include <csignal>
 #include <memory>
 #include <stdexcept>
@@ -14,7 +14,7 @@
 namespace oblique::test {
 namespace {
 
-/// A server with a study of many points that nobody solves yet.
+/// A server with a study of many points and no worker.
 class ServerAwayTest : public ::testing::Test {
  protected:
   std::vector<std::string> submit_and_watch() const {
@@ -42,7 +42,7 @@ class ServerAwayTest : public ::testing::Test {
   std::unique_ptr<Server> server_ = std::make_unique<Server>(folder_, database_);
 };
 
-TEST_F(ServerAwayTest, WatchingGoesOnWhenTheServerIsKilledAndComesBack) {
+TEST_F(ServerAwayTest, WatchingContinuesAfterTheServerIsKilledAndRestarted) {
   Process submitting(folder_, client_program(), submit_and_watch());
   wait_until_said(submitting, "waits for a worker");
   Process watching(folder_, client_program(), watch());
@@ -60,7 +60,7 @@ TEST_F(ServerAwayTest, WatchingGoesOnWhenTheServerIsKilledAndComesBack) {
   EXPECT_EQ(Database(database_).rows(), kManyPoints);
 }
 
-TEST_F(ServerAwayTest, AServerThatWasNeverThereIsNotWaitedFor) {
+TEST_F(ServerAwayTest, AServerThatNeverAnsweredIsNotWaitedFor) {
   kill_server();
   for (auto arguments : {submit_and_watch(), watch()}) {
     arguments.insert(arguments.end(), {"--timeout", "0.2"});
@@ -70,12 +70,12 @@ TEST_F(ServerAwayTest, AServerThatWasNeverThereIsNotWaitedFor) {
   }
 }
 
-TEST_F(ServerAwayTest, ASignalEndsTheWatchingWithItsNumberWhetherTheServerIsThereOrNot) {
+TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
   for (const bool is_away : {false, true}) {
     std::vector<std::unique_ptr<Process>> clients;
     for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
       clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
-      // Watching wants the study to be there.
+      // Watching needs an existing study.
       wait_until("the study is stored", [this] {
         const std::string count = "SELECT count(*) FROM studies";
         try {

@@ -26,7 +26,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using protocol::Descriptor;
 constexpr int kLongestPoll_ms = 5;
-/// Of one direction, before it is read no further: as much as a fast and long line holds.
+/// Size of the buffer per direction, after which it is not read: as on a fast long line.
 constexpr std::size_t kMostUnderWay = std::size_t{4} << 20U;
 
 sockaddr_in on_loopback(std::uint16_t port) {
@@ -41,12 +41,12 @@ const sockaddr* any_address(const sockaddr_in& address) {
   return reinterpret_cast<const sockaddr*>(&address);
 }
 
-/// What came from one end and has not yet gone to the other.
+/// Bytes from one side that are not sent to the other yet.
 class Direction {
  public:
   bool takes_more() const { return !has_end_ && bytes_ < kMostUnderWay; }
 
-  /// Reads what there is.
+  /// Reads available bytes.
   void take(int from, Clock::time_point due) {
     std::string bytes(65536, '\0');
     const ssize_t count = recv(from, bytes.data(), bytes.size(), MSG_DONTWAIT);
@@ -59,7 +59,7 @@ class Direction {
     under_way_.push_back({due, std::move(bytes)});
   }
 
-  /// Sends what is due. False when that was the end.
+  /// Sends bytes that are due; false after the end.
   bool pass_on(int to, Clock::time_point now) {
     while (!under_way_.empty() && under_way_.front().due <= now) {
       std::string& bytes = under_way_.front().bytes;
@@ -71,7 +71,7 @@ class Direction {
       bytes_ -= sent;
       bytes.erase(0, sent);
       if (!bytes.empty()) {
-        return true;  // it reads no faster
+        return true;  // the receiver is slower
       }
       under_way_.pop_front();
     }
@@ -86,14 +86,14 @@ class Direction {
  private:
   struct Piece {
     Clock::time_point due;
-    std::string bytes;  ///< none: the end
+    std::string bytes;  ///< empty: the end
   };
   std::deque<Piece> under_way_;
   std::size_t bytes_ = 0;
   bool has_end_ = false;
 };
 
-/// Two connections, of a peer and to the server, and what is under way between them.
+/// The connection of a peer, the one to the server, and the bytes in between.
 struct Line {
   Descriptor peer;
   Descriptor server;
@@ -101,7 +101,7 @@ struct Line {
   Direction to_peer = {};
   bool is_swallowed = false;
 
-  /// False when it has ended.
+  /// False if it has ended.
   bool move(Clock::time_point now, std::chrono::milliseconds delay, bool stalls) {
     for (auto [direction, from, to] :
          {std::tuple(&to_server, &peer, &server), std::tuple(&to_peer, &server, &peer)}) {

@@ -12,8 +12,8 @@ namespace oblique::test {
 /// cut again and again.
 class TcpProxy {
  public:
-  /// Forwards to the server at that ZeroMQ address. Every byte and every end arrives `delay` later,
-  /// in either direction. All connections are cut after each `cut_interval`, unless it is 0.
+  /// Forwards to the server at that ZeroMQ address. Every byte and every end arrives `delay` later
+  /// in both directions. All connections are cut after each `cut_interval`, unless it is 0.
   explicit TcpProxy(const std::string& server_url, std::chrono::milliseconds delay = {},
                     std::chrono::milliseconds cut_interval = {});
   ~TcpProxy();
@@ -22,14 +22,14 @@ class TcpProxy {
 
   /// Its ZeroMQ address.
   std::string url() const;
-  /// While true, nothing is forwarded; what arrived meanwhile is forwarded afterwards.
+  /// While true, nothing is forwarded; received bytes are forwarded afterwards.
   void stall(bool holds) { stalls_ = holds; }
-  /// From now on everything on the present connections is lost, their ends too, so that each side
-  /// believes the other silent. Later connections are forwarded.
+  /// Drops everything on the present connections, their ends too, so that each side is silent for
+  /// the other. Later connections are forwarded.
   void swallow() { ++swallowed_; }
-  /// Connections made so far.
+  /// Number of connections so far.
   int connections() const { return connections_; }
-  /// Connections cut so far.
+  /// Number of cut connections so far.
   int cuts() const { return cuts_; }
 
  private:
@@ -44,7 +44,7 @@ class TcpProxy {
   std::atomic<int> swallowed_ = 0;
   std::atomic<int> connections_ = 0;
   std::atomic<int> cuts_ = 0;
-  std::jthread thread_;  ///< last, as it uses the others
+  std::jthread thread_;  ///< last: it uses the other members
 };
 
 }  // namespace oblique::test

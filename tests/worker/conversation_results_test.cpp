@@ -117,7 +117,7 @@ TEST_F(ConversationTest, ManyRangesGoInSeveralMessagesOfWhichTheLastEndsTheBatch
   int numbers = 0;
   ASSERT_GT(sent_results().size(), 1U);
   for (const protocol::Results& results : sent_results()) {
-    EXPECT_LE(results.left_out_size(), 2 * protocol::kMostLeftOutRanges);
+    EXPECT_LE(results.left_out_size(), 2 * protocol::kMaxLeftOutRanges);
     numbers += results.left_out_size();
   }
   EXPECT_EQ(numbers, 50'000);
@@ -309,7 +309,7 @@ TEST_F(ConversationTest, AStoppingWorkerTakesNoTrace) {
   receive(trace_order(5));
   EXPECT_FALSE(has<SolveTrace>());
   ASSERT_EQ(sent(WorkerMessage::kTrace).size(), 1U);
-  EXPECT_TRUE(sent(WorkerMessage::kTrace)[0].trace().not_taken());
+  EXPECT_TRUE(sent(WorkerMessage::kTrace)[0].trace().declined());
 }
 
 }  // namespace

@@ -129,7 +129,7 @@ TEST(TraceSolverTest, AnOrderIsAnsweredByItsRowsAndItsResult) {
   solver.take(order(7));
   const auto trace = answer_of(solver);
   EXPECT_EQ(trace.trace_id(), 7U);
-  EXPECT_FALSE(trace.not_taken());
+  EXPECT_FALSE(trace.declined());
   EXPECT_EQ(trace.result().reals(0), 5.0);
   EXPECT_EQ(trace.states(), std::string("\0\0\0\3\3", 5));
   ASSERT_EQ(static_cast<std::size_t>(trace.values_size()), 5 * kNumbers);
@@ -148,7 +148,7 @@ TEST(TraceSolverTest, WhileOneIsSolvedAnotherIsNotTaken) {
   solver.take(order(8));
   const auto refused = answer_of(solver);
   EXPECT_EQ(refused.trace_id(), 8U);
-  EXPECT_TRUE(refused.not_taken());
+  EXPECT_TRUE(refused.declined());
   solving.release();
   EXPECT_EQ(answer_of(solver).trace_id(), 7U);
 }
@@ -162,7 +162,7 @@ TEST(TraceSolverTest, ACancelledOrderIsAnsweredAsNotTakenAndADroppedOneNotAtAll)
   solver.cancel(7);
   solving.release();
   const auto trace = answer_of(solver);
-  EXPECT_TRUE(trace.not_taken());
+  EXPECT_TRUE(trace.declined());
   EXPECT_EQ(trace.states().size(), 0U);
 
   solving.hold();

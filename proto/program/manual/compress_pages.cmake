@@ -1,4 +1,4 @@
-# Run by cpack: manual pages are compressed in packages, without a time or a name in them.
+# Run by cpack: compresses manual pages, without times or names in the result.
 find_program(GZIP gzip REQUIRED)
 file(GLOB found "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/share/man/man1/*.1"
      "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/*/usr/share/man/man1/*.1")

@@ -1,5 +1,4 @@
-# Installs the pages in `pages` to `man_folder`, with the date of today, or of SOURCE_DATE_EPOCH where that
-# is set.
+# Installs the pages in `pages` to `man_folder`, dated today or by SOURCE_DATE_EPOCH if it is set.
 string(TIMESTAMP date "%Y-%m-%d" UTC)
 cmake_path(ABSOLUTE_PATH man_folder BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}")
 file(GLOB found "${pages}/*.1")

@@ -1,11 +1,11 @@
-# From the help of a program or verb, as CLI11 prints it, to help from which help2man makes a page that
-# reads well: what stands in brackets behind a flag moves into its sentence, notes join the description.
-# Variables: nested (1: of a verb of a verb), examples (file that gets them, for an [EXAMPLES] of help2man).
+# Turns help as CLI11 prints it into help that help2man formats well: annotations behind a flag move
+# into its sentence, notes join the description. Variables: nested (name of a subcommand; empty for
+# others), examples (output file for the section [EXAMPLES]).
 { line[NR] = $0 }
 
 function trimmed(text) { gsub(/^ +| +$/, "", text); return text }
 
-# Takes what follows `word` in `head`, flags alone, and gives it as "--a, --b".
+# Removes `word` and the flags after it from `head`, and returns the flags as "--a, --b".
 function taken_from_head(word,    at, rest, count, names, i, given) {
   at = index(head, " " word ":")
   if (!at) return ""
@@ -20,8 +20,8 @@ function taken_from_head(word,    at, rest, count, names, i, given) {
   return given
 }
 
-# One option or argument: its head, and its meaning with what CLI11 says behind the name.
-function tell(text,    excludes, needs, required, default_, at, type) {
+# Prints one option or argument: its head, and its meaning with CLI11's annotations.
+function print_option(text,    excludes, needs, required, default_, at, type) {
   head = trimmed(head)
   at = index(head, " Needs:")
   excludes = taken_from_head("Excludes")
@@ -47,14 +47,14 @@ function tell(text,    excludes, needs, required, default_, at, type) {
   sub(/^-h,/, "-h, ", head)
   sub(/^-y,/, "-y, ", head)
   if (required && head ~ /^-/) text = text "; required"
-  # A machine's own, which it says itself.
+  # Omit a default that depends on the machine; the text names it.
   if (default_ != "" && default_ != "[]" && text !~ /default is/) text = text "; default: " default_
   if (needs != "") text = text "; only with " needs
   if (excludes != "") text = text "; not with " excludes
   printf "  %s\n%30s%s\n", head, "", text
 }
 
-function tell_entry(i,    text) {
+function print_entry(i,    text) {
   if (substr(line[i + 1], 1, column - 1) ~ /^ +$/ && substr(line[i], 4) !~ /  /) {
     head = line[i]
     text = trimmed(line[++i])
@@ -63,12 +63,12 @@ function tell_entry(i,    text) {
     text = trimmed(substr(line[i], column))
   }
   while (i < NR && substr(line[i + 1], 1, column - 1) ~ /^ +$/) text = text " " trimmed(line[++i])
-  tell(text)
+  print_option(text)
   return i
 }
 
-# An example, with what it is about as a comment above it, and long ones in several lines.
-function tell_example(text,    at, comment, command) {
+# Prints an example: its description as a comment above it, a long command on several lines.
+function print_example(text,    at, comment, command) {
   text = trimmed(text)
   comment = ""
   if (match(text, /   */)) {
@@ -87,7 +87,7 @@ function tell_example(text,    at, comment, command) {
   print command > examples
 }
 
-# The blank before the last flag in the first 66 characters of a command; 0: there is none.
+# Position of the blank before the last flag within the first 66 characters; 0: none.
 function last_flag(text,    i) {
   for (i = 66; i > 20; --i) if (substr(text, i, 3) == " --") return i
   for (i = 67; i < length(text); ++i) if (substr(text, i, 3) == " --") return i
@@ -99,22 +99,22 @@ END {
   about = ""
   body = 0
   for (i = 1; i <= NR && line[i] !~ /^Usage:/; ++i) {
-    if (line[i] ~ /^Example: /) tell_example(substr(line[i], 10))
+    if (line[i] ~ /^Example: /) print_example(substr(line[i], 10))
     else about = about line[i] "\n"
   }
   sub(/\n$/, "", about)
   if (about !~ /\.$/) about = about "."
   about = about "\n"
   first = i + 1
-  # What stands below the options: examples, and notes.
+  # Below the options: examples and notes.
   for (last = NR; last > first && line[last] !~ /^  /; --last) {}
   for (i = first; i <= NR; ++i) if (line[i] ~ /^Examples:/) { last = i - 1; break }
   notes = ""
   for (i = last + 1; i <= NR; ++i) {
     if (line[i] ~ /^Examples:/) {
-      while (line[i + 1] ~ /^  /) tell_example(line[++i])
+      while (line[i + 1] ~ /^  /) print_example(line[++i])
     } else if (line[i] !~ /^Exit codes:/) {
-      # Lines that are typed stay lines.
+      # Keep indented lines as they are.
       notes = notes line[i] (line[i] ~ /^  / ? "\n\n" : "\n")
     }
   }
@@ -127,7 +127,7 @@ END {
     if (line[i] ~ /^Positionals:/) print "Arguments:"
     else if (line[i] ~ /^Options:/) print nested ? "Flags:" : "Options:\n"
     else if (line[i] ~ /^Subcommands:/) print "*Commands*\n"
-    else if (line[i] ~ /^  [^ ]/) i = tell_entry(i)
+    else if (line[i] ~ /^  [^ ]/) i = print_entry(i)
     else print line[i]
   }
 }

@@ -4,20 +4,21 @@
 
 namespace oblique::protocol {
 
-/// What a program was built from, and how.
+/// The source and build of a program.
 struct Origin {
   std::string version;        ///< "0.2.0"
-  std::string commit;         ///< its first 12 digits; empty: not known
-  std::string committed_on;   ///< "2026-11-20"; empty: not known
-  bool with_changes = false;  ///< the tree had changes that were not committed
+  std::string commit;         ///< first 12 digits; empty: unknown
+  std::string committed_on;   ///< "2026-11-20"; empty: unknown
+  bool with_changes = false;  ///< the tree had uncommitted changes
   std::string compiler;       ///< "GCC 12.2.0"
   std::string build_type;  ///< "Release", or with sanitizers "RelWithDebInfo, sanitizers: thread"
 };
 
 Origin origin();
 
-/// As `--version` says it after the program's name: "0.2.0 (commit 0123456789ab, 2026-11-20)",
-/// "0.2.0 (commit 0123456789ab with changes, 2026-11-20)" or "0.2.0 (commit unknown)".
+/// The text that `--version` prints after the program's name: "0.2.0 (commit 0123456789ab,
+/// 2026-11-20)", "0.2.0 (commit 0123456789ab with changes, 2026-11-20)" or "0.2.0 (commit
+/// unknown)".
 std::string version_and_commit();
 
 }  // namespace oblique::protocol

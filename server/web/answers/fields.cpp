@@ -52,8 +52,8 @@ std::optional<double> FieldReader::number(const std::string& name) const {
 
 std::uint64_t FieldReader::cells(const std::string& name, std::uint64_t usual) const {
   const std::uint64_t cells = whole(name).value_or(usual);
-  if (cells < 1 || cells > kMostCells) {
-    throw std::invalid_argument(fmt::format("{} must be from 1 to {}", name, kMostCells));
+  if (cells < 1 || cells > kMaxCells) {
+    throw std::invalid_argument(fmt::format("{} must be from 1 to {}", name, kMaxCells));
   }
   return cells;
 }

@@ -1,4 +1,4 @@
-// Slices and bins: values on a grid, and counts and averages in bins.
+// Pictures: slices (values on a grid) and bins (counts and averages).
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -29,25 +29,23 @@ namespace {
 using nlohmann::ordered_json;
 using protocol::AxisLayout;
 
-/// The bytes of numbers, for the end of `numbers_answer`.
 template <typename Number>
 std::string bytes_of(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
-/// The value of a cell that is an integer or a real number.
 double real_of(const protocol::Cell& cell) {
   return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
 }
 
-/// The column that a field names. Throws std::invalid_argument unless it is a number or, where
+/// The column that a field names. Throws std::invalid_argument unless it is numeric or, where
 /// allowed, a category.
 PictureColumn picture_column(const FieldReader& fields, const std::string& name,
                              bool may_be_category) {
   const std::string text = fields.text(name).value_or("");
   auto column = find_picture_column(text);
   if (!column || (column->is_category && !may_be_category)) {
-    throw std::invalid_argument(fmt::format("{} must be a column of numbers{}; \"{}\" is none",
+    throw std::invalid_argument(fmt::format("{} must be a column of numbers{}, and \"{}\" is not",
                                             name, may_be_category ? " or categories" : "",
                                             protocol::excerpt(text)));
   }
@@ -58,7 +56,7 @@ PictureColumn picture_column(const FieldReader& fields, const std::string& name,
 
 constexpr std::uint64_t kUsualCells = 256;
 
-/// The axis of that key; null if the block has no such axis with values of its own.
+/// The axis of that key; null if the block has none with listed or ranged values.
 const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key) {
   const auto axis = std::ranges::find_if(axes, [key](const AxisLayout& layout) {
     return layout.axis->key() == key && protocol::has_own_values(*layout.axis);
@@ -66,12 +64,12 @@ const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key
   return axis == axes.end() ? nullptr : &*axis;
 }
 
-/// One side of a slice: the values of an axis that are shown.
+/// One side of a slice: the shown values of an axis.
 struct Side {
   const AxisLayout* axis = nullptr;  ///< null: the slice is a line
-  std::uint64_t first = 0;           ///< number of the first value in the selected part
+  std::uint64_t first = 0;           ///< index of the first value in the selected part
   std::uint64_t last = 0;
-  std::vector<std::uint64_t> numbers = {0};  ///< numbers of the shown values, rising
+  std::vector<std::uint64_t> numbers = {0};  ///< indices of the shown values, ascending
   std::vector<double> values = {};           ///< the shown values
 
   std::uint64_t stride() const { return axis == nullptr ? 0 : axis->stride; }
@@ -101,7 +99,6 @@ Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::strin
   const std::uint64_t steps = std::max<std::uint64_t>(shown - 1, 1);
   side.numbers.clear();
   for (std::uint64_t i = 0; i < shown; ++i) {
-    // Half is added to round to the nearest value.
     side.numbers.push_back(side.first +
                            (shown > 1 ? (2 * i * steps_there + steps) / (2 * steps) : 0));
     side.values.push_back(protocol::axis_value(*axis.axis, side.numbers.back()));
@@ -109,7 +106,7 @@ Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::strin
   return side;
 }
 
-/// Parses `at`: numbers of the values at which axes are held, by key.
+/// Parses `at`: the indices at which the other axes are fixed, by key.
 std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& axes,
                                                  const std::string& at) {
   std::map<std::string, std::uint64_t> held;
@@ -119,9 +116,9 @@ std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& 
     const Fields number{{"at", std::string(entry.substr(std::min(mark + 1, entry.size())))}};
     const AxisLayout* const axis = find(axes, key);
     if (axis == nullptr || !FieldReader(number).text("at")) {
-      throw std::invalid_argument(
-          fmt::format("at must be KEY@NUMBER of axes of the block, separated by commas; {} is none",
-                      protocol::excerpt(entry)));
+      throw std::invalid_argument(fmt::format(
+          "at must list KEY@NUMBER for axes of the block, separated by commas; {} is not one",
+          protocol::excerpt(entry)));
     }
     held[key] = *FieldReader(number).whole("at");
     if (held[key] >= axis->values) {
@@ -132,7 +129,7 @@ std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& 
   return held;
 }
 
-/// A plane, or a line, through the points of a block whose axes multiply.
+/// A plane, or a line, through the points of a product block.
 struct Grid {
   Grid(const protocol::PointTable& table, const FieldReader& fields);
 
@@ -140,8 +137,8 @@ struct Grid {
   std::vector<AxisLayout> axes;
   Side x;
   Side y;
-  ordered_json at = ordered_json::array();  ///< the axes that are held
-  std::uint64_t first_point;                ///< point of the first values of both axes
+  ordered_json at = ordered_json::array();  ///< the fixed axes
+  std::uint64_t first_point;                ///< point at the first values of both axes
 };
 
 Grid::Grid(const protocol::PointTable& table, const FieldReader& fields)
@@ -152,15 +149,15 @@ Grid::Grid(const protocol::PointTable& table, const FieldReader& fields)
   const auto number = static_cast<int>(std::min<std::uint64_t>(block, 1U << 30U));
   if (number >= blocks.size() ||
       protocol::block_kind(blocks[number]) != protocol::BlockKind::kProduct) {
-    throw std::invalid_argument(fmt::format(
-        "block must be the number of a block whose axes multiply, below {}", blocks.size()));
+    throw std::invalid_argument(
+        fmt::format("block must be the number of a grid block, below {}", blocks.size()));
   }
   axes = protocol::layout_of(blocks[number]);
   const AxisLayout* const x_axis = find(axes, x_key);
   const AxisLayout* const y_axis = find(axes, y_key);
   if (x_axis == nullptr || x_key == y_key || (!y_key.empty() && y_axis == nullptr)) {
     throw std::invalid_argument(
-        fmt::format("x must be an axis of block {}, and y none or another one", block));
+        fmt::format("x must be an axis of block {}, and y another one or empty", block));
   }
   x = side_of(*x_axis, fields, "x");
   if (y_axis != nullptr) {
@@ -181,13 +178,13 @@ Grid::Grid(const protocol::PointTable& table, const FieldReader& fields)
   }
 }
 
-/// Why a cell has no value. In numbers a mark is the NaN with the bits kNan + mark, in categories
-/// the code 0xffff - mark.
+/// Why a cell has no value. Encoded in numbers as the NaN with the bits kNan + mark, in categories
+/// as the code 0xffff - mark.
 enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFiltered, kHasValue };
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// The offset of the point number for each cell along a side, as a JSON array.
+/// The offset in point numbers of each cell along a side, as a JSON array.
 std::string offsets_json(const Side& side, std::uint64_t first) {
   std::vector<std::uint64_t> offsets;
   for (const std::uint64_t number : side.numbers) {
@@ -217,11 +214,12 @@ class SliceAnswer : public StudyAnswer {
   const Fields fields_;
   const PictureColumn column_;
   std::optional<Grid> grid_;
-  std::vector<std::pair<std::uint64_t, std::size_t>> points_;  // and their cells, by rising point
-  std::size_t next_point_ = 0;  // index of the first one that can have the next row
-  std::vector<Mark> marks_;     // of the cells, row by row
-  std::vector<float> numbers_;  // the same, of a column of numbers
-  std::map<std::string, std::vector<std::size_t>> places_;  // of categories: cells by text
+  // points and their cells, by rising point
+  std::vector<std::pair<std::uint64_t, std::size_t>> points_;
+  std::size_t next_point_ = 0;  // index of the first point that the next row can have
+  std::vector<Mark> marks_;     // marks of the cells, row by row
+  std::vector<float> numbers_;  // values of the cells in a numeric column
+  std::map<std::string, std::vector<std::size_t>> places_;  // cells by text in a category column
 };
 
 StudyAnswer::Next SliceAnswer::next(const ServedStudy& study) {
@@ -248,7 +246,7 @@ void SliceAnswer::list_points() {
   numbers_.resize(points_.size());
 }
 
-/// Selects point, value and mark of the cells that have a row. SQLite looks each point up by key.
+/// Selects point, value and mark of cells with a row. SQLite looks up each point by key.
 protocol::StudyQuery SliceAnswer::query() const {
   protocol::StudyQuery query;
   query.add_select("point");
@@ -272,7 +270,7 @@ void SliceAnswer::take_row(const protocol::ChunkRows& row) {
     ++next_point_;
   }
   if (next_point_ == points_.size() || points_[next_point_].first != point) {
-    throw std::runtime_error("a reader process returned another point than it was asked for");
+    throw std::runtime_error("a reader process returned a point that was not requested");
   }
   const std::size_t cell = points_[next_point_].second;
   marks_[cell] = static_cast<Mark>(row.cell(2).integer);
@@ -324,8 +322,8 @@ std::vector<std::uint32_t> SliceAnswer::number_bits() const {
   return bits;
 }
 
-/// Returns the codes of the cells, and adds their dictionary to `head`. Texts are sorted by
-/// falling frequency, then alphabetically, as in `oblique plot`.
+/// Returns the codes of the cells and adds their dictionary to `head`. Texts are sorted by falling
+/// frequency, then alphabetically, as in `oblique plot`.
 std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
   std::vector<std::uint16_t> codes;
   for (const Mark mark : marks_) {
@@ -340,8 +338,7 @@ std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
   for (std::size_t code = 0; code < ranked.size(); ++code) {
     const auto& [text, places] = ranked[code];
     for (const std::size_t cell : places) {
-      // A code above the limit would be a mark; only a file that was changed by hand has so many
-      // texts.
+      // A code above the limit would be a mark. Only an edited database has so many texts.
       codes[cell] = static_cast<std::uint16_t>(std::min<std::size_t>(code, kLastCode - 5));
     }
     head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});
@@ -352,18 +349,17 @@ std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
 // ---- Bins ---------------------------------------------------------------------------------------
 
 constexpr std::uint64_t kUsualBins = 64;
-/// Values within this relative distance of an end count as inside: users type 0.2 for 0.6 / 3.
+/// Values within this relative distance of an end count as inside, because users type 0.2 for 0.6 /
+/// 3.
 constexpr double kEndTolerance = 1e-12;
 
-/// A number as SQL text.
 std::string sql_number(double value) {
   constexpr double kMost = std::numeric_limits<double>::max();
   return fmt::format("({:#})", std::clamp(value, -kMost, kMost));
 }
 
-/// The bins along one column.
 struct BinSide {
-  std::string name;  ///< x or y
+  std::string name;  ///< "x" or "y"
   PictureColumn column;
   std::uint64_t bins = kUsualBins;
   bool is_logarithmic = false;
@@ -373,7 +369,7 @@ struct BinSide {
   double most = 0.0;
 
   bool has_typed_ends() const { return typed_least && typed_most; }
-  /// The SQL condition for rows whose value can be in a bin of this side.
+  /// The SQL condition for rows whose value may be in a bin of this side.
   std::string has_place_sql() const {
     return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
   }
@@ -384,7 +380,6 @@ struct BinSide {
     return fmt::format("{} BETWEEN {} AND {}", column.name, sql_number(least - slack_below),
                        sql_number(most + slack_above));
   }
-  /// The SQL expression for the number of a row's bin.
   std::string bin_sql() const {
     const double first = place_of(least);
     const double width = place_of(most) - first;
@@ -395,7 +390,7 @@ struct BinSide {
     return fmt::format("max(min(CAST(({} - {}) * {} AS INTEGER), {}), 0)", place, sql_number(first),
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
-  /// Sets the ends that the user did not give to those of `range`, the range of the column; it is
+  /// Sets ends that the user did not give to those of `range`, the range of the column, which is
   /// empty if no row has a value. Equal ends make one bin. Throws std::invalid_argument for wrong
   /// ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
@@ -443,9 +438,9 @@ class BinsAnswer : public StudyAnswer {
   HttpAnswer answer(std::uint64_t study) const;
 
   std::vector<BinSide> sides_;
-  std::optional<PictureColumn> z_;  // whose mean is requested
+  std::optional<PictureColumn> z_;  // column whose mean is requested
   bool has_ends_ = false;
-  std::vector<std::uint32_t> counts_;  // empty while the ends are read
+  std::vector<std::uint32_t> counts_;  // empty until the ends are known
   std::vector<float> means_;
   std::uint64_t outside_ = 0;
 };
@@ -471,7 +466,7 @@ StudyAnswer::Next BinsAnswer::next(const ServedStudy& study) {
   return counts_.empty() ? Next(counts_query()) : Next(answer(study.id));
 }
 
-/// A query of the solved points that meet the condition and have a value on all sides.
+/// A query of the solved points that meet the condition and have values for all sides.
 protocol::StudyQuery BinsAnswer::query() const {
   std::string where =
       condition().empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition());
@@ -491,7 +486,7 @@ protocol::StudyQuery BinsAnswer::ends_query() const {
   return query;
 }
 
-/// Counts by a query with one row per bin. Rows beyond the ends have the bin NULL.
+/// A query with one row per bin. Rows outside the ends have the bin NULL.
 protocol::StudyQuery BinsAnswer::counts_query() {
   std::size_t size = 1;
   std::string bin;

@@ -52,7 +52,7 @@ ordered_json json_of(const protocol::Cell& cell) {
   return nullptr;
 }
 
-/// As RFC 4180 has it; NULL is an empty field.
+/// Formats a field as in RFC 4180; NULL is an empty field.
 std::string csv_field(const ordered_json& value) {
   if (!value.is_string()) {
     return value.is_null() ? std::string() : value.dump();
@@ -76,13 +76,11 @@ std::string csv_line(const ordered_json& values) {
   return fields + "\r\n";
 }
 
-/// The rows of a query, sent on chunk by chunk.
 class RowStream {
  public:
   RowStream(std::shared_ptr<ServiceExchange> exchange, bool as_csv)
       : exchange_(std::move(exchange)), as_csv_(as_csv) {}
 
-  /// Takes the first chunk, which has the columns.
   void begin(const protocol::QueryReply& chunk) {
     const ordered_json columns(
         std::vector<std::string>(chunk.columns().begin(), chunk.columns().end()));
@@ -107,7 +105,7 @@ class RowStream {
  private:
   void take(const protocol::QueryReply& chunk) {
     if (!protocol::is_sound(chunk)) {
-      throw std::runtime_error("a reader process of the server sent no valid answer");
+      throw std::runtime_error("a reader process of the server sent an invalid answer");
     }
     for (protocol::ChunkRows rows(chunk); rows.next(); ++rows_) {
       ordered_json values = ordered_json::array();
@@ -126,7 +124,7 @@ class RowStream {
 
   std::shared_ptr<ServiceExchange> exchange_;
   bool as_csv_;
-  std::string text_;  // not sent yet
+  std::string text_;  // text that is not sent yet
   std::uint64_t rows_ = 0;
   bool has_ended_ = false;
 };
@@ -179,11 +177,10 @@ HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::Tr
                         numbers + states);
 }
 
-/// What follows from a reply: the answer or the next request.
 using NextStep = std::variant<HttpAnswer, ClientRequest>;
 using OnReply = std::function<NextStep(const ClientReply&)>;
 
-/// Sends requests one after the other until there is an answer. An error of the service is one.
+/// Sends requests one after another until there is an answer. An error of the service is an answer.
 PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const ClientRequest& first,
                            OnReply on_reply) {
   exchange->send(first);
@@ -200,8 +197,8 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
-/// The same for a study that HTTP identifies by its number and the service by its name, which
-/// `request` gets.
+/// The same for a study that HTTP identifies by number and the service by name; sets the name in
+/// `request`.
 PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
                                std::function<ClientRequest(const std::string&)> request,
                                OnReply on_reply) {
@@ -284,10 +281,10 @@ PendingAnswer submit_study(ServiceClient& service, const std::string& body) {
                         const protocol::SubmitReply& submitted = reply.submit();
                         return json_answer({{"id", submitted.study_id()},
                                             {"points", submitted.points()},
-                                            {"settled", submitted.settled()},
+                                            {"settled", submitted.completed()},
                                             {"created", submitted.created()},
                                             {"appended", submitted.appended()},
-                                            {"taken", submitted.taken().points()}});
+                                            {"taken", submitted.reused().points()}});
                       });
 }
 
@@ -323,7 +320,7 @@ PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint
     return FieldReader(fields).text(name).value_or("") == "1";
   };
   const bool with_shape = is_set("shape");
-  ClientRequest request;  // `every` stays 0: as many instants as fit
+  ClientRequest request;  // `every` is 0: as many instants as fit
   request.mutable_trace()->set_point(point);
   request.mutable_trace()->set_shape(with_shape);
   request.mutable_trace()->set_fall(is_set("fall"));
@@ -336,7 +333,7 @@ PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint
                  ? std::nullopt
                  : std::optional(
                        error_answer(MHD_HTTP_SERVICE_UNAVAILABLE,
-                                    "too many traces are on their way to browsers already"));
+                                    "too many traces are being sent to browsers: try again later"));
     }
     if (slot) {
       flow = named_study_flow(

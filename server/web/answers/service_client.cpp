@@ -54,7 +54,7 @@ void ServiceClient::decode_frames() {
     }
     const auto awaited = awaited_.find(reply.request_id());
     if (awaited == awaited_.end()) {
-      continue;  // a notice of a delay belongs to no request
+      continue;  // StillWorking belongs to no request
     }
     const bool is_part = reply.has_query() && !reply.query().ends();
     awaited->second.may_end = awaited->second.may_end && is_part;
@@ -79,11 +79,11 @@ void ServiceClient::send(protocol::ClientRequest request) {
 }
 
 std::vector<std::string> ServiceClient::take() {
-  constexpr std::size_t kMostATurn = 8;  // so that the loop can serve other clients in between
+  constexpr std::size_t kMaxATurn = 8;  // lets the loop serve other clients in between
   woken_.clear();
   const std::lock_guard lock(mutex_);
   std::vector<std::string> some;
-  while (!requests_.empty() && some.size() < kMostATurn) {
+  while (!requests_.empty() && some.size() < kMaxATurn) {
     some.push_back(std::move(requests_.front()));
     requests_.pop_front();
   }

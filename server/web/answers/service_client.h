@@ -18,11 +18,13 @@
 
 namespace oblique::server {
 
-/// So many may do something at a time. Must outlive what it gives.
+/// A limited number of slots, for example for concurrent requests. Must outlive the slots that it
+/// gives out.
 class Slots {
  public:
   explicit Slots(std::size_t count) : free_(count) {}
-  /// A slot, which is free again when the pointer's last copy is gone. Null: none is free.
+  /// Takes a slot, which is free again when the last copy of the pointer is gone. Null if none is
+  /// free.
   std::shared_ptr<const void> take() {
     if (free_ == 0) {
       return nullptr;
@@ -35,49 +37,50 @@ class Slots {
   std::size_t free_;
 };
 
-/// The recipes of the last few studies that answers were about.
+/// The recipes of the last few requested studies.
 class RecipeCache {
  public:
   using Table = std::shared_ptr<const protocol::PointTable>;
 
-  /// Null: it is not kept, or the study has other points by now.
+  /// Null if the recipe is not in the cache, or the study has grown since.
   Table find(std::uint64_t study, std::uint64_t points) const;
   void put(std::uint64_t study, Table table);
 
  private:
-  std::deque<std::pair<std::uint64_t, Table>> kept_;  // the latest first
+  std::deque<std::pair<std::uint64_t, Table>> kept_;  // latest first
 };
 
-/// The HTTP side as one client of the service: requests go to the loop's thread, and replies back.
+/// The HTTP thread as one client of the service: passes requests to the loop's thread, and replies
+/// back.
 class ServiceClient {
  public:
-  /// The identity of this client for the service; no connection has it.
+  /// The identity of this client in the service, which no connection has.
   static constexpr const char* kIdentity = "the page";
 
   // ---- Called by the HTTP server's thread.
-  /// A new request number, different from those of HTTP requests.
+  /// A new request number, different from those of browser requests.
   std::uint64_t new_number() { return ++last_number_; }
   void ask(std::uint64_t number, protocol::ClientRequest request);
-  /// The next reply to request `number`; none if there is none yet.
+  /// The next reply to request `number`, if there is one.
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
-  /// Drops further replies to request `number`, and ends its query or trace.
+  /// Drops further replies to request `number` and ends its query or trace.
   void forget(std::uint64_t number);
   RecipeCache& recipes() { return recipes_; }
-  /// For the requests whose replies take much memory.
+  /// Slots for requests whose replies need much memory.
   Slots& recipe_slots() { return recipe_slots_; }
   Slots& trace_slots() { return trace_slots_; }
 
   // ---- Called by the loop's thread.
   /// Readable when there are requests to take.
   int descriptor() const { return woken_.descriptor(); }
-  /// The next few frames of ClientRequest.
+  /// Takes the next few encoded ClientRequests.
   std::vector<std::string> take();
-  /// Adds a received frame of ClientReply.
+  /// Adds an encoded ClientReply.
   void put(std::string frame);
 
  private:
   struct Awaited {
-    bool may_end = false;  ///< a query or trace whose answer has not ended
+    bool may_end = false;  ///< a query or trace without its last reply
     std::deque<protocol::ClientReply> replies = {};
   };
 
@@ -96,9 +99,9 @@ class ServiceClient {
   Slots trace_slots_{limits::kTracesOfPage};
 };
 
-/// Requests to the service, one after the other. Each but the ones for more rows has a number of
-/// its own, because a late error about the last one may follow. The destructor ends what the
-/// service still does.
+/// Sends requests to the service one after another. Each except those for more rows has its own
+/// number, because a late error about the previous one may follow. The destructor ends the running
+/// request.
 class ServiceExchange {
  public:
   explicit ServiceExchange(ServiceClient& service) : service_(service) {}
@@ -112,11 +115,11 @@ class ServiceExchange {
     chunks_ = 0;
     service_.ask(number_, request);
   }
-  /// One more chunk of the answer to the query was taken.
+  /// Confirms one more chunk of the answer to the query.
   void request_more_rows() {
     protocol::ClientRequest more;
     more.mutable_more_rows()->set_request_id(number_);
-    more.mutable_more_rows()->set_taken(++chunks_);
+    more.mutable_more_rows()->set_received(++chunks_);
     service_.ask(number_, more);
   }
   /// The next reply, if it has come.
@@ -128,7 +131,7 @@ class ServiceExchange {
   std::uint64_t chunks_ = 0;
 };
 
-/// The HTTP answer to an error of the service; it does not repeat the name of an unknown study.
+/// The HTTP answer for an error of the service, without the name of an unknown study.
 HttpAnswer failure(const protocol::ErrorReply& error);
 
 }  // namespace oblique::server

@@ -31,7 +31,7 @@ using nlohmann::ordered_json;
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-/// Longer lists of values are not in the answer; slices have the values that they show.
+/// Longer lists of values are omitted; slices contain the values that they show.
 constexpr std::uint64_t kMostListed = 4096;
 
 ordered_json axis_json(const protocol::AxisLayout& layout) {
@@ -85,9 +85,9 @@ ordered_json columns_json() {
   return columns;
 }
 
-/// The model of blocks without model axes, key by key.
+/// The model of blocks without model axes, as a list of keys.
 ordered_json model_json(const protocol::Recipe& recipe) {
-  const auto model = protocol::unjudged_from_message(recipe.model());
+  const auto model = protocol::from_message_unchecked(recipe.model());
   ordered_json keys = ordered_json::array();
   for (const solver::ParameterKey& key : solver::model_keys()) {
     keys.push_back({{"key", key.name},
@@ -105,9 +105,9 @@ class WholeStudy : public StudyAnswer {
   Next next(const ServedStudy& study) override {
     const protocol::PointTable& table = *study.table;
     const protocol::Recipe& recipe = table.recipe();
-    constexpr int kMostBlocks = 1000;
+    constexpr int kMaxBlocks = 1000;
     ordered_json blocks = ordered_json::array();
-    for (int i = 0; i < std::min(recipe.blocks_size(), kMostBlocks); ++i) {
+    for (int i = 0; i < std::min(recipe.blocks_size(), kMaxBlocks); ++i) {
       blocks.push_back(block_json(recipe.blocks(i), table.block(static_cast<std::size_t>(i))));
     }
     return json_answer({{"id", study.id},
@@ -117,7 +117,7 @@ class WholeStudy : public StudyAnswer {
                         {"errors", recipe.errors()},
                         {"model", model_json(recipe)},
                         {"blocks", std::move(blocks)},
-                        {"blocks_left_out", std::max(recipe.blocks_size() - kMostBlocks, 0)},
+                        {"blocks_left_out", std::max(recipe.blocks_size() - kMaxBlocks, 0)},
                         {"columns", columns_json()},
                         {"usual_columns", usual_columns(recipe)}});
   }
@@ -147,25 +147,26 @@ class OnePoint : public StudyAnswer {
   const std::uint64_t point_;
 };
 
-/// A model from JSON: names of a preset and an integrator, and numbers of single keys.
+/// Parses a model from JSON: preset and integrator are names, other keys numbers.
 protocol::ModelParameters model_of(const nlohmann::json& written) {
-  protocol::WrittenModel model;
+  protocol::ModelInput model;
   for (const auto& [key, value] : written.items()) {
-    if (key == protocol::WrittenModel::kPreset && value.is_string()) {
+    if (key == protocol::ModelInput::kPreset && value.is_string()) {
       model.preset = value.get<std::string>();
     } else if (key == "integrator" && value.is_string()) {
       model.values[key] = static_cast<double>(solver::integrator_named(value.get<std::string>()));
     } else if (value.is_number()) {
       model.values[key] = value.get<double>();
     } else {
-      throw solver::InputError("model: " + key + " must be a number; preset and integrator a name");
+      throw solver::InputError("model: " + key +
+                               " must be a number (preset and integrator: a name)");
     }
   }
   return protocol::to_message(model.model());
 }
 
-/// The least drop [m] above which only a computed fall shows whether the tip reaches an H of the
-/// study; none if the tip reaches all of them.
+/// The smallest drop [m] above which only a computed fall shows whether the tip reaches H, if the
+/// study has such an H.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
@@ -208,7 +209,7 @@ class Flow {
       }
     }
     if (FlowClock::now() >= deadline_) {
-      return error_answer(503, "that takes too long: ask for less, as by a condition");
+      return error_answer(503, "the request takes too long: narrow it, for example by a condition");
     }
     return std::nullopt;
   }
@@ -225,11 +226,11 @@ class Flow {
       slot_.reset();
       return go_on();
     }
-    if (error_) {  // the condition alone is not wrong
+    if (error_) {  // the condition is not the fault
       return error_;
     }
     if (!protocol::is_sound(reply.query())) {
-      throw std::runtime_error("a reader process of the server sent no valid answer");
+      throw std::runtime_error("a reader process of the server sent an invalid answer");
     }
     for (protocol::ChunkRows rows(reply.query()); rows.next();) {
       answer_->take_row(rows);
@@ -249,7 +250,6 @@ class Flow {
     return find_recipe();
   }
 
-  /// In the cache, or requests it unless as many do as may.
   std::optional<HttpAnswer> find_recipe() {
     study_.table = service_.recipes().find(study_.id, points_);
     if (study_.table) {
@@ -300,12 +300,12 @@ class Flow {
   ServiceClient& service_;
   ServiceExchange exchange_;
   ServedStudy study_;
-  std::uint64_t points_ = 0;          // of the study
-  std::shared_ptr<const void> slot_;  // while the recipe is requested
+  std::uint64_t points_ = 0;          // number of points of the study
+  std::shared_ptr<const void> slot_;  // held while the recipe is requested
   bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;
-  std::optional<HttpAnswer> error_;  // set while the condition runs as it was written
+  std::optional<HttpAnswer> error_;  // set while the unchanged condition runs alone
 };
 
 }  // namespace
@@ -329,7 +329,7 @@ HttpAnswer check_answer(const std::string& body) {
   protocol::SubmitRequest asked = study_of_body(body);
   return parse_request([&] {
     const protocol::PointTable table(std::move(*asked.mutable_recipe()));
-    table.judge_points();
+    table.validate_points();
     const protocol::StudySize size = protocol::size_of(table);
     return json_answer({{"points", size.points},
                         {"models", size.models},
@@ -342,7 +342,7 @@ HttpAnswer check_answer(const std::string& body) {
 }
 
 protocol::SubmitRequest study_of_body(const std::string& body) {
-  // Protobuf refuses deeper JSON too. Copying or writing a deeper value would overflow the stack.
+  // Protobuf refuses deeper JSON too. Copying or writing it would overflow the stack.
   constexpr int kDeepest = 50;
   bool is_deep = false;
   auto whole = nlohmann::json::parse(
@@ -352,7 +352,7 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
         return !is_deep;
       },
       false);
-  const std::string no_study = "the body is no study: ";
+  const std::string no_study = "the body is not a study: ";
   if (is_deep) {
     throw std::invalid_argument(no_study + "it is nested too deeply");
   }
@@ -369,7 +369,7 @@ protocol::SubmitRequest study_of_body(const std::string& body) {
                                 protocol::excerpt({read.message().data(), read.message().size()}));
   }
   if (has_model && (!written.is_object() || asked.recipe().has_model())) {
-    throw std::invalid_argument(no_study + "its model is said once, as an object");
+    throw std::invalid_argument(no_study + "give its model once, as an object");
   }
   if (has_model) {
     *asked.mutable_recipe()->mutable_model() = parse_request([&] { return model_of(written); });

@@ -15,16 +15,17 @@
 #include <microhttpd.h>
 #include <nlohmann/json.hpp>
 
-// Requests and answers over HTTP.
+// HTTP requests and answers.
 namespace oblique::server {
 
 struct HttpRequest {
   std::string method;
-  std::string path;                           ///< without the query string
-  std::map<std::string, std::string> fields;  ///< of the query string, decoded; first of equal
-  std::multimap<std::string, std::string> headers;  ///< names in lower case
+  std::string path;  ///< without the query string
+  /// decoded fields of the query string; the first of equal names
+  std::map<std::string, std::string> fields;
+  std::multimap<std::string, std::string> headers;  ///< header names in lower case
   std::string body;
-  bool has_zero_bytes = false;  ///< in a field
+  bool has_zero_bytes = false;  ///< a field contains zero bytes
 
   /// All values of a header.
   std::vector<std::string> all(const std::string& name) const;
@@ -32,27 +33,28 @@ struct HttpRequest {
   std::string header(const std::string& name) const;
 };
 
-/// Returns the bytes to send next, empty if there are none yet; nothing at the end. Called on the
-/// HTTP server's thread, again after each wake; destroyed when the connection ends. Throws to break
-/// the answer off.
+/// Returns the next bytes of an answer; empty if there are none yet, nothing at the end. Called on
+/// the HTTP thread, again after each wake; destroyed when the connection ends. Throws to break off
+/// the answer.
 using HttpStream = std::function<std::optional<std::string>()>;
 
 struct HttpAnswer {
   unsigned status;  ///< MHD_HTTP_OK and so on
   std::string content_type;
   std::string body;
-  std::vector<std::pair<std::string, std::string>> headers = {};  ///< besides those of all answers
-  HttpStream stream = {};                                         ///< replaces the body if set
-  std::shared_ptr<const void> until_sent = {};  ///< destroyed when the body was sent
+  /// in addition to those of all answers
+  std::vector<std::pair<std::string, std::string>> headers = {};
+  HttpStream stream = {};                       ///< replaces the body, if set
+  std::shared_ptr<const void> until_sent = {};  ///< destroyed when the body has been sent
 };
 
-/// Returns the answer when it is ready. Called on the HTTP server's thread, again after each wake;
-/// destroyed when the answer was returned or the client has disconnected.
+/// Returns the answer when it is ready. Called on the HTTP thread, again after each wake; destroyed
+/// when it has returned the answer or the client has disconnected.
 using PendingAnswer = std::function<std::optional<HttpAnswer>()>;
 
 using HttpOutcome = std::variant<HttpAnswer, PendingAnswer>;
 
-/// The number that is the whole of a text; none for other texts.
+/// Parses a text that is a single number; none for other texts.
 template <typename Number>
 std::optional<Number> read_number(const std::string& text) {
   Number number{};
@@ -61,20 +63,19 @@ std::optional<Number> read_number(const std::string& text) {
   return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
 }
 
-/// A sentence as plain text.
+/// An answer with a sentence as plain text.
 HttpAnswer text_answer(unsigned status, std::string_view sentence);
 
 HttpAnswer json_answer(const nlohmann::ordered_json& value, unsigned status = 200);
 
-/// {"error": sentence}
+/// An answer with the JSON {"error": sentence}.
 HttpAnswer error_answer(unsigned status, const std::string& sentence);
 
-/// Binary numbers after a head that describes them: four bytes with the length of the head, little
-/// endian; the head as JSON, padded with spaces so that the numbers begin at a multiple of eight
-/// bytes; the numbers.
+/// An answer with binary numbers: four bytes with the length of the head, little endian; the head
+/// as JSON, padded with spaces so that the numbers begin at a multiple of eight bytes; the numbers.
 HttpAnswer numbers_answer(const nlohmann::ordered_json& head, const std::string& numbers);
 
-/// JSON on one line; bytes that are not UTF-8 are replaced.
+/// Formats JSON on one line; replaces bytes that are not UTF-8.
 std::string json_text(const nlohmann::ordered_json& value);
 
 }  // namespace oblique::server

@@ -20,7 +20,7 @@
 namespace oblique::server {
 namespace {
 
-/// What a page of ours may load, and who may embed it: only this server.
+/// Content-Security-Policy: our pages load only files of this server, and no page may embed them.
 constexpr const char* kContentPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -47,7 +47,7 @@ MHD_Result take_field(void* into, MHD_ValueKind /*kind*/, const char* name, std:
 }
 
 /// Whether the client has closed the connection or its sending half, as browsers do when they no
-/// longer want the answer. libmicrohttpd does not watch a suspended connection.
+/// longer need the answer. libmicrohttpd does not watch a suspended connection.
 bool is_gone(MHD_Connection* connection) {
   pollfd item{MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
               POLLRDHUP, 0};
@@ -82,14 +82,12 @@ void add_headers(MHD_Response* response, const HttpAnswer& answer) {
 
 }  // namespace
 
-/// A request and what became of it.
 struct HttpServer::Exchange {
   HttpRequest request;
   PendingAnswer pending = {};
   bool is_answered = false;
 };
 
-/// An answer that is sent piece by piece.
 struct HttpServer::Stream {
   Stream(HttpServer& of, MHD_Connection* to, HttpStream from)
       : server(of), connection(to), next(std::move(from)) {
@@ -103,7 +101,7 @@ struct HttpServer::Stream {
   MHD_Connection* const connection;
   HttpStream next;
   std::string unsent = {};
-  std::size_t sent = 0;  ///< bytes of `unsent`
+  std::size_t sent = 0;  ///< number of bytes of `unsent` that were sent
 };
 
 HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
@@ -120,8 +118,7 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
   if (socket < 0) {
     throw std::runtime_error("cannot listen at " + url_ + ": " + std::strerror(errno));
   }
-  // Not by epoll: there libmicrohttpd 0.9.75 stops serving once the limit of connections is
-  // reached.
+  // Not epoll, with which libmicrohttpd 0.9.75 stops serving at the connection limit.
   daemon_ = MHD_start_daemon(
       MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_POLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
       nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET, socket,
@@ -138,7 +135,7 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
 
 HttpServer::~HttpServer() {
   is_stopping_ = true;
-  wake();  // libmicrohttpd stops only if no connection is suspended
+  wake();  // libmicrohttpd can stop only without suspended connections
   MHD_stop_daemon(daemon_);
 }
 
@@ -151,13 +148,13 @@ void HttpServer::wake() {
   }
   for (const auto& [connection, transfer] : transfers_) {
     if (transfer.due <= now) {
-      ::shutdown(transfer.socket, SHUT_RDWR);  // libmicrohttpd sees it and closes the connection
+      ::shutdown(transfer.socket, SHUT_RDWR);  // libmicrohttpd then closes the connection
     }
   }
 }
 
-/// For libmicrohttpd each byte that comes or goes begins the idle time anew: it alone lets a peer
-/// that sends one now and then stay for ever.
+/// libmicrohttpd restarts its idle time at each byte, so a slow peer could stay for ever;
+/// transfers_ limits the whole transfer.
 void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*context*/,
                                MHD_ConnectionNotificationCode what) {
   auto& server = *static_cast<HttpServer*>(self);
@@ -172,7 +169,7 @@ void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*
   try {
     server.transfers_.insert_or_assign(connection, Transfer{socket, due});
   } catch (const std::exception&) {
-    ::shutdown(socket, SHUT_RDWR);  // no memory: the connection ends
+    ::shutdown(socket, SHUT_RDWR);  // out of memory, so the connection ends
   }
 }
 
@@ -186,7 +183,8 @@ void HttpServer::set_due(MHD_Connection* connection, Time due) {
   transfers_.at(connection).due = due;
 }
 
-/// `wakes` is the number of wakes before the answer was asked for: a later one was meant for it.
+/// `wakes` is the number of wakes before the answer was polled. After a later wake the connection
+/// is not suspended.
 void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
   const std::lock_guard lock(mutex_);
   MHD_suspend_connection(connection);
@@ -197,15 +195,15 @@ void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
   }
 }
 
-/// Called when the head of a request has come, for each part of its body, after the body, and again
-/// when the connection is resumed.
+/// Called after the head of a request, for each part of its body, after the body, and when the
+/// connection is resumed.
 MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const char* path,
                                   const char* method, const char* /*version*/, const char* upload,
                                   std::size_t* upload_bytes, void** exchange) {
   auto& server = *static_cast<HttpServer*>(self);
   try {
     if (*exchange == nullptr) {
-      auto* const begun = new Exchange;  // deleted by the callback of completed requests
+      auto* const begun = new Exchange;  // deleted by the callback for completed requests
       *exchange = begun;
       begun->request.method = method;
       begun->request.path = path;
@@ -220,9 +218,9 @@ MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const 
       return server.answer(connection, known);
     }
     known.request.body.append(upload, bytes);
-    return known.request.body.size() <= kMostBodyBytes ? MHD_YES : MHD_NO;
+    return known.request.body.size() <= kMaxBodyBytes ? MHD_YES : MHD_NO;
   } catch (const std::exception&) {
-    return MHD_NO;  // no memory: the connection ends
+    return MHD_NO;  // out of memory, so the connection ends
   }
 }
 
@@ -238,12 +236,12 @@ MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
     return send(connection, exchange, *std::move(refusal));
   }
   const std::string length = request.header("content-length");
-  set_due(connection, due_for(length.empty() ? 0 : std::stoul(length)));  // `refuse` has read it
+  set_due(connection, due_for(length.empty() ? 0 : std::stoul(length)));  // checked by `refuse`
   return MHD_YES;
 }
 
 MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
-  const std::uint64_t wakes = wakes_;  // read first: whoever stops wakes afterwards
+  const std::uint64_t wakes = wakes_;  // read first, so that a wake during the poll is not lost
   if (is_stopping_ || (exchange.pending && is_gone(connection))) {
     return MHD_NO;
   }
@@ -290,7 +288,7 @@ MHD_Result HttpServer::send(MHD_Connection* connection, Exchange& exchange, Http
   return queued;
 }
 
-/// Moves the body or the stream out of the answer. Null: there is no memory.
+/// Moves the body or the stream out of the answer. Null if out of memory.
 MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& answer) {
   if (answer.stream) {
     constexpr std::size_t kBlock = 4096;
@@ -313,7 +311,7 @@ MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& an
   return response;
 }
 
-/// Called for more of a stream when all earlier bytes were sent, and again after a wake.
+/// Called for more of a stream when all earlier bytes were sent, and after a wake.
 ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* into,
                               std::size_t most) {
   Stream& stream = *static_cast<Stream*>(context);

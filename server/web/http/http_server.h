@@ -18,48 +18,49 @@
 
 namespace oblique::server {
 
-/// Bounds on what peers can make the HTTP server hold. A connection is for one request.
+/// Limits on resources that HTTP peers can use. A connection serves one request.
 struct HttpLimits {
-  unsigned connections = 256;                ///< more wait to be accepted
-  unsigned connections_of_one_address = 64;  ///< more are closed
+  unsigned connections = 256;                ///< further ones wait to be accepted
+  unsigned connections_of_one_address = 64;  ///< further ones are closed
   unsigned streams = 32;
-  /// A connection's memory for request line, headers and the headers of the answer.
+  /// Memory of a connection for request line, headers and the headers of the answer.
   std::size_t bytes_of_connection = std::size_t{16} * 1024;
-  /// A connection that neither sends nor takes anything for this long is closed; not while the
-  /// server has nothing to say. The head of a request must come within this time of connecting.
+  /// A connection is closed after this time without any transfer, except while the server prepares
+  /// its answer. The head of a request must arrive within this time of connecting.
   std::chrono::seconds idle{10};
-  /// Bodies and answers, but for streams, have `idle` and a second for that many bytes.
+  /// Bodies and answers, except streams, may take `idle` plus a second for each of this number of
+  /// bytes.
   std::size_t least_bytes_a_second = std::size_t{4} * 1024;
 };
 
-/// Called on the server's thread.
+/// Functions that the server calls on its thread.
 struct HttpHandlers {
-  /// Throws std::invalid_argument for a wrong request.
+  /// Answers a request. Throws std::invalid_argument for a wrong request.
   std::function<HttpOutcome(const HttpRequest&)> answer;
-  /// Why a POST is refused, before its body is read; none: it is answered.
+  /// Returns why a POST is refused before its body is read; none: it is accepted.
   std::function<std::optional<HttpAnswer>(const HttpRequest&)> refuse_change;
-  /// Called on any thread.
+  /// May be called on any thread.
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
 /// Answers GET, HEAD and POST over HTTP/1.0 and 1.1 on libmicrohttpd's thread. A request whose
-/// answer is not ready waits without delaying others.
+/// answer is not ready does not delay others.
 class HttpServer {
  public:
-  /// Listens from now on. Throws std::runtime_error, naming the address, if it cannot.
+  /// Starts to listen. Throws std::runtime_error with the address on failure.
   HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
              HttpHandlers handlers);
-  /// Requests that wait get no answer.
+  /// Waiting requests get no answer.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// As http://127.0.0.1:7602, with the actual port.
+  /// Such as http://127.0.0.1:7602, with the actual port.
   const std::string& url() const { return url_; }
-  /// Calls all pending answers and streams again; those whose client has disconnected are
-  /// destroyed. Ends connections whose time is up. From any thread; does not block.
+  /// Polls all pending answers and streams again, destroys those whose client has disconnected, and
+  /// ends connections whose time is over. Thread-safe; does not block.
   void wake();
-  /// Number of answers by status. For the handlers.
+  /// Number of answers by status; for the handlers.
   const std::map<unsigned, std::uint64_t>& answers() const { return answers_; }
 
  private:
@@ -68,7 +69,7 @@ class HttpServer {
   using Time = std::chrono::steady_clock::time_point;
   struct Transfer {
     int socket;
-    Time due;  ///< when the request, or the answer, must have come through
+    Time due;  ///< deadline for the request or the answer
   };
 
   static MHD_Result on_request(void* self, MHD_Connection* connection, const char* path,
@@ -84,7 +85,7 @@ class HttpServer {
   MHD_Result send(MHD_Connection* connection, Exchange& exchange, HttpAnswer answer);
   MHD_Response* response_of(MHD_Connection* connection, HttpAnswer& answer);
   void suspend(MHD_Connection* connection, std::uint64_t wakes);
-  /// When that many bytes must have been transferred, beginning now.
+  /// Deadline for the transfer of that many bytes from now.
   Time due_for(std::size_t bytes) const;
   void set_due(MHD_Connection* connection, Time due);
 
@@ -98,7 +99,7 @@ class HttpServer {
   std::atomic<std::uint64_t> wakes_ = 0;
   std::mutex mutex_;
   std::set<MHD_Connection*> suspended_;            // guarded by mutex_
-  std::map<MHD_Connection*, Transfer> transfers_;  // of all connections; the same
+  std::map<MHD_Connection*, Transfer> transfers_;  // of all connections; guarded by mutex_
   MHD_Daemon* daemon_ = nullptr;
 };
 

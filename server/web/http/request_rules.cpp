@@ -20,7 +20,6 @@ bool is_own(const std::string& host, const OwnNames& own) {
          (own.is_loopback ? is_loopback(host).value_or(false) : is_loopback(host).has_value());
 }
 
-/// Whether a header is present once, with this value.
 bool is(const HttpRequest& request, const std::string& header, std::string_view value) {
   const auto values = request.all(header);
   return values.size() == 1 && values.front() == value;
@@ -31,8 +30,8 @@ bool all_are(const std::vector<std::string>& values, const std::set<std::string>
                      [&](const std::string& value) { return allowed.contains(value); });
 }
 
-/// A link on a page of another site that opens in a tab, not within that page. Without fields, for
-/// a token in a link that somebody else made must not let the browser in.
+/// Whether the request follows a link on a page of another site into a tab. It must have no fields,
+/// because a link made by others must not use a token to log in the browser.
 bool is_followed_link(const HttpRequest& request) {
   return request.path == "/" && request.fields.empty() && request.method == "GET" &&
          request.all("origin").empty() &&
@@ -44,7 +43,7 @@ bool is_followed_link(const HttpRequest& request) {
 }  // namespace
 
 std::string host_without_port(const std::string& header) {
-  constexpr std::size_t kLongest = 300;  // a name has 253 characters at most
+  constexpr std::size_t kLongest = 300;  // a host name has at most 253 characters
   static const std::regex kHost(
       R"((?:\[([0-9a-f.]*:[0-9a-f:.]*)\]|([a-z0-9._-]+))(?::[0-9]{0,5})?)", std::regex::icase);
   std::smatch found;
@@ -66,10 +65,11 @@ std::optional<HttpAddress> parse_http_address(const std::string& text) {
   const std::string address = host == "localhost" ? "127.0.0.1" : host;
   const auto port = read_number<std::uint16_t>(text.substr(text.rfind(':') + 1));
   if (!port || !is_loopback(address)) {
-    throw std::runtime_error(fmt::format(
-        "--http {} is no ADDRESS:PORT, as 127.0.0.1:7602 or [::1]:7602 with a port from 0 to 65535 "
-        "(0: the system picks one), and not \"off\"",
-        protocol::visible(text)));
+    throw std::runtime_error(
+        fmt::format("--http {} is not ADDRESS:PORT, as 127.0.0.1:7602 or [::1]:7602, with a port "
+                    "from 0 to 65535 "
+                    "(0: chosen by the system), or \"off\"",
+                    protocol::visible(text)));
   }
   return HttpAddress{address, *port == 0 ? "*" : std::to_string(*port)};
 }
@@ -79,39 +79,40 @@ std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own
   const auto origins = request.all("origin");
   const auto sites = request.all("sec-fetch-site");
   if (hosts.size() > 1) {
-    return text_answer(MHD_HTTP_BAD_REQUEST, "a request has one Host");
+    return text_answer(MHD_HTTP_BAD_REQUEST, "a request must have one Host header");
   }
   if (!hosts.empty() && !is_own(host_without_port(hosts.front()), own)) {
     const std::string name = protocol::excerpt(hosts.front());
-    return text_answer(MHD_HTTP_FORBIDDEN,
-                       fmt::format("\"{}\" is no name of this server: use its address, or start it "
-                                   "with --http-name and the name without the port",
-                                   name));
+    return text_answer(
+        MHD_HTTP_FORBIDDEN,
+        fmt::format("\"{}\" is not a name of this server: use its address, or start it "
+                    "with --http-name and this name without the port",
+                    name));
   }
   if (request.has_zero_bytes) {
-    return text_answer(MHD_HTTP_BAD_REQUEST, "fields of a request contain no zero bytes");
+    return text_answer(MHD_HTTP_BAD_REQUEST, "fields of a request must not contain zero bytes");
   }
   const std::set<std::string> own_origins =
       hosts.empty() ? std::set<std::string>() : std::set{"http://" + hosts.front()};
   const bool is_from_here =
       all_are(origins, own_origins) && all_are(sites, {"same-origin", "none"});
   if (!is_from_here && !is_followed_link(request)) {
-    return text_answer(MHD_HTTP_FORBIDDEN, "pages of other sites get nothing from this server");
+    return text_answer(MHD_HTTP_FORBIDDEN, "requests from pages of other sites are refused");
   }
   if (request.method == "POST") {
     if (origins.size() != 1 || !all_are(sites, {"same-origin"})) {
-      return text_answer(MHD_HTTP_FORBIDDEN, "changes come from a page of this server only");
+      return text_answer(MHD_HTTP_FORBIDDEN, "only a page of this server can make changes");
     }
   } else if (request.method != "GET" && request.method != "HEAD") {
-    return text_answer(MHD_HTTP_METHOD_NOT_ALLOWED, "only GET, HEAD and POST are answered");
+    return text_answer(MHD_HTTP_METHOD_NOT_ALLOWED, "only GET, HEAD and POST are allowed");
   }
   const std::string length = request.header("content-length");
   if (request.headers.contains("transfer-encoding") ||
       (!length.empty() &&
-       read_number<std::uint64_t>(length).value_or(kMostBodyBytes + 1) > kMostBodyBytes)) {
+       read_number<std::uint64_t>(length).value_or(kMaxBodyBytes + 1) > kMaxBodyBytes)) {
     return text_answer(
         MHD_HTTP_CONTENT_TOO_LARGE,
-        fmt::format("a body states its length, which is at most {} bytes", kMostBodyBytes));
+        fmt::format("a body must state its length, at most {} bytes", kMaxBodyBytes));
   }
   return std::nullopt;
 }

@@ -1,6 +1,6 @@
-# Writes a C++ source with the files of the page, gzipped: cmake -DOUT=FILE -DFOLDER=DIR -DNAMES=a,b -P embed.cmake
-# Lines of our scripts that are comments and nothing else are empty there: a browser needs none of them, and lines
-# keep their numbers.
+# Writes a C++ source with the gzipped files of the page: cmake -DOUT=FILE -DFOLDER=DIR -DNAMES=a,b
+# -P embed.cmake. Blanks lines of our scripts that contain only comments, so that the others keep
+# their line numbers.
 string(REPLACE "," ";" NAMES "${NAMES}")
 set(entries "")
 set(arrays "")

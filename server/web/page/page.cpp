@@ -21,8 +21,8 @@ constexpr std::string_view kStudies = "/api/studies";
 constexpr std::string_view kCheck = "/api/check";
 
 constexpr const char* kHowToEnter =
-    "this server shows its page to those who have its token: open the address that it printed when "
-    "it started, or that `oblique view` prints";
+    "the page needs the token of this server: open the address that the server printed when "
+    "it started, or the one that `oblique view` prints";
 
 /// /api/studies/STUDY[/points/POINT][/PART]
 struct StudyPath {
@@ -45,7 +45,6 @@ std::optional<StudyPath> parse_study_path(const std::string& path) {
   return parsed;
 }
 
-/// A change of a study that is named in the path.
 struct PathChange {
   std::uint64_t study;
   protocol::StudyChange change;
@@ -57,8 +56,8 @@ std::optional<PathChange> parse_change(const std::string& path) {
   return change ? std::optional(PathChange{parsed->study, *change}) : std::nullopt;
 }
 
-/// The file at the request's path, / being the page itself; 304 if the browser has it. None: there
-/// is no such file.
+/// The file at the request's path (/ is the page), or 304 if the browser has it; none if there is
+/// no such file.
 std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
   const auto files = page_files();
   const auto file = std::ranges::find_if(files, [&](const PageFile& one) {
@@ -67,7 +66,7 @@ std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
   if (file == files.end()) {
     return std::nullopt;
   }
-  // The browser keeps the file, and asks each time whether it has changed.
+  // The browser caches the file and checks each time whether it has changed.
   HttpAnswer answer{MHD_HTTP_OK,
                     std::string(file->content_type),
                     {},
@@ -98,17 +97,18 @@ bool Page::is_trusted(const HttpRequest& request) const {
 std::optional<HttpAnswer> Page::refuse_change(const HttpRequest& request) const {
   const std::string& path = request.path;
   if (path != kStudies && path != kCheck && !parse_change(path)) {
-    return error_answer(MHD_HTTP_METHOD_NOT_ALLOWED, "nothing can be changed here");
+    return error_answer(MHD_HTTP_METHOD_NOT_ALLOWED, "this path accepts no POST");
   }
   return is_trusted(request) ? std::nullopt
                              : std::optional(error_answer(MHD_HTTP_UNAUTHORIZED, kHowToEnter));
 }
 
-/// Exchanges the token for a cookie, which removes it from the browser's address and history.
+/// Exchanges the token for a cookie, which removes the token from the browser's address bar and
+/// history.
 HttpAnswer Page::enter(const HttpRequest& request) const {
   if (!token().is(request.fields.at("token"))) {
     return text_answer(MHD_HTTP_FORBIDDEN,
-                       "that is not the token of this server, which draws another one each time it "
+                       "that is not the token of this server, which may create a new one when it "
                        "starts");
   }
   HttpAnswer answer = text_answer(MHD_HTTP_SEE_OTHER, "");
@@ -139,10 +139,11 @@ std::optional<HttpOutcome> Page::answer(const HttpRequest& request) {
     return error_answer(MHD_HTTP_UNAUTHORIZED, kHowToEnter);
   }
   if (!is_text(request.fields)) {
-    return error_answer(MHD_HTTP_BAD_REQUEST, "fields of a request are UTF-8");
+    return error_answer(MHD_HTTP_BAD_REQUEST, "fields of a request must be UTF-8");
   }
   auto outcome = request.method == "POST" ? change(request) : read(request);
-  return outcome ? std::move(outcome) : error_answer(MHD_HTTP_NOT_FOUND, "there is nothing here");
+  return outcome ? std::move(outcome)
+                 : error_answer(MHD_HTTP_NOT_FOUND, "there is nothing at this path");
 }
 
 std::optional<HttpOutcome> Page::read(const HttpRequest& request) {
@@ -227,7 +228,8 @@ void EventFeed::refresh() {
   std::string overview = overview_json(*latest);
   if (overview != overview_) {
     overview_ = std::move(overview);
-    id_ = std::to_string(latest->made_ms);  // unique: a restarted server goes on with the clock
+    // unique, because a restarted server uses the same clock
+    id_ = std::to_string(latest->made_ms);
   }
 }
 

@@ -34,7 +34,7 @@ std::string drawn_token() {
   return protocol::sha256_of(bytes);
 }
 
-/// In a time that does not depend on how many characters are right.
+/// Compares in a time that does not depend on the number of equal characters.
 bool is_same(std::string_view one, std::string_view other) {
   return one.size() == other.size() && sodium_memcmp(one.data(), other.data(), one.size()) == 0;
 }
@@ -75,7 +75,7 @@ PageToken PageToken::from_file(const std::string& path) {
     return write_new_token(path);
   }
   if ((about.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    throw_wrong(path, "others may read it: chmod 600 keeps it to its owner");
+    throw_wrong(path, "others may read it: use chmod 600");
   }
   std::string token = protocol::read_small_file(path, "the token file", kLongest + 1);
   if (token.ends_with('\n')) {
@@ -85,8 +85,8 @@ PageToken PageToken::from_file(const std::string& path) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
   });
   if (token.size() < kShortest || token.size() > kLongest || !is_plain) {
-    throw_wrong(path, fmt::format("a token has {} to {} letters and digits, on one line", kShortest,
-                                  kLongest));
+    throw_wrong(path, fmt::format("a token must have {} to {} letters and digits, on one line",
+                                  kShortest, kLongest));
   }
   return PageToken(std::move(token));
 }

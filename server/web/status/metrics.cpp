@@ -25,13 +25,14 @@ std::string text_of(double value) {
   return std::isnan(value) ? "NaN" : solver::exact_number(value);
 }
 
-/// Writes metrics in the text format. Values of labels need no escaping: they are words of ours.
+/// Writes metrics in Prometheus' text format. Values of labels are fixed words and need no
+/// escaping.
 class MetricText {
  public:
   void gauge(std::string_view name, std::string_view help) { family(name, "gauge", help); }
   void counter(std::string_view name, std::string_view help) { family(name, "counter", help); }
 
-  /// A value of the last family; `labels` as state="idle".
+  /// Writes a value of the last metric; `labels` such as state="idle".
   template <typename Value>
   void sample(Value value, std::string_view labels = {}) {
     text_ += labels.empty() ? fmt::format("{} {}\n", name_, text_of(value))
@@ -68,7 +69,7 @@ void add_progress(MetricText& out, const Snapshot& now) {
   out.sample(now.points_failed);
   out.gauge("oblique_points_open", "Points of running studies without a result.");
   out.sample(now.points_open);
-  out.gauge("oblique_points_leased", "Points at workers.");
+  out.gauge("oblique_points_leased", "Points leased to workers.");
   out.sample(now.points_leased);
   out.gauge("oblique_studies", "Studies in the database.");
   for (std::size_t i = 0; i < now.studies_by_state.size(); ++i) {
@@ -91,7 +92,8 @@ void add_workers(MetricText& out, const Snapshot& now) {
   for (std::size_t i = 0; i < now.groups.size(); ++i) {
     out.sample(now.groups.at(i).threads, label(i));
   }
-  out.gauge("oblique_threads_wanted", "Threads that would solve the open points within a minute.");
+  out.gauge("oblique_threads_wanted",
+            "Number of threads that would solve the open points within a minute.");
   out.sample(now.threads_wanted());
 }
 
@@ -99,7 +101,7 @@ void add_writer_and_disk(MetricText& out, const Snapshot& now, const DiskUsage& 
   out.histogram("oblique_commit_duration_seconds", "Duration of a transaction.", now.commit_s);
   out.gauge("oblique_writer_queue_bytes", "Results that are not durable yet.");
   out.sample(now.writer_bytes);
-  out.gauge("oblique_database_writable", "1: the database takes results; 0: it does not.");
+  out.gauge("oblique_database_writable", "1: the database accepts results; 0: it does not.");
   out.sample(std::uint64_t{now.database_fault.empty() ? 1U : 0U});
   out.gauge("oblique_database_bytes", "Size of the database and of its write-ahead log.");
   out.sample(disk.database, "file=\"database\"");
@@ -117,7 +119,7 @@ void add_requests(MetricText& out, const Snapshot& now,
   for (const auto& [status, count] : http_answers) {
     out.sample(count, fmt::format("code=\"{}\"", status));
   }
-  out.counter("oblique_peers_refused_total", "Peers that were not let in, or sent away.");
+  out.counter("oblique_peers_refused_total", "Peers that were refused or disconnected.");
   for (std::size_t i = 0; i < now.refusals.size(); ++i) {
     out.sample(now.refusals.at(i),
                fmt::format("cause=\"{}\"", name_of(static_cast<RefusalCause>(i))));

@@ -14,20 +14,19 @@
 namespace oblique::server {
 namespace {
 
-/// A worker sends something in each heartbeat interval of 900 ms.
-/// Shorter silences are shown as none.
+/// Shorter silences are shown as none, because heartbeats come every 900 ms.
 constexpr std::uint32_t kSilence_ms = 2000;
 
-/// Time in which the wanted threads would solve the open points.
+/// Time in which `threads_wanted` would solve the open points.
 constexpr double kWantedWithin_s = 60.0;
 
 void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapshot) {
   const StudyStates& states = service.states();
   snapshot.studies_by_state = states.counts();
-  std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by falling priority, then by age
+  std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by descending priority, then by age
   ranked.reserve(states.unfinished().size());
   for (const StudyId id : states.unfinished()) {
-    if (!service.scheduler().knows_study(id)) {
+    if (!service.scheduler().has_study(id)) {
       continue;  // it is not durable yet
     }
     const StudyCounts points = service.scheduler().study(id);
@@ -95,7 +94,7 @@ nlohmann::ordered_json study_json(const protocol::StudyStatus& study) {
           {"solver_version", study.solver_version()},
           {"created_at", study.created_at()},
           {"submitted_by", study.submitted_by()},
-          {"taken_over", study.taken().points()}};
+          {"taken_over", study.reused().points()}};
 }
 
 nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker) {

@@ -23,26 +23,26 @@ namespace oblique::server {
 
 class Service;
 
-/// The state of the server at one moment, made by the event loop for the HTTP thread. Points are of
-/// studies that run or are paused, unless something else is said.
+/// The state of the server at one moment, made by the event loop for the HTTP thread. Points are
+/// those of running and paused studies unless stated otherwise.
 struct Snapshot {
-  std::int64_t made_ms = 0;         ///< of the steady clock
+  std::int64_t made_ms = 0;         ///< on the steady clock
   std::uint64_t points_solved = 0;  ///< stored since the server started
-  std::uint64_t points_failed = 0;  ///< the same
-  std::uint64_t points_open = 0;    ///< of running studies
+  std::uint64_t points_failed = 0;  ///< as points_solved
+  std::uint64_t points_open = 0;    ///< in running studies
   std::uint64_t points_leased = 0;
   double points_per_s = 0.0;
-  double thread_s_per_point = 0.0;  ///< of the last batches; 0: unknown
+  double thread_s_per_point = 0.0;  ///< over the last batches; 0: unknown
   std::array<std::uint64_t, kStudyStates> studies_by_state{};
-  /// Studies that run or are paused: the first kShownStudies, by falling priority and then by age.
+  /// Running and paused studies: the first kShownStudies, by descending priority and then by age.
   std::vector<protocol::StudyStatus> studies;
-  std::uint64_t unlisted = 0;                   ///< further ones
+  std::uint64_t unlisted = 0;                   ///< number of further ones
   std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers
   WorkerGroups groups{};                        ///< all workers by state
 
   Histogram commit_s{{}};
-  std::uint64_t writer_bytes = 0;  ///< of results that are not durable yet
-  std::string database_fault;      ///< why the database takes no results; empty: it does
+  std::uint64_t writer_bytes = 0;  ///< size of results that are not durable yet
+  std::string database_fault;      ///< why the database accepts no results; empty: it does
   bool is_stopping = false;
   std::array<std::uint64_t, kRefusalCauses> refusals{};  ///< peers by cause
   QueryCounts queries;
@@ -61,13 +61,13 @@ struct SnapshotSources {
   const Writer& writer;
 };
 
-/// Costs in proportion to the studies that run or are paused, and to the workers.
+/// Takes time proportional to the running and paused studies and to the workers.
 Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms);
 
-/// With `left_s`, the time left [s]; null while it is unknown.
+/// Includes `left_s`, the remaining time [s]; null if unknown.
 nlohmann::ordered_json study_json(const protocol::StudyStatus& study);
 nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker);
-/// The JSON of each element of a list.
+/// A JSON array of the elements of a list.
 template <class List, class ToJson>
 nlohmann::ordered_json json_list(const List& list, const ToJson& to_json) {
   auto json = nlohmann::ordered_json::array();
@@ -77,10 +77,10 @@ nlohmann::ordered_json json_list(const List& list, const ToJson& to_json) {
   return json;
 }
 
-/// What the page shows of a server, as one line.
+/// The overview for the page, as one line of JSON.
 std::string overview_json(const Snapshot& snapshot);
 
-/// What the file system reports about the database [bytes]. NaN: it reports nothing.
+/// What the file system reports about the database [bytes]; NaN if it reports nothing.
 struct DiskUsage {
   double database = 0.0;
   double wal = 0.0;  ///< 0 if there is no write-ahead log
@@ -95,7 +95,7 @@ struct MetricSources {
   std::string solver_version;
 };
 
-/// All metrics, which README.md lists, in Prometheus' text format 0.0.4.
+/// All metrics in Prometheus' text format 0.0.4; README.md lists them.
 std::string metrics_text(const MetricSources& sources);
 
 /// The latest snapshot, published by the event loop for the HTTP thread.
@@ -106,7 +106,7 @@ class SnapshotCache {
     const std::lock_guard lock(mutex_);
     latest_.swap(shared);
   }
-  /// Null before the first.
+  /// The latest snapshot; null before the first one.
   std::shared_ptr<const Snapshot> latest() const {
     const std::lock_guard lock(mutex_);
     return latest_;

@@ -51,7 +51,7 @@ Overloaded(Handlers...) -> Overloaded<Handlers...>;
 
 protocol::WorkerHello hello_of(std::size_t number) {
   protocol::WorkerHello hello;
-  protocol::say_protocol(hello);
+  protocol::set_protocol(hello);
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
   hello.set_name("crowd:" + std::to_string(number));
@@ -205,7 +205,7 @@ class Crowd::Parts {
                                             .is_worker = true,
                                             .key = settings_.key};
     member.socket.reset();
-    member.socket = protocol::made_dealer(context_, settings);
+    member.socket = protocol::make_dealer(context_, settings);
     protocol::connect(*member.socket, settings);
     epoll_event event{EPOLLIN, {.u64 = number}};
     epoll_ctl(epoll_.number(), EPOLL_CTL_ADD, member.socket->get(zmq::sockopt::fd), &event);

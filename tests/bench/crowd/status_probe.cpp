@@ -52,7 +52,7 @@ void StatusProbe::run() {
   zmq::context_t context;
   const protocol::DealerSettings settings{
       .url = client_url_, .example_url = client_url_, .key = key_};
-  zmq::socket_t socket = protocol::made_dealer(context, settings);
+  zmq::socket_t socket = protocol::make_dealer(context, settings);
   protocol::connect(socket, settings);
   protocol::ClientRequest request;
   request.set_protocol_version(protocol::kProtocolVersion);

@@ -41,7 +41,7 @@ ScriptedServer::Answer gives(
     std::function<std::vector<std::string>(std::uint64_t request_id, std::uint64_t taken)> more) {
   return [more](const protocol::ClientRequest& request) -> std::vector<std::string> {
     if (request.has_more_rows()) {
-      return more(request.more_rows().request_id(), request.more_rows().taken());
+      return more(request.more_rows().request_id(), request.more_rows().received());
     }
     if (request.has_query()) {
       return {frame_of(request.request_id(), chunk_of(1, {0, 1}, false))};

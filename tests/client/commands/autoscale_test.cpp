@@ -58,7 +58,7 @@ TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
   } cases[] = {
       {"running", 100, 30, "", 65},  // 3 failed, 2 left out
       {"running", 100, 30, "a worker", 65},
-      {"running", 100, 30, "the database, which takes no results: disk full", 0},
+      {"running", 100, 30, "the database, which accepts no results: disk full", 0},
       {"paused", 100, 30, "", 0},
       {"done", 100, 95, "", 0},
       {"running", 10, 30, "", 0},  // counts of a server that miscounts

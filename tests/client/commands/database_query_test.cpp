@@ -60,7 +60,7 @@ TEST_F(DatabaseQuery, AWrongStatementIsWrongUsage) {
       {{"query", "a", "--where", "E > 1e10"}, "write e, or E_Pa"},
       {{"query", "a", "--where", "fn_peak > 1"}, "did you mean `fn_peak_N`"},
       {{"query", "a", "--where", "point >= 0 --", "--limit", "1"}, "it has a comment (--)"},
-      {{"sql", "DELETE FROM runs"}, "this only reads"},
+      {{"sql", "DELETE FROM runs"}, "only reading is allowed"},
       {{"sql", "SELECT * FROM runs WHERE mu > @mu"}, "parameter"},
   };
   for (const auto& [words, says] : wrong) {

@@ -75,7 +75,7 @@ def test_results_show_what_they_are():
         ({"mu": True}, "mu = True is not allowed: mu must be a number"),
         ({"preset": None}, "preset = None is not allowed"),
         ({"lengths": []}, "lengths must be the length of each link"),
-        ({"lengths": [0.5], "links": "2"}, "lengths stands beside links or length"),
+        ({"lengths": [0.5], "links": "2"}, "lengths cannot be combined with links or length"),
         ({"mu": np.ma.masked}, "mu = nan is not allowed"),
     ],
 )

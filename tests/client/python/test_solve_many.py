@@ -75,8 +75,8 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
         ({"threads": 0}, "threads = 0 is not allowed"),
         ({"mu": ["a"] * 1000}, "'a', '... is not allowed: mu must be a number or numbers"),
         ({"lengths": [[0.4, 0.4]]}, "lengths must be the length of each link"),
-        ({"lengths": [0.4, 0.5], "links": 2}, "lengths stands beside links or length"),
-        ({"lengths": [0.4, 0.5], "length": "H / 2"}, "lengths stands beside links or length"),
+        ({"lengths": [0.4, 0.5], "links": 2}, "lengths cannot be combined with links or length"),
+        ({"lengths": [0.4, 0.5], "length": "H / 2"}, "lengths cannot be combined with links or length"),
         ({"integrator": ["euler"]}, 'integrator = "euler" is not allowed'),
     ],
 )

@@ -190,8 +190,8 @@ TEST(StudyFile, TakesExpressionsFiltersAndSingleLengths) {
   EXPECT_DOUBLE_EQ(model.I_m4, 25e-8 / 4.0 / 3.14159265358979312);
   EXPECT_EQ(model.lengths_m, (std::vector{0.4, 0.4, 0.4}));
   EXPECT_EQ(table.model(0).lengths_m, (std::vector{0.4, 0.3, 0.4}));
-  EXPECT_FALSE(table.is_left_in(0));
-  EXPECT_TRUE(table.is_left_in(1));
+  EXPECT_FALSE(table.passes_filter(0));
+  EXPECT_TRUE(table.passes_filter(1));
   EXPECT_EQ(protocol::size_of(table).points, 4U);
 }
 
@@ -201,7 +201,7 @@ TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
     const auto study = read_study_file(folder + name + ".toml", pretended_reach());
     EXPECT_EQ(study.name, name);
     const protocol::PointTable table(study.recipe);
-    EXPECT_NO_THROW(table.judge_points());
+    EXPECT_NO_THROW(table.validate_points());
     return protocol::size_of(table).points;
   };
   EXPECT_EQ(points("paper"), 10U);

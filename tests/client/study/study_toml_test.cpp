@@ -118,8 +118,8 @@ class DrawnRecipe {
     if (kind == BlockKind::kSample) {
       constexpr const char* kKinds[] = {"random", "lhs", "sobol"};
       *block.mutable_sample() =
-          protocol::written_sample(kKinds[below(3)], 1 + static_cast<std::int64_t>(below(1000)),
-                                   static_cast<std::int64_t>(below(std::uint64_t{1} << 62)));
+          protocol::parse_sample(kKinds[below(3)], 1 + static_cast<std::int64_t>(below(1000)),
+                                 static_cast<std::int64_t>(below(std::uint64_t{1} << 62)));
     }
     if (chance(0.4)) {
       block.set_where("mu > 0.5 * e and H <= 1 || A<1e300");

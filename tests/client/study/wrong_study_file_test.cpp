@@ -52,7 +52,7 @@ TEST(WrongStudyFile, IsRefusedWithThePlace) {
        {"[[block]]\nmu = 0.4\ne = 1\n", "1:1", "H is missing: every block needs H, mu and e"},
        {"[[block]]\nzip = true\nH = [0.5, 0.6]\nmu = [0.4, 0.5, 0.6]\ne = 1\n", "3:5", "H has 2 v"},
        {"[model]\nlengths = [0.4, 0.2]\n" + block_with("H = 0.7"), "4:5", "H = 0.7 m"},
-       {"[model]\nlengths = [0.4]\nlinks = 2\n" + point, "2:11", "give either lengths"}},
+       {"[model]\nlengths = [0.4]\nlinks = 2\n" + point, "2:11", "give lengths, one per link"}},
       [](const std::string& text) { return text; });
 }
 
@@ -103,7 +103,8 @@ TEST(WrongStudyFile, WithAWrongAxisIsRefused) {
        {"mu = { from = 0.5, to = 1, step = 0.2 }", "3:6", "step = 0.2 does not lead from 0.5 to 1"},
        {"mu = { from = 1, to = 2, count = 3, spacing = 'lgo' }", "3:47", "linear or log"},
        {"mu = { from = 1, to = 2, step = 1, spacing = 'log' }", "3:46", "linear with `step`"},
-       {"mu = { from = 0, to = 2, count = 3, spacing = 'log' }", "3:6", "the logarithm needs ends"},
+       {"mu = { from = 0, to = 2, count = 3, spacing = 'log' }", "3:6",
+        "logarithmic ends must be > 0"},
        {"mu = { csv = 3 }", "3:14", "mu: csv = 3 is a number: it must be the name of a file"},
        {"mu = { column = 'a' }", "3:6", "`column` needs `csv`"},
        {"mu = { csv = 'a.csv', colum = 'a' }", "3:23", "`colum` (did you mean `column`?)"},

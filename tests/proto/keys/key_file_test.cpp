@@ -40,7 +40,7 @@ std::string message_of(const std::function<void()>& work) {
 }
 
 KeyFile worker_key() {
-  return {Role::kWorker, "worker", made_key_pair(), made_key_pair().public_key};
+  return {Role::kWorker, "worker", generate_key_pair(), generate_key_pair().public_key};
 }
 
 mode_t mode_of(const std::string& path) {
@@ -69,8 +69,8 @@ class KeyFileTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
-  const KeyPair pair = made_key_pair();
+TEST(CurveKeyTest, AreFormattedAsByLibzmq) {
+  const KeyPair pair = generate_key_pair();
   const std::string secret = z85(pair.secret_key.bytes());
   char text[kKeyCharacters + 1];
   ASSERT_NE(zmq_z85_encode(text, pair.secret_key.data(), pair.public_key.size()), nullptr);
@@ -78,21 +78,21 @@ TEST(CurveKeyTest, AreWrittenAsLibzmqWritesThem) {
   char public_half[kKeyCharacters + 1];
   ASSERT_EQ(zmq_curve_public(public_half, secret.c_str()), 0);
   EXPECT_EQ(z85(pair.public_key), public_half);
-  EXPECT_EQ(public_half_of(pair.secret_key), pair.public_key);
+  EXPECT_EQ(public_key_of(pair.secret_key), pair.public_key);
 }
 
-TEST(CurveKeyTest, AreNotReadFromTextThatIsNone) {
-  const std::string good = z85(made_key_pair().public_key);
-  EXPECT_FALSE(key_of_z85(""));
-  EXPECT_FALSE(key_of_z85(good.substr(1)));
-  EXPECT_FALSE(key_of_z85(good + "00000"));
-  EXPECT_FALSE(key_of_z85(good.substr(5) + std::string(5, '\0')));
-  EXPECT_FALSE(key_of_z85(std::string(40, '"')));
-  EXPECT_FALSE(key_of_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
+TEST(CurveKeyTest, AreNotParsedFromInvalidText) {
+  const std::string good = z85(generate_key_pair().public_key);
+  EXPECT_FALSE(parse_z85(""));
+  EXPECT_FALSE(parse_z85(good.substr(1)));
+  EXPECT_FALSE(parse_z85(good + "00000"));
+  EXPECT_FALSE(parse_z85(good.substr(5) + std::string(5, '\0')));
+  EXPECT_FALSE(parse_z85(std::string(40, '"')));
+  EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
 }
 
-TEST_F(KeyFileTest, IsReadAsItWasWrittenAndIsForItsOwnerAlone) {
-  const KeyFile server{Role::kServer, "server", made_key_pair(), std::nullopt};
+TEST_F(KeyFileTest, IsReadAsWrittenAndOnlyItsOwnerMayReadIt) {
+  const KeyFile server{Role::kServer, "server", generate_key_pair(), std::nullopt};
   for (const KeyFile& key : {worker_key(), server}) {
     const std::string path = folder_.file(key.name);
     write_key_file(path, key);
@@ -100,7 +100,7 @@ TEST_F(KeyFileTest, IsReadAsItWasWrittenAndIsForItsOwnerAlone) {
     EXPECT_EQ(read.role, key.role);
     EXPECT_EQ(read.name, key.name);
     EXPECT_EQ(read.pair.public_key, key.pair.public_key);
-    EXPECT_EQ(public_half_of(read.pair.secret_key), key.pair.public_key);
+    EXPECT_EQ(public_key_of(read.pair.secret_key), key.pair.public_key);
     EXPECT_EQ(read.server, key.server);
     EXPECT_EQ(mode_of(path), 0600U);
   }
@@ -118,7 +118,7 @@ TEST_F(KeyFileTest, IsNeverOverwrittenNorWrittenThroughALink) {
   EXPECT_FALSE(std::filesystem::exists(folder_.file("elsewhere")));
 }
 
-TEST_F(KeyFileTest, IsRefusedWhenOthersMayReadItWithTheCommandThatMendsIt) {
+TEST_F(KeyFileTest, IsRefusedWithTheRemedyWhenOthersMayReadIt) {
   for (const mode_t mode : {0640U, 0604U, 0666U}) {
     const std::string path = written(text_of(worker_key()), mode);
     EXPECT_THAT(message_of([&] { read_key_file(path); }),
@@ -129,15 +129,15 @@ TEST_F(KeyFileTest, IsRefusedWhenOthersMayReadItWithTheCommandThatMendsIt) {
   EXPECT_NO_THROW(read_key_file(folder_.file("some.key")));
 }
 
-TEST_F(KeyFileTest, NamesFileLineAndKeyOfAFaultAndShowsNoSecret) {
+TEST_F(KeyFileTest, ErrorsHaveFileLineAndKeyAndNoSecret) {
   const KeyFile key = worker_key();
-  const std::string other = z85(made_key_pair().secret_key.bytes());
+  const std::string other = z85(generate_key_pair().secret_key.bytes());
   const std::string secret = z85(key.pair.secret_key.bytes());
   for (const auto& [from, to, place, words] : std::vector<std::array<std::string, 4>>{
            {"\"worker\"", "\"boss\"", ":1:", "`role` must be \"server\", \"client\", \"worker\""},
            {"\"w\"", "\"../w\"", ":2:", "`name`"},
            {"public", "pubic", ":3:", "did you mean `public`"},
-           {secret, other, ":4:", "not the other half"},
+           {secret, other, ":4:", "does not belong to `public`"},
            {"secret", " secret", ":4:", "must begin its line"},
            {"server = ", "#", ":1:", "`server` is missing"},
            {"server = ", "server = 3 #", ":5:", "`server` must be a text"},
@@ -152,7 +152,8 @@ TEST_F(KeyFileTest, NamesFileLineAndKeyOfAFaultAndShowsNoSecret) {
               AllOf(HasSubstr("none.key"), HasSubstr("No such file")));
 }
 
-/// A key file that another process has written, so that nothing of it is in this one's memory.
+/// A key file written by another process, so that this one has no other copy of the secret in
+/// memory.
 std::string file_of_another_process(const std::string& path) {
   const pid_t writer = fork();
   if (writer == 0) {
@@ -181,7 +182,7 @@ void expect_no_copy_in_a_core_dump(const SecretKey& key) {
       test::is_in_a_core_dump({reinterpret_cast<const char*>(key.data()), key.bytes().size()}));
 }
 
-TEST_F(KeyFileTest, IsReadIntoLockedMemoryThatIsNotInACoreDump) {
+TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   if (!test::kAllMemoryMayBeRead) {
     GTEST_SKIP() << "a sanitizer objects to reading all memory";
   }
@@ -190,7 +191,8 @@ TEST_F(KeyFileTest, IsReadIntoLockedMemoryThatIsNotInACoreDump) {
   expect_no_copy_in_a_core_dump(made.pair.secret_key);
   const KeyFile key = read_key_file(file_of_another_process(folder_.file("worker.key")));
   expect_no_copy_in_a_core_dump(key.pair.secret_key);
-  // Nor as text, of which freed memory keeps the end. What is searched for is not dumped either.
+  // Nor as text, whose end freed memory would keep. The searched bytes themselves are not dumped
+  // either.
   constexpr std::size_t kEnd = 24;
   SecretKey end;
   std::string text = z85(key.pair.secret_key.bytes());
@@ -200,7 +202,7 @@ TEST_F(KeyFileTest, IsReadIntoLockedMemoryThatIsNotInACoreDump) {
 }
 
 AuthorizedKey key_called(const std::string& name, Role role = Role::kWorker) {
-  return {name, role, made_key_pair().public_key, "2026-11-22T03:00:00Z"};
+  return {name, role, generate_key_pair().public_key, "2026-11-22T03:00:00Z"};
 }
 
 class AuthorizedKeysTest : public ::testing::Test {
@@ -243,10 +245,10 @@ TEST_F(AuthorizedKeysTest, FindsKeysByKeyAndByNameUntilTheyAreRemoved) {
   EXPECT_EQ(keys.find(reader.public_key), keys.find("reader"));
   EXPECT_EQ(keys.find("reader")->role, Role::kReader);
   EXPECT_EQ(keys.find("reader")->added_at, "2026-11-22T03:00:00Z");
-  EXPECT_EQ(keys.find(made_key_pair().public_key), nullptr);
+  EXPECT_EQ(keys.find(generate_key_pair().public_key), nullptr);
 }
 
-TEST_F(AuthorizedKeysTest, NothingChangesWhenAChangeIsRefused) {
+TEST_F(AuthorizedKeysTest, ARefusedChangeChangesNothing) {
   const AuthorizedKey key = key_called("worker");
   add(key);
   const std::string before = text();
@@ -261,7 +263,7 @@ TEST_F(AuthorizedKeysTest, NothingChangesWhenAChangeIsRefused) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1);
 }
 
-TEST_F(AuthorizedKeysTest, ManyAtOnceLoseNothing) {
+TEST_F(AuthorizedKeysTest, ConcurrentChangesLoseNothing) {
   constexpr int kAdders = 4;
   constexpr int kKeysOfEach = 25;
   std::vector<std::thread> adders;
@@ -278,7 +280,7 @@ TEST_F(AuthorizedKeysTest, ManyAtOnceLoseNothing) {
   EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(kAdders * kKeysOfEach));
 }
 
-TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedWhereEverybodyMayWriteOrReplaceIt) {
+TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedIfEveryUserMayWriteOrReplaceIt) {
   add(key_called("a"));
   chmod(path_.c_str(), 0640);
   add(key_called("b"));
@@ -294,7 +296,7 @@ TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedWhereEverybodyMayWriteOrRepla
   EXPECT_THAT(error_of(text()), AllOf(HasSubstr("chmod o-w"), HasSubstr(path_ + " has mode 0666")));
 }
 
-TEST_F(AuthorizedKeysTest, IsChangedWhereALinkLeads) {
+TEST_F(AuthorizedKeysTest, AChangeThroughALinkChangesItsTarget) {
   const std::string real = folder_.file("real.toml");
   std::ofstream{real};
   std::filesystem::create_symlink("real.toml", path_);
@@ -303,13 +305,13 @@ TEST_F(AuthorizedKeysTest, IsChangedWhereALinkLeads) {
   EXPECT_THAT(read_authorized_keys(real).all(), SizeIs(1));
 }
 
-TEST_F(AuthorizedKeysTest, NamesTheLineOfAnEntryThatIsWrongOrThereTwice) {
+TEST_F(AuthorizedKeysTest, ErrorsNameTheLineOfAnInvalidOrRepeatedEntry) {
   const AuthorizedKey a = key_called("a");
   AuthorizedKey same_key = a;
   same_key.name = "b";
   for (const auto& [text, line, says] : std::vector<std::array<std::string, 3>>{
-           {entry(a) + entry(key_called("a")), "6", "called a already"},
-           {entry(a) + entry(same_key), "6", "there already, called a"},
+           {entry(a) + entry(key_called("a")), "6", "already has a key called a"},
+           {entry(a) + entry(same_key), "6", "already has the public key"},
            {entry(a) + "expires = 3\n", "6", "unknown key `expires`"},
            {entry(a) + "[", "6", ""},
            {entry(key_called("s", Role::kServer)), "3", "`role`"},
@@ -347,7 +349,7 @@ TEST_F(KeyFolderTest, HasAServerAndOneListedKeyOfEachOtherRole) {
   }
 }
 
-TEST_F(KeyFolderTest, IsNotMadeOverFilesThatExistAndThenChangesNothing) {
+TEST_F(KeyFolderTest, IsNotCreatedOverExistingFilesAndChangesNothing) {
   std::filesystem::create_directory(keys_);
   std::ofstream(keys_ + "/worker.key") << "precious";
   EXPECT_THROW(make_key_folder(keys_), std::runtime_error);
@@ -360,11 +362,11 @@ TEST_F(KeyFolderTest, IsNotMadeOverFilesThatExistAndThenChangesNothing) {
   EXPECT_EQ(files(), 5);
 }
 
-TEST_F(KeyFolderTest, TakesFurtherKeysWithAFileOrOnlyTheirPublicHalf) {
+TEST_F(KeyFolderTest, FurtherKeysAreAddedWithAFileOrByTheirPublicKey) {
   make_key_folder(keys_);
   const AuthorizedKey alice = add_key(keys_, "alice", Role::kClient, std::nullopt);
   EXPECT_EQ(read_key_file(key_file_in(keys_, "alice")).pair.public_key, alice.public_key);
-  const CurveKey bobs = made_key_pair().public_key;
+  const CurveKey bobs = generate_key_pair().public_key;
   add_key(keys_, "bob", Role::kWorker, bobs);
   EXPECT_FALSE(std::filesystem::exists(key_file_in(keys_, "bob")));
   const AuthorizedKeys listed = read_authorized_keys(authorized_keys_in(keys_));
@@ -372,7 +374,7 @@ TEST_F(KeyFolderTest, TakesFurtherKeysWithAFileOrOnlyTheirPublicHalf) {
   EXPECT_EQ(listed.find(alice.public_key)->role, Role::kClient);
 }
 
-TEST_F(KeyFolderTest, ListsNoKeyWhoseFileCannotBeWrittenAndWritesNoneThatCannotBeListed) {
+TEST_F(KeyFolderTest, AKeyIsNeitherListedWithoutItsFileNorWrittenWithoutBeingListed) {
   make_key_folder(keys_);
   std::ofstream(keys_ + "/alice.key") << "precious";
   EXPECT_THROW(add_key(keys_, "alice", Role::kClient, std::nullopt), std::runtime_error);

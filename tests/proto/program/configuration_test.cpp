@@ -15,7 +15,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// What a program with a few options makes of its three places.
+/// Parses the options of a small program from file, environment and flags.
 class ConfigurationTest : public testing::Test {
  protected:
   struct Options {
@@ -45,7 +45,7 @@ class ConfigurationTest : public testing::Test {
     variables_.push_back(name);
   }
 
-  /// Parses; what is told goes to `told_`, what holds to `options_` and `printed_`.
+  /// Parses; error output goes to `errors_`, settings to `options_` and `printed_`.
   std::optional<int> parse(std::vector<std::string> words) {
     options_ = Options();
     CLI::App app("A program under test", "program");
@@ -68,25 +68,25 @@ class ConfigurationTest : public testing::Test {
     const auto exit_code =
         configuration.parse(static_cast<int>(arguments.size()), arguments.data());
     std::cerr.rdbuf(before);
-    told_ = told.str();
+    errors_ = told.str();
     printed_ = exit_code ? "" : configuration.printed();
     return exit_code;
   }
 
   void expect_refused(const std::vector<std::string>& words, const std::string& sentence) {
     EXPECT_EQ(parse(words), 2) << sentence;
-    EXPECT_NE(told_.find(sentence), std::string::npos) << told_;
+    EXPECT_NE(errors_.find(sentence), std::string::npos) << errors_;
   }
 
   test::TemporaryFolder folder_;
   std::string default_file_ = folder_.file("default.toml");
   Options options_;
-  std::string told_;
+  std::string errors_;
   std::string printed_;
   std::vector<std::string> variables_;
 };
 
-TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
+TEST_F(ConfigurationTest, FlagsOverrideTheEnvironmentWhichOverridesTheFile) {
   const std::string file = write(
       "db = \"file.db\"\nport = 1\nloud = true\n"
       "listen = [\"127.0.0.1\", \"::1\"]\n[limits]\nconnections = 3\n");
@@ -94,7 +94,7 @@ TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
   set("TEST_PROGRAM_LIMITS_CONNECTIONS", "4");
   set("TEST_PROGRAM_LOUD", "false");
   set("TEST_KEYS", "shared.key");
-  EXPECT_EQ(parse({"--config", file, "--limits-connections", "5"}), std::nullopt) << told_;
+  EXPECT_EQ(parse({"--config", file, "--limits-connections", "5"}), std::nullopt) << errors_;
   EXPECT_EQ(options_.db, "file.db");
   EXPECT_EQ(options_.port, 2);
   EXPECT_EQ(options_.connections, 5);
@@ -104,13 +104,13 @@ TEST_F(ConfigurationTest, AFlagIsStrongerThanTheEnvironmentAndThatThanTheFile) {
   set("TEST_PROGRAM_KEYS", "own.key");
   set("TEST_PROGRAM_PORT", "");
   set("TEST_PROGRAM_SERVICE_HOST", "10.0.0.1");
-  EXPECT_EQ(parse({"--config", file, "--listen", "::2"}), std::nullopt) << told_;
+  EXPECT_EQ(parse({"--config", file, "--listen", "::2"}), std::nullopt) << errors_;
   EXPECT_EQ(options_.keys, "own.key");
   EXPECT_EQ(options_.port, 1) << "an empty variable and one of no setting are ignored";
   EXPECT_EQ(options_.listen, std::vector<std::string>{"::2"}) << "a flag replaces the list";
 }
 
-TEST_F(ConfigurationTest, TheFileIsThatOfTheFlagOrOfTheEnvironmentOrTheDefaultOne) {
+TEST_F(ConfigurationTest, TheFileComesFromTheFlagOrTheEnvironmentOrIsTheDefault) {
   write("port = 1\n", "default.toml");
   EXPECT_EQ(parse({}), std::nullopt);
   EXPECT_EQ(options_.port, 1);
@@ -124,7 +124,7 @@ TEST_F(ConfigurationTest, TheFileIsThatOfTheFlagOrOfTheEnvironmentOrTheDefaultOn
   expect_refused({}, "gone.toml");
 }
 
-TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
+TEST_F(ConfigurationTest, NoConfigIgnoresFilesAndEnvironment) {
   write("port = 1\n", "default.toml");
   set("TEST_PROGRAM_DB", "environment.db");
   set("TEST_KEYS", "a.key");
@@ -136,18 +136,18 @@ TEST_F(ConfigurationTest, NoConfigLeavesFilesAndEnvironmentOut) {
                  "--config excludes --no-config");
 }
 
-TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
+TEST_F(ConfigurationTest, ReadingThePrintedSettingsGivesTheSameSettings) {
   EXPECT_EQ(parse({}), std::nullopt);
-  EXPECT_EQ(parse({"--config", write(printed_)}), std::nullopt) << told_ << printed_;
+  EXPECT_EQ(parse({"--config", write(printed_)}), std::nullopt) << errors_ << printed_;
   EXPECT_EQ(options_.db, "default.db");
   EXPECT_TRUE(options_.listen.empty());
   const std::string odd = "a \"b\" \\ 'c' \x1b\xc3\xa4.db";
   EXPECT_EQ(parse({"--db", odd, "--port", "9", "--loud", "--listen", "::1", "--quiet",
                    "--limits-connections", "6"}),
             std::nullopt)
-      << told_;
+      << errors_;
   const std::string file = write(printed_);
-  EXPECT_EQ(parse({"--config", file}), std::nullopt) << told_ << printed_;
+  EXPECT_EQ(parse({"--config", file}), std::nullopt) << errors_ << printed_;
   EXPECT_EQ(options_.db, odd);
   EXPECT_EQ(options_.port, 9);
   EXPECT_TRUE(options_.loud);
@@ -156,18 +156,18 @@ TEST_F(ConfigurationTest, WhatIsPrintedGivesTheSameWhenItIsReadAgain) {
   EXPECT_EQ(options_.connections, 6);
 }
 
-TEST_F(ConfigurationTest, WhatIsWrongInTheFileIsToldWithItsLine) {
+TEST_F(ConfigurationTest, ErrorsInTheFileHaveTheirLine) {
   const auto refuse = [this](const std::string& text, const std::string& sentence) {
     const std::string file = write(text);
     expect_refused({"--config", file}, sentence);
-    EXPECT_NE(told_.find(file + ":"), std::string::npos) << told_;
+    EXPECT_NE(errors_.find(file + ":"), std::string::npos) << errors_;
   };
   refuse("\nprot = 5\n", "a.toml:2:1: there is no setting prot (did you mean `port`?)");
   refuse("[limits]\nconections = 5\n", "did you mean `limits_connections`?");
   refuse("port = 99999\n", "a.toml:1:1: --port: Value 99999 not in range 0 to 65535");
   refuse("port = true\n", "a.toml:1:1: --port: Value true not in range 0 to 65535");
   refuse("port = []\n", "a.toml:1:8: port = [] is not allowed");
-  refuse("port = [1, 2]\n", "a.toml:1:1: --port is given more than once");
+  refuse("port = [1, 2]\n", "a.toml:1:1: --port was given more than once");
   refuse("port = 1979-05-27\n", "a.toml:1:8: port = 1979-05-27 is not allowed");
   refuse("loud = \"perhaps\"\n", "a.toml:1:1: Could not convert: --loud = perhaps");
   refuse("loud = \n", "a.toml:1:");
@@ -193,7 +193,7 @@ TEST_F(ConfigurationTest, QuietIsTheShortFormOfALevel) {
   EXPECT_EQ(options_.log.level, "warning");
   EXPECT_NE(printed_.find("log_level = \"warning\""), std::string::npos) << printed_;
   set("TEST_PROGRAM_LOG_LEVEL", "error");
-  EXPECT_EQ(parse({"--quiet"}), std::nullopt) << told_;
+  EXPECT_EQ(parse({"--quiet"}), std::nullopt) << errors_;
   EXPECT_EQ(options_.log.level, "warning");
   expect_refused({"--quiet", "--log-level", "info"}, "excludes");
 }

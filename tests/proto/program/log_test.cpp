@@ -22,7 +22,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// What a program writes to its standard error.
+/// Captures standard error.
 class ProgramLogTest : public testing::Test {
  protected:
   ProgramLogTest() : before_(dup(STDERR_FILENO)) {
@@ -51,7 +51,7 @@ class ProgramLogTest : public testing::Test {
   int before_;
 };
 
-TEST_F(ProgramLogTest, JsonIsOneValidObjectALineWhateverThePeersSay) {
+TEST_F(ProgramLogTest, EachJsonLineIsOneValidObjectWhateverTextPeersSend) {
   set_up_log("oblique-server", {"debug", "json"});
   const std::vector<std::string> messages{
       "plain",
@@ -93,7 +93,7 @@ TEST_F(ProgramLogTest, TheJournalGetsLevelsAndNoTimes) {
   EXPECT_EQ(lines(), (std::vector<std::string>{"<6>one\\ntwo", "<4>low", "<3>broken"}));
 }
 
-TEST_F(ProgramLogTest, AnotherStandardErrorGetsTimes) {
+TEST_F(ProgramLogTest, LinesHaveTimesWithoutAJournal) {
   setenv("JOURNAL_STREAM", "1:1", 1);
   set_up_log("oblique-worker");
   spdlog::info("ready");

@@ -22,7 +22,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A service manager's socket.
+/// Plays the service manager: receives datagrams on its socket.
 class NotifierTest : public testing::Test {
  protected:
   NotifierTest() {
@@ -38,8 +38,8 @@ class NotifierTest : public testing::Test {
     unsetenv("WATCHDOG_USEC");
   }
 
-  /// All that has come.
-  std::vector<std::string> heard() const {
+  /// All received datagrams.
+  std::vector<std::string> received() const {
     std::vector<std::string> all;
     std::array<char, 4096> bytes{};
     ssize_t got = 0;
@@ -55,24 +55,24 @@ class NotifierTest : public testing::Test {
   Notifier::Clock::time_point now_;
 };
 
-TEST_F(NotifierTest, SendsReadinessAStatusOnceInOneLineAndAnEndWithTheTimeThatItMayTake) {
+TEST_F(NotifierTest, SendsReadinessEachStatusOnceAndStoppingWithItsLongestTime) {
   Notifier notifier;
   notifier.ready("clients at x");
   notifier.status("one\nREADY=1");
   notifier.status("one\nREADY=1");
   notifier.stopping("draining", 120s);
-  EXPECT_EQ(heard(), (std::vector<std::string>{
-                         "READY=1\nSTATUS=clients at x", "STATUS=one\\nREADY=1",
-                         "STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"}));
+  EXPECT_EQ(received(), (std::vector<std::string>{
+                            "READY=1\nSTATUS=clients at x", "STATUS=one\\nREADY=1",
+                            "STOPPING=1\nSTATUS=draining\nEXTEND_TIMEOUT_USEC=120000000"}));
 }
 
-TEST_F(NotifierTest, SaysThatItLivesAtHalfOfTheTimeAndOnlyWhenItTurns) {
+TEST_F(NotifierTest, FeedsTheWatchdogAtHalfOfItsTimeOnlyWhenCalled) {
   setenv("WATCHDOG_USEC", "1000000", 1);
   Notifier notifier;
   std::size_t said = 0;
   for (int turn = 0; turn < 100; ++turn, now_ += 100ms) {  // 10 s
-    notifier.turn(now_);
-    said += heard().size();
+    notifier.feed_watchdog(now_);
+    sent += received().size();
   }
   EXPECT_EQ(said, 20U);
 }
@@ -83,14 +83,14 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
     setenv("NOTIFY_SOCKET", name.c_str(), 1);
     Notifier notifier;
     notifier.ready("ready");
-    notifier.turn(now_);
+    notifier.feed_watchdog(now_);
     notifier.stopping("stopping", 1s);
   }
-  EXPECT_TRUE(heard().empty());
+  EXPECT_TRUE(received().empty());
 }
 
-/// What `stop_with_parent` returns in a child process, and whether the child then gets SIGTERM for
-/// the end of its parent.
+/// Returns what `stop_with_parent` returns in a child process, and whether the child gets SIGTERM
+/// when its parent ends.
 std::pair<bool, bool> stops_with(pid_t parent) {
   const pid_t child = fork();
   if (child == 0) {
@@ -104,7 +104,7 @@ std::pair<bool, bool> stops_with(pid_t parent) {
   return {(WEXITSTATUS(status) & 1) != 0, (WEXITSTATUS(status) & 2) != 0};
 }
 
-TEST(StopWithParent, TheSystemIsAskedForSigtermWhenTheParentEnds) {
+TEST(StopWithParent, TheProcessGetsSigtermWhenItsParentEnds) {
   EXPECT_EQ(stops_with(0), std::pair(true, false)) << "without the option";
   EXPECT_EQ(stops_with(getpid()), std::pair(true, true));
   EXPECT_EQ(stops_with(getppid()), std::pair(false, true)) << "it has ended";
@@ -122,7 +122,7 @@ TEST(StopSignals, TheFirstOfSeveralIsTheExitCode) {
   EXPECT_EQ(stop.exit_code(), 128 + SIGHUP);
 }
 
-TEST(StopSignals, AHangUpThatIsIgnoredStaysIgnored) {
+TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
   const auto before = std::signal(SIGHUP, SIG_IGN);
   {
     StopSignals stop;
@@ -132,10 +132,10 @@ TEST(StopSignals, AHangUpThatIsIgnoredStaysIgnored) {
   std::signal(SIGHUP, before);
 }
 
-TEST(StopSignals, AfterItSignalsArePassedOnButNotOneThatHasCome) {
+TEST(StopSignals, ItsEndRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
-    raise(SIGTERM);  // would end this process below if it were left pending
+    raise(SIGTERM);  // would end this process below if it stayed pending
   }
   sigset_t blocked;
   ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);

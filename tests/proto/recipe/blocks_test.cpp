@@ -19,7 +19,7 @@
 namespace oblique::protocol {
 namespace {
 
-TEST(AxisTest, ARangeHasBothEndsExactlyAndRisesBetweenThem) {
+TEST(AxisTest, ARangeHasExactEndsAndRisesBetweenThem) {
   const Axis axis = range("mu", 0.1, 0.1 + 1e-12, 1000);
   EXPECT_EQ(axis_value(axis, 0), axis.from());
   EXPECT_EQ(axis_value(axis, 999), axis.to());
@@ -28,8 +28,9 @@ TEST(AxisTest, ARangeHasBothEndsExactlyAndRisesBetweenThem) {
   }
 }
 
-// Of 1,000 grids from 0 to 5 with steps of up to 50 units of their last decimal, and from 1e7 on.
-TEST(AxisTest, EveryValueOfADecimalGridIsTheNumberThatPeopleType) {
+// Tests 1,000 grids that start between 0 and 5, or at 1e7, with steps of up to 50 units of their
+// last decimal.
+TEST(AxisTest, EveryValueOfADecimalGridEqualsTheTypedNumber) {
   std::mt19937 random(1);
   const auto pick = [&](int from, int to) {
     return std::uniform_int_distribution<std::int64_t>(from, to)(random);
@@ -63,7 +64,7 @@ TEST(AxisTest, ARangeWhoseStepHasMoreDecimalsOrNoneIsRoundedOnce) {
   EXPECT_EQ(axis_value(range("mu", 0.0, 1.0 / 3.0, 3), 1), 1.0 / 6.0);
 }
 
-TEST(AxisTest, ALogarithmicRangeHasItsEndsAndTheNumbersThatPeopleType) {
+TEST(AxisTest, ALogarithmicRangeHasExactEndsAndDecimalValues) {
   const Axis decades = log_range("mu", 0.01, 100.0, 5);
   const Axis octaves = log_range("links", 1.0, 64.0, 7);
   for (std::uint64_t i = 0; i < 5; ++i) {
@@ -80,7 +81,7 @@ TEST(AxisTest, ALogarithmicRangeHasItsEndsAndTheNumbersThatPeopleType) {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-TEST(BlockKindsTest, AxesOfAZipGoSideBySideAndSingleValuesAreConstant) {
+TEST(BlockKindsTest, PointIOfAZipHasValueIOfEachAxisAndSingleValuesAreConstant) {
   const PointTable table(
       recipe_of_blocks({zipped({listed("k", {1e7, 2e7, 1e7}), listed("H", {0.3, 0.2, 0.3}),
                                 log_range("mu", 0.1, 10.0, 3), listed("e", {0.9})})}));
@@ -138,7 +139,7 @@ TEST(BlockKindsTest, ValuesOfAListAreDrawnWithEqualChances) {
               ElementsAre(testing::Pair(2, 100), testing::Pair(4, 100), testing::Pair(8, 100)));
 }
 
-TEST(BlockKindsTest, AnAxisFollowsFromOthersInAnyOrder) {
+TEST(BlockKindsTest, AnAxisMayBeComputedFromOthersInAnyOrder) {
   const PointTable table(
       recipe_of({{following("I", "A^2 / (4 * pi) * eta2"), listed("A", {1e-4, 2e-4}),
                   following("eta2", "1 + rho / 2700"), listed("H", {0.5, 0.6}),
@@ -155,7 +156,7 @@ TEST(BlockKindsTest, AnAxisFollowsFromOthersInAnyOrder) {
   }
 }
 
-TEST(BlockKindsTest, AModelThatFollowsFromThePointIsItsOwn) {
+TEST(BlockKindsTest, AModelThatDependsOnThePointIsDifferentForEachPoint) {
   const PointTable table(recipe_of({{following("k", "1e7 * H"), listed("H", {0.5, 0.6}),
                                      listed("mu", {0.1, 0.2}), listed("e", {1.0})}}));
   EXPECT_EQ(table.models(), 4U);
@@ -173,7 +174,7 @@ TEST(BlockKindsTest, SingleLengthsActAfterLinksAndLength) {
   EXPECT_THAT(table.model(6).lengths_m, ElementsAre(0.3, 0.2, 0.3));
 }
 
-TEST(BlockKindsTest, AnExpressionUsesTheLengthThatLinksMake) {
+TEST(BlockKindsTest, AnExpressionUsesTheLengthSetByLinks) {
   Recipe recipe = recipe_of({{listed("links", {2, 3}), following("tip_mass", "length2"),
                               listed("H", {0.2}), listed("mu", {0.4}), listed("e", {1.0})}});
   solver::ModelParameters base = solver::preset("paper");
@@ -198,7 +199,7 @@ TEST(KeysTest, EveryKeyHasItsNumber) {
 
 std::string fault_of_points(const Block& block) {
   try {
-    PointTable(recipe_of_blocks({block})).judge_points();
+    PointTable(recipe_of_blocks({block})).validate_points();
   } catch (const solver::InputError& fault) {
     return fault.what();
   }
@@ -208,7 +209,7 @@ std::string fault_of_points(const Block& block) {
 std::vector<std::uint64_t> left_in(const PointTable& table) {
   std::vector<std::uint64_t> points;
   for (std::uint64_t i = 0; i < table.size(); ++i) {
-    if (table.is_left_in(i)) {
+    if (table.passes_filter(i)) {
       points.push_back(i);
     }
   }
@@ -229,16 +230,16 @@ Block with_k(const std::string& k, std::uint64_t points, const std::string& wher
 TEST(FilterTest, PointsThatAreLeftOutKeepTheirNumbersAndOtherBlocksTheirPoints) {
   const PointTable table(recipe_of_blocks({grid("mu > 1.9 * e"), grid(""), grid("mu < 0.05")}));
   EXPECT_EQ(table.size(), 66U);
-  EXPECT_TRUE(table.has_filter() && table.needs_judging());
+  EXPECT_TRUE(table.has_filter() && table.has_points_to_validate());
   EXPECT_EQ(left_in(table).size(), 1U + 22U + 2U);
   EXPECT_EQ(table.point(20).mu, 1.0);
-  EXPECT_EQ(table.first_left_in(0, 66), 20U);
-  EXPECT_EQ(table.first_left_in(22, 66), 22U);
-  EXPECT_EQ(table.first_left_in(46, 66), 66U);
-  EXPECT_EQ(table.first_left_in(0, 10), 10U);
-  EXPECT_THROW(static_cast<void>(table.is_left_in(66)), std::out_of_range);
+  EXPECT_EQ(table.first_passing(0, 66), 20U);
+  EXPECT_EQ(table.first_passing(22, 66), 22U);
+  EXPECT_EQ(table.first_passing(46, 66), 66U);
+  EXPECT_EQ(table.first_passing(0, 10), 10U);
+  EXPECT_THROW(static_cast<void>(table.passes_filter(66)), std::out_of_range);
   const PointTable plain(recipe_of_blocks({grid("")}));
-  EXPECT_FALSE(plain.needs_judging() || plain.has_filter());
+  EXPECT_FALSE(plain.has_points_to_validate() || plain.has_filter());
 }
 
 TEST(FilterTest, UsesExpressionsTheModelAndPointsOfZipsAndSamples) {
@@ -256,7 +257,7 @@ TEST(FilterTest, UsesExpressionsTheModelAndPointsOfZipsAndSamples) {
               5.0);
 }
 
-TEST(JudgedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
+TEST(ValidatedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
   const Block beyond = zipped({listed("length", {0.1, 1.0}), listed("H", {0.5, 2.0}),
                                listed("mu", {0.4}), listed("e", {1.0})});
   Block reached = beyond;
@@ -269,8 +270,8 @@ TEST(JudgedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
            {beyond, {"point 0: H = 0.5", "length = 0.1"}},
            {reached, {}},
            {outside, {}},
-           {grid("sqrt(mu - 0.5) > 0.1"), {"point 0: where has no value"}},
-           {grid("mu > 2"), {"leaves no point in"}}}) {
+           {grid("sqrt(mu - 0.5) > 0.1"), {"point 0: where is not a number"}},
+           {grid("mu > 2"), {"leaves out all points"}}}) {
     const std::string fault = fault_of_points(block);
     EXPECT_EQ(fault.empty(), words.empty()) << fault;
     for (const char* word : words) {
@@ -279,7 +280,7 @@ TEST(JudgedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
   }
 }
 
-TEST(JudgedPointsTest, OfManyPointsSomeAtRandomAreJudgedAndTheOthersFailLater) {
+TEST(ValidatedPointsTest, OfManyPointsRandomOnesAreValidatedAndOthersFailLater) {
   constexpr std::uint64_t kMany = 100'000'001;
   EXPECT_THAT(fault_of_points(with_k("1e7 * (0.99 - mu)", kMany)), HasSubstr("k = "))
       << "one in a hundred";

@@ -18,7 +18,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Reads an expression, and its names in the order of the text into `names`.
+/// Parses an expression; adds its names to `names` in the order of the text.
 Expression read(const std::string& text, std::vector<std::string>& names) {
   return Expression(text, [&](std::string_view name) {
     const auto found = std::find(names.begin(), names.end(), name);
@@ -97,7 +97,7 @@ TEST(ExpressionTest, EveryFunctionTakesItsArgumentsAndNoOthers) {
   }
 }
 
-TEST(ExpressionTest, WhatFollowsFromNoNumberIsNoNumberAlsoWhenCompared) {
+TEST(ExpressionTest, NanStaysNanAlsoInComparisons) {
   for (const char* text : {"sqrt(-1)", "sqrt(-1) > 0", "!sqrt(-1)", "log(-1) < 5 || 1 == 1",
                            "0 / 0 == 0", "min(1, sqrt(-1))", "if(sqrt(-1), 1, 2)"}) {
     EXPECT_TRUE(std::isnan(value_of(text))) << text;
@@ -105,26 +105,26 @@ TEST(ExpressionTest, WhatFollowsFromNoNumberIsNoNumberAlsoWhenCompared) {
   EXPECT_TRUE(std::isinf(value_of("1 / 0")));
 }
 
-TEST(ExpressionTest, ATextThatIsNoneIsRefusedWithTheReason) {
+TEST(ExpressionTest, AnInvalidTextIsRefusedWithTheReason) {
   for (const auto& [text, reason] : std::vector<std::pair<std::string, std::string>>{
            {"", "empty"},
-           {"e = 1", "`==` compares"},
+           {"e = 1", "use `==` to compare"},
            {"\"text\"", "a value is missing before `\"`"},
-           {"a ? b : c", "`?` means nothing"},
+           {"a ? b : c", "`?` is not an operator"},
            {"a; b", "`;`"},
            {"0 < mu < 1", "a < b && b < c"},
            {"0 < mu == 1", "a < b && b < c"},
            {"sqr(2)", "did you mean `sqrt`?"},
            {"2 mu", "operator is missing before `mu`"},
            {"(1)(2)", "operator is missing before `(`"},
-           {"2 * not mu == 0.2", "`not` needs brackets"},
-           {"-not mu", "`not` needs brackets"},
+           {"2 * not mu == 0.2", "needs brackets"},
+           {"-not mu", "needs brackets"},
            {"1 not 2", "operator is missing before `not`"},
-           {"2mu", "runs into"},
-           {"1.2.3", "runs into"},
-           {"1e", "runs into"},
-           {"0x10", "runs into"},
-           {"1e999", "cannot be read"},
+           {"2mu", "missing after a number"},
+           {"1.2.3", "missing after a number"},
+           {"1e", "missing after a number"},
+           {"0x10", "missing after a number"},
+           {"1e999", "invalid number"},
            {"(1 + 2", "open"},
            {"1 + 2)", "closing"},
            {"1, 2", "arguments of a function"},
@@ -137,7 +137,7 @@ TEST(ExpressionTest, ATextThatIsNoneIsRefusedWithTheReason) {
            {"1 < or 2", "a value is missing before `or`"},
            {"()", "a value is missing before `)`"},
            {"min(1,)", "a value is missing before `)`"},
-           {std::string(kLongestText + 1, '1'), "more than 1000"}}) {
+           {std::string(kLongestText + 1, '1'), "at most 1000"}}) {
     EXPECT_THAT(objection_to(text), HasSubstr(reason)) << text;
   }
 }

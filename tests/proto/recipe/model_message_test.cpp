@@ -18,20 +18,20 @@ namespace {
 
 const std::vector<Axis> kPoint{listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})};
 
-TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedAndCanBeReadUnjudged) {
+TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedUnlessReadUnchecked) {
   EXPECT_THROW(from_message(ModelParameters{}), solver::InputError);
   ModelParameters message = to_message(unusual_model());
   message.set_spectral_radius(1.0);
   EXPECT_THROW(from_message(message), solver::InputError);
-  EXPECT_EQ(unjudged_from_message(message).spectral_radius, 1.0);
+  EXPECT_EQ(from_message_unchecked(message).spectral_radius, 1.0);
   message = to_message(unusual_model());
   message.set_elements_per_link(4'000'000'000U);
-  EXPECT_THROW(unjudged_from_message(message), solver::InputError) << "no model could hold it";
+  EXPECT_THROW(from_message_unchecked(message), solver::InputError) << "no model could hold it";
 }
 
-// These texts stand in databases and names of studies. One that has to change needs another version
-// in its first word, and another schema.
-TEST(Canonical, TheTextOfAModelIsTheSameForEver) {
+// Databases and names of studies contain these texts. A changed text needs another version in its
+// first word, and another schema.
+TEST(Canonical, TheTextOfAModelNeverChanges) {
   EXPECT_EQ(canonical_model(solver::preset("paper")),
             "oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10 A=0.0005309 I=2.243e-08 rho=2700 g=9.81 "
             "elements_per_link=4 k=2.7e+07 eta2=1.2463 tip_mass=0 integrator=explicit "
@@ -100,7 +100,7 @@ TEST(Canonical, ModelErrorsBlocksAndTheOrderOfAxesCount) {
 
 TEST(Canonical, BlocksAreComparedAsTheyAreWritten) {
   const Recipe recipe = recipe_of({kPoint});
-  Recipe padded;  // a field that nobody knows
+  Recipe padded;  // an unknown field
   ASSERT_TRUE(padded.ParseFromString(recipe.SerializeAsString() + std::string("\x98\x06\x01", 3)));
   EXPECT_EQ(recipe_digest(padded), recipe_digest(recipe));
   const auto of = [](const Axis& mu) {
@@ -115,19 +115,19 @@ using namespace std::string_literals;
 using testing::AllOf;
 using testing::HasSubstr;
 
-TEST(WrittenModel, IsItsPresetAndTheKeysThatOverrideIt) {
+TEST(ModelInput, IsItsPresetAndTheKeysThatOverrideIt) {
   const auto model =
-      WrittenModel{.preset = "printed", .values = {{"length", 0.2}, {"k", 1e7}, {"links", 2}}}
+      ModelInput{.preset = "printed", .values = {{"length", 0.2}, {"k", 1e7}, {"links", 2}}}
           .model();
   EXPECT_EQ(model.lengths_m, (std::vector{0.2, 0.2}));
   EXPECT_EQ(model.k_N_m, 1e7);
   EXPECT_EQ(model.eta2, solver::preset("printed").eta2);
-  EXPECT_EQ(WrittenModel().model(), solver::preset("standard"));
+  EXPECT_EQ(ModelInput().model(), solver::preset("standard"));
 }
 
-TEST(WrittenModel, NamesKeyAndValueThatNoModelHas) {
+TEST(ModelInput, ErrorsHaveTheKeyAndTheInvalidValue) {
   const struct {
-    WrittenModel model;
+    ModelInput model;
     const char* key;
     const char* says;
   } wrong[] = {
@@ -137,8 +137,8 @@ TEST(WrittenModel, NamesKeyAndValueThatNoModelHas) {
       {{.lengths_m = {{0.4, -0.3}}}, "lengths", "lengths = -0.3"},
       {{.lengths_m = std::vector<double>()}, "lengths", "lengths = []"},
       {{.lengths_m = std::vector(65, 0.1)}, "lengths", "from 1 to 64"},
-      {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths stands beside"},
-      {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths stands beside"},
+      {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths cannot be combined"},
+      {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths cannot be combined"},
   };
   for (const auto& [model, key, says] : wrong) {
     try {
@@ -151,30 +151,30 @@ TEST(WrittenModel, NamesKeyAndValueThatNoModelHas) {
   }
 }
 
-TEST(StudyName, MayBeAnyTextThatPeopleCanReadAndShellsTake) {
+TEST(StudyName, MayBeAnyVisibleText) {
   for (const auto& name : {"paper"s, "μ and e, 2nd"s, "a-b"s, "参数"s, std::string(100, 'x')}) {
-    EXPECT_EQ(objection_to_study_name(name), "") << name;
+    EXPECT_EQ(study_name_error(name), "") << name;
   }
   for (const auto& name : {""s, std::string(101, 'x'), "-x"s}) {
-    EXPECT_NE(objection_to_study_name(name), "") << name;
+    EXPECT_NE(study_name_error(name), "") << name;
   }
 }
 
-TEST(StudyName, IsRefusedAndShownEscapedWithCharactersThatAreNotVisible) {
+TEST(StudyName, IsRefusedAndShownEscapedIfItHasInvisibleCharacters) {
   for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
                            "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
-    const auto objection = objection_to_study_name(name);
+    const auto objection = study_name_error(name);
     EXPECT_THAT(objection, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
                                  testing::Not(HasSubstr(name))));
   }
 }
 
-TEST(StudyPriority, IsWithinLimitsThatTheObjectionNames) {
+TEST(StudyPriority, IsWithinLimitsThatTheErrorNames) {
   for (const std::int64_t priority : {-1000, 0, 1000}) {
-    EXPECT_EQ(objection_to_priority(priority), "");
+    EXPECT_EQ(priority_error(priority), "");
   }
-  EXPECT_EQ(objection_to_priority(1001), "priority = 1001 is not allowed: -1000 to 1000 is");
-  EXPECT_NE(objection_to_priority(-1001), "");
+  EXPECT_EQ(priority_error(1001), "priority = 1001 is not allowed: it must be -1000 to 1000");
+  EXPECT_NE(priority_error(-1001), "");
 }
 
 }  // namespace

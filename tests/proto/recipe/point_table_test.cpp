@@ -15,7 +15,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// A study with every feature: several blocks, listed and ranged axes, model axes in two of them.
+/// A study with every feature: several blocks, listed and ranged axes, model axes in two blocks.
 Recipe varied_recipe() {
   Recipe recipe = recipe_of({
       {listed("H", {0.96, 1.0, 1.04}), listed("mu", {0.4, 0.8}), range("e", 0.5, 1.0, 6)},
@@ -35,7 +35,7 @@ struct ExpectedPoint {
   double e_star;
 };
 
-/// Enumerates one block by walking its axes as nested loops, the first outermost.
+/// Enumerates the points of a block by nested loops over its axes, the first outermost.
 void enumerate(const Block& block, int depth, ExpectedPoint current,
                std::vector<ExpectedPoint>& points) {
   if (depth == block.axes_size()) {
@@ -58,7 +58,7 @@ void enumerate(const Block& block, int depth, ExpectedPoint current,
   }
 }
 
-TEST(PointTableTest, EveryPointIsThatOfNestedLoopsOverTheAxes) {
+TEST(PointTableTest, PointsAreThoseOfNestedLoopsOverTheAxes) {
   const PointTable table(varied_recipe());
   std::vector<ExpectedPoint> expected;
   for (const Block& block : table.recipe().blocks()) {
@@ -89,7 +89,7 @@ TEST(PointTableTest, ASegmentIsTheLongestRunOfPointsWithOneModel) {
   EXPECT_EQ(segments, 1 + 6 + 1 + 3);
 }
 
-TEST(PointTableTest, BlocksThatShareAModelAndFollowEachOtherAreOneSegment) {
+TEST(PointTableTest, AdjacentBlocksThatShareAModelAreOneSegment) {
   const std::vector<Axis> point{listed("H", {1.0}), listed("mu", {0.4}), listed("e", {1.0})};
   const std::vector<Axis> two{listed("H", {0.9, 1.0}), listed("mu", {0.4}), listed("e", {1.0})};
   std::vector<Axis> other_model = two;
@@ -107,7 +107,7 @@ TEST(PointTableTest, BlocksThatShareAModelAndFollowEachOtherAreOneSegment) {
   EXPECT_THROW(table.segment_at(13), std::out_of_range);
 }
 
-TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {
+TEST(PointTableTest, AnyPointOfATrillionCanBeComputed) {
   const PointTable table(recipe_of({{range("H", 0.5, 1.1, 10'000), range("mu", 0.0, 1.0, 10'000),
                                      range("e", 0.5, 1.0, 10'000)}}));
   ASSERT_EQ(table.size(), kMaxPoints);
@@ -120,7 +120,7 @@ TEST(PointTableTest, AStudyOfATrillionPointsIsReadAtAnyPoint) {
   EXPECT_EQ(inner.e_star, axis_value(table.recipe().blocks(0).axes(2), 9012));
 }
 
-TEST(PointTableTest, ABillionModelsAreReadAtAnyModelAndNoneBeyond) {
+TEST(PointTableTest, AnyModelOfABillionCanBeComputedAndNoneBeyond) {
   const PointTable table(recipe_of({{range("k", 1e7, 3e7, 1'000'000'001), listed("H", {1.0}),
                                      listed("mu", {0.4}), listed("e", {1.0})}}));
   EXPECT_EQ(table.models(), 1'000'000'001U);
@@ -147,7 +147,7 @@ PointResult result_of(std::uint64_t point, const PointTable& table) {
   return result;
 }
 
-TEST(PointInputs, MayDifferInTheLastBitsAndAreKeptAsTheyWereSent) {
+TEST(PointInputs, MayDifferInTheLastBitsAndAreStoredAsSent) {
   const PointTable table = table_of_lengths();
   PointResult result = result_of(3, table);
   EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
@@ -159,7 +159,7 @@ TEST(PointInputs, MayDifferInTheLastBitsAndAreKeptAsTheyWereSent) {
   EXPECT_EQ(inputs_of(result, table).H_m, H_m);
 }
 
-TEST(PointInputs, ThatDifferByMoreAreAFault) {
+TEST(PointInputs, ThatDifferByMoreAreRefused) {
   const PointTable table = table_of_lengths();
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -179,7 +179,7 @@ TEST(PointInputs, ThatDifferByMoreAreAFault) {
   EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("mu")) << "the study has 0";
 }
 
-TEST(PointInputs, OfTheModelAreWholeNumbersAndLengthsToo) {
+TEST(PointInputs, IncludeWholeNumbersAndLengthsOfTheModel) {
   const PointTable table = table_of_lengths();
   for (void (*change)(ModelParameters&) :
        {+[](ModelParameters& m) { m.set_elements_per_link(m.elements_per_link() + 1); },
@@ -191,7 +191,7 @@ TEST(PointInputs, OfTheModelAreWholeNumbersAndLengthsToo) {
   }
 }
 
-TEST(PointInputs, AreComparedInTextsOfModelsToo) {
+TEST(PointInputs, AreComparedAlsoInTextsOfModels) {
   const std::string own = canonical_model(solver::preset("paper"));
   const auto with = [&](const std::string& part, const std::string& other) {
     return std::string(own).replace(own.find(part), part.size(), other);
@@ -208,7 +208,7 @@ TEST(PointInputs, AreComparedInTextsOfModelsToo) {
   }
 }
 
-TEST(PointInputs, OfAStudyThatHasGrownByModelsSinceAreThoseOfItsPoint) {
+TEST(PointInputs, WithoutAModelAreThoseOfAStudyThatLaterGrewByModels) {
   const Axis H = listed("H", {0.8});
   const Axis mu = listed("mu", {0.0, 0.4});
   const Axis e = listed("e", {0.9});
@@ -267,7 +267,7 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
 }
 
 // 0.02 is four standard deviations of a share of a third in 10^4 points.
-TEST(StudySize, EstimatesWhatAFilterLeavesInOfMorePoints) {
+TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
   const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
   const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");
   const auto size = size_of_blocks({plain, large});
@@ -280,7 +280,7 @@ TEST(StudySize, EstimatesWhatAFilterLeavesInOfMorePoints) {
 }
 
 // 400 is more than four standard deviations of the estimate.
-TEST(StudySize, EstimatesTheFallsOfMorePointsFromTenThousand) {
+TEST(StudySize, EstimatesTheFallsFromTenThousandPointsAboveThatNumber) {
   const auto shared = size_of_blocks(
       {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});
   EXPECT_TRUE(shared.falls_estimated);
@@ -296,7 +296,7 @@ TEST(StudySize, EstimatesTheFallsOfMorePointsFromTenThousand) {
   EXPECT_EQ(drawn.falls, 1'000'000'000U);
 }
 
-TEST(StudySize, IsOfAResultForEachPointAndOfEachModel) {
+TEST(StudySize, CountsAResultForEachPointAndEachModel) {
   EXPECT_EQ(size_of_blocks({filtered({kSomeH, range("mu", 0.1, 1, 100), kSomeE}, "")}).bytes,
             100U * 970 + 600);
   EXPECT_EQ(

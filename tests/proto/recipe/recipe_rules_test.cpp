@@ -1,4 +1,4 @@
-// What makes a recipe wrong, and how the message names it.
+// Rules of recipes, and the messages for violations.
 #include <limits>
 #include <string>
 #include <vector>
@@ -36,7 +36,7 @@ const Axis kH = listed("H", {0.5});
 const Axis kMu = listed("mu", {0.4});
 const Axis kE = listed("e", {1.0});
 
-/// A product of this axis of mu, and one of a model key beside H, mu and e.
+/// A product block with this axis of mu, and one with a further model key.
 Block of_mu(const Axis& mu) {
   return filtered({listed("H", {1.0}), mu, kE}, "");
 }
@@ -73,8 +73,8 @@ Axis with_value(Axis axis, double value) {
 
 struct Refused {
   Block block;
-  std::string key = {};   ///< of the error
-  std::string says = {};  ///< a part of the message; empty: the block is allowed
+  std::string key = {};   ///< key of the error
+  std::string says = {};  ///< part of the message; empty: the block is allowed
 };
 
 void expect_refusals(const std::vector<Refused>& blocks) {
@@ -91,7 +91,7 @@ void expect_refusals(const std::vector<Refused>& blocks) {
   }
 }
 
-TEST(RecipeRules, KeysAreKnownAndGivenOnceInOrder) {
+TEST(RecipeRules, KeysMustBeKnownUniqueAndInOrder) {
   expect_refusals({
       {with(listed("wobble", {1.0})), "wobble", "unknown key `wobble`: the keys are"},
       {filtered({kH, kMu, listed("mu", {0.5}), kE}, ""), "mu", "mu appears twice"},
@@ -115,8 +115,8 @@ TEST(RecipeRules, ListsAndRangesHaveAllowedValues) {
       {of_mu(listed("mu", {})), "mu", "mu = [] has no values"},
       {of_mu(with_value(range("mu", 0.1, 0.2, 2), 0.4)), "mu", "mu has values of several kinds"},
       {of_mu(range("mu", 2.0, 0.5, 4)), "mu", "from 2 to 0.5 is reversed"},
-      {of_mu(range("mu", 0.5, 2.0, 1)), "mu", "holds both ends"},
-      {of_mu(range("mu", 0.5, 0.5, 7)), "mu", "count = 7 is not allowed with equal ends, 0.5"},
+      {of_mu(range("mu", 0.5, 2.0, 1)), "mu", "contains both ends"},
+      {of_mu(range("mu", 0.5, 0.5, 7)), "mu", "count = 7 is not allowed with equal ends 0.5"},
       {of_mu(listed("mu", {kNan})), "mu", "mu = nan"},
       {of_mu(listed("mu", {kInfinity})), "mu", "mu = inf"},
       {of_mu(range("mu", 0.0, kInfinity, 3)), "mu", "mu = inf"},
@@ -151,7 +151,7 @@ TEST(RecipeRules, ARangeIsRefusedExactlyWhenOneOfItsValuesIs) {
   }
 }
 
-TEST(RecipeRules, NoHIsLargerThanTheShortestFingerOfTheBlock) {
+TEST(RecipeRules, HMustNotExceedTheShortestFingerOfTheBlock) {
   expect_refusals({
       {filtered({range("H", 0.9, 1.3, 5), kMu, kE}, ""), "H", "the length of the chain, 1.2 m"},
       {with(listed("length", {0.4, 0.3})), "H", "0.9 m"},
@@ -165,14 +165,14 @@ TEST(RecipeRules, NoHIsLargerThanTheShortestFingerOfTheBlock) {
   });
 }
 
-TEST(RecipeRules, ZipsAndSamplesFitTogether) {
+TEST(RecipeRules, AxesMustFitZipsAndSamples) {
   expect_refusals({
       {zipped({listed("H", {0.3, 0.2}), listed("mu", {0.1, 0.2, 0.3}), kE}), "H",
        "H has 2 values and another axis 3"},
-      {drawing(normal(0.4, 0.05)), "mu", "cut it off with `from`"},
+      {drawing(normal(0.4, 0.05)), "mu", "truncate it with `from`"},
       {drawing(normal(0.4, 0.05, 0.0))},
       {drawing(normal(0.4, 0.0, 0.0)), "mu", "sd = 0"},
-      {drawing(normal(0.4, 1e-3, 1e3)), "mu", "nothing is left"},
+      {drawing(normal(0.4, 1e-3, 1e3)), "mu", "has no values from"},
       {drawing(uniform("mu", -0.1, 1.0)), "mu", "mu = -0.1"},
       {drawing(uniform("mu", 1.0, 0.5)), "mu", "swap"},
       {drawing(log_uniform(0.0, 1.0)), "mu", "logarithm"},
@@ -184,27 +184,27 @@ TEST(RecipeRules, ZipsAndSamplesFitTogether) {
   });
 }
 
-TEST(RecipeRules, ExpressionsAreReadable) {
+TEST(RecipeRules, ExpressionsMustBeValid) {
   const auto both = [](const Axis& a, const Axis& b) { return filtered({a, b, kH, kMu, kE}, ""); };
   expect_refusals({
       {both(following("E", "k"), following("k", "E")), "E", "circle"},
       {both(following("E", "E * 2"), listed("k", {1e7})), "E", "circle"},
       {both(following("E", "muu * 2"), listed("k", {1e7})), "E", "did you mean `mu`?"},
       {both(following("E", "2 +"), listed("k", {1e7})), "E", "a value is missing"},
-      {with(following("E", "length4")), "E", "`length4` is the length of no link"},
+      {with(following("E", "length4")), "E", "`length4` is not a key"},
   });
   EXPECT_THAT(refusal(with(following("E", "2 +"))), StartsWith("E = \"2 +\": a value is missing"));
 }
 
 TEST(RecipeRules, AStudyHasABoundedNumberOfExpressionsBlocksAndPoints) {
   const Block expressed = filtered({kH, following("mu", "H / 2"), kE}, "");
-  EXPECT_EQ(refusal(recipe_of_blocks(std::vector<Block>(kMostExpressions, expressed))), "");
-  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMostExpressions + 1, expressed))),
+  EXPECT_EQ(refusal(recipe_of_blocks(std::vector<Block>(kMaxExpressions, expressed))), "");
+  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMaxExpressions + 1, expressed))),
               HasSubstr("more than 1000 expressions"));
-  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMostBlocks + 1, of_mu(kMu)))),
+  EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMaxBlocks + 1, of_mu(kMu)))),
               HasSubstr("10001 blocks, more than 10000"));
   const std::uint64_t huge = std::numeric_limits<std::uint64_t>::max();
-  const std::uint64_t half = std::uint64_t{1} << 32U;  // half * half would wrap to 0
+  const std::uint64_t half = std::uint64_t{1} << 32U;  // half * half would overflow to 0
   const Block most =
       filtered({kH, range("mu", 0, 1, 1'000'000), range("e", 0.5, 1, 1'000'000)}, "");
   EXPECT_EQ(refusal(most), "");
@@ -215,7 +215,7 @@ TEST(RecipeRules, AStudyHasABoundedNumberOfExpressionsBlocksAndPoints) {
   }
 }
 
-TEST(RecipeRules, ARecipeThatNoWorkerCanBeSentIsRefused) {
+TEST(RecipeRules, ARecipeTooLongForAWorkerIsRefused) {
   Recipe recipe = recipe_of({{listed("mu", {})}});
   recipe.mutable_blocks(0)->mutable_axes(0)->mutable_values()->Resize(1 << 20, 0.5);
   EXPECT_NO_THROW(check_size(recipe));

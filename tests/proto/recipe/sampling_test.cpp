@@ -1,4 +1,4 @@
-// Points of samples in the unit cube, and the quantiles of distributions.
+// Sample points in the unit cube, and quantiles of distributions.
 #include "proto/recipe/sampling.h"
 
 #include <algorithm>
@@ -27,7 +27,8 @@ using protocol::SAMPLE_SOBOL;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Digest of points in all dimensions, each coordinate times 2^64 in eight bytes, the least first.
+/// Digest of points in all dimensions; each coordinate times 2^64 in eight bytes, least significant
+/// first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   std::string bytes;
   for (std::uint64_t index = first; index < first + count; ++index) {
@@ -41,9 +42,9 @@ std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   return protocol::sha256_of(bytes);
 }
 
-// Digests of what boost::random::sobol(32) of Boost 1.74 gives: it leaves out the origin, so its
-// point i is ours i + 1. The far ones are behind `seed(2^40 - 17)`.
-TEST(SobolTest, AllDimensionsAreThoseOfBoost) {
+// Digests of boost::random::sobol(32) of Boost 1.74, which leaves out the origin, so its point i is
+// our i + 1. The later points follow `seed(2^40 - 17)`.
+TEST(SobolTest, AllDimensionsEqualThoseOfBoost) {
   EXPECT_EQ(digest_of_points(1, 4096),
             "9ec19155dfd8ef8b7ce1b7bd2e7c349bf4734b172ed36d96519d9b3f7f30f0dc");
   EXPECT_EQ(digest_of_points((std::uint64_t{1} << 40) - 16, 64),
@@ -51,9 +52,9 @@ TEST(SobolTest, AllDimensionsAreThoseOfBoost) {
   EXPECT_THROW(sobol_bits(3, kSobolDimensions), std::out_of_range);
 }
 
-// Nested: digit k of the result is digit k of the value, changed or not by the digits before it
-// alone. So two values agree in as many first digits after as before, and in no more.
-TEST(OwenScramblingTest, ValuesShareAsManyFirstDigitsAfterAsBefore) {
+// Scrambling is nested: digit k of the result depends only on the digits up to k. So two values
+// have equally many common leading digits before and after.
+TEST(OwenScramblingTest, ScramblingKeepsTheNumberOfCommonLeadingDigits) {
   for (int shared = 0; shared < kSobolBits; ++shared) {
     const std::uint64_t value = 0x9e3779b97f4a7 ^ (std::uint64_t{1} << shared);
     const std::uint64_t other = value ^ (std::uint64_t{1} << (kSobolBits - 1 - shared));
@@ -77,7 +78,8 @@ TEST(SampleTest, ALatinHypercubeHasOnePointInEachStratumOfEachDimension) {
   }
 }
 
-TEST(SampleTest, AnyPointOfTheMostIsFoundAtOnceWithinTheOpenCubeAndDependsOnTheSeed) {
+TEST(SampleTest,
+     EachPointOfTheLargestSampleIsComputedDirectlyLiesInTheOpenCubeAndDependsOnTheSeed) {
   for (const auto kind : {SAMPLE_RANDOM, SAMPLE_LATIN_HYPERCUBE, SAMPLE_SOBOL}) {
     for (const std::uint64_t index : {std::uint64_t{0}, kMostPoints / 3, kMostPoints - 1}) {
       for (std::uint32_t d = 0; d < kSobolDimensions; ++d) {
@@ -92,7 +94,7 @@ TEST(SampleTest, AnyPointOfTheMostIsFoundAtOnceWithinTheOpenCubeAndDependsOnTheS
   }
 }
 
-TEST(SampleTest, RandomAndSobolPointsStayWhenTheCountGrowsAndThoseOfALatinHypercubeDoNot) {
+TEST(SampleTest, RandomAndSobolPointsKeepTheirValuesWhenTheCountGrowsUnlikeLatinHypercubes) {
   for (const auto kind : {SAMPLE_RANDOM, SAMPLE_LATIN_HYPERCUBE, SAMPLE_SOBOL}) {
     int same = 0;
     for (std::uint64_t i = 0; i < 100; ++i) {
@@ -102,7 +104,7 @@ TEST(SampleTest, RandomAndSobolPointsStayWhenTheCountGrowsAndThoseOfALatinHyperc
   }
 }
 
-// Stored studies have these points.
+// Stored studies contain these points.
 TEST(SampleTest, ValuesAreThoseOfTheFirstVersion) {
   for (const auto& [kind, of_first, of_last] :
        {std::tuple{SAMPLE_RANDOM, 0.73936814972315379, 0.22969086515040626},
@@ -131,8 +133,8 @@ Quantiles normal(double mean, double sd, double from, double to) {
   return of_kind(protocol::DISTRIBUTION_NORMAL, from, to, mean, sd);
 }
 
-/// Mean of `of` over the values in the middles of `n` equal parts: the integral over the
-/// distribution, nearly.
+/// Mean of `of` at the midpoints of `n` equal parts: approximately the integral over the
+/// distribution.
 double mean_of(const Quantiles& distribution, const std::function<double(double)>& of) {
   constexpr int kParts = 100'000;
   double sum = 0.0;
@@ -151,8 +153,8 @@ double variance(const Quantiles& distribution) {
   return mean_of(distribution, [&](double x) { return (x - center) * (x - center); });
 }
 
-// Digits of tables: M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, table 26.5,
-// and, from 1e-10 on, those that AS 241 gives as its checks.
+// Values from M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, table 26.5, and
+// from 1e-10 on the check values of AS 241.
 TEST(NormalTest, QuantilesAreThoseOfTheTables) {
   EXPECT_NEAR(normal_quantile(0.5), 0.0, 1e-17);
   EXPECT_NEAR(normal_quantile(0.25), -0.6744897501960817, 1e-15);
@@ -161,17 +163,17 @@ TEST(NormalTest, QuantilesAreThoseOfTheTables) {
   EXPECT_NEAR(normal_quantile(1e-20), -9.262340089798408, 1e-14);
 }
 
-// An error of one part in 1e16 in z is one of z^2 such parts in p.
-TEST(NormalTest, QuantileAndPartBelowUndoEachOther) {
+// A relative error of 1e-16 in z gives one of z^2 times 1e-16 in p.
+TEST(NormalTest, QuantileAndProbabilityAreInverse) {
   for (double p = 1e-300; p < 0.5; p *= 1.7) {
     const double z = normal_quantile(p);
     EXPECT_NEAR(normal_part_below(z) / p, 1.0, 1e-15 * (2.0 + z * z)) << p;
   }
 }
 
-// Mean and variance of a normal distribution that is cut off at a and b, in units of sd from the
-// mean: with Z = Phi(b) - Phi(a), (phi(a) - phi(b))/Z and 1 + (a phi(a) - b phi(b))/Z - mean^2.
-TEST(DistributionTest, ATruncatedNormalHasTheMomentsOfTheory) {
+// Mean and variance of a normal distribution truncated at a and b, in units of sd from the mean:
+// with Z = Phi(b) - Phi(a), (phi(a) - phi(b))/Z and 1 + (a phi(a) - b phi(b))/Z - mean^2.
+TEST(DistributionTest, ATruncatedNormalHasTheTheoreticalMoments) {
   const auto phi = [](double z) {
     return std::isinf(z) ? 0.0 : std::exp(-z * z / 2.0) / std::sqrt(2.0 * std::acos(-1.0));
   };
@@ -206,7 +208,7 @@ TEST(DistributionTest, ValuesRiseWithTheFractionAndStayBetweenTheEnds) {
   EXPECT_FALSE(std::isnormal(normal(0.0, 1.0, 38.0, 39.0).part_left()));
 }
 
-// Stored studies have these values, but for the last bits of <cmath>.
+// Stored studies contain these values, up to the last bits of <cmath>.
 TEST(DistributionTest, ValuesAreThoseOfTheFirstVersion) {
   EXPECT_DOUBLE_EQ(uniform(0.3, 1.1).value_at(0.123), 0.39839999999999998);
   EXPECT_DOUBLE_EQ(log_uniform(0.01, 2.0).value_at(0.123), 0.019187866556359772);

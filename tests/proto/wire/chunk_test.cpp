@@ -1,4 +1,4 @@
-// Rows in chunks: what is written is read, and what does not fit together is found out.
+// Chunks: writing and reading, and detection of inconsistent ones.
 #include <cmath>
 #include <limits>
 
@@ -50,7 +50,7 @@ TEST(Chunk, OfATableHasItsRows) {
   EXPECT_EQ(back.rows, whole.rows);
 }
 
-TEST(Chunk, ThatDoesNotFitTogetherIsNotSound) {
+TEST(Chunk, WithInconsistentCellsIsNotSound) {
   const auto broken = [](auto&& breaking) {
     QueryReply chunk = two_rows();
     breaking(chunk);

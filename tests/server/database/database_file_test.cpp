@@ -22,8 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A database that lies in a folder where nothing can be written. What it holds: two rows in the
-/// file and, with a log beside it, a third one there.
+/// A database in a read-only folder: two rows in the file and, if it has a log, a third one there.
 class ReadOnlyFolderTest : public StoreFixture {
  protected:
   ReadOnlyFolderTest() {
@@ -48,11 +47,11 @@ class ReadOnlyFolderTest : public StoreFixture {
     return folder_.file(name + "/some % results?.db");
   }
 
-  /// Runs `what` as a user who can write nowhere but in `out`: root could write in every folder.
-  /// Ends the process with 0 when `what` gives true.
+  /// Runs `what` in a child process as a user who can write only in `out`, because root could write
+  /// everywhere. The process ends with 0 if `what` returns true.
   void as_stranger(const std::function<bool()>& what) const {
-    constexpr uid_t kNobody = 65534;
-    if (::geteuid() == 0 && (::setgid(kNobody) != 0 || ::setuid(kNobody) != 0)) {
+    constexpr uid_t kNoProcess = 65534;
+    if (::geteuid() == 0 && (::setgid(kNoProcess) != 0 || ::setuid(kNoProcess) != 0)) {
       std::_Exit(2);
     }
     try {
@@ -100,14 +99,14 @@ TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
               testing::ExitedWithCode(0), "");
 }
 
-TEST_F(ReadOnlyFolderTest, ADatabaseThatMayNotBeReadIsSaidToBeItsOwnersAlone) {
+TEST_F(ReadOnlyFolderTest, PermissionDeniedIsReportedWithTheRemedy) {
   const std::string file = file_in("alone");
   ::chmod(file.c_str(), ::geteuid() == 0 ? 0600 : 0);
   EXPECT_EXIT(as_stranger([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
-              "permission denied; a database is its owner's alone");
+              "permission denied. Only its owner can read");
 }
 
-TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
+TEST(FileSystemOf, AMissingPathHasTheFileSystemOfItsParent) {
   EXPECT_EQ(file_system_of("/dev/shm/none/oblique.db"), "tmpfs");
   EXPECT_EQ(file_system_of("/proc/self/oblique.db"), "proc");
   for (const char* type : {"nfs4", "cifs", "lustre", "fuse.sshfs", "fuse.gcsfuse"}) {
@@ -116,7 +115,7 @@ TEST(FileSystemOf, APathThatDoesNotExistIsThatOfTheFolderAboveIt) {
   for (const char* type : {"ext4", "tmpfs", "overlay", "fuseblk", "fuse.mergerfs"}) {
     EXPECT_FALSE(is_network_file_system(type)) << type;
   }
-  EXPECT_EQ(objection_to_shared_disk("/dev/shm/oblique.db"), "") << "it is local";
+  EXPECT_EQ(network_disk_error("/dev/shm/oblique.db"), "") << "it is local";
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// The whole server in this process, over real sockets of the loopback device, with a pretended
-// worker and client.
+// The whole server in this process, on loopback sockets, with a simulated worker and client.
 #include "server/event_loop/event_loop.h"
 
 #include <atomic>
@@ -32,9 +31,9 @@ class EventLoopTest : public testing::Test {
 
 TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   EXPECT_EQ(client.submit("a", 30).submit().points(), 30U);
-  PretendedWorker worker(server.worker_endpoint());
+  SimulatedWorker worker(server.worker_endpoint());
   ASSERT_TRUE(worker.hello().has_welcome());
   worker.work(30);
   EXPECT_EQ(client.status("a").state(), "done");
@@ -47,49 +46,49 @@ TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
   EXPECT_EQ(known.workers(0).solved_points(), 30U);
 }
 
-TEST_F(EventLoopTest, PointsThatAnotherStudyHasAreItsRows) {
+TEST_F(EventLoopTest, ResultsOfAnotherStudyAreReused) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   client.submit("a", 20);
-  PretendedWorker worker(server.worker_endpoint());
+  SimulatedWorker worker(server.worker_endpoint());
   worker.hello();
   worker.work(20);
   ClientRequest request;
   request.mutable_submit()->set_name("b");
   *request.mutable_submit()->mutable_recipe() = table_of(20)->recipe();
   const auto reply = client.ask(request).submit();
-  EXPECT_EQ(reply.settled(), 20U);
-  EXPECT_EQ(reply.taken().points(), 20U);
+  EXPECT_EQ(reply.completed(), 20U);
+  EXPECT_EQ(reply.reused().points(), 20U);
   EXPECT_EQ(client.status("b").state(), "done");
   EXPECT_EQ(client.rows("SELECT count(*) FROM runs WHERE reused_from = 'a/' || point").rows.at(0),
             protocol::Row{std::int64_t{20}});
 }
 
-TEST_F(EventLoopTest, ARestartedServerGoesOnWhereItWas) {
+TEST_F(EventLoopTest, ARestartedServerContinues) {
   {
     RunningServer server(path_);
-    PretendedClient client(server.client_endpoint());
+    SimulatedClient client(server.client_endpoint());
     client.submit("a", 30);
-    PretendedWorker worker(server.worker_endpoint());
+    SimulatedWorker worker(server.worker_endpoint());
     worker.hello();
     worker.work(5);
   }
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   const auto status = client.status("a");
   EXPECT_GE(status.solved(), 5U);
   EXPECT_EQ(status.state(), "running");
-  PretendedWorker worker(server.worker_endpoint());
+  SimulatedWorker worker(server.worker_endpoint());
   EXPECT_EQ(worker.hello().welcome().worker_id(), 2U);
   worker.work(30 - status.solved());
   EXPECT_EQ(client.status("a").state(), "done");
 }
 
-TEST_F(EventLoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
+TEST_F(EventLoopTest, AStoppingServerNotifiesWorkersAndCommitsReceivedResults) {
   auto server = std::make_unique<RunningServer>(path_);
-  PretendedClient client(server->client_endpoint());
+  SimulatedClient client(server->client_endpoint());
   client.submit("a", 1000);
-  PretendedWorker worker(server->worker_endpoint());
+  SimulatedWorker worker(server->worker_endpoint());
   worker.hello();
   worker.credit(1);
   worker.receive();  // the definition
@@ -100,7 +99,7 @@ TEST_F(EventLoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
   worker.send(heartbeat);
   bool received = false;
   bool stored = false;
-  while (!received) {  // its answer tells that the results before it have arrived
+  while (!received) {  // its answer shows that the results before it have arrived
     const auto message = worker.receive();
     received = message.has_heartbeat_reply();
     stored = stored || message.has_results_stored();
@@ -116,13 +115,13 @@ TEST_F(EventLoopTest, AStoppingServerTellsItsWorkersAndCommitsWhatItReceived) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).solved(), points_of(batch).size());
 }
 
-TEST_F(EventLoopTest, HostileFramesHarmNobody) {
+TEST_F(EventLoopTest, MaliciousFramesHarmNoOtherPeer) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
-  PretendedWorker worker(server.worker_endpoint());
+  SimulatedClient client(server.client_endpoint());
+  SimulatedWorker worker(server.worker_endpoint());
   worker.hello();
-  PretendedWorker hostile_worker(server.worker_endpoint());
-  PretendedClient hostile_client(server.client_endpoint());
+  SimulatedWorker hostile_worker(server.worker_endpoint());
+  SimulatedClient hostile_client(server.client_endpoint());
   for (const std::string& frame :
        {std::string(), std::string(1000, '\xff'), std::string("GET /")}) {
     hostile_worker.send_frame(frame);
@@ -137,9 +136,9 @@ TEST_F(EventLoopTest, HostileFramesHarmNobody) {
   EXPECT_EQ(client.status("a").state(), "done");
 }
 
-TEST_F(EventLoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
+TEST_F(EventLoopTest, ALongRecipeIsStoredAndLeasedWithoutDelayingOthers) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   client.submit("small", 10);
   ClientRequest large;
   large.set_protocol_version(protocol::kProtocolVersion);
@@ -153,24 +152,24 @@ TEST_F(EventLoopTest, ALongRecipeIsStoredAndHandedOutWhileOthersAreAnswered) {
     *block.add_axes() = protocol::range("mu", 0.1, 1.0, 1024);
     *block.add_axes() = protocol::listed("e", {1.0});
   }
-  PretendedClient other(server.client_endpoint());
+  SimulatedClient other(server.client_endpoint());
   other.send(large);
   EXPECT_EQ(client.status("small").points(), 10U);
   EXPECT_EQ(other.receive().submit().points(), 1024ULL * 1024 * kBlocks);
-  PretendedWorker worker(server.worker_endpoint());
+  SimulatedWorker worker(server.worker_endpoint());
   worker.hello();
   worker.credit(1);
   EXPECT_EQ(worker.receive().study().recipe().blocks_size(), kBlocks);
   EXPECT_TRUE(worker.receive().has_batch());
 }
 
-/// Compares for hours without a look at the clock.
+/// Compares bytes for hours without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
-TEST_F(EventLoopTest, ALongQueryHoldsUpNothingElse) {
+TEST_F(EventLoopTest, ALongQueryDelaysNothingElse) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
-  PretendedClient other(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
+  SimulatedClient other(server.client_endpoint());
   other.start_query(kDeaf);
   EXPECT_TRUE(client.submit("a", 10).has_submit());
   EXPECT_EQ(client.status("a").points(), 10U);
@@ -181,20 +180,20 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
   QueueSettings queue;
   queue.readers = 2;
   ClientHandlerSettings clients;
-  clients.still_working_every_ms = 1'000'000;  // no failed reply shows that the client is gone
+  clients.still_working_every_ms = 1'000'000;  // no failed reply reveals that the client is gone
   RunningServer server(path_, queue, {}, clients);
   for (int i = 0; i < 2; ++i) {
-    PretendedClient client(server.client_endpoint());
-    client.send(PretendedClient::query_request(kDeaf));
+    SimulatedClient client(server.client_endpoint());
+    client.send(SimulatedClient::query_request(kDeaf));
     EXPECT_TRUE(client.submit("a", 10).has_submit());  // so that the query has arrived
   }
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
 }
 
-TEST_F(EventLoopTest, TheServerStopsWhateverQueriesDo) {
+TEST_F(EventLoopTest, RunningQueriesDoNotDelayAStop) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   client.start_query(kDeaf);
   EXPECT_EQ(server.stop().lost_writes, 0U);
   while (!client.receive().has_error()) {
@@ -206,10 +205,10 @@ TEST_F(EventLoopTest, TheSecondServerOfADatabaseIsRefused) {
   EXPECT_THROW(RunningServer{path_}, StorageError);
 }
 
-TEST_F(EventLoopTest, ClientsAndWorkersGetToKnowWhoIsLetIn) {
+TEST_F(EventLoopTest, StatusShowsWhichPeersAreAdmitted) {
   for (const bool is_insecure : {false, true}) {
     RunningServer server(path_, {}, {}, {}, {.insecure = is_insecure});
-    PretendedClient client(server.client_endpoint());
+    SimulatedClient client(server.client_endpoint());
     ClientRequest status;
     status.mutable_status();
     const std::string access = is_insecure ? "insecure" : "loopback";
@@ -220,11 +219,11 @@ TEST_F(EventLoopTest, ClientsAndWorkersGetToKnowWhoIsLetIn) {
   }
 }
 
-// ---- Malicious peers, by raw TCP. What they meet in the network alone is tested in network/ ----
+// ---- Malicious peers, by raw TCP ----------------------------------------------------------------
 
 constexpr std::size_t kMiB = std::size_t{1} << 20U;
 
-/// Memory of this process, the server in it.
+/// Memory of this process, including the server.
 std::size_t resident_bytes() {
   std::ifstream statm("/proc/self/statm");
   std::size_t total_pages = 0;
@@ -233,10 +232,11 @@ std::size_t resident_bytes() {
   return resident_pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// What a server may need besides what it holds for peers, where every byte has its shadow too.
+/// Memory that a server may need in addition to that for peers; the address sanitizer adds a shadow
+/// byte for each eight.
 constexpr std::size_t with_shadows(std::size_t bytes) {
 #if defined(__SANITIZE_THREAD__)
-  return 5 * bytes;  // the thread sanitizer keeps four for each
+  return 5 * bytes;  // the thread sanitizer needs four more per byte
 #else
   return bytes;
 #endif
@@ -244,7 +244,7 @@ constexpr std::size_t with_shadows(std::size_t bytes) {
 
 std::string hello_frame() {
   WorkerMessage message;
-  protocol::say_protocol(*message.mutable_hello());
+  protocol::set_protocol(*message.mutable_hello());
   message.mutable_hello()->set_solver_version("1.0");
   message.mutable_hello()->set_threads(1);
   return zmtp_frame(protocol::encode(message));
@@ -274,16 +274,16 @@ std::string repeated(const std::string& text, int times) {
   return all;
 }
 
-TEST_F(EventLoopTest, AClientThatReadsNothingFillsNoMemory) {
+TEST_F(EventLoopTest, AClientThatReadsNothingCannotExhaustMemory) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   constexpr int kStudies = 200;
   for (int i = 0; i < kStudies; ++i) {
     const auto reply = client.submit(std::to_string(i) + std::string(90, 'n'), 10);
     ASSERT_TRUE(reply.has_submit()) << reply.error().message();
   }
   RawPeer silent(server.client_endpoint());
-  silent.shake_hands();
+  silent.complete_handshake();
   const std::size_t before = resident_bytes();
   // Their answers would have more than a gigabyte.
   const std::string requests = repeated(status_frame(), 1000);
@@ -294,16 +294,16 @@ TEST_F(EventLoopTest, AClientThatReadsNothingFillsNoMemory) {
   EXPECT_LT(resident_bytes(), before + with_shadows(100 * kMiB));
 }
 
-TEST_F(EventLoopTest, FloodsOfManyWorkersAndClientsKeepNobodyFromBeingServed) {
+TEST_F(EventLoopTest, FloodsOfWorkersAndClientsDoNotStarveOthers) {
   RunningServer server(path_);
-  PretendedClient client(server.client_endpoint());
+  SimulatedClient client(server.client_endpoint());
   client.submit("a", 2000);
   std::atomic<bool> stop = false;
   std::vector<std::thread> floods;
   for (int i = 0; i < 4; ++i) {
     floods.emplace_back([&, i] {
       RawPeer peer(i % 2 == 0 ? server.worker_endpoint() : server.client_endpoint());
-      peer.shake_hands();
+      peer.complete_handshake();
       const std::string bytes = i % 2 == 0 ? hello_frame() + repeated(heartbeat_frame(1000), 100)
                                            : repeated(status_frame(), 1000);
       while (!stop) {
@@ -311,7 +311,7 @@ TEST_F(EventLoopTest, FloodsOfManyWorkersAndClientsKeepNobodyFromBeingServed) {
       }
     });
   }
-  PretendedWorker worker(server.worker_endpoint());
+  SimulatedWorker worker(server.worker_endpoint());
   worker.hello();
   worker.work(2000);
   EXPECT_EQ(client.status("a").state(), "done");

@@ -33,7 +33,7 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// A server on ports that the system picked, stopped when it goes out of scope.
+/// A server on ports chosen by the system; the destructor stops it.
 class RunningServer {
  public:
   explicit RunningServer(const std::string& database, QueueSettings queue = {},
@@ -75,7 +75,7 @@ class RunningServer {
     settings.worker_port = "*";
     settings.client_port = "*";
     settings.service.solver_version = "1.0";
-    // Pretended workers send no heartbeats, and on a busy machine they wait long for their tests.
+    // Simulated workers send no heartbeats and may wait long on a busy machine.
     settings.service.scheduler.lost_after_ms = kLongestSilence_ms;
     settings.queries.reader_program = OBLIQUE_SERVER_PROGRAM;
     return settings;
@@ -90,7 +90,7 @@ class RunningServer {
   std::thread thread_;
 };
 
-/// A DEALER socket that speaks in messages.
+/// A DEALER socket that sends and receives messages.
 template <typename Out, typename In>
 class Peer {
  public:
@@ -110,7 +110,7 @@ class Peer {
                    i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
     }
   }
-  /// Waits until the server ends the connection; false when it does not.
+  /// Waits until the server ends the connection; false after a timeout.
   bool is_cut_off() { return disconnections_.check_event(kLongest_ms); }
   In receive() {
     zmq::message_t frame;
@@ -119,7 +119,7 @@ class Peer {
       throw std::runtime_error("the server does not answer");
     }
     if (!protocol::decode(frame.to_string_view(), message)) {
-      throw std::runtime_error("the server sent what is no message");
+      throw std::runtime_error("the server sent an invalid message");
     }
     return message;
   }
@@ -129,16 +129,16 @@ class Peer {
 
   zmq::context_t context_;
   zmq::socket_t socket_;
-  zmq::monitor_t disconnections_;  // of them alone
+  zmq::monitor_t disconnections_;  // only disconnections
 };
 
-class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
+class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
  public:
   using Peer::Peer;
 
   ServerToWorker hello() {
     WorkerMessage message;
-    protocol::say_protocol(*message.mutable_hello());
+    protocol::set_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version("1.0");
     message.mutable_hello()->set_instruction_set("avx2");
     message.mutable_hello()->set_name("pretended");
@@ -159,10 +159,10 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     message.mutable_credit()->set_batches(batches);
     send(message);
   }
-  /// Which points it fails.
+  /// Sets the points that it reports as failed.
   void fail(std::set<std::uint64_t> points) { failing_ = std::move(points); }
-  /// Sends a result for each point of the batch, or names it as left out. Returns how many these
-  /// are.
+  /// Sends a result for each point of the batch, or reports it as left out. Returns the number of
+  /// left-out points.
   std::uint64_t solve(const protocol::Batch& batch) {
     WorkerMessage message;
     auto& results = *message.mutable_results();
@@ -178,7 +178,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
       if (failing_.contains(point)) {
         *results.add_results() =
             protocol::failed_point(point, "failed as " + std::to_string(point));
-      } else if (table.is_left_in(point)) {
+      } else if (table.passes_filter(point)) {
         *results.add_results() = solved_point(point, table);
       } else {
         results.add_left_out(point);
@@ -188,7 +188,7 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
     send(message);
     return points.size();
   }
-  /// Takes batches, one at a time, until `points` are solved and stored.
+  /// Solves batches, one at a time, until `points` points are stored.
   void work(std::uint64_t points) {
     std::uint64_t waiting = points;
     credit(1);
@@ -208,10 +208,11 @@ class PretendedWorker : public Peer<WorkerMessage, ServerToWorker> {
   std::uint64_t sequence_ = 0;
   std::map<std::uint64_t, std::uint64_t> in_hand_;
   std::set<std::uint64_t> failing_;
-  std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;  // as defined last
+  // the latest definitions
+  std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;
 };
 
-class PretendedClient : public Peer<ClientRequest, ClientReply> {
+class SimulatedClient : public Peer<ClientRequest, ClientReply> {
  public:
   using Peer::Peer;
 
@@ -243,12 +244,12 @@ class PretendedClient : public Peer<ClientRequest, ClientReply> {
     protocol::append_rows(query(sql).query(), table);
     return table;
   }
-  /// Asks for what takes minutes, and waits until it is said that the query runs.
+  /// Sends a query that takes minutes and waits until it runs.
   void start_query(const std::string& sql) {
     ClientRequest request = query_request(sql);
     request.set_request_id(++id_);
     send(request);
-    constexpr int kMostWords = 600;  // one a second
+    constexpr int kMostWords = 600;  // one per second
     for (int words = 0; words < kMostWords; ++words) {
       const auto word = receive();
       ASSERT_EQ(word.still_working().request_id(), id_);

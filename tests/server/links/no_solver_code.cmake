@@ -10,8 +10,8 @@ foreach(target IN LISTS TARGETS)
   endif()
 endforeach()
 
-# functions_of(FILE KINDS VARIABLE): the functions of ours that FILE defines, by their mangled names. Of the
-# solver's archives those that one file alone defines (T); linkers make a program's own ones local (t).
+# functions_of(FILE KINDS VARIABLE): the mangled names of our functions that FILE defines. KINDS: T
+# for functions that only one file of an archive defines, t for those that a linker made local.
 function(functions_of file kinds variable)
   execute_process(COMMAND ${NM} --defined-only ${file} OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
   if(failed)

@@ -49,7 +49,7 @@ class MaintenanceTest : public StoreFixture {
  protected:
   MaintenanceTest() { commit({study_, worker(1), solved(study_, numbers(0, 5))}); }
 
-  /// The first page of a table.
+  /// The root page of a table.
   static std::int64_t page_of(const std::string& path, const std::string& table) {
     return std::stoll(
         rows(path, "SELECT rootpage FROM sqlite_schema WHERE name = '" + table + "'").at(0));
@@ -59,7 +59,7 @@ class MaintenanceTest : public StoreFixture {
   const AddStudy study_ = study_of(10);
 };
 
-TEST_F(MaintenanceTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
+TEST_F(MaintenanceTest, ACopyOfAnOpenDatabaseHasAllCommittedRows) {
   back_up(path_, copy_);
   commit({solved(study_, numbers(5, 10))});
   Store copy(copy_);
@@ -72,7 +72,7 @@ TEST_F(MaintenanceTest, ACopyMadeWhileTheDatabaseIsOpenHasAllThatWasCommitted) {
       << "a copy is its owner's alone";
 }
 
-TEST_F(MaintenanceTest, OnlyADatabaseOfOursIsCopiedOrSalvagedAndNoFileIsReplaced) {
+TEST_F(MaintenanceTest, OnlyOurDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) {
   const std::string notes = folder_.file("notes.txt");
   std::ofstream(notes) << "not a database, and long enough to be sure of it";
   std::ofstream(folder_.file("empty.db"));
@@ -88,7 +88,7 @@ TEST_F(MaintenanceTest, OnlyADatabaseOfOursIsCopiedOrSalvagedAndNoFileIsReplaced
 
 class SalvageTest : public MaintenanceTest {
  protected:
-  /// Study, point and, by its checksum, all else of each row, in the order of the texts.
+  /// Study, point and checksum of each row, in the order of the texts.
   static std::vector<std::string> rows_of(const std::string& file) {
     return rows(file,
                 "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM results"
@@ -96,8 +96,8 @@ class SalvageTest : public MaintenanceTest {
   }
 };
 
-TEST_F(SalvageTest, WhatCanBeReadOfADamagedFileIsSavedAndTheRestIsPendingAgain) {
-  constexpr std::uint64_t kPoints = 1500;  // with some more the root of their tree splits
+TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) {
+  constexpr std::uint64_t kPoints = 1500;  // with more points the root of their tree splits
   const std::string whole = folder_.file("whole.db");
   const auto large = study_of(kPoints);
   Store(whole).commit(std::vector<Change>{large, worker(1), solved(large, numbers(0, kPoints)),
@@ -110,7 +110,7 @@ TEST_F(SalvageTest, WhatCanBeReadOfADamagedFileIsSavedAndTheRestIsPendingAgain) 
   const struct {
     const char* what;
     std::function<void(const std::string&)> damage;
-    double least_share;  ///< of the rows. Upper pages of a tree are behind lower ones.
+    double least_share;  ///< least share of the rows. Inner pages of a tree come after its leaves.
   } cases[] = {{"one page of rows",
                 [&](const auto& file) {
                   overwrite_page(file, static_cast<std::int64_t>(size) / 2 / kPageBytes + 1);
@@ -156,7 +156,7 @@ TEST_F(SalvageTest, ADamagedRowIsNotSavedButAStudyOrModelWithADamagedValueIsWith
   EXPECT_THAT(faults(copy_), IsEmpty());
 }
 
-TEST_F(SalvageTest, ASoundDatabaseIsSalvagedWholeWithTheRowsInItsLogWhichStaysAsItIs) {
+TEST_F(SalvageTest, ASoundDatabaseIsSalvagedCompletelyAndNotChanged) {
   const std::string crashed = folder_.file("crashed.db");
   std::filesystem::copy_file(path_, crashed);
   std::filesystem::copy_file(path_ + "-wal", crashed + "-wal");
@@ -215,8 +215,8 @@ TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
   EXPECT_EQ(row.real(0), result.mu()) << "as it was solved";
 }
 
-TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheRefusalNamesTheWayOut) {
-  close();  // all is in the one file now
+TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheErrorHasTheRemedy) {
+  close();  // all rows are in the database file
   overwrite_page(path_, page_of(path_, "studies"));
   EXPECT_FALSE(faults().empty());
   EXPECT_THROW(back_up(path_, copy_), StorageError);
@@ -224,7 +224,7 @@ TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheRefusalNamesTheWayO
   EXPECT_THAT(refusal(), HasSubstr("--salvage"));
 }
 
-TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
+TEST_F(MaintenanceTest, TheChecksumCoversEveryColumnOfAResult) {
   close();
   std::filesystem::copy_file(path_, copy_);
   for (const std::string_view column : result_columns()) {
@@ -233,23 +233,23 @@ TEST_F(MaintenanceTest, EveryColumnOfAResultIsUnderItsChecksum) {
                     " WHEN 'null' THEN 1 ELSE {0} + 1 END WHERE point = 4",
                     column));
     EXPECT_THAT(faults(), Contains(HasSubstr(column == "study_id" ? "refers to study number 2"
-                                                                  : "not the one that was stored")))
+                                                                  : "changed after it was stored")))
         << column;
     std::filesystem::copy_file(copy_, path_, std::filesystem::copy_options::overwrite_existing);
   }
 }
 
-TEST_F(MaintenanceTest, AStudyOrModelThatWasChangedAndAReferenceToNoStudyAreFound) {
+TEST_F(MaintenanceTest, ChangedStudiesAndModelsAndDanglingReferencesAreFound) {
   close();
   by_hand(
       "UPDATE studies SET created_at = 'b'; UPDATE models SET E = E + 1;"
       "INSERT INTO reused_points VALUES (7, 'b', 1)");
   EXPECT_THAT(faults(),
               ElementsAre("table reused_points: refers to study number 7, which does not exist",
-                          "model 1: it is not the one that was stored", HasSubstr("study 1, a")));
+                          "model 1: it was changed after it was stored", HasSubstr("study 1, a")));
 }
 
-TEST_F(MaintenanceTest, AStudyThatIsNotFinishedIsNamedThoughTheDatabaseIsSound) {
+TEST_F(MaintenanceTest, UnfinishedStudiesOfASoundDatabaseAreNamed) {
   const auto found = diagnose(path_);
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_THAT(found.remarks, ElementsAre("study a is running: 5 of 10 points have a result"));
@@ -286,7 +286,7 @@ TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemed
   EXPECT_THAT(faults(), ElementsAre("study a is done: 5 of 10 points have a result"));
 }
 
-TEST_F(MaintenanceTest, ADoneStudyOfWhichRowsWereDeletedByHandIsSound) {
+TEST_F(MaintenanceTest, ADoneStudyWithRowsDeletedByHandIsSound) {
   commit({solved(study_, numbers(5, 10))});
   close();
   by_hand("UPDATE studies SET state = 'done'; DELETE FROM results WHERE point > 6");
@@ -305,7 +305,7 @@ class RowFaultsTest : public StoreFixture {
   }
 };
 
-TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResultIsNamed) {
+TEST_F(RowFaultsTest, ARowWithoutAChecksumIsComparedWithTheRecipe) {
   const std::vector<std::pair<std::string, std::string>> damages{
       {"point = 77", "point 77: the study has no such point"},
       {"H = 1.000000000002", "H is 1.000000000002"},
@@ -314,7 +314,7 @@ TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResult
       {"peaks = replace(peaks, ']', '')", "one of its lists cannot be read"},
       {"phases = '[inf]'", "one of its lists cannot be read"},
       {"impulse_n_Ns = NULL", "outputs are missing"},
-      {"error = 'none'", "point 1: it is failed, and has outputs"},
+      {"error = 'none'", "point 1: it failed, but has outputs"},
       {"model_id = 7", "point 1: its model does not exist"},
       {"worker_id = 7", "point 1: its worker does not exist"}};
   const std::string columns = fmt::format("{}", fmt::join(result_columns(), ", "));
@@ -329,13 +329,13 @@ TEST_F(RowFaultsTest, ARowWithoutAChecksumThatDisagreesWithTheRecipeOrIsNoResult
   }
 }
 
-TEST_F(RowFaultsTest, AModelThatIsNotThatOfTheRecipeIsNamed) {
+TEST_F(RowFaultsTest, AModelThatDiffersFromTheRecipeIsNamed) {
   solver::ModelParameters other = solver::preset("paper");
   other.E_Pa += 1.0;
   execute_with(open_database(path_, SQLITE_OPEN_READWRITE).get(),
                "UPDATE models SET definition = ?, checksum = NULL",
                protocol::canonical_model(other));
-  EXPECT_THAT(faults(), Contains(HasSubstr("point 0: its model is not")));
+  EXPECT_THAT(faults(), Contains(HasSubstr("point 0: its model differs")));
 }
 
 TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
@@ -345,7 +345,7 @@ TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
   EXPECT_THAT(faults(), Contains(HasSubstr("its recipe cannot be read")));
 }
 
-TEST_F(RowFaultsTest, AStudyThatWouldKeepAServerFromStartingIsNamed) {
+TEST_F(RowFaultsTest, AStudyThatWouldPreventAStartIsNamed) {
   by_hand("CREATE TABLE before AS SELECT * FROM studies");
   for (const char* change : {"points = 1000000000000000000", "points = -1",
                              "priority = 9223372036854775807", "name = ''", "name = char(27)",
@@ -370,7 +370,7 @@ class OfflineStudyTest : public MaintenanceTest {
   }
 };
 
-TEST_F(OfflineStudyTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
+TEST_F(OfflineStudyTest, AStudyIsRenamedUnlessTheNameIsInUseOrInvalid) {
   commit({study_of(10, 2, "b")});
   EXPECT_THROW(rename_study(path_, 1, "c"), StorageError) << "a server works on it";
   EXPECT_THROW(delete_study(path_, 1), StorageError);
@@ -379,9 +379,9 @@ TEST_F(OfflineStudyTest, AStudyGetsAnotherNameUnlessThatIsTakenOrNone) {
   close();
   rename_study(path_, 1, "friction");
   EXPECT_EQ(Store(path_).studies().at(0).name, "friction");
-  EXPECT_THAT(refusal_of_renaming(1, "b"), HasSubstr("there is a study called \"b\""));
+  EXPECT_THAT(refusal_of_renaming(1, "b"), HasSubstr("already has a study called \"b\""));
   EXPECT_THAT(refusal_of_renaming(1, ""), HasSubstr("name"));
-  EXPECT_THAT(refusal_of_renaming(7, "c"), HasSubstr("no longer"));
+  EXPECT_THAT(refusal_of_renaming(7, "c"), HasSubstr("is not in"));
   EXPECT_THAT(faults(), IsEmpty());
 }
 
@@ -389,7 +389,7 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   commit({solved(study_, numbers(5, 10))});
   close();
   EXPECT_TRUE(delete_study(path_, 1));
-  { const Store next(path_); }  // a start deletes what no row refers to
+  { const Store next(path_); }  // a start deletes orphaned rows
   for (const char* table :
        {"studies", "models", "workers", "results", "completed_ranges", "deletions"}) {
     EXPECT_EQ(number(std::string("SELECT count(*) FROM ") + table), 0) << table;
@@ -397,16 +397,16 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   EXPECT_THROW(delete_study(path_, 1), StudyRefused);
 }
 
-TEST_F(OfflineStudyTest, TheRecipeIsThatWhichWasStoredAlsoWhileAServerWorks) {
+TEST_F(OfflineStudyTest, TheStoredRecipeCanBeReadWhileAServerWorks) {
   EXPECT_EQ(stored_recipe(path_, 1).SerializeAsString(),
             study_.table->recipe().SerializeAsString());
   EXPECT_THROW(stored_recipe(path_, 2), StudyRefused);
 }
 
-TEST_F(OfflineStudyTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
+TEST_F(OfflineStudyTest, ATooLongRecipeIsNotParsed) {
   close();
   const std::string block =
-      study_.table->recipe().SerializeAsString();  // a longer recipe goes on so
+      study_.table->recipe().SerializeAsString();  // a longer recipe continues like this
   std::string bytes;
   while (bytes.size() <= protocol::kMaxFrameBytes) {
     bytes += block;
@@ -416,10 +416,10 @@ TEST_F(OfflineStudyTest, ARecipeThatIsLongerThanAServerTakesIsNotParsed) {
     execute_with(database.get(), "UPDATE studies SET recipe = ?", Blob{bytes});
   }
   EXPECT_THROW(stored_recipe(path_, 1), StorageError);
-  EXPECT_THAT(faults(), testing::Contains(HasSubstr("more than a recipe may have")));
+  EXPECT_THAT(faults(), testing::Contains(HasSubstr("damaged or too many")));
 }
 
-TEST_F(OfflineStudyTest, RowsThatADeletionHasLeftAreNoFaultsAndAreNotMerged) {
+TEST_F(OfflineStudyTest, RemainingRowsOfADeletedStudyAreNeitherFaultsNorMerged) {
   commit({study_of(10, 2, "b"), DeleteStudy{1}});
   close();
   const Diagnosis found = diagnose(path_);

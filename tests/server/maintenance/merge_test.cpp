@@ -38,15 +38,15 @@ struct Part {
   std::string solver_version = "0.1";
   std::string worker = "host";
   std::vector<std::uint64_t> failed{};
-  double closure = 0.0;  ///< added to that of each result
+  double closure = 0.0;  ///< added to `closure` of each result
 };
 
-/// Databases that are made, and merged into the one called `all`.
+/// Makes databases and merges them into the one called `all`.
 class MergeTest : public StoreFixture {
  protected:
   std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
 
-  /// A database with these studies and results; some may be there already.
+  /// Makes a database with these studies and results, or adds them to it.
   void make(const std::string& name, const std::vector<Part>& parts) const {
     Store store(file(name));
     for (const Part& part : parts) {
@@ -106,7 +106,7 @@ class MergeTest : public StoreFixture {
   }
 };
 
-TEST_F(MergeTest, StudiesOfSeveralDatabasesStandInOneWithAllTheirRows) {
+TEST_F(MergeTest, StudiesOfSeveralDatabasesAreMergedWithAllRows) {
   make("one", {{.study = "a", .end = 10}, {.study = "b", .end = 3, .worker = "other host"}});
   make("two", {{.study = "c", .end = 7, .failed = {2}}});
   EXPECT_EQ(merge("one").studies_added, 2U);
@@ -156,7 +156,7 @@ TEST_F(MergeTest, AServerMayUseTheSourceButNotTheTarget) {
   EXPECT_THROW(merge("one"), StorageError);
 }
 
-TEST_F(MergeTest, ARowOfTheTargetStaysAndThoseThatDifferAreCountedAndTheFirstOnesNamed) {
+TEST_F(MergeTest, RowsOfTheTargetAreKeptAndDifferencesAreCountedAndNamed) {
   make("all", {{.table = table_of(1000), .end = 900}});
   make("one", {{.table = table_of(1000), .end = 1000, .closure = 1e-12}});
   const std::string before = text("all", "SELECT quote(closure) FROM results WHERE point = 2");
@@ -168,7 +168,7 @@ TEST_F(MergeTest, ARowOfTheTargetStaysAndThoseThatDifferAreCountedAndTheFirstOne
   EXPECT_EQ(text("all", "SELECT quote(closure) FROM results WHERE point = 2"), before);
 }
 
-TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
+TEST_F(MergeTest, ASolvedRowReplacesAFailedOneButNotViceVersa) {
   make("all", {{.end = 10, .failed = {1, 2}}});
   make("one", {{.end = 10, .failed = {2, 3}}});
   const Merged merged = merge("one");
@@ -179,7 +179,7 @@ TEST_F(MergeTest, APointThatFailedGivesWayToASolvedOneAndNotTheOtherWay) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ANameThatAnotherRecipeHasRefusesTheWholeDatabaseUnlessAPrefixIsGiven) {
+TEST_F(MergeTest, ANameWithAnotherRecipeRefusesTheSourceUnlessAPrefixIsGiven) {
   make("all", {{.study = "a", .end = 1}});
   make("one", {{.study = "b", .end = 2}, {.study = "a", .table = table_of(11), .end = 5}});
   EXPECT_THAT(refusal("one"), AllOf(HasSubstr("a study called \"a\""), HasSubstr("block 1 differs"),
@@ -201,7 +201,7 @@ TEST_F(MergeTest, ResultsOfAnotherSolverVersionAreRefused) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "1");
 }
 
-TEST_F(MergeTest, AnyFaultThatACheckFindsRefusesTheWholeDatabase) {
+TEST_F(MergeTest, ASourceWithAnyFaultIsRefused) {
   int number = 0;
   for (const char* change :
        {"UPDATE results SET fn_peak_N = 1 WHERE point = 2", "UPDATE models SET k = -1",
@@ -216,7 +216,7 @@ TEST_F(MergeTest, AnyFaultThatACheckFindsRefusesTheWholeDatabase) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
-TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
+TEST_F(MergeTest, TheSourceIsNotChangedAndItsStateIsCopied) {
   make("one", {{.end = 5}});
   by_hand(file("one"), "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
@@ -233,7 +233,8 @@ TEST_F(MergeTest, WhatIsMergedIsNotChangedAndItsStateGoesAlong) {
             "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
-/// Makes each new connection kill the process when it updates a study, as after its last row.
+/// Makes each new connection kill the process when it updates a study, which happens after its last
+/// row.
 void kill_when_a_study_is_updated() {
   const auto watch = [](sqlite3* database) {
     sqlite3_update_hook(
@@ -250,7 +251,7 @@ void kill_when_a_study_is_updated() {
   sqlite3_auto_extension(reinterpret_cast<void (*)()>(extension));
 }
 
-TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
+TEST_F(MergeTest, AKilledMergeChangesNothingAndCanBeRepeated) {
   make("all", {{.study = "before", .end = 5}});
   make("one", {{.table = table_of(20'000), .end = 20'000}});
   const pid_t child = fork();
@@ -268,7 +269,7 @@ TEST_F(MergeTest, KilledInTheMiddleItLeavesWhatWasThereAndIsDoneByTheNextTry) {
   EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging")) << "nor a copy of the source";
 }
 
-TEST_F(MergeTest, AStudyThatGrewInOneDatabaseIsUnitedWithWhatItWas) {
+TEST_F(MergeTest, AGrownStudyIsUnitedWithItsShorterVersion) {
   for (const bool source_grew : {true, false}) {
     const std::string name = source_grew ? "grown" : "shorter";
     make("all", {{.study = name, .table = source_grew ? table_of(10) : grown_table(), .end = 5}});

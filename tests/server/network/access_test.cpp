@@ -1,4 +1,4 @@
-// Who may connect from where, and the addresses of ports and peers.
+// Admission of peers, and the addresses of ports and peers.
 #include "server/network/access.h"
 
 #include <cstdint>
@@ -61,11 +61,11 @@ TEST(AddressToBindTest, WithoutKeysOrInsecureOnlyLoopbackIsAllowed) {
   EXPECT_THAT(address_to_bind({"*", "", true}), AnyOf("::", "0.0.0.0"));
 }
 
-TEST(AddressToBindTest, OtherTextAndKeysWithInsecureAreRefused) {
+TEST(AddressToBindTest, InvalidAddressesAndKeysWithInsecureAreRefused) {
   for (const char* address : {"example.org", "", "1.2.3", "127.0.0.1:7600", "[::1]"}) {
     EXPECT_THAT(address_or_error({address, "", true}), HasSubstr("is not an address"));
   }
-  EXPECT_THAT(address_or_error({"127.0.0.1", "server.key", true}), HasSubstr("exclude"));
+  EXPECT_THAT(address_or_error({"127.0.0.1", "server.key", true}), HasSubstr("cannot be combined"));
 }
 
 class AccessControlTest : public testing::Test {
@@ -79,14 +79,14 @@ class AccessControlTest : public testing::Test {
   }
   ~AccessControlTest() override { spdlog::set_default_logger(logger_); }
 
-  /// What was logged since the last call.
+  /// Log lines since the last call.
   std::string take_log() {
     const std::string text = log_.str();
     log_.str("");
     return text;
   }
   protocol::CurveKey add(const std::string& name, Role role = Role::kWorker) {
-    const protocol::CurveKey key = protocol::made_key_pair().public_key;
+    const protocol::CurveKey key = protocol::generate_key_pair().public_key;
     protocol::change_authorized_keys(list_, [&](AuthorizedKeys& keys) {
       keys.add({name, role, key, "2026-11-22T03:00:00Z"});
     });
@@ -94,7 +94,7 @@ class AccessControlTest : public testing::Test {
   }
   AccessControl control() const { return AccessControl({"127.0.0.1", server_key_, false}); }
   bool refresh(AccessControl& control) { return control.refresh(now_ms_ += 500); }
-  /// The name with which a key is admitted, or the cause of its refusal.
+  /// The name of an admitted key, or the cause of its refusal.
   static std::string result_of(const AccessControl& control, const protocol::CurveKey& key,
                                PortRole port = PortRole::kWorkers) {
     const AuthResult result = control.security(port)->authenticate(key);
@@ -106,7 +106,7 @@ class AccessControlTest : public testing::Test {
   test::TemporaryFolder folder_;
   std::string server_key_ = folder_.file("server.key");
   std::string list_ = folder_.file("authorized_keys.toml");
-  protocol::KeyPair server_ = protocol::made_key_pair();
+  protocol::KeyPair server_ = protocol::generate_key_pair();
   std::ostringstream log_;
   std::shared_ptr<spdlog::logger> logger_ = spdlog::default_logger();
   std::int64_t now_ms_ = 0;
@@ -121,7 +121,7 @@ TEST_F(AccessControlTest, AServerNeedsItsOwnKeyFileAndTheListBesideIt) {
   EXPECT_THAT(take_log(), AllOf(HasSubstr("the 1 keys of " + list_),
                                 HasSubstr(protocol::z85(server_.public_key))));
   protocol::write_key_file(folder_.file("worker.key"),
-                           {Role::kWorker, "w", protocol::made_key_pair(), server_.public_key});
+                           {Role::kWorker, "w", protocol::generate_key_pair(), server_.public_key});
   EXPECT_THROW(AccessControl({"127.0.0.1", folder_.file("worker.key"), false}), solver::InputError);
 }
 
@@ -136,7 +136,7 @@ TEST_F(AccessControlTest, EachRoleHasItsPort) {
   EXPECT_EQ(result_of(access, worker, PortRole::kClients), "key of another role");
   EXPECT_EQ(result_of(access, client), "key of another role");
   EXPECT_EQ(result_of(access, reader), "key of another role");
-  EXPECT_EQ(result_of(access, protocol::made_key_pair().public_key), "unknown key");
+  EXPECT_EQ(result_of(access, protocol::generate_key_pair().public_key), "unknown key");
 }
 
 TEST_F(AccessControlTest, ChangesOfTheListAreReadTwiceASecond) {
@@ -156,13 +156,13 @@ TEST_F(AccessControlTest, ChangesOfTheListAreReadTwiceASecond) {
   EXPECT_FALSE(refresh(access));
 }
 
-TEST_F(AccessControlTest, AListThatIsBrokenOrGoneChangesNothingAndIsLoggedOnce) {
+TEST_F(AccessControlTest, AnInvalidOrMissingListChangesNothingAndIsLoggedOnce) {
   const auto key = add("w");
   AccessControl access = control();
   std::ofstream(list_, std::ios::app) << "[[key";
   take_log();
   EXPECT_FALSE(refresh(access));
-  EXPECT_THAT(take_log(), AllOf(HasSubstr(list_), HasSubstr("remain admitted")));
+  EXPECT_THAT(take_log(), AllOf(HasSubstr(list_), HasSubstr("stay the same")));
   EXPECT_FALSE(refresh(access));
   EXPECT_THAT(take_log(), IsEmpty());
   std::filesystem::remove(list_);
@@ -174,7 +174,7 @@ TEST_F(AccessControlTest, AListThatIsBrokenOrGoneChangesNothingAndIsLoggedOnce) 
   EXPECT_EQ(result_of(access, other), "other");
 }
 
-TEST_F(AccessControlTest, AnEmptiedListCountsFromTheFourthTimeAsAnEditorMayGoOnToWrite) {
+TEST_F(AccessControlTest, AnEmptyListAppliesFromItsFourthReadAsAnEditorMayBeWriting) {
   const auto key = add("w");
   AccessControl access = control();
   std::ofstream(list_, std::ios::trunc).close();
@@ -216,7 +216,7 @@ PeerAddress peer_address(const std::string& address, int port = 1) {
   return PeerAddress(system_address(address, port));
 }
 
-/// Nothing where the machine has no IPv6.
+/// Nothing if the machine has no IPv6.
 std::optional<Listener> listening(const std::string& address) {
   try {
     return Listener(address, "*");
@@ -238,7 +238,7 @@ std::string address_of_peer(const Listener& listener, const std::string& from) {
   return listener.accept().address.text;
 }
 
-TEST(PeerAddressTest, IsWrittenAsInEndpoints) {
+TEST(PeerAddressTest, IsFormattedAsInEndpoints) {
   EXPECT_EQ(peer_address("::1", 7600).text, "[::1]:7600");
   EXPECT_EQ(peer_address("2001:0DB8::0:1", 65535).text, "[2001:db8::1]:65535");
   EXPECT_EQ(peer_address("::ffff:10.0.0.3", 4711).text, "10.0.0.3:4711");
@@ -263,7 +263,7 @@ TEST(ListenerTest, APeerOfTheSameFamilyHasItsAddress) {
   EXPECT_THAT(address_of_peer(*v6, "::1"), StartsWith("[::1]:"));
 }
 
-TEST(ListenerTest, AtTwoColonsPeersOfBothFamiliesAreAccepted) {
+TEST(ListenerTest, TheIpv6WildcardAcceptsBothFamilies) {
   const auto both = listening("::");
   if (!both) {
     GTEST_SKIP() << "this machine has no IPv6";
@@ -273,7 +273,7 @@ TEST(ListenerTest, AtTwoColonsPeersOfBothFamiliesAreAccepted) {
   EXPECT_THAT(address_of_peer(*both, "::ffff:127.0.0.1"), StartsWith("127.0.0.1:"));
 }
 
-TEST(ListenerTest, APortThatIsTakenAndAddressesThatAreNotNumericAreNamed) {
+TEST(ListenerTest, PortsInUseAndInvalidAddressesAreReported) {
   const auto error_of = [](const std::string& address, const std::string& port) -> std::string {
     try {
       const Listener listener(address, port);
@@ -284,8 +284,8 @@ TEST(ListenerTest, APortThatIsTakenAndAddressesThatAreNotNumericAreNamed) {
   };
   const Listener first("127.0.0.1", "*");
   const std::string port = first.endpoint().substr(first.endpoint().rfind(':') + 1);
-  EXPECT_THAT(error_of("127.0.0.1", port),
-              AllOf(HasSubstr("tcp://127.0.0.1:" + port), HasSubstr("does a server run already?")));
+  EXPECT_THAT(error_of("127.0.0.1", port), AllOf(HasSubstr("tcp://127.0.0.1:" + port),
+                                                 HasSubstr("another server may be running")));
   for (const char* const address : {"localhost", "::1::", "[::1", "::g"}) {
     EXPECT_THAT(error_of(address, port), HasSubstr(address));
   }

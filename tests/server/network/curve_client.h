@@ -15,7 +15,7 @@
 
 namespace oblique::server {
 
-/// Admits the keys that were added to it or a copy of it.
+/// Admits the keys added to it or to a copy of it.
 class ListAuthenticator {
  public:
   void add(const protocol::CurveKey& key, const std::string& name) {
@@ -45,24 +45,24 @@ inline std::string curve_greeting() {
   return bytes.replace(12, 5, "CURVE");
 }
 
-/// The client's end of CURVE (rfc.zeromq.org 26). A test that changes its fields makes it send what
-/// no library sends.
+/// The client's side of CURVE (rfc.zeromq.org 26). Tests change its fields to send what no library
+/// sends.
 struct CurveClient {
   CurveClient(const protocol::KeyPair& own_keys, const protocol::CurveKey& servers_key)
       : own(own_keys), server(servers_key) {}
 
   protocol::KeyPair own;
   protocol::CurveKey server;
-  protocol::KeyPair brief = protocol::made_key_pair();  // C', c'
-  std::uint64_t nonce = 1;                              // of the next command
+  protocol::KeyPair short_term = protocol::generate_key_pair();  // C', c'
+  std::uint64_t nonce = 1;                                       // number of the next command
   std::string properties = zmtp_properties("DEALER");
 
-  // From WELCOME on.
-  protocol::CurveKey servers_brief{};  // S'
+  // Set by WELCOME.
+  protocol::CurveKey server_short_term{};  // S'
   std::string cookie;
 
-  // For a wrong vouch.
-  std::optional<protocol::CurveKey> vouched_brief = {};
+  // Replacements for a wrong vouch.
+  std::optional<protocol::CurveKey> vouched_short_term = {};
   std::optional<protocol::CurveKey> vouched_server = {};
   std::optional<protocol::SecretKey> vouching_secret = {};
 
@@ -88,52 +88,53 @@ struct CurveClient {
     return text;
   }
 
-  /// HELLO without its name.
+  /// The data of HELLO.
   std::string hello() {
     std::string data("\1\0", 2);
     data.append(72, '\0');
-    data += text_of_key(brief.public_key);
+    data += text_of_key(short_term.public_key);
     const std::string number = next_number();
     data += number;
     return data += box(std::string(64, '\0'), curve_nonce("CurveZMQHELLO---", number), server,
-                       brief.secret_key);
+                       short_term.secret_key);
   }
-  /// Takes WELCOME without its name; false if it is not for this client.
+  /// Handles the data of WELCOME; false if it is not for this client.
   bool take_welcome(std::string_view data) {
     const auto text = opened(data.substr(16), curve_nonce("WELCOME-", data.substr(0, 16)), server,
-                             brief.secret_key);
+                             short_term.secret_key);
     if (!text || text->size() != 128) {
       return false;
     }
-    std::copy_n(text->begin(), servers_brief.size(), servers_brief.begin());
+    std::copy_n(text->begin(), server_short_term.size(), server_short_term.begin());
     cookie = text->substr(32);
     return true;
   }
-  /// INITIATE without its name.
+  /// The data of INITIATE.
   std::string initiate() {
     const std::string vouch_nonce(16, 'v');
     std::string text = text_of_key(own.public_key) + vouch_nonce;
-    text += box(text_of_key(vouched_brief.value_or(brief.public_key)) +
+    text += box(text_of_key(vouched_short_term.value_or(short_term.public_key)) +
                     text_of_key(vouched_server.value_or(server)),
-                curve_nonce("VOUCH---", vouch_nonce), servers_brief,
+                curve_nonce("VOUCH---", vouch_nonce), server_short_term,
                 vouching_secret.value_or(own.secret_key));
     text += properties;
     const std::string number = next_number();
     return cookie + number +
-           box(text, curve_nonce("CurveZMQINITIATE", number), servers_brief, brief.secret_key);
+           box(text, curve_nonce("CurveZMQINITIATE", number), server_short_term,
+               short_term.secret_key);
   }
   /// An encrypted frame with these flags inside: 1 more, 2 command.
   std::string sealed(std::string_view body, unsigned flags = 0) {
     const std::string number = next_number();
     const std::string text = static_cast<char>(flags) + std::string(body);
-    return zmtp_frame(
-        "\x07MESSAGE" + number +
-        box(text, curve_nonce("CurveZMQMESSAGEC", number), servers_brief, brief.secret_key));
+    return zmtp_frame("\x07MESSAGE" + number +
+                      box(text, curve_nonce("CurveZMQMESSAGEC", number), server_short_term,
+                          short_term.secret_key));
   }
-  /// The flags and the body in a MESSAGE of the server; nothing if it is not for this client.
+  /// Flags and body of a MESSAGE of the server; nothing if it is not for this client.
   std::optional<std::string> opened_message(std::string_view message) const {
     return opened(message.substr(16), curve_nonce("CurveZMQMESSAGES", message.substr(8, 8)),
-                  servers_brief, brief.secret_key);
+                  server_short_term, short_term.secret_key);
   }
 };
 

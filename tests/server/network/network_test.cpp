@@ -1,5 +1,4 @@
-// The network and its bounds: raw TCP connections without keys and with them, and sockets of
-// libzmq.
+// The network and its limits: raw TCP connections with and without keys, and sockets of libzmq.
 #include "server/network/network.h"
 
 #include <algorithm>
@@ -32,7 +31,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A TCP connection with the client's end of CURVE.
+/// A TCP connection with the client's side of CURVE.
 struct KeyedPeer {
   KeyedPeer(const std::string& endpoint, const CurveClient& keys, const char* source)
       : tcp(endpoint, source), curve(keys) {}
@@ -42,7 +41,7 @@ struct KeyedPeer {
   CurveClient curve;
 };
 
-/// A network with a port that needs keys and one that does not, driven by the test.
+/// A network with one port that needs keys and one that does not.
 class NetworkTest : public testing::Test {
  protected:
   explicit NetworkTest(NetworkLimits limits = {}) : network_(limits) {
@@ -51,7 +50,7 @@ class NetworkTest : public testing::Test {
     authenticator_.add(worker_.public_key, "anna");
   }
 
-  /// Runs the network until `done`; one that never gets there fails the test.
+  /// Runs the network until `done`; fails the test after a timeout.
   template <typename Done>
   void run_until(const Done& done) {
     const auto give_up = std::chrono::steady_clock::now() + test::kHangLimit;
@@ -81,7 +80,7 @@ class NetworkTest : public testing::Test {
 
   std::unique_ptr<RawPeer> open_peer() {
     auto peer = std::make_unique<RawPeer>(network_.endpoint(open_));
-    peer->shake_hands();
+    peer->complete_handshake();
     return peer;
   }
   std::vector<std::unique_ptr<RawPeer>> open_peers(std::size_t count) {
@@ -100,10 +99,10 @@ class NetworkTest : public testing::Test {
     std::ranges::generate(peers, [&] { return keyed_peer(worker_, server_.public_key, source); });
     return peers;
   }
-  /// Runs the network until the peer has received so many bytes, and returns them.
+  /// Runs the network until the peer has received that many bytes, and returns them.
   std::string received_by(KeyedPeer& peer, std::size_t bytes) {
     std::string received;
-    run_until([&] { return (received += peer.tcp.receive_what_is_there()).size() >= bytes; });
+    run_until([&] { return (received += peer.tcp.receive_available()).size() >= bytes; });
     return received;
   }
   void take_welcome(KeyedPeer& peer) {
@@ -121,7 +120,7 @@ class NetworkTest : public testing::Test {
     static_cast<void>(received_by(*peer, 1));
     return peer;
   }
-  /// The identity of a peer without a key that has sent a message, which is taken.
+  /// Takes a message of a peer without a key and returns the peer's identity.
   std::string identity_of(RawPeer& peer) {
     peer.send(zmtp_frame("hello"));
     return next().identity;
@@ -136,8 +135,8 @@ class NetworkTest : public testing::Test {
   static constexpr std::size_t kWelcomedBytes = kGreetingBytes + 170;
 
   std::int64_t now_ms_ = 1000;
-  protocol::KeyPair server_ = protocol::made_key_pair();
-  protocol::KeyPair worker_ = protocol::made_key_pair();
+  protocol::KeyPair server_ = protocol::generate_key_pair();
+  protocol::KeyPair worker_ = protocol::generate_key_pair();
   ListAuthenticator authenticator_;
   Network network_;
   Network::Port keyed_ = 0;
@@ -153,11 +152,11 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   }
   EXPECT_EQ(next().body, "flood");
   RawPeer modest(network_.endpoint(open_));
-  // In one packet, so that all of it has come when the server answers with its own READY.
+  // In one packet, so that everything has arrived when the server answers with READY.
   modest.send(zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("first") + zmtp_frame("second"));
   std::size_t received = 0;
   run_until([&] {
-    received += modest.receive_what_is_there().size();
+    received += modest.receive_available().size();
     return received > kGreetingBytes;
   });
   std::vector<std::string> bodies;
@@ -169,7 +168,7 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   EXPECT_LE(std::find(first, bodies.end(), "second") - first, 2);
 }
 
-TEST_F(NetworkTest, APeerWhoseMessageIsNotTakenIsNotRead) {
+TEST_F(NetworkTest, APeerWithAnUntakenMessageIsNotRead) {
   const auto flood = open_peer();
   const std::string frame = zmtp_frame(std::string(1 << 20, 'x'));
   std::size_t sent = 0;
@@ -183,7 +182,7 @@ TEST_F(NetworkTest, APeerWhoseMessageIsNotTakenIsNotRead) {
   EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
 }
 
-TEST_F(NetworkTest, WhatAPeerSentBeforeItLeftIsTakenAndItsEndIsReportedOnce) {
+TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndItIsReportedOnce) {
   const auto leaving = open_peer();
   leaving->send(zmtp_frame("first") + zmtp_frame("second") + zmtp_frame("last"));
   leaving->reset();
@@ -200,11 +199,11 @@ TEST_F(NetworkTest, WhatAPeerSentBeforeItLeftIsTakenAndItsEndIsReportedOnce) {
   EXPECT_EQ(disconnects[0].reason, "");
 }
 
-TEST_F(NetworkTest, MoreThanOneReadThatAPeerSentBeforeItLeftIsTaken) {
+TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   auto leaving = open_peer();
-  std::size_t received = 0;  // what it left unread would cut off what it sends
+  std::size_t received = 0;  // unread input would reset the connection and lose its output
   run_until([&] {
-    received += leaving->receive_what_is_there().size();
+    received += leaving->receive_available().size();
     return received == kGreetingBytes + zmtp_ready("ROUTER").size();
   });
   const std::string body(40'000, 'x');
@@ -222,7 +221,7 @@ TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected
   RawPeer stranger(network_.endpoint(open_));
   stranger.send("GET / HTTP/1.1\r\n\r\n");
   RawPeer in_parts(network_.endpoint(open_));
-  in_parts.shake_hands();
+  in_parts.complete_handshake();
   in_parts.send(zmtp_frame("part", true));
   std::size_t ended = 0;
   run_until([&] { return (ended += network_.take_disconnects().size()) == 2; });
@@ -238,7 +237,7 @@ class PausingNetworkTest : public NetworkTest {
       : NetworkTest({.held_in_bytes = 3'000'000, .held_in_to_pause_bytes = kPause}) {}
 };
 
-TEST_F(PausingNetworkTest, PeersThatSendMoreThanIsTakenAreNotReadAndLoseNothing) {
+TEST_F(PausingNetworkTest, PeersThatSendTooFastAreNotReadAndLoseNothing) {
   constexpr std::size_t kMessage = 60'000;
   const auto peers = open_peers(40);
   for (const auto& peer : peers) {
@@ -283,11 +282,11 @@ TEST_F(TightNetworkTest, APeerThatReadsNothingIsBusyAndThenDisconnected) {
   }
   EXPECT_TRUE(was_busy);
   EXPECT_EQ(delivery, Delivery::kGone);
-  EXPECT_THAT(network_.take_disconnects().at(0).reason, HasSubstr("unread"));
+  EXPECT_THAT(network_.take_disconnects().at(0).reason, HasSubstr("does not read"));
   EXPECT_EQ(network_.waiting_out_bytes(), 0U);
 }
 
-TEST_F(TightNetworkTest, APeerThatReadsAgainIsNoLongerBusy) {
+TEST_F(TightNetworkTest, ABusyPeerThatReadsAgainIsNoLongerBusy) {
   const auto slow = open_peer();
   const std::string identity = identity_of(*slow);
   while (network_.send(identity, reply_) != Delivery::kBusy) {
@@ -330,12 +329,12 @@ TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected)
   EXPECT_EQ(next().body, std::string(1000, 'm'));
 }
 
-TEST_F(TightNetworkTest, TheQuietestConnectionMakesRoomUnlessAllWereActiveJustNow) {
+TEST_F(TightNetworkTest, TheMostSilentConnectionMakesRoomUnlessAllAreActive) {
   const auto quiet = open_peer();
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> at_work;
-  for (int i = 0; i < 3; ++i) {  // one after the other: handshakes make room first
+  for (int i = 0; i < 3; ++i) {  // one after another, because handshakes make room first
     at_work.push_back(open_peer());
     identity_of(*at_work.back());
   }
@@ -366,12 +365,12 @@ TEST_F(TightNetworkTest, NewHandshakesReplaceEachOtherAndNoAdmittedPeer) {
 
 TEST_F(NetworkTest, RefusedHandshakesAreCountedAndLeaveNothingBehind) {
   constexpr std::size_t kPeers = 80;
-  const protocol::KeyPair stranger = protocol::made_key_pair();
+  const protocol::KeyPair stranger = protocol::generate_key_pair();
   std::vector<std::unique_ptr<KeyedPeer>> peers;
   for (std::size_t i = 0; i < kPeers; ++i) {
     peers.push_back(keyed_peer(stranger, i % 4 == 0 ? stranger.public_key : server_.public_key));
     if (i % 4 == 1) {
-      peers.back()->tcp.shake_hands();
+      peers.back()->tcp.complete_handshake();
     } else {
       peers.back()->say_hello();
     }
@@ -392,7 +391,7 @@ TEST_F(NetworkTest, RefusedHandshakesAreCountedAndLeaveNothingBehind) {
   EXPECT_THAT(disconnects[0].address, testing::StartsWith("127.0.0.1:"));
 }
 
-TEST_F(NetworkTest, APeerThatLeavesInItsGreetingUsesAnotherMechanismAndASilentOneIsNotRefused) {
+TEST_F(NetworkTest, APeerThatDisconnectsAtTheGreetingCountsAsOtherMechanismAndASilentOneDoesNot) {
   {
     RawPeer plain(network_.endpoint(keyed_));
     const RawPeer silent(network_.endpoint(keyed_));
@@ -428,7 +427,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   }
 }
 
-TEST_F(NetworkTest, ANameThatChangesInTheListCountsFromTheNextMessage) {
+TEST_F(NetworkTest, AChangedNameInTheListAppliesToTheNextMessage) {
   const auto worker = admitted();
   worker->tcp.send(worker->curve.sealed("first"));
   EXPECT_EQ(next(keyed_).key->name, "anna");
@@ -462,7 +461,7 @@ class CrowdTest : public NetworkTest {
   std::vector<std::unique_ptr<KeyedPeer>> crowd_ = keyed_peers(300);
 };
 
-TEST_F(CrowdTest, AllOfASlowCrowdAreAdmittedThoughItsLaterPartWaitsInTheSystem) {
+TEST_F(CrowdTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
   for (const auto& peer : crowd_) {
     peer->say_hello();
   }
@@ -476,7 +475,7 @@ TEST_F(CrowdTest, AllOfASlowCrowdAreAdmittedThoughItsLaterPartWaitsInTheSystem) 
   EXPECT_EQ(network_.connections(), crowd_.size());
 }
 
-TEST_F(CrowdTest, SilentPeersMakeRoomAfterAPartOfTheirTime) {
+TEST_F(CrowdTest, SilentPeersMakeRoomAfterAFractionOfTheirTime) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
   run_until([&] { return refused(RefusalCause::kBound) == kMost; });
   EXPECT_EQ(network_.connections(), kMost);
@@ -488,7 +487,7 @@ class CrowdOfOneAddressTest : public NetworkTest {
   CrowdOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMost, .handshakes_of_source = kMost}) {}
 };
 
-TEST_F(CrowdOfOneAddressTest, KeepsOutNobodyElseAndReplacesItsNewestThenItsOldestHandshakes) {
+TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
   const auto crowd = keyed_peers(100, kElsewhere);
   run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMost; });
   EXPECT_EQ(network_.connections(), kMost);
@@ -500,7 +499,7 @@ TEST_F(CrowdOfOneAddressTest, KeepsOutNobodyElseAndReplacesItsNewestThenItsOldes
   crowd[0]->say_hello();
   take_welcome(*crowd[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  const auto silent = keyed_peers(1, kElsewhere);  // `second` left room for it
+  const auto silent = keyed_peers(1, kElsewhere);  // `second` made room for it
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(crowd[0]->tcp.receive(), "") << "in the place of the oldest";
 }
@@ -515,7 +514,7 @@ TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
   for (auto& peer : peers) {
     peer = admitted();
   }
-  now_ms_ += 60'000;  // all of them are silent for long
+  now_ms_ += 60'000;  // all have been silent for long
   RawPeer newcomer(network_.endpoint(keyed_));
   run_until([&] { return refused(RefusalCause::kBound) == 1; });
   EXPECT_EQ(newcomer.receive(), "");
@@ -534,7 +533,7 @@ TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedWhateverItsStep) {
 
 // ---- Sockets of libzmq --------------------------------------------------------------------------
 
-/// A DEALER of libzmq, with keys if they are given, and a monitor of its handshakes.
+/// A DEALER of libzmq, with optional keys and a monitor of its handshakes.
 struct Dealer {
   Dealer(zmq::context_t& context, const std::string& endpoint,
          const protocol::KeyPair* own = nullptr, const protocol::CurveKey* server = nullptr)
@@ -556,7 +555,7 @@ struct Dealer {
     socket.connect(endpoint);
   }
   void send(const std::string& body) { socket.send(zmq::buffer(body), zmq::send_flags::dontwait); }
-  /// The kind and the value of the next failure of a handshake.
+  /// Kind and value of the next handshake failure.
   std::optional<std::pair<int, int>> failure() {
     zmq::message_t event;
     while (monitor.recv(event, zmq::recv_flags::dontwait)) {
@@ -581,7 +580,7 @@ class LibzmqPeersTest : public NetworkTest {
   std::unique_ptr<Dealer> dealer(const protocol::KeyPair& own, const protocol::CurveKey& server) {
     return std::make_unique<Dealer>(context_, network_.endpoint(keyed_), &own, &server);
   }
-  /// Runs the network until the socket reports that its handshake has failed, and how.
+  /// Runs the network until the socket reports a failed handshake, and returns how.
   std::pair<int, int> failure_of(Dealer& dealer) {
     std::optional<std::pair<int, int>> failure;
     run_until([&] { return (failure = dealer.failure()).has_value(); });
@@ -591,7 +590,7 @@ class LibzmqPeersTest : public NetworkTest {
   zmq::context_t context_;
 };
 
-TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
+TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysWithTheKeysName) {
   const auto worker = dealer(worker_, server_.public_key);
   worker->send("hello");
   const Incoming incoming = next(keyed_);
@@ -612,7 +611,7 @@ TEST_F(LibzmqPeersTest, MessagesOfAllSizesPassBothWaysAndNameTheKey) {
 }
 
 TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
-  const protocol::KeyPair stranger = protocol::made_key_pair();
+  const protocol::KeyPair stranger = protocol::generate_key_pair();
   EXPECT_EQ(failure_of(*dealer(stranger, server_.public_key)),
             std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));
   EXPECT_EQ(failure_of(*dealer(worker_, stranger.public_key)),
@@ -629,8 +628,8 @@ TEST_F(LibzmqPeersTest, RefusedSocketsReportWhy) {
   run_until([&] { return refused(RefusalCause::kOtherMechanism) == 2; });
 }
 
-TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAtOnceWithAllThatItSent) {
-  const protocol::KeyPair other = protocol::made_key_pair();
+TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAndDropsItsMessages) {
+  const protocol::KeyPair other = protocol::generate_key_pair();
   authenticator_.add(other.public_key, "berta");
   const auto revoked = dealer(worker_, server_.public_key);
   const auto staying = dealer(other, server_.public_key);
@@ -649,7 +648,8 @@ TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAtOnceWithAllThatItSent) {
   ASSERT_EQ(disconnects.size(), 1U);
   const bool one_is_revoked = from_one.key->name == "anna";
   EXPECT_EQ(disconnects[0].identity, (one_is_revoked ? from_one : from_other).identity);
-  EXPECT_EQ(failure_of(*revoked), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));  // and back
+  // it reconnects
+  EXPECT_EQ(failure_of(*revoked), std::pair(ZMQ_EVENT_HANDSHAKE_FAILED_AUTH, 400));
   staying->send("still there");
   EXPECT_EQ(next(keyed_).body, "still there");
 }

@@ -41,30 +41,30 @@ class RawPeer : public test::RawTcp {
  public:
   using RawTcp::RawTcp;
 
-  void shake_hands() { send(zmtp_greeting() + zmtp_ready("DEALER")); }
-  /// Throws after the server has ended the connection.
+  void complete_handshake() { send(zmtp_greeting() + zmtp_ready("DEALER")); }
+  /// Throws if the server has ended the connection.
   void send(std::string_view bytes) {
     if (!send_all(bytes)) {
       throw std::runtime_error("the server takes no more");
     }
   }
-  /// Sends what the server takes at once; returns how many bytes.
+  /// Sends as much as fits; returns the number of bytes.
   std::size_t send_what_fits(std::string_view bytes) {
     const ssize_t sent = ::send(number(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return sent < 0 ? 0 : static_cast<std::size_t>(sent);
   }
-  /// Sends what the server takes at once of `frames`, then of their rest, and so on.
+  /// Sends as much of `frames` as fits, and the rest with the next calls.
   void flood(const std::string& frames) {
     if (left_.empty()) {
       left_ = frames;
     }
     left_.erase(0, send_what_fits(left_));
   }
-  /// Reads what has come already, which may be nothing.
-  std::string receive_what_is_there() { return receive(MSG_DONTWAIT); }
+  /// Reads received bytes without blocking.
+  std::string receive_available() { return receive(MSG_DONTWAIT); }
 
  private:
-  std::string left_;  // of a flood
+  std::string left_;  // rest of a flood
 };
 
 }  // namespace oblique::server

@@ -1,4 +1,4 @@
-// The protocol without keys, and with keys for a client that can send what no library sends.
+// The protocol without keys, and with keys and a client that can send what no library sends.
 #include "server/network/zmtp.h"
 
 #include <cstddef>
@@ -44,7 +44,7 @@ TEST(ZmtpTest, SendsGreetingAtOnceAndReadyAfterTheGreetingOfThePeer) {
   EXPECT_THAT(zmtp.fault(), IsEmpty());
 }
 
-TEST(ZmtpTest, AFaultBehindAMessageWaitsForItsTurn) {
+TEST(ZmtpTest, AFaultAfterAMessageIsReportedAfterThatMessage) {
   Zmtp zmtp = opened();
   zmtp.receive(zmtp_frame("sound") + "\xff");
   EXPECT_THAT(zmtp.fault(), IsEmpty());
@@ -52,7 +52,7 @@ TEST(ZmtpTest, AFaultBehindAMessageWaitsForItsTurn) {
   EXPECT_THAT(zmtp.fault(), HasSubstr("unknown kind"));
 }
 
-TEST(ZmtpTest, WhatBreaksTheProtocolIsAFaultAtItsFirstBytes) {
+TEST(ZmtpTest, ViolationsAreFaultsAtTheirFirstByte) {
   std::string old_version = zmtp_greeting();
   old_version[10] = '\x01';
   std::string other_mechanism = zmtp_greeting();
@@ -69,13 +69,13 @@ TEST(ZmtpTest, WhatBreaksTheProtocolIsAFaultAtItsFirstBytes) {
            {old_version.substr(0, 11), "ZMTP 3"},
            {other_mechanism, "runs without keys"},
            {zmtp_greeting() + zmtp_frame("early").substr(0, 2), "before the handshake"},
-           {zmtp_greeting() + zmtp_ready("PUB"), "not of a type"},
+           {zmtp_greeting() + zmtp_ready("PUB"), "cannot connect to a ROUTER"},
            {zmtp_greeting() + command_frame("READY", "x"), "cut off"},
            {zmtp_greeting() + command_frame("HELLO", ""), "READY"},
            {zmtp_greeting() + std::string("\x04\x00", 2), "without a name"},
            {zmtp_greeting() + too_long_a_command, "65536 bytes; the limit is 4096"},
            {zmtp_greeting() + ready + zmtp_frame("part", true).substr(0, 1), "several frames"},
-           {zmtp_greeting() + ready + zmtp_ping().substr(0, 2), "heartbeats"}}) {
+           {zmtp_greeting() + ready + zmtp_ping().substr(0, 2), "heartbeat"}}) {
     Zmtp zmtp;
     zmtp.receive(bytes);
     EXPECT_THAT(zmtp.fault(), HasSubstr(fault)) << bytes;
@@ -94,9 +94,9 @@ std::string flipped(std::string bytes, std::size_t at) {
   return bytes;
 }
 
-/// Both ends of a connection.
+/// Both sides of a connection.
 struct Link {
-  /// What the server answers to these bytes.
+  /// Returns the server's answer to these bytes.
   std::string send(std::string_view bytes) {
     zmtp.receive(bytes);
     while (zmtp.pending_step() != Zmtp::PendingStep::kNone) {
@@ -106,7 +106,7 @@ struct Link {
   }
   std::string hello_frame() { return command_frame("HELLO", client.hello()); }
   std::string initiate_frame() { return command_frame("INITIATE", client.initiate()); }
-  /// The server refuses these bytes with that answer, or without any.
+  /// Expects that the server refuses these bytes, with that answer or without one.
   void expect_refused(std::string_view bytes, const std::string& answer = error_frame("500")) {
     EXPECT_EQ(send(bytes), answer);
     EXPECT_THAT(zmtp.fault(), Not(IsEmpty()));
@@ -145,8 +145,8 @@ class CurveTest : public testing::Test {
     return link;
   }
 
-  protocol::KeyPair server_ = protocol::made_key_pair();
-  protocol::KeyPair own_ = protocol::made_key_pair();
+  protocol::KeyPair server_ = protocol::generate_key_pair();
+  protocol::KeyPair own_ = protocol::generate_key_pair();
   ListAuthenticator authenticator_;
   PortSecurity security_{server_, authenticator_};
 };
@@ -160,7 +160,7 @@ TEST_F(CurveTest, APeerWithAnAuthorizedKeyIsAdmittedAndTheServerProvesItsOwnKey)
   const std::string_view ready = std::string_view(answer).substr(2);
   const auto properties =
       CurveClient::opened(ready.substr(14), curve_nonce("CurveZMQREADY---", ready.substr(6, 8)),
-                          link.client.servers_brief, link.client.brief.secret_key);
+                          link.client.server_short_term, link.client.short_term.secret_key);
   EXPECT_EQ(properties, zmtp_properties("ROUTER"));
   EXPECT_TRUE(link.zmtp.is_open());
   EXPECT_EQ(link.zmtp.identity()->name, "anna");
@@ -171,30 +171,30 @@ TEST_F(CurveTest, TwoHandshakesWithTheSameClientKeysDiffer) {
   const CurveClient anna = client();
   const Link first = welcomed(anna);
   const Link second = welcomed(anna);
-  EXPECT_NE(first.client.servers_brief, second.client.servers_brief);
+  EXPECT_NE(first.client.server_short_term, second.client.server_short_term);
   EXPECT_NE(first.client.cookie, second.client.cookie);
 }
 
 TEST_F(CurveTest, AKeyThatIsNotAuthorizedIsRefused) {
-  Link link = welcomed({protocol::made_key_pair(), server_.public_key});
+  Link link = welcomed({protocol::generate_key_pair(), server_.public_key});
   link.expect_refused(link.initiate_frame(), error_frame("400"));
   EXPECT_EQ(link.zmtp.cause(), RefusalCause::kUnknownKey);
 }
 
 TEST_F(CurveTest, AHelloForAnotherServerIsRefusedAtOnce) {
   Link link = greeted();
-  link.client = {own_, protocol::made_key_pair().public_key};
+  link.client = {own_, protocol::generate_key_pair().public_key};
   link.expect_refused(curve_greeting() + link.hello_frame());
   EXPECT_EQ(link.zmtp.cause(), RefusalCause::kWrongServerKey);
 }
 
-TEST_F(CurveTest, APeerThatDoesNotHoldTheKeyThatItShowsIsRefusedWhetherOrNotTheKeyIsListed) {
-  const protocol::KeyPair other = protocol::made_key_pair();
+TEST_F(CurveTest, APeerThatDoesNotHoldItsKeyIsRefusedWhetherOrNotTheKeyIsListed) {
+  const protocol::KeyPair other = protocol::generate_key_pair();
   std::set<std::string> faults;
-  for (const protocol::KeyPair& shown : {own_, protocol::made_key_pair()}) {
+  for (const protocol::KeyPair& shown : {own_, protocol::generate_key_pair()}) {
     std::vector<CurveClient> thieves(3, {shown, server_.public_key});
     thieves[0].vouching_secret = other.secret_key;
-    thieves[1].vouched_brief = other.public_key;
+    thieves[1].vouched_short_term = other.public_key;
     thieves[2].vouched_server = other.public_key;
     for (const CurveClient& client : thieves) {
       Link thief = welcomed(client);
@@ -202,14 +202,14 @@ TEST_F(CurveTest, APeerThatDoesNotHoldTheKeyThatItShowsIsRefusedWhetherOrNotTheK
       faults.insert(thief.zmtp.fault());
     }
   }
-  EXPECT_THAT(faults, ElementsAre(HasSubstr("does not hold")));
+  EXPECT_THAT(faults, ElementsAre(HasSubstr("does not hold the secret")));
 }
 
-TEST_F(CurveTest, KeysWithWhichEverySecretIsKnownAreRefused) {
-  // Points of small order: the shared secret is zero, whoever computes it.
+TEST_F(CurveTest, KeysOfSmallOrderAreRefused) {
+  // Points of small order: the shared secret is always zero.
   for (const std::uint8_t first : {std::uint8_t{0}, std::uint8_t{1}}) {
     Link link = greeted();
-    link.client.brief.public_key = {first};
+    link.client.short_term.public_key = {first};
     link.expect_refused(curve_greeting() + link.hello_frame());
   }
   CurveClient zero = client();
@@ -244,7 +244,7 @@ TEST_F(CurveTest, ACommandOfAnotherLengthIsRefused) {
   }
 }
 
-TEST_F(CurveTest, AHandshakeHoldsNoMoreThanItsLongestCommand) {
+TEST_F(CurveTest, AHandshakeStoresAtMostItsLongestCommand) {
   Link greedy = welcomed();
   greedy.client.properties.append(16'000'000, 'p');
   greedy.expect_refused(greedy.initiate_frame().substr(0, 9));
@@ -287,7 +287,7 @@ TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNobody) {
   for (std::size_t at = 0; at < kGreetingBytes; ++at) {
     Link link = greeted();
     const std::string answers = link.send(flipped(curve_greeting(), at) + link.hello_frame());
-    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // some bytes have no meaning
+    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // some bytes are ignored
     EXPECT_FALSE(link.zmtp.is_open()) << at;
   }
   const std::string hello = greeted().hello_frame();
@@ -331,7 +331,7 @@ TEST_F(CurveTest, AConnectionHasOneHandshake) {
 
 TEST_F(CurveTest, CommandsOutOfOrderAreRefused) {
   CurveClient anna = client();
-  anna.servers_brief = server_.public_key;  // without a WELCOME
+  anna.server_short_term = server_.public_key;  // without a WELCOME
   for (const std::string& bytes :
        {zmtp_ready("DEALER"), command_frame("WELCOME", std::string(160, 'w')),
         command_frame("INITIATE", std::string(300, 'i')), zmtp_ping(), anna.sealed("too early"),
@@ -346,11 +346,11 @@ TEST_F(CurveTest, CommandsOutOfOrderAreRefused) {
 
 TEST_F(CurveTest, CountersThatDoNotGrowEndTheConnection) {
   Link link = welcomed();
-  link.client.nonce = 1;  // HELLO's
+  link.client.nonce = 1;  // the counter of HELLO
   link.expect_refused(link.initiate_frame());
 
   Link opened = open();
-  opened.client.nonce = 2;  // INITIATE's
+  opened.client.nonce = 2;  // the counter of INITIATE
   opened.expect_refused(opened.client.sealed("with the counter of the handshake"), "");
 
   const auto ends_after_first_message = [&](const auto& second) {
@@ -372,7 +372,7 @@ TEST_F(CurveTest, CountersThatDoNotGrowEndTheConnection) {
 
 // ---- Messages, with keys and without ------------------------------------------------------------
 
-TEST_F(CurveTest, MessagesAreTheSameHoweverTheirBytesAreCut) {
+TEST_F(CurveTest, MessagesDoNotDependOnHowTheirBytesAreSplit) {
   const std::vector<std::string> sent{"", "short", std::string(1000, 'l')};
   const auto bodies_of = [](Link& link, std::string_view bytes, std::size_t piece) {
     std::vector<std::string> bodies;
@@ -416,7 +416,7 @@ TEST_F(CurveTest, AFrameOfTheLargestSizeIsTakenAndALargerOneIsAFaultAtItsHeader)
   }
 }
 
-TEST_F(CurveTest, AFlippedBitAnywhereInAMessageIsNoMessage) {
+TEST_F(CurveTest, AMessageWithAFlippedBitIsRefused) {
   constexpr std::size_t kFrameBytes = 2 + CurveSession::kAddedBytes + 4;
   for (std::size_t at = 0; at < kFrameBytes; ++at) {
     Link link = open();
@@ -429,17 +429,17 @@ TEST_F(CurveTest, AFlippedBitAnywhereInAMessageIsNoMessage) {
 
 TEST_F(CurveTest, MessagesOfTheServerHaveCountersThatGrow) {
   Link link = open();
-  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has the first one
+  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has the first counter
     std::string_view body = "reply";
     const std::string frame = link.zmtp.begin_message(body);
     EXPECT_THAT(body, IsEmpty());
-    EXPECT_EQ(frame[0], 0);  // libzmq takes the outer bit for the inner one
+    EXPECT_EQ(frame[0], 0);  // libzmq reads the outer bit as the inner one
     EXPECT_EQ(link.client.opened_message(frame.substr(2)), std::string("\0reply", 6));
     EXPECT_EQ(number_of(std::string_view(frame).substr(10, 8)), counter);
   }
 }
 
-TEST_F(CurveTest, AFrameIsDecryptedWhenItsTurnHasComeAndNothingAfterItIsExamined) {
+TEST_F(CurveTest, AFrameIsDecryptedInItsTurnAndLaterBytesAreNotExamined) {
   Link link = open();
   Zmtp& zmtp = link.zmtp;
   zmtp.receive(link.client.sealed("first") + link.client.sealed("second"));
@@ -451,7 +451,7 @@ TEST_F(CurveTest, AFrameIsDecryptedWhenItsTurnHasComeAndNothingAfterItIsExamined
   EXPECT_EQ(zmtp.pending_step(), Zmtp::PendingStep::kSealedFrame);
 }
 
-TEST_F(CurveTest, EncryptedFramesMayComeAsCommandsAsTheStandardDefinesThem) {
+TEST_F(CurveTest, EncryptedFramesMayBeCommandsAsInTheStandard) {
   Link link = open();
   for (const std::string& body : {std::string("short"), std::string(5000, 'l')}) {
     std::string bytes = link.client.sealed(body);
@@ -462,7 +462,7 @@ TEST_F(CurveTest, EncryptedFramesMayComeAsCommandsAsTheStandardDefinesThem) {
   }
 }
 
-TEST_F(CurveTest, FramesThatAreNoWholeMessageEndTheConnection) {
+TEST_F(CurveTest, IncompleteOrPlainFramesEndTheConnection) {
   const auto ends = [&](const auto& bytes_of) {
     Link link = open();
     link.expect_refused(bytes_of(link.client), "");

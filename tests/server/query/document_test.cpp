@@ -1,5 +1,5 @@
-// The tables of server/store/tables.md against the one source of each: the comments of the schema
-// and the columns of `oblique columns`.
+// Compares server/store/tables.md with the comments of the schema and the columns of `oblique
+// columns`.
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -18,7 +18,7 @@ namespace {
 
 using Comments = std::map<std::string, std::string>;
 
-/// The comment on each column of a table: beside it, or in the lines before it.
+/// The comment on each column of a table: beside it, or on the lines before it.
 Comments comments_of(const std::string& create) {
   static const std::regex kLine("[ \n]*(\\w*)[^\n]*?(?:-- ([^\n]*))?(?:\n|$)");
   Comments comments;
@@ -55,7 +55,7 @@ class DocumentTest : public StoreFixture {
  protected:
   DocumentTest() { store(); }
 
-  /// `comments` are those of the table `results`, which come before `oblique columns` there.
+  /// For the table `results`, `comments` take precedence over `oblique columns`.
   std::string table_text(const std::string& title, const Comments& comments, bool has_units) const {
     const std::string table = title.substr(0, title.find(' '));
     std::string text =
@@ -85,7 +85,7 @@ class DocumentTest : public StoreFixture {
   }
 };
 
-/// OBLIQUE_WRITE_TABLES=1 in the environment writes them instead.
+/// With OBLIQUE_WRITE_TABLES=1 in the environment it writes the document instead.
 TEST_F(DocumentTest, EveryTableViewAndColumnIsDocumentedAsItsSourceDescribesIt) {
   std::string tables;
   Comments of_results;

@@ -28,8 +28,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// Study "a" has ten solved points, e = 1, H = 1, mu from 0 to 1; of the five of "it's" 0, 1 and 2
-/// are solved and 4 failed.
+/// Study "a" has ten solved points with e = 1, H = 1 and mu from 0 to 1. Of the five points of
+/// "it's" 0, 1 and 2 are solved and 4 failed.
 class PlanTest : public StoreFixture {
  protected:
   PlanTest() {
@@ -78,7 +78,7 @@ class PlanTest : public StoreFixture {
   std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
     return texts(plan(database_.get(), asked).sql);
   }
-  /// What SQLite does for a question.
+  /// SQLite's query plan for a question.
   std::string steps_of(const protocol::StudyQuery& asked) const {
     return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
                                                                  plan(database_.get(), asked).sql),
@@ -94,7 +94,7 @@ class PlanTest : public StoreFixture {
   PlannedColumn column(const std::string& select) const {
     return plan(database_.get(), question(select)).columns.at(0);
   }
-  /// The message of the error; empty: the query is right.
+  /// The error message; empty: the query is valid.
   std::string error(const protocol::StudyQuery& asked) const {
     try {
       plan(database_.get(), asked);
@@ -111,7 +111,7 @@ class PlanTest : public StoreFixture {
   DatabaseHandle database_;
 };
 
-TEST_F(PlanTest, RowsComeInTheOrderOfTheirPointsUnlessAnotherIsAskedFor) {
+TEST_F(PlanTest, RowsAreInTheOrderOfPointsUnlessAnotherIsRequested) {
   EXPECT_THAT(texts(of_other(question("point"))), ElementsAre("0", "1", "2", "4"));
   EXPECT_THAT(texts(of_other(question("mu", "status = 'solved' AND mu > 0"))),
               ElementsAre("0.25", "0.5"));
@@ -182,7 +182,7 @@ TEST_F(PlanTest, FunctionsAggregateTheNumbersOfRows) {
   EXPECT_THROW(texts("SELECT median('x') FROM results"), StorageError);
 }
 
-TEST_F(PlanTest, CorrIsPearsonsCorrelationOfTheRowsThatHaveBoth) {
+TEST_F(PlanTest, CorrIsPearsonsCorrelationOfRowsWithBothValues) {
   // Of 0, 1, 2 with 0, 1, 4: covariance 2, variances 1 and 13/3.
   EXPECT_NEAR(number("corr(point, point * point)", "point < 3"), 2.0 / std::sqrt(13.0 / 3.0),
               1e-15);
@@ -192,7 +192,7 @@ TEST_F(PlanTest, CorrIsPearsonsCorrelationOfTheRowsThatHaveBoth) {
   EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of them does not vary";
 }
 
-TEST_F(PlanTest, ElementsAreThoseOfTheListsInTheView) {
+TEST_F(PlanTest, ElementsEqualThoseOfTheListsInTheView) {
   edit(
       "UPDATE results SET peaks = '[]', ft_peaks = '[]', phases = '[]', stick_intervals = '[]',"
       " reaction_peaks = '[]' WHERE point = 1;"
@@ -208,7 +208,7 @@ TEST_F(PlanTest, ElementsAreThoseOfTheListsInTheView) {
   const auto expect_same = [&](const std::string& written, const std::string& sql) {
     const auto shown = texts("SELECT " + sql + " FROM runs WHERE study = 'a' ORDER BY point");
     EXPECT_EQ(texts(question(written)), shown) << written;
-    // With a column that only the view has.
+    // `links` is a column that only the view has.
     EXPECT_EQ(texts(question(written + ", links")), shown) << written;
   };
   for (const auto& [list, members] : lists) {
@@ -264,7 +264,7 @@ TEST_F(PlanTest, ElementsMayBeInEveryPartOfAQuery) {
   EXPECT_THAT(error("peaks[0.5].fn_N"), HasSubstr("whole number"));
 }
 
-TEST_F(PlanTest, WholeNumbersInListsDivideAsOthersDo) {
+TEST_F(PlanTest, WholeNumbersInListsAreDividedAsRealNumbers) {
   edit("UPDATE results SET peaks = '[[0,3,1,1],[1,2,1,1]]', phases = '[3,2]' WHERE point = 1");
   for (const char* ratio : {"peaks[0].fn_N / peaks[1].fn_N", "fn_peaks_N[0] / fn_peaks_N[1]",
                             "phases[0].t1_s / phases[1].t1_s"}) {
@@ -333,34 +333,34 @@ TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
                {"median(mu), mode", "", "mode has many values"},
                {"mu, count(*) FILTER (WHERE e = 1)", "", "mu has many"},
                {"*, count(*)", "", "* has many"},
-               {"H, MU, count(*)", "H", "MU is no column, and SQL would take it for mu: write mu"}};
+               {"H, MU, count(*)", "H", "MU is not a column, and SQL ignores case: write mu"}};
   for (const auto& [select, group, message] : wrong) {
     EXPECT_THAT(error(select, "", group), AllOf(HasSubstr("--select"), HasSubstr(message)));
   }
 }
 
-TEST_F(PlanTest, AWrongPartIsNamedByItsFlagAndAWrongNameWithTheNearest) {
+TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
   const struct {
     protocol::StudyQuery asked;
     const char* flag;
     const char* message;
-  } wrong[] = {{question("media(mu)"), "--select", "did you mean `median`?"},
-               {question("mode, count"), "--select", "did you mean `count`?"},
-               {question("peaks.cnt"), "--select", "`peaks.count`"},
-               {question("stik_total_s"), "`stick_total_s`", "oblique columns"},
-               {question("count(*)", "\"mux\" > 0.5"), "did you mean `mu`",
-                "a text stands in single quotes"},
-               {question("mu", "major_mode = \"SC\""), "--where", "no such column: SC"},
-               {question("mu", "", "", "\"mux\""), "--order", "no such column: mux"},
-               {question("count(*)", "", "\"mux\""), "--group", "no such column: mux"},
-               {question("mu FROM runs --"), "--select", ""},
-               {question("mu", "mu > 0.5 --"), "--where", ""},
-               {question("mu", "", "mu ORDER BY 1"), "--group", ""},
-               {question("mu", "", "", "mu LIMIT 1"), "--order", ""},
-               {question("mu", "mu >"), "--where \"mu >\"", "incomplete"},
-               {question("mu +"), "--select \"mu +\"", ""},
-               {question("mu", "mu = = 1"), "--where", "near \"=\""},
-               {question("mu", "", "", "mu DESC DESC"), "--order \"mu DESC DESC\"", ""}};
+  } wrong[] = {
+      {question("media(mu)"), "--select", "did you mean `median`?"},
+      {question("mode, count"), "--select", "did you mean `count`?"},
+      {question("peaks.cnt"), "--select", "`peaks.count`"},
+      {question("stik_total_s"), "`stick_total_s`", "oblique columns"},
+      {question("count(*)", "\"mux\" > 0.5"), "did you mean `mu`", "write texts in single quotes"},
+      {question("mu", "major_mode = \"SC\""), "--where", "no such column: SC"},
+      {question("mu", "", "", "\"mux\""), "--order", "no such column: mux"},
+      {question("count(*)", "", "\"mux\""), "--group", "no such column: mux"},
+      {question("mu FROM runs --"), "--select", ""},
+      {question("mu", "mu > 0.5 --"), "--where", ""},
+      {question("mu", "", "mu ORDER BY 1"), "--group", ""},
+      {question("mu", "", "", "mu LIMIT 1"), "--order", ""},
+      {question("mu", "mu >"), "--where \"mu >\"", "incomplete"},
+      {question("mu +"), "--select \"mu +\"", ""},
+      {question("mu", "mu = = 1"), "--where", "near \"=\""},
+      {question("mu", "", "", "mu DESC DESC"), "--order \"mu DESC DESC\"", ""}};
   for (const auto& [asked, flag, message] : wrong) {
     EXPECT_THAT(error(asked), AllOf(HasSubstr(flag), HasSubstr(message))) << asked.DebugString();
   }
@@ -371,7 +371,7 @@ TEST_F(PlanTest, AWrongPartIsNamedByItsFlagAndAWrongNameWithTheNearest) {
   EXPECT_THAT(error("mu", "", "", "\"Fn_Peak_N\""),
               AllOf(HasSubstr("--order"), HasSubstr("write fn_peak_N")));
   EXPECT_EQ(error("H AS h, LENGTH(mode)", "", "", "h DESC"), "");
-  EXPECT_THAT(error("peak[0].fn_N"), HasSubstr("peak is no list"));
+  EXPECT_THAT(error("peak[0].fn_N"), HasSubstr("peak is not a list"));
   EXPECT_THAT(error("peaks[0].fn_M"), HasSubstr("did you mean `fn_N`"));
   EXPECT_THAT(error("xyzzy"), Not(HasSubstr("did you mean")));
   EXPECT_EQ(error("mu [0], mu AS \"my mu\", \"e\""), "");
@@ -381,21 +381,21 @@ TEST_F(PlanTest, AWrongPartIsNamedByItsFlagAndAWrongNameWithTheNearest) {
   EXPECT_THAT(error(unknown), HasSubstr("no study called \"b\""));
 }
 
-TEST_F(PlanTest, NumbersAreThoseThatWereTypedInEveryPartOfAQuery) {
-  // SQLite 3.40 reads the neighbour of each of these.
+TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedOnes) {
+  // SQLite 3.40 reads a neighbouring double for each of these.
   for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
     EXPECT_EQ(number(typed), std::stod(typed));
     EXPECT_EQ(number(std::string("DISTINCT ") + typed), std::stod(typed));
   }
   EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
   EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
-  // True of one row if both numbers are the same.
+  // True for one row if both numbers are equal.
   const std::string is_it = "point = 3 AND 0.1166477 = 1166477 / 1e7";
   EXPECT_EQ(number(question("count(*)", "", is_it)), 9.0);
   EXPECT_EQ(number(question("point", "", "", is_it + " DESC")), 3.0);
 }
 
-/// The message about a text; empty: it may stand in a statement.
+/// The error message for a text; empty: it is allowed.
 std::string objection(const std::string& text) {
   try {
     check_sql_part("--where", text);
@@ -417,7 +417,7 @@ TEST(SqlPart, ExpressionsAreAllowed) {
   }
 }
 
-TEST(SqlPart, NothingReachesBeyondIt) {
+TEST(SqlPart, NothingCanChangeTheStatementAroundIt) {
   const std::pair<std::string, const char*> wrong[] = {
       {"mu > 0.5 --", "it has a comment (--)"},
       {"mu /* x */ > 0.5", "it has a comment (/*)"},
@@ -427,7 +427,7 @@ TEST(SqlPart, NothingReachesBeyondIt) {
       {"mu > $x", "it has a parameter ($)"},
       {"mu > #1", "it has a parameter (#)"},
       {"mu > 0.5; SELECT 1", "it has a semicolon"},
-      {"mu > 0.5) OR (1", "closed that was not opened"},
+      {"mu > 0.5) OR (1", "closing bracket has no opening one"},
       {"(mu > 0.5", "bracket is not closed"},
       {"mode = 'x'' --", "the quote ' is not closed"},
       {"\"mu > 1", "the quote \" is not closed"},

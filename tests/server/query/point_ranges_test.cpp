@@ -1,4 +1,4 @@
-// Ranges of points that follow from a condition, and whole plans against SQLite without them.
+// Ranges of points from conditions, and whole plans compared with SQLite alone.
 #include "server/query/plan.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using protocol::range;
 using protocol::Recipe;
 using Ranges = std::vector<PointRange>;
 
-/// Ten values of H from 0.1, mu from 0.2 and e from 0.1, the fastest.
+/// Ten values each of H from 0.1, mu from 0.2 and e from 0.1.
 Recipe cube() {
   return protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10), range("mu", 0.2, 2.0, 10), range("e", 0.1, 1.0, 10)}});
@@ -36,7 +36,7 @@ Ranges ranges(const std::string& condition) {
   return point_ranges(cube(), condition);
 }
 
-TEST(PointRanges, AnAxisIsRestrictedToOneValueMoreAtEachEnd) {
+TEST(PointRanges, RangesAreOneAxisValueWiderAtEachEnd) {
   EXPECT_EQ(ranges("H = 0.3"), (Ranges{{100, 399}}));
   EXPECT_EQ(ranges("H < 0.3"), (Ranges{{0, 399}}));
   EXPECT_EQ(ranges("H >= 0.8"), (Ranges{{600, 999}}));
@@ -65,7 +65,7 @@ TEST(PointRanges, OtherConditionsRestrictNothing) {
   }
 }
 
-TEST(PointRanges, OfHugeStudiesAreFew) {
+TEST(PointRanges, AreFewInHugeStudies) {
   const auto recipe = protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});
   EXPECT_EQ(points_in(point_ranges(recipe, "H = 0.1 AND mu = 0 AND e = 1")), 2U * 2 * 2);
@@ -78,7 +78,7 @@ TEST(PointRanges, OfHugeStudiesAreFew) {
 
 // ---- Random studies and conditions --------------------------------------------------------------
 
-/// Random studies and conditions, the same on every machine.
+/// Random studies and conditions, equal on every machine.
 class Drawn {
  public:
   explicit Drawn(unsigned seed) : engine_(seed) {}
@@ -107,8 +107,8 @@ class Drawn {
     return recipe;
   }
 
-  /// Over what the recipe knows and what it does not, with values of its axes and others.
-  /// Most of them are conjunctions.
+  /// A condition over columns with and without an axis, and values of axes and others. Most
+  /// conditions are conjunctions.
   std::string condition(const Recipe& recipe, int depth = 0) {
     const std::size_t kind = depth == 0 && !once_in(4) ? 5 : below(depth < 3 ? 9 : 4);
     const auto inner = [&] { return condition(recipe, depth + 1); };
@@ -132,7 +132,7 @@ class Drawn {
   }
 
  private:
-  /// Axes side by side, a sample, an axis that follows from others, or a filter; or none of it.
+  /// Makes the block a zip or sample, or adds an expression or filter, or changes nothing.
   void make_unusual(protocol::Block& block) {
     auto& e = *block.mutable_axes(block.axes_size() - 1);
     switch (below(6)) {
@@ -216,12 +216,12 @@ class Drawn {
   std::mt19937 engine_;
 };
 
-/// A study of that number, of which every fourth is stored in part.
+/// A study with that number; every fourth one has only some of its rows.
 std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
   const Table points = table(recipe);
   AddResults results{number, points, 0, "", "", 1, "now", {}};
   for (std::uint64_t point = 0; point < points->size(); ++point) {
-    if (points->is_left_in(point) && (number % 4 != 0 || point % 3 != 0)) {
+    if (points->passes_filter(point) && (number % 4 != 0 || point % 3 != 0)) {
       results.results.push_back(point % 7 == 0 ? protocol::failed_point(point, "why")
                                                : solved_point(point));
     }
@@ -231,7 +231,7 @@ std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
 
 using SameRows = StoreFixture;
 
-TEST_F(SameRows, APlanGivesTheRowsThatSqliteGivesWithoutIt) {
+TEST_F(SameRows, APlanReturnsTheSameRowsAsSqliteAlone) {
   constexpr std::uint64_t kStudies = 10;
   constexpr int kConditions = 60;
   Drawn drawn(7);

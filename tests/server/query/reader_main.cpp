@@ -1,4 +1,4 @@
-// A reader process of its own, so that these tests need no server.
+// A reader process for tests without a server.
 #include "server/query/query_pool.h"
 
 int main(int, char** arguments) {

@@ -51,8 +51,8 @@ TEST_F(ReaderTest, ValuesHaveTheirTypes) {
   using Integer = std::int64_t;
   const protocol::Row expected{Integer{1},        0.5, Text("\xc3\xa9"), std::monostate{},
                                Text("x'0AFF'"),
-                               Text("x'FF'"),      // no UTF-8
-                               Text("x'EDA080'"),  // no UTF-8
+                               Text("x'FF'"),      // not UTF-8
+                               Text("x'EDA080'"),  // not UTF-8
                                Integer{0},         // LIKE is case-sensitive
                                Integer{1}};
   EXPECT_EQ(reply.rows.at(0), expected);
@@ -75,21 +75,21 @@ TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
 
 TEST_F(ReaderTest, StatementsThatWriteReachOutsideOrAreWrongAreRefusedWithTheReason) {
   const std::pair<const char*, const char*> wrong[] = {
-      {"DELETE FROM results", "this only reads"},
-      {"INSERT INTO about VALUES ('x')", "this only reads"},
-      {"UPDATE studies SET name = 'z'", "this only reads"},
-      {"CREATE TEMP TABLE t (x)", "this only reads"},
-      {"ATTACH DATABASE '/tmp/elsewhere.db' AS other", "this only reads"},
-      {"PRAGMA writable_schema = 1", "this only reads"},
-      {"VACUUM INTO '/tmp/copy.db'", "this only reads"},
-      {"BEGIN", "this only reads"},
-      {"ANALYZE", "this only reads"},
+      {"DELETE FROM results", "only reading is allowed"},
+      {"INSERT INTO about VALUES ('x')", "only reading is allowed"},
+      {"UPDATE studies SET name = 'z'", "only reading is allowed"},
+      {"CREATE TEMP TABLE t (x)", "only reading is allowed"},
+      {"ATTACH DATABASE '/tmp/elsewhere.db' AS other", "only reading is allowed"},
+      {"PRAGMA writable_schema = 1", "only reading is allowed"},
+      {"VACUUM INTO '/tmp/copy.db'", "only reading is allowed"},
+      {"BEGIN", "only reading is allowed"},
+      {"ANALYZE", "only reading is allowed"},
       {"SELECT fts3_tokenizer('simple')", "not authorized to use function"},
       {"SELECT load_extension('x')", "not authorized to use function"},
       {"SELECT rtreecheck('results')", "not authorized to use function"},
       {"SELECT 1 WHERE 1 > :mu", "a parameter"},
       {"SELECT 1; SELECT 2", "one statement"},
-      {"  ", "no statement"},
+      {"  ", "the statement is empty"},
       {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "no such column: mux"},
   };
   for (const auto& [sql, reason] : wrong) {
@@ -118,13 +118,12 @@ TEST_F(ReaderTest, ARowOrAValueOverItsLimitIsAnError) {
   EXPECT_EQ(refusal_of("SELECT zeroblob(400)", limits), "it ran");
   const QueryLimits of_values{1000, 0, 1 << 20U};
   EXPECT_THAT(refusal_of("SELECT length(zeroblob(1048577))", of_values),
-              HasSubstr("more than the 1 MiB allowed"));
+              HasSubstr("exceeds the allowed 1 MiB"));
   EXPECT_EQ(refusal_of("SELECT length(zeroblob(1000000))", of_values), "it ran");
 }
 
 TEST_F(ReaderTest, AnEndlessQueryEndsAtItsTimeLimit) {
-  EXPECT_THAT(refusal_of(kEndless, {1000, 50, 1'000'000}),
-              HasSubstr("took too long (more than 0.05 s)"));
+  EXPECT_THAT(refusal_of(kEndless, {1000, 50, 1'000'000}), HasSubstr("took more than 0.05 s"));
 }
 
 TEST_F(ReaderTest, ARunningQueryCanBeInterrupted) {
@@ -143,21 +142,21 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(all[0].solved(), 2U);
   EXPECT_EQ(all[0].failed(), 1U);
   EXPECT_EQ(all[0].state(), "running");
-  EXPECT_EQ(all[0].taken().points(), 3U);
-  ASSERT_EQ(all[0].taken().from_size(), 2);
-  EXPECT_EQ(all[0].taken().from(0).study(), "y");
+  EXPECT_EQ(all[0].reused().points(), 3U);
+  ASSERT_EQ(all[0].reused().from_size(), 2);
+  EXPECT_EQ(all[0].reused().from(0).study(), "y");
   EXPECT_EQ(Reader(path_).study_status("b").at(0).solved(), 0U);
   EXPECT_THROW(Reader(path_).study_status("c"), QueryError);
   commit({solved(study_of(4), {1})});
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
 }
 
-/// Study "a" has points 0 to 9, of which 5 is not solved yet, and rows of a fourth of a chunk.
+/// Study "a" has points 0 to 9; point 5 is not solved yet. A row is a quarter of a chunk.
 class AnswerTest : public StoreFixture {
  protected:
   AnswerTest() { commit({study_, worker(1), solved(study_, {0, 1, 2, 3, 4, 6, 7, 8, 9})}); }
 
-  /// Only full chunks, however slow the machine is.
+  /// Full chunks only, even on a slow machine.
   static QueryLimits full_chunks() {
     QueryLimits limits;
     limits.longest_chunk_ms = INT64_MAX;
@@ -183,7 +182,7 @@ class AnswerTest : public StoreFixture {
   const AddStudy study_ = study_of(10);
 };
 
-TEST_F(AnswerTest, ComesInNumberedChunksOfOneMoment) {
+TEST_F(AnswerTest, HasNumberedChunksOfOneSnapshot) {
   Reader reader(path_);
   Answer answer = reader.answer(wide_rows(), full_chunks());
   const auto first = answer.next();

@@ -1,4 +1,4 @@
-// Points that a filter leaves out: workers name them, and they are completed without a row.
+// Left-out points: workers report them, and they are completed without a row.
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,7 +26,7 @@ std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers
 /// Every second point.
 constexpr const char* kEven = "floor(mu / 2) == mu / 2";
 
-/// The worker answers the whole batch, its answer is stored, and it wants another.
+/// The worker answers the whole batch, the answer is stored, and the worker requests another batch.
 std::vector<Effect> solve(SchedulerBench& bench, const protocol::PointTable& table,
                           const SendBatch& batch) {
   auto effects = bench.solve_and_store(batch, 1e-3, &table);
@@ -49,7 +49,7 @@ TEST_F(LeftOutPointsTest, AStudyIsDoneWhenEveryPointIsSolvedOrLeftOut) {
     bench.solve_all(bench.join(1, 2), 1e-3, table.get());
     std::uint64_t left_in = 0;
     for (std::uint64_t point = 0; point < 100; ++point) {
-      left_in += table->is_left_in(point) ? 1U : 0U;
+      left_in += table->passes_filter(point) ? 1U : 0U;
     }
     const StudyCounts counts = bench.scheduler.study(1);
     EXPECT_EQ(counts.solved(), left_in) << where;
@@ -69,7 +69,7 @@ TEST_F(LeftOutPointsTest, APointIsLeftOutOnceThatIsDurable) {
   EXPECT_EQ(bench_.scheduler.study(1).left_out, event.left_out.size());
 }
 
-TEST_F(LeftOutPointsTest, ABatchOfWhichNothingIsLeftInIsAnAnswerAndNoLoss) {
+TEST_F(LeftOutPointsTest, ABatchWithOnlyLeftOutPointsIsAnAnswerAndNoLoss) {
   SchedulerBench bench;
   const auto table = filtered_table(100, "mu == 99");
   bench.feed(StudyAdded{1, table, {}});
@@ -80,7 +80,7 @@ TEST_F(LeftOutPointsTest, ABatchOfWhichNothingIsLeftInIsAnAnswerAndNoLoss) {
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
 }
 
-TEST_F(LeftOutPointsTest, APointThatADoneBatchNeitherSolvedNorNamedIsHandedOutAgain) {
+TEST_F(LeftOutPointsTest, APointWithoutAnAnswerInADoneBatchIsLeasedAgain) {
   const SendBatch batch = bench_.join(1, 1).at(0);
   ResultsReceived event = bench_.answer_to(batch, 1e-3, table_.get());
   const std::uint64_t forgotten = event.left_out.front().begin;
@@ -93,7 +93,7 @@ TEST_F(LeftOutPointsTest, APointThatADoneBatchNeitherSolvedNorNamedIsHandedOutAg
   EXPECT_EQ(again.attempt, 2U);
 }
 
-TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingOfThatCounts) {
+TEST_F(LeftOutPointsTest, AWorkerThatReportsPointsOutsideItsBatchIsDisconnected) {
   const SendBatch batch = bench_.join(1, 1).at(0);
   const SendBatch other = bench_.join(2, 1).at(0);
   for (const std::uint64_t point : {other.first_point(), std::uint64_t{99}, std::uint64_t{100}}) {
@@ -105,12 +105,12 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOutsideItsBatchIsLostAndNothingO
     const auto effects = bench.feed(event);
     ASSERT_EQ(only<DropWorker>(effects).size(), 1U) << point;
     EXPECT_TRUE(only<StoreResults>(effects).empty());
-    EXPECT_FALSE(bench.scheduler.knows_worker(1));
+    EXPECT_FALSE(bench.scheduler.has_worker(1));
     EXPECT_EQ(bench.scheduler.study(1).completed, 0U);
   }
 }
 
-TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfABlockWithoutAFilterIsLost) {
+TEST_F(LeftOutPointsTest, AWorkerThatReportsPointsOfABlockWithoutAFilterIsDisconnected) {
   protocol::Recipe recipe = filtered_table(2, kEven)->recipe();
   *recipe.add_blocks() = table_of(100)->recipe().blocks(0);
   const auto table = std::make_shared<const protocol::PointTable>(recipe);
@@ -123,18 +123,18 @@ TEST_F(LeftOutPointsTest, AWorkerThatNamesPointsOfABlockWithoutAFilterIsLost) {
   }
 }
 
-TEST_F(LeftOutPointsTest, OfALeaseThatHasEndedResultsCountAndRangesDoNot) {
+TEST_F(LeftOutPointsTest, AfterTheEndOfALeaseResultsCountAndLeftOutRangesDoNot) {
   const SendBatch batch = bench_.join(1, 1).at(0);
   ResultsReceived event = bench_.answer_to(batch, 1e-3, table_.get());
-  event.lease = 0;  // as after a restart of the server
+  event.lease = 0;  // as after a server restart
   const auto stores = only<StoreResults>(bench_.feed(event));
   ASSERT_EQ(stores.size(), 1U);
   EXPECT_EQ(stores[0].accepted.size(), event.outcomes.size());
   EXPECT_TRUE(stores[0].left_out.empty());
-  EXPECT_TRUE(bench_.scheduler.knows_worker(1));
+  EXPECT_TRUE(bench_.scheduler.has_worker(1));
 }
 
-TEST_F(LeftOutPointsTest, AfterARestartTheyAreKnownAndNotHandedOut) {
+TEST_F(LeftOutPointsTest, AfterARestartLeftOutPointsAreNotLeased) {
   IntervalSet completed(0, 90);
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_, completed, 3, false, false, {}, "", false, 45});
@@ -143,7 +143,7 @@ TEST_F(LeftOutPointsTest, AfterARestartTheyAreKnownAndNotHandedOut) {
   EXPECT_EQ(bench.join(1, 1).at(0).first_point(), 90U);
 }
 
-TEST_F(LeftOutPointsTest, PointsThatAStudyGrowsByAreNamedToo) {
+TEST_F(LeftOutPointsTest, PointsAddedByGrowthMayBeLeftOutToo) {
   bench_.solve_all(bench_.join(1, 1), 1e-3, table_.get());
   protocol::Recipe recipe = table_->recipe();
   *recipe.add_blocks() = filtered_table(10, "mu > 7")->recipe().blocks(0);
@@ -154,7 +154,7 @@ TEST_F(LeftOutPointsTest, PointsThatAStudyGrowsByAreNamedToo) {
   EXPECT_EQ(bench_.scheduler.study(1).left_out, 58U);
 }
 
-/// The number of points in the batch that a worker gets after `batches` others, which took no time.
+/// The size of the batch that a worker gets after `batches` others that took no time.
 std::uint64_t batch_size_after(int batches, const std::string& where) {
   const auto table = filtered_table(1'000'000, where);
   SchedulerBench bench(table, trusting());
@@ -165,12 +165,12 @@ std::uint64_t batch_size_after(int batches, const std::string& where) {
   return batch.count();
 }
 
-TEST(LeftOutPoints, BatchesStayShortUntilAPointWasSolvedUnlessTheFilterKeepsNothing) {
+TEST(LeftOutPoints, BatchesStayShortUntilAPointIsSolvedUnlessNonePassesTheFilter) {
   EXPECT_EQ(batch_size_after(20, "mu > 900000"), SchedulerSettings().unsolved_batch_points);
   EXPECT_EQ(batch_size_after(50, "mu < 100"), SchedulerSettings().largest_batch_points);
 }
 
-TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutHasNoSolverVersion) {
+TEST_F(LeftOutPointsTest, AStudyWithOnlyLeftOutPointsHasNoSolverVersion) {
   const auto table = filtered_table(100, "mu > 90");
   SchedulerBench bench(table, trusting(), "1.0");
   const SendBatch batch = bench.join(1, 1).at(0);
@@ -181,7 +181,7 @@ TEST_F(LeftOutPointsTest, AStudyOfWhichPointsAreOnlyLeftOutHasNoSolverVersion) {
   EXPECT_EQ(bench.scheduler.study(1).solver_version, "");
 }
 
-TEST_F(LeftOutPointsTest, MoreLeftOutPointsThanAreSettledMakeNoHugeNumbers) {
+TEST_F(LeftOutPointsTest, ATooLargeCountOfLeftOutPointsIsCutToTheCompletedOnes) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_, IntervalSet(0, 10), 3, false, false, {}, "", false, 7});
   EXPECT_EQ(bench.scheduler.study(1).solved(), 0U);

@@ -23,7 +23,7 @@ std::uint64_t fall_of(const PointTable& table, std::uint64_t point) {
   return solver::fall_hash(table.model(table.point(point).model));
 }
 
-/// The falls in the order of places, each once for each run of places that have it.
+/// The falls in the order of places, once per run of places with the same fall.
 std::vector<std::uint64_t> runs_of_falls(const PointTable& table, const PointOrder& order) {
   std::vector<std::uint64_t> falls;
   for (std::uint64_t place = 0; place < table.size(); ++place) {
@@ -46,7 +46,7 @@ void expect_each_point_once(const PointTable& table, const PointOrder& order) {
   EXPECT_LT(*points.rbegin(), table.size());
 }
 
-TEST(PointOrderTest, PointsThatShareAFallFollowEachOther) {
+TEST(PointOrderTest, PointsWithTheSameFallFollowEachOther) {
   const PointTable table(sample_with_falls(500, 7));
   PointOrder order;
   order.arrange(table, 0, IntervalSet(0, 500), 1);
@@ -112,7 +112,7 @@ TEST(PointOrderTest, SetsOfPointsBecomeSetsOfPlacesAndBack) {
   EXPECT_EQ(back, points);
 }
 
-TEST(PointOrderTest, PointsThatAStudyGrowsByComeBehindAllOthers) {
+TEST(PointOrderTest, PointsAddedByGrowthComeLast) {
   protocol::Recipe recipe = sample_with_falls(100, 3);
   PointOrder order;
   order.arrange(PointTable(recipe), 0, IntervalSet(0, 100), 1);
@@ -133,7 +133,7 @@ TEST(PointOrderTest, PointsThatAStudyGrowsByComeBehindAllOthers) {
 }
 
 TEST(PointOrderTest, AStudyOfTooManyModelsStaysInTheOrderOfItsNumbers) {
-  const PointTable table(sample_with_falls(PointOrder::kMostModels + 1, 3));
+  const PointTable table(sample_with_falls(PointOrder::kMaxModels + 1, 3));
   PointOrder order;
   order.arrange(table, 0, IntervalSet(0, 1), 8);
   EXPECT_FALSE(order.is_arranged());

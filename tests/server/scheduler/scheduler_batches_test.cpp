@@ -1,4 +1,4 @@
-// How large batches are, and which points belong together.
+// Sizes of batches, and which points they contain.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -22,7 +22,7 @@ using protocol::range;
 
 // ---- Pace ----
 
-/// Batches follow a worker's pace and nothing else.
+/// The size of batches depends on pace only.
 SchedulerSettings by_pace_alone() {
   SchedulerSettings settings = trusting();
   settings.tail_batches_per_thread = 0;
@@ -30,7 +30,7 @@ SchedulerSettings by_pace_alone() {
   return settings;
 }
 
-TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
+TEST(SchedulerPace, TheNewestBatchHasHalfOfTheWeight) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;
   SchedulerBench bench(table_of(1'000'000), settings);
@@ -39,7 +39,7 @@ TEST(SchedulerPace, OneSlowBatchCountsHalfAgainstOneOfItsSizeThatIsKnown) {
   EXPECT_EQ(bench.next_after(second, 3e-3).count(), 50U) << "0.1 s at 2 ms a point";
 }
 
-TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLittleOfOthers) {
+TEST(SchedulerPace, AMessageIsWeightedByItsPointsSoThatOneFallChangesThePaceLittle) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 1000;
   SchedulerBench bench(table_of(1'000'000), settings);
@@ -57,14 +57,14 @@ TEST(SchedulerPace, AMessageCountsByItsPointsSoThatAFallBeforeTheFirstOnesSaysLi
   EXPECT_NEAR(static_cast<double>(next.count()), 0.1 / (0.299 / 1000), 5.0);
 }
 
-TEST(SchedulerPace, WhoSaysThatPointsTakeDaysIsNotBelieved) {
+TEST(SchedulerPace, AnImplausiblyLongTimeIsCut) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;
   SchedulerBench bench(table_of(1'000'000), settings);
   EXPECT_EQ(bench.next_after(bench.join(1, 1).at(0), 1e9).count(), 100U);
 }
 
-TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
+TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanes) {
   SchedulerBench bench(table_of(1'000'000), by_pace_alone());
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 0.5);
   EXPECT_EQ(second.count(), 8U) << "0.5 s a point, and eight at a time take little longer than one";
@@ -72,7 +72,7 @@ TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanesOfAWorker) {
   EXPECT_LT(third.count(), 4U) << "but not when they take minutes";
 }
 
-TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
+TEST(SchedulerPace, TheLastBatchesOfAStudyHaveAShortestDuration) {
   SchedulerSettings settings = trusting();
   settings.shortest_batch_s = 0.01;
   SchedulerBench bench(table_of(1000), settings);
@@ -86,7 +86,7 @@ TEST(SchedulerPace, TheLastBatchesOfAStudyAreNotShorterThanTheirWayIsWorth) {
   EXPECT_LT(counts.size(), 12U);
 }
 
-TEST(SchedulerPace, ABatchGrowsToSoManyTimesTheLastOneAtMost) {
+TEST(SchedulerPace, ABatchGrowsAtMostByTheGrowthFactor) {
   SchedulerSettings settings = by_pace_alone();
   settings.growth = 4;
   SchedulerBench bench(table_of(1'000'000), settings);
@@ -108,7 +108,7 @@ std::uint64_t cut(const Interval& free, const BatchSize& wanted) {
   return end_of_batch(mixed_table(), PointOrder{}, free, wanted);
 }
 
-TEST(BatchCut, ABatchEndsWithAModelAndHasSoManyAsItHasRoomFor) {
+TEST(BatchCut, ABatchEndsWithAModelAndContainsAsManyAsFit) {
   EXPECT_EQ(cut({0, 90}, {.points = 12}), 10U);
   EXPECT_EQ(cut({0, 90}, {.points = 18, .most_points = 25}), 10U);
   EXPECT_EQ(cut({8, 90}, {.points = 8, .most_points = 12}), 20U) << "two points would be few";
@@ -120,7 +120,7 @@ TEST(BatchCut, ABatchEndsWithAModelAndHasSoManyAsItHasRoomFor) {
   EXPECT_EQ(cut({0, 90}, {.points = 3, .groups = 2, .most_points = 19}), 10U);
 }
 
-TEST(BatchCut, NoBatchLeavesTheFreePoints) {
+TEST(BatchCut, ABatchStaysWithinTheFreePoints) {
   for (std::uint64_t begin = 0; begin < 90; begin += 7) {
     for (std::uint64_t end = begin + 1; end <= 90; end += 5) {
       for (const std::uint64_t points : {0U, 1U, 8U, 17U, 1000U}) {
@@ -144,13 +144,13 @@ std::shared_ptr<const PointTable> table_of_models(std::uint64_t models, std::uin
         points == 1 ? listed("mu", {0.4}) : range("mu", 0.1, 1.0, points), listed("e", {1.0})}}));
 }
 
-/// In studies of models of many points: the model that a batch begins with.
+/// In a study of models with many points: the model of a batch's first point.
 constexpr std::uint64_t kMany = 100'000;
 std::uint64_t model_of(const SendBatch& batch) {
   return batch.first_point() / kMany;
 }
 
-TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
+TEST(SchedulerModels, TheFirstBatchHasAModelForEachLane) {
   SchedulerBench bench(table_of_models(10'000, 1));
   const auto batches = bench.join(1, 2, 3);
   ASSERT_EQ(batches.size(), 2U);
@@ -158,7 +158,7 @@ TEST(SchedulerModels, TheFirstBatchHasAModelForEachLaneOfAWorkersThreads) {
   EXPECT_EQ(batches[1].first_point(), 24U);
 }
 
-TEST(SchedulerModels, BatchesOfAPointAModelFillLanesAlsoWhereAFallTakesLongerThanABatchShould) {
+TEST(SchedulerModels, BatchesOfOnePointPerModelFillLanesEvenIfAFallExceedsTheTarget) {
   SchedulerBench bench(table_of_models(10'000, 1), trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < 5; ++i) {
@@ -171,7 +171,7 @@ TEST(SchedulerModels, BatchesOfAPointAModelFillLanesAlsoWhereAFallTakesLongerTha
   EXPECT_EQ(batch.count(), 1U) << "a lost worker would cost minutes";
 }
 
-TEST(SchedulerModels, InTheEndEveryWorkerHasItsPart) {
+TEST(SchedulerModels, AtTheEndOfAStudyEveryWorkerHasPoints) {
   SchedulerBench bench(trusting());
   bench.feed(WorkerJoined{1, 1});
   bench.feed(WorkerJoined{2, 1});
@@ -184,7 +184,7 @@ TEST(SchedulerModels, InTheEndEveryWorkerHasItsPart) {
   EXPECT_NE(batches[0].worker, batches[1].worker);
 }
 
-TEST(SchedulerModels, ABatchEndsWithAModelWhereItCan) {
+TEST(SchedulerModels, ABatchEndsWithAModelIfPossible) {
   SchedulerBench bench(table_of_models(2000, 9), trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   std::uint64_t whole = 0;
@@ -195,7 +195,7 @@ TEST(SchedulerModels, ABatchEndsWithAModelWhereItCan) {
   EXPECT_GE(whole, 10U) << "at first too little is known of its pace";
 }
 
-TEST(SchedulerModels, ModelsOfManyPointsFillLanesForAsLongAsABatchMayTakeForIt) {
+TEST(SchedulerModels, ModelsOfManyPointsFillLanesUpToTheirLongestTime) {
   SchedulerBench bench(table_of_models(1000, 1000), trusting());
   SendBatch batch = bench.join(1, 1).at(0);
   for (int i = 0; i < 20; ++i) {
@@ -208,7 +208,7 @@ TEST(SchedulerModels, ModelsOfManyPointsFillLanesForAsLongAsABatchMayTakeForIt) 
   EXPECT_EQ(batch.count(), 2000U) << "1 s";
 }
 
-TEST(SchedulerModels, WorkersTakeModelsOfTheirOwnWhileThereAreAny) {
+TEST(SchedulerModels, WorkersGetDifferentModelsWhileThereAreEnough) {
   SchedulerBench bench(table_of_models(3, kMany), trusting());
   std::vector<SendBatch> held;
   for (const WorkerId worker : {1U, 2U, 3U}) {
@@ -223,7 +223,7 @@ TEST(SchedulerModels, WorkersTakeModelsOfTheirOwnWhileThereAreAny) {
   EXPECT_EQ(model_of(bench.join(4, 1).at(0)), 0U) << "all models are begun: it helps with one";
 }
 
-TEST(SchedulerModels, AWorkerFinishesItsModelAlsoWhenAnotherTookPartOfIt) {
+TEST(SchedulerModels, AWorkerFinishesItsModelEvenIfAnotherHasPartOfIt) {
   SchedulerBench bench(table_of_models(2, kMany), trusting());
   const SendBatch first = bench.join(1, 1).at(0);
   const SendBatch other = bench.join(2, 1).at(0);
@@ -233,7 +233,7 @@ TEST(SchedulerModels, AWorkerFinishesItsModelAlsoWhenAnotherTookPartOfIt) {
   EXPECT_EQ(model_of(bench.next_after(other, 1e-4)), model_of(other));
 }
 
-TEST(SchedulerModels, ALongBatchCountsForAsManyAsItTakesInTheShareOfAStudy) {
+TEST(SchedulerModels, ALongBatchCountsAsSeveralInTheShareOfAStudy) {
   SchedulerBench bench(table_of_models(100'000, 1), trusting());
   bench.feed(StudyAdded{2, table_of(1'000'000), {}});
   std::vector<SendBatch> held = bench.join(1, 2);
@@ -254,7 +254,7 @@ std::shared_ptr<const PointTable> sample(std::uint64_t points, std::uint64_t fal
       protocol::sample_with_falls(points, falls, protocol::SAMPLE_LATIN_HYPERCUBE));
 }
 
-/// Every `step`-th of `numbers` points, the first included.
+/// Every `step`-th of `numbers` points, including the first.
 IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
   IntervalSet points;
   for (std::uint64_t point = 0; point < numbers; point += step) {
@@ -276,7 +276,7 @@ std::vector<std::uint64_t> points_in(const std::vector<SendBatch>& batches) {
   return points;
 }
 
-TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerButForAFewThatAreShared) {
+TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerExceptAFewSharedOnes) {
   SchedulerBench bench;
   const auto table = sample(20'000, 500);
   bench.feed(StudyAdded{1, table, {}});
@@ -300,7 +300,7 @@ TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerButForAFewThatAreShared) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 20'000U);
 }
 
-TEST(SchedulerFalls, AServerThatStartsAgainHandsOutTheRest) {
+TEST(SchedulerFalls, ARestartedServerLeasesTheRest) {
   SchedulerBench bench;
   const IntervalSet completed = every(3, 2'000);
   bench.feed(StudyAdded{1, sample(2'000, 50), completed});
@@ -311,7 +311,7 @@ TEST(SchedulerFalls, AServerThatStartsAgainHandsOutTheRest) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 2'000U);
 }
 
-TEST(SchedulerFalls, PointsOfALostWorkerComeBackAndAFailedPointIsNamedByItsNumber) {
+TEST(SchedulerFalls, PointsOfALostWorkerAreReturnedAndAFailedPointHasItsNumber) {
   SchedulerBench bench(sample(300, 4), trusting());
   const std::uint64_t failed = bench.join(1, 1).at(0).first_point();
   bench.feed(WorkerLeft{1});
@@ -328,55 +328,55 @@ StudyPoints points_without(std::uint64_t numbers, IntervalSet completed) {
   return {StudyTable(table_of(numbers)), std::move(completed), 0, LossLimits{}};
 }
 
-Batch taken(StudyPoints& points, const BatchSize& wanted) {
+Batch take(StudyPoints& points, const BatchSize& wanted) {
   const auto batch = points.take(wanted);
   points.check_invariants();
   return batch.value();
 }
 
-TEST(ScatteredPointsTest, ABatchGoesOnBehindSettledPointsUntilItHasWhatIsWanted) {
+TEST(ScatteredPointsTest, ABatchSkipsCompletedPointsUntilItHasTheWantedSize) {
   StudyPoints points = points_without(100, every(2, 100));
-  const Batch batch = taken(points, {8});
+  const Batch batch = take(points, {8});
   EXPECT_EQ(batch.first_place, 1U);
   EXPECT_EQ(batch.end(), 16U);
   EXPECT_EQ(batch.points, 8U);
   EXPECT_EQ(points.leased(), 8U);
-  EXPECT_EQ(taken(points, {8}).first_place, 17U);
+  EXPECT_EQ(take(points, {8}).first_place, 17U);
 }
 
-TEST(ScatteredPointsTest, ABatchEndsBeforePointsThatAnotherHoldsAndBeforeAWideGap) {
+TEST(ScatteredPointsTest, ABatchEndsBeforeLeasedPointsAndBeforeAWideGap) {
   StudyPoints points = points_without(1000, [] {
     IntervalSet completed(0, 3);
     completed.insert(5, 8);
     return completed;
   }());
-  EXPECT_EQ(taken(points, {2}).end(), 5U);
+  EXPECT_EQ(take(points, {2}).end(), 5U);
   points.reopen(IntervalSet(0, 8));
-  EXPECT_EQ(taken(points, {8}).end(), 3U) << "3 and 4 are still out";
+  EXPECT_EQ(take(points, {8}).end(), 3U) << "3 and 4 are still out";
 
   StudyPoints sparse = points_without(1000, [] {
     IntervalSet completed(3, 500);
     completed.insert(505, 520);
     return completed;
   }());
-  EXPECT_EQ(taken(sparse, {8}).end(), 3U);
-  const Batch next = taken(sparse, {8});
+  EXPECT_EQ(take(sparse, {8}).end(), 3U);
+  const Batch next = take(sparse, {8});
   EXPECT_EQ(next.first_place, 500U);
   EXPECT_EQ(next.end(), 523U);
   EXPECT_EQ(next.points, 8U);
 }
 
-TEST(ScatteredPointsTest, ABatchGoesOnIntoAnotherModelOnlyWhereThatHasRoomInIt) {
+TEST(ScatteredPointsTest, ABatchContinuesWithAnotherModelOnlyIfAllItsPointsFit) {
   const auto table = std::make_shared<const protocol::PointTable>(
       protocol::recipe_of({{protocol::listed("E", {6e10, 7e10}), protocol::listed("H", {1.0}),
                             protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
   StudyPoints points(StudyTable(table), every(2, 20), 0, LossLimits{});
-  EXPECT_EQ(taken(points, {8}).end(), 10U) << "the other's fall is another worker's";
+  EXPECT_EQ(take(points, {8}).end(), 10U) << "the other's fall is another worker's";
   StudyPoints both(StudyTable(table), every(2, 20), 0, LossLimits{});
-  EXPECT_EQ(taken(both, {18}).end(), 20U);
+  EXPECT_EQ(take(both, {18}).end(), 20U);
 }
 
-TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {
+TEST(ScatteredPointsTest, OnlyOpenPointsOfALostBatchAreReturned) {
   SchedulerSettings settings = trusting();
   settings.first_batch_points = 16;
   SchedulerBench bench(settings);
@@ -391,7 +391,7 @@ TEST(ScatteredPointsTest, WhatIsLeftOfALostBatchComesBackAndNothingBetween) {
   EXPECT_EQ(points_in(bench.join(2, 1000)).size(), 495U);
 }
 
-TEST(ScatteredPointsTest, ResultsOfSettledPointsBetweenThoseOfABatchAreNotTaken) {
+TEST(ScatteredPointsTest, ResultsOfCompletedPointsWithinABatchAreIgnored) {
   SchedulerBench bench(trusting());
   bench.feed(StudyAdded{1, table_of(100), every(2, 100)});
   SendBatch batch = bench.join(1, 1).at(0);

@@ -23,19 +23,19 @@ std::vector<Kind> only(const std::vector<Effect>& effects) {
   return kept;
 }
 
-/// Settings by which newcomers get as many batches as they ask for, for tests of something else.
+/// Settings with which new workers get all requested batches.
 inline SchedulerSettings trusting() {
   SchedulerSettings settings;
   settings.newcomer_batches = 1'000'000;
   return settings;
 }
 
-/// A scheduler whose invariants are checked after each event, with a clock that tests set.
+/// A scheduler whose invariants are checked after each event, with a settable clock.
 class SchedulerBench {
  public:
   explicit SchedulerBench(const SchedulerSettings& settings = {}, std::string solver_version = {})
       : scheduler(settings, std::move(solver_version)) {}
-  /// With study 1.
+  /// Starts with study 1.
   explicit SchedulerBench(const std::shared_ptr<const protocol::PointTable>& table,
                           const SchedulerSettings& settings = {}, std::string solver_version = {})
       : SchedulerBench(settings, std::move(solver_version)) {
@@ -48,20 +48,20 @@ class SchedulerBench {
     return effects;
   }
 
-  /// A worker of one thread that takes `credit` batches; returns what it got at once.
+  /// Joins a worker with `credit` batches; returns the batches that it gets at once.
   std::vector<SendBatch> join(WorkerId worker, std::uint32_t credit, std::uint32_t threads = 1) {
     feed(WorkerJoined{worker, threads});
     return only<SendBatch>(feed(CreditGiven{worker, credit}));
   }
 
-  /// A connection of that process, as `join`.
+  /// As `join`, for a worker of that process.
   std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
     auto effects = feed(WorkerJoined{worker, 1, process});
     append(effects, feed(CreditGiven{worker, credit}));
     return effects;
   }
 
-  /// The worker solves the probe, and asks for another batch in its place.
+  /// The worker solves the probe and requests another batch.
   std::vector<Effect> solve_probe(const SendProbe& probe) {
     auto effects = feed(ResultsReceived{
         probe.worker, kProbeStudy, probe.lease, ++sequence, true, 1e-3, {{0, false}}});
@@ -70,14 +70,14 @@ class SchedulerBench {
     return effects;
   }
 
-  /// What a worker sends that solved the whole batch in `busy_s`, but for points that the filter of
-  /// `table` leaves out.
+  /// The message of a worker that solved the whole batch in `busy_s`, except points that the filter
+  /// of `table` leaves out.
   ResultsReceived answer_to(const SendBatch& batch, double busy_s = 1e-3,
                             const protocol::PointTable* table = nullptr) {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s, {}};
     for (const Interval& range : batch.points) {
       for (std::uint64_t point = range.begin; point < range.end; ++point) {
-        if (table == nullptr || table->is_left_in(point)) {
+        if (table == nullptr || table->passes_filter(point)) {
           event.outcomes.push_back({point, false});
         } else {
           event.left_out.insert(point);
@@ -90,7 +90,7 @@ class SchedulerBench {
     return feed(answer_to(batch, busy_s));
   }
 
-  /// The results are received and made durable. Returns the effects of both.
+  /// Receives results and makes them durable. Returns the effects of both.
   std::vector<Effect> store(const ResultsReceived& event) {
     auto effects = feed(event);
     for (const StoreResults& store : only<StoreResults>(effects)) {
@@ -107,8 +107,8 @@ class SchedulerBench {
     return store(answer_to(batch, busy_s, table));
   }
 
-  /// Solves the batches in turn, and those that their workers get for them, until nothing is left.
-  /// Returns all in the order in which they were solved.
+  /// Solves the batches in turn, and those that follow, until none is left. Returns all in the
+  /// order of solving.
   std::vector<SendBatch> solve_all(std::vector<SendBatch> batches, double s_per_point = 1e-3,
                                    const protocol::PointTable* table = nullptr) {
     for (std::size_t i = 0; i < batches.size(); ++i) {
@@ -123,14 +123,14 @@ class SchedulerBench {
     return batches;
   }
 
-  /// What the worker gets once it has solved the batch at so many seconds a point.
+  /// The batch that the worker gets after solving this one at that pace.
   SendBatch next_after(const SendBatch& batch, double s_per_point) {
     solve_and_store(batch, s_per_point * static_cast<double>(batch.count()));
     return only<SendBatch>(feed(CreditGiven{batch.worker, 1})).at(0);
   }
 
-  /// Time passes in steps as in the server's loop; `alive` send heartbeats with what they hold.
-  /// Returns all effects.
+  /// Lets time pass in steps, as in the server's loop; workers in `alive` send heartbeats with
+  /// their leases. Returns all effects.
   std::vector<Effect> pass(std::int64_t duration_ms, const std::vector<WorkerId>& alive = {}) {
     std::vector<Effect> all;
     const std::int64_t end_ms = now_ms + duration_ms;

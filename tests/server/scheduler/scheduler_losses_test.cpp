@@ -1,4 +1,4 @@
-// Workers that are lost without fault of the points that they held: nothing of that fails a point.
+// Lost workers: no sound point fails because of them.
 #include <algorithm>
 #include <cstdint>
 #include <deque>
@@ -18,7 +18,7 @@
 namespace oblique::server {
 namespace {
 
-/// Workers 1, 2 and 3 are lost with points and have solved none.
+/// Workers 1, 2 and 3 are lost with points before they have solved any.
 void lose_newcomers(SchedulerBench& bench) {
   for (const WorkerId newcomer : {1U, 2U, 3U}) {
     bench.join(newcomer, 1);
@@ -26,7 +26,7 @@ void lose_newcomers(SchedulerBench& bench) {
   }
 }
 
-TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
+TEST(SchedulerLosses, PeersThatTakeBatchesAndDisappearUnderNewNamesFailNoPoint) {
   SchedulerBench bench(table_of(2000));
   WorkerId fake = 100;
   const auto vanish = [&] {
@@ -60,7 +60,7 @@ TEST(SchedulerLosses, PeersThatTakeBatchesAndVanishUnderNewNamesFailNoPoint) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 2000U);
 }
 
-TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints) {
+TEST(SchedulerLosses, NewWorkersMustSolveAProbeWhileOthersAreLostWithPoints) {
   SchedulerBench bench(table_of(1'000'000));
   for (const WorkerId fake : {1U, 2U, 3U}) {
     EXPECT_FALSE(bench.join(fake, 1).empty());
@@ -78,7 +78,7 @@ TEST(SchedulerLosses, NewcomersSolveAProbeFirstWhileOthersVanishWithTheirPoints)
   EXPECT_FALSE(bench.join(5, 1).empty()) << "it has been calm for a minute";
 }
 
-TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
+TEST(SchedulerLosses, AnUnsolvedProbeIsRepeatedEverySecond) {
   SchedulerBench bench(table_of(1'000'000));
   lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("faulty", 4, 10)).at(0);
@@ -89,7 +89,7 @@ TEST(SchedulerLosses, AProbeThatIsNotSolvedIsRepeatedEverySecondAndNoOftener) {
   EXPECT_EQ(only<SendProbe>(bench.pass(1000, {4})).size(), 1U);
 }
 
-TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
+TEST(SchedulerLosses, AProbeThatNeverArrivedIsSentAgain) {
   SchedulerBench bench(table_of(1'000'000));
   lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("sound", 4, 2)).at(0);
@@ -100,14 +100,14 @@ TEST(SchedulerLosses, AProbeThatNeverArrivedIsGivenAgain) {
   EXPECT_EQ(only<SendProbe>(bench.feed(HeartbeatReceived{4, {}})).size(), 1U);
 }
 
-TEST(SchedulerLosses, ResultsThatBelongToNoLeaseAreNoAnswerToAProbeThatWasNotGiven) {
+TEST(SchedulerLosses, ResultsWithoutALeaseAreNoAnswerToAProbe) {
   SchedulerBench bench(table_of(100));
   bench.join(1, 1);
   bench.feed(ResultsReceived{1, 1, 0, 1, false, 1e-3, {{50, false}}});
   EXPECT_FALSE(bench.scheduler.worker(1, bench.now_ms).is_proven);
 }
 
-TEST(SchedulerLosses, AHeartbeatThatNamesLeaseZeroNamesNothing) {
+TEST(SchedulerLosses, AHeartbeatWithLeaseZeroHoldsNoLease) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   bench.pass(3000, {1});
@@ -117,7 +117,7 @@ TEST(SchedulerLosses, AHeartbeatThatNamesLeaseZeroNamesNothing) {
   EXPECT_EQ(bench.scheduler.study(1).leased, 0U) << "the batch did not reach it";
 }
 
-TEST(SchedulerLosses, ABatchThatCouldNotBeSentSpeaksNeitherAgainstItsPointsNorAgainstTheWorker) {
+TEST(SchedulerLosses, ABatchThatCouldNotBeSentMakesNeitherPointsNorWorkerSuspect) {
   SchedulerBench bench(table_of(1));
   for (WorkerId worker = 1; worker <= 20; ++worker) {
     const auto sent = only<SendBatch>(bench.join_as("process", worker, 1));
@@ -127,7 +127,7 @@ TEST(SchedulerLosses, ABatchThatCouldNotBeSentSpeaksNeitherAgainstItsPointsNorAg
   }
 }
 
-TEST(SchedulerLosses, OnlyWhatWasSentToALostWorkerCountsAsLost) {
+TEST(SchedulerLosses, OnlySentBatchesOfALostWorkerCountAsLost) {
   SchedulerBench bench(table_of(100));
   const auto sent = bench.join(1, 2);
   ASSERT_EQ(sent.size(), 2U);
@@ -163,7 +163,7 @@ TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe)
   EXPECT_FALSE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
 }
 
-TEST(SchedulerLosses, ABatchThatEndsWithoutAnAnswerIsOneAndOneOfWhichAllPointsWereAnsweredIsNone) {
+TEST(SchedulerLosses, ABatchThatEndsWithOpenPointsIsALossAndACompletelyAnsweredOneIsNot) {
   SchedulerBench bench(table_of(1'000'000));
   const SendBatch batch = bench.join(1, 1).at(0);
   ResultsReceived answers{1, 1, batch.lease, 1, false, 1e-3, {}};
@@ -188,7 +188,7 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
   EXPECT_EQ(only<SendBatch>(effects)[0].first_point(), lost.first_point());
 }
 
-TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {
+TEST(SchedulerLosses, ANewWorkerThatReconnectsIsNotLost) {
   SchedulerBench bench(table_of(1'000'000));
   // Each of four processes has an earlier connection, which held a batch, replaced by a new one.
   for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
@@ -200,7 +200,7 @@ TEST(SchedulerLosses, ANewcomerThatConnectsAnewHasNotVanished) {
   EXPECT_FALSE(bench.scheduler.worker(30, bench.now_ms).is_set_aside);
 }
 
-TEST(SchedulerLosses, PointsAreSuspectNoMoreWhenTheirWorkersComeBack) {
+TEST(SchedulerLosses, PointsAreNoLongerSuspectWhenTheirWorkersReturn) {
   SchedulerSettings settings;
   settings.tail_batches_per_thread = 0;
   SchedulerBench bench(table_of(4), settings);
@@ -214,7 +214,7 @@ TEST(SchedulerLosses, PointsAreSuspectNoMoreWhenTheirWorkersComeBack) {
   EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{4, 1})).size(), 1U);
 }
 
-TEST(SchedulerLosses, AWorkerIsNotLostAfterExactlyTheTimeThatItMayBeSilent) {
+TEST(SchedulerLosses, AWorkerIsNotLostAfterExactlyItsLongestSilence) {
   SchedulerBench bench;
   bench.feed(WorkerJoined{1, 1});
   for (const std::int64_t step_ms : {900, 900, 900, 100}) {
@@ -225,7 +225,7 @@ TEST(SchedulerLosses, AWorkerIsNotLostAfterExactlyTheTimeThatItMayBeSilent) {
   EXPECT_EQ(only<DropWorker>(bench.feed(Tick{})).size(), 1U);
 }
 
-TEST(WorkerProcesses, OfThoseThatAreGoneTheLatestAreRemembered) {
+TEST(WorkerProcesses, TheLatestAbsentProcessesAreKept) {
   WorkerProcesses processes(2);
   for (WorkerId worker = 1; worker < 100; ++worker) {
     const std::string id = "process " + std::to_string(worker);
@@ -240,8 +240,8 @@ TEST(WorkerProcesses, OfThoseThatAreGoneTheLatestAreRemembered) {
 
 // ---- Points that cost workers ----
 
-/// One worker after another, as a supervisor starts them, each a new process. Each dies of any
-/// batch that holds a killing point.
+/// Workers started one after another, as by a supervisor, each a new process. Each dies of any
+/// batch with a harmful point.
 class Supervised {
  public:
   Supervised(SchedulerBench& bench, std::set<std::uint64_t> killers, std::uint32_t prefetch,
@@ -263,7 +263,7 @@ class Supervised {
   bool finished = false;
 
  private:
-  /// False when the worker died of it.
+  /// False if the worker died.
   bool live() {
     if (probe_) {
       take(bench_.solve_probe(*std::exchange(probe_, std::nullopt)));
@@ -310,7 +310,7 @@ class Supervised {
   std::optional<SendProbe> probe_;
 };
 
-TEST(SchedulerSuspects, PointsThatKillAreFoundByFewWorkersWhateverStudyTheyAreOf) {
+TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
   const auto table = [](const protocol::Recipe& recipe) {
     return std::make_shared<const protocol::PointTable>(recipe);
   };
@@ -330,8 +330,8 @@ TEST(SchedulerSuspects, PointsThatKillAreFoundByFewWorkersWhateverStudyTheyAreOf
     const std::set<std::uint64_t> killers{137, 777};
     Supervised supervised(bench, killers, 3, points.get());
     supervised.run();
-    // Each costs two workers until it is suspect, one for each split of at most 1000 points by
-    // eight, and three when it is alone.
+    // Each harmful point costs two workers until it is suspect, one for each split of at most 1000
+    // points by eight, and three when it is alone.
     EXPECT_LE(supervised.deaths, 2 * (2 + 4 + 3));
     ASSERT_EQ(supervised.failed.size(), 2U);
     EXPECT_TRUE(supervised.failed.contains(137) && supervised.failed.contains(777));
@@ -341,8 +341,8 @@ TEST(SchedulerSuspects, PointsThatKillAreFoundByFewWorkersWhateverStudyTheyAreOf
   }
 }
 
-TEST(SchedulerSuspects, AStudyOfNothingButAPointThatKillsEndsToo) {
-  // No worker can show that it is fit by any other point: each is given a probe.
+TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
+  // No worker can become proven by another point, so each gets a probe.
   SchedulerBench bench(table_of(1));
   Supervised supervised(bench, {0}, 2);
   supervised.run();
@@ -351,11 +351,10 @@ TEST(SchedulerSuspects, AStudyOfNothingButAPointThatKillsEndsToo) {
   EXPECT_EQ(supervised.failed.size(), 1U);
 }
 
-/// Workers of which each has solved something, and the points that are left.
+/// Proven workers, and the points that are left.
 class SuspectTest : public testing::Test {
  protected:
-  /// Workers 1 to `workers`, one after another, each of which solves one point of a study of so
-  /// many points more than `left`.
+  /// Workers 1 to `workers` each solve one point of a study; `left` points remain.
   void prove(WorkerId workers, std::uint64_t left) {
     bench_.feed(StudyAdded{1, table_of(workers + left), {}});
     for (WorkerId worker = 1; worker <= workers; ++worker) {
@@ -380,7 +379,7 @@ class SuspectTest : public testing::Test {
   SchedulerBench bench_{settings()};
 };
 
-TEST_F(SuspectTest, APointFailsOnceItCostThreeProvenWorkersAloneAndNoneOfThemCameBack) {
+TEST_F(SuspectTest, APointFailsAfterThreeProvenWorkersWereLostWithItAloneAndNoneReturned) {
   prove(3, 1);
   for (const WorkerId worker : {1U, 2U, 3U}) {
     EXPECT_EQ(credit(worker).size(), 1U) << worker;
@@ -393,7 +392,7 @@ TEST_F(SuspectTest, APointFailsOnceItCostThreeProvenWorkersAloneAndNoneOfThemCam
   EXPECT_EQ(failures[0].attempt, 3U);
 }
 
-TEST_F(SuspectTest, APointDoesNotFailWhenOneOfItsThreeWorkersComesBack) {
+TEST_F(SuspectTest, APointDoesNotFailWhenOneOfItsThreeWorkersReturns) {
   prove(3, 1);
   for (const WorkerId worker : {1U, 2U, 3U}) {
     credit(worker);
@@ -407,7 +406,7 @@ TEST_F(SuspectTest, APointDoesNotFailWhenOneOfItsThreeWorkersComesBack) {
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
 
-TEST_F(SuspectTest, OneProcessThatIsLostAgainAndAgainWithAPointDoesNotFailIt) {
+TEST_F(SuspectTest, RepeatedLossesOfOneProcessDoNotFailAPoint) {
   prove(1, 1);
   credit(1);
   bench_.feed(WorkerUnreachable{1});
@@ -423,17 +422,17 @@ TEST_F(SuspectTest, OneProcessThatIsLostAgainAndAgainWithAPointDoesNotFailIt) {
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
 }
 
-TEST_F(SuspectTest, AWorkerThatHeldAnotherPointTooDoesNotAccuseEither) {
+TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherRisky) {
   prove(5, 2);
   for (WorkerId worker = 1; worker <= 5; ++worker) {
     bench_.feed(CreditGiven{worker, 2});
     bench_.feed(WorkerUnreachable{worker});
-    bench_.join_as(name(worker), worker + 10, 0);  // and back, so that the points stay together
+    bench_.join_as(name(worker), worker + 10, 0);  // it returns, so that the points stay together
   }
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
 }
 
-TEST_F(SuspectTest, AnAccusedPointWaitsSomeSecondsForTheWorkerThatHasBeenProvenLongest) {
+TEST_F(SuspectTest, ARiskyPointIsReservedForTheLongestProvenWorkerForSomeSeconds) {
   for (const bool comes : {true, false}) {
     bench_ = SchedulerBench(settings());
     prove(3, 1);
@@ -467,7 +466,7 @@ TEST(SchedulerSuspects, SuspectPointsGoToAProvenWorkerThatHoldsNothingElse) {
   EXPECT_EQ(suspect[0].first_point(), 0U);
 }
 
-TEST(SchedulerSuspects, ThePartsOfASplitChunkStaySuspect) {
+TEST(SchedulerSuspects, ThePartsOfASplitIntervalStaySuspect) {
   SchedulerSettings settings;
   settings.first_batch_points = 32;
   settings.tail_batches_per_thread = 0;
@@ -496,7 +495,7 @@ TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
   ASSERT_EQ(busy.size(), 2U);
   std::deque<SendBatch> held(busy.begin(), busy.end());
   bench.pass(3250, {3});  // worker 2 dies: its points are suspect now
-  EXPECT_FALSE(bench.scheduler.knows_worker(2));
+  EXPECT_FALSE(bench.scheduler.has_worker(2));
   bool suspect_was_leased = false;
   for (int i = 0; i < 200 && !held.empty() && !suspect_was_leased; ++i) {
     const auto batch = held.front();
@@ -513,7 +512,7 @@ TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
   EXPECT_TRUE(suspect_was_leased);
 }
 
-TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutAnswersDoesNotTakeThemForEver) {
+TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutAnswersGetsOnlyThree) {
   prove(1, 1);
   auto effects = bench_.feed(CreditGiven{1, 1});
   int rounds = 0;

@@ -1,4 +1,4 @@
-// Workers that take too long: others get their points, and nothing counts as lost.
+// Slow workers: others get their points, and nothing counts as lost.
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kMinute_ms = 60'000;
 
-TEST(SchedulerStall, AStudyEndsBesideWorkersThatTakeCreditsAndOnlySendHeartbeats) {
+TEST(SchedulerStall, AStudyEndsDespiteWorkersThatOnlySendHeartbeats) {
   SchedulerBench bench(table_of(2000));
   std::vector<Effect> effects;
   for (const WorkerId idle : {1U, 2U}) {
@@ -28,7 +28,7 @@ TEST(SchedulerStall, AStudyEndsBesideWorkersThatTakeCreditsAndOnlySendHeartbeats
   for (int step = 0; step < 40'000 && !is_finished; ++step) {
     std::vector<Effect> next = bench.pass(250, {1, 2, 3});
     for (const SendProbe& probe : only<SendProbe>(effects)) {
-      SchedulerBench::append(next, bench.solve_probe(probe));  // the idle ones solve these, too
+      SchedulerBench::append(next, bench.solve_probe(probe));  // idle workers solve probes too
     }
     for (const SendBatch& batch : only<SendBatch>(effects)) {
       if (batch.worker == 3) {
@@ -70,7 +70,7 @@ TEST_F(StallTest, AMinuteWithoutAResultEndsTheLeasesOfAWorker) {
   EXPECT_TRUE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside);
 }
 
-TEST_F(StallTest, ItsPointsAreNotSuspectHoweverManyWorkersStallWithThem) {
+TEST_F(StallTest, PointsOfStalledWorkersAreNotSuspect) {
   for (WorkerId worker = 2; worker <= 20; ++worker) {
     EXPECT_TRUE(only<StoreFailure>(bench_.pass(kMinute_ms + 1000, {worker - 1})).empty());
     bench_.feed(WorkerLeft{worker - 1});
@@ -81,7 +81,7 @@ TEST_F(StallTest, ItsPointsAreNotSuspectHoweverManyWorkersStallWithThem) {
   }
 }
 
-TEST_F(StallTest, WhatItSendsLateIsStoredOnce) {
+TEST_F(StallTest, ItsLateResultsAreStoredOnce) {
   bench_.pass(kMinute_ms + 1000, {1});
   const auto again = bench_.join(2, 1);
   ASSERT_EQ(again.size(), 1U);
@@ -99,7 +99,7 @@ TEST_F(StallTest, AWorkerThatStoresSomethingInTimeKeepsItsBatch) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, 1U);
 }
 
-TEST_F(StallTest, WhileTheDatabaseTakesNothingNoWorkerStalls) {
+TEST_F(StallTest, NoWorkerStallsWhileTheDatabaseAcceptsNothing) {
   bench_.feed(DispatchHeld{true});
   bench_.pass(10 * kMinute_ms, {1});
   bench_.feed(DispatchHeld{false});
@@ -115,7 +115,7 @@ TEST_F(StallTest, TimeInWhichTheServerDidNotRunDoesNotCount) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
 }
 
-TEST_F(StallTest, AfterThatItGetsAProbeAndThenTwoBatchesAgain) {
+TEST_F(StallTest, AStalledWorkerGetsAProbeAndThenTwoBatches) {
   bench_.feed(StudyAdded{2, table_of(1'000'000), {}});
   bench_.feed(CreditGiven{1, 1024});
   const auto probe = only<SendProbe>(bench_.pass(kMinute_ms + 1000, {1}));
@@ -124,7 +124,7 @@ TEST_F(StallTest, AfterThatItGetsAProbeAndThenTwoBatchesAgain) {
   EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).size(), 2U);
 }
 
-TEST(SchedulerStall, SlowPointsGetAMultipleOfTheTimeThatTheFastestWorkerNeeds) {
+TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
   SchedulerSettings settings = trusting();
   settings.first_batch_points = 1;
   SchedulerBench bench(table_of(100), settings);
@@ -132,26 +132,26 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheTimeThatTheFastestWorkerNeeds) {
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
   bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
-  // Ten times what eight points side by side take.
+  // Ten times the time of eight points side by side.
   bench.pass(780'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-/// And worker 2 waits.
+/// As StallTest, with worker 2 waiting.
 class StragglerTest : public StallTest {
  protected:
   StragglerTest() { EXPECT_TRUE(bench_.join(2, 1).empty()); }
 
-  /// The batch that worker 2 gets once the first one straggles.
+  /// The batch that worker 2 gets when the first one straggles.
   SendBatch second() {
     const auto batches = only<SendBatch>(bench_.pass(1500, {1, 2}));
     EXPECT_EQ(batches.size(), 1U);
     return batches.at(0);
   }
 
-  /// Answers to some points of a batch, which become durable.
+  /// Answers some points of a batch durably.
   std::vector<Effect> answer(const SendBatch& batch, const std::vector<std::uint64_t>& points,
                              bool done) {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench_.sequence, done, 0.0, {}};
@@ -176,7 +176,7 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
   SchedulerBench bench(settings());
   bench.feed(StudyAdded{1, table_of(4), {}});
   bench.join(1, 1);
-  for (const WorkerId id : {11U, 12U, 13U}) {  // newcomers that vanish set aside those that follow
+  for (const WorkerId id : {11U, 12U, 13U}) {  // losses of new workers set aside later ones
     bench.feed(StudyAdded{id, table_of(1), {}});
     bench.join_as("vanishes " + std::to_string(id), id, 1);
     bench.feed(WorkerUnreachable{id});
@@ -198,7 +198,7 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
   EXPECT_EQ(batches[0].worker, 2U);
 }
 
-TEST_F(StragglerTest, OnlyWhatIsLeftOfTheBatchGoesToTheSecondWorker) {
+TEST_F(StragglerTest, OnlyOpenPointsOfTheBatchGoToTheSecondWorker) {
   answer(batch_, {0, 1}, false);
   const SendBatch batch = second();
   EXPECT_EQ(batch.first_point(), 2U);
@@ -243,8 +243,8 @@ TEST_F(StragglerTest, AWorkerDoesNotGetItsOwnBatchTwiceNorAThirdWorkerOne) {
   EXPECT_TRUE(only<SendBatch>(bench_.pass(20'000, {1, 2, 3})).empty());
 }
 
-TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStraggler) {
-  // Worker 2 is known to need 10 s a point.
+TEST_F(StragglerTest, ABatchOfSlowPointsIsNotAStraggler) {
+  // Worker 2 needs 10 s per point.
   SchedulerSettings one = settings();
   one.first_batch_points = 1;
   SchedulerBench slow(table_of(2), one);
@@ -257,7 +257,7 @@ TEST_F(StragglerTest, ABatchOfSlowPointsIsNotTakenForAStraggler) {
   EXPECT_EQ(only<SendBatch>(slow.pass(10'000, {1, 2})).size(), 1U);
 }
 
-TEST_F(StragglerTest, ABatchThatWaitsBehindAnotherOfItsWorkerIsTakenOver) {
+TEST_F(StragglerTest, ABatchThatWaitsForAnotherOfItsWorkerGoesToASecondWorker) {
   SchedulerSettings one = settings();
   one.first_batch_points = 1;
   SchedulerBench bench(table_of(3), one);
@@ -274,18 +274,18 @@ TEST_F(StragglerTest, ABatchThatWaitsBehindAnotherOfItsWorkerIsTakenOver) {
   EXPECT_EQ(taken[0].first_point(), waits.first_point());
 }
 
-TEST_F(StragglerTest, ABatchThatKillsWorkersIsFoundAlthoughTwoOfThemHadIt) {
+TEST_F(StragglerTest, AHarmfulBatchIsFoundAlthoughTwoWorkersHeldIt) {
   second();
   bench_.feed(WorkerUnreachable{1});
   bench_.join(3, 1);
   EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty()) << "not given to a third worker";
   const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
-  // Two workers were lost: the points are suspect now, and go to a worker that has proven itself.
+  // After two lost workers the points are suspect and go to a proven worker.
   ASSERT_EQ(probe.size(), 1U);
   EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U) << "split";
 }
 
-TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseEndsThatLease) {
+TEST_F(StragglerTest, ForgettingAFailureEndsALeaseThatContainsThePoint) {
   bench_.store(ResultsReceived{1, 1, batch_.lease, 1, false, 0.0, {{2, true}}});
   const auto effects = bench_.feed(FailuresForgotten{1, IntervalSet(2, 3)});
   ASSERT_EQ(only<ReleaseBatch>(effects).size(), 1U);
@@ -297,7 +297,7 @@ TEST_F(StragglerTest, AFailureForgottenUnderARunningLeaseEndsThatLease) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, again[0].count());
 }
 
-TEST_F(StragglerTest, ACancelGivesBackThePointsOfLeasesThatOverlap) {
+TEST_F(StragglerTest, ACancellationReturnsThePointsOfTwinLeases) {
   second();
   ASSERT_EQ(bench_.scheduler.worker(2, bench_.now_ms).leased_points, batch_.count());
   EXPECT_EQ(only<WithdrawStudy>(bench_.feed(StudyCancelled{1})).size(), 2U);

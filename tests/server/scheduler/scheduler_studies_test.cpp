@@ -1,4 +1,4 @@
-// What happens to studies: how they share the workers, reuse results, grow and are deleted.
+// Studies: sharing of workers, reuse, growth and deletion.
 #include <cstdint>
 #include <map>
 #include <string>
@@ -15,7 +15,7 @@ namespace {
 using testing::IsEmpty;
 using testing::SizeIs;
 
-/// How many of the next `batches` batches each study gets.
+/// The number of the next `batches` batches that each study gets.
 std::map<StudyId, int> shares(SchedulerBench& bench, std::uint32_t batches) {
   std::map<StudyId, int> counts;
   for (const auto& batch : only<SendBatch>(bench.feed(CreditGiven{1, batches}))) {
@@ -24,7 +24,7 @@ std::map<StudyId, int> shares(SchedulerBench& bench, std::uint32_t batches) {
   return counts;
 }
 
-TEST(SchedulerShare, StudiesOfOnePriorityShareTheWorkersAlike) {
+TEST(SchedulerShare, StudiesOfEqualPriorityShareTheWorkersEqually) {
   SchedulerBench bench(table_of(1'000'000), trusting());
   bench.feed(StudyAdded{2, table_of(1'000'000), {}});
   bench.feed(WorkerJoined{1, 1});
@@ -42,7 +42,7 @@ TEST(SchedulerShare, AStudyOfAHigherPriorityComesFirst) {
   EXPECT_EQ(shares(bench, 10).at(1), 10);
 }
 
-TEST(SchedulerShare, AStudyThatOpensLaterOrAgainDoesNotCatchUpWithWhatWentBefore) {
+TEST(SchedulerShare, AStudyThatOpensLaterOrAgainDoesNotCatchUp) {
   for (const bool is_reopened : {false, true}) {
     SchedulerBench bench(table_of(1'000'000), trusting());
     StudyAdded other{2, table_of(1'000'000), {}};
@@ -60,7 +60,7 @@ TEST(SchedulerShare, AStudyThatOpensLaterOrAgainDoesNotCatchUpWithWhatWentBefore
   }
 }
 
-TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStaySettled) {
+TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStayCompleted) {
   SchedulerBench bench(trusting());
   IntervalSet completed(0, 10);
   bench.feed(StudyAdded{1, table_of(10), completed, 3});
@@ -83,7 +83,7 @@ StudyAdded held_study(std::uint64_t points) {
   return added;
 }
 
-TEST(SchedulerReuse, ReusedPointsAreNotHandedOut) {
+TEST(SchedulerReuse, ReusedPointsAreNotLeased) {
   SchedulerBench bench;
   bench.feed(held_study(10));
   bench.feed(PointsReused{1, IntervalSet(2, 10)});
@@ -94,7 +94,7 @@ TEST(SchedulerReuse, ReusedPointsAreNotHandedOut) {
   EXPECT_LE(batches.back().first_point() + batches.back().count(), 2U);
 }
 
-TEST(SchedulerReuse, AStudyOfWhichAllPointsAreReusedIsFinished) {
+TEST(SchedulerReuse, AStudyWithAllPointsReusedIsFinished) {
   SchedulerBench bench;
   bench.feed(held_study(10));
   bench.feed(PointsReused{1, IntervalSet(0, 5)});
@@ -117,7 +117,7 @@ TEST(SchedulerReuse, LeasedPointsAreReusedTooAndTheirBatchIsReleased) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), second.count() + 5);
 }
 
-TEST(SchedulerReuse, AHeldStudyCanBePausedCancelledAndGoOn) {
+TEST(SchedulerReuse, AHeldStudyCanBePausedCancelledAndReopened) {
   SchedulerBench bench;
   bench.feed(held_study(10));
   EXPECT_THAT(bench.join(1, 4), IsEmpty());
@@ -139,7 +139,7 @@ TEST(SchedulerReuse, SuspectPointsAreReusedToo) {
 
 // ---- Growth and deletion ----
 
-TEST(SchedulerGrowthTest, OfAStudyThatIsDoneOnlyTheFurtherPointsAreHandedOut) {
+TEST(SchedulerGrowthTest, AfterGrowthOfADoneStudyOnlyTheFurtherPointsAreLeased) {
   SchedulerBench bench(table_of(10), trusting());
   bench.solve_all(bench.join(1, 3));
   ASSERT_EQ(bench.scheduler.study(1).open(), 0U);
@@ -152,7 +152,7 @@ TEST(SchedulerGrowthTest, OfAStudyThatIsDoneOnlyTheFurtherPointsAreHandedOut) {
   EXPECT_EQ(bench.scheduler.study(1).completed, 25U);
 }
 
-TEST(SchedulerGrowthTest, AWorkerIsToldOfTheFurtherPointsOnceBeforeItsNextBatch) {
+TEST(SchedulerGrowthTest, AfterGrowthAWorkerGetsTheRecipeOnceBeforeItsNextBatch) {
   SchedulerSettings settings = trusting();
   settings.tail_batches_per_thread = 0;
   settings.first_batch_points = 5;
@@ -169,7 +169,7 @@ TEST(SchedulerGrowthTest, AWorkerIsToldOfTheFurtherPointsOnceBeforeItsNextBatch)
   EXPECT_TRUE(only<DefineStudy>(further).empty()) << "told once";
 }
 
-TEST(SchedulerGrowthTest, ABatchOfBeforeCountsAlsoWhenItComesAfterTheGrowth) {
+TEST(SchedulerGrowthTest, ResultsOfAnEarlierBatchCountAfterGrowth) {
   SchedulerBench bench(table_of(4));
   const auto batch = bench.join(1, 1).at(0);
   bench.feed(StudyGrown{1, table_of(8)});
@@ -177,7 +177,7 @@ TEST(SchedulerGrowthTest, ABatchOfBeforeCountsAlsoWhenItComesAfterTheGrowth) {
   EXPECT_EQ(bench.scheduler.study(1).completed, batch.count());
 }
 
-TEST(SchedulerGrowthTest, PausedAndCancelledStudiesGoOn) {
+TEST(SchedulerGrowthTest, GrowthReopensPausedAndCancelledStudies) {
   for (const bool is_paused : {true, false}) {
     SchedulerBench bench(table_of(10), trusting());
     is_paused ? bench.feed(StudyPaused{1}) : bench.feed(StudyCancelled{1});
@@ -187,14 +187,14 @@ TEST(SchedulerGrowthTest, PausedAndCancelledStudiesGoOn) {
   }
 }
 
-TEST(SchedulerGrowthTest, ThePriorityOfTheGrowthHolds) {
+TEST(SchedulerGrowthTest, GrowthSetsThePriority) {
   SchedulerBench bench(table_of(10));
   bench.feed(StudyAdded{2, table_of(10), {}});
   bench.feed(StudyGrown{2, table_of(20), 7});
   EXPECT_EQ(bench.join(1, 1).at(0).study, 2U);
 }
 
-TEST(SchedulerGrowthTest, GrowthOfAnUnknownStudyOrToNoMorePointsIsNone) {
+TEST(SchedulerGrowthTest, GrowthOfAnUnknownStudyOrWithoutFurtherPointsHasNoEffect) {
   SchedulerBench bench;
   bench.join(1, 1);
   EXPECT_TRUE(bench.feed(StudyGrown{1, table_of(10)}).empty());
@@ -203,14 +203,14 @@ TEST(SchedulerGrowthTest, GrowthOfAnUnknownStudyOrToNoMorePointsIsNone) {
   EXPECT_TRUE(bench.scheduler.study(1).cancelled);
 }
 
-TEST(SchedulerRemovalTest, WhoSolvesADeletedStudyDropsItAndGetsAnother) {
+TEST(SchedulerRemovalTest, WorkersDropADeletedStudyAndGetAnother) {
   SchedulerBench bench(table_of(10));
   bench.join(1, 2);
   const auto batches = bench.feed(StudyAdded{2, table_of(10), {}});
   ASSERT_TRUE(only<SendBatch>(batches).empty());
   const auto effects = bench.feed(StudyRemoved{1});
   EXPECT_EQ(only<WithdrawStudy>(effects).size(), 1U);
-  EXPECT_FALSE(bench.scheduler.knows_study(1));
+  EXPECT_FALSE(bench.scheduler.has_study(1));
   EXPECT_EQ(bench.scheduler.leases(), 0U);
   EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{1, 1})).at(0).study, 2U);
 }
@@ -226,7 +226,7 @@ TEST(SchedulerRemovalTest, ResultsOfADeletedStudyAreDroppedAndAcknowledged) {
       only<AcknowledgeResults>(bench.feed(ResultsStored{1, 1, stores[0].sequence, {}})).size(), 1U);
 }
 
-TEST(SchedulerRemovalTest, ResultsThatWereOnTheirWayToTheDiskAreAcknowledged) {
+TEST(SchedulerRemovalTest, ResultsBeingWrittenAreAcknowledged) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   const auto store = only<StoreResults>(bench.solve(batch)).at(0);
@@ -236,18 +236,18 @@ TEST(SchedulerRemovalTest, ResultsThatWereOnTheirWayToTheDiskAreAcknowledged) {
   EXPECT_TRUE(only<StudyFinished>(effects).empty());
 }
 
-TEST(SchedulerRemovalTest, WhatLossesSaidOfItsPointsIsForgotten) {
+TEST(SchedulerRemovalTest, LossesOfItsPointsAreForgotten) {
   SchedulerBench bench(table_of(1));
-  // Condemned: three proven processes were lost with the point alone.
+  // The point is failing: three proven processes were lost with it alone.
   bench.feed(StudyAdded{2, table_of(1000), {}});
   for (WorkerId worker = 1; worker <= 6; ++worker) {
     bench.join_as("process " + std::to_string(worker), worker, 1);
-    bench.pass(4000);  // it is lost
+    bench.pass(4000);  // the worker is lost
   }
   bench.feed(StudyRemoved{1});
   bench.feed(StudyRemoved{2});
   EXPECT_TRUE(only<StoreFailure>(bench.pass(30'000)).empty());
-  for (WorkerId worker = 1; worker <= 6; ++worker) {  // they come back
+  for (WorkerId worker = 1; worker <= 6; ++worker) {  // they return
     bench.join_as("process " + std::to_string(worker), 10 + worker, 1);
   }
   bench.feed(StudyAdded{3, table_of(10), {}});
@@ -264,7 +264,7 @@ StudyAdded old_study(std::uint64_t failed = 0) {
   return added;
 }
 
-TEST(SchedulerVersion, AStudyWithResultsOfAnotherVersionIsNotHandedOutAndOthersAre) {
+TEST(SchedulerVersion, AStudyWithResultsOfAnotherVersionIsNotLeased) {
   SchedulerBench bench(SchedulerSettings{}, "2.0");
   bench.feed(old_study());
   EXPECT_TRUE(bench.join(1, 1).empty());
@@ -274,7 +274,7 @@ TEST(SchedulerVersion, AStudyWithResultsOfAnotherVersionIsNotHandedOutAndOthersA
   EXPECT_EQ(bench.scheduler.study(2).solver_version, "2.0");
 }
 
-TEST(SchedulerVersion, AStudyWhoseOnlyResultsWereForgottenFailuresIsHandedOut) {
+TEST(SchedulerVersion, AStudyWhoseOnlyResultsWereForgottenFailuresIsLeased) {
   SchedulerBench bench(SchedulerSettings{}, "2.0");
   bench.feed(old_study(1));
   EXPECT_TRUE(bench.join(2, 1).empty());

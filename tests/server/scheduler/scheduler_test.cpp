@@ -30,13 +30,13 @@ TEST(SchedulerTest, AWorkerWithCreditGetsTheDefinitionOnceAndThenItsBatches) {
   EXPECT_TRUE(only<DefineStudy>(further).empty());
 }
 
-TEST(SchedulerTest, AWorkerGetsNoMoreBatchesThanItAskedFor) {
+TEST(SchedulerTest, AWorkerGetsAtMostTheRequestedNumberOfBatches) {
   SchedulerBench bench(table_of(1'000'000), trusting());
   EXPECT_EQ(bench.join(5, 3).size(), 3U);
   EXPECT_TRUE(bench.pass(1000, {5}).empty());
 }
 
-TEST(SchedulerTest, ABatchRunsAcrossBlocksOfOnePointEach) {
+TEST(SchedulerTest, ABatchMaySpanBlocks) {
   constexpr std::uint64_t kBlocks = 1000;
   const std::vector<protocol::Axis> point{
       protocol::listed("H", {1.0}), protocol::listed("mu", {0.4}), protocol::listed("e", {1.0})};
@@ -59,7 +59,7 @@ TEST(SchedulerTest, TenPointsSpreadOverTwoWorkers) {
   EXPECT_LE(std::max(points[1], points[2]), 5U);
 }
 
-TEST(SchedulerTest, TheTailGoesOutInEverSmallerBatches) {
+TEST(SchedulerTest, BatchesShrinkTowardTheEnd) {
   SchedulerSettings settings;
   settings.shortest_batch_s = 0.0;
   SchedulerBench bench(table_of(2000), settings);
@@ -90,7 +90,7 @@ TEST(SchedulerTest, ResultsAreAcknowledgedOnlyAfterTheyAreStored) {
   EXPECT_EQ(only<StudyFinished>(stored).size(), 1U);
 }
 
-TEST(SchedulerTest, ADuplicateResultIsNotKeptButStillAcknowledged) {
+TEST(SchedulerTest, ADuplicateResultIsAcknowledgedButNotStored) {
   SchedulerBench bench(table_of(4));
   const auto batch = bench.join(7, 1).at(0);
   bench.solve_and_store(batch);
@@ -101,7 +101,7 @@ TEST(SchedulerTest, ADuplicateResultIsNotKeptButStillAcknowledged) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), batch.count());
 }
 
-TEST(SchedulerTest, APointIsKeptOnceOfAMessageAndNotIfTheStudyDoesNotHaveIt) {
+TEST(SchedulerTest, RepeatedAndUnknownPointsInAMessageAreIgnored) {
   SchedulerBench bench(table_of(4));
   bench.join(7, 1);
   const auto store = only<StoreResults>(bench.feed(ResultsReceived{
@@ -124,23 +124,23 @@ TEST(SchedulerTest, ASilentWorkersPointsGoToAnotherWithinThreeSeconds) {
   EXPECT_EQ(batches[0].attempt, 2U);
 }
 
-TEST(SchedulerTest, WorkersAreNotBlamedWhenTheServerItselfStoodStill) {
+TEST(SchedulerTest, WorkersAreNotLostWhenTheServerItselfDidNotRun) {
   SchedulerBench bench(table_of(4));
   bench.join(1, 1);
   bench.pass(1000, {1});
-  bench.now_ms += 60'000;  // the server was stopped and continues
+  bench.now_ms += 60'000;  // the server did not run for a minute
   EXPECT_TRUE(only<DropWorker>(bench.feed(Tick{})).empty());
   EXPECT_EQ(only<DropWorker>(bench.pass(3500)).size(), 1U);
 }
 
-TEST(SchedulerTest, ALateResultOfAnOldAttemptIsKeptWhileThePointIsOpen) {
+TEST(SchedulerTest, ALateResultOfAnOldAttemptIsStoredWhileThePointIsOpen) {
   SchedulerBench bench(table_of(4));
   const auto old = bench.join(1, 1).at(0);
   bench.pass(3250);
-  EXPECT_FALSE(bench.scheduler.knows_worker(1));
+  EXPECT_FALSE(bench.scheduler.has_worker(1));
   const auto again = bench.join(2, 1).at(0);
   ASSERT_EQ(again.first_point(), old.first_point());
-  bench.join(3, 0);  // the lost worker with a new number
+  bench.join(3, 0);  // the lost worker returns with a new number
   const auto late = only<StoreResults>(
       bench.feed(ResultsReceived{3, 1, old.lease, 1, true, 0.1, {{old.first_point(), false}}}));
   EXPECT_EQ(late.at(0).accepted.size(), 1U);
@@ -148,7 +148,7 @@ TEST(SchedulerTest, ALateResultOfAnOldAttemptIsKeptWhileThePointIsOpen) {
   EXPECT_EQ(second.at(0).accepted.size(), again.count() - 1);
 }
 
-TEST(SchedulerTest, AStrangersLeaseIsNotClosedByResultsThatNameIt) {
+TEST(SchedulerTest, ResultsDoNotEndALeaseOfAnotherWorker) {
   SchedulerBench bench(table_of(100));
   const auto batch = bench.join(1, 1).at(0);
   bench.join(2, 0);
@@ -169,7 +169,7 @@ TEST(SchedulerTest, ABatchThatNeverReachedItsWorkerIsLeasedAgain) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   bench.now_ms += 1000;
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());  // it may be on its way
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());  // the batch may be on its way
   bench.pass(3000, {1});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {batch.lease}}).empty());
   bench.feed(HeartbeatReceived{1, {}});
@@ -188,7 +188,7 @@ TEST(SchedulerTest, ACancelledStudyIsWithdrawnAndGetsNoMoreBatches) {
   EXPECT_TRUE(bench.feed(StudyCancelled{1}).empty());
 }
 
-TEST(SchedulerTest, ACancelledStudyThatIsReopenedGoesOnWithANewDefinition) {
+TEST(SchedulerTest, AReopenedStudyIsDefinedAgain) {
   SchedulerBench bench(table_of(100));
   const auto batch = bench.join(1, 1).at(0);
   bench.feed(StudyCancelled{1});
@@ -207,7 +207,7 @@ TEST(SchedulerTest, ResultsOfACancelledStudyAreKept) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), batch.count());
 }
 
-TEST(SchedulerTest, ARestoredStudyHandsOutOnlyWhatIsOpen) {
+TEST(SchedulerTest, OnlyOpenPointsOfARestoredStudyAreLeased) {
   SchedulerBench bench(trusting());
   IntervalSet completed(0, 5);
   completed.insert(7);
@@ -229,7 +229,7 @@ TEST(SchedulerTest, ARestoredStudyWithoutOpenPointsIsFinished) {
             1U);
 }
 
-TEST(SchedulerTest, NothingIsHandedOutWhileTheDiskTakesNothing) {
+TEST(SchedulerTest, NothingIsLeasedWhileTheDiskAcceptsNothing) {
   SchedulerBench bench(table_of(100));
   bench.feed(DispatchHeld{true});
   EXPECT_TRUE(bench.join(1, 2).empty());
@@ -248,7 +248,7 @@ TEST(SchedulerTest, EventsOfUnknownWorkersAndStudiesChangeNothing) {
   EXPECT_TRUE(bench.feed(ResultsStored{9, 9, 9, {{0, false}}}).empty());
 }
 
-TEST(SchedulerTest, ResultsOfAnUnknownStudyAreAcknowledgedSoThatTheWorkerForgetsThem) {
+TEST(SchedulerTest, ResultsOfAnUnknownStudyAreAcknowledgedSoThatTheWorkerDropsThem) {
   SchedulerBench bench;
   bench.join(1, 0);
   const auto store =
@@ -260,12 +260,12 @@ TEST(SchedulerTest, ResultsOfAnUnknownStudyAreAcknowledgedSoThatTheWorkerForgets
 
 // ---- Batches that a worker gives back ----
 
-TEST(SchedulerTest, ABatchThatIsGivenBackIsFreeAtOnceAndNoLoss) {
+TEST(SchedulerTest, AReturnedBatchIsFreeAtOnceAndNoLoss) {
   SchedulerBench bench(table_of(100), trusting());
   const SendBatch batch = only<SendBatch>(bench.join_as("a", 1, 1)).at(0);
   ASSERT_GT(batch.count(), 1U);
-  bench.join_as("b", 2, 1000);  // takes all others and waits for more
-  // One point is solved, the rest goes back.
+  bench.join_as("b", 2, 1000);  // gets all others and waits for more
+  // One point is solved, the others are returned.
   bench.feed(ResultsReceived{1, 1, batch.lease, 1, false, 1e-3, {{batch.first_point(), false}}});
   const auto again = only<SendBatch>(bench.feed(BatchesReturned{1, {batch.lease}}));
   std::uint64_t next = batch.first_point() + 1;
@@ -280,7 +280,7 @@ TEST(SchedulerTest, ABatchThatIsGivenBackIsFreeAtOnceAndNoLoss) {
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).leased_points, 0U);
 }
 
-TEST(SchedulerTest, ResultsThatComeAfterTheirBatchWentBackCount) {
+TEST(SchedulerTest, ResultsAfterTheReturnOfTheirBatchCount) {
   SchedulerBench bench(table_of(1), trusting());
   const SendBatch batch = bench.join(1, 1).at(0);
   bench.feed(BatchesReturned{1, {batch.lease}});
@@ -290,7 +290,7 @@ TEST(SchedulerTest, ResultsThatComeAfterTheirBatchWentBackCount) {
             1U);
 }
 
-TEST(SchedulerTest, LeasesOfOthersAndUnknownOnesStay) {
+TEST(SchedulerTest, ReturningLeasesOfOthersOrUnknownOnesHasNoEffect) {
   SchedulerBench bench(table_of(100), trusting());
   const SendBatch batch = bench.join(1, 1).at(0);
   const SendBatch other = bench.join(2, 1).at(0);
@@ -300,9 +300,9 @@ TEST(SchedulerTest, LeasesOfOthersAndUnknownOnesStay) {
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-TEST(SchedulerTest, ASuspectPointStaysSuspectWhenItIsGivenBack) {
+TEST(SchedulerTest, AReturnedSuspectPointStaysSuspect) {
   SchedulerBench bench(table_of(1), trusting());
-  // Two processes are lost with it: it is suspect.
+  // After the loss of two processes the point is suspect.
   bench.join_as("a", 1, 1);
   bench.feed(WorkerUnreachable{1});
   bench.join_as("b", 2, 1);
@@ -318,7 +318,7 @@ TEST(SchedulerTest, ASuspectPointStaysSuspectWhenItIsGivenBack) {
   EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker gets it";
 }
 
-TEST(SchedulerTest, AProbeThatIsGivenBackKeepsNobodyWaiting) {
+TEST(SchedulerTest, AReturnedProbeIsSentAgain) {
   SchedulerBench bench(table_of(1), trusting());
   bench.join_as("a", 1, 1);
   bench.feed(WorkerUnreachable{1});
@@ -329,11 +329,11 @@ TEST(SchedulerTest, AProbeThatIsGivenBackKeepsNobodyWaiting) {
   EXPECT_FALSE(only<SendProbe>(bench.pass(2000, {3})).empty());
 }
 
-// ---- What many workers and studies cost, in examined workers ----
+// ---- Costs of many workers and studies, in examined workers ----
 
 constexpr WorkerId kWorkers = 1000;
 
-/// A thousand workers that ask for batches, of which there are none.
+/// A thousand workers that request batches when there are none.
 class IdleCrowd : public testing::Test {
  protected:
   IdleCrowd() {
@@ -350,7 +350,7 @@ class IdleCrowd : public testing::Test {
   std::int64_t now_ms_ = 1'000'000;
 };
 
-TEST_F(IdleCrowd, AMessageOfOneWorkerMakesTheServerLookAtNoOther) {
+TEST_F(IdleCrowd, AMessageOfOneWorkerExaminesNoOther) {
   const std::uint64_t before = scheduler_.examined_workers();
   for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
     scheduler_.handle(HeartbeatReceived{worker, {}}, now_ms_);
@@ -359,12 +359,12 @@ TEST_F(IdleCrowd, AMessageOfOneWorkerMakesTheServerLookAtNoOther) {
   scheduler_.check_invariants();
 }
 
-TEST_F(IdleCrowd, TheFirstThatAskedIsServedFirstHoweverOftenItFoundNothing) {
+TEST_F(IdleCrowd, WorkersAreServedInTheOrderOfTheirRequests) {
   scheduler_.handle(HeartbeatReceived{500, {}}, now_ms_);
   EXPECT_EQ(only<SendBatch>(add_study()).at(0).worker, 1U);
 }
 
-TEST(ManyStudies, ThatRestCostDispatchNothing) {
+TEST(ManyStudies, WithoutOpenPointsCostDispatchNothing) {
   const auto cost_with = [](StudyId resting) {
     Scheduler scheduler(trusting());
     for (StudyId study = 1; study <= resting; ++study) {

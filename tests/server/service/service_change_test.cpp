@@ -1,4 +1,4 @@
-// Changes of studies: pause, resume, retry, grow, rename, delete, and what keys may do.
+// Changes of studies (pause, resume, retry, grow, rename, delete) and rights of keys.
 #include <memory>
 #include <string>
 #include <utility>
@@ -15,7 +15,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-TEST_F(ServiceTest, APausedStudyHandsOutNothingUntilItIsResumed) {
+TEST_F(ServiceTest, APausedStudyIsNotLeasedUntilItIsResumed) {
   submit("a");
   request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
   EXPECT_FALSE(last_reply().has_change()) << "not durable yet";
@@ -28,7 +28,7 @@ TEST_F(ServiceTest, APausedStudyHandsOutNothingUntilItIsResumed) {
   EXPECT_TRUE(last_message().has_batch());
 }
 
-TEST_F(ServiceTest, ChangesThatAreThereAlreadyAreAnsweredAtOnce) {
+TEST_F(ServiceTest, ChangesWithoutEffectAreAnsweredAtOnce) {
   submit("a");
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(last_reply().change().study().state(), "running");
@@ -40,7 +40,7 @@ TEST_F(ServiceTest, ChangesThatAreThereAlreadyAreAnsweredAtOnce) {
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
+TEST_F(ServiceTest, RetriedPointsAreLeasedWhenTheirRowsAreDeleted) {
   submit("a", 1);
   hello_and_credit();
   answer_batch(0);
@@ -62,7 +62,7 @@ TEST_F(ServiceTest, RetriedPointsAreHandedOutAgainOnceTheirRowsAreGone) {
   EXPECT_EQ(last_reply().change().study().state(), "done");
 }
 
-TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingMoreIsAcknowledgedAndEverybodyIsTold) {
+TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingIsAcknowledgedAndAllPeersAreNotified) {
   submit("a");
   hello_and_credit();
   ASSERT_TRUE(last_message().has_batch());
@@ -90,13 +90,14 @@ TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingMoreIsAcknowledgedAndEverybodyIs
   EXPECT_EQ(status_of("a").waits_for(), "the file was deleted");
 }
 
-TEST_F(ServiceTest, OfSeveralChangesEachWaitsForTheOutcomeOfTheOneBefore) {
+TEST_F(ServiceTest, EachChangeWaitsForThePreviousOne) {
   submit("a");
   for (const bool is_first_stored : {true, false}) {
     ports_.replies.clear();
     request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
     request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
-    request(change_request("a", protocol::STUDY_CHANGE_CANCEL));  // a client that asks again
+    // a client that repeats its request
+    request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
     request(change_request("a", protocol::STUDY_CHANGE_RESUME));
     ASSERT_EQ(ports_.jobs.size(), 1U);
     write_all(is_first_stored ? "" : "disk full");
@@ -123,7 +124,7 @@ TEST_F(ServiceTest, AStudyThatIsDoneWhileAPauseIsWrittenStaysDone) {
   EXPECT_EQ(status_of("a").state(), "done") << "points handed out before are still stored";
 }
 
-TEST_F(ServiceTest, ARefusedChangeLeavesTheStudyAsItWasAndInDoubt) {
+TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
   submit("a");
   for (const auto change : {protocol::STUDY_CHANGE_PAUSE, protocol::STUDY_CHANGE_CANCEL}) {
     request(change_request("a", change));
@@ -131,7 +132,7 @@ TEST_F(ServiceTest, ARefusedChangeLeavesTheStudyAsItWasAndInDoubt) {
     EXPECT_THAT(last_error(), HasSubstr("disk full"));
     EXPECT_EQ(status_of("a").state(), "running");
   }
-  // What the disk took of the refused ones could count after a crash.
+  // What the disk stored of the refused changes could count after a crash.
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(ports_.jobs.size(), 1U);
   write_all();
@@ -144,7 +145,7 @@ TEST_F(ServiceTest, ARefusedChangeLeavesTheStudyAsItWasAndInDoubt) {
 
 // ---- Growth, names, deletion ----
 
-/// `points` points, and behind them a block of `further`.
+/// `points` points, followed by a block of `further`.
 protocol::Recipe grown_recipe(std::uint64_t points, std::uint64_t further) {
   protocol::Recipe recipe = table_of(points)->recipe();
   *recipe.add_blocks() = table_of(further)->recipe().blocks(0);
@@ -179,7 +180,7 @@ class ServiceGrowthTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedOnceTheyAreDurable) {
+TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedWhenTheyAreDurable) {
   submit("a", 10);
   grow("a", 10, 5);
   grow("a", 10, 5);  // another client
@@ -199,7 +200,7 @@ TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedOnceTheyAreDurable) {
   EXPECT_EQ(service_->scheduler().study(1).points, 15U);
 }
 
-TEST_F(ServiceGrowthTest, ADoneStudyRunsAgainAndItsWorkersGetTheFurtherPoints) {
+TEST_F(ServiceGrowthTest, ADoneStudyThatGrowsRunsAgain) {
   submit("a", 3);
   solve_everything();
   ASSERT_EQ(status_of("a").state(), "done");
@@ -262,11 +263,11 @@ TEST_F(ServiceGrowthTest, ARenamedStudyIsFoundByItsNewNameAndByItsNumber) {
   EXPECT_TRUE(last_reply().submit().created()) << "the old name is free";
 }
 
-TEST_F(ServiceGrowthTest, AUsedNameIsRefusedAlsoWhileItIsBeingWritten) {
+TEST_F(ServiceGrowthTest, ANameInUseIsRefusedEvenWhileItIsBeingWritten) {
   submit("a");
   submit("b");
   rename("a", "b");
-  EXPECT_THAT(last_error(), HasSubstr("there is a study called \"b\" already"));
+  EXPECT_THAT(last_error(), HasSubstr("there is already a study called \"b\""));
   rename("a", "c");
   ports_.replies.clear();
   request(submit_request("c", 3));
@@ -275,14 +276,14 @@ TEST_F(ServiceGrowthTest, AUsedNameIsRefusedAlsoWhileItIsBeingWritten) {
   ASSERT_EQ(ports_.replies.size(), 3U);
   EXPECT_EQ(ports_.replies[0].change().study().name(), "c");
   EXPECT_THAT(ports_.replies[1].error().message(), HasSubstr("there is a study called \"c\""));
-  EXPECT_THAT(ports_.replies[2].error().message(), HasSubstr("there is a study called \"c\""));
+  EXPECT_THAT(ports_.replies[2].error().message(), HasSubstr("already a study called \"c\""));
   rename("c", "");
   EXPECT_TRUE(last_reply().has_error());
   rename("c", "c");
   EXPECT_EQ(last_reply().change().study().name(), "c");
 }
 
-TEST_F(ServiceGrowthTest, ARefusedRenamingOrDeletionLeavesTheStudyAsItWas) {
+TEST_F(ServiceGrowthTest, ARefusedRenamingOrDeletionHasNoEffect) {
   submit("a");
   rename("a", "b");
   write_all("the disk is full");
@@ -367,7 +368,7 @@ class ServiceKeysTest : public ServiceTest {
   std::shared_ptr<const KeyIdentity> reader_ = holder_of("onlooker", protocol::Role::kReader);
 };
 
-TEST_F(ServiceKeysTest, AReaderMayAskAndChangesNothing) {
+TEST_F(ServiceKeysTest, AReaderMayReadButNotChange) {
   EXPECT_EQ(error_of(submit_request("a"), alice_), "");
   std::vector<ClientRequest> refused{submit_request("b"), long_submission("long", kLongRequest)};
   for (const auto change : {protocol::STUDY_CHANGE_CANCEL, protocol::STUDY_CHANGE_PAUSE,
@@ -377,7 +378,7 @@ TEST_F(ServiceKeysTest, AReaderMayAskAndChangesNothing) {
   }
   for (const ClientRequest& message : refused) {
     EXPECT_THAT(error_of(message, reader_),
-                AllOf(HasSubstr("\"onlooker\" is a reader's"), HasSubstr("change nothing")));
+                AllOf(HasSubstr("\"onlooker\" has the role reader"), HasSubstr("change nothing")));
   }
   EXPECT_EQ(status_of("a").state(), "running");
   ClientRequest query = client_request();
@@ -394,9 +395,9 @@ TEST_F(ServiceKeysTest, AStudyHasTheNameOfTheKeyThatFirstSubmittedIt) {
   EXPECT_EQ(status_of("b").submitted_by(), "");
 }
 
-TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
+TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreLimited) {
   EXPECT_THAT(error_of(submit_request("a", 1001)),
-              HasSubstr("0 points are open, and the server allows 1000 "
+              HasSubstr("0 points are open, and at most 1000 are allowed "
                         "(--limits-open-points)"));
   EXPECT_EQ(error_of(submit_request("a", 600)), "");
   EXPECT_THAT(error_of(submit_request("b", 401)), HasSubstr("open-points"));
@@ -404,11 +405,11 @@ TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreBounded) {
     EXPECT_EQ(error_of(submit_request(name, 1)), "") << name;
   }
   EXPECT_THAT(error_of(submit_request("f", 1)),
-              HasSubstr("5 studies are open, and the server allows 5:"));
+              HasSubstr("5 studies are open, and at most 5 are allowed:"));
   EXPECT_EQ(error_of(submit_request("a", 600)), "") << "it is open already";
 }
 
-TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheBounds) {
+TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheLimits) {
   submit("a", 1000);
   EXPECT_EQ(error_of(cancel_request("a")), "");
   EXPECT_EQ(error_of(submit_request("b", 1000)), "");
@@ -419,7 +420,7 @@ TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheBounds) 
   EXPECT_EQ(status_of("a").state(), "cancelled");
 }
 
-TEST_F(ServiceKeysTest, QueriesOfAllConnectionsOfAKeyAreThoseOfOneClient) {
+TEST_F(ServiceKeysTest, AllConnectionsOfAKeyCountAsOneClient) {
   ClientRequest query = client_request();
   query.mutable_query()->set_sql("SELECT 1");
   send(query, "one", alice_);

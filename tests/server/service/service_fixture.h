@@ -23,7 +23,8 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// Keeps what the service sends. Writes, queries and checks have an outcome when the test says so.
+/// Records everything that the service sends. Writes, queries and checks get their outcome from the
+/// test.
 class FakePorts final : public Ports {
  public:
   Delivery to_worker(const std::string& identity, const std::string& frame) override {
@@ -62,9 +63,9 @@ class FakePorts final : public Ports {
   std::vector<WriteJob> jobs;
   std::vector<QueryJob> queries;
   std::vector<std::uint64_t> cancelled_queries;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> more;  // ticket, chunks taken
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> more;  // ticket, received chunks
   std::vector<Check> checks;
-  std::vector<std::string> lines;  // of the log
+  std::vector<std::string> lines;  // lines of the log
 };
 
 inline ClientRequest client_request(std::uint64_t request_id = 0) {
@@ -74,7 +75,7 @@ inline ClientRequest client_request(std::uint64_t request_id = 0) {
   return message;
 }
 
-/// A submission whose recipe has so many bytes at least.
+/// A submission with a recipe of at least that many bytes.
 inline ClientRequest long_submission(const std::string& name, std::size_t bytes) {
   ClientRequest message = client_request(7);
   message.mutable_submit()->set_name(name);
@@ -87,14 +88,14 @@ inline ClientRequest long_submission(const std::string& name, std::size_t bytes)
   return message;
 }
 
-/// Bytes of a request that is read on the check thread.
+/// Size of a request that is parsed on the check thread.
 inline constexpr std::size_t kLongRequest = std::size_t{100} * 1024;
 
 class ServiceTest : public testing::Test {
  protected:
   ServiceTest() { start({}); }
 
-  /// Another server starts, on a database with these studies.
+  /// Starts another server on a database with these studies.
   void start(ServiceSettings settings, std::vector<StoredStudy> studies = {}) {
     settings.solver_version = "1.0";
     settings.database_id = "db";
@@ -117,7 +118,7 @@ class ServiceTest : public testing::Test {
     send(message, identity);
   }
   std::string last_error() { return last_reply().error().message(); }
-  /// Results of other studies are not reused.
+  /// Submits without reuse of results.
   ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = client_request(42);
     message.mutable_submit()->set_name(name);
@@ -125,7 +126,7 @@ class ServiceTest : public testing::Test {
     message.mutable_submit()->set_no_reuse(true);
     return message;
   }
-  /// Submits a study, which is stored.
+  /// Submits a study and stores it.
   void submit(const std::string& name, std::uint64_t points = 10) {
     request(submit_request(name, points));
     write_all();
@@ -139,12 +140,12 @@ class ServiceTest : public testing::Test {
   ClientRequest cancel_request(const std::string& name) {
     return change_request(name, protocol::STUDY_CHANGE_CANCEL);
   }
-  /// A change that is stored.
+  /// Requests a change and stores it.
   void change(const std::string& name, protocol::StudyChange change) {
     request(change_request(name, change));
     write_all();
   }
-  /// Results of the points of the last batch, failed ones from `first_failed` on.
+  /// Results for the last batch; points from `first_failed` on failed.
   void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
     const auto batch = last_message().batch();
     WorkerMessage message;
@@ -156,19 +157,19 @@ class ServiceTest : public testing::Test {
     results.set_batch_done(true);
     for (const std::uint64_t i : points_of(batch)) {
       if (batch.study_id() != 0 &&
-          !service_->states().record(batch.study_id()).table->is_left_in(i)) {
+          !service_->states().record(batch.study_id()).table->passes_filter(i)) {
         results.add_left_out(i);
         results.add_left_out(1);
         continue;
       }
       *results.add_results() = i >= first_failed       ? protocol::failed_point(i, "for the test")
-                               : batch.study_id() == 0 ? solved_point(i)  // of a probe
+                               : batch.study_id() == 0 ? solved_point(i)  // a probe
                                                        : solved(i, batch.study_id());
     }
     worker_says(message, identity);
     write_all();
   }
-  /// The point of that study as a worker sends it.
+  /// A result of that point as a worker sends it.
   protocol::PointResult solved(std::uint64_t point, StudyId study = 1) const {
     return solved_point(point, *service_->states().record(study).table.get());
   }
@@ -196,7 +197,7 @@ class ServiceTest : public testing::Test {
   }
   void hello(const std::string& identity = "worker", const std::string& solver = "1.0") {
     WorkerMessage message;
-    protocol::say_protocol(*message.mutable_hello());
+    protocol::set_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version(solver);
     message.mutable_hello()->set_threads(1);
     worker_says(message, identity);
@@ -225,7 +226,7 @@ class ServiceTest : public testing::Test {
     request(message);
     return last_reply().status().studies(0);
   }
-  /// All that waits is written, and fails with `error` unless that is empty.
+  /// Completes all waiting writes, with `error` unless that is empty.
   void write_all(const std::string& error = {}) {
     for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
       const bool refused = !error.empty() && job.answer_failure;
@@ -235,18 +236,18 @@ class ServiceTest : public testing::Test {
     }
     service_->scheduler().check_invariants();
   }
-  /// The query that was asked `index`-th gets that answer.
+  /// Gives the `index`-th query that answer.
   void answer_query(std::size_t index, const std::string& reply) {
     service_->query_report({QueryReport::Kind::kAnswered, ports_.queries.at(index).ticket, reply});
   }
-  /// Runs the checks that wait.
+  /// Runs the waiting checks.
   void run_checks() {
     for (const Ports::Check& check : std::exchange(ports_.checks, {})) {
       check()(now_);
     }
     service_->scheduler().check_invariants();
   }
-  /// Time passes in ticks.
+  /// Lets time pass in ticks.
   void pass(std::int64_t duration_ms) {
     for (const std::int64_t end_ms = now_.steady_ms + duration_ms; now_.steady_ms < end_ms;) {
       now_.steady_ms += 100;

@@ -1,4 +1,4 @@
-// What the service does when the disk or a peer does not keep up.
+// The service when the disk or a peer is slow.
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 class ServiceLoadTest : public ServiceTest {
  protected:
-  /// Begins anew with other settings, a study of 1000 points and a worker.
+  /// Starts again with other settings, a study of 1000 points and a worker.
   void begin(const ServiceSettings& settings) {
     start(settings);
     submit("a", 1000);
@@ -33,7 +33,7 @@ class ServiceLoadTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
+TEST_F(ServiceLoadTest, NoBatchIsSentWhileTheDiskIsFarBehind) {
   ServiceSettings settings;
   settings.ledger.bytes = 4000;
   begin(settings);
@@ -48,7 +48,7 @@ TEST_F(ServiceLoadTest, NoBatchGoesOutWhileTheDiskIsFarBehind) {
   EXPECT_EQ(batches_sent(), 2U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheServerLives) {
+TEST_F(ServiceLoadTest, AWorkerThatIsNotReadIsNotSilentAndGetsSignsOfLife) {
   ServiceSettings settings;
   settings.ledger.bytes = 1;
   begin(settings);
@@ -66,7 +66,7 @@ TEST_F(ServiceLoadTest, AWorkerThatIsNotHeardIsNotTakenForSilentAndHearsThatTheS
   EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
 }
 
-TEST_F(ServiceLoadTest, AWorkerWhoseMessagesWaitToBeTakenIsNotTakenForSilent) {
+TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotSilent) {
   begin({});
   ports_.unheard = "worker";
   pass(10'000);
@@ -76,7 +76,7 @@ TEST_F(ServiceLoadTest, AWorkerWhoseMessagesWaitToBeTakenIsNotTakenForSilent) {
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskHearsSignsOfLifeThoughItGoesOnSpeaking) {
+TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsSignsOfLife) {
   begin({});
   ports_.worker_messages.clear();
   for (std::uint64_t point = 900; point < 960; ++point) {
@@ -88,7 +88,7 @@ TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskHearsSignsOfLifeThoughI
   EXPECT_LE(ports_.worker_messages.size(), 6U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatchAndNoStudyCountsAsLost) {
+TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatch) {
   begin({});
   ports_.busy = "worker";
   credit(1);
@@ -112,7 +112,7 @@ class FloodedServiceTest : public ServiceTest {
   }
 };
 
-TEST_F(FloodedServiceTest, NoWorkerJoinsWhileTooMuchWaitsForTheDisk) {
+TEST_F(FloodedServiceTest, NoWorkerJoinsWhileTheDiskIsTooFarBehind) {
   hello();
   WorkerMessage message;
   message.mutable_results()->set_study_id(1);
@@ -127,23 +127,23 @@ TEST_F(FloodedServiceTest, NoWorkerJoinsWhileTooMuchWaitsForTheDisk) {
   EXPECT_EQ(service_->scheduler().workers(), 2U);
 }
 
-TEST_F(FloodedServiceTest, ChangesBeyondTheLimitAreRefusedUntilTheDiskTookOthers) {
+TEST_F(FloodedServiceTest, ChangesBeyondTheLimitAreRefusedUntilOthersAreStored) {
   for (const char* name : {"a", "b", "c", "d"}) {
     request(submit_request(name));
   }
-  EXPECT_THAT(last_error(), HasSubstr("ask again later"));
+  EXPECT_THAT(last_error(), HasSubstr("try again later"));
   write_all();
   submit("d");
   EXPECT_TRUE(last_reply().has_submit());
 }
 
-// ---- Writes without an outcome ----
+// ---- Pending writes ----
 
 class WriteLedgerTest : public testing::Test {
  protected:
   static LedgerLimits small() { return {.bytes = 200, .writes = 24, .changes = 3}; }
 
-  /// A results message of so many bytes.
+  /// A Results message of that size.
   void write_results(std::size_t bytes) {
     AddResults change{};
     change.message_bytes = bytes;
@@ -209,7 +209,7 @@ TEST_F(WriteLedgerTest, BatchesAreHeldDuringAFaultAndAfterItWhileTheDiskIsBehind
   EXPECT_FALSE(ledger_.holds_batches());
 }
 
-TEST_F(WriteLedgerTest, MessagesAreTakenUntilTheBytesOrWritesAreTooMany) {
+TEST_F(WriteLedgerTest, MessagesAreReadUntilBytesOrWritesReachTheirLimit) {
   write_results(199);
   EXPECT_TRUE(ledger_.has_room());
   write_results(1);
@@ -223,7 +223,7 @@ TEST_F(WriteLedgerTest, MessagesAreTakenUntilTheBytesOrWritesAreTooMany) {
   EXPECT_FALSE(ledger_.has_room());
 }
 
-TEST_F(WriteLedgerTest, ResultsAndChangesOfClientsHaveBoundsOfTheirOwn) {
+TEST_F(WriteLedgerTest, ResultsAndChangesOfClientsHaveSeparateLimits) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(ledger_.has_room_for_changes());
     write_change();

@@ -1,4 +1,4 @@
-// Requests that take long: recipes that are checked, queries and traces.
+// Long requests: checks of recipes, queries and traces.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 
 // ---- Checks ----
 
-TEST_F(ServiceTest, ALongRecipeIsJudgedElsewhereAndOthersAreAnsweredMeanwhile) {
+TEST_F(ServiceTest, ALongRecipeIsCheckedWithoutDelayingOthers) {
   request(long_submission("large", kLongRequest));
   ASSERT_EQ(ports_.checks.size(), 1U);
   EXPECT_TRUE(ports_.replies.empty());
@@ -47,19 +47,19 @@ TEST_F(ServiceTest, ALongRecipeWithAFaultIsRefusedWithTheReason) {
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, LongRequestsThatWaitAreBounded) {
+TEST_F(ServiceTest, WaitingLongRequestsAreLimited) {
   const std::string frame = protocol::encode(long_submission("a", std::size_t{10} << 20U));
   for (int i = 0; i < 12; ++i) {
     service_->client_frame("client " + std::to_string(i), frame, now_);
   }
   EXPECT_EQ(ports_.checks.size(), limits::kWaitingCheckBytes / frame.size());
-  EXPECT_THAT(last_error(), HasSubstr("ask again later"));
+  EXPECT_THAT(last_error(), HasSubstr("try again later"));
   run_checks();
   request(long_submission("b", kLongRequest));
   EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
 }
 
-TEST_F(ServiceTest, ALongFrameThatIsNoMessageIsAnsweredWithItsNumber) {
+TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsNumber) {
   std::string frame = protocol::encode(long_submission("a", kLongRequest));
   frame.back() = '\x7f';
   frame += '\x7f';
@@ -90,7 +90,7 @@ class ServiceQueryTest : public ServiceTest {
                  const std::string& identity = "client") {
     ClientRequest message = client_request(request_id);
     message.mutable_more_rows()->set_request_id(request_id);
-    message.mutable_more_rows()->set_taken(taken);
+    message.mutable_more_rows()->set_received(taken);
     send(message, identity);
   }
   /// A reader gives another chunk of the answer.
@@ -102,7 +102,7 @@ class ServiceQueryTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
+TEST_F(ServiceQueryTest, AClientGetsStillWorkingEverySecondForItsQuery) {
   ask(7);
   pass(900);
   EXPECT_TRUE(ports_.replies.empty());
@@ -121,7 +121,7 @@ TEST_F(ServiceQueryTest, AClientHearsEverySecondThatItsQueryWaitsOrRuns) {
   EXPECT_EQ(ports_.replies.size(), replies);
 }
 
-TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesOrIsGoneAreCancelledAndNobodyElses) {
+TEST_F(ServiceQueryTest, OnlyTheQueriesOfADisconnectedClientAreCancelled) {
   for (const bool leaves : {true, false}) {
     start({});
     ports_ = {};
@@ -143,7 +143,7 @@ TEST_F(ServiceQueryTest, TheQueriesOfAClientThatLeavesOrIsGoneAreCancelledAndNob
   }
 }
 
-TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndOneThatIsAskedTwiceUnderItsNumberRunsOnce) {
+TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndARepeatedOneRunsOnce) {
   ask(7);
   ask(7);
   EXPECT_EQ(ports_.queries.size(), 1U);
@@ -155,7 +155,7 @@ TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndOneThatIsAskedTwiceUnderItsN
   EXPECT_EQ(last_reply().request_id(), 8U);
 }
 
-TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReaders) {
+TEST_F(ServiceQueryTest, ChunksAreForwardedAndTheirConfirmationsPassedToTheReaders) {
   using Taken = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
   ask(7);
   give(0);
@@ -172,30 +172,30 @@ TEST_F(ServiceQueryTest, PartsOfAnAnswerGoOutAsTheyComeAndMoreIsAskedOfTheReader
   answer_query(0, reply_of({}));
   EXPECT_EQ(ports_.replies.size(), 3U);
   want_more(7, 3);
-  EXPECT_THAT(last_error(), testing::HasSubstr("no answer"));
+  EXPECT_THAT(last_error(), testing::HasSubstr("no query"));
   EXPECT_EQ(last_reply().request_id(), 7U);
 }
 
-TEST_F(ServiceQueryTest, WhoSaysToHaveTakenWhatWasNotGivenLosesTheAnswer) {
+TEST_F(ServiceQueryTest, ConfirmingUnsentChunksEndsTheAnswer) {
   ask(7);
   give(0);
   want_more(7, UINT64_MAX);
-  EXPECT_THAT(last_error(), testing::HasSubstr("than was given"));
+  EXPECT_THAT(last_error(), testing::HasSubstr("than were sent"));
   EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
   EXPECT_TRUE(ports_.more.empty());
 }
 
-TEST_F(ServiceQueryTest, AnswersOfOthersCanBeNeitherTakenNorEnded) {
+TEST_F(ServiceQueryTest, AnswersOfOtherClientsCanBeNeitherConfirmedNorEnded) {
   ask(7);
   give(0);
   want_more(7, 1, "another");
-  EXPECT_THAT(last_error(), testing::HasSubstr("no answer"));
+  EXPECT_THAT(last_error(), testing::HasSubstr("no query"));
   end(7, "another");
   EXPECT_TRUE(ports_.more.empty());
   EXPECT_TRUE(ports_.cancelled_queries.empty());
 }
 
-TEST_F(ServiceQueryTest, AnAnswerThatItsClientEndsIsCancelledWithoutAReply) {
+TEST_F(ServiceQueryTest, EndQueryCancelsTheAnswerWithoutAReply) {
   ask(7);
   give(0);
   end(7);
@@ -206,7 +206,7 @@ TEST_F(ServiceQueryTest, AnAnswerThatItsClientEndsIsCancelledWithoutAReply) {
   EXPECT_EQ(ports_.replies.size(), 1U);
 }
 
-TEST_F(ServiceQueryTest, NobodyIsToldToWaitWhileHeIsWaitedFor) {
+TEST_F(ServiceQueryTest, StillWorkingIsNotSentWhileTheClientIsSlow) {
   ask(7);
   for (std::uint64_t i = 0; i < kChunksAhead; ++i) {
     give(0);
@@ -240,7 +240,7 @@ class ServiceTraceTest : public ServiceTest {
     send(trace_request(id, point), identity);
   }
 
-  /// Orders that workers were sent.
+  /// Trace orders sent to workers.
   std::vector<protocol::TraceOrder> orders() const {
     std::vector<protocol::TraceOrder> found;
     for (const ServerToWorker& message : ports_.worker_messages) {
@@ -268,10 +268,10 @@ class ServiceTraceTest : public ServiceTest {
     *trace.mutable_result() = solved_point(0);
     return trace;
   }
-  static protocol::Trace not_taken(const protocol::TraceOrder& order) {
+  static protocol::Trace declined(const protocol::TraceOrder& order) {
     protocol::Trace trace;
     trace.set_trace_id(order.trace_id());
-    trace.set_not_taken(true);
+    trace.set_declined(true);
     return trace;
   }
   void worker_sends(const protocol::Trace& trace, const std::string& identity = "worker") {
@@ -292,7 +292,7 @@ class ServiceTraceTest : public ServiceTest {
   }
 };
 
-TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheClient) {
+TEST_F(ServiceTraceTest, AWorkerSolvesATraceBesideItsBatchesAndTheClientGetsIt) {
   hello();
   credit(2);
   auto message = trace_request(7, 3);
@@ -315,7 +315,7 @@ TEST_F(ServiceTraceTest, APointGoesToAWorkerBesideItsBatchesAndTheAnswerToTheCli
   EXPECT_EQ(reply.outputs(), protocol::sent_outputs());
 }
 
-TEST_F(ServiceTraceTest, WhatThePointIsIsSaidWithoutAnyWorker) {
+TEST_F(ServiceTraceTest, TheInputsOfAPointNeedNoWorker) {
   auto message = trace_request(7, 99);
   message.mutable_trace()->set_only_point(true);
   send(message, "client");
@@ -324,7 +324,7 @@ TEST_F(ServiceTraceTest, WhatThePointIsIsSaidWithoutAnyWorker) {
   EXPECT_FALSE(last_reply().trace().has_trace());
 }
 
-TEST_F(ServiceTraceTest, WhatDoesNotExistIsNamed) {
+TEST_F(ServiceTraceTest, UnknownStudiesAndPointsAreNamed) {
   hello();
   send(trace_request(7, 0, "b"), "client");
   EXPECT_THAT(last_error(), HasSubstr("no study called \"b\""));
@@ -337,7 +337,7 @@ TEST_F(ServiceTraceTest, WhatDoesNotExistIsNamed) {
   EXPECT_TRUE(orders().empty());
 }
 
-TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainForItMayKill) {
+TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainBecauseItMayKillAWorker) {
   hello_and_credit();
   answer_batch(0);
   ask(7, 0);
@@ -354,7 +354,7 @@ TEST_F(ServiceTraceTest,
   worker_sends(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
-  // One that is too long is answered with what would fit.
+  // The reply to a too long trace has the `every` that would fit.
   ask(9, 3);
   trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
@@ -373,20 +373,20 @@ TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
   EXPECT_THAT(last_error(), HasSubstr("no worker is connected"));
 }
 
-TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDoesNotTakeItIsReplacedOnce) {
+TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
   for (const bool is_lost : {true, false}) {
     hello("one");
     ask(7, 3);
     hello("two");
     const auto first = orders().size() - 1;
-    is_lost ? goodbye("one") : worker_sends(not_taken(orders()[first]), "one");
+    is_lost ? goodbye("one") : worker_sends(declined(orders()[first]), "one");
     ASSERT_EQ(orders().size(), first + 2);
     EXPECT_TRUE(ports_.replies.empty());
     if (is_lost) {
       hello("three");
     }
-    is_lost ? goodbye("two") : worker_sends(not_taken(orders()[first + 1]), "two");
-    EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no worker"));
+    is_lost ? goodbye("two") : worker_sends(declined(orders()[first + 1]), "two");
+    EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no connected worker"));
     EXPECT_EQ(orders().size(), first + 2);
     goodbye("three");
     ports_.replies.clear();
@@ -396,7 +396,7 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDoesNotTakeItIsReplacedOnce) {
 TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
   hello();
   ask(7, 3);
-  ask(7, 3);  // sent again
+  ask(7, 3);  // repeated
   end(8);
   end(7, "another");
   EXPECT_EQ(cancels(), 0);
@@ -404,14 +404,14 @@ TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
   EXPECT_EQ(cancels(), 1);
   ask(8, 4);
   EXPECT_EQ(orders().size(), 1U) << "the worker has not said that it is free";
-  worker_sends(not_taken(orders()[0]));
+  worker_sends(declined(orders()[0]));
   EXPECT_EQ(orders().size(), 2U);
   service_->client_left("client");
   EXPECT_EQ(cancels(), 2);
   EXPECT_TRUE(ports_.replies.empty());
 }
 
-TEST_F(ServiceTraceTest, AClientHearsEverySecondThatItsTraceWaitsOrIsSolved) {
+TEST_F(ServiceTraceTest, AClientGetsStillWorkingEverySecondForItsTrace) {
   hello();
   ask(7, 3);
   ask(7, 4, "another");
@@ -424,7 +424,7 @@ TEST_F(ServiceTraceTest, AClientHearsEverySecondThatItsTraceWaitsOrIsSolved) {
   EXPECT_EQ(cancels(), 1) << "no word of it could be delivered";
 }
 
-TEST_F(ServiceTraceTest, ATraceHasItsTime) {
+TEST_F(ServiceTraceTest, ATraceHasATimeLimit) {
   hello();
   auto message = trace_request(7, 3);
   message.mutable_trace()->set_time_limit_ms(500);
@@ -434,7 +434,7 @@ TEST_F(ServiceTraceTest, ATraceHasItsTime) {
   EXPECT_EQ(cancels(), 1);
 }
 
-TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
+TEST_F(ServiceTraceTest, RunningAndWaitingTracesAreLimited) {
   for (const char* worker : {"one", "two", "three"}) {
     hello(worker);
   }
@@ -446,7 +446,7 @@ TEST_F(ServiceTraceTest, FewAreWithWorkersAtATimeAndFewWait) {
   EXPECT_EQ(orders().size(), limits::kRunningTraces);
 }
 
-TEST_F(ServiceTraceTest, ChecksOfPointsAreBoundedAlsoWhenTheirClientsAreGone) {
+TEST_F(ServiceTraceTest, ChecksOfPointsAreLimitedEvenIfTheirClientsAreGone) {
   StoredStudy study;
   study.study_id = 1;
   study.name = "a";
@@ -480,31 +480,30 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
     return last_error();
   };
   EXPECT_THAT(with([](auto& trace) { trace.add_values(1.0); }), HasSubstr("other columns"));
-  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\5"); }),
-              HasSubstr("a state that no contact has"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\5"); }), HasSubstr("an unknown state"));
   EXPECT_THAT(with([](auto& trace) { trace.set_states("\4\2"); }),
-              HasSubstr("rows of the fall that were not requested"));
-  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\4"); }), HasSubstr("falls again"));
+              HasSubstr("rows of the fall, which were not requested"));
+  EXPECT_THAT(with([](auto& trace) { trace.set_states("\2\4"); }), HasSubstr("after the touch"));
   EXPECT_THAT(with([](auto& trace) { trace.set_values(0, std::nan("")); }),
               HasSubstr("not finite"));
   EXPECT_THAT(with([](auto& trace) { trace.mutable_result()->add_reals(1.0); }),
-              HasSubstr("sent no trace"));
+              HasSubstr("sent an invalid trace"));
   EXPECT_THAT(with([](auto& trace) {
                 trace.clear_values();
                 trace.clear_states();
               }),
-              HasSubstr("no instant"));
-  worker_sends(trace_of({}, ""));  // of no order
+              HasSubstr("no rows"));
+  worker_sends(trace_of({}, ""));  // belongs to no order
   ask(99, 60);
   worker_sends(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());
 }
 
-TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnAThreadOfItsOwn) {
+TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnTheCheckThread) {
   request(long_submission("long", kLongRequest));
   run_checks();
   write_all();
-  request(change_request("long", protocol::STUDY_CHANGE_CANCEL));  // its table is given up
+  request(change_request("long", protocol::STUDY_CHANGE_CANCEL));  // releases its table
   write_all();
   hello();
   ports_.replies.clear();
@@ -515,7 +514,7 @@ TEST_F(ServiceTraceTest, APointOfALongRecipeIsFoundOnAThreadOfItsOwn) {
   ASSERT_EQ(orders().size(), 1U);
 }
 
-TEST_F(ServiceTraceTest, AStoppingServerTellsWorkersAndAnswersWhoeverWaitsOrComes) {
+TEST_F(ServiceTraceTest, AStoppingServerNotifiesWorkersAndRefusesRequests) {
   hello();
   for (const bool is_stopped : {false, true}) {
     ports_.replies.clear();
@@ -542,7 +541,7 @@ TEST_F(ServiceTraceTest, AStoppingServerTellsWorkersAndAnswersWhoeverWaitsOrCome
   }
   const auto sent = ports_.worker_messages.size();
   credit(1);
-  EXPECT_EQ(ports_.worker_messages.size(), sent) << "nothing is handed out";
+  EXPECT_EQ(ports_.worker_messages.size(), sent) << "no batch is sent";
 }
 
 }  // namespace

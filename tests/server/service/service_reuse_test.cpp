@@ -1,4 +1,4 @@
-// Results that a study reuses, and points that it leaves out.
+// Reused results and left-out points.
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -22,7 +22,7 @@ class ServiceReuseTest : public ServiceTest {
   static constexpr std::uint64_t kSource = 1;
   static constexpr std::uint64_t kStudy = 2;
 
-  /// Study 1, "a", is solved in part.
+  /// Study 1, "a", is partly solved.
   void solve_some() {
     request(submit_request("a"));
     write_all();
@@ -35,7 +35,7 @@ class ServiceReuseTest : public ServiceTest {
     message.mutable_submit()->set_no_reuse(false);
     return message;
   }
-  /// With ten points more.
+  /// The same with ten more points.
   ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
@@ -47,7 +47,7 @@ class ServiceReuseTest : public ServiceTest {
     request(reusing("b"));
     write_all();
   }
-  /// The first points of the parts that wait for the writer.
+  /// The first points of parts that wait for the writer.
   std::vector<std::uint64_t> parts() const {
     std::vector<std::uint64_t> firsts;
     for (const WriteJob& job : ports_.jobs) {
@@ -57,7 +57,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return firsts;
   }
-  /// The study of the end that waits for the writer; 0: none does.
+  /// The study whose EndReuse waits for the writer; 0: none.
   std::uint64_t ended() const {
     for (const WriteJob& job : ports_.jobs) {
       if (const auto* end = std::get_if<EndReuse>(&job.change)) {
@@ -66,7 +66,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return 0;
   }
-  /// Writes what waits; this came of the part that is among it.
+  /// Completes all waiting writes; a waiting part has this outcome.
   void write_part(const ReusedResults& outcome) {
     for (WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
@@ -93,7 +93,7 @@ TEST_F(ServiceReuseTest, NothingIsLookedUpWithoutAnyResultOrForARequestWithoutRe
   EXPECT_EQ(last_reply().submit().study_id(), kStudy);
 }
 
-TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
+TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsLeasedAndTheReplyWaits) {
   solve_some();
   request(reusing("b"));
   const std::size_t replies = ports_.replies.size();
@@ -109,10 +109,10 @@ TEST_F(ServiceReuseTest, UntilTheLookupEndsNothingIsHandedOutAndTheReplyWaits) {
   EXPECT_EQ(ended(), kStudy);
   write_all();
   const auto reply = last_reply().submit();
-  EXPECT_EQ(reply.settled(), 4U);
-  EXPECT_EQ(reply.taken().points(), 4U);
-  EXPECT_EQ(reply.taken().from(0).study(), "a");
-  EXPECT_FALSE(status_of("b").taken().under_way());
+  EXPECT_EQ(reply.completed(), 4U);
+  EXPECT_EQ(reply.reused().points(), 4U);
+  EXPECT_EQ(reply.reused().from(0).study(), "a");
+  EXPECT_FALSE(status_of("b").reused().under_way());
   EXPECT_EQ(status_of("b").waits_for(), "");
   EXPECT_THAT(ports_.jobs, IsEmpty());
 }
@@ -123,34 +123,34 @@ TEST_F(ServiceReuseTest, TheReplyWaitsAtMostSomeSeconds) {
   service_->tick(now_);
   const auto reply = last_reply().submit();
   EXPECT_EQ(reply.study_id(), kStudy);
-  EXPECT_TRUE(reply.taken().under_way());
+  EXPECT_TRUE(reply.reused().under_way());
 }
 
-TEST_F(ServiceReuseTest, ALookupThatFindsNothingForAMillionProbesOrLongIsCutShort) {
+TEST_F(ServiceReuseTest, ALookupIsCutShortAfterAMillionProbesOrALongTimeWithoutAResult) {
   for (const bool is_long : {false, true}) {
     start({});
     submit_study();
     const auto vain_part = [&](std::uint64_t next) {
       now_.steady_ms += is_long ? StudyChanges::kLongestInVain_ms / 2 : 0;
-      write_part({{}, {}, is_long ? 1 : StudyChanges::kMostProbesInVain / 2, next});
+      write_part({{}, {}, is_long ? 1 : StudyChanges::kMaxProbesInVain / 2, next});
     };
     vain_part(1);
-    write_part(copies_of_a(IntervalSet(0, 1), 2));  // and both begin again
+    write_part(copies_of_a(IntervalSet(0, 1), 2));  // restarts both limits
     vain_part(3);
     EXPECT_THAT(parts(), ElementsAre(3));
     vain_part(4);
     EXPECT_EQ(ended(), kStudy);
     write_all();
-    EXPECT_TRUE(last_reply().submit().taken().cut_short());
+    EXPECT_TRUE(last_reply().submit().reused().cut_short());
   }
 }
 
-TEST_F(ServiceReuseTest, ALookupThatFailsIsCutShortAndTheStudyGoesOn) {
+TEST_F(ServiceReuseTest, AFailedLookupIsCutShortAndTheStudyRuns) {
   submit_study();
   write_all("a page is damaged");
   EXPECT_EQ(ended(), kStudy);
   write_all();
-  EXPECT_TRUE(last_reply().submit().taken().cut_short());
+  EXPECT_TRUE(last_reply().submit().reused().cut_short());
   EXPECT_EQ(status_of("b").waits_for(), "");
 }
 
@@ -174,7 +174,7 @@ TEST_F(ServiceReuseTest, AStudyDoesNotGrowDuringItsLookup) {
   EXPECT_THAT(last_error(), HasSubstr("cannot grow while results"));
 }
 
-TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
+TEST_F(ServiceReuseTest, ACancelledOrDeletedStudyIsNotLookedUpFurther) {
   for (const auto change : {protocol::STUDY_CHANGE_CANCEL, protocol::STUDY_CHANGE_DELETE}) {
     start({});
     submit_study();
@@ -189,14 +189,14 @@ TEST_F(ServiceReuseTest, ThePartUnderWayOfACancelledOrDeletedStudyIsTheLast) {
   }
 }
 
-TEST_F(ServiceReuseTest, AServerThatStopsLeavesTheRestToTheNextOne) {
+TEST_F(ServiceReuseTest, AStoppedLookupIsLeftToTheNextServer) {
   submit_study();
   service_->drain(now_);
   write_part(copies_of_a(IntervalSet(0, 4), 4));
   EXPECT_THAT(ports_.jobs, IsEmpty());
 }
 
-TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
+TEST_F(ServiceReuseTest, AServerContinuesAnUnfinishedLookup) {
   StoredStudy source{kSource, "a", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
   source.completed = IntervalSet(0, 5);
   StoredStudy pending{kStudy, "b", table_of(10), StudyState::kRunning, "then", {}, {}, {}, {}};
@@ -205,11 +205,11 @@ TEST_F(ServiceReuseTest, AServerThatStartsGoesOnWithALookupThatHasNotEnded) {
   pending.completed = IntervalSet(0, 3);
   start({}, {source, pending});
   EXPECT_THAT(parts(), ElementsAre(0));
-  EXPECT_EQ(status_of("b").taken().points(), 3U);
-  EXPECT_TRUE(status_of("b").taken().under_way());
+  EXPECT_EQ(status_of("b").reused().points(), 3U);
+  EXPECT_TRUE(status_of("b").reused().under_way());
   write_part(copies_of_a(IntervalSet(3, 5)));
   EXPECT_EQ(ended(), kStudy);
-  EXPECT_EQ(status_of("b").taken().points(), 5U);
+  EXPECT_EQ(status_of("b").reused().points(), 5U);
 }
 
 // ---- Filters ----
@@ -232,7 +232,7 @@ class FilteredStudyTest : public ServiceTest {
   }
 };
 
-TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
+TEST_F(FilteredStudyTest, PointsAreValidatedOnTheCheckThread) {
   request(filtered_request("mu > 0.75"));
   EXPECT_THAT(ports_.replies, IsEmpty());
   ASSERT_EQ(ports_.checks.size(), 1U);
@@ -246,7 +246,7 @@ TEST_F(FilteredStudyTest, PointsAreJudgedElsewhereAndTheStudyHasAllOfThem) {
   EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 
-TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
+TEST_F(FilteredStudyTest, TracesOfAFilteredStudyUseThePointNumbers) {
   submit_filtered();
   hello();
   const auto ask = [&](std::uint64_t point) {
@@ -263,7 +263,7 @@ TEST_F(FilteredStudyTest, PointsOfAFilteredStudyHaveTracesByTheirNumbers) {
   EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
 }
 
-TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
+TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
   submit_filtered();
   hello_and_credit();
   while (last_message().has_batch()) {
@@ -276,7 +276,7 @@ TEST_F(FilteredStudyTest, TheWorkerNamesWhatIsLeftOutAndTheRestIsSolved) {
   EXPECT_EQ(status.left_out(), 8U);
 }
 
-TEST_F(FilteredStudyTest, RangesThatAreNoneEndTheConnectionOfTheirWorker) {
+TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
   submit_filtered();
   // After three lost workers the next one gets a probe: the first two are of its batch.
   const std::vector<std::vector<std::uint64_t>> wrong{

@@ -1,4 +1,4 @@
-// Studies and workers message by message: what is acknowledged when, and which peers are refused.
+// Studies and workers, message by message: acknowledgements and refused peers.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -33,7 +33,7 @@ TEST_F(ServiceTest, AStudyIsAcknowledgedOnlyOnceItIsStored) {
   EXPECT_TRUE(reply.submit().created());
 }
 
-TEST_F(ServiceTest, WhileTheDatabaseStoresNothingForSecondsClientsAreToldSo) {
+TEST_F(ServiceTest, ClientsGetAnErrorWhenTheDatabaseStoresNothingForSeconds) {
   submit("a");
   const std::size_t replies = ports_.replies.size();
   request(submit_request("b"));
@@ -52,7 +52,7 @@ TEST_F(ServiceTest, WhileTheDatabaseStoresNothingForSecondsClientsAreToldSo) {
   EXPECT_EQ(status_of("a").waits_for(), "a worker");
 }
 
-TEST_F(ServiceTest, TheStatusOfAStudySaysThatItsOnlyWorkerIsSetAside) {
+TEST_F(ServiceTest, StatusShowsThatTheOnlyWorkerIsSetAside) {
   submit("a", 1);
   hello_and_credit();
   for (int second = 0; second < 80; ++second) {
@@ -105,7 +105,7 @@ TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
   EXPECT_TRUE(last_message().has_heartbeat_reply());
 }
 
-TEST_F(ServiceTest, AWorkerThatSaysHelloTwiceBeginsAnew) {
+TEST_F(ServiceTest, ASecondHelloStartsANewSession) {
   submit("a");
   hello_and_credit();
   ASSERT_TRUE(last_message().has_batch());
@@ -114,7 +114,7 @@ TEST_F(ServiceTest, AWorkerThatSaysHelloTwiceBeginsAnew) {
   EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
 }
 
-TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
+TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
   submit("a", 1);
   hello_and_credit();
   WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
@@ -124,7 +124,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedOnceTheyAreStored) {
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
-  // Its end is noted in the database.
+  // The database records that the study is done.
   ASSERT_EQ(ports_.jobs.size(), 1U);
   EXPECT_EQ(std::get<SetStudyState>(ports_.jobs[0].change).state, StudyState::kDone);
 }
@@ -147,7 +147,7 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
   EXPECT_EQ(service_->scheduler().study(1).failed, 2U);
 }
 
-TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
+TEST_F(ServiceTest, AWorkerWithWrongInputsIsNotProven) {
   submit("a", 2);
   hello_and_credit();
   WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
@@ -159,7 +159,7 @@ TEST_F(ServiceTest, AWorkerThatSolvesOtherPointsThanTheStudyHasIsNotProven) {
   }
 }
 
-TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
+TEST_F(ServiceTest, InvalidFramesAreCountedAndClientsGetAnError) {
   service_->worker_frame("worker", "\xff\xff", now_);
   service_->worker_frame("worker", "", now_);
   EXPECT_EQ(service_->bad_frames(), 2U);
@@ -170,7 +170,7 @@ TEST_F(ServiceTest, WhatIsNoMessageIsCountedAndClientsAreTold) {
   EXPECT_THAT(last_error(), HasSubstr("kind of request"));
 }
 
-TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
+TEST_F(ServiceTest, StatusHasTheRateOfTheLastSeconds) {
   submit("a", 1000);
   hello();
   std::vector<std::uint64_t> points(100);
@@ -184,18 +184,18 @@ TEST_F(ServiceTest, StatusTellsTheRateOfTheLastSeconds) {
   EXPECT_EQ(status.created_at(), "2023-11-14T22:13:20.123Z");
 }
 
-// ---- Peers of other versions, and those that do what no sound peer does ----
+// ---- Peers of other versions, and incorrect peers ----
 
 WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver_version) {
   WorkerMessage message;
-  protocol::say_protocol(*message.mutable_hello());
+  protocol::set_protocol(*message.mutable_hello());
   message.mutable_hello()->set_protocol_version(protocol_version);
   message.mutable_hello()->set_solver_version(solver_version);
   message.mutable_hello()->set_threads(1);
   return message;
 }
 
-TEST_F(ServiceTest, AWorkerWithAnotherSolverOrOtherOutputsIsRefusedAndToldWhy) {
+TEST_F(ServiceTest, AWorkerWithAnotherSolverOrOtherOutputsIsRefusedWithTheReason) {
   worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
   EXPECT_THAT(last_message().refused().reason(), AllOf(HasSubstr("0.9"), HasSubstr("1.0")));
   for (const std::string& outputs : {std::string(), protocol::sent_outputs() + " new_N"}) {
@@ -251,25 +251,26 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
        {0U, protocol::kProtocolVersion - 1, protocol::kProtocolVersion + 1, 77U}) {
     worker_says(hello_of(version, "1.0"));
     EXPECT_THAT(last_message().refused().reason(),
-                HasSubstr(fmt::format("{}, the worker {}", own, version)));
+                HasSubstr(fmt::format("{}, but the worker has version {}", own, version)));
     ClientRequest message = submit_request("a");
     message.set_protocol_version(version);
     request(message);
-    EXPECT_THAT(last_error(),
-                HasSubstr(version == 0 ? std::string("the port for clients")
-                                       : fmt::format("{}, the client {}", own, version)));
+    EXPECT_THAT(
+        last_error(),
+        HasSubstr(version == 0 ? std::string("this port is for clients")
+                               : fmt::format("{}, but the client has version {}", own, version)));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
-TEST_F(ServiceTest, WhatAWorkerSaysOfItselfCannotForgeLines) {
+TEST_F(ServiceTest, TextFromAWorkerCannotForgeLogLines) {
   WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
   message.mutable_hello()->set_name("a\n\x1b[31mb");
   worker_says(message);
   EXPECT_THAT(ports_.lines.back(), HasSubstr("(a??[31mb, 1 threads) joins"));
 }
 
-TEST_F(ServiceTest, AWorkerWhoseConnectionIsGoneIsFoundAsSoonAsAHeartbeatIsLate) {
+TEST_F(ServiceTest, ALateHeartbeatRevealsALostConnection) {
   submit("a");
   hello_and_credit();
   ports_.unreachable = "worker";
@@ -282,7 +283,7 @@ TEST_F(ServiceTest, AWorkerWhoseConnectionIsGoneIsFoundAsSoonAsAHeartbeatIsLate)
   EXPECT_EQ(service_->scheduler().study(1).leased, 0U);
 }
 
-TEST_F(ServiceTest, AStudyWhoseResultsTheDiskDoesNotTakeSaysSoAndForgetsItAfterwards) {
+TEST_F(ServiceTest, StatusShowsWhileTheDiskAcceptsNoResults) {
   submit("a");
   hello();
   service_->written({WriteReport::Kind::kFault, 0, "disk full"}, now_);
@@ -291,13 +292,13 @@ TEST_F(ServiceTest, AStudyWhoseResultsTheDiskDoesNotTakeSaysSoAndForgetsItAfterw
   EXPECT_THAT(status_of("a").waits_for(), IsEmpty());
 }
 
-TEST_F(ServiceTest, MessagesThatAreLongerThanThoseOfWorkersAreBadFramesThatAreNotParsed) {
+TEST_F(ServiceTest, TooLargeMessagesOfWorkersAreNotParsed) {
   WorkerMessage heartbeat;
-  for (std::uint64_t i = 0; i <= protocol::kMostLeasesAHeartbeat; ++i) {
+  for (std::uint64_t i = 0; i <= protocol::kMaxLeasesAHeartbeat; ++i) {
     heartbeat.mutable_heartbeat()->add_lease_ids(i);
   }
   WorkerMessage results;
-  for (std::size_t i = 0; i <= protocol::kMostResultsAMessage; ++i) {
+  for (std::size_t i = 0; i <= protocol::kMaxResultsAMessage; ++i) {
     results.mutable_results()->add_results();
   }
   worker_says(heartbeat);
@@ -312,7 +313,7 @@ TEST_F(ServiceTest, MessagesThatAreLongerThanThoseOfWorkersAreBadFramesThatAreNo
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirst) {
+TEST_F(ServiceTest, AWorkerGetsARowWithItsFirstResult) {
   submit("a", 4);
   for (int i = 0; i < 1000; ++i) {
     hello("worker " + std::to_string(i));
@@ -326,7 +327,7 @@ TEST_F(ServiceTest, AWorkerThatDeliversNothingLeavesNoRowAndOneThatDoesHasItFirs
   EXPECT_EQ(std::get<AddResults>(ports_.jobs[1].change).worker_id, 1001U);
 }
 
-TEST_F(ServiceTest, WorkersThatComeAndGoWithoutEndDoNotFillTheLog) {
+TEST_F(ServiceTest, WorkersThatReconnectAgainAndAgainDoNotFillTheLog) {
   WorkerMessage goodbye;
   goodbye.mutable_goodbye();
   for (int i = 0; i < 10'000; ++i) {
@@ -343,7 +344,7 @@ TEST_F(ServiceTest, WorkersThatComeAndGoWithoutEndDoNotFillTheLog) {
   EXPECT_THAT(ports_.lines[1], HasSubstr("joins"));
 }
 
-TEST_F(ServiceTest, StudiesComeInPagesThatHoldEachOnce) {
+TEST_F(ServiceTest, PagesOfStudiesContainEachStudyOnce) {
   constexpr int kStudies = 2500;
   for (int i = 0; i < kStudies; ++i) {
     service_->client_frame("client", protocol::encode(submit_request(std::to_string(i))), now_);
@@ -376,7 +377,7 @@ class ProcessesTest : public ServiceTest {
     message.mutable_hello()->set_process_id(process_id);
     worker_says(message, identity);
   }
-  /// Three newcomers get batches and are gone.
+  /// Three new workers get batches and are lost.
   void let_newcomers_vanish() {
     for (const char* identity : {"x", "y", "z"}) {
       hello_as(identity, identity);
@@ -390,7 +391,7 @@ class ProcessesTest : public ServiceTest {
   }
 };
 
-TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
+TEST_F(ProcessesTest, TheStatusOfAWorkerCountsTheLossesOfItsProcess) {
   submit("a", 100);
   hello_as("first", "process 1");
   credit(2, "first");
@@ -401,7 +402,7 @@ TEST_F(ProcessesTest, WorkersSayWhatWasLostWithTheirProcess) {
   EXPECT_FALSE(worker.set_aside());
 }
 
-TEST_F(ProcessesTest, AProbeIsAStudyOfOnePointThatAnyWorkerReadsAndItsResultIsAcknowledged) {
+TEST_F(ProcessesTest, AProbeIsAValidStudyOfOnePointWhoseResultIsAcknowledged) {
   submit("a", 100);
   let_newcomers_vanish();
   hello_as("worker", "sound");

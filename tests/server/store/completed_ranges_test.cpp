@@ -35,7 +35,7 @@ TEST_F(CompletedRangesTest, RetriedFailuresLeaveTheirRangeAndTheStudyStaysCounte
   EXPECT_THAT(ranges(), ElementsAre("0+9"));
   commit({ForgetFailures{1, IntervalSet(4, 7), "now"}});
   EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3")) << "only failures are forgotten";
-  // What fails in a transaction can be forgotten in it.
+  // A failure stored in a transaction can be deleted in the same one.
   commit({failed(study, {4}), ForgetFailures{1, IntervalSet(4, 5), "now"}});
   EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3"));
   EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
@@ -59,7 +59,7 @@ TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsAreOpenAfterTheNext
 }
 
 /// Random additions and removals of points and ranges.
-TEST_F(CompletedRangesTest, RandomChangesLeaveThePointsOfASetInTheFewestRanges) {
+TEST_F(CompletedRangesTest, RandomChangesGiveTheFewestRanges) {
   constexpr std::uint64_t kPoints = 60;
   const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
   create_tables(database.get());
@@ -75,7 +75,7 @@ TEST_F(CompletedRangesTest, RandomChangesLeaveThePointsOfASetInTheFewestRanges) 
           written.add(seed, begin);
           expected.insert(begin);
           break;
-        case 1:  // as points that a condition leaves out
+        case 1:  // as left-out points
           written.add(seed, Interval{begin, end});
           expected.insert(begin, end);
           break;
@@ -131,7 +131,7 @@ TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
   EXPECT_THAT(ranges(), ElementsAre("3+4"));
 }
 
-TEST_F(CompletedRangesTest, APointThatHadARowAlreadyIsCompletedByItsResult) {
+TEST_F(CompletedRangesTest, AResultCompletesAPointThatAlreadyHasARow) {
   const auto study = study_of(10);
   commit({study, worker(1), solved(study, {3, 4})});
   by_hand("DELETE FROM completed_ranges");

@@ -1,4 +1,4 @@
-// Rows of other studies that are reused, as the store looks them up and copies them.
+// Reuse of rows of other studies: lookup and copy.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -53,7 +53,7 @@ class ResultReuseTest : public StoreFixture {
   static constexpr std::uint64_t kOldWorker = 2;
 };
 
-/// Study 1 has solved points 0 to 9, all of which study 2 has, too.
+/// Study 1 has solved points 0 to 9, which study 2 has too.
 class SamePointsTest : public ResultReuseTest {
  protected:
   SamePointsTest() {
@@ -77,7 +77,7 @@ TEST_F(SamePointsTest, SoundRowsAreCopiedAndCountedByTheirOrigin) {
   EXPECT_THAT(study.reused, ElementsAre(Pair("a", 10)));
 }
 
-TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInItsStudyItsPointAndWhereItCameFrom) {
+TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInStudyPointAndOrigin) {
   reused();
   std::vector<std::string> same;
   for (const std::string_view column : result_columns()) {
@@ -135,14 +135,14 @@ TEST_F(ResultReuseTest, PartsFollowEachOtherAndSkipCompletedPoints) {
   const std::uint64_t part = *first.next_point;
   EXPECT_LT(part, 5000U);
   EXPECT_EQ(first.points, IntervalSet(0, part));
-  const auto second = reuse_part(2, points, 0);  // as after a restart of the server
+  const auto second = reuse_part(2, points, 0);  // as after a server restart
   EXPECT_EQ(second.points, IntervalSet(part, 2 * part));
   const auto third = reuse_part(2, points, 2 * part);
   EXPECT_EQ(third.points, IntervalSet(2 * part, 10'000));
   EXPECT_EQ(third.next_point, std::nullopt);
 }
 
-TEST_F(ResultReuseTest, AModelThatNoRowHasCostsOneProbe) {
+TEST_F(ResultReuseTest, AModelWithoutRowsCostsOneProbe) {
   const Table known = table_of(10);
   add(1, "a", known);
   solve(1, known);
@@ -157,7 +157,7 @@ TEST_F(ResultReuseTest, AModelThatNoRowHasCostsOneProbe) {
 
 // ---- Random studies against a lookup in a map ---------------------------------------------------
 
-/// Few values of each key, so that studies share points, some of them twice.
+/// Few values per key, so that studies share points and contain some twice.
 protocol::Block random_block(std::mt19937& random) {
   const auto pick = [&](const std::string& key, std::vector<double> values) {
     std::shuffle(values.begin(), values.end(), random);
@@ -199,22 +199,22 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
            std::bit_cast<std::uint64_t>(point.e_star)}};
 }
 
-TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
+TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
   std::mt19937 random(4711);
-  std::map<Inputs, std::string> solved;  // by inputs the first row, as reused_from has it
+  std::map<Inputs, std::string> solved;  // the first row for each set of inputs, as in reused_from
   std::size_t reused = 0;
   std::size_t open = 0;
   for (std::uint64_t study = 1; study <= 60; ++study) {
     const Table points = random_table(random);
     add(study, "study " + std::to_string(study), points);
-    // Some points fail before, and others are solved by another version: these keep their rows.
+    // Some points have failed or were solved by another version; these keep their rows.
     const AddStudy added = study_of(points, study);
     AddResults own = results_of(added, {}, kWorker);
     AddResults old = results_of(added, {}, kOldWorker);
     std::vector<std::string> expected;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
       const std::uint64_t fate = random() % 10;
-      if (!points->is_left_in(number)) {
+      if (!points->passes_filter(number)) {
         continue;
       }
       if (fate == 0) {
@@ -233,11 +233,11 @@ TEST_F(ResultReuseTest, RandomStudiesGetWhatALookupInAMapFinds) {
     EXPECT_EQ(copies(study), expected) << "study " << study;
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
-    // What is left is solved in part. A copy comes behind its source, so it is never the first.
+    // Solves some of the other points. A copy follows its source, so it is never the first.
     AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {
-      if (points->is_left_in(number) && !completed.contains(number) && random() % 2 == 0) {
+      if (points->passes_filter(number) && !completed.contains(number) && random() % 2 == 0) {
         rest.results.push_back(solved_point(number));
         solved.emplace(inputs_of(*points, number), fmt::format("study {}/{}", study, number));
       }

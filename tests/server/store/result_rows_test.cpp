@@ -105,7 +105,7 @@ TEST_F(ResultRowsTest, ViewsHaveARowForEachElementOfAListAndNoIntegersExceptMajo
               ElementsAre("1|2|0|1.0|7.0", "1|2|1|2.0|0.33333333"));
 }
 
-TEST_F(ResultRowsTest, PeaksOfFtThatEqualThoseOfPeaksAreNullAndRunsShowsThemWhole) {
+TEST_F(ResultRowsTest, FtPeaksEqualToThoseOfPeaksAreStoredAsNullAndShownByRuns) {
   auto same = listed();
   same.peaks = {{0.25, 3.0, 2.0, true}, {0.5, 2.0, 1.5, false}};
   same.ft_peaks = {{0.25, 2.0}, {0.5, 1.5}};
@@ -122,7 +122,7 @@ TEST_F(ResultRowsTest, PeaksOfFtThatEqualThoseOfPeaksAreNullAndRunsShowsThemWhol
       ElementsAre("[[0.25,2],[0.5,1.5]]|0", "[[0.25,2],[0.5,1.5]]|0", "[[0.25,2]]|0", "|1"));
 }
 
-TEST_F(ResultRowsTest, OutputsThatAResultLacksAreNull) {
+TEST_F(ResultRowsTest, MissingOutputsAreNull) {
   auto lacking = listed();
   lacking.margin.reset();
   lacking.margin_event.reset();

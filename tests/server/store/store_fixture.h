@@ -26,14 +26,14 @@ inline Table table(const protocol::Recipe& recipe) {
   return std::make_shared<const protocol::PointTable>(recipe);
 }
 
-/// Ten points, mu from 0 to 1, of which a condition leaves out some.
+/// Ten points with mu from 0 to 1, of which a filter leaves out some.
 inline Table filtered_table(const std::string& where) {
   protocol::Recipe recipe = table_of(10)->recipe();
   recipe.mutable_blocks(0)->set_where(where);
   return table(recipe);
 }
 
-/// Ten points, and as many behind them.
+/// Ten points, and ten more after them.
 inline Table grown_table() {
   protocol::Recipe recipe = table_of(10)->recipe();
   *recipe.add_blocks() = recipe.blocks(0);
@@ -47,7 +47,7 @@ inline std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end
   return found;
 }
 
-/// A database in a folder of its own, and what other programs read and write in it.
+/// A database in its own folder, and access to it as by other programs.
 class StoreFixture : public testing::Test {
  protected:
   static AddStudy study_of(Table points, std::uint64_t id = 1, const std::string& name = "a") {
@@ -96,7 +96,7 @@ class StoreFixture : public testing::Test {
   void commit(const std::vector<Change>& changes) { store().commit(changes); }
   void close() { store_.reset(); }
 
-  /// As another program does.
+  /// Runs SQL as another program.
   void by_hand(const std::string& sql) const { by_hand(path_, sql); }
   static void by_hand(const std::string& path, const std::string& sql) {
     execute(open_database(path, SQLITE_OPEN_READWRITE).get(), sql);
@@ -118,7 +118,7 @@ class StoreFixture : public testing::Test {
     return found;
   }
   std::int64_t number(const std::string& sql) const { return std::stoll(rows(sql).at(0)); }
-  /// What a check of the whole file finds.
+  /// The faults that a check of the whole file finds.
   std::vector<std::string> faults() const { return faults(path_); }
   static std::vector<std::string> faults(const std::string& path) { return diagnose(path).faults; }
   /// Why the database cannot be opened.

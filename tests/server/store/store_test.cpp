@@ -27,7 +27,7 @@ using testing::SizeIs;
 
 using StoreTest = StoreFixture;
 
-TEST_F(StoreTest, WhatWasCommittedIsThereAfterReopening) {
+TEST_F(StoreTest, CommittedRowsAreThereAfterReopening) {
   auto study = study_of(10);
   study.submitted_by = "alice";
   commit({study, worker(1), solved(study, {0, 1, 5}), failed(study, {7})});
@@ -59,7 +59,7 @@ TEST_F(StoreTest, AnInterruptEndsALongStatement) {
               testing::ThrowsMessage<StorageError>(HasSubstr("interrupted")));
 }
 
-TEST_F(StoreTest, AnEmptyDatabaseHasAnIdentityAndCountsStarts) {
+TEST_F(StoreTest, AnEmptyDatabaseHasAnIdAndCountsStarts) {
   EXPECT_THAT(store().studies(), IsEmpty());
   EXPECT_EQ(store().last_study_id(), 0U);
   EXPECT_EQ(store().last_worker_id(), 0U);
@@ -113,7 +113,8 @@ StudyTable table_of_models(std::uint64_t models, std::uint64_t points) {
 
 TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
   const AddStudy first{1, "a", table_of_models(11, 2), "now"};
-  const AddStudy second{2, "b", table_of_models(101, 2), "now"};  // of which eleven are the same
+  // eleven of its models are the same
+  const AddStudy second{2, "b", table_of_models(101, 2), "now"};
   commit({first, second, worker(1)});
   commit({solved(first, {8, 0, 2, 4, 6, 10})});
   commit({solved(second, {1, 20, 21, 40, 60, 200, 201})});
@@ -153,7 +154,7 @@ TEST_F(StoreTest, ADatabaseInUseIsNotOpenedTwice) {
   EXPECT_THAT(refusal(), HasSubstr("already uses the database"));
 }
 
-TEST_F(StoreTest, OtherFilesAreRefusedByTheirKind) {
+TEST_F(StoreTest, OtherKindsOfFilesAreRefused) {
   std::ofstream(path_) << std::string(5000, 'x');
   EXPECT_THAT(refusal(), HasSubstr("is not a database"));
   EXPECT_EQ(std::filesystem::file_size(path_), 5000U);
@@ -169,10 +170,10 @@ TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
   EXPECT_THAT(refusal(), HasSubstr("another program (application id 0)"));
 }
 
-TEST_F(StoreTest, AStudyThatThisVersionDoesNotAcceptIsSkippedAndNamed) {
+TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
   commit({study_of(10, 1, "too elastic"), study_of(10, 2, "b"), study_of(3, 3, "c")});
   close();
-  // Other versions may take an e that this one cannot solve.
+  // Other versions may accept an e that this one refuses.
   const protocol::Recipe recipe =
       protocol::recipe_of({{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, 10),
                             protocol::listed("e", {1e-4})}});
@@ -195,7 +196,7 @@ TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check")));
 }
 
-TEST_F(StoreTest, ANumberIsNeverGivenToAnotherStudy) {
+TEST_F(StoreTest, AStudyNumberIsNeverReused) {
   const auto study = study_of(5, 2);
   commit({study, solved(study, {0}), study_of(5, 3, "b")});
   close();
@@ -231,7 +232,7 @@ class StudyDeletionTest : public StoreFixture {
     close();
     store();
   }
-  /// A study called by its number, all of whose points are solved by the worker of that number.
+  /// A study named by its number, whose points are all solved by the worker of that number.
   void add_solved(std::uint64_t id, const Table& points) {
     const AddStudy study = study_of(points, id, "study " + std::to_string(id));
     commit({study, worker(id), solved(study, numbers(0, points->size()), id)});
@@ -244,7 +245,7 @@ class StudyDeletionTest : public StoreFixture {
   std::int64_t rows_in(const std::string& from) const {
     return number("SELECT count(*) FROM " + from);
   }
-  /// Number of steps until all is cleared away.
+  /// Number of steps until all rows are deleted.
   int clear_all(std::size_t most) {
     int steps = 1;
     while (store().clear_away(most) != ClearedAway::kAll) {
@@ -269,7 +270,7 @@ TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndARightChecksu
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsGoAFewAtATime) {
+TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsAreDeletedInParts) {
   add_solved(1, table_of(100));
   add_solved(2, table_of(50));
   commit({DeleteStudy{1}});
@@ -328,7 +329,7 @@ TEST_F(StudyDeletionTest, ADeletionThatIsRolledBackDeletesNothing) {
   EXPECT_EQ(rows_in("results"), 6) << "later results are stored";
 }
 
-TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRowsAreGone) {
+TEST_F(StudyDeletionTest, OrphanedModelsAndWorkersAreDeletedAtAStartAfterTheRows) {
   add_solved(1, table_with_k(1e7, 20));
   add_solved(2, table_with_k(2e7, 20));
   add_solved(3, table_with_k(2e7, 20));
@@ -347,7 +348,7 @@ TEST_F(StudyDeletionTest, ModelsAndWorkersWithoutRowsGoAtTheNextStartOnceAllRows
       << "a model that was deleted comes again";
 }
 
-TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
+TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
   add_solved(1, table_of(2000));
   add_solved(2, table_of(2000));
   store().checkpoint_at(1);
@@ -369,7 +370,7 @@ TEST_F(StudyDeletionTest, WhileAReaderKeepsTheLogLongItWaits) {
 
 // ---- Tables, views and triggers -----------------------------------------------------------------
 
-/// A database with three solved points, and what other programs do to it.
+/// A database with three solved points, changed by other programs.
 class SchemaTest : public StoreFixture {
  protected:
   SchemaTest() {
@@ -384,7 +385,7 @@ class SchemaTest : public StoreFixture {
   }
 };
 
-TEST_F(SchemaTest, EachStartCreatesWhatWasDroppedOrReplacedAndOtherViewsStay) {
+TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
   by_hand("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
   const auto before = objects();
   ASSERT_EQ(before.size(), 9U);
@@ -406,7 +407,7 @@ TEST_F(SchemaTest, TriggersOfTheFileDoNotRunWithTheChangesOfAServer) {
   EXPECT_THAT(rows("SELECT priority FROM studies"), ElementsAre("7"));
 }
 
-TEST_F(SchemaTest, AFileWithATableInThePlaceOfAViewIsRefusedAndTheTableStays) {
+TEST_F(SchemaTest, AFileWithATableNamedLikeAViewIsRefusedUnchanged) {
   by_hand("DROP VIEW runs; CREATE TABLE runs (mine)");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
   EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
@@ -430,7 +431,7 @@ class StoreFilesTest : public StoreFixture {
   static std::int64_t rows_of(const std::string& path) {
     return std::stoll(rows(path, "SELECT count(*) FROM results").at(0));
   }
-  /// Rows in the database file alone, without its log.
+  /// Number of rows in the database file, without its log.
   std::int64_t rows_of_copy(const std::string& name) {
     fs::copy_file(path_, folder_.file(name));
     return rows_of(folder_.file(name));
@@ -451,7 +452,7 @@ TEST_F(StoreFilesTest, ACommitDuringWhichTheFileIsDeletedIsNotAcknowledged) {
   EXPECT_THROW(add_result(0), StorageGone);
 }
 
-TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced) {
+TEST_F(StoreFilesTest, NothingIsAcknowledgedAfterTheFileIsDeletedRenamedOrReplaced) {
   const std::map<std::string, std::function<void()>> blows{
       {"the database is deleted", [&] { fs::remove(path_); }},
       {"it is renamed", [&] { fs::rename(path_, folder_.file("elsewhere.db")); }},
@@ -474,7 +475,7 @@ TEST_F(StoreFilesTest, NothingIsAcknowledgedOnceAFileIsDeletedRenamedOrReplaced)
   }
 }
 
-TEST_F(StoreFilesTest, ARenamedDatabaseGetsWhatWasAcknowledgedWhenItsServerEnds) {
+TEST_F(StoreFilesTest, ARenamedDatabaseGetsAllAcknowledgedChangesWhenItsServerEnds) {
   add_result(0);
   add_result(1);
   const std::string elsewhere = folder_.file("elsewhere.db");
@@ -486,7 +487,7 @@ TEST_F(StoreFilesTest, ARenamedDatabaseGetsWhatWasAcknowledgedWhenItsServerEnds)
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(StoreFilesTest, AReaderInTheMiddleOfAQueryKeepsTheLogAndOneThatOnlyWaitsDoesNot) {
+TEST_F(StoreFilesTest, ARunningQueryKeepsTheLogAndAnIdleReaderDoesNot) {
   add_result(0);
   EXPECT_EQ(rows_of_copy("before.db"), 0) << "it is in the log";
   const DatabaseHandle waits = open_database(path_, SQLITE_OPEN_READONLY);
@@ -498,14 +499,14 @@ TEST_F(StoreFilesTest, AReaderInTheMiddleOfAQueryKeepsTheLogAndOneThatOnlyWaitsD
     add_result(1);
     EXPECT_FALSE(store().merge_log());
     EXPECT_GT(fs::file_size(path_ + "-wal"), 0U);
-    add_result(2);  // and it goes on
+    add_result(2);  // the server continues
   }
   EXPECT_TRUE(store().merge_log());
   EXPECT_EQ(fs::file_size(path_ + "-wal"), 0U);
   EXPECT_EQ(rows_of_copy("after.db"), 3);
 }
 
-TEST_F(StoreFilesTest, ANewDatabaseIsForItsOwnerAloneAndAnOldOneKeepsItsMode) {
+TEST_F(StoreFilesTest, OnlyItsOwnerMayReadANewDatabaseAndAnOldOneKeepsItsMode) {
   const auto mode_of = [](const std::string& path) {
     struct stat found {};
     EXPECT_EQ(::stat(path.c_str(), &found), 0) << path;

@@ -25,7 +25,7 @@ using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 using Kind = WriteReport::Kind;
 
-/// A database that fails when a test says so.
+/// A database that fails on request.
 class TestStorage final : public Storage {
  public:
   void commit(std::span<const Change> changes) override {
@@ -65,7 +65,7 @@ class TestStorage final : public Storage {
     is_interrupted.notify_all();
   }
 
-  /// Called for each change of a commit, which fails when this throws.
+  /// Called for each change of a commit; an exception makes the commit fail.
   std::function<void(const Change&)> on_change = [this](const Change&) {
     if (is_full) {
       throw StorageError("the disk is full");
@@ -79,7 +79,7 @@ class TestStorage final : public Storage {
   std::atomic<int> parts_left = 0;
   std::atomic<bool> is_interrupted = false;
   std::vector<std::size_t> sizes;      ///< of the commits that succeeded
-  std::vector<std::uint64_t> workers;  ///< that were added
+  std::vector<std::uint64_t> workers;  ///< added workers
 };
 
 WriteJob kept(std::uint64_t ticket) {
@@ -94,7 +94,7 @@ WriteJob answered(std::uint64_t ticket, std::uint64_t study = 1) {
 /// Kinds and tickets of reports.
 using Reports = std::vector<std::pair<Kind, std::uint64_t>>;
 
-Reports told(const std::vector<WriteReport>& reports) {
+Reports kinds_and_tickets(const std::vector<WriteReport>& reports) {
   Reports found;
   for (const WriteReport& report : reports) {
     found.emplace_back(report.kind, report.ticket);
@@ -104,8 +104,7 @@ Reports told(const std::vector<WriteReport>& reports) {
 
 class GroupCommitTest : public testing::Test {
  protected:
-  /// Writes the jobs once.
-  Reports write() { return told(commits_.write(jobs_)); }
+  Reports write() { return kinds_and_tickets(commits_.write(jobs_)); }
 
   TestStorage storage_;
   GroupCommit commits_{storage_};
@@ -122,7 +121,7 @@ TEST_F(GroupCommitTest, OneBadChangeDoesNotBlockTheOthers) {
   EXPECT_EQ(write(), (Reports{{Kind::kStored, 1}, {Kind::kRefused, 2}, {Kind::kStored, 3}}));
 }
 
-TEST_F(GroupCommitTest, ResultsWaitForAFullDiskOrMemoryAndAreWrittenWhenThereIsRoom) {
+TEST_F(GroupCommitTest, ResultsWaitWhileDiskOrMemoryIsFull) {
   for (const bool is_memory : {false, true}) {
     storage_.workers.clear();
     storage_.on_change = [is_memory](const Change&) {
@@ -139,7 +138,7 @@ TEST_F(GroupCommitTest, ResultsWaitForAFullDiskOrMemoryAndAreWrittenWhenThereIsR
   }
 }
 
-TEST_F(GroupCommitTest, AChangeThatWaitsIsNotOvertakenByALaterOneOfItsStudy) {
+TEST_F(GroupCommitTest, ALaterChangeDoesNotOvertakeAWaitingOneOfItsStudy) {
   storage_.on_change = [](const Change& change) {
     if (!std::holds_alternative<ForgetFailures>(change)) {
       throw StorageError("the disk is full");
@@ -175,7 +174,7 @@ TEST_F(GroupCommitTest, ALookupOfResultsIsTheLastChangeOfItsTransactionAndMayFai
   EXPECT_FALSE(commits_.is_faulty());
 }
 
-TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone) {
+TEST_F(GroupCommitTest, CommitsToADeletedFileAreNotReportedAsStored) {
   storage_.goes_in_commit = true;
   jobs_ = {kept(1), answered(2)};
   EXPECT_EQ(write(), (Reports{{Kind::kGone, 0}}));
@@ -185,10 +184,10 @@ TEST_F(GroupCommitTest, NothingIsReportedStoredThatWasCommittedToAFileThatIsGone
   EXPECT_THAT(storage_.sizes, ElementsAre(2));
 }
 
-TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
+TEST_F(GroupCommitTest, EveryOperationDetectsAMissingFile) {
   using Way = std::function<void(GroupCommit&, std::vector<WriteReport>&)>;
   const std::vector<Way> ways{
-      [](auto& commits, auto& reports) { reports = commits.tend(); },
+      [](auto& commits, auto& reports) { reports = commits.maintain(); },
       [](auto& commits, auto& reports) { EXPECT_FALSE(commits.merge(reports)); },
       [](auto& commits, auto& reports) { EXPECT_FALSE(commits.clear(10, reports)); }};
   storage_.is_gone = true;
@@ -197,28 +196,28 @@ TEST_F(GroupCommitTest, AFileThatIsGoneIsNoticedInWhateverIsDone) {
     commits.resume_deletions();
     std::vector<WriteReport> reports;
     way(commits, reports);
-    EXPECT_EQ(told(reports), (Reports{{Kind::kGone, 0}}));
+    EXPECT_EQ(kinds_and_tickets(reports), (Reports{{Kind::kGone, 0}}));
     EXPECT_TRUE(commits.is_gone());
     EXPECT_FALSE(commits.has_to_clear());
-    EXPECT_THAT(commits.tend(), IsEmpty()) << "reported once";
+    EXPECT_THAT(commits.maintain(), IsEmpty()) << "reported once";
   }
 }
 
 TEST_F(GroupCommitTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersAllowIt) {
-  commits_.tend();
+  commits_.maintain();
   EXPECT_EQ(storage_.merges, 0) << "no study is done";
   jobs_ = {kept(1), answered(2)};
   write();
   storage_.merged_at = 8;
   std::vector<WriteReport> reports;
   for (int i = 0; i < 20; ++i) {
-    std::ranges::move(commits_.tend(), std::back_inserter(reports));
+    std::ranges::move(commits_.maintain(), std::back_inserter(reports));
   }
   EXPECT_EQ(storage_.merges, 8);
-  EXPECT_EQ(told(reports), (Reports{{Kind::kUnmerged, 0}})) << "reported once";
+  EXPECT_EQ(kinds_and_tickets(reports), (Reports{{Kind::kUnmerged, 0}})) << "reported once";
 }
 
-TEST_F(GroupCommitTest, AStepOfADeletionThatFailsIsRepeatedAndReportsNothing) {
+TEST_F(GroupCommitTest, AFailedDeletionStepIsRepeatedWithoutAReport) {
   EXPECT_FALSE(commits_.has_to_clear()) << "not before it is told";
   commits_.resume_deletions();
   storage_.parts_left = 2;
@@ -287,7 +286,7 @@ TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
   EXPECT_EQ(writer_.finish(), 1U) << "it is not durable";
 }
 
-TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsOneThatReadersKeep) {
+TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsFailure) {
   storage_.merged_at = 1'000'000;
   writer_.submit(kept(1));
   EXPECT_EQ(writer_.finish(), 0U);
@@ -295,7 +294,7 @@ TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsOneThatReadersK
   EXPECT_EQ(count(Kind::kUnmerged), 1U);
 }
 
-TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWithoutAny) {
+TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWhenIdle) {
   writer_.submit(kept(1));
   ASSERT_EQ(wait_for_ticket(1), Kind::kStored);
   storage_.parts_left = 300;

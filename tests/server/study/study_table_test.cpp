@@ -23,7 +23,7 @@ protocol::Recipe recipe_of_mu(const protocol::Axis& mu) {
   return protocol::recipe_of({{listed("H", {1.0}), mu, listed("e", {1.0})}});
 }
 
-StudyTable judged(const protocol::Recipe& recipe) {
+StudyTable validated(const protocol::Recipe& recipe) {
   return StudyTable(std::make_shared<const protocol::PointTable>(recipe));
 }
 
@@ -31,15 +31,15 @@ StudyTable stored(const protocol::Recipe& recipe, std::uint64_t points) {
   return StudyTable(recipe.SerializeAsString(), points);
 }
 
-TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
+TEST(StudyTable, GrowsByBlocksOnlyWhetherOrNotTheTablesAreMade) {
   protocol::Recipe before = recipe_of_mu(listed("mu", {0.1, 0.2}));
   protocol::Recipe longer = before;
   *longer.add_blocks() = recipe_of_mu(listed("mu", {0.3})).blocks(0);
   for (const bool with_errors : {false, true}) {
     before.set_errors(with_errors);
     longer.set_errors(with_errors);
-    for (const StudyTable& one : {judged(before), stored(before, 2)}) {
-      for (const StudyTable& other : {judged(longer), stored(longer, 3)}) {
+    for (const StudyTable& one : {validated(before), stored(before, 2)}) {
+      for (const StudyTable& other : {validated(longer), stored(longer, 3)}) {
         EXPECT_EQ(one.growth_to(other).kind, Growth::Kind::kLonger);
         EXPECT_EQ(other.growth_to(one).kind, Growth::Kind::kShorter);
         EXPECT_EQ(one.growth_to(one).kind, Growth::Kind::kSame);
@@ -47,20 +47,22 @@ TEST(StudyTable, GrowsByBlocksWhicheverOfBothTablesIsMadeAndByNothingElse) {
     }
   }
   before.set_errors(false);
-  EXPECT_EQ(judged(before).growth_to(judged(longer)).kind, Growth::Kind::kOther) << "errors differ";
+  EXPECT_EQ(validated(before).growth_to(validated(longer)).kind, Growth::Kind::kOther)
+      << "errors differ";
   longer.set_errors(false);
   *longer.mutable_model() = protocol::to_message(solver::preset("converged"));
-  EXPECT_EQ(judged(before).growth_to(judged(longer)).kind, Growth::Kind::kOther) << "models differ";
+  EXPECT_EQ(validated(before).growth_to(validated(longer)).kind, Growth::Kind::kOther)
+      << "models differ";
 }
 
 TEST(StudyTable, DamagedBytesCannotBeCompared) {
   const StudyTable damaged(std::string("\xff"), 1);
-  EXPECT_THROW(damaged.growth_to(judged(recipe_of_mu(listed("mu", {0.1})))), std::runtime_error);
+  EXPECT_THROW(damaged.growth_to(validated(recipe_of_mu(listed("mu", {0.1})))), std::runtime_error);
 }
 
-TEST(StudyTable, ComparesWithoutMakingTheTableOfAStudyThatRests) {
+TEST(StudyTable, ComparesWithoutMakingReleasedTables) {
   const auto resting = stored(recipe_of_mu(range("mu", 0.1, 0.5, 5)), 5);
-  (void)resting.growth_to(judged(recipe_of_mu(listed("mu", {1, 2, 3, 4, 5}))));
+  (void)resting.growth_to(validated(recipe_of_mu(listed("mu", {1, 2, 3, 4, 5}))));
   EXPECT_FALSE(resting.is_made());
 }
 
@@ -80,7 +82,7 @@ protocol::Recipe recipe_of_sample(protocol::SampleKind kind, std::uint64_t count
       {protocol::uniform("H", 0.3, 1.1), listed("mu", {0.4}), listed("e", {1.0})}, kind, count)});
 }
 
-TEST(RecipeGrowth, FewerBlocksAreShorterAndTheNumbersAreSaid) {
+TEST(RecipeGrowth, FewerBlocksAreShorterAndTheirNumbersAreNamed) {
   const Growth growth = growth_of(blocks_of({kFiveMus, kTwoMus}), blocks_of({kFiveMus}));
   EXPECT_EQ(growth.kind, Growth::Kind::kShorter);
   EXPECT_EQ(growth.difference, "stored 2 blocks, given 1");
@@ -102,7 +104,7 @@ TEST(RecipeGrowth, AxesInAnotherOrderDiffer) {
   EXPECT_EQ(growth_of(of(k, eta2), of(eta2, k)).kind, Growth::Kind::kOther);
 }
 
-TEST(RecipeGrowth, KeysOfTheModelAndTheChoiceOfErrorsAreNamed) {
+TEST(RecipeGrowth, DifferingModelKeysAndErrorsAreNamed) {
   auto given = blocks_of({kFiveMus, kTwoMus});
   auto model = solver::preset("paper");
   model.k_N_m = 1e7;

@@ -1,4 +1,4 @@
-// Over real sockets of the loopback device, with what sound and hostile peers send; and the rules
+// The HTTP server on loopback sockets, with correct and malicious peers; and the request rules
 // alone.
 #include "server/web/http/http_server.h"
 
@@ -36,8 +36,8 @@ using testing::Not;
 
 const std::string kEnd = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
-/// Repeats the path of a request; /large does so at length. /wait is answered after `open`, /wrong
-/// and /broken throw, /loud and /quiet are streams that always, or never, have more.
+/// Returns the path of a request; /large returns it many times. /wait is answered after `open`;
+/// /wrong and /broken throw; /loud is an endless stream and /quiet one without output.
 class EchoServer {
  public:
   explicit EchoServer(const HttpLimits& limits = {})
@@ -58,7 +58,7 @@ class EchoServer {
   /// Number of pending answers and streams.
   long in_progress() const { return token_.use_count() - 1; }
   static constexpr std::size_t kLargeBytes = 50'000'000;  // more than sockets buffer
-  /// Wakes the server, as its owner does regularly, until that many are in progress.
+  /// Wakes the server regularly, as its owner does, until that many are in progress.
   void wake_until_in_progress(long count) {
     while (in_progress() != count) {
       server_.wake();
@@ -97,7 +97,7 @@ class EchoServer {
   HttpServer server_;  // last: its thread uses the others
 };
 
-/// A peer that has requested a path, and read the head of the answer if it is a stream.
+/// A peer that has requested a path and, for a stream, read the head of the answer.
 std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
   auto peer = std::make_unique<RawHttp>(server.url());
   peer->send("GET " + path + kEnd);
@@ -201,7 +201,7 @@ TEST(HttpServer, SurvivesAnyBytes) {
   EXPECT_EQ(body_of(get(server.url(), "/after")), "/after\n");
 }
 
-TEST(HttpServer, AnAddressWithItsShareOfConnectionsTakesNoneFromOthers) {
+TEST(HttpServer, AnAddressAtItsConnectionLimitDoesNotAffectOthers) {
   HttpLimits limits;
   limits.connections_of_one_address = 4;
   const EchoServer server(limits);
@@ -221,7 +221,7 @@ TEST(HttpServer, AnswersAgainWhenTooManyConnectionsHaveEnded) {
   }
 }
 
-TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
+TEST(HttpServer, AnIdleConnectionEnds) {
   HttpLimits limits;
   limits.idle = std::chrono::seconds(1);
   EchoServer server(limits);
@@ -236,7 +236,7 @@ TEST(HttpServer, APeerThatNeitherSendsNorTakesAnythingIsEnded) {
   EXPECT_FALSE(quiet->has_news()) << "it takes all that there is";
 }
 
-TEST(HttpServer, APeerWithoutEndIsEnded) {
+TEST(HttpServer, ATooSlowTransferEnds) {
   HttpLimits limits;
   limits.idle = test::kHangLimit;
   EchoServer server(limits);
@@ -278,7 +278,8 @@ TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
     closing.reset();
     server.wake_until_in_progress(1);
   }
-  for (const std::string path : {"/wait", "/quiet"}) {  // browsers may close their half first
+  // browsers may close their sending half first
+  for (const std::string path : {"/wait", "/quiet"}) {
     const auto halving = begin(server, path);
     server.wake_until_in_progress(2);
     ::shutdown(halving->number(), SHUT_WR);
@@ -302,7 +303,7 @@ TEST(HttpServer, APendingAnswerDelaysNoOther) {
   }
 }
 
-TEST(HttpServer, StreamsAreBounded) {
+TEST(HttpServer, StreamsAreLimited) {
   HttpLimits limits;
   limits.streams = 2;
   EchoServer server(limits);
@@ -329,7 +330,7 @@ TEST(HttpServer, StopsWhileRequestsWait) {
   EXPECT_EQ(streaming->read_to_the_end(), "");
 }
 
-TEST(HttpServer, DoesNotListenElsewhereWithoutDescriptors) {
+TEST(HttpServer, FailsToListenWithoutDescriptors) {
   rlimit usual{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
   rlimit one = usual;
@@ -365,7 +366,7 @@ unsigned status_of(const std::string& method, const std::string& path, const Hea
   return refusal ? refusal->status : 200;
 }
 
-TEST(RequestRules, OnLoopbackOnlyNamesOfLoopbackAreAnswered) {
+TEST(RequestRules, OnLoopbackOnlyLoopbackNamesAreAccepted) {
   for (const auto host : protocol::split(
            "127.0.0.1:7602 localhost localhost:1 localhost: [::1]:7602 [::1] 127.8.9.10:80"
            " LOCALHOST:7602",
@@ -385,7 +386,7 @@ TEST(RequestRules, OnLoopbackOnlyNamesOfLoopbackAreAnswered) {
   }
 }
 
-TEST(RequestRules, BeyondLoopbackAnyAddressIsAnsweredAndOnlyNamesThatWereGiven) {
+TEST(RequestRules, BeyondLoopbackAnyAddressAndTheGivenNamesAreAccepted) {
   const OwnNames own{false, {"oblique.lab"}};
   for (const std::string host : {"10.1.2.3:7602", "[2001:db8::1]:7602", "127.0.0.1", "localhost",
                                  "oblique.lab:7602", "Oblique.Lab"}) {
@@ -415,7 +416,7 @@ void expect_statuses(const std::vector<RequestRow>& rows) {
   }
 }
 
-TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
+TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutALimit) {
   expect_statuses({
       {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
       {"HEAD", "/", {kHost}, 200},
@@ -435,7 +436,7 @@ TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutABound) {
   }
 }
 
-TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
+TEST(RequestRules, RefuseRequestsOfOtherSites) {
   const Header same{"sec-fetch-site", "same-origin"};
   expect_statuses({
       {"POST", "/", {kHost, kOrigin}, 200},
@@ -461,7 +462,7 @@ TEST(RequestRules, RefuseWhatPagesOfOtherSitesSend) {
   }
 }
 
-TEST(RequestRules, OfOtherSitesOnlyAFollowedLinkToThePageIsAnswered) {
+TEST(RequestRules, OtherSitesMayOnlyLinkToThePage) {
   const Header cross{"sec-fetch-site", "cross-site"};
   const Header tab{"sec-fetch-mode", "navigate"};
   const Header page{"sec-fetch-dest", "document"};
@@ -512,7 +513,7 @@ WebSettings settings_of(const std::vector<std::string>& arguments) {
   return options.settings().value();
 }
 
-TEST(HttpOptions, OnlyTheDefaultAddressMayBeTakenAndNamesAreInLowerCase) {
+TEST(HttpOptions, OnlyTheDefaultAddressMayBeInUseAndNamesAreInLowerCase) {
   EXPECT_EQ(settings_of({}).address.address, "127.0.0.1");
   EXPECT_EQ(settings_of({}).address.port, "7602");
   EXPECT_TRUE(settings_of({}).may_be_missing);

@@ -15,9 +15,9 @@ class RawHttp : public test::RawTcp {
  public:
   using RawTcp::RawTcp;
 
-  /// False when the server takes no more.
+  /// False if the server accepts no more.
   bool send(const std::string& bytes) { return send_all(bytes); }
-  /// What comes until those bytes have; what follows them waits.
+  /// Receives until these bytes have arrived; later bytes wait.
   std::string read_until(const std::string& end) {
     std::string all;
     while (!all.ends_with(end)) {
@@ -33,7 +33,7 @@ class RawHttp : public test::RawTcp {
     send(bytes);
     return read_to_the_end();
   }
-  /// The server has said something, or ended the connection.
+  /// Whether the server has sent something or ended the connection.
   bool has_news() const {
     pollfd item{number(), POLLIN, 0};
     return ::poll(&item, 1, 0) == 1;
@@ -44,7 +44,7 @@ inline std::string get(const std::string& url, const std::string& path) {
   return RawHttp(url).ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
 }
 
-/// 0 where there is no answer.
+/// The status; 0 without an answer.
 inline int status_of_answer(const std::string& answer) {
   return answer.starts_with("HTTP/1.") ? std::stoi(answer.substr(answer.find(' ') + 1)) : 0;
 }

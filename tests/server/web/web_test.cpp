@@ -25,7 +25,7 @@
 namespace oblique::server {
 namespace {
 
-/// Takes everything.
+/// Ports that accept everything.
 class TakingStorage final : public Storage {
  public:
   void commit(std::span<const Change> /*changes*/) override {}
@@ -51,7 +51,7 @@ class SnapshotTest : public ServiceTest {
   Writer writer_{storage_, [](const auto&) {}};
 };
 
-TEST_F(SnapshotTest, FollowsPointsOnTheirWay) {
+TEST_F(SnapshotTest, FollowsThePointsOfAStudy) {
   submit("a", 100);
   EXPECT_EQ(snapshot().points_open, 100U);
   EXPECT_EQ(snapshot().points_leased, 0U);
@@ -85,7 +85,7 @@ TEST_F(SnapshotTest, CountsAWorkerOnce) {
   EXPECT_EQ(workers(snapshot(), WorkerState::kIdle), 1U);
 }
 
-TEST_F(SnapshotTest, CountsOnlyWhatRunsAsOpen) {
+TEST_F(SnapshotTest, CountsOnlyRunningStudiesAsOpen) {
   submit("runs", 10);
   submit("paused", 20);
   submit("cancelled", 40);
@@ -120,7 +120,7 @@ TEST_F(SnapshotTest, LeavesOutAStudyThatIsNotDurable) {
   EXPECT_EQ(snapshot().studies_by_state, (std::array<std::uint64_t, kStudyStates>{}));
 }
 
-TEST_F(SnapshotTest, SaysWhyNothingIsStoredAndHowManyQueriesWait) {
+TEST_F(SnapshotTest, ShowsWhyNothingIsStoredAndHowManyQueriesWait) {
   for (std::uint64_t id = 1; id <= 2; ++id) {
     ClientRequest message = client_request(id);
     message.mutable_query()->set_sql("SELECT 1");
@@ -135,7 +135,7 @@ TEST_F(SnapshotTest, SaysWhyNothingIsStoredAndHowManyQueriesWait) {
   EXPECT_TRUE(snapshot().is_stopping);
 }
 
-TEST(Snapshot, ThreadsAreWantedForOpenPointsOnly) {
+TEST(Snapshot, WantsThreadsForOpenPointsOnly) {
   Snapshot snapshot;
   EXPECT_EQ(snapshot.threads_wanted(), 0U);
   snapshot.points_open = 1'000'000'000;
@@ -179,7 +179,7 @@ Metrics metrics_of(const Snapshot& snapshot) {
   return parse(metrics_text({snapshot, {4096.0, 0.0, 1e9}, {{200, 3}, {404, 1}}, "1.0"}));
 }
 
-TEST(Metrics, AreThoseThatTheReadmeLists) {
+TEST(Metrics, AreTheOnesInTheReadme) {
   std::map<std::string, std::string> listed;
   std::ifstream readme(OBLIQUE_WEB_README);
   const std::regex row(R"(\| `([a-z_]+)` \| (counter|gauge|histogram) \|.*)");
@@ -215,13 +215,13 @@ TEST(Metrics, ShowTheSnapshot) {
   EXPECT_EQ(values["oblique_http_requests_total{code=\"404\"}"], 1.0);
 }
 
-TEST(Health, IsThatTheEventLoopRuns) {
+TEST(Health, IsGoodWhileTheEventLoopRuns) {
   EXPECT_EQ(health(1000, 6000).status, 200U);
   EXPECT_EQ(health(1000, 8500).status, 503U);
   EXPECT_EQ(health(1000, 8500).body, "the server's event loop has not run for 7.5 s\n");
 }
 
-TEST(Health, ReadinessNamesWhatIsMissing) {
+TEST(Health, ReadinessHasTheReason) {
   constexpr double kPlenty = 1e12;
   EXPECT_EQ(readiness({}, kPlenty).status, 200U);
   EXPECT_EQ(readiness({}, std::numeric_limits<double>::quiet_NaN()).status, 200U);  // unknown
@@ -229,11 +229,11 @@ TEST(Health, ReadinessNamesWhatIsMissing) {
   faulty.database_fault = "disk I/O error\n\x1b[2J";
   EXPECT_EQ(readiness(faulty, kPlenty).status, 503U);
   EXPECT_EQ(readiness(faulty, kPlenty).body,
-            "the database takes no results: disk I/O error\\n\\x1b[2J\n");
+            "the database accepts no results: disk I/O error\\n\\x1b[2J\n");
   Snapshot stopping;
   stopping.is_stopping = true;
   EXPECT_EQ(readiness(stopping, kPlenty).status, 503U);
-  EXPECT_EQ(readiness({}, 1e6).body, "the database's disk has 1 MB left\n");
+  EXPECT_EQ(readiness({}, 1e6).body, "the disk of the database has 1 MB left\n");
 }
 
 WebSettings anywhere() {
@@ -243,7 +243,7 @@ WebSettings anywhere() {
   return settings;
 }
 
-TEST(Web, SaysThatTheServerStartsBeforeTheLoopRuns) {
+TEST(Web, ReportsThatTheServerStartsBeforeTheLoopRuns) {
   const Web web(anywhere());
   EXPECT_EQ(body_of(get(web.url(), "/healthz")), "the server runs\n");
   for (const std::string path : {"/metrics", "/readyz"}) {
@@ -269,8 +269,8 @@ class WebTest : public testing::Test {
 };
 
 TEST_F(WebTest, MetricsFollowTheServer) {
-  PretendedClient(server_.client_endpoint()).submit("a", 20);
-  PretendedWorker worker(server_.worker_endpoint());
+  SimulatedClient(server_.client_endpoint()).submit("a", 20);
+  SimulatedWorker worker(server_.worker_endpoint());
   worker.hello();
   worker.work(20);
   EXPECT_THAT(get_started("/metrics"),
@@ -289,9 +289,9 @@ TEST_F(WebTest, MetricsFollowTheServer) {
             1.0);
 }
 
-TEST_F(WebTest, NamesItsPaths) {
+TEST_F(WebTest, ErrorsNameThePaths) {
   EXPECT_EQ(body_of(get(server_.http_url(), "/healthz")), "the server runs\n");
-  EXPECT_EQ(body_of(get_started("/readyz")), "the server takes work\n");
+  EXPECT_EQ(body_of(get_started("/readyz")), "the server accepts work\n");
   for (const std::string path : {"/metrics/", "/Metrics", "//metrics", "/../metrics", "*"}) {
     const std::string answer = get(server_.http_url(), path);
     EXPECT_EQ(status_of_answer(answer), 404) << path;
@@ -299,7 +299,7 @@ TEST_F(WebTest, NamesItsPaths) {
   }
 }
 
-TEST(Web, AServerWithoutAPortOfItsOwnGoesOnOnlyIfItMay) {
+TEST(Web, AServerRunsWithoutHttpOnlyIfItMay) {
   const test::TemporaryFolder folder;
   const RunningServer first(folder.file("a.db"), {}, {}, {}, {}, anywhere());
   WebSettings taken = anywhere();
@@ -310,7 +310,7 @@ TEST(Web, AServerWithoutAPortOfItsOwnGoesOnOnlyIfItMay) {
   taken.may_be_missing = true;
   const RunningServer second(folder.file("b.db"), {}, {}, {}, {}, taken);
   EXPECT_EQ(second.http_url(), "");
-  EXPECT_EQ(PretendedClient(second.client_endpoint()).submit("a", 5).kind_case(),
+  EXPECT_EQ(SimulatedClient(second.client_endpoint()).submit("a", 5).kind_case(),
             ClientReply::kSubmit);
 }
 

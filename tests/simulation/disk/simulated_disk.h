@@ -32,7 +32,6 @@ using server::SetPriority;
 using server::SetStudyState;
 using server::StudyState;
 
-/// The study that a change is of.
 template <typename Kind>
 std::uint64_t study_of(const Kind& change) {
   if constexpr (requires { change.study_id; }) {
@@ -42,21 +41,21 @@ std::uint64_t study_of(const Kind& change) {
   }
 }
 
-/// What a store gives to a server that starts.
+/// The contents that a store returns to a starting server.
 struct Found {
   std::vector<server::StoredStudy> studies;
   std::uint64_t last_study_id = 0;
   std::uint64_t last_worker_id = 0;
-  std::uint64_t starts = 0;  ///< of servers, this one included
+  std::uint64_t starts = 0;  ///< starts of servers, including this one
 };
 
-/// What a store must hold after the changes that it was given, kept in the plainest way. The real
-/// store is held against it. Throws Violation where they differ.
+/// A simple model of the contents that a store must have. The real store is compared with it.
+/// Throws Violation if they differ.
 class StoreModel {
  public:
   using Rows = std::map<std::uint64_t, std::shared_ptr<const protocol::PointResult>>;
 
-  /// The store took these changes. None may be a result for a point that has one.
+  /// The store has stored these changes. None may be a result for a point that has one.
   void stored(std::span<const server::Change> changes) {
     bool control = false;
     bool writes = false;
@@ -72,23 +71,23 @@ class StoreModel {
       entries_.push_back({{changes.begin(), changes.end()}, true});
     }
   }
-  /// The store refused them: they are not there, but as long as nothing was written in their place
-  /// a crash may bring them back, all or none.
+  /// The store refused these changes. As long as nothing was written in their place, a crash may
+  /// bring them back, all or none.
   void refused(std::span<const server::Change> changes) {
     ++failed_commits;
     entries_.push_back({{changes.begin(), changes.end()}, false});
   }
 
-  /// A commit with a full sync of something that is not held against this model.
+  /// A commit with a full sync of something that this model does not contain.
   void synced() {
     synced_ = now_;
     entries_.clear();
   }
 
-  /// What a store holds after a restart must be all that was stored, or, when power was lost, that
-  /// without the last commits since the one that was synced. Takes it for the truth.
+  /// Compares the contents after a restart with everything that was stored; after a power failure
+  /// the commits since the last full sync may be missing. Adopts them as the new state.
   void restarted(const Found& found, bool power_was_lost) {
-    // Without a loss of power only what was refused since the last commit is in doubt.
+    // Without a power failure only changes refused since the last commit are in doubt.
     const auto last_stored =
         std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& e) { return e.stored; });
     auto entry = power_was_lost ? entries_.begin() : last_stored.base();
@@ -126,7 +125,7 @@ class StoreModel {
       synced_ = now_;
       entries_.clear();
     } else if (came_back != entries_.end()) {
-      // It counts from now on. Others that were refused beside it may still come instead.
+      // It counts from now on. Other refused changes may still appear instead.
       came_back->stored = true;
       std::rotate(came_back, came_back + 1, entries_.end());
     }
@@ -152,16 +151,16 @@ class StoreModel {
   }
 
   std::uint64_t failed_commits = 0;
-  std::uint64_t undone_commits = 0;  ///< that losing power undid
-  std::uint64_t refused_kept = 0;    ///< that failed and were there after a crash
+  std::uint64_t undone_commits = 0;  ///< commits undone by power failures
+  std::uint64_t refused_kept = 0;    ///< refused changes that existed after a crash
 
  private:
   struct Contents {
     std::map<std::uint64_t, server::StoredStudy> studies;
     std::map<std::uint64_t, Rows> rows;
-    std::uint64_t last_study_id = 0;  ///< of deleted ones too
+    std::uint64_t last_study_id = 0;  ///< including deleted studies
     std::uint64_t last_worker_id = 0;
-    bool has_deleted = false;  ///< then rows of workers may be gone, the last one's too
+    bool has_deleted = false;  ///< rows of workers may then be gone, even the last one
 
     bool operator==(const Found& found) const {
       return last_study_id == found.last_study_id &&
@@ -185,7 +184,7 @@ class StoreModel {
     std::vector<server::Change> changes;
     bool stored;
   };
-  /// Says whether anything had to be written.
+  /// Whether anything had to be written.
   static bool apply(const server::Change& change, Contents& contents) {
     if (const auto* study = std::get_if<AddStudy>(&change)) {
       contents.last_study_id = std::max(contents.last_study_id, study->study_id);
@@ -270,11 +269,11 @@ class StoreModel {
   }
 
   Contents now_;
-  Contents synced_;             // at the last commit with a full sync
-  std::vector<Entry> entries_;  // what came since, in order
+  Contents synced_;             // contents at the last commit with a full sync
+  std::vector<Entry> entries_;  // later changes, in order
 };
 
-// The store locks its database there; the contents are elsewhere.
+// The store locks a file there; the contents are in memory.
 inline const std::string& database_path() {
   static const test::TemporaryFolder kFolder;
   static const std::string kPath = kFolder.file("database");
@@ -293,11 +292,11 @@ inline const std::string& empty_database() {
   return kImage;
 }
 
-/// What the first server finds at the path of its database.
+/// The file that the first server finds.
 enum class DiskAtFirst { kEmptyDatabase, kEmptyFile };
 
-/// The real store on simulated files, held against a model after each restart. Whoever commits
-/// must look whether the process died on the way.
+/// The real store on simulated files, compared with a model after each restart. After a commit the
+/// caller must check whether the process died in it.
 class SimulatedDisk final : public server::Storage {
  public:
   explicit SimulatedDisk(World& world, DiskAtFirst at_first = DiskAtFirst::kEmptyDatabase)
@@ -307,12 +306,12 @@ class SimulatedDisk final : public server::Storage {
         checkpoint_pages_(static_cast<int>(
             std::array{4, 16, 64, 1000}.at(static_cast<std::size_t>(world.between(0, 3))))) {}
 
-  /// A server starts. Throws StorageError when the disk is at fault, Violation when what the store
-  /// has is not what it must have.
+  /// Starts a server. Throws StorageError after a fault of the disk, and Violation if the contents
+  /// of the store are wrong.
   Found open() {
     files_.start();
     store_ = std::make_unique<server::Store>(files_.path());
-    // Checkpoints come more often than in a server, for these databases are small.
+    // Checkpoints are more frequent than in a server, because these databases are small.
     store_->checkpoint_at(checkpoint_pages_);
     Found found{store_->studies(), store_->last_study_id(), store_->last_worker_id()};
     model_.restarted(found, power_was_lost_);
@@ -324,9 +323,9 @@ class SimulatedDisk final : public server::Storage {
     model_.synced();
     return found;
   }
-  /// The server ends in an orderly way.
+  /// Ends the server normally.
   void close() { store_.reset(); }
-  /// The server is killed, or the machine loses power; also while no server runs.
+  /// Kills the server or cuts the power; also possible while no server runs.
   void crash(bool power_is_lost) {
     if (power_is_lost) {
       files_.lose_power();
@@ -336,7 +335,7 @@ class SimulatedDisk final : public server::Storage {
     }
     store_.reset();
   }
-  /// The process died while it wrote.
+  /// Whether the process died during a write.
   bool died() const { return !files_.is_used(); }
   /// A store may fail.
   bool is_at_fault() const {
@@ -360,9 +359,9 @@ class SimulatedDisk final : public server::Storage {
     cleared_rows += store_->cleared_rows() - before;
     return cleared;
   }
-  std::uint64_t cleared_rows = 0;  ///< of deleted studies
+  std::uint64_t cleared_rows = 0;  ///< rows of deleted studies
 
-  /// Compares every row with the model's, and lets SQLite look for damage. Throws Violation.
+  /// Compares every row with the model and runs SQLite's checks. Throws Violation.
   void check_rows() {
     using server::Statement;
     const auto database = server::open_database(files_.path(), SQLITE_OPEN_READONLY);

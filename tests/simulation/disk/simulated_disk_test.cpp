@@ -1,4 +1,4 @@
-// The store on the simulated disk, without the rest of the world: every moment of a short life.
+// The store on the simulated disk alone, interrupted at every operation of a short run.
 #include "tests/simulation/disk/simulated_disk.h"
 
 #include <memory>
@@ -31,7 +31,7 @@ server::AddResults result(const server::AddStudy& study, std::uint64_t point) {
   return results;
 }
 
-/// Opens the store and makes the changes that it lacks.
+/// Opens the store and makes the missing changes.
 void solve_all(SimulatedDisk& disk) {
   disk.open();
   for (std::uint64_t id = 1; id <= 3; ++id) {
@@ -49,7 +49,7 @@ void solve_all(SimulatedDisk& disk) {
   }
 }
 
-/// Solves all and closes the store. False when the process died on the way.
+/// Solves all points and closes the store. False if the process died.
 bool live(SimulatedDisk& disk) {
   try {
     solve_all(disk);
@@ -60,7 +60,7 @@ bool live(SimulatedDisk& disk) {
   return !disk.died();
 }
 
-TEST(FailingSync, EndsTheServerAndLosesNoStudyWhenThePowerGoes) {
+TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
   std::uint64_t failures = 0;
   for (std::int64_t sync = 1;; ++sync) {
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
@@ -87,14 +87,14 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyWhenThePowerGoes) {
       }
       ++failures;
       EXPECT_TRUE(ended) << "sync " << sync << ", seed " << seed;
-      // A server that starts again builds on what it finds, and then the power goes.
+      // A restarted server continues from the contents, and then the power fails.
       const bool starts_again = seed % 2 == 0;
       if (starts_again) {
         disk.crash(false);
         ASSERT_NO_THROW(solve_all(disk)) << "sync " << sync << ", seed " << seed;
       }
       disk.crash(true);
-      // The model refuses what is not there any more and was promised.
+      // The model detects missing acknowledged changes.
       ASSERT_NO_THROW(disk.open()) << "sync " << sync << ", seed " << seed;
       disk.check_rows();
     }
@@ -103,7 +103,7 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyWhenThePowerGoes) {
 
 class SimulatedDiskTest : public testing::TestWithParam<bool> {};
 
-TEST_P(SimulatedDiskTest, NoDeathInAnyOperationLosesWhatWasPromised) {
+TEST_P(SimulatedDiskTest, NoAcknowledgedChangeIsLostWhicheverOperationIsInterrupted) {
   const bool power_is_lost = GetParam();
   bool survived = false;
   std::uint64_t deaths = 0;

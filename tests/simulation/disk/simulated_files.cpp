@@ -27,7 +27,7 @@ struct Vfs {
   std::map<std::string, SimulatedFiles*> files;  // by the path of the database
   std::mt19937_64 random;
 
-  /// Those that a name belongs to: a database, its log or its journal; or nullptr.
+  /// The files that a name belongs to, as database, log or journal; or nullptr.
   SimulatedFiles* owner_of(std::string_view name) const {
     for (const auto& [path, owner] : files) {
       if (name.starts_with(path)) {
@@ -47,12 +47,12 @@ struct Handle : sqlite3_file {
   SimulatedFiles* files = nullptr;
   std::shared_ptr<SimulatedFile> file;
   std::uint64_t life = 0;
-  bool syncs_directory = false;  // its name may be new
+  bool syncs_directory = false;  // its name may not be synced yet
   std::shared_ptr<SharedMemory> memory;
   std::array<bool, SQLITE_SHM_NLOCK> shared{};
   std::array<bool, SQLITE_SHM_NLOCK> exclusive{};
 
-  /// Its process is gone.
+  /// Whether its process is gone.
   bool is_dead() const { return life != files->life(); }
 };
 
@@ -243,7 +243,7 @@ int open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* fla
   handle->files = files;
   handle->file = std::move(opened);
   handle->life = files->life();
-  // As the default VFS does: for a database it leaves that to its log and journal.
+  // As the default VFS: for a database the log and journal do this.
   handle->syncs_directory = (flags & SQLITE_OPEN_CREATE) != 0 && (flags & SQLITE_OPEN_MAIN_DB) == 0;
   if (flags_out != nullptr) {
     *flags_out = flags;
@@ -303,12 +303,12 @@ void remove_from_vfs(SimulatedFiles& files) {
 
 // ---- The disk's side ----------------------------------------------------------------------------
 
-/// What disks write whole.
+/// Size that disks write atomically.
 constexpr std::size_t kSector = 512;
-/// What systems keep in memory, and write to disks, together.
+/// Size of pages that systems cache and write.
 constexpr std::size_t kPage = 4096;
 
-/// The part of a write that is done when the rest fails.
+/// The part of a write that is done before it fails.
 std::string_view some_of(World& world, std::string_view bytes) {
   return bytes.substr(
       0, static_cast<std::size_t>(world.between(0, static_cast<std::int64_t>(bytes.size()))));
@@ -318,7 +318,8 @@ std::string_view some_of(World& world, std::string_view bytes) {
 
 // ---- One file ----------------------------------------------------------------------------------
 
-/// Draws which steps reached the disk: the first ones and part of the next, or any of each sector.
+/// Draws which steps reached the disk: the first ones and part of the next, or any subset per
+/// sector.
 class SimulatedFile::Losses {
  public:
   Losses(World& world, const std::vector<Step>& steps)
@@ -337,7 +338,7 @@ class SimulatedFile::Losses {
   }
 
   bool keeps_size(std::int64_t step) const { return step < kept_; }
-  /// The size that the file has after a step that is kept in part.
+  /// The size of the file after a partial step.
   std::size_t torn_end(std::int64_t step, std::size_t end) const {
     return step == kept_ && !reordered_ ? std::min(end, torn_before_ * kSector) : 0;
   }
@@ -357,7 +358,7 @@ class SimulatedFile::Losses {
   std::int64_t steps_;
   bool reordered_;
   std::int64_t kept_;
-  std::size_t torn_before_ = 0;  // of step kept_, the sectors before this one are kept too
+  std::size_t torn_before_ = 0;  // sectors of step kept_ before this one are kept too
   std::map<std::size_t, std::int64_t> kept_of_sector_;
 };
 

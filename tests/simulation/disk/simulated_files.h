@@ -16,7 +16,7 @@
 
 namespace oblique::simulation {
 
-/// One file on a simulated disk: what a reader sees, and what of it losing power leaves.
+/// One file on a simulated disk: the contents for readers, and what survives a power failure.
 class SimulatedFile {
  public:
   SimulatedFile() = default;
@@ -26,18 +26,18 @@ class SimulatedFile {
   void write(std::size_t offset, std::string_view bytes);
   void truncate(std::size_t size);
   void sync();
-  /// A sync failed, and the system takes the pages for clean nevertheless, as Linux does: what was
-  /// written is read back and never gets to the disk, unless its page is written again.
+  /// A sync fails and the system marks the pages as clean, as Linux does: their contents can be
+  /// read, but reach the disk only if they are written again.
   void forget_unsynced();
 
-  /// What was synced stays. Of what was written since, the disk has any part: sectors are written
-  /// whole, in any order, and a sector written several times has any of its states. The size of the
-  /// file is another such thing. What is in the file and was never written is zero.
+  /// Loses power. Synced contents are kept; of later writes any part is: sectors are atomic, may
+  /// reach the disk in any order, and may have any of their states. The file size is kept or not in
+  /// the same way. Bytes inside the file that were never written are zero.
   void lose_power(World& world);
 
  private:
   struct Step {
-    std::size_t offset;  // or the new size
+    std::size_t offset;  // offset, or the new size
     std::string bytes;
     bool truncates;
   };
@@ -50,7 +50,7 @@ class SimulatedFile {
   std::set<std::size_t> forgotten_pages_;
 };
 
-/// What the connections to one database share of its write-ahead index. A crash loses it.
+/// The write-ahead index that connections to one database share. A crash loses it.
 struct SharedMemory {
   static constexpr std::size_t kRegion = 32768;
   std::vector<std::unique_ptr<std::array<std::byte, kRegion>>> regions;
@@ -63,7 +63,7 @@ struct SharedMemory {
 /// thread may use such files in a process.
 class SimulatedFiles {
  public:
-  /// The database begins as `image`, durably. What SQLite draws at random follows from `world` too.
+  /// Starts with `image` as durable database. SQLite's random numbers follow from `world` too.
   SimulatedFiles(World& world, std::string path, const std::string& image);
   ~SimulatedFiles();
   SimulatedFiles(const SimulatedFiles&) = delete;
@@ -72,29 +72,29 @@ class SimulatedFiles {
   const std::string& path() const { return path_; }
   std::string contents() const { return entries_.at(path_)->contents(); }
 
-  /// A process begins to use the files.
+  /// A process starts to use the files.
   void start();
-  /// It is gone: its handles do nothing any more, what it wrote is there.
+  /// The process ends: its handles do nothing more; its writes are kept.
   void kill();
   bool is_used() const { return used_; }
-  /// The machine is gone: files and their names are as the disk has them.
+  /// The power fails: files and names are as on the disk.
   void lose_power();
-  /// The process dies within the so-many-th write, sync, truncation or deletion from now; 0: never.
+  /// The process dies in that write, sync, truncation or deletion, counted from now; 0: never.
   void plan_death(std::int64_t operations) { death_in_ = operations; }
-  /// The so-many-th sync from now fails, once, and what it did not write is lost; 0: none.
+  /// That sync, counted from now, fails once and loses its data; 0: none.
   void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
-  /// The planned sync is still to come.
+  /// Whether the planned failure is still to come.
   bool awaits_failing_sync() const { return failing_sync_in_ > 0; }
-  /// A sync failed since the process began.
+  /// Whether a sync has failed since the process started.
   bool sync_failed() const { return sync_failed_; }
   /// Counts processes.
   std::uint64_t life() const { return life_; }
 
-  bool full = false;     ///< no file can grow
-  bool failing = false;  ///< reads, writes and syncs fail now and then
-  bool forgets = false;  ///< what a sync that failed did not write is lost
+  bool full = false;     ///< whether no file can grow
+  bool failing = false;  ///< whether reads, writes and syncs fail now and then
+  bool forgets = false;  ///< whether a failed sync loses its data
 
-  // What the VFS needs. Numbers are result codes of SQLite.
+  // Functions for the VFS. Numbers are SQLite's result codes.
   std::shared_ptr<SimulatedFile> open(const std::string& name, bool create);
   bool exists(const std::string& name) const { return entries_.contains(name); }
   int remove(const std::string& name, bool sync_directory);

@@ -1,5 +1,5 @@
-// A library that a test loads into a program with LD_PRELOAD: syncs of files fail while the file
-// that OBLIQUE_FAIL_SYNC names exists.
+// A library that a test loads into a program with LD_PRELOAD. While the file named by
+// OBLIQUE_FAIL_SYNC exists, file syncs fail.
 #include <dlfcn.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// Disks that fill or fail to sync, and runs that are stopped or killed.
+// Full disks, failing syncs, and runs that are stopped or killed.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 
 // ---- Disks ----
 
-/// No file of that process may grow beyond `bytes`, as on a full disk.
+/// Limits the size of files of that process, as on a full disk.
 void limit_files(pid_t pid, rlim_t bytes) {
   const rlimit limit{bytes, RLIM_INFINITY};
   ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
@@ -30,7 +30,7 @@ std::string status_of(const TemporaryFolder& folder, const Server& server) {
       .out;
 }
 
-TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
+TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
   const TemporaryFolder folder;
   const std::string file = folder.file("full.db");
   const Database database(file);
@@ -43,7 +43,7 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
   ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   Worker worker(folder, server.worker_url());
   wait_until("the study waits for the disk", [&] {
-    return status_of(folder, server).find("takes no results") != std::string::npos;
+    return status_of(folder, server).find("accepts no results") != std::string::npos;
   });
   const double rows = database.rows();
   EXPECT_GT(rows, 0);
@@ -51,7 +51,7 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
   const Outcome refused =
       run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                            "--name", "another", "--server", server.client_url()});
-  // So little may still have fitted.
+  // Some rows may still have fitted.
   EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
       << refused.err;
   EXPECT_TRUE(is_running(server.process().pid()));
@@ -61,14 +61,14 @@ TEST(DiskFullTest, AStudyWaitsForRoomOnTheDiskSaysSoAndLosesNothing) {
   wait_until("the study is done",
              [&] { return database.number("SELECT count(*)" + rows_of_study) == 2000; });
   EXPECT_EQ(database.number("SELECT count(DISTINCT point)" + rows_of_study), 2000);
-  EXPECT_EQ(status_of(folder, server).find("takes no results"), std::string::npos);
+  EXPECT_EQ(status_of(folder, server).find("accepts no results"), std::string::npos);
   EXPECT_EQ(run_oblique(folder, {"check", "--db", file}).exit_code, 0);
 }
 
 TEST(FailedSyncTest, AServerEndsWithOneAndTheNextOneRecovers) {
   const TemporaryFolder folder;
   const std::string file = folder.file("failing.db");
-  // LD_PRELOAD ends a path at a space or colon, which that of the build folder may have.
+  // LD_PRELOAD splits paths at spaces and colons, which the build folder may contain.
   const std::string library = folder.file("failing_sync.so");
   std::filesystem::create_symlink(OBLIQUE_FAILING_SYNC, library);
   const std::string mark = folder.file("fails");
@@ -96,7 +96,7 @@ TEST(FailedSyncTest, AServerEndsWithOneAndTheNextOneRecovers) {
 
 // ---- Runs ----
 
-/// `oblique run` of a study that takes long enough to be stopped in its middle.
+/// `oblique run` of a study that takes long enough to be interrupted.
 class RunTest : public ::testing::Test {
  protected:
   std::vector<std::string> arguments() const {
@@ -104,7 +104,7 @@ class RunTest : public ::testing::Test {
   }
   static constexpr double kPoints = kManyPoints;
 
-  /// The server and the workers of a run, once all are there and at work.
+  /// The server and workers of a run, when all of them are working.
   std::vector<pid_t> started_by(const Process& run) {
     wait_until("rows in the database", [&] { return database_.rows() >= kPoints / 400; });
     const auto children = children_of(run.pid());
@@ -124,7 +124,7 @@ class RunTest : public ::testing::Test {
 TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
-  kill(-run.pid(), SIGINT);  // as a terminal does: to the whole group
+  kill(-run.pid(), SIGINT);  // to the whole group, as a terminal does
   EXPECT_EQ(run.wait(), 128 + SIGINT);
   EXPECT_NE(run.err().find("the same command again"), std::string::npos) << run.err();
   EXPECT_EQ(run.out(), "");
@@ -159,7 +159,7 @@ TEST_F(RunTest, ARunThatIsKilledLeavesNoProcessAndTheSameCommandContinues) {
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);
 }
 
-TEST(WorkerOfARunTest, EndsWhenTheRunWasKilledBeforeTheWorkerBegan) {
+TEST(WorkerOfARunTest, EndsIfTheRunWasKilledBeforeTheWorkerStarted) {
   const TemporaryFolder folder;
   Process parent(folder, client_program(), {"--help"});
   parent.wait();
@@ -167,19 +167,20 @@ TEST(WorkerOfARunTest, EndsWhenTheRunWasKilledBeforeTheWorkerBegan) {
       folder, worker_program(),
       {"--server", "tcp://127.0.0.1:1", "--stop-with-parent", std::to_string(parent.pid())});
   EXPECT_EQ(worker.wait(), 0);
-  EXPECT_NE(worker.err().find("parent process was gone"), std::string::npos) << worker.err();
+  EXPECT_NE(worker.err().find("parent process ended before"), std::string::npos) << worker.err();
 }
 
-TEST_F(RunTest, ARunGoesOnWhenOneOfItsWorkersIsKilled) {
+TEST_F(RunTest, ARunContinuesWhenOneOfItsWorkersIsKilled) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
-  const pid_t worker = *std::max_element(children.begin(), children.end());  // started last
+  // the process started last
+  const pid_t worker = *std::max_element(children.begin(), children.end());
   kill(worker, SIGKILL);
   EXPECT_EQ(run.wait(), 0) << run.err();
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);
 }
 
-TEST_F(RunTest, ASecondRunOnADatabaseInUseIsRefusedAndTheFirstGoesOn) {
+TEST_F(RunTest, ASecondRunOnADatabaseInUseIsRefusedAndTheFirstContinues) {
   Process first(folder_, client_program(), arguments());
   started_by(first);
   Process second(folder_, client_program(), arguments());

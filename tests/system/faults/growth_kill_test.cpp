@@ -1,4 +1,4 @@
-// Servers that are killed while studies grow, get other names and are deleted.
+// Servers that are killed while studies grow, are renamed or deleted.
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -22,7 +22,7 @@ constexpr int kPointsABlock = 200;
 
 class GrowthKillTest : public ::testing::Test {
  protected:
-  /// A study file of so many blocks of 200 points each, none in another study.
+  /// A study file with that many blocks of 200 points each, which no other study has.
   std::string study_file(const std::string& name, double k, int blocks) const {
     const std::string path = folder_.file(name + ".toml");
     std::ofstream file(path);
@@ -62,7 +62,7 @@ class GrowthKillTest : public ::testing::Test {
   std::mt19937 random_{14};
 };
 
-TEST_F(GrowthKillTest, WhatWasAcknowledgedIsThereAndWhatWasDeletedStaysAwayWheneverItIsKilled) {
+TEST_F(GrowthKillTest, AcknowledgedChangesSurviveAKillAtAnyTime) {
   const Worker worker(folder_, server_->worker_url());
   std::string victim;
   for (int round = 0; round < kRounds; ++round) {
@@ -74,13 +74,13 @@ TEST_F(GrowthKillTest, WhatWasAcknowledgedIsThereAndWhatWasDeletedStaysAwayWhene
               kPointsABlock * (round + 1))
         << round;
     if (deleting != nullptr) {
-      // Asked again of the next server, it may be that the one before had done it.
+      // The request is repeated at the next server; the killed one may have carried it out.
       const int code = deleting->wait();
       EXPECT_TRUE(code == 0 || deleting->err().find("no study") != std::string::npos)
           << round << ": " << deleting->err();
       EXPECT_EQ(number("SELECT count(*) FROM studies WHERE name = '" + victim + "'"), 0) << round;
     }
-    // Its rows are there when it is deleted in the next round, or come just then.
+    // Its rows exist when it is deleted in the next round, or arrive just then.
     victim = "victim " + std::to_string(round);
     const auto next = submit(study_file(victim, 1e7 + round, 2));
     EXPECT_EQ(next->wait(), 0) << next->err();

@@ -1,4 +1,4 @@
-// Who has a key gets in, and who has none, or a wrong one, is told so at once, on both sides.
+// Peers with a listed key are admitted; others are refused at once, with the reason on both sides.
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -19,7 +19,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A server with keys of its own, and folders with keys of others.
+/// A server with keys, and folders with keys of others.
 class KeysTest : public ::testing::Test {
  protected:
   KeysTest() {
@@ -49,7 +49,7 @@ class KeysTest : public ::testing::Test {
   static void wait_until_said(const Process& process, const std::string& words) {
     wait_until("is said: " + words, [&] { return process.err().find(words) != std::string::npos; });
   }
-  /// The exit code and the words of a client that is not let in.
+  /// Expects the exit code and the message of a client that is not admitted.
   void expect_turned_away(const std::string& key_file, const std::string& words) const {
     const Outcome outcome = ask({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
@@ -79,21 +79,21 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
   another[2] = "another";
   const Outcome refused = ask(another, key("reader"));
   EXPECT_EQ(refused.exit_code, 1);
-  EXPECT_THAT(refused.err, HasSubstr("is a reader's"));
+  EXPECT_THAT(refused.err, HasSubstr("has the role reader"));
 }
 
-TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
+TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
   expect_turned_away("", "requires a key, and none was given");
   expect_turned_away(key("worker"), "it is for workers, and this port is for clients");
   const std::string others = folder_.file("others");
   ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
-  expect_turned_away(others + "/client.key", "the public key of the server in that file");
+  expect_turned_away(others + "/client.key", "the server's public key in that file is wrong");
   ASSERT_EQ(change_keys({"add", "gone", "--role", "client"}).exit_code, 0);
   wait_until_said(server_->process(), "new: gone");
   ASSERT_EQ(change_keys({"revoke", "gone"}).exit_code, 0);
   wait_until_said(server_->process(), "revoked: gone");
-  expect_turned_away(key("gone"), "not on the server's list, or was revoked");
-  wait_until_said(server_->process(), "has the role worker, and this port is for clients");
+  expect_turned_away(key("gone"), "not in the server's list");
+  wait_until_said(server_->process(), "has the role worker, but this port is for clients");
   wait_until_said(server_->process(), "another public key of the server");
   const Outcome seen = ask({"workers"}, key("reader"));
   EXPECT_THAT(seen.err, AllOf(HasSubstr("turned away since the server began: "),
@@ -101,7 +101,7 @@ TEST_F(KeysTest, AClientThatIsNotLetInSaysWhyAndWhoseKeyItShowed) {
   EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2) << "nobody but the server uses that";
 }
 
-TEST_F(KeysTest, AGoodKeyAtTheOtherPortIsToldThatItMayBeThatOne) {
+TEST_F(KeysTest, AValidKeyAtTheWrongPortIsRefusedWithTheHint) {
   const Outcome outcome =
       run_oblique(folder_, {"status", "--server", server_->worker_url(), "--keys", key("client")});
   EXPECT_EQ(outcome.exit_code, 1);
@@ -111,7 +111,7 @@ TEST_F(KeysTest, AGoodKeyAtTheOtherPortIsToldThatItMayBeThatOne) {
   wait_until_said(worker, "or this is not its port for workers (by default 7601)");
 }
 
-TEST_F(KeysTest, AServerThatIsGivenAKeyOfAnothersNamesTheVariableOfItsOwn) {
+TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwn) {
   Process server(folder_, server_program(),
                  {"--db", folder_.file("a.db"), "--worker-port", "0", "--client-port", "0"},
                  Environment{{"OBLIQUE_KEYS", key("client")}});
@@ -128,7 +128,7 @@ TEST_F(KeysTest, AKeyFileThatOthersMayReadIsWrongUsageWithTheRemedy) {
   EXPECT_THAT(outcome.err, HasSubstr("chmod 600 '" + key("client") + "'"));
 }
 
-TEST_F(KeysTest, AServerWithoutKeysSaysSoToWhoComesWithSome) {
+TEST_F(KeysTest, AServerWithoutKeysIsReportedToPeersWithKeys) {
   const Server open(folder_, folder_.file("open.db"));
   const Outcome outcome =
       run_oblique(folder_, {"status", "--server", open.client_url(), "--keys", key("client")});
@@ -138,7 +138,7 @@ TEST_F(KeysTest, AServerWithoutKeysSaysSoToWhoComesWithSome) {
   wait_until_said(worker, "has no keys");
 }
 
-TEST_F(KeysTest, AWorkerThatIsNotLetInSaysWhyAndGoesOnTryingSlowly) {
+TEST_F(KeysTest, ARefusedWorkerReportsTheReasonAndRetriesSlowly) {
   const auto client = worker_with(key("client"));
   wait_until_said(*client, "it is for clients, and this port is for workers: trying again in 2 s");
   const Worker keyless(folder_, server_->worker_url());
@@ -155,7 +155,7 @@ TEST_F(KeysTest, AWorkerWhoseKeyIsAddedLaterJoinsThenAndLeavesWhenItIsRevoked) {
   EXPECT_THAT(change_keys({"list"}).out, Not(HasSubstr("late")));
   const auto worker = worker_with(key("late"));
   wait_until_said(*worker, "did not accept this key");
-  // The public key, as the file says it: `keys add --public` lists it again.
+  // The public key from the file; `keys add --public` adds it to the list again.
   std::string line;
   std::ifstream file(key("late"));
   while (std::getline(file, line) && !line.starts_with("public = \"")) {
@@ -172,7 +172,7 @@ TEST_F(KeysTest, AWorkerWhoseKeyIsAddedLaterJoinsThenAndLeavesWhenItIsRevoked) {
   });
 }
 
-TEST_F(KeysTest, WhoWatchesWithAKeyThatIsRevokedIsTold) {
+TEST_F(KeysTest, AWatchingClientReportsThatItsKeyIsRevoked) {
   ASSERT_EQ(ask(kFewPoints, key("client")).exit_code, 0);
   Process watching(folder_, client_program(),
                    {"watch", "few", "--server", server_->client_url(), "--keys", key("reader")});
@@ -182,7 +182,7 @@ TEST_F(KeysTest, WhoWatchesWithAKeyThatIsRevokedIsTold) {
   EXPECT_THAT(watching.err(), HasSubstr("was revoked"));
 }
 
-TEST_F(KeysTest, ListsThatCannotBeChangedAsAskedStayAsTheyAre) {
+TEST_F(KeysTest, AFailedChangeLeavesTheListUnchanged) {
   const std::string before = change_keys({"list", "--format", "csv"}).out;
   EXPECT_EQ(change_keys({"add", "x", "--role", "server"}).exit_code, 2);
   EXPECT_EQ(change_keys({"add", "x", "--role", "worker", "--public", "short"}).exit_code, 2);
@@ -195,7 +195,7 @@ TEST_F(KeysTest, ListsThatCannotBeChangedAsAskedStayAsTheyAre) {
   EXPECT_THAT(again.err, HasSubstr("oblique keys add NAME --role ROLE --dir "));
 }
 
-TEST_F(KeysTest, ARevokedKeysFileStaysAndWhoAddsItsNameAgainIsToldWhatItIs) {
+TEST_F(KeysTest, TheFileOfARevokedKeyIsKeptAndNamedWhenItsNameIsAddedAgain) {
   ASSERT_EQ(change_keys({"add", "anna", "--role", "client"}).exit_code, 0);
   EXPECT_THAT(change_keys({"revoke", "anna"}).err,
               HasSubstr("The file " + key("anna") + " stays, and is worth nothing"));
@@ -207,7 +207,7 @@ TEST_F(KeysTest, ARevokedKeysFileStaysAndWhoAddsItsNameAgainIsToldWhatItIs) {
   EXPECT_EQ(change_keys({"add", "anna", "--role", "client"}).exit_code, 0);
 }
 
-TEST_F(KeysTest, TheFolderCalledKeysIsTakenWhereThisOneHasNone) {
+TEST_F(KeysTest, TheSubfolderKeysIsUsedIfTheCurrentFolderHasNoKeys) {
   EXPECT_THAT(run_oblique(folder_, {"keys", "list"}).out, HasSubstr("reader"));
   EXPECT_EQ(run_oblique(folder_, {"keys", "add", "anna", "--role", "client"}).exit_code, 0);
   EXPECT_TRUE(std::filesystem::exists(key("anna")));
@@ -222,7 +222,7 @@ TEST_F(KeysTest, TheFolderCalledKeysIsTakenWhereThisOneHasNone) {
   }
 }
 
-TEST_F(KeysTest, WhoSubmitsAgainIsToldTheNewPriorityAndHowToSeeMore) {
+TEST_F(KeysTest, SubmittingAgainReportsTheNewPriority) {
   const auto worker = worker_with(key("worker"));
   EXPECT_THAT(ask(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
   auto again = kFewPoints;
@@ -234,7 +234,7 @@ TEST_F(KeysTest, WhoSubmitsAgainIsToldTheNewPriorityAndHowToSeeMore) {
                                      " --keys " + key("client")));
 }
 
-TEST(OpenDoorsTest, BeyondLoopbackAServerNeedsKeysOrTheWordInsecure) {
+TEST(OpenPortsTest, BeyondLoopbackAServerNeedsKeysOrInsecure) {
   const TemporaryFolder folder;
   const std::vector<std::string> beyond{"--listen", "0.0.0.0",       "--worker-port",
                                         "0",        "--client-port", "0"};
@@ -249,7 +249,7 @@ TEST(OpenDoorsTest, BeyondLoopbackAServerNeedsKeysOrTheWordInsecure) {
   EXPECT_THAT(open.process().err(), HasSubstr("INSECURE"));
 }
 
-TEST(OpenDoorsTest, ServerWorkerAndClientSpeakByIpv6) {
+TEST(OpenPortsTest, ServerWorkerAndClientConnectByIpv6) {
   const TemporaryFolder folder;
   std::unique_ptr<Server> server;
   try {

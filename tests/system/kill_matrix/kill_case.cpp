@@ -24,7 +24,7 @@ constexpr bool kRun = true;
 constexpr const char* kClient = "oblique";
 constexpr const char* kServer = "oblique-server";
 constexpr const char* kWorker = "oblique-worker";
-constexpr const char* kNobody = "";
+constexpr const char* kNoProcess = "";
 constexpr int kNoSignal = 0;
 
 // Points that are a storm.
@@ -55,9 +55,9 @@ constexpr std::array kMatrix{
     Entry{kRun, kServer, "after-commit", SIGKILL, 8},
     Entry{kRun, kWorker, "before-send:results", SIGSTOP, 4},
     Entry{kRun, kClient, "after-receive:status", SIGSTOP, 12},
-    Entry{kApart, kNobody, kKilledWorkers, kNoSignal, 1},
-    Entry{kApart, kNobody, kCutConnections, kNoSignal, 1},
-    Entry{kApart, kNobody, kVanishingPeers, kNoSignal, 1},
+    Entry{kApart, kNoProcess, kKilledWorkers, kNoSignal, 1},
+    Entry{kApart, kNoProcess, kCutConnections, kNoSignal, 1},
+    Entry{kApart, kNoProcess, kVanishingPeers, kNoSignal, 1},
     // Those of the server.
     Entry{kApart, kServer, "before-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "time", SIGSTOP, 1500},

@@ -11,36 +11,35 @@
 
 namespace oblique::test {
 
-/// This machine does not let us make networks; the message says what it refused.
+/// The system refuses to create networks; the message has the reason.
 class NoNamespaces : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A machine of a test's network: a network namespace with the loopback device and one cable, eth0,
-/// to the switch, at which the test itself is. Programs that are started while an `Inside` lives
-/// run on it.
+/// A machine of a test's network: a network namespace with loopback and one cable, eth0, to the
+/// switch, to which the test is connected. Programs that are started while an `Inside` exists run
+/// on it.
 class Host {
  public:
   const std::string& name() const { return name_; }
-  /// Its addresses without their prefixes, as 10.77.0.2, fd77::2 and fe80::4d:2.
+  /// Its addresses without prefix length, as 10.77.0.2, fd77::2 and fe80::4d:2.
   std::string v4() const;
   std::string v6() const;
   std::string link_local() const;
   int network() const { return network_.number(); }
 
-  /// The other end of its cable is pulled, or put back.
+  /// Unplugs or plugs in its cable at the switch.
   void pull_cable() const;
   void plug_cable() const;
-  /// So many of the packets that arrive at it are lost, at random.
+  /// Drops that percentage of arriving packets at random.
   void lose_percent(int percent) const;
-  /// Whatever it sends, or is sent to it, is lost: neither end of any connection learns of it.
+  /// Drops all packets to and from it, so that neither side of a connection is notified.
   void lose_everything() const;
   void lose_nothing() const;
-  /// From now on its addresses end in `last`, and those of before are gone.
+  /// Changes its addresses to those that end in `last`.
   void renumber(int last);
-  /// Runs a command of the shell on it to its end; what it wrote. Throws std::runtime_error when
-  /// it fails.
+  /// Runs a shell command on it and returns its output. Throws std::runtime_error if it fails.
   std::string run(const std::string& command) const;
 
  private:
@@ -53,7 +52,7 @@ class Host {
   protocol::Descriptor network_;
 };
 
-/// While it lives, this thread, and what it starts, is on that machine.
+/// While this object exists, this thread and the programs that it starts run on that machine.
 class Inside {
  public:
   explicit Inside(const Host& host);
@@ -65,20 +64,19 @@ class Inside {
   protocol::Descriptor before_;
 };
 
-/// A switch and machines at it, in user, mount and network namespaces of this process: they need no
-/// root, have no names outside, and are gone with it and its children.
+/// A switch with machines, in user, mount and network namespaces of this process. They need no
+/// root, have no names outside, and end with this process and its children.
 class Lan {
  public:
-  /// Moves this process, which has one thread, to these namespaces. Throws NoNamespaces.
+  /// Moves this process, which must have one thread, to these namespaces. Throws NoNamespaces.
   explicit Lan(const TemporaryFolder& folder);
   ~Lan();
   Lan(const Lan&) = delete;
   Lan& operator=(const Lan&) = delete;
 
-  /// A machine with the addresses 10.77.0.`last` and fd77::`last`.
+  /// Adds a machine with the addresses 10.77.0.`last` and fd77::`last`.
   Host& add(const std::string& name, int last);
-  /// From now on programs on all machines find these addresses under that name, and nothing under
-  /// any other.
+  /// Programs on all machines resolve that name to these addresses, and no other name.
   void set_addresses(const std::string& name, const std::vector<std::string>& addresses) const;
 
  private:

@@ -1,5 +1,5 @@
-// Programs on machines of their own, while lines break, lose and stall, machines get other
-// addresses, and others listen; and the commands of README.md by which a second machine joins.
+// Programs on separate machines, with broken, lossy and stalled lines, changed addresses and
+// eavesdroppers; and the commands of README.md for a second machine.
 #include <arpa/inet.h>
 #include <linux/if_packet.h>
 #include <net/ethernet.h>
@@ -43,8 +43,8 @@ using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A server, two workers and a client, each on a machine of its own, and a study that takes
-/// seconds. Skips where no networks can be made.
+/// A server, two workers and a client, each on its own machine, and a study that takes seconds.
+/// Skips if no networks can be created.
 class StudyOnLan : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -63,7 +63,7 @@ class StudyOnLan : public ::testing::Test {
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
 
-  /// The options by which a client or worker (`role`) reaches the server.
+  /// The options with which a client or worker (`role`) reaches the server.
   std::vector<std::string> access(const std::string& role) const {
     const std::string port = role == "worker" ? "7601" : "7600";
     std::vector<std::string> options{"--server", "tcp://" + server_name_ + ":" + port};
@@ -73,7 +73,7 @@ class StudyOnLan : public ::testing::Test {
     return options;
   }
 
-  /// At the ports that it has by default; `::` are all addresses of both families.
+  /// On its default ports; `::` stands for all addresses of both families.
   void start_server(const std::string& address = "::") {
     const Inside inside(*server_host_);
     std::vector<std::string> arguments{"--db", folder_.file("study.db"), "--listen", address};
@@ -84,7 +84,7 @@ class StudyOnLan : public ::testing::Test {
     }
     server_ = std::make_unique<Server>(folder_, arguments);
   }
-  /// A worker on that machine, under the name of its machine.
+  /// A worker on that machine, named like it.
   std::unique_ptr<Process> worker_on(const Host& host) const {
     const Inside inside(host);
     auto arguments = access("worker");
@@ -92,7 +92,7 @@ class StudyOnLan : public ::testing::Test {
                                        "--stop-with-parent", std::to_string(getpid())});
     return std::make_unique<Process>(folder_, worker_program(), arguments);
   }
-  /// `oblique` with these arguments, and how the server is reached, on the client's machine.
+  /// `oblique` with these arguments and the server's address, on the client's machine.
   std::unique_ptr<Process> client(std::vector<std::string> arguments) const {
     const Inside inside(*client_host_);
     const auto options = access("client");
@@ -100,9 +100,9 @@ class StudyOnLan : public ::testing::Test {
     return std::make_unique<Process>(folder_, client_program(), arguments);
   }
 
-  /// Starts what does not run yet of all these. Once points are stored `fault` happens, at the end
-  /// of which what was broken is mended; then the study is completed (small_study.h) and all
-  /// workers still run. Prints how soon rows came again.
+  /// Starts all programs that do not run yet. When points are stored it calls `fault`, which also
+  /// repairs the fault. Then the study must complete (small_study.h) and all workers must still
+  /// run. Prints the time until new rows.
   void goes_on_after(const std::function<void()>& fault, std::size_t workers = 2) {
     if (server_ == nullptr) {
       start_server();
@@ -134,9 +134,9 @@ class StudyOnLan : public ::testing::Test {
   std::array<Host*, 2> worker_hosts_{};
   Host* client_host_ = nullptr;
 
-  /// How workers and clients write where the server is; its IPv4 address to begin with.
+  /// The server's name for workers and clients; at first its IPv4 address.
   std::string server_name_;
-  std::string keys_;  ///< folder of the keys that all programs have; empty: they have none
+  std::string keys_;  ///< folder of the keys of all programs; empty: no keys
 
   std::unique_ptr<Server> server_;
   std::vector<std::unique_ptr<Process>> workers_;
@@ -179,7 +179,7 @@ TEST_F(BrokenLines, AWorkerIsCutOffWithoutAWordAndStartedAgain) {
     worker_hosts_[0]->lose_everything();
     workers_[0]->send(SIGKILL);
     workers_[0]->wait();
-    worker_hosts_[0]->lose_nothing();  // the server still has the connection of the one before
+    worker_hosts_[0]->lose_nothing();  // the server still has the connection of the previous worker
     workers_[0] = worker_on(*worker_hosts_[0]);
   });
 }
@@ -271,18 +271,18 @@ TEST_F(IPv6, IsTriedWhereNobodyAnswersAtTheAddressOfIPv4OfTheSameName) {
 
 // ---- With keys on, nothing that people wrote or that was computed can be read on the way --------
 
-/// Everything that goes through the cable of a machine, in both directions, as the switch sees it.
+/// Captures all packets on the cable of a machine, in both directions.
 class Capture {
  public:
-  /// Throws std::runtime_error where the system gives no such socket.
+  /// Throws std::runtime_error if the system refuses such a socket.
   explicit Capture(const Host& host)
       : socket_(socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, htons(ETH_P_ALL))) {
     sockaddr_ll cable{};
     cable.sll_family = AF_PACKET;
     cable.sll_protocol = htons(ETH_P_ALL);
     cable.sll_ifindex = static_cast<int>(if_nametoindex(("to-" + host.name()).c_str()));
-    // So that none is lost while this machine is busy. As root of the namespace one may go beyond
-    // the system's bound; if not, its default has to do.
+    // A large buffer, so that no packet is lost on a busy machine. Root of the namespace may exceed
+    // the system's limit; otherwise the default must suffice.
     constexpr int kWaitingBytes = 64 << 20;
     static_cast<void>(setsockopt(socket_.number(), SOL_SOCKET, SO_RCVBUFFORCE, &kWaitingBytes,
                                  sizeof kWaitingBytes));
@@ -292,7 +292,7 @@ class Capture {
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
 
-  /// What went by until now, one packet after another, with all their headers. Ends the capture.
+  /// Ends the capture and returns all packets with their headers.
   const std::string& bytes() {
     thread_.request_stop();
     thread_.join();
@@ -301,7 +301,7 @@ class Capture {
 
  private:
   void run(const std::stop_token& stop) {
-    // Virtual cables carry what a real one would in several packets.
+    // Virtual cables transmit large packets that a real one would split.
     std::vector<char> packet(std::size_t{1} << 17U);
     while (!stop.stop_requested()) {
       pollfd polled{socket_.number(), POLLIN, 0};
@@ -315,17 +315,16 @@ class Capture {
 
   protocol::Descriptor socket_;
   std::string bytes_;
-  std::jthread thread_;  ///< last, as it uses the others
+  std::jthread thread_;  ///< last: it uses the other members
 };
 
 class PlainText : public StudyOnLan {
  protected:
-  /// What goes to the server and comes from it while a study with a conspicuous name is solved and
-  /// asked for.
+  /// All traffic of the server while a study with a conspicuous name is solved and queried.
   std::string captured() {
     Capture capture(*server_host_);
     start_server();
-    workers_.push_back(worker_on(*worker_hosts_[0]));  // it says its name, worker1
+    workers_.push_back(worker_on(*worker_hosts_[0]));  // it sends its name, worker1
     using Words = std::vector<std::string>;
     for (const Words& asked :
          {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
@@ -338,8 +337,8 @@ class PlainText : public StudyOnLan {
     return capture.bytes();
   }
 
-  /// What says something: names of the study and the worker, a column, words of a statement, the
-  /// states of a contact, a unit's instruction set.
+  /// Revealing texts: names of study and worker, a column, words of a statement, states of a
+  /// contact, an instruction set.
   const std::vector<std::string> telling_{"conspicuous", "worker1", "fn_peak_N",
                                           "SELECT",      "SC SR",   "0.95"};
 };
@@ -367,7 +366,7 @@ std::string readme() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// What the first fenced block of that kind has after `place`.
+/// The content of the first fenced block of that kind after `place`.
 std::string block_after(const std::string& text, const std::string& place,
                         const std::string& kind) {
   const std::string fence = "\n```" + kind + "\n";
@@ -375,7 +374,7 @@ std::string block_after(const std::string& text, const std::string& place,
   return text.substr(begin, text.find("\n```", begin) + 1 - begin);
 }
 
-/// A command and the machine on whose prompt it is typed.
+/// A command and the machine on which it is typed.
 struct Typed {
   std::string machine;
   std::string command;
@@ -399,7 +398,8 @@ class ReadmeCommands : public StudyOnLan {
     }
   }
 
-  /// Types it on its machine. scp, which needs a login there, is a cp of the machines' folders.
+  /// Runs the command on its machine. scp, which needs a login, is replaced by cp between the
+  /// machines' folders.
   std::unique_ptr<Process> type(const Typed& typed) const {
     const bool is_coordinator = typed.machine == "coordinator";
     const Inside inside(is_coordinator ? *server_host_ : *client_host_);

@@ -1,5 +1,4 @@
-// Lines that are long, stall and end without a word, on loopback: they need no network of their
-// own.
+// Lines that are slow, stall, or break silently, on loopback.
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -20,10 +19,10 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A server with keys, and two workers and a client behind a long line to it.
+/// A server with keys, and two workers and a client on a slow line to it.
 class LongLines : public ::testing::Test {
  protected:
-  /// Every byte takes that long to the other end.
+  /// Delay of every byte.
   void start(milliseconds delay) {
     ASSERT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 0);
     server_ = std::make_unique<Server>(folder_, folder_.file("study.db"),
@@ -35,8 +34,7 @@ class LongLines : public ::testing::Test {
                       std::vector<std::string>{"--threads", "1", "--keys", keys_ + "/worker.key"});
     }
     auto arguments = submit_and_watch();
-    // On a machine that does much else a long line takes longer than the ten seconds that are
-    // usual.
+    // On a busy machine a slow line may exceed the default of ten seconds.
     arguments.insert(arguments.end(), {"--server", to_clients_port_->url(), "--keys", client_key_,
                                        "--timeout", "600"});
     client_.emplace(folder_, client_program(), arguments);
@@ -64,7 +62,7 @@ class LongLines : public ::testing::Test {
 };
 
 TEST_F(LongLines, TheyTakeLongerForAHandshakeThanIsWaitedForAtFirst) {
-  start(milliseconds(600));  // until a study is submitted and points of it are stored
+  start(milliseconds(600));  // until a study is submitted and points are stored
   EXPECT_GE(to_workers_port_->connections(), 4) << "both workers tried again";
 }
 

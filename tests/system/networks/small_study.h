@@ -16,13 +16,13 @@
 
 namespace oblique::test {
 
-/// The words after `oblique` by which a client submits the study and watches it to its end, but for
-/// the server.
+/// The arguments of `oblique` with which a client submits and watches the study, except for the
+/// server.
 inline std::vector<std::string> submit_and_watch() {
   return many_points("many", {"submit", "--watch"});
 }
 
-/// Waits until so many points have a row.
+/// Waits until that many points have a row.
 inline void wait_for_rows(const Database& database, double at_least) {
   wait_until("rows", [&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -30,16 +30,16 @@ inline void wait_for_rows(const Database& database, double at_least) {
   });
 }
 
-/// Prints how long something took since then, beside the test's own lines.
+/// Prints the time since then.
 inline void print_measured(const std::string& what, std::chrono::steady_clock::time_point since) {
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - since;
   const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
   std::printf("[ MEASURED ] %s: %s: %.1f s\n", test->name(), what.c_str(), time.count());
 }
 
-/// The watching `client` learns that the study has ended, each point has one row, none failed, and
-/// by `workers`, what `oblique workers --format json` wrote, none is taken for one that is lost
-/// again and again.
+/// Expects that the watching `client` reports the end of the study, that each point has one row and
+/// none failed, and that no worker in `workers` (output of `oblique workers --format json`) is set
+/// aside.
 inline void expect_completed(Process& client, const Database& database,
                              const std::function<std::string()>& workers) {
   wait_for_rows(database, kManyPoints);

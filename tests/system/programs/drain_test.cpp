@@ -1,4 +1,4 @@
-// A server that is told to stop while results are under way, and what systemd is told meanwhile.
+// Draining: a server that is stopped while batches run, and its notifications of systemd.
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -17,8 +17,7 @@
 namespace oblique::test {
 namespace {
 
-/// A service manager's socket for one program. What does not fit there is lost: the system keeps
-/// ten messages.
+/// Plays the service manager for one program. Excess messages are lost: the system keeps ten.
 class Manager {
  public:
   explicit Manager(const TemporaryFolder& folder, const std::string& name = "notify")
@@ -37,14 +36,14 @@ class Manager {
   Environment environment() const {
     return {{"NOTIFY_SOCKET", path_}, {"OBLIQUE_SERVER_DRAIN", "600"}};
   }
-  /// With signs of life.
+  /// With the watchdog.
   Environment watching() const {
     Environment all = environment();
     all["WATCHDOG_USEC"] = "400000";
     return all;
   }
-  /// Whether that was said so far.
-  bool heard(const std::string& what) {
+  /// Whether that message was received so far.
+  bool received(const std::string& what) {
     std::array<char, 4096> bytes{};
     ssize_t got = 0;
     while ((got = recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0) {
@@ -61,7 +60,7 @@ class Manager {
 
 class DrainTest : public testing::Test {
  protected:
-  /// Points whose fall takes a minute and more.
+  /// Points whose fall takes more than a minute.
   void submit() {
     const Outcome outcome = run_oblique(
         folder_, {"submit", "--server", server_.client_url(), "--preset", "paper", "--H", "1",
@@ -84,20 +83,20 @@ class DrainTest : public testing::Test {
   Server server_{folder_, folder_.file("a.db"), manager_.environment()};
 };
 
-TEST_F(DrainTest, WaitsForWhatIsUnderWayAndSaysSoToClientsAndToTheManager) {
+TEST_F(DrainTest, WaitsForRunningBatchesAndReportsThisToClientsAndSystemd) {
   submit();
   Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
   wait_until_leased();
   server_.process().send(SIGTERM);
-  wait_until("it drains", [&] { return manager_.heard("STATUS=draining"); });
-  EXPECT_TRUE(manager_.heard("STOPPING=1"));
+  wait_until("it drains", [&] { return manager_.received("STATUS=draining"); });
+  EXPECT_TRUE(manager_.received("STOPPING=1"));
   const Outcome refused =
       run_oblique(folder_, {"submit", "--server", server_.client_url(), "--preset", "paper", "--H",
                             "1", "--mu", "0.5", "--e", "1", "--name", "another"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.err.find("draining"), std::string::npos) << refused.err;
   EXPECT_NE(status().out.find("draining"), std::string::npos);
-  worker.send(SIGTERM);  // which gives its batch back
+  worker.send(SIGTERM);  // it gives its batch back
   EXPECT_EQ(server_.process().wait(), 0);
   const std::string log = server_.process().err();
   EXPECT_NE(log.find(" drained: "), std::string::npos) << log;
@@ -108,29 +107,29 @@ TEST_F(DrainTest, ASecondSignalEndsItAtOnce) {
   Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
   wait_until_leased();
   server_.process().send(SIGTERM);
-  wait_until("it drains", [&] { return manager_.heard("STATUS=draining"); });
+  wait_until("it drains", [&] { return manager_.received("STATUS=draining"); });
   server_.process().send(SIGINT);
   EXPECT_EQ(server_.process().wait(), 0);
   EXPECT_EQ(server_.process().err().find(" drained: "), std::string::npos);
 }
 
-TEST_F(DrainTest, WithNothingUnderWayItEndsAtOnce) {
+TEST_F(DrainTest, EndsAtOnceWithoutRunningBatches) {
   server_.process().send(SIGTERM);
   EXPECT_EQ(server_.process().wait(), 0);
   EXPECT_NE(server_.process().err().find(" drained: "), std::string::npos);
 }
 
-TEST_F(DrainTest, ServerAndWorkerTellTheManagerThatTheyAreReadyAndAlive) {
+TEST_F(DrainTest, ServerAndWorkerNotifySystemdOfReadinessAndFeedItsWatchdog) {
   Manager of_server(folder_, "of_server");
   const Server server(folder_, folder_.file("b.db"), of_server.watching());
   Manager of_worker(folder_, "of_worker");
   Worker worker(folder_, server.worker_url(), {}, of_worker.watching());
   for (Manager* manager : {&of_server, &of_worker}) {
-    wait_until("it is ready", [&] { return manager->heard("READY=1"); });
-    wait_until("it lives", [&] { return manager->heard("WATCHDOG=1"); });
+    wait_until("it is ready", [&] { return manager->received("READY=1"); });
+    wait_until("it lives", [&] { return manager->received("WATCHDOG=1"); });
   }
   worker.send(SIGTERM);
-  wait_until("it stops", [&] { return of_worker.heard("STOPPING=1"); });
+  wait_until("it stops", [&] { return of_worker.received("STOPPING=1"); });
   EXPECT_EQ(worker.wait(), 0);
 }
 

@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBetweenCuts{150};
 constexpr int kShortestLife_ms = 20;
 constexpr int kLongestLife_ms = 300;
-constexpr std::uint32_t kGreed = 1000;  ///< batches that a vanishing peer asks for
+constexpr std::uint32_t kGreed = 1000;  ///< number of batches that a vanishing peer requests
 
 const std::vector<std::string> kOneThread{"--threads", "1"};
 
@@ -34,8 +34,8 @@ std::string worker_solver_version() {
   return version;
 }
 
-/// A peer that speaks as a worker does, requests batches and vanishes. Whether it got one of a
-/// study.
+/// A peer that joins as a worker, requests batches and disappears. Returns whether it got a batch
+/// of a study.
 bool vanish_with_points(const std::string& server_url, const std::string& solver_version,
                         int number) {
   zmq::context_t context;
@@ -44,7 +44,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
   socket.set(zmq::sockopt::rcvtimeo, 200);
   socket.connect(server_url);
   protocol::WorkerMessage hello;
-  protocol::say_protocol(*hello.mutable_hello());
+  protocol::set_protocol(*hello.mutable_hello());
   hello.mutable_hello()->set_solver_version(solver_version);
   hello.mutable_hello()->set_name("pretended");
   hello.mutable_hello()->set_threads(1);
@@ -55,7 +55,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
     static_cast<void>(
         socket.send(zmq::buffer(protocol::encode(*message)), zmq::send_flags::dontwait));
   }
-  constexpr int kMostMessages = 4;  // welcome, study, two batches
+  constexpr int kMostMessages = 4;  // Welcome, study, two batches
   for (int i = 0; i < kMostMessages; ++i) {
     zmq::message_t frame;
     protocol::ServerToWorker message;

@@ -10,27 +10,27 @@
 
 namespace oblique::test {
 
-/// What goes on around a server from the beginning of a storm to its end, beside sound workers. No
-/// point may fail for it.
+/// A storm: repeated faults of one kind around a server, in addition to sound workers. No point may
+/// fail because of it.
 enum class StormKind {
-  kKilledWorkers,   ///< a worker is killed a moment after it was started, again and again
+  kKilledWorkers,   ///< a worker is killed shortly after its start, again and again
   kCutConnections,  ///< the connection of a worker is cut again and again
-  kVanishingPeers   ///< peers that take batches and vanish, each under a name of its own
+  kVanishingPeers   ///< peers that take batches and disappear, each under a new name
 };
 
 class Storm {
  public:
-  /// Against the server that awaits workers at `server_url`. `environment` is for the processes
-  /// that are started.
+  /// Starts the storm at the server with the workers' address `server_url`. `environment` is for
+  /// the processes that it starts.
   Storm(StormKind kind, const TemporaryFolder& folder, const std::string& server_url,
         const Environment& environment = {});
   ~Storm();
   Storm(const Storm&) = delete;
   Storm& operator=(const Storm&) = delete;
 
-  /// Workers killed, connections cut, or peers that vanished with points.
+  /// Number of killed workers, cut connections, or peers that disappeared with points.
   int blows() const { return proxy_ ? proxy_->cuts() : blows_.load(); }
-  /// Ends it: nothing of it is left.
+  /// Ends the storm and all its processes.
   void end();
 
  private:
@@ -43,7 +43,7 @@ class Storm {
   std::atomic<int> blows_ = 0;
   std::unique_ptr<TcpProxy> proxy_;
   std::unique_ptr<Worker> behind_proxy_;
-  std::jthread thread_;  ///< last, as it uses the others
+  std::jthread thread_;  ///< last: it uses the other members
 };
 
 }  // namespace oblique::test

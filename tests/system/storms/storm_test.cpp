@@ -1,4 +1,4 @@
-// Workers that are lost again and again beside a sound one: every point is solved.
+// Workers are lost again and again while one is sound: every point is solved.
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,8 +15,8 @@ namespace {
 
 class StormTest : public ::testing::Test {
  protected:
-  /// Studies of many points, of which a filter may leave some out, are solved by one worker in such
-  /// a storm, one after another until so many blows fell.
+  /// One worker solves studies of many points, some left out by a filter, during such a storm,
+  /// until that many faults have happened.
   void weather(StormKind kind, int blows, const std::string& filter = {}) {
     Server server(folder_, folder_.file("many.db"));
     Storm storm(kind, folder_, server.worker_url());
@@ -25,7 +25,7 @@ class StormTest : public ::testing::Test {
     while (studies == 0 || storm.blows() < blows) {
       submit(server, "many " + std::to_string(++studies), filter);
       if (kind == StormKind::kVanishingPeers) {
-        // They had every chance before there was anybody else.
+        // They had time to disturb before the sound worker joined.
         wait_until("the first peers vanished", [&] { return storm.blows() >= blows; });
       }
       if (!sound) {
@@ -60,15 +60,15 @@ class StormTest : public ::testing::Test {
   Database database_{folder_.file("many.db")};
 };
 
-TEST_F(StormTest, AWorkerKilledAgainAndAgainBesideASoundOneFailsNoPoint) {
+TEST_F(StormTest, RepeatedKillsOfAWorkerFailNoPoint) {
   weather(StormKind::kKilledWorkers, 5);
 }
 
-TEST_F(StormTest, AConnectionCutAgainAndAgainFailsNoPoint) {
+TEST_F(StormTest, RepeatedCutsOfAConnectionFailNoPoint) {
   weather(StormKind::kCutConnections, 5);
 }
 
-TEST_F(StormTest, PeersThatTakeBatchesAndVanishUnderEverNewNamesFailNoPoint) {
+TEST_F(StormTest, PeersThatTakeBatchesAndDisappearFailNoPoint) {
   weather(StormKind::kVanishingPeers, 2, "sin(1000 * mu) > -0.9");
 }
 

@@ -23,7 +23,7 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 
-TEST_F(PageStudyTest, ASliceIsIndexArithmeticOnTheRecipe) {
+TEST_F(PageStudyTest, ASliceComputesItsPointsFromTheRecipe) {
   solve_grid();
   const Numbers slice = slice_of("z=fn_peak_N&x=mu&y=H&at=e@1");
   EXPECT_EQ(slice.head["nx"], 4);
@@ -38,7 +38,7 @@ TEST_F(PageStudyTest, ASliceIsIndexArithmeticOnTheRecipe) {
       EXPECT_EQ(values[row * 4 + column], force_of(row * 8 + column * 2 + 1)) << row << column;
     }
   }
-  // The other way round it is the same, transposed.
+  // With the axes exchanged the slice is transposed.
   const Numbers turned = slice_of("z=fn_peak_N&x=H&y=mu&at=e@1");
   EXPECT_EQ(turned.read<float>(56, 12)[1], values[4]);
   // A line has one row.
@@ -46,7 +46,7 @@ TEST_F(PageStudyTest, ASliceIsIndexArithmeticOnTheRecipe) {
   EXPECT_EQ(line.head["ny"], 1);
   EXPECT_EQ(line.head["y"], nullptr);
   EXPECT_EQ(line.read<float>(32, 4)[3], force_of(16 + 6));
-  // More cells than were requested are never sent.
+  // At most the requested number of cells is sent.
   const Numbers few = slice_of("z=fn_peak_N&x=mu&y=H&nx=2&ny=2&x0=1&at=e@0");
   EXPECT_EQ(few.head["x"]["all_lines"], false);
   EXPECT_EQ(few.head["x"]["first"], 1);
@@ -57,7 +57,7 @@ TEST_F(PageStudyTest, ASliceIsIndexArithmeticOnTheRecipe) {
   EXPECT_EQ(modes.read<std::uint16_t>(56, 12), std::vector<std::uint16_t>(12, 0));
 }
 
-TEST_F(PageStudyTest, WhatIsNotSolvedAndWhatIsLeftOutIsMarked) {
+TEST_F(PageStudyTest, UnsolvedAndLeftOutCellsAreMarked) {
   submit("filtered", filtered_grid("mu < 0.5"));
   const Numbers slice = slice_of("z=mode&x=mu");
   EXPECT_EQ(slice.head["missing"], 3);
@@ -69,20 +69,20 @@ TEST_F(PageStudyTest, WhatIsNotSolvedAndWhatIsLeftOutIsMarked) {
   EXPECT_EQ(numbers.read<std::uint32_t>(32, 4)[3], 0x7fc00002U);
 }
 
-TEST_F(PageStudyTest, WhatAStudyThatIsDoneHasNoRowOfWasLeftOutByItsWorker) {
+TEST_F(PageStudyTest, InADoneStudyPointsWithoutARowAreLeftOut) {
   submit("filtered", filtered_grid("mu < 0.5"));
   solve(24);
   const auto edited = open_database(page_.database(), SQLITE_OPEN_READWRITE);
   sqlite3_busy_timeout(edited.get(), 10'000);
   const std::string slice = "/api/studies/1/slice?z=mode&x=mu&y=H&at=e@0";
   EXPECT_EQ(page_.numbers(slice).head["left_out"], 3);
-  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // as if its machine left it out
+  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // as if the worker left it out
   EXPECT_EQ(page_.numbers(slice).head["left_out"], 4);
   EXPECT_EQ(page_.numbers(slice).head["missing"], 0);
   EXPECT_EQ(page_.json("/api/studies/1/points/4")["left_out"], true);
 }
 
-TEST_F(PageStudyTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
+TEST_F(PageStudyTest, AStudyOfABillionPointsHasSlicesAndBins) {
   submit("huge", protocol::recipe_of(
                      {{protocol::range("H", 0.1, 1.0, 1000), protocol::range("mu", 0.0, 2.0, 1000),
                        protocol::range("e", 0.5, 1.0, 1000)}}));
@@ -96,12 +96,12 @@ TEST_F(PageStudyTest, AStudyOfABillionPointsIsLookedAtLikeASmallOne) {
   EXPECT_FLOAT_EQ(bins.head["x"]["least"], force_of(0));
 }
 
-TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyThatAreNot) {
+TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyOpenOnes) {
   submit("wide", protocol::recipe_of(
                      {{protocol::range("H", 0.1, 1.0, 40), protocol::range("mu", 0.0, 2.0, 40),
                        protocol::range("e", 0.5, 1.0, 40)}}));
   solve(200);
-  std::set<std::uint64_t> solved;  // whole batches
+  std::set<std::uint64_t> solved;  // points of whole batches
   const json stored = page_.json("/api/studies/1/rows?select=point&limit=64000");
   for (const json& row : stored["rows"]) {
     solved.insert(row[0].get<std::uint64_t>());
@@ -133,7 +133,7 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyThatAreNot) {
   }
 }
 
-TEST_F(PageStudyTest, WrongQuestionsAreToldWhatIsAllowed) {
+TEST_F(PageStudyTest, ErrorsOfWrongRequestsNameWhatIsAllowed) {
   submit_grid();
   for (const std::string query :
        {"z=muu&x=mu", "z=peaks&x=mu", "z=mode", "z=mode&x=mu&y=mu", "z=mode&x=k",
@@ -165,7 +165,7 @@ TEST_F(PageStudyTest, BinsCountEveryPointOnce) {
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mu&xlog=1&x0=0"), 400);
 }
 
-TEST_F(PageStudyTest, BothEndsThatPeopleTypeAreInTheBins) {
+TEST_F(PageStudyTest, TypedEndsAreInsideTheBins) {
   solve_grid();
   const std::string bins = "/api/studies/1/bins?x=mu&nx=2&";
   for (const std::string log : {"", "&xlog=1"}) {
@@ -179,7 +179,7 @@ TEST_F(PageStudyTest, BothEndsThatPeopleTypeAreInTheBins) {
   EXPECT_EQ(page_.numbers(bins + "x0=1e-300&x1=1e300&xlog=1").head["points"], 18);
 }
 
-TEST_F(PageStudyTest, BinsOfNothingHaveTheEndsThatWereTyped) {
+TEST_F(PageStudyTest, BinsWithoutPointsHaveTheTypedEnds) {
   submit_grid();
   const std::string bins = "/api/studies/1/bins?x=fn_peak_N";
   EXPECT_EQ(page_.numbers(bins + "&x0=2").head["x"]["most"], 2);
@@ -190,7 +190,7 @@ TEST_F(PageStudyTest, BinsOfNothingHaveTheEndsThatWereTyped) {
 
 // ---- Conditions ---------------------------------------------------------------------------------
 
-TEST_F(PageStudyTest, ASliceMarksWhatDoesNotMeetACondition) {
+TEST_F(PageStudyTest, ASliceMarksCellsThatDoNotMeetACondition) {
   solve_grid();
   const std::string slice = "/api/studies/1/slice?x=mu&y=H&at=e@1&z=";
   const Numbers some =
@@ -211,7 +211,7 @@ TEST_F(PageStudyTest, ASliceMarksWhatDoesNotMeetACondition) {
   EXPECT_EQ(page_.numbers(slice + "mode&where=NULL").head["filtered"], 12);
 }
 
-TEST_F(PageStudyTest, WhatWasNotSolvedIsNotLeftOutByACondition) {
+TEST_F(PageStudyTest, UnsolvedCellsAreNotMarkedByACondition) {
   submit_grid();
   solve(4);
   const std::string slice = "/api/studies/1/slice?x=mu&y=H&z=mode&where=mu%20%3E%200.1";
@@ -222,7 +222,7 @@ TEST_F(PageStudyTest, WhatWasNotSolvedIsNotLeftOutByACondition) {
   EXPECT_EQ(page_.numbers(slice).head["solved"], 9);
 }
 
-TEST_F(PageStudyTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
+TEST_F(PageStudyTest, AConditionFollowsTheQueryLanguage) {
   solve_grid();
   const std::vector<std::pair<std::string, std::string>> all{
       {"muu%20%3E%201", "did you mean `mu`?"},
@@ -238,12 +238,12 @@ TEST_F(PageStudyTest, AConditionIsJudgedAsTheQueryLanguageDoes) {
     }
     EXPECT_EQ(page_.status("/api/studies/9/" + picture + "&where=1"), 404);
   }
-  // What is wrong beside it is told before anything is looked for.
+  // Other errors are reported before any lookup.
   EXPECT_EQ(page_.status("/api/studies/1/slice?z=muu&x=mu&where=1"), 400);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mode&where=1"), 400);
 }
 
-/// The query by which a slice of the study `grid` is read.
+/// The query for a slice of the study `grid`.
 protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& recipe) {
   ServiceClient client;
   const PendingAnswer pending = slice_answer(client, 1, fields);

@@ -31,7 +31,7 @@ inline WebSettings page_settings(bool shows_without_token = false) {
   return settings;
 }
 
-/// Of numbers behind a head.
+/// Parses an answer with numbers and their head.
 struct Numbers {
   nlohmann::json head;
   std::string bytes;
@@ -47,7 +47,7 @@ struct Numbers {
   }
 };
 
-/// A whole server, and a browser that it has let in.
+/// A whole server, and a browser with access.
 class PageServer {
  public:
   explicit PageServer(const WebSettings& web = page_settings(), const std::string& database = {})
@@ -72,10 +72,10 @@ class PageServer {
     return RawHttp(url()).ask(method + " " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" +
                               headers + "\r\n" + body);
   }
-  /// As the page asks.
+  /// Sends a request as the page does.
   std::string get(const std::string& path) const { return ask("GET", path, cookie_header()); }
   int status(const std::string& path) const { return status_of_answer(get(path)); }
-  /// A request whose answer is not read here.
+  /// Sends a request without reading the answer.
   std::unique_ptr<RawHttp> begin(const std::string& path) const {
     auto browser = std::make_unique<RawHttp>(url());
     browser->send("GET " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" + cookie_header() +
@@ -110,12 +110,12 @@ class PageServer {
   std::string cookie_;
 };
 
-/// As `solved_point` makes it.
+/// The force in the result of `solved_point`.
 inline float force_of(std::uint64_t point) {
   return static_cast<float>(std::round((1.0 / 3.0 + static_cast<double>(point)) * 1e4 * 1e5) / 1e5);
 }
 
-/// A server that shows its page, and studies that a pretended worker solves.
+/// A server with its page, and studies that a simulated worker solves.
 class PageStudyTest : public testing::Test {
  protected:
   void submit(const std::string& name, const protocol::Recipe& recipe) {
@@ -125,12 +125,12 @@ class PageStudyTest : public testing::Test {
     ASSERT_TRUE(client_.ask(request).has_submit());
   }
   void solve(std::uint64_t points, const std::set<std::uint64_t>& failing = {}) {
-    PretendedWorker worker(page_.server().worker_endpoint());
+    SimulatedWorker worker(page_.server().worker_endpoint());
     worker.fail(failing);
     worker.hello();
     worker.work(points);
   }
-  /// 3 heights, 4 frictions, 2 restitutions.
+  /// A grid of 3 H, 4 mu and 2 e.
   static protocol::Recipe grid_recipe() {
     return protocol::recipe_of(
         {{protocol::listed("H", {1.0, 0.9, 0.8}), protocol::range("mu", 0.0, 0.6, 4),
@@ -154,7 +154,7 @@ class PageStudyTest : public testing::Test {
   }
 
   PageServer page_;
-  PretendedClient client_{page_.server().client_endpoint()};
+  SimulatedClient client_{page_.server().client_endpoint()};
 };
 
 }  // namespace oblique::server

@@ -1,4 +1,4 @@
-// Who may see and change what, and what the page requests of a whole server besides pictures.
+// Access to the page, and its requests to a whole server except for pictures.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -21,7 +21,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-TEST(PageAccess, ATokenBecomesACookieAndGoesFromTheAddress) {
+TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   const PageServer page;
   const std::string answer = page.ask("GET", std::string("/?token=") + kTestToken, "");
   EXPECT_EQ(status_of_answer(answer), 303);
@@ -37,7 +37,7 @@ TEST(PageAccess, ATokenBecomesACookieAndGoesFromTheAddress) {
   }
 }
 
-TEST(PageAccess, OnlyTheServerOfAFileNamesItAndOnlyToThoseWhoAreIn) {
+TEST(PageAccess, OnlyAViewOfAFileNamesItAndOnlyWithAccess) {
   EXPECT_EQ(PageServer().json("/api/session")["file"], "");
   WebSettings web = page_settings();
   web.page.is_of_file = true;
@@ -46,7 +46,7 @@ TEST(PageAccess, OnlyTheServerOfAFileNamesItAndOnlyToThoseWhoAreIn) {
   EXPECT_EQ(nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")))["file"], "");
 }
 
-TEST(PageAccess, WithoutTheCookieNothingIsShown) {
+TEST(PageAccess, WithoutTheCookieNothingIsReadable) {
   const PageServer page;
   const std::string right = page.cookie_header();
   for (const std::string path :
@@ -71,7 +71,7 @@ TEST(PageAccess, WithoutTheCookieNothingIsShown) {
   }
 }
 
-TEST(PageAccess, AnOperatorMayLetAllLookAndNoneChange) {
+TEST(PageAccess, ReadingMayBeAllowedWithoutTheToken) {
   const PageServer page(page_settings(true));
   const auto session = nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")));
   EXPECT_EQ(session["may_look"], true);
@@ -123,13 +123,13 @@ TEST(PageAccess, WrongRequestsAreRefused) {
   EXPECT_EQ(status_of_answer(page.post("/api/studies", std::string(262'144, ' '))), 400);
 }
 
-TEST_F(PageStudyTest, TheWorkerIsToldWhenTheBrowserOfATraceHasGone) {
+TEST_F(PageStudyTest, ATraceIsCancelledWhenItsBrowserDisconnects) {
   submit_grid();
-  PretendedWorker worker(page_.server().worker_endpoint());
+  SimulatedWorker worker(page_.server().worker_endpoint());
   worker.hello();
   auto browser = page_.begin("/api/studies/1/points/3/trace");
   while (!worker.receive().has_trace_order()) {
-    // It was welcomed before.
+    // It got its Welcome before.
   }
   browser.reset();
   while (!worker.receive().has_trace_cancel()) {
@@ -137,7 +137,7 @@ TEST_F(PageStudyTest, TheWorkerIsToldWhenTheBrowserOfATraceHasGone) {
   }
 }
 
-TEST(PageFiles, ComeGzippedWithTheirTypesToEverybodyWhoDoesNotHaveThem) {
+TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
   const PageServer page;
   const auto type_of = [&](const std::string& path) {
     const std::string answer = page.ask("GET", path, "");
@@ -170,7 +170,7 @@ TEST(PageFiles, AreSmall) {
   EXPECT_LE(bytes, 120'000U);
 }
 
-TEST(PageToken, TokensDifferAndACookieFollowsFromItsToken) {
+TEST(PageToken, TokensDifferAndACookieIsDerivedFromItsToken) {
   const PageToken one;
   const PageToken other;
   EXPECT_NE(one.text(), other.text());
@@ -182,7 +182,7 @@ TEST(PageToken, TokensDifferAndACookieFollowsFromItsToken) {
   EXPECT_THAT(one.cookie_for("[::1]"), StartsWith("oblique-80="));
 }
 
-TEST(PageToken, AFileIsMadeForItsOwnerAndReadAgain) {
+TEST(PageToken, ATokenFileIsCreatedForItsOwnerAndReadAgain) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("token");
   const std::string token = PageToken::from_file(path).text();
@@ -206,7 +206,7 @@ TEST(PageToken, AFileIsMadeForItsOwnerAndReadAgain) {
 
 // ---- Studies, points and rows -------------------------------------------------------------------
 
-/// A study of these values, as the body of a check.
+/// A study with these values, as the body of a check.
 std::string body_with(const std::string& H, const std::string& others = "",
                       const std::string& model = "{}", const std::string& mu = R"("values":[1])",
                       const std::string& where = "") {
@@ -224,7 +224,7 @@ std::map<std::string, json> named(const json& list, const char* member) {
   return found;
 }
 
-TEST_F(PageStudyTest, TheOverviewIsToldOnceAndThenWhatChanges) {
+TEST_F(PageStudyTest, TheOverviewIsSentOnceAndThenAfterChanges) {
   RawHttp tab(page_.url());
   tab.send("GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_EQ(status_of_answer(tab.read_to_the_end()), 401);
@@ -283,7 +283,7 @@ TEST_F(PageStudyTest, StudiesAndWorkersAreListedAndOthersAreNotFound) {
   }
 }
 
-TEST_F(PageStudyTest, RowsAreAskedForAsOnTheCommandLine) {
+TEST_F(PageStudyTest, RowsAreQueriedAsOnTheCommandLine) {
   solve_grid();
   const json rows = page_.json(
       "/api/studies/1/rows?select=point,fn_peak_N&where=mu%20%3C%200.1&order=point%20DESC&limit=2");
@@ -311,7 +311,7 @@ TEST_F(PageStudyTest, APointHasTheInputsOfItsRecipe) {
   EXPECT_THAT(trace, HasSubstr("no worker is connected"));
 }
 
-TEST_F(PageStudyTest, AStudyIsStartedAndChangedFromThePage) {
+TEST_F(PageStudyTest, AStudyIsSubmittedAndChangedFromThePage) {
   const std::string made = page_.post(
       "/api/studies", body_with(R"("values":[1])", "", "{}", R"("from":0,"to":1,"count":5)"));
   EXPECT_EQ(json::parse(body_of(made))["points"], 5);
@@ -328,7 +328,7 @@ TEST_F(PageStudyTest, AStudyIsStartedAndChangedFromThePage) {
   }
 }
 
-TEST_F(PageStudyTest, TheModelOfAStudyIsSaidByPresetIntegratorAndKeys) {
+TEST_F(PageStudyTest, AModelIsGivenByPresetIntegratorAndKeys) {
   const auto body = [](const std::string& model) {
     return body_with(R"("values":[1])", "", model);
   };
@@ -356,7 +356,7 @@ TEST_F(PageStudyTest, TheModelOfAStudyIsSaidByPresetIntegratorAndKeys) {
 
 // ---- Checks before a study is submitted ---------------------------------------------------------
 
-TEST_F(PageStudyTest, AStudyIsJudgedBeforeItIsSubmitted) {
+TEST_F(PageStudyTest, AStudyIsCheckedBeforeItIsSubmitted) {
   const auto check = [&](const std::string& mu, const std::string& where) {
     return page_.post("/api/check", body_with(R"("values":[1])", "", "{}", mu, where));
   };
@@ -374,7 +374,7 @@ TEST_F(PageStudyTest, AStudyIsJudgedBeforeItIsSubmitted) {
   EXPECT_EQ(page_.json("/api/studies")["studies"].size(), 0U);
 }
 
-TEST_F(PageStudyTest, ADropBeyondTheLengthOfTheFingerIsRefusedAndOneThatOnlyAFallTellsIsSaid) {
+TEST_F(PageStudyTest, ADropAboveTheLengthIsRefusedAndAnUncertainOneIsReported) {
   const auto check = [&](const std::string& H, const std::string& others = {}) {
     return page_.post("/api/check", body_with(H, others));
   };
@@ -393,7 +393,7 @@ TEST_F(PageStudyTest, ADropBeyondTheLengthOfTheFingerIsRefusedAndOneThatOnlyAFal
   EXPECT_DOUBLE_EQ(reached_m(R"("expression":"0.5 + 0.1 * e")"), 1.08);
 }
 
-TEST_F(PageStudyTest, AtMostEightyCharactersOfAWrongKeyAreRepeated) {
+TEST_F(PageStudyTest, ErrorsRepeatAtMostEightyCharactersOfAKey) {
   const std::string key(10'000, 'k');
   for (const std::string& body :
        {"{\"" + key + "\":1}", "{\"recipe\":{},\"model\":{\"" + key + "\":1}}",

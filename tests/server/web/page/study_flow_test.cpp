@@ -1,4 +1,4 @@
-// Answers about a study, and the requests for them; the test plays the service.
+// Answers about a study and the requests for them; the test plays the service.
 #include "server/web/answers/study_answers.h"
 
 #include <cstdint>
@@ -53,7 +53,7 @@ class StudyFlowTest : public testing::Test {
     }
     return requests;
   }
-  /// Numbers of the requests that the service is told to end since the last call, in order.
+  /// Numbers of the requests that were ended since the last call, in order.
   std::vector<std::uint64_t> ended() {
     std::vector<std::uint64_t> numbers;
     for (const ClientRequest& request : requested()) {
@@ -120,7 +120,7 @@ TEST_F(StudyFlowTest, AnAnswerIsMadeOfAllChunksOfAQuery) {
   EXPECT_FALSE(pending());
   const ClientRequest more = requested().at(0);
   EXPECT_EQ(more.more_rows().request_id(), query.request_id());
-  EXPECT_EQ(more.more_rows().taken(), 1U);
+  EXPECT_EQ(more.more_rows().received(), 1U);
   reply(query.request_id(), chunk_of({5}, true));
   EXPECT_EQ(pending()->body, "1 2 5 ");
 }
@@ -132,13 +132,13 @@ TEST_F(StudyFlowTest, ALateErrorAboutAQueryThatHasEndedDoesNotEndTheNext) {
   reply(first, chunk_of({}, true));
   EXPECT_FALSE(pending());
   const std::uint64_t second = requested().back().request_id();
-  reply(first, error_of("no answer to that request is under way"));
+  reply(first, error_of("no query of this connection has that request number"));
   EXPECT_FALSE(pending());
   reply(second, chunk_of({2}, true));
   EXPECT_EQ(pending()->body, "1 2 ");
 }
 
-TEST_F(StudyFlowTest, TheQueryOfAClientThatHasGoneEnds) {
+TEST_F(StudyFlowTest, TheQueryOfADisconnectedClientEnds) {
   PendingAnswer pending = described();
   const ClientRequest query = requested().at(0);
   pending = nullptr;
@@ -199,13 +199,13 @@ TEST_F(StudyFlowTest, FewTracesAreRequestedOrSentAtATime) {
   EXPECT_EQ(requested().size(), 1U);
 }
 
-TEST_F(StudyFlowTest, AfterItsDeadlineTheAnswerSaysSo) {
+TEST_F(StudyFlowTest, AnAnswerAfterItsDeadlineIsAnError) {
   const PendingAnswer pending =
       study_flow(client_, 1, std::make_unique<Points>(), FlowClock::now());
   EXPECT_EQ(pending()->status, 503U);
 }
 
-TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
+TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItUnchanged) {
   for (const bool is_condition_wrong : {true, false}) {
     const PendingAnswer pending = described(1, "muu > 1");
     reply(requested().at(0).request_id(), error_of("wrong in the whole query"));
@@ -221,7 +221,7 @@ TEST_F(StudyFlowTest, AnErrorAboutAConditionShowsItAsItWasWritten) {
   }
 }
 
-TEST_F(StudyFlowTest, ATraceWhoseBrowserWentEndsUnlessItHasCome) {
+TEST_F(StudyFlowTest, ATraceWhoseBrowserDisconnectedEndsUnlessItIsComplete) {
   ClientRequest trace;
   trace.mutable_trace()->set_study("a");
   client_.ask(1, trace);
