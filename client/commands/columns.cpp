@@ -26,10 +26,10 @@ constexpr const char* kListColumnsExamples = R"(Examples:
   oblique columns --format csv
   oblique columns --trace                   columns of the files that `oblique trace` writes
 
-Lists the columns of `oblique query` and their names in `oblique solve --json`, then the elements of
-lists, counted from 0, and the functions that `oblique query` accepts. Values are in SI units. Tables
-show short times in us or ms and slides in mm; the heading gives the unit. x points from the pin to
-the released tip, y up. Times of a contact count from touch.)";
+Lists the columns of `oblique query` and their names in `oblique solve --json`, then the elements
+of lists, counted from 0, and the functions that `oblique query` accepts. Values are in SI units.
+Tables show short times in us or ms and slides in mm; the heading gives the unit. x points from the
+pin to the released tip, y up. Times of a contact count from touch.)";
 
 /// The columns that match `pattern`, all if it is empty. Throws solver::InputError if none match.
 std::vector<server::Column> columns_like(const std::string& pattern) {

@@ -49,8 +49,8 @@ constexpr const char* kCheckExamples = R"(Examples:
 
 Reads the whole database: every page, index and reference, and every row, which is compared with its
 checksum and the recipe of its study. Unfinished studies are listed; they are no damage. A copy made
-without the file that ends in -wal lacks rows in this way. Exit code 1 if the database is damaged. To
-save what can be read of a damaged file:  oblique backup saved.db --db damaged.db --salvage)";
+without the file that ends in -wal lacks rows in this way. Exit code 1 if the database is damaged.
+To save what can be read of a damaged file:  oblique backup saved.db --db damaged.db --salvage)";
 
 struct MergeFlags {
   std::vector<std::string> sources;
@@ -99,10 +99,10 @@ void note_merged(Console& console, const std::string& source, const std::string&
   const auto add = [&out](std::uint64_t count, const char* text) {
     out << (count > 0 ? fmt::format(fmt::runtime(text), format_count(count)) : "");
   };
-  add(merged.studies_grown, "; {} of these studies grew");
   add(merged.failures_replaced, ", {} of them for points that had failed");
   add(merged.results_known, "; {} existed already");
   add(merged.results_differing, ", {} of these with other values: those of --db are kept");
+  add(merged.studies_grown, "; {} of the united studies grew");
   out << ".\n";
   for (const std::string& remark : merged.remarks) {
     out << "  " << protocol::visible(remark) << '\n';

@@ -39,9 +39,9 @@ constexpr const char* kPlotExamples = R"(Examples:
   oblique plot friction --point 7 --panel loop --show
   oblique plot --H 1 --mu 1.2 --e 1 --out impact.svg    a point that belongs to no study
 
-OUTPUT and COL are columns of `oblique query` or SQL expressions of them, such as fn_peak_N/ft_peak_N.
-KEY is an axis of the study. An axis without --at is held at its first value; a message names it. A
-map or lines show one block of a study; a message says which. Maps of texts, such as modes, name the
+OUTPUT and COL are columns of `oblique query` or SQL expressions, such as fn_peak_N/ft_peak_N. KEY
+is an axis of the study. An axis without --at is held at its first value; a message names it. A map
+or lines show one block of a study; a message says which. Maps of texts, such as modes, name the
 most frequent ones. Cells without a result are hatched, failed ones crossed. Scattered points, and
 points that are too many to draw, are gathered in cells; the picture says so. gnuplot draws the
 pictures (Debian: gnuplot-nox); --out FILE.gp writes its script and does not need it. Without --out

@@ -38,8 +38,8 @@ constexpr const char* kWatchExamples = R"(Examples:
   oblique watch paper --db sweep.db
   oblique watch paper --server tcp://127.0.0.1:7600
 
-Ctrl-C ends watching; the study continues. If the server stops answering, watch waits for it. The exit
-code is 1 if a point failed or the study is not done.)";
+Ctrl-C ends watching; the study continues. If the server stops answering, watch waits for it. The
+exit code is 1 if a point failed or the study is not done.)";
 
 struct StatusFlags {
   std::string study;  // empty: all

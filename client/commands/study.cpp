@@ -36,10 +36,10 @@ constexpr const char* kStudyCheckExamples = R"(Examples:
   oblique study check sweep.toml --json
   oblique study check --H 1 --mu 0.01:2:40:log --e 0.6,0.8,1 --where "mu > 0.5 * e"
 
-Nothing is submitted. The predicted time is that of `oblique run` on this machine: (falls x time of a
-fall + points x time of a contact) / threads. Some falls and contacts are timed for it on all cores,
-which takes a few seconds on fine meshes. The size is
-estimated from the average size of results and models.)";
+Nothing is submitted. The predicted time is that of `oblique run` on this machine:
+(falls x time of a fall + points x time of a contact) / threads. Some falls and contacts are timed
+for it on all cores, which takes a few seconds on fine meshes. The size is estimated from the
+average size of results and models.)";
 
 struct CheckFlags {
   StudyFlags study;

@@ -34,8 +34,8 @@ constexpr const char* kRenameExamples = R"(Examples:
   oblique rename friction friction-paper --db lab.db
   oblique rename friction friction-paper --server tcp://127.0.0.1:7600
 
-The study keeps its number, points and results; `oblique watch` continues. A database file is changed
-directly if no server uses it; otherwise name the server.)";
+The study keeps its number, points and results; `oblique watch` continues. A database file is
+changed directly if no server uses it; otherwise name the server.)";
 
 constexpr const char* kDeleteExamples = R"(Examples:
   oblique delete friction
@@ -43,9 +43,9 @@ constexpr const char* kDeleteExamples = R"(Examples:
   oblique delete friction --server tcp://127.0.0.1:7600
 
 Deletes the study and all its results; they cannot be restored, so make a copy with `oblique backup`
-first. Asks for confirmation on a terminal and needs --yes elsewhere. A running study is stopped. Its
-name is free at once, while a server removes the rows in the background. The file keeps its size;
-later results use the space. A database file is changed directly if no server uses it.)";
+first. Asks for confirmation on a terminal; elsewhere --yes is required. A running study is stopped.
+Its name is free at once; a server removes the rows in the background. The file keeps its size; later
+results use the space. A database file is changed directly if no server uses it.)";
 
 struct ChangeFlags {
   std::string study;

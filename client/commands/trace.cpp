@@ -18,9 +18,9 @@ constexpr const char* kTraceExamples = R"(Examples:
   oblique trace paper 3 --format json > point3.json
   oblique trace paper 3 --server tcp://127.0.0.1:7600 --on-worker --out point3.csv
 
-The point is solved again: in this process if the database is a file, else by a worker of the server.
-The result is compared with the stored row; standard error shows whether they are equal. `oblique
-columns --trace` describes the columns.)";
+The point is solved again: in this process if the database is a file, else by a worker of the
+server. The result is compared with the stored row; standard error shows whether they are equal.
+`oblique columns --trace` describes the columns.)";
 
 struct TraceFlags {
   std::string study;

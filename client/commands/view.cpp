@@ -30,7 +30,7 @@ constexpr const char* kViewExamples = R"(Examples:
 
 Prints an address to open in a browser on this machine, until Ctrl-C. Over ssh, forward the port:
 ssh -L 8000:127.0.0.1:8000 HOST. Unfinished studies continue meanwhile. Start other studies on the
-page: commands that change the file, such as `oblique run`, are refused until the page is closed.
+page: commands that change the file, such as `oblique run`, are refused until `oblique view` ends.
 Links to the page stay valid only with the same --port.)";
 
 struct ViewFlags {

@@ -50,8 +50,9 @@ void note_access(Console& console, const protocol::WorkersReply& reply) {
     console.note("refused since the server started:" + refusals);
   }
   if (reply.bad_frames() > 0) {
-    console.note(fmt::format("{} malformed messages arrived; the server's log names the senders",
-                             counted(reply.bad_frames(), "frame", "frames")));
+    console.note(
+        fmt::format("{} arrived; the server's log names the senders",
+                    counted(reply.bad_frames(), "malformed message", "malformed messages")));
   }
 }
 

@@ -96,7 +96,7 @@ class StudyFromAScript(Recipe):
         self.assertEqual(max(float(r["fn_peak_N"]) for r in rows), float(said.split()[-2]))
         # Again: nothing is solved twice, and the answer is the same.
         self.assertEqual(self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url),
-                         said.replace(" 0 done", " 16 done; the server had it already"))
+                         said.replace(" 0 done", " 16 done; the server already had it"))
         # Cancelled, it is not done: 1.
         self.run_in_folder("oblique", "submit", "--name", "long", "--preset", "paper", "--H", "1", "--mu", "0.1:2:1000", "--e",
                            "0.5:1:1000", OBLIQUE_SERVER=url)

@@ -1,4 +1,5 @@
-// What a picture is of: pickers, sliders, scales. A choice is written into the address, and shown from there.
+// Pickers, sliders and scales of a picture. A choice is written into the address and read from
+// there.
 import { button, checkbox, h, labelled, picker, setChildren } from "../lib/dom.js";
 import { heading, shown, shownUnit, withUnit } from "../lib/format.js";
 import { axisValue, fillIn, varyingAxes } from "./fields.js";
@@ -11,7 +12,7 @@ export function controlsOf(view) {
   const pickers = h("div.controls");
   const sliders = h("div.sliders");
 
-  /** Shows the picture of another choice. */
+  /** Shows another picture. */
   function choose(changes) {
     view.set(changes, true);
     fillIn(view.fields, study);
@@ -20,7 +21,7 @@ export function controlsOf(view) {
     view.load();
   }
 
-  /** Draws the same data in another way, or loads it again where it depends on the scale. */
+  /** Draws the same data with other settings; loads data again if it depends on the scale. */
   function redraw(changes) {
     view.set(changes);
     if (view.is("pic") === "map") view.draw();
@@ -40,7 +41,7 @@ export function controlsOf(view) {
     });
   }
 
-  /** Columns that a picture can show, with the one that it shows. */
+  /** Columns that a picture can show, including the present one. */
   function columnChoices(shownColumn, mayBeCategory) {
     const found = view.columns.filter(
       ([name]) => mayBeCategory || view.columnOf(name).picture === "numbers",
@@ -55,7 +56,7 @@ export function controlsOf(view) {
     const outputs = columnChoices(view.is("z"), kind === "map" || kind === "scatter");
     const none = kind === "scatter" ? [["", "none"]] : [];
     const z = picker([...none, ...outputs], view.is("z"), (name) => {
-      view.fields.set("z", name); // "" is a choice too
+      view.fields.set("z", name); // "" is a valid choice
       choose({ ...(name ? { z: name } : {}), from: "", to: "" });
     });
     return labelled(kind === "scatter" ? "colour" : "output", z);
@@ -110,12 +111,12 @@ export function controlsOf(view) {
       view.map.dragSelects = drag === "select";
       view.draw();
     });
-    return labelled("mouse", drags, "Dragging over the picture; with Shift the other one");
+    return labelled("mouse", drags, "While dragging; with Shift the other action");
   }
 
   const hasColourBar = () => view.hasMap && view.columnOf(view.is("z"))?.picture === "numbers";
 
-  /** The range of colours, in shown units. */
+  /** The range of colours in shown units. */
   function rangeFields() {
     const [, factor] = shownUnit(view.is("z"), view.unitOf(view.is("z")));
     const end = (name) => {

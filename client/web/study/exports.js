@@ -1,4 +1,4 @@
-// The picture as files, the view as a link, and the commands that make both.
+// The picture as files, the view as a link, and equivalent commands.
 import { button, command, copyButton, h, saveFile, setChildren } from "../lib/dom.js";
 import { dbFlag, quoted } from "../lib/format.js";
 import { pngOf } from "../lib/png.js";
@@ -6,7 +6,7 @@ import { joined } from "./conditions.js";
 import { csvOf } from "./describe.js";
 import { spanOf } from "./legend.js";
 
-/** The flags of `oblique plot` that draw the picture of a view. */
+/** Flags of `oblique plot` for the picture of a view. */
 function plotFlags(view) {
   const is = (name) => view.is(name);
   const { head } = view.picture;
@@ -16,7 +16,7 @@ function plotFlags(view) {
     lines: [["lines", is("z")], x, ["by", is("y")]],
     scatter: [
       ["scatter", `${is("x")},${is("y")}`],
-      ["colour", view.picture.z.isCategory ? "" : is("z")], // oblique plot colours by numbers
+      ["colour", view.picture.z.isCategory ? "" : is("z")], // oblique plot colours only by numbers
     ],
     histogram: [["histogram", is("x")]],
   }[is("pic")];
@@ -71,12 +71,12 @@ export function showExports(view) {
     h(
       "div.row.files",
       button("PNG", () => savePng().catch((error) => view.complain(error)), {
-        title: "the picture as it is shown",
+        title: "the picture as shown",
       }),
       button("CSV", saveCsv, { title: "the numbers of the picture" }),
       copyButton("Copy link", () => location.href, { title: "the address of this view" }),
     ),
-    h("p", "The picture and the table on a command line:"),
+    h("p", "Commands for this picture and table:"),
     command("the picture", plotCommand(view)),
     command("the table", queryCommand(view)),
   );

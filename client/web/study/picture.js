@@ -1,20 +1,21 @@
-// The data of a picture: slices, bins, single points and medians in one form, asked for as the address says.
+// Data of a picture: slices, bins, single points and medians in one form.
 import { numbers, rows } from "../api.js";
 import { endsOf, quantile, scale } from "../lib/scale.js";
 import { joined, within } from "./conditions.js";
 import { ownAxes } from "./fields.js";
 
 /**
- * A side has name, unit (SI), values, isWhole (no value between the ends is left out), and edges of bins or the numbers of
- * the values on their axis. A picture has x and y, z {name, unit, isCategory} with its ends least and most, values row by
- * row (of categories indices into the dictionary [{text, cells}]), the head of the server's answer, point(column, row),
- * whyEmpty(cell): "" or one of emptyKinds, and dots {points, x, y, z}: single points, or labels of lines.
+ * A side has name, unit (SI), values, isWhole (the values between the ends are complete), and edges
+ * of bins or indices of the values on their axis. A picture has sides x and y; z {name, unit,
+ * isCategory} and its range least to most; values by rows (for categories indices into the
+ * dictionary [{text, cells}]); the head of the server's answer; point(column, row); whyEmpty(cell):
+ * "" or one of emptyKinds; and dots {points, x, y, z} for single points, or labels for lines.
  */
 
 /** Kinds of cells without a value, by their bits. */
 export const emptyKinds = ["missing", "failed", "left_out", "none", "filtered"];
 
-/** Points that are drawn one by one; more are gathered in bins. */
+/** Maximum number of points drawn one by one; more are grouped in bins. */
 export const mostDots = 20_000;
 const mostCells = 256; // a side
 const firstCells = 96;
@@ -22,11 +23,11 @@ const mostLines = 8;
 const mostBins = 96;
 const mostForMedians = 100_000;
 
-/** Asks for numbers of a study behind a head. */
+/** Requests binary numbers of a study. */
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
-/** The numbers of the values that the server shows of an axis. */
+/** Indices of the values of an axis that the server shows. */
 function numbersOf({ first, last }, shown) {
   const steps = Math.max(shown - 1, 1);
   const number = (i) => first + Math.floor((2 * i * (last - first) + steps) / (2 * steps));
@@ -71,7 +72,7 @@ async function slice(view, query, signal) {
   };
 }
 
-/** A side of bins of equal width, or one bin around the only value. */
+/** A side of equal bins, or one bin around a single value. */
 function binSide(name, unit, least, most, bins, isLog) {
   if (!(most > least)) {
     const half = Math.abs(least) * 0.05 || 0.5;
@@ -92,13 +93,13 @@ function binSide(name, unit, least, most, bins, isLog) {
 
 const noSide = { name: "", unit: "", values: new Float64Array(1), isWhole: true };
 
-/** In which bin of a side a value lies. */
+/** The bin of a value. */
 function binOf({ edges, values }, value, isLog) {
   const place = scale(edges[0], edges.at(-1), isLog).place(value);
   return Math.min(Math.max(Math.floor(place * values.length), 0), values.length - 1);
 }
 
-/** How many points lie in cells over one or two columns, or the mean of a third there. */
+/** Number of points by cell over one or two columns, or the mean of a third column. */
 async function bins(view, query, signal) {
   const { head, bytes, begin } = await ask(view.study.id, "bins", query, signal);
   const side = (of) =>
@@ -128,7 +129,7 @@ async function bins(view, query, signal) {
   };
 }
 
-/** The categories of values, the most frequent first, and the index of each value. */
+/** The categories, most frequent first, and the index of each value. */
 function categoriesOf(values) {
   const cells = new Map();
   for (const text of values) if (text !== null) cells.set(text, (cells.get(text) ?? 0) + 1);
@@ -139,7 +140,7 @@ function categoriesOf(values) {
   return { dictionary, codes: values.map((text) => places.get(text) ?? null) };
 }
 
-/** Single points; null: there are more than mostDots. */
+/** Single points; null if there are more than mostDots. */
 async function dots(view, signal) {
   const [xName, yName, zName] = ["x", "y", "z"].map((name) => view.is(name));
   const isLog = { x: view.is("xlog") !== "", y: view.is("ylog") !== "" };
@@ -181,7 +182,7 @@ async function dots(view, signal) {
   };
 }
 
-/** The median of an output, and the quartiles around it, in bins over a column. */
+/** Median and quartiles of an output in bins over a column. */
 async function medians(view, signal) {
   const [x, z] = [view.is("x"), view.is("z")];
   const where = joined(shownWhere(view), `${z} IS NOT NULL`);
@@ -214,7 +215,7 @@ async function medians(view, signal) {
   };
 }
 
-/** The filter and the part that a picture of columns is zoomed into. */
+/** The filter and the zoomed part of a picture of columns. */
 function shownWhere(view) {
   const part = (name) => within(view.is(name), view.is(`${name}0`), view.is(`${name}1`));
   return joined(view.is("where"), part("x"), view.is("pic") === "scatter" ? part("y") : "");
@@ -237,7 +238,7 @@ function sliceQuery(view, cells) {
 
 function binsQuery(view) {
   const isScatter = view.is("pic") === "scatter";
-  // A few points a bin.
+  // A few points per bin.
   const side = Math.round(Math.min(Math.max(Math.sqrt(view.study.points / 3), 6), mostBins));
   const z = view.columnOf(view.is("z"))?.picture === "numbers" ? ["z"] : [];
   return {
@@ -254,7 +255,9 @@ async function scatter(view, signal) {
   return (gathered.head.points <= mostDots && (await dots(view, signal))) || gathered;
 }
 
-/** How many cells a side a picture has, one picture after the other: large maps come coarse first. */
+/**
+ * Numbers of cells per side, in the order of loading: large maps are first shown with fewer cells.
+ */
 export function stepsTo(view, isRefresh) {
   if (view.is("pic") !== "map" || isRefresh) return [mostCells];
   const sides = ownAxes(view.block).filter((axis) =>
@@ -264,14 +267,17 @@ export function stepsTo(view, isRefresh) {
   return cells > 4 * firstCells ** 2 ? [firstCells, mostCells] : [mostCells];
 }
 
-/** The picture that the address of a view says. */
+/** The picture described by the address of a view. */
 export function askPicture(view, cells, signal) {
   if (view.is("pic") === "scatter") return scatter(view, signal);
   if (view.is("pic") === "histogram") return bins(view, binsQuery(view), signal);
   return view.block ? slice(view, sliceQuery(view, cells), signal) : medians(view, signal);
 }
 
-/** Which cells, bins or points of a picture have points that meet a condition too: {cells, counts, points}. */
+/**
+ * The cells, bins or points of a picture that have points under another condition: {cells, counts,
+ * points}.
+ */
 export async function askSelected(view, picture, condition, signal) {
   const where = joined(view.is("where"), condition);
   if (picture.labels) return { cells: new Uint8Array(picture.values.length) };

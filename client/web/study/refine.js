@@ -1,23 +1,23 @@
-// Submits the part that a map shows as a study of its own, with more values along both axes.
+// Submits the part that a map shows as a new study with more values along both axes.
 import { post } from "../api.js";
 import { button, h, labelled } from "../lib/dom.js";
 import { count } from "../lib/format.js";
 
-/** Steps along an axis are halved, or divided further until there are this many. */
+/** Steps along an axis are halved, or divided further to get at least this number of values. */
 const leastSteps = 64;
 
 const integrators = ["explicit", "generalized-alpha"];
 
-/** The model as a recipe has it: its names end with their units. */
+/** The model of a recipe; its names end with their units. */
 function modelOf(model) {
   const nameOf = ({ key, unit }) =>
     unit ? `${key}_${unit.replace("/", "_").replaceAll("^", "")}` : key;
-  const own = model.filter(({ key }) => key !== "links" && key !== "length"); // lengths says both
+  const own = model.filter(({ key }) => key !== "links" && key !== "length"); // lengths gives both
   const values = Object.fromEntries(own.map((one) => [nameOf(one), one.value]));
   return { ...values, integrator: Math.max(integrators.indexOf(values.integrator), 0) };
 }
 
-/** An axis from the smallest to the largest value that is shown of it. */
+/** An axis from the smallest to the largest shown value. */
 function finerAxis(view, name, axis) {
   const { values } = view.picture[name];
   const { first, last } = view.picture.head[name];
@@ -34,7 +34,7 @@ function finerAxis(view, name, axis) {
   };
 }
 
-/** The axes of the block that is shown; other axes are held where they are. */
+/** The axes of the shown block; other axes keep their selected values. */
 function finerAxes(view) {
   const held = new Map(view.picture.head.at.map((one) => [one.key, one.value]));
   return view.block.axes.map((axis) => {
@@ -51,11 +51,12 @@ function nextName(name) {
   return base === undefined ? `${name}-refined` : `${base}-refined-${Number(number) + 1}`;
 }
 
-/** A field for the name of the new study, and the button. */
+/** The button and a field for the name of the new study. */
 export function refineRow(view) {
   const settings = { type: "text", value: nextName(view.study.name), spellcheck: false };
   const name = h("input", { ...settings, autocomplete: "off" });
-  const title = "Submits the shown part with more values along both axes as a study, and shows it";
+  const title =
+    "Submits the shown part with more values along both axes as a new study and shows it";
   const submitButton = button("Refine", () => submit(), { class: "refine", title });
   const element = h("div.row", { hidden: true }, labelled("new study", name), submitButton);
 
@@ -77,7 +78,7 @@ export function refineRow(view) {
   }
   return {
     element,
-    /** Offers the button for the picture that is shown. */
+    /** Shows the button if the picture can be refined. */
     offer() {
       const isMap = view.is("pic") === "map" && view.picture.head.x?.stride;
       element.hidden = !view.place.mayChange || !isMap;

@@ -1,14 +1,16 @@
-// How far a study is, why points failed, and what its model is.
+// Progress of a study, reasons of failures, and its model.
 import { json, retryMs, rows } from "../api.js";
 import { h, setChildren } from "../lib/dom.js";
 import { count, counted, withUnit } from "../lib/format.js";
 import { completed, failedCondition, progressOf, studyButtons } from "../overview.js";
 import { axisValue, columnOfAxis } from "./fields.js";
 
-/** On fewer elements a link forces are off by more than a fifth of a per cent, and a tenth of the modes are others. */
+/**
+ * With fewer elements per link, forces are off by more than 0.2 %, and a tenth of the modes differ.
+ */
 const enoughElements = 8;
 
-/** The values of an axis in short; `ends` are those of drawn values. */
+/** The values of an axis in short; `ends` are those of sampled values. */
 function valuesOf(axis, ends) {
   const { key, unit, values, distribution, expression } = axis;
   if (expression) return `${key} = ${expression}`;
@@ -19,7 +21,7 @@ function valuesOf(axis, ends) {
   return `${key} ${listed[0]} to ${text(axisValue(axis, values - 1))} (${count(values)})`;
 }
 
-/** The smallest and largest values of drawn axes in results: {key: [least, most]}. */
+/** The range of sampled axes in the results: {key: [least, most]}. */
 async function drawnEnds({ id, blocks }, signal) {
   const keys = blocks[0]?.axes.filter((axis) => axis.distribution).map((axis) => axis.key) ?? [];
   if (keys.length === 0) return {};
@@ -28,7 +30,7 @@ async function drawnEnds({ id, blocks }, signal) {
   return Object.fromEntries(keys.map((key, i) => [key, row.slice(2 * i, 2 * i + 2)]));
 }
 
-/** Axes, mesh and model of a study, the keys of the model to be opened. */
+/** Axes and mesh of a study; opening it shows the keys of the model. */
 export function modelLine(study, signal) {
   const { blocks, model } = study;
   const meshAxis = blocks
@@ -53,7 +55,7 @@ export function modelLine(study, signal) {
   return h("details.model", line, h("ul", ...model.map((one) => h("li", textOf(one)))));
 }
 
-/** Why points failed, by the first of them, and a link to all. */
+/** The reason of the first failure, and a link to all failed points. */
 function failureLine(view) {
   const { id } = view.study;
   const element = h("p.failure", { hidden: true });
@@ -77,7 +79,7 @@ function failureLine(view) {
   };
 }
 
-/** State, progress and buttons of a study; `moved` is called when points were completed. */
+/** State, progress and buttons of a study; calls `moved` when points are completed. */
 export function statusRow(view, moved) {
   const { study, place } = view;
   const status = h("div.row.standing");
@@ -96,7 +98,7 @@ export function statusRow(view, moved) {
       progressOf(told),
       counted(told.points, "point"),
       told.failed > 0 && h("span.bad", `${count(told.failed)} failed`),
-      told.left_out > 0 && h("span.weak", `${count(told.left_out)} filtered out`),
+      told.left_out > 0 && h("span.weak", `${count(told.left_out)} left out by where`),
       told.state === "running" && told.waits_for && h("span.weak", `waiting for ${told.waits_for}`),
     ];
     setChildren(status, ...parts.filter(Boolean).map((one) => h("span", one)));
@@ -106,7 +108,7 @@ export function statusRow(view, moved) {
         studyButtons(told, (...said) => view.say(...said)),
       );
     failure.show(told);
-    // Points may have come while the view was opened.
+    // Points may have been completed while the view was loading.
     const hasMoved = done === null ? study.state === "running" : completed(told) !== done;
     ({ state } = told);
     done = completed(told);
@@ -125,7 +127,7 @@ export function statusRow(view, moved) {
   ask();
   return {
     element,
-    /** Takes an overview, which may not list the study. */
+    /** Receives an overview, which may not contain the study. */
     take(now) {
       const told = now.studies.find((one) => one.id === study.id);
       const byState = JSON.stringify(now.studies_by_state);

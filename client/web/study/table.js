@@ -1,5 +1,4 @@
-// Points of a study: those that meet the filter and the selection and lie in the part that the picture shows, a page at a
-// time.
+// The points of a study that meet the filter and the selection and lie in the shown part, in pages.
 import { rows, rowsPath } from "../api.js";
 import { button, h, setChildren } from "../lib/dom.js";
 import { count, heading, shown, shownUnit } from "../lib/format.js";
@@ -35,7 +34,7 @@ export class PointTable {
     });
   }
 
-  /** The columns of the table: what varies, what the picture shows, the main outputs. */
+  /** Columns of the table: those that vary, those of the picture, the main outputs. */
   columns() {
     const { view } = this;
     const usual = view.study.usual_columns;
@@ -54,7 +53,7 @@ export class PointTable {
     return joined(this.view.is("where"), this.view.is("mark"), ...this.view.shownParts());
   }
 
-  /** Loads the page of the address, if the query is another one or results have come. */
+  /** Loads the page of the address if the query or the results have changed. */
   async load(isRefresh = false) {
     const { view } = this;
     const page = Math.min(Math.max(Math.floor(Number(view.is("page"))) || 1, 1), mostPages);
@@ -98,7 +97,7 @@ export class PointTable {
     this.#query = "";
     if (!error.isSilence) this.table.replaceChildren();
     this.said.textContent = "";
-    // A wrong condition is shown beside its field.
+    // An error in a condition is shown beside its field.
     const isOfCondition = error.status === 400 && (this.view.is("where") || this.view.is("mark"));
     if (!isOfCondition) this.view.complain(error);
   }
@@ -134,7 +133,7 @@ export class PointTable {
     const last = Math.min(first + pageSize, total);
     const range =
       total > 0 ? `${count(first + 1)} to ${count(last)} of ${count(total)} rows.` : "No rows.";
-    const cut = total > mostInFile ? ` The CSV has the first ${count(mostInFile)}.` : "";
+    const cut = total > mostInFile ? ` The CSV contains the first ${count(mostInFile)}.` : "";
     this.said.textContent = range + cut;
   }
 
@@ -143,11 +142,11 @@ export class PointTable {
     this.view.set({ page: page > 1 ? String(page) : "" });
     this.load();
   }
-  /** Sorts by a column, then the other way round, then by point again. */
+  /** Sorts by a column: ascending, descending, then by point again. */
   #sort(name) {
     const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.is("order")] ?? name;
     this.view.set({ order: next, page: "" });
     this.load();
-    this.view.draw(); // its commands name the order
+    this.view.draw(); // the commands contain the order
   }
 }

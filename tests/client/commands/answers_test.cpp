@@ -101,7 +101,7 @@ TEST(Answers, ThatBreakOffSaySoAndEndWithOne) {
     wider.set_ends(true);
     return std::vector{frame_of(id, wider)};
   };
-  const std::string broke_off = "the answer broke off after 2 rows";
+  const std::string broke_off = "the answer ended after 2 rows";
   for (const auto& [answer, says] : {std::pair{gives(error), std::string("disk is \\x1b[2J gone")},
                                      {gives(lacking), broke_off},
                                      {gives(unsound), broke_off},
@@ -121,14 +121,14 @@ TEST(Answers, ThatComeNoFurtherEndWithOne) {
     csv = ask(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);
-  EXPECT_THAT(csv.err, testing::HasSubstr("broke off after 2 rows: nothing came from"));
+  EXPECT_THAT(csv.err, testing::HasSubstr("ended after 2 rows: nothing came from"));
 }
 
 TEST(Watch, EndsWithZeroForADoneStudyAndWithOneForACancelledOne) {
   EXPECT_EQ(ask(ScriptedServer(has_study("done")), {"watch", "s"}).exit_code, 0);
   const auto watch = ask(ScriptedServer(has_study("cancelled")), {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
-  EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; oblique resume goes on"));
+  EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; `oblique resume` continues"));
 }
 
 TEST(Watch, TellsHowManyPointsFailedAndWhyAndEndsWithOne) {

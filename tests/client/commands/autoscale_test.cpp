@@ -193,7 +193,7 @@ TEST(AutoscaleFlags, ThatCannotWorkAreWrongUsage) {
   } wrong[] = {
       {{"slurm"}, "--max is required"},
       {{"pbs", "--max", "1"}, "it must be slurm"},
-      {{"slurm", "--min", "3", "--max", "2", "--script", "jobs"}, "it is more than --max 2"},
+      {{"slurm", "--min", "3", "--max", "2", "--script", "jobs"}, "it must be at most --max 2"},
       {{"slurm", "--max", "2", "--script", "jobs", "--name", "a,b"}, "--name a,b is not allowed"},
       {{"slurm", "--max", "2", "--script", "jobs", "--sbatch-args", "--array=1-3"}, "is one job"},
       {{"slurm", "--max", "2", "--script", "jobs"}, "OBLIQUE_WORKER_SERVER is not set"},

@@ -50,7 +50,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {"study check --H 1 --mu 0.4 --e 1 --k 0-mu",
        "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
       {"submit --H 1 --mu 0.4 --e 1 --priority 1001", "--priority: priority = 1001 is not allowed"},
-      {"solve --H 1,1.1 --mu 0.4 --e 1", "solve takes one value for each"},
+      {"solve --H 1,1.1 --mu 0.4 --e 1", "solve takes one value per flag"},
       {"solve --H 1 --mu 0.4 --e 1 --trace /nowhere/x.csv", "/nowhere/x.csv"},
       {"solve --elements-per-lnk=3", "(did you mean `--elements-per-link`?)"},
       {"solve --H 1 --mu 0.4 --e 1 --dt 0.1000000000000001", "dt = 0.1000000000000001 s"},
@@ -60,9 +60,9 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {"submit --H 1 --mu 0.4 --e 1 --server nowhere", "tcp://HOST:PORT"},
       {"status --timeout -1", "--timeout -1"},
       {"status --db a.db --server tcp://127.0.0.1:1", "--server"},
-      {"view --server tcp://127.0.0.1:1", "A server has a page of its own"},
+      {"view --server tcp://127.0.0.1:1", "A server has its own page"},
       {"paper --study x", "--db"},
-      {"converge --H 1 --mu 0.4,0.6 --e 1", "2 points, and converge takes one"},
+      {"converge --H 1 --mu 0.4,0.6 --e 1", "2 points, but converge takes one"},
       {"converge --H 1 --mu 0.4 --e 1 --finest 24", "--finest 24"},
       {"solve --H 1 --mu 0.4 --e 1 --tolerance 0.1", "tolerance = 0.1"},
       {"fit --from papre", "papre"},
@@ -97,7 +97,7 @@ TEST(CommandLine, SaysOfACoarseMeshWhatItCostsBesideTheDataAndOfAStudyOnce) {
     words.insert(words.end(), {"--H", "0.6", "--mu", "0.4", "--e", "1"});
     return test::run_oblique(folder, words).err;
   };
-  const std::string note = "Note: on 4 elements a link forces are off by 3 %";
+  const std::string note = "Note: 4 elements a link give errors of 3 % in forces";
   EXPECT_THAT(err_of({"solve", "--preset", "paper", "--json"}), HasSubstr(note));
   EXPECT_THAT(err_of({"study", "check", "--preset", "paper", "--no-rate"}), HasSubstr(note));
   EXPECT_THAT(err_of({"run", "--preset", "paper"}), HasSubstr(note));

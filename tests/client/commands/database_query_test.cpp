@@ -86,7 +86,7 @@ TEST_F(DatabaseQuery, AFileIsOfTheFormatThatItsNameSays) {
             0);
   std::ifstream file(folder_.path() / "x.csv");
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "point\n0\n");
-  EXPECT_THAT(ask({"sql", "SELECT 1", "--out", "x.txt"}).err, HasSubstr("end its name in .csv"));
+  EXPECT_THAT(ask({"sql", "SELECT 1", "--out", "x.txt"}).err, HasSubstr("end the name in .csv"));
   EXPECT_THAT(ask({"query", "a", "--select", "point", "--out", "/dev/stdout"}).out,
               testing::StartsWith("point\n"));
 }

@@ -55,8 +55,8 @@ TEST_F(Doctor, ReportsEachCheckOnALineOfItsOwn) {
   for (const char* says : {"versions   oblique ", "oblique-server is of the same build\n",
                            "oblique-worker is of the same build\n", "processor  ",
                            "threads may be used; the solver uses ", "solver     ",
-                           "ms of processor time a point; reference for ", "disk       ",
-                           "there is no database oblique.db yet", "key        no key file is named",
+                           "ms of processor time per point; reference for ", "disk       ",
+                           "there is no database oblique.db yet", "key        no key file",
                            "server     not checked"}) {
     EXPECT_THAT(out, HasSubstr(says));
   }

@@ -340,7 +340,7 @@ TEST_F(EveryCommandThatReads, StatusHasRoomInEightyColumns) {
   EXPECT_LE(line.size(), 80U);
   EXPECT_THAT(status.out,
               AllOf(HasSubstr("50 %"),
-                    HasSubstr("friction waits for a server: nobody is at work on oblique.db.")));
+                    HasSubstr("friction waits for a server; none uses oblique.db now.")));
 }
 
 }  // namespace

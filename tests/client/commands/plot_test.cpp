@@ -107,7 +107,7 @@ TEST_F(Plot, OfNoValueSaysSoOnStandardErrorAndHasNoColours) {
   const auto outcome =
       plot({"a", "--scatter", "mu,fn_peak_N", "--colour", "duration_s", "--where", "mu > 5"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("No point of the picture has a value"));
+  EXPECT_THAT(outcome.err, HasSubstr("No point has a value"));
   EXPECT_THAT(outcome.out, Not(HasSubstr("gradient")));
   EXPECT_THAT(plot({"a", "--histogram", "fn_peak_N"}).err, Not(HasSubstr("No point")));
 }
@@ -139,7 +139,7 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
                           {{"a", "--panel", "loop"}, "--point N"},
                           {{"a", "--point", "3", "--map", "fn_peak_N"}, "--map"},
                           {{"a", "--point", "3", "--on-worker"}, "--server"},
-                          {{"--H", "0.5,1", "--mu", "1", "--e", "1"}, "one value each"},
+                          {{"--H", "0.5,1", "--mu", "1", "--e", "1"}, "one value per flag"},
                           {{"a", "--point", "12"}, "0 to 11", 1}}) {
     const auto outcome = plot(wrong.arguments);
     EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.says << outcome.err;
@@ -152,9 +152,9 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndSaysWhereItIsOtherThanStored) {
   const auto other = plot({"a", "--point", "0"});
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_THAT(other.out, AllOf(HasSubstr("Point 0 of a"), HasSubstr("Shape of the finger")));
-  EXPECT_THAT(other.err, HasSubstr("Solved again, it is other than stored in "));
+  EXPECT_THAT(other.err, HasSubstr("The point was solved again: differs from the stored row in "));
   EXPECT_THAT(other.err, HasSubstr("fn_peak_N"));
-  EXPECT_THAT(other.out, HasSubstr("it is other than stored in")) << "in the picture too";
+  EXPECT_THAT(other.out, HasSubstr("differs from the stored row in")) << "in the picture too";
   const auto not_stored = plot({"a", "--point", "11"});
   EXPECT_EQ(not_stored.exit_code, 0) << not_stored.err;
   EXPECT_THAT(not_stored.err, Not(HasSubstr("stored")));

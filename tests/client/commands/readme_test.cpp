@@ -64,8 +64,7 @@ TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
   std::smatch number;
   ASSERT_TRUE(std::regex_search(
       printed.out, number,
-      std::regex(
-          "(\\d+) trustworthy published numbers: rms difference (\\S+ %), largest (\\S+ %)")));
+      std::regex("(\\d+) reliable published numbers: rms difference (\\S+ %), largest (\\S+ %)")));
   const std::string summary = text_of("README.md");
   EXPECT_NE(summary.find("The " + number.str(1) + " trustworthy numbers"), std::string::npos);
   EXPECT_NE(summary.find("rms difference of " + number.str(2)), std::string::npos);

@@ -94,7 +94,7 @@ TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryCommandThatReads) {
 
   const auto compared = test::run_oblique(folder, {"paper", "--db", "oblique.db"});
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
-  EXPECT_NE(compared.out.find("63 trustworthy published numbers: rms"), std::string::npos);
+  EXPECT_NE(compared.out.find("63 reliable published numbers: rms"), std::string::npos);
 }
 
 TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
@@ -144,8 +144,9 @@ TEST(Run, OfAStudyThatIsPausedElsewhereSaysHowToGoOnAndEndsWithOne) {
   EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(outcome.out, "");
-  EXPECT_THAT(outcome.err,
-              HasSubstr("somebody has paused \"many\": the same command again goes on with it"));
+  EXPECT_THAT(
+      outcome.err,
+      HasSubstr("\"many\" was paused by another command: run this command again to continue"));
   const auto before = solved(folder);
   test::Process again(folder, test::client_program(), run_arguments());
   wait_for([&] { return solved(folder) > before; });
@@ -223,7 +224,7 @@ TEST(Run, OfAStudyThatAnotherSolverBeganIsNotWaitedForAndTheWaysOutAreNamed) {
   const auto outcome = test::run_oblique(folder, {"run", "begun.toml"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(outcome.out, "");
-  EXPECT_THAT(outcome.err, HasSubstr("are of solver 0.1, and the workers here have "));
+  EXPECT_THAT(outcome.err, HasSubstr("are of solver 0.1, but the workers here have solver "));
   EXPECT_THAT(outcome.err, HasSubstr("its other 2 points"));
   EXPECT_THAT(outcome.err, HasSubstr("--name begun-"));
   EXPECT_THAT(test::run_oblique(folder, {"status"}).out, HasSubstr("0.1\n"))

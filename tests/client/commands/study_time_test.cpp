@@ -42,8 +42,9 @@ TEST(StudyTime, WhereFallsDominateNamesWhatSharesOneAndWhatWouldBeCheaper) {
       "H = { from = 0.8, to = 1 }\nE = { from = 6e10, to = 8e10 }\n"
       "k = { distribution = 'log-uniform', from = 1e7, to = 1e8 }\n");
   EXPECT_EQ(time_in_words(kCost, size_of(20'000, 20'000), recipe),
-            "about 33 min 30 s on 2 threads: 100 % of it is 20,000 falls.\n"
-            "        H, mu, e, k and eta2 share one fall; E with count = 16: about 12 s");
+            "about 33 min 30 s on 2 threads: 100 % of it for 20,000 falls.\n"
+            "        Points that differ only in H, mu, e, k and eta2 share one fall; E with count "
+            "= 16: about 12 s");
 }
 
 TEST(StudyTime, NamesAllDrawnKeysOfFallsAndCountsTheValuesOfTheOthers) {

@@ -127,7 +127,7 @@ TEST_F(TraceCommand, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   says({"models", "first"}, 2, "POINT");
   says({"models"}, 2, "POINT");
   says({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
-  says({"models", "0", "--out", "x.jsn"}, 2, "end its name in .csv");
+  says({"models", "0", "--out", "x.jsn"}, 2, "end the name in .csv");
   says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
   says({"models", "0", "--local", "--on-worker"}, 2, "--local");
   says({"models", "0", "--every", "0"}, 2, "--every");
@@ -152,7 +152,7 @@ TEST_F(TraceCommand, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers)
   }
   const auto outcome = run({"trace", "made-up", "0", "--out", "x.csv"});
   EXPECT_EQ(outcome.exit_code, 0) << "the trace is what was asked for";
-  EXPECT_THAT(outcome.err, HasSubstr("other than stored"));
+  EXPECT_THAT(outcome.err, HasSubstr("differs from the stored row"));
   EXPECT_THAT(outcome.err, HasSubstr("fn_peak_N"));
   EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now by "));
 

@@ -314,8 +314,8 @@ TEST(FallSentence, NamesTheOutputThatTheFallMovesMost) {
   exact.level.model.tolerance = 1e-6;
   exact.result.vt_out_m_s *= 1.0 + 1e-6;
   EXPECT_EQ(fall_sentence(step, exact),
-            "The fall, solved for 1e-05, changes outputs by 0.0001 % (vt_out_m_s) at most beside "
-            "one solved for 1e-06.\n");
+            "A fall solved for 1e-06 instead of 1e-05 changes outputs by at most 0.0001 % "
+            "(vt_out_m_s).\n");
   EXPECT_EQ(json_of_fall(step, exact)["same_mode"], true);
   exact.result.major_mode = "sC sR";
   EXPECT_NE(fall_sentence(step, exact).find("gives another"), std::string::npos);
@@ -380,7 +380,7 @@ TEST(Verdict, BlamesTheEventThatComesAndGoes) {
   const auto refinement = refinement_with({coarsest, middle, finest});
   EXPECT_FALSE(converges(refinement));
   EXPECT_NE(shown(refinement)
-                .find("The step does not converge by dt/4: the mode is not one on the finest three "
+                .find("The step does not converge by dt/4: the mode differs on the finest three "
                       "levels; to blame: dt/4 has a compression of 1 us, from 200.00 to 201.00 us "
                       "(V_n grazes 0); dt/2 has not."),
             std::string::npos)
@@ -397,7 +397,8 @@ TEST(Verdict, NamesOutputsThatGoOnChangingByMoreThanAThousandthOfTheirScale) {
   finest.vt_out_m_s = -3.0;
   const auto refinement = refinement_with({second_order(0.1), second_order(0.05), finest});
   EXPECT_FALSE(converges(refinement));
-  EXPECT_NE(shown(refinement).find("the mode settles, but not vt_out_m_s"), std::string::npos)
+  EXPECT_NE(shown(refinement).find("the mode settles, but these outputs do not: vt_out_m_s"),
+            std::string::npos)
       << shown(refinement);
   auto coarsest = second_order(0.1);
   auto middle = second_order(0.05);

@@ -109,7 +109,7 @@ TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
   const auto text = out.str();
   for (const char* part :
        {"4.040 / 4.00 / +1.00", "0.1100 / 0.100 / +10.00", "not solved", "the same",
-        "7 trustworthy published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
+        "7 reliable published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
         "The mode is the published one in 1 of 1 cases", "column 3: 7.0 kN", "it is column 2"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
   }

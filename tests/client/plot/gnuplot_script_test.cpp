@@ -51,8 +51,8 @@ std::vector<std::pair<std::string, Figure>> all_figures() {
 
 TEST(GnuplotScript, OfALineIsShortAndReadable) {
   const auto text = script_of(test::lines_of(1, 2), PictureFormat::kSvg, {400, 300}, "picture.svg");
-  EXPECT_THAT(text, StartsWith(R"(# A picture by `oblique plot`, for gnuplot 5.4 or later.
-# Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.
+  EXPECT_THAT(text, StartsWith(R"(# A picture made by `oblique plot`, for gnuplot 5.4 or later.
+# Run it with `gnuplot`; for PDF or PNG set the terminal to pdfcairo or pngcairo.
 set terminal svg size 400,300 font 'DejaVu Sans,12' background '#ffffff'
 set output 'picture.svg'
 )"));
@@ -90,7 +90,7 @@ TEST(GnuplotScript, LeavesTextsFromOutsideAsTheyAre) {
 
 TEST(GnuplotScript, TellsCellsWithoutAValueApart) {
   const auto text = script(test::gappy_map());
-  EXPECT_THAT(text, AllOf(HasSubstr("'no result (1)'"), HasSubstr("'left out by --where (1)'"),
+  EXPECT_THAT(text, AllOf(HasSubstr("'no result (1)'"), HasSubstr("'excluded by --where (1)'"),
                           HasSubstr("'failed (1)'")));
   for (const char* number : {"0", "1", "2"}) {
     EXPECT_THAT(text, HasSubstr("using ($7==" + std::string(number) +

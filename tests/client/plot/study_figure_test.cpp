@@ -121,7 +121,7 @@ TEST(Map, OfManyModesGathersThoseWithNextToNoPoints) {
   EXPECT_TRUE(categories.back().is_other);
   EXPECT_EQ(categories.back().name, "8 other modes");
   EXPECT_EQ(categories.back().points, 88U + 87U + 86U + 5U);
-  EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv has all 20")));
+  EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv lists all 20")));
 }
 
 TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
@@ -167,7 +167,7 @@ TEST(Scatter, DrawsFewPointsEachAndSaysHowManyLackAValue) {
   const Figure figure = figure_from({.scatter = "mu,slide_m"}, {"mu", "slide_m"},
                                     {{1.0, 1.0}, {2.0, {}}, {3.0, 2.0}});
   EXPECT_EQ(figure.panels[0].curves[0].x.size(), 3U);
-  EXPECT_THAT(figure.notes, ElementsAre("1 of 3 points lack a value that can be drawn."));
+  EXPECT_THAT(figure.notes, ElementsAre("1 of 3 points have no value that can be drawn."));
 }
 
 TEST(Scatter, CountsManyPointsInCells) {
@@ -180,7 +180,7 @@ TEST(Scatter, CountsManyPointsInCells) {
   }
   EXPECT_EQ(points, 10'000.0);
   EXPECT_EQ(figure.panels[0].cells->count(CellState::kNoResult), 0U);
-  EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("10,000 points, gathered in ")));
+  EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("10,000 points, grouped in ")));
 }
 
 TEST(Histogram, HoldsEachValueOnceInTheBinThatBeginsAtIt) {
@@ -201,7 +201,7 @@ TEST(Histogram, HoldsEachValueOnceInTheBinThatBeginsAtIt) {
 TEST(Histogram, OfLogarithmsAndOfNothingSaysWhatIsLeftOut) {
   const Figure figure = figure_from({.histogram = "margin", .is_x_logarithmic = true}, {"margin"},
                                     {{0.0}, {0.1}, {1.0}, {10.0}});
-  EXPECT_THAT(figure.notes, ElementsAre("1 of 4 points have no value, or one outside the axis."));
+  EXPECT_THAT(figure.notes, ElementsAre("1 of 4 points have no value or lie outside the axis."));
   EXPECT_TRUE(figure_from({.histogram = "margin"}, {"margin"}, {}).is_empty);
 }
 

@@ -69,7 +69,7 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
 @pytest.mark.parametrize(
     "keys, sentence",
     [
-        ({"mu": [0.1, 0.2], "e": [1, 1, 1]}, "these shapes do not fit each other: mu (2,), e (3,)"),
+        ({"mu": [0.1, 0.2], "e": [1, 1, 1]}, "these shapes cannot be broadcast together: mu (2,), e (3,)"),
         ({"mu": ["a", "b"]}, "mu = ['a', 'b'] is not allowed: mu must be a number or numbers"),
         ({"e": 2}, "e = 2 is not allowed: e must be in [0.001, 1]"),
         ({"threads": 0}, "threads = 0 is not allowed"),

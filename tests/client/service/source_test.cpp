@@ -97,8 +97,7 @@ TEST_F(SourceTest, IsTheServerAtItsDefaultAddressWhenThereIsNoFileEither) {
 
 TEST_F(SourceTest, SaysOfAFileThatNobodyWorksOnItUnlessAServerHasIt) {
   make_database("oblique.db", "default");
-  EXPECT_EQ(open({})->status("default").at(0).waits_for(),
-            "a server: nobody is at work on oblique.db");
+  EXPECT_EQ(open({})->status("default").at(0).waits_for(), "a server; none uses oblique.db now");
   const server::Store at_work("oblique.db");
   EXPECT_EQ(open({})->status("default").at(0).waits_for(), "");
 }
@@ -176,7 +175,7 @@ TEST(WaitMessages, NameOnceWhatAStudyWaitsForAndThatItGoesOn) {
   EXPECT_EQ(update(messages, 1.9, "a worker"), "");
   EXPECT_EQ(update(messages, 2, "a worker"), "The study waits for a worker.");
   EXPECT_EQ(update(messages, 100, "a worker"), "");
-  EXPECT_EQ(update(messages, 101, ""), "The study goes on.");
+  EXPECT_EQ(update(messages, 101, ""), "The study continues.");
   EXPECT_EQ(update(messages, 102, ""), "");
 }
 

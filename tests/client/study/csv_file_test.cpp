@@ -64,13 +64,13 @@ TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(csv_error("drop\ninf\n"), HasSubstr("mu = inf"));
   EXPECT_THAT(csv_error("drop,b\n1\n"), HasSubstr("measured.csv:2: the line has 1 fields"));
   EXPECT_THAT(csv_error("drop\n0,4\n"), HasSubstr("measured.csv:2: the line has 2 fields"));
-  EXPECT_THAT(csv_error("drop\n\"1\n"), HasSubstr("measured.csv:2: a quote is opened"));
+  EXPECT_THAT(csv_error("drop\n\"1\n"), HasSubstr("measured.csv:2: a quote is not closed"));
   EXPECT_THAT(csv_error("drop\n\"1\"2\n"), HasSubstr("measured.csv:2: text follows"));
   EXPECT_THAT(csv_error("drop\n\x1b[2J\n"), HasSubstr("\\x1b[2J"));
 }
 
 TEST(CsvFile, WantsNamesAboveItsColumns) {
-  EXPECT_THAT(csv_error(""), HasSubstr("it needs a line with the names of columns"));
+  EXPECT_THAT(csv_error(""), HasSubstr("it needs a line with column names"));
   EXPECT_THAT(csv_error("drop\n"), HasSubstr("and lines with values"));
   EXPECT_THAT(csv_error("0.4,0.5\n0.6,0.7\n"), HasSubstr("it must name the columns"));
   EXPECT_THAT(csv_error("drop;mu\n1;2\n"), HasSubstr("semicolons"));

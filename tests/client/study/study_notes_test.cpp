@@ -45,7 +45,7 @@ TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNo
       {"preset = 'converged'", "", ""},
       {"elements_per_link = 8", "", ""},
       {"preset = 'paper'", "elements_per_link = [8, 16]\n", ""},
-      {"elements_per_link = 7", "", "on 7 elements a link forces are off by up to 3"},
+      {"elements_per_link = 7", "", "7 elements a link give errors of up to 3"},
       {"elements_per_link = 2", "", "durations by more than 12"},
       {"", "elements_per_link = [16, 4]\n", "on 4 elements"},
       {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "on 2 elements"},
@@ -82,7 +82,7 @@ TEST(ValueNotes, LooksAtTheEndsOfRangesAndAtWhatIsDrawn) {
 TEST(ValueNotes, SaysThatARangeOfASampleIsAListOfValues) {
   EXPECT_EQ(value_notes("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
                                       "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
-            "Note: mu: 5 values; 0.1:1 draws between them.\n")
+            "Note: mu takes 5 values; 0.1:1 draws any value between them.\n")
       << "numbers of elements are drawn from a list alone";
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
 }

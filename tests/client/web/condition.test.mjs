@@ -55,7 +55,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   await web.rowsSaid(page, new RegExp(`of ${selected} rows`));
   await page.select(".controls select", "histogram");
   await web.shows(page, ".lines .legend", /selected/);
-  await web.press(page, "Filter to selection");
+  await web.press(page, "Use selection as filter");
   await web.until(page, () => document.querySelector(".marks input").value === "");
   assert.equal(await web.fieldOf(page, "where"), condition);
   await page.goBack();
