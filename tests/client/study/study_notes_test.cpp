@@ -30,9 +30,9 @@ std::string value_notes(const std::string& model, const std::string& block) {
 
 TEST(MeshNote, SaysInOneLineWhatThePublishedMeshCostsAndWhatPredicts) {
   EXPECT_EQ(mesh_note("preset = 'paper'"),
-            "Note: on 4 elements a link forces are off by 3 %, durations by 12 %, and 4 in 10 "
-            "points get another sequence of states than on 48; to predict: preset = "
-            "\"standard\"\n");
+            "Note: 4 elements a link give errors of 3 % in forces, 12 % in durations, and another "
+            "sequence of states for 4 in 10 points, compared with 48; use preset = \"standard\" for "
+            "predictions\n");
 }
 
 TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNotMeasured) {
