@@ -67,7 +67,8 @@ BothRefinements refined(Console& console, const std::vector<Level>& meshes,
     levels.push_back(*exact_fall);
   }
   const auto all = solve_levels(levels, point, line, [&line](const SolvedLevel& level) {
-    line.print(fmt::format("{} solved in {}", level.level.name, format_duration(level.wall_s)));
+    line.print(fmt::format("{}: fall and contact took {}", level.level.name,
+                           format_duration(level.wall_s)));
   });
   const auto end_of_meshes = all.begin() + static_cast<std::ptrdiff_t>(meshes.size());
   const auto end_of_steps = end_of_meshes + static_cast<std::ptrdiff_t>(steps.size());

@@ -54,7 +54,7 @@ void print_submitted(Console& console, const Study& study, const protocol::Submi
       known += fmt::format("; its priority is now {}", *settings.priority);
     }
   }
-  if (const std::string taken = taken_over(reply.taken()); !taken.empty()) {
+  if (const std::string taken = reused_points_note(reply.taken()); !taken.empty()) {
     known += "; " + taken;
   }
   console.out() << fmt::format("{}: {} points, {} done{}", study.name, format_count(reply.points()),

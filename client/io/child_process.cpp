@@ -174,7 +174,7 @@ std::string ChildProcess::ending() const {
   return fmt::format("ended with exit code {}", WEXITSTATUS(*status_));
 }
 
-std::string ChildProcess::last_words() const {
+std::string ChildProcess::last_output() const {
   constexpr std::size_t kMostBytes = 4000;
   constexpr int kMostLines = 12;
   const std::size_t bytes = bytes_in(errors_);
@@ -208,7 +208,7 @@ std::string output_of(ChildSettings settings, const std::function<bool()>& keep_
     std::this_thread::sleep_for(kPause);
   }
   if (!child.succeeded()) {
-    auto words = child.last_words();
+    auto words = child.last_output();
     std::replace(words.begin(), words.end(), '\n', ' ');
     throw ProcessError(fmt::format("{} {}{}{}", settings.program.string(), child.ending(),
                                    words.empty() ? "" : ": ", words));

@@ -74,7 +74,7 @@ class ChildProcess {
   /// How it ended: "ended with exit code 1" or "was killed by signal 9 (Killed)".
   std::string ending() const;
   /// The last lines of its standard error, if kept.
-  std::string last_words() const;
+  std::string last_output() const;
   /// Its standard output, if kept. Throws ProcessError if it is longer than `most_bytes`.
   std::string output(std::size_t most_bytes) const;
 

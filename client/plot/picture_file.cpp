@@ -139,7 +139,7 @@ std::string output_of_gnuplot(const std::string& script) {
     std::string output = gnuplot.output(kMostBytes);
     if (!gnuplot.succeeded() || output.empty()) {
       throw std::runtime_error(
-          fmt::format("gnuplot {}: {}", gnuplot.ending(), gnuplot.last_words()));
+          fmt::format("gnuplot {}: {}", gnuplot.ending(), gnuplot.last_output()));
     }
     return output;
   } catch (const ProgramNotFound&) {

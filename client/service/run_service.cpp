@@ -42,8 +42,8 @@ constexpr std::chrono::seconds kReadyWithin{60};
 constexpr std::chrono::seconds kStopWithin{5};
 constexpr std::chrono::milliseconds kPause{1};
 
-std::string with_last_words(const std::string& what, const ChildProcess& child) {
-  const auto words = child.last_words();
+std::string with_last_output(const std::string& what, const ChildProcess& child) {
+  const auto words = child.last_output();
   return words.empty() ? what : fmt::format("{}; its last output:\n{}", what, words);
 }
 
@@ -73,7 +73,7 @@ std::string first_line(const Descriptor& ready, const ChildProcess& server,
       throw Interrupted("stopped before the server was ready");
     }
     if (Clock::now() > deadline) {
-      throw ProcessError(with_last_words(
+      throw ProcessError(with_last_output(
           fmt::format("no answer within {} s: {}", kReadyWithin.count(), why_silent(database)),
           server));
     }
@@ -131,7 +131,7 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
                                    format_count(submitted.settled()),
                                    format_count(submitted.points()));
   }
-  if (const std::string taken = taken_over(submitted.taken()); !taken.empty()) {
+  if (const std::string taken = reused_points_note(submitted.taken()); !taken.empty()) {
     console.notes() << fmt::format("\"{}\": {}\n", study.name, taken);
   }
   FollowedStudy followed(connection, study.name);
@@ -226,8 +226,8 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
   while (server_->is_running() && Clock::now() < deadline) {
     std::this_thread::sleep_for(kPause);
   }
-  throw ProcessError(
-      with_last_words(fmt::format("the server did not start: it {}", server_->ending()), *server_));
+  throw ProcessError(with_last_output(
+      fmt::format("the server did not start: it {}", server_->ending()), *server_));
 }
 
 void EmbeddedService::start_worker(const ServiceSettings& settings) {
@@ -249,11 +249,11 @@ void EmbeddedService::start_worker(const ServiceSettings& settings) {
 
 void EmbeddedService::check() {
   if (!server_->is_running()) {
-    throw ProcessError(with_last_words(fmt::format("the server {}", server_->ending()), *server_));
+    throw ProcessError(with_last_output(fmt::format("the server {}", server_->ending()), *server_));
   }
   if (std::none_of(workers_.begin(), workers_.end(),
                    [](const auto& worker) { return worker->is_running(); })) {
-    throw ProcessError(with_last_words(
+    throw ProcessError(with_last_output(
         fmt::format("no worker is left: the last one {}", workers_.back()->ending()),
         *workers_.back()));
   }
@@ -264,7 +264,7 @@ std::string EmbeddedService::news() {
   for (const auto& worker : workers_) {
     if (!worker->is_running() && reported_.insert(worker->pid()).second) {
       text += text.empty() ? "" : "\n";
-      text += with_last_words(
+      text += with_last_output(
           fmt::format("a worker (process {}) {}", worker->pid(), worker->ending()), *worker);
     }
   }

@@ -132,7 +132,7 @@ void warn_if_insecure(Console& console, const std::string& access, const std::st
   }
 }
 
-std::string taken_over(const protocol::TakenOver& taken) {
+std::string reused_points_note(const protocol::TakenOver& taken) {
   if (taken.points() == 0 && !taken.cut_short()) {
     return {};
   }

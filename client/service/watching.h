@@ -69,7 +69,7 @@ int print_end(Console& console, const protocol::StudyStatus& status,
 void warn_if_insecure(Console& console, const std::string& access, const std::string& place);
 
 /// "12 points reused: 7 from a, 5 from b"; else empty.
-std::string taken_over(const protocol::TakenOver& taken);
+std::string reused_points_note(const protocol::TakenOver& taken);
 
 /// Studies as a table for `status` and `studies`.
 protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies);

@@ -72,7 +72,7 @@ export function follow({ take, say, reconnected }) {
       if (source?.readyState !== EventSource.CLOSED) return;
       close(); // browsers do not reconnect after a refusal
       session().then(
-        (told) => told.may_look || say(`The server was restarted: ${told.how_to_enter}.`),
+        (update) => update.may_look || say(`The server was restarted: ${update.how_to_enter}.`),
         () => {},
       );
       timer = setTimeout(open, retryMs);

@@ -138,10 +138,13 @@ function say(text, isBad) {
   pace.className = isBad ? "bad" : "";
 }
 
-function take(told) {
-  now = told;
-  say(told.database_fault || `${Math.round(told.points_per_s)} points/s`, told.database_fault);
-  shown.take?.(told);
+function take(update) {
+  now = update;
+  say(
+    update.database_fault || `${Math.round(update.points_per_s)} points/s`,
+    update.database_fault,
+  );
+  shown.take?.(update);
 }
 
 async function begin() {

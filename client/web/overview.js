@@ -216,14 +216,14 @@ export function overview(root, place) {
 
   read();
   return {
-    take(told) {
-      now = told;
-      if (told.is_stopping) say("The server is stopping.");
-      for (const study of told.studies) studies.set(study.id, study);
+    take(update) {
+      now = update;
+      if (update.is_stopping) say("The server is stopping.");
+      for (const study of update.studies) studies.set(study.id, study);
       // Events contain only some studies. The others are read when a state changes, or every few
       // seconds.
-      const isOld = told.unlisted > 0 && performance.now() - readAt > retryMs;
-      const changed = JSON.stringify(told.studies_by_state);
+      const isOld = update.unlisted > 0 && performance.now() - readAt > retryMs;
+      const changed = JSON.stringify(update.studies_by_state);
       if (changed !== states || isOld) read();
       states = changed;
       draw();

@@ -78,10 +78,10 @@ class HelpAndCompletion(unittest.TestCase):
         for words in VERBS:
             self.assertEqual({word for word in offered(words) if word.startswith("-")}, flags_in_help(words), words)
 
-    def test_numbered_flags_are_told_of_once(self):
+    def test_numbered_flags_are_listed_once(self):
         self.assertGreater(sum(len(numbered_in_help(words)) for words in VERBS), 3)
 
-    def test_examples_show_flags_that_there_are(self):
+    def test_examples_use_existing_flags(self):
         seen = 0
         for words in VERBS:
             for example in examples_of(words):
@@ -142,14 +142,14 @@ class Pages(unittest.TestCase):
                 self.assertIn(section, sections, name)
             self.assertEqual("--db FILE" in page.replace("\\-", "-").replace("\\fR", ""), ".SH FILES" in page and "oblique.db" in page, name)
 
-    def test_pages_named_in_pages_are_there(self):
+    def test_pages_named_in_pages_exist(self):
         for name, page in self.pages.items():
             named = re.findall(r"\\fB([\w\\-]+)\\fR\(1\)", page)
             self.assertGreater(len(named), 0, name)
             for other in named:
                 self.assertIn(other.replace("\\-", "-"), self.pages, name)
 
-    def test_pages_name_neither_the_place_nor_the_time_at_which_they_are_made(self):
+    def test_pages_contain_neither_the_folder_nor_the_time_of_the_build(self):
         copied = self.folder / "elsewhere/bin"
         copied.parent.mkdir()
         copied.symlink_to(PROGRAMS.resolve())

@@ -86,7 +86,7 @@ class Recipe(unittest.TestCase):
 
 
 class StudyFromAScript(Recipe):
-    def test_it_submits_waits_and_asks_and_its_exit_code_says_what_became_of_the_study(self):
+    def test_it_submits_waits_and_queries_and_its_exit_code_is_the_studys(self):
         url, workers = self.start_server()
         self.start("oblique-worker", "--server", workers)
         said = self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url)

@@ -46,13 +46,13 @@ function textOf(value, { name, unit }) {
 /** Reads the point with its row, if it has a result. */
 async function readPoint(study, point, signal) {
   const select = study.columns.map((column) => column.name).join(",");
-  const [told, answer] = await Promise.all([
+  const [update, answer] = await Promise.all([
     json(`/api/studies/${study.id}/points/${point}`, signal),
     rows(study.id, { select, where: `point = ${point}` }, signal),
   ]);
   const values = answer.rows[0];
   const row = values && Object.fromEntries(answer.columns.map((name, i) => [name, values[i]]));
-  return { ...told, row };
+  return { ...update, row };
 }
 
 /** The main numbers, or why there are none. */
@@ -204,7 +204,7 @@ export async function pointView(root, place, id, point) {
   const study = await json(`/api/studies/${id}`, signal);
   const back = h("a", { href: place.last(`/study/${id}`) }, study.name);
   place.trail([back, `point ${count(point)}`]);
-  let told = await readPoint(study, point, signal);
+  let update = await readPoint(study, point, signal);
   const { element: said, say } = statusLine();
   const [facts, numbers] = [h("div"), h("div")];
   const pictures = h("section", { "aria-label": "Time histories" }, said);
@@ -214,8 +214,8 @@ export async function pointView(root, place, id, point) {
   let isAsking = false;
 
   function show() {
-    facts.replaceChildren(...mainFacts(told, study.columns));
-    numbers.replaceChildren(...(told.row ? allNumbers(told.row, study.columns) : []));
+    facts.replaceChildren(...mainFacts(update, study.columns));
+    numbers.replaceChildren(...(update.row ? allNumbers(update.row, study.columns) : []));
   }
   show();
   root.replaceChildren(
@@ -238,11 +238,11 @@ export async function pointView(root, place, id, point) {
     async take(now) {
       const listed = now.studies.find((one) => one.id === id);
       const completedNow = listed ? completed(listed) : -1;
-      if (told.row || isAsking || completedNow === done) return;
+      if (update.row || isAsking || completedNow === done) return;
       isAsking = true;
       try {
-        told = await readPoint(study, point, signal);
-        if (told.row) show();
+        update = await readPoint(study, point, signal);
+        if (update.row) show();
         done = completedNow;
       } catch {
         // the next overview tries again

@@ -24,7 +24,7 @@ export function controlsOf(view) {
   /** Draws the same data with other settings; loads data again if it depends on the scale. */
   function redraw(changes) {
     view.set(changes);
-    if (view.is("pic") === "map") view.draw();
+    if (view.field("pic") === "map") view.draw();
     else view.load();
   }
 
@@ -34,9 +34,9 @@ export function controlsOf(view) {
       (kind) => kind !== "map" || mayMap,
     );
     const isOfGrid = (kind) => grids.length > 0 && ["map", "lines"].includes(kind);
-    return picker(kinds, view.is("pic"), (pic) => {
-      const keepsX = isOfGrid(pic) && isOfGrid(view.is("pic"));
-      const z = view.is("z") === "" ? {} : { z: view.is("z") };
+    return picker(kinds, view.field("pic"), (pic) => {
+      const keepsX = isOfGrid(pic) && isOfGrid(view.field("pic"));
+      const z = view.field("z") === "" ? {} : { z: view.field("z") };
       choose({ pic, ...zoomedOut, ...z, ...(keepsX ? {} : { x: "" }), y: "", from: "", to: "" });
     });
   }
@@ -52,10 +52,10 @@ export function controlsOf(view) {
   }
 
   function outputPicker() {
-    const kind = view.is("pic");
-    const outputs = columnChoices(view.is("z"), kind === "map" || kind === "scatter");
+    const kind = view.field("pic");
+    const outputs = columnChoices(view.field("z"), kind === "map" || kind === "scatter");
     const none = kind === "scatter" ? [["", "none"]] : [];
-    const z = picker([...none, ...outputs], view.is("z"), (name) => {
+    const z = picker([...none, ...outputs], view.field("z"), (name) => {
       view.fields.set("z", name); // "" is a valid choice
       choose({ ...(name ? { z: name } : {}), from: "", to: "" });
     });
@@ -67,12 +67,15 @@ export function controlsOf(view) {
       ? varyingAxes(view.block).map((axis) => [axis.key, heading(axis.key, axis.unit)])
       : null;
     const axisPicker = (name, none = []) =>
-      picker([...none, ...(axes ?? columnChoices(view.is(name), false))], view.is(name), (key) =>
-        choose({
-          [name]: key,
-          ...(name === "x" && view.is("y") === key ? { y: "" } : {}),
-          ...zoomedOut,
-        }),
+      picker(
+        [...none, ...(axes ?? columnChoices(view.field(name), false))],
+        view.field(name),
+        (key) =>
+          choose({
+            [name]: key,
+            ...(name === "x" && view.field("y") === key ? { y: "" } : {}),
+            ...zoomedOut,
+          }),
       );
     const found = [labelled("x axis", axisPicker("x"))];
     if (view.hasMap) found.push(labelled("y axis", axisPicker("y")));
@@ -88,13 +91,13 @@ export function controlsOf(view) {
     });
     return labelled(
       "block",
-      picker(choices, view.is("block"), (block) => choose({ block, ...zoomedOut })),
+      picker(choices, view.field("block"), (block) => choose({ block, ...zoomedOut })),
     );
   }
 
   function scaleBoxes() {
-    const kind = view.is("pic");
-    const isOn = (name) => view.is(name) !== "";
+    const kind = view.field("pic");
+    const isOn = (name) => view.field(name) !== "";
     const box = (name, text) =>
       checkbox(text, isOn(name), (is) => redraw({ [name]: is ? "1" : "" }));
     return h(
@@ -106,7 +109,7 @@ export function controlsOf(view) {
   }
 
   function mousePicker() {
-    const drags = picker(["zoom", "select"], view.is("drag") || "zoom", (drag) => {
+    const drags = picker(["zoom", "select"], view.field("drag") || "zoom", (drag) => {
       view.set({ drag: drag === "select" ? drag : "" });
       view.map.dragSelects = drag === "select";
       view.draw();
@@ -114,13 +117,13 @@ export function controlsOf(view) {
     return labelled("mouse", drags, "While dragging; with Shift the other action");
   }
 
-  const hasColourBar = () => view.hasMap && view.columnOf(view.is("z"))?.picture === "numbers";
+  const hasColourBar = () => view.hasMap && view.columnOf(view.field("z"))?.picture === "numbers";
 
   /** The range of colours in shown units. */
   function rangeFields() {
-    const [, factor] = shownUnit(view.is("z"), view.unitOf(view.is("z")));
+    const [, factor] = shownUnit(view.field("z"), view.unitOf(view.field("z")));
     const end = (name) => {
-      const value = view.is(name) === "" ? "" : shown(Number(view.is(name)) * factor);
+      const value = view.field(name) === "" ? "" : shown(Number(view.field(name)) * factor);
       const settings = { type: "text", inputMode: "decimal", value, placeholder: "auto", size: 7 };
       const field = h("input", settings);
       field.addEventListener("change", () => {
@@ -166,7 +169,7 @@ export function controlsOf(view) {
   }
 
   function show() {
-    const isHistogram = view.is("pic") === "histogram";
+    const isHistogram = view.field("pic") === "histogram";
     setChildren(
       pickers,
       labelled("picture", kindPicker()),
@@ -177,7 +180,7 @@ export function controlsOf(view) {
       ...(hasColourBar() ? rangeFields() : []),
       scaleBoxes(),
     );
-    const isShown = ({ key }) => key === view.is("x") || key === view.is("y");
+    const isShown = ({ key }) => key === view.field("x") || key === view.field("y");
     const held = view.block ? varyingAxes(view.block).filter((axis) => !isShown(axis)) : [];
     sliders.replaceChildren(...held.map(sliderOf));
   }

@@ -21,9 +21,9 @@ export function factsOf(view) {
   }
   const outside = head.outside > 0 ? `, ${count(head.outside)} outside` : "";
   const bins = `${counted(head.points, "point")} in ${counted(picture.values.length, "bin")}${outside}.`;
-  const isMode = view.columnOf(view.is("z"))?.picture === "categories" && view.hasMap;
+  const isMode = view.columnOf(view.field("z"))?.picture === "categories" && view.hasMap;
   const why = y.name ? ` More than ${count(mostDots)} points are grouped in bins.` : "";
-  return bins + why + (isMode ? ` ${view.is("z")} is shown only for single points.` : "");
+  return bins + why + (isMode ? ` ${view.field("z")} is shown only for single points.` : "");
 }
 
 function sliceFacts({ picture: { head, x, y }, study }) {

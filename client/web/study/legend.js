@@ -19,8 +19,8 @@ export const emptyTexts = {
 /** Range of the colours; ends that the address does not give come from the picture. */
 export function spanOf(view, { least, most }) {
   const end = (name) => {
-    const isNumber = view.is(name) !== "" && Number.isFinite(Number(view.is(name)));
-    return isNumber ? Number(view.is(name)) : null;
+    const isNumber = view.field(name) !== "" && Number.isFinite(Number(view.field(name)));
+    return isNumber ? Number(view.field(name)) : null;
   };
   const [from, to] = [end("from"), end("to")];
   // Values of slices and bins have single precision.

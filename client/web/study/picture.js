@@ -142,8 +142,8 @@ function categoriesOf(values) {
 
 /** Single points; null if there are more than mostDots. */
 async function dots(view, signal) {
-  const [xName, yName, zName] = ["x", "y", "z"].map((name) => view.is(name));
-  const isLog = { x: view.is("xlog") !== "", y: view.is("ylog") !== "" };
+  const [xName, yName, zName] = ["x", "y", "z"].map((name) => view.field(name));
+  const isLog = { x: view.field("xlog") !== "", y: view.field("ylog") !== "" };
   const select = ["point", xName, yName, ...(zName ? [zName] : [])].join(",");
   const query = { select, where: shownWhere(view), limit: mostDots + 1 };
   const answer = await rows(view.study.id, query, signal);
@@ -161,7 +161,7 @@ async function dots(view, signal) {
   };
   const side = (name, column) => {
     const [least, most] = endsOf(all[name]);
-    const end = (which, usual) => Number(view.is(name + which) || (usual ?? 0));
+    const end = (which, usual) => Number(view.field(name + which) || (usual ?? 0));
     const [from, to] = [end("0", least), end("1", most)];
     return binSide(column, view.unitOf(column), from, to, 1, isLog[name]);
   };
@@ -184,11 +184,11 @@ async function dots(view, signal) {
 
 /** Median and quartiles of an output in bins over a column. */
 async function medians(view, signal) {
-  const [x, z] = [view.is("x"), view.is("z")];
+  const [x, z] = [view.field("x"), view.field("z")];
   const where = joined(shownWhere(view), `${z} IS NOT NULL`);
   const query = { select: `${x},${z}`, where, order: "point", limit: mostForMedians };
   const answer = await rows(view.study.id, query, signal);
-  const isLog = view.is("xlog") !== "";
+  const isLog = view.field("xlog") !== "";
   const found = answer.rows.filter(([value]) => typeof value === "number" && (!isLog || value > 0));
   const [least, most] = endsOf(found.map(([value]) => value));
   const number = Math.min(Math.max(Math.round(Math.sqrt(found.length) / 2), 4), 40);
@@ -217,30 +217,32 @@ async function medians(view, signal) {
 
 /** The filter and the zoomed part of a picture of columns. */
 function shownWhere(view) {
-  const part = (name) => within(view.is(name), view.is(`${name}0`), view.is(`${name}1`));
-  return joined(view.is("where"), part("x"), view.is("pic") === "scatter" ? part("y") : "");
+  const part = (name) => within(view.field(name), view.field(`${name}0`), view.field(`${name}1`));
+  return joined(view.field("where"), part("x"), view.field("pic") === "scatter" ? part("y") : "");
 }
 
 const given = (view, ...names) =>
-  Object.fromEntries(names.filter((name) => view.is(name)).map((name) => [name, view.is(name)]));
+  Object.fromEntries(
+    names.filter((name) => view.field(name)).map((name) => [name, view.field(name)]),
+  );
 
 function sliceQuery(view, cells) {
   const keys = ownAxes(view.block).map((axis) => axis.key);
-  const isHeld = ([key]) => keys.includes(key) && ![view.is("x"), view.is("y")].includes(key);
+  const isHeld = ([key]) => keys.includes(key) && ![view.field("x"), view.field("y")].includes(key);
   const at = [...view.places()].filter(isHeld).map(([key, number]) => `${key}@${number}`);
   return {
     ...given(view, "z", "x", "y", "block", "x0", "x1", "y0", "y1", "where"),
     ...(at.length > 0 ? { at: at.join(",") } : {}),
     nx: cells,
-    ny: view.is("pic") === "lines" ? mostLines : cells,
+    ny: view.field("pic") === "lines" ? mostLines : cells,
   };
 }
 
 function binsQuery(view) {
-  const isScatter = view.is("pic") === "scatter";
+  const isScatter = view.field("pic") === "scatter";
   // A few points per bin.
   const side = Math.round(Math.min(Math.max(Math.sqrt(view.study.points / 3), 6), mostBins));
-  const z = view.columnOf(view.is("z"))?.picture === "numbers" ? ["z"] : [];
+  const z = view.columnOf(view.field("z"))?.picture === "numbers" ? ["z"] : [];
   return {
     ...given(view, "x", "xlog", "x0", "x1", "where"),
     nx: isScatter ? side : Math.min(side * 2, 64),
@@ -259,9 +261,9 @@ async function scatter(view, signal) {
  * Numbers of cells per side, in the order of loading: large maps are first shown with fewer cells.
  */
 export function stepsTo(view, isRefresh) {
-  if (view.is("pic") !== "map" || isRefresh) return [mostCells];
+  if (view.field("pic") !== "map" || isRefresh) return [mostCells];
   const sides = ownAxes(view.block).filter((axis) =>
-    [view.is("x"), view.is("y")].includes(axis.key),
+    [view.field("x"), view.field("y")].includes(axis.key),
   );
   const cells = sides.reduce((all, axis) => all * Math.min(axis.values, mostCells), 1);
   return cells > 4 * firstCells ** 2 ? [firstCells, mostCells] : [mostCells];
@@ -269,8 +271,8 @@ export function stepsTo(view, isRefresh) {
 
 /** The picture described by the address of a view. */
 export function askPicture(view, cells, signal) {
-  if (view.is("pic") === "scatter") return scatter(view, signal);
-  if (view.is("pic") === "histogram") return bins(view, binsQuery(view), signal);
+  if (view.field("pic") === "scatter") return scatter(view, signal);
+  if (view.field("pic") === "histogram") return bins(view, binsQuery(view), signal);
   return view.block ? slice(view, sliceQuery(view, cells), signal) : medians(view, signal);
 }
 
@@ -279,7 +281,7 @@ export function askPicture(view, cells, signal) {
  * points}.
  */
 export async function askSelected(view, picture, condition, signal) {
-  const where = joined(view.is("where"), condition);
+  const where = joined(view.field("where"), condition);
   if (picture.labels) return { cells: new Uint8Array(picture.values.length) };
   if (picture.dots) {
     const query = {
@@ -300,7 +302,7 @@ export async function askSelected(view, picture, condition, signal) {
     return { cells: head.counts.map((number) => Math.min(number, 1)), counts: head.counts };
   }
   const side = Math.max(picture.x.values.length, picture.y.values.length);
-  const told = await slice(view, { ...sliceQuery(view, side), where }, signal);
-  const isOut = (cell) => ["missing", "left_out", "filtered"].includes(told.whyEmpty(cell));
+  const update = await slice(view, { ...sliceQuery(view, side), where }, signal);
+  const isOut = (cell) => ["missing", "left_out", "filtered"].includes(update.whyEmpty(cell));
   return { cells: Uint8Array.from(picture.values, (_, cell) => (isOut(cell) ? 0 : 1)) };
 }

@@ -24,7 +24,7 @@ function finerAxis(view, name, axis) {
   const [from, to] = [Math.min(...values), Math.max(...values)];
   const steps = last - first;
   if (steps === 0) return { key: axis.key, values: [from] };
-  const isLog = axis.range ? axis.range.spacing === "log" : view.is(`${name}log`) && from > 0;
+  const isLog = axis.range ? axis.range.spacing === "log" : view.field(`${name}log`) && from > 0;
   return {
     key: axis.key,
     from,
@@ -39,7 +39,7 @@ function finerAxes(view) {
   const held = new Map(view.picture.head.at.map((one) => [one.key, one.value]));
   return view.block.axes.map((axis) => {
     const { key, expression } = axis;
-    const name = ["x", "y"].find((one) => view.is(one) === key);
+    const name = ["x", "y"].find((one) => view.field(one) === key);
     if (name) return finerAxis(view, name, axis);
     return expression ? { key, expression } : { key, values: [held.get(key)] };
   });
@@ -68,7 +68,7 @@ export function refineRow(view) {
       const recipe = { errors: study.errors, model: modelOf(study.model), blocks: [axes] };
       const made = await post("/api/studies", { name: name.value.trim(), recipe });
       const kept = ["z", "x", "y", "xlog", "ylog", "zlog", "from", "to"]
-        .map((one) => [one, view.is(one)])
+        .map((one) => [one, view.field(one)])
         .filter(([, value]) => value !== "");
       view.place.go(`#/study/${made.id}?${new URLSearchParams([["pic", "map"], ...kept])}`);
     } catch (error) {
@@ -80,12 +80,12 @@ export function refineRow(view) {
     element,
     /** Shows the button if the picture can be refined. */
     offer() {
-      const isMap = view.is("pic") === "map" && view.picture.head.x?.stride;
+      const isMap = view.field("pic") === "map" && view.picture.head.x?.stride;
       element.hidden = !view.place.mayChange || !isMap;
       if (element.hidden) return;
       const axes = finerAxes(view);
       const size = ["x", "y"].map(
-        (side) => axes.find(({ key }) => key === view.is(side))?.count ?? 1,
+        (side) => axes.find(({ key }) => key === view.field(side))?.count ?? 1,
       );
       submitButton.textContent = `Refine to ${size.map(count).join(" × ")} points`;
     },

@@ -91,27 +91,29 @@ export function statusRow(view, moved) {
   let states = "";
   let askedAt = 0;
 
-  function show(told) {
-    const waitsFor = told.state === "running" && told.waits_for;
+  function show(update) {
+    const waitsFor = update.state === "running" && update.waits_for;
     const parts = [
-      told.state,
-      progressOf(told),
-      counted(told.points, "point"),
-      told.failed > 0 && h("span.bad", `${count(told.failed)} failed`),
-      told.left_out > 0 && h("span.weak", `${count(told.left_out)} left out by where`),
-      told.state === "running" && told.waits_for && h("span.weak", `waiting for ${told.waits_for}`),
+      update.state,
+      progressOf(update),
+      counted(update.points, "point"),
+      update.failed > 0 && h("span.bad", `${count(update.failed)} failed`),
+      update.left_out > 0 && h("span.weak", `${count(update.left_out)} left out by where`),
+      update.state === "running" &&
+        update.waits_for &&
+        h("span.weak", `waiting for ${update.waits_for}`),
     ];
     setChildren(status, ...parts.filter(Boolean).map((one) => h("span", one)));
     if (place.mayChange)
       setChildren(
         buttons,
-        studyButtons(told, (...said) => view.say(...said)),
+        studyButtons(update, (...said) => view.say(...said)),
       );
-    failure.show(told);
+    failure.show(update);
     // Points may have been completed while the view was loading.
-    const hasMoved = done === null ? study.state === "running" : completed(told) !== done;
-    ({ state } = told);
-    done = completed(told);
+    const hasMoved = done === null ? study.state === "running" : completed(update) !== done;
+    ({ state } = update);
+    done = completed(update);
     if (hasMoved) moved();
   }
 
@@ -120,8 +122,8 @@ export function statusRow(view, moved) {
     const page = await json(`/api/studies?limit=1&after=${study.id - 1}`, place.signal).catch(
       () => null,
     );
-    const told = page?.studies[0];
-    if (told?.id === study.id) show(told);
+    const update = page?.studies[0];
+    if (update?.id === study.id) show(update);
   }
 
   ask();
@@ -129,10 +131,10 @@ export function statusRow(view, moved) {
     element,
     /** Receives an overview, which may not contain the study. */
     take(now) {
-      const told = now.studies.find((one) => one.id === study.id);
+      const update = now.studies.find((one) => one.id === study.id);
       const byState = JSON.stringify(now.studies_by_state);
       const isLive = ["running", "paused"].includes(state);
-      if (told) show(told);
+      if (update) show(update);
       else if (byState !== states || (isLive && performance.now() - askedAt > retryMs)) ask();
       states = byState;
     },

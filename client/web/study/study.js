@@ -55,7 +55,8 @@ function conditionFields(view) {
     "drag with Shift, or enter a condition",
     `${language}: these points are marked`,
   );
-  const keep = () => view.change({ where: joined(view.is("where"), view.is("mark")), mark: "" });
+  const keep = () =>
+    view.change({ where: joined(view.field("where"), view.field("mark")), mark: "" });
   const buttons = h(
     "span.buttons",
     button("Use selection as filter", keep),
@@ -70,8 +71,8 @@ function conditionFields(view) {
     ),
     /** Shows the conditions of the address. */
     show() {
-      for (const [name, { input }] of Object.entries(fields)) input.value = view.is(name);
-      buttons.hidden = !view.is("mark");
+      for (const [name, { input }] of Object.entries(fields)) input.value = view.field(name);
+      buttons.hidden = !view.field("mark");
       this.say("where", "");
       this.say("mark", "");
     },
@@ -85,8 +86,8 @@ function conditionFields(view) {
 /** The contents of a chart of lines or bars, in shown units. */
 function linesOf(view, picture) {
   const { x, y, z, head, labels } = picture;
-  const isBars = view.is("pic") === "histogram";
-  const isLog = view.is("ylog") !== "" && !isBars;
+  const isBars = view.field("pic") === "histogram";
+  const isLog = view.field("ylog") !== "" && !isBars;
   const [[xUnit, xFactor], [zUnit, zFactor]] = [x, z].map((one) => shownUnit(one.name, one.unit));
   const order = orderOf(x);
   const valuesOf = (row) =>
@@ -126,7 +127,7 @@ function linesOf(view, picture) {
       unit: xUnit,
       values,
       ends,
-      isLog: view.is("xlog") !== "" && values[0] > 0,
+      isLog: view.field("xlog") !== "" && values[0] > 0,
     },
     y: {
       label: isBars ? "points" : heading(z.name, z.unit),
@@ -136,7 +137,7 @@ function linesOf(view, picture) {
     },
     series,
     isBars,
-    dragSelects: view.is("drag") === "select",
+    dragSelects: view.field("drag") === "select",
     height: 380,
     zoom: (part) => view.zoom(inUnits(part)),
     select: (part) => view.selectPart(inUnits(part)),
@@ -169,7 +170,7 @@ export class StudyView {
     this.map = new MapCanvas({
       hover: (cell) => this.#speak(cell ?? this.map.chosen),
       choose: (cell, point) => this.choose(point ?? this.picture.point(...cell), cell),
-      open: () => this.is("cell") && place.go(this.pointAddress(this.is("cell"))),
+      open: () => this.field("cell") && place.go(this.pointAddress(this.field("cell"))),
       zoom: (part) => this.zoom(part),
       select: (part) => this.selectPart(part),
     });
@@ -206,7 +207,7 @@ export class StudyView {
   }
 
   /** A field of the address. */
-  is(name) {
+  field(name) {
     return this.fields.get(name) ?? "";
   }
 
@@ -221,21 +222,21 @@ export class StudyView {
 
   /** The block of the grid in the picture; undefined: the picture is of columns. */
   get block() {
-    const isOfGrid = ["map", "lines"].includes(this.is("pic")) && this.is("block") !== "";
-    return isOfGrid ? this.study.blocks[Number(this.is("block"))] : undefined;
+    const isOfGrid = ["map", "lines"].includes(this.field("pic")) && this.field("block") !== "";
+    return isOfGrid ? this.study.blocks[Number(this.field("block"))] : undefined;
   }
   get hasMap() {
-    return ["map", "scatter"].includes(this.is("pic"));
+    return ["map", "scatter"].includes(this.field("pic"));
   }
   /** Whether the address gives the range of the colours or of the axis of lines. */
   get hasSpan() {
     return ["from", "to"].some(
-      (end) => this.is(end) !== "" && Number.isFinite(Number(this.is(end))),
+      (end) => this.field(end) !== "" && Number.isFinite(Number(this.field(end))),
     );
   }
   /** Indices of the values of fixed axes. */
   places() {
-    const held = this.is("at")
+    const held = this.field("at")
       .split(",")
       .filter((one) => one.includes("@"));
     return new Map(held.map((one) => one.split("@")).map(([key, number]) => [key, Number(number)]));
@@ -253,7 +254,7 @@ export class StudyView {
   /** The zoomed part of the picture as conditions on x and y. */
   shownParts() {
     if (!this.picture) return [];
-    return ["x", "y"].map((name) => shownPart(this.picture[name], this.is(`${name}0`) !== ""));
+    return ["x", "y"].map((name) => shownPart(this.picture[name], this.field(`${name}0`) !== ""));
   }
 
   /** Shows another address of the same study. */
@@ -264,7 +265,7 @@ export class StudyView {
     this.#showAddress();
   }
   #showAddress() {
-    this.map.dragSelects = this.is("drag") === "select";
+    this.map.dragSelects = this.field("drag") === "select";
     this.conditions.show();
     this.controls.show();
     this.load();
@@ -294,7 +295,7 @@ export class StudyView {
       if (!this.#isStale) setTimeout(() => this.reconnected(), retryMs);
       this.#isStale = true;
       this.say("The server does not answer. The last answer is shown.", true);
-    } else if (error.status === 400 && condition && this.is(condition)) {
+    } else if (error.status === 400 && condition && this.field(condition)) {
       this.conditions.say(condition, error.message);
     } else {
       this.say(error.message, true);
@@ -373,7 +374,8 @@ export class StudyView {
       this.#drawLines();
     }
     setChildren(this.legend, ...(this.hasMap ? legendOf(this, this.#look()) : []));
-    const isPart = this.is("x0") || this.is("y0") || (this.is("pic") === "lines" && this.hasSpan);
+    const isPart =
+      this.field("x0") || this.field("y0") || (this.field("pic") === "lines" && this.hasSpan);
     const showAll = isPart && button("Show all", () => this.zoom(null));
     setChildren(this.facts, factsOf(this), showAll && " Zoomed. ", showAll);
     showExports(this);
@@ -384,9 +386,9 @@ export class StudyView {
     return {
       from,
       to,
-      zLog: this.is("zlog") !== "" && from > 0,
-      xLog: this.is("xlog") !== "",
-      yLog: this.is("ylog") !== "",
+      zLog: this.field("zlog") !== "" && from > 0,
+      xLog: this.field("xlog") !== "",
+      yLog: this.field("ylog") !== "",
       categories: this.picture.dictionary.map(({ text }) => looks.of(text)),
     };
   }
@@ -418,7 +420,7 @@ export class StudyView {
   }
   /** Selects the points that meet a condition; null: none. */
   select(condition) {
-    if ((condition ?? "") !== this.is("mark")) this.change({ mark: condition ?? "" });
+    if ((condition ?? "") !== this.field("mark")) this.change({ mark: condition ?? "" });
   }
   /** Selects the points in a part of the picture; null: none. */
   selectPart(part) {
@@ -428,7 +430,7 @@ export class StudyView {
   async #loadSelected() {
     this.#askedSelected?.abort();
     const { picture } = this;
-    const condition = this.is("mark");
+    const condition = this.field("mark");
     if (!picture || (!condition && !this.selected)) return;
     const { signal } = (this.#askedSelected = new AbortController());
     try {
@@ -448,7 +450,7 @@ export class StudyView {
     const { picture } = this;
     if (!picture) return;
     const zoomed = { x0: "", x1: "", y0: "", y1: "", page: "" };
-    const isLines = this.is("pic") === "lines";
+    const isLines = this.field("pic") === "lines";
     if (!part && isLines) Object.assign(zoomed, { from: "", to: "" });
     if (part) {
       [zoomed.x0, zoomed.x1] = addressOf(picture.x, part.x);
@@ -478,7 +480,7 @@ export class StudyView {
     setChildren(this.choice, point !== null && link(`Open point ${count(point)}`));
   }
   #showChoice() {
-    if (this.is("cell")) this.choose(Number(this.is("cell")));
+    if (this.field("cell")) this.choose(Number(this.field("cell")));
     else if (!this.map.chosen || this.picture.x.edges) this.choose(null, null);
   }
   /** The cell of a point in the picture; null: none. */

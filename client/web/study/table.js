@@ -40,9 +40,9 @@ export class PointTable {
     const usual = view.study.usual_columns;
     const status = usual.indexOf("status");
     const shownNames = ["x", "y", "z"]
-      .map((name) => view.is(name))
+      .map((name) => view.field(name))
       .filter((name) => view.columnOf(name));
-    const asksForErrors = /\b(error|status)\b/.test(`${view.is("where")} ${view.is("mark")}`);
+    const asksForErrors = /\b(error|status)\b/.test(`${view.field("where")} ${view.field("mark")}`);
     const state = asksForErrors ? ["status", "error"] : [];
     return [
       ...new Set([...usual.slice(0, status), ...state, ...shownNames, ...usual.slice(status + 1)]),
@@ -50,17 +50,17 @@ export class PointTable {
   }
 
   condition() {
-    return joined(this.view.is("where"), this.view.is("mark"), ...this.view.shownParts());
+    return joined(this.view.field("where"), this.view.field("mark"), ...this.view.shownParts());
   }
 
   /** Loads the page of the address if the query or the results have changed. */
   async load(isRefresh = false) {
     const { view } = this;
-    const page = Math.min(Math.max(Math.floor(Number(view.is("page"))) || 1, 1), mostPages);
+    const page = Math.min(Math.max(Math.floor(Number(view.field("page"))) || 1, 1), mostPages);
     const first = (page - 1) * pageSize;
     const query = {
       where: this.condition(),
-      order: view.is("order") || "point",
+      order: view.field("order") || "point",
       select: this.columns().join(","),
     };
     const text = JSON.stringify([page, query]);
@@ -98,7 +98,8 @@ export class PointTable {
     if (!error.isSilence) this.table.replaceChildren();
     this.said.textContent = "";
     // An error in a condition is shown beside its field.
-    const isOfCondition = error.status === 400 && (this.view.is("where") || this.view.is("mark"));
+    const isOfCondition =
+      error.status === 400 && (this.view.field("where") || this.view.field("mark"));
     if (!isOfCondition) this.view.complain(error);
   }
 
@@ -106,7 +107,7 @@ export class PointTable {
     const page = found.slice(first, first + pageSize);
     const isNumber = (i) => page.some((row) => typeof row[i] === "number");
     const kind = (i) => (isNumber(i) ? "number" : "");
-    const order = this.view.is("order");
+    const order = this.view.field("order");
     const head = columns.map((name, i) => {
       const isDown = order === `${name} DESC`;
       const sorted = order === name ? "ascending" : isDown ? "descending" : "none";
@@ -138,13 +139,13 @@ export class PointTable {
   }
 
   #turn(by) {
-    const page = (Number(this.view.is("page")) || 1) + by;
+    const page = (Number(this.view.field("page")) || 1) + by;
     this.view.set({ page: page > 1 ? String(page) : "" });
     this.load();
   }
   /** Sorts by a column: ascending, descending, then by point again. */
   #sort(name) {
-    const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.is("order")] ?? name;
+    const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });
     this.load();
     this.view.draw(); // the commands contain the order

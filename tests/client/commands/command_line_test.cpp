@@ -78,7 +78,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   }
 }
 
-TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
+TEST(CommandLine, ConvergesWithTheModelOfThePointThatTheFilterKeeps) {
   const auto converged = [](const std::vector<std::string>& more) {
     std::vector<std::string> words{"converge", "--preset", "paper", "--H",   "0.9",
                                    "--mu",     "0.4",      "--e",   "1",     "--coarsest",
@@ -91,7 +91,7 @@ TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
   EXPECT_EQ(converged({"--k", "1e7,2e7", "--where", "k > 1.5e7"}), converged({"--k", "2e7"}));
 }
 
-TEST(CommandLine, SaysOfACoarseMeshWhatItCostsBesideTheDataAndOfAStudyOnce) {
+TEST(CommandLine, NotesTheErrorsOfACoarseMeshOnceOnStandardError) {
   const test::TemporaryFolder folder;
   const auto err_of = [&](std::vector<std::string> words) {
     words.insert(words.end(), {"--H", "0.6", "--mu", "0.4", "--e", "1"});
@@ -112,7 +112,7 @@ TEST(CommandLine, SaysOfACoarseMeshWhatItCostsBesideTheDataAndOfAStudyOnce) {
   }
 }
 
-TEST(CommandLine, RefusesFilesThatAreNotRegularAndSaysWhatTheyAre) {
+TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(mkfifo(folder.file("pipe").c_str(), 0600), 0);
   std::ofstream(folder.path() / "pipe.toml") << "[[block]]\ncsv = 'pipe'\n";
@@ -158,7 +158,7 @@ TEST(CommandLine, RepeatsAtMostEightyCharactersOfAWrongKey) {
   }
 }
 
-TEST(CommandLine, WhatIsNotThereFailsWithOneAndSaysWhatToDo) {
+TEST(CommandLine, MissingThingsFailWithOneAndTheRemedy) {
   const struct {
     const char* line;
     const char* says;
@@ -176,7 +176,7 @@ TEST(CommandLine, WhatIsNotThereFailsWithOneAndSaysWhatToDo) {
   }
 }
 
-TEST(CommandLine, ADatabaseThatIsGivenAsAStudyFileIsNamedSo) {
+TEST(CommandLine, ADatabaseGivenAsAStudyFileIsRecognised) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "camp.db") << "SQLite format 3 and so on";
   const auto run = test::run_oblique(folder, {"run", "camp.db"});
@@ -195,7 +195,7 @@ TEST(CommandLine, FailsWhenStandardOutputCannotBeWritten) {
   EXPECT_EQ(WEXITSTATUS(status), 1);
 }
 
-TEST(HelpText, GoesOnBelowAMeaning) {
+TEST(HelpText, WrapsDescriptionsAtTheirColumn) {
   EXPECT_EQ(fitted_help("  --at N    one two three four\n  --b       five\n", 20, 12),
             "  --at N    one two\n"
             "            three\n"
@@ -203,7 +203,7 @@ TEST(HelpText, GoesOnBelowAMeaning) {
             "  --b       five\n");
 }
 
-TEST(HelpText, MovesTheRestOfASentenceToTheNextLine) {
+TEST(HelpText, WrapsSentences) {
   EXPECT_EQ(fitted_help("one two three\nfour five\n\nsix seven eight\n", 10, 12),
             "one two\nthree four\nfive\n\nsix seven\neight\n");
 }

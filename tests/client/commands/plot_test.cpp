@@ -1,4 +1,4 @@
-// `oblique plot` and `oblique paper --figures`, as people call them.
+// `oblique plot` and `oblique paper --figures`.
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
@@ -29,14 +29,14 @@ std::string contents_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// A folder with oblique.db: a study `a` of which 4 of 12 points have a result.
+/// A folder with oblique.db: a study `a` with results for 4 of 12 points.
 class Plot : public testing::Test {
  protected:
   Plot() {
     server::Store store(folder_.file("oblique.db"));
     test::add_study(store, "a", 12, 4);
   }
-  /// As SVG on standard output, where the arguments do not say otherwise.
+  /// Draws SVG on standard output, unless the arguments say otherwise.
   test::Outcome plot(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "plot");
     const auto says_where = [](const std::string& word) {
@@ -52,7 +52,7 @@ class Plot : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Plot, WritesWhatTheFilesEndingSaysAndAsksForAFileInAPipe) {
+TEST_F(Plot, WritesTheFormatOfTheEndingAndNeedsAFileInAPipe) {
   const auto unasked = plot({"a"});
   EXPECT_EQ(unasked.exit_code, 0) << unasked.err;
   EXPECT_THAT(unasked.out, AllOf(StartsWith("<?xml"), HasSubstr("a: fn"), HasSubstr("</svg>")));
@@ -103,7 +103,7 @@ TEST_F(Plot, ShowsAsciiInAPipe) {
   EXPECT_THAT(outcome.out, Not(HasSubstr("<svg")));
 }
 
-TEST_F(Plot, OfNoValueSaysSoOnStandardErrorAndHasNoColours) {
+TEST_F(Plot, WithoutValuesReportsItOnStandardError) {
   const auto outcome =
       plot({"a", "--scatter", "mu,fn_peak_N", "--colour", "duration_s", "--where", "mu > 5"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -148,7 +148,7 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
   }
 }
 
-TEST_F(Plot, DrawsAPointSolvedAgainAndSaysWhereItIsOtherThanStored) {
+TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
   const auto other = plot({"a", "--point", "0"});
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_THAT(other.out, AllOf(HasSubstr("Point 0 of a"), HasSubstr("Shape of the finger")));
@@ -166,7 +166,7 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndSaysWhereItIsOtherThanStored) {
   EXPECT_THAT(same.err + same.out, Not(HasSubstr("stored")));
 }
 
-TEST_F(Plot, OfAServerHasTheShapesThatAWorkerSends) {
+TEST_F(Plot, OfAServerHasTheShapesFromAWorker) {
   const test::Server server(folder_, "oblique.db");
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
   const auto ask = [&](const std::string& more) {
@@ -197,7 +197,7 @@ TEST_F(Plot, DrawsPanelsOfAPointOfNoStudy) {
               HasSubstr("compression"));
 }
 
-TEST(PaperFigures, AreFiveFilesInAFolderOfTheirOwn) {
+TEST(PaperFigures, AreFiveFilesInOneFolder) {
   const test::TemporaryFolder folder;
   const auto outcome = test::run_oblique(folder, {"paper", "--figures", "made/here"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

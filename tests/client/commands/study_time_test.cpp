@@ -37,7 +37,7 @@ TEST(StudyTime, IsThatOfEachFallOnceAndOfEachContactOverTheThreads) {
       << "while one thread solves the last fall, the other one waits";
 }
 
-TEST(StudyTime, WhereFallsDominateNamesWhatSharesOneAndWhatWouldBeCheaper) {
+TEST(StudyTime, IfFallsDominateNamesParametersThatShareAFallAndACheaperStudy) {
   const auto recipe = sample_of(
       "H = { from = 0.8, to = 1 }\nE = { from = 6e10, to = 8e10 }\n"
       "k = { distribution = 'log-uniform', from = 1e7, to = 1e8 }\n");
@@ -55,14 +55,14 @@ TEST(StudyTime, NamesAllDrawnKeysOfFallsAndCountsTheValuesOfTheOthers) {
               HasSubstr("; A, E with count = 8 each: about 23 s"));  // 128 falls
 }
 
-TEST(StudyTime, SaysNothingOfFallsWhereContactsTakeMostOfTheTime) {
+TEST(StudyTime, DoesNotMentionFallsIfContactsDominate) {
   const auto recipe = sample_of("H = 1\nE = { from = 6e10, to = 8e10, count = 21 }\n");
   EXPECT_EQ(time_in_words(kCost, size_of(20'000, 21), recipe), "about 13 s on 2 threads");
   EXPECT_EQ(time_in_words(kCost, size_of(1, 1), recipe), "about 1.6 s on 2 threads")
       << "nothing would be cheaper than one fall";
 }
 
-TEST(StudyTime, ProposesNoCountWhereNoKeyOfTheFallIsDrawn) {
+TEST(StudyTime, SuggestsNoCountIfNoKeyOfTheFallIsSampled) {
   const auto words = time_in_words(
       kCost, size_of(2'000, 2'000),
       sample_of(

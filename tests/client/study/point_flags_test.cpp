@@ -160,7 +160,7 @@ TEST(PointFlags, RefuseWrongValuesWithTheFlagAsItWasTyped) {
   }
 }
 
-TEST(PointFlags, NameTheOtherFlagsThatAreWrong) {
+TEST(PointFlags, NameOtherWrongFlags) {
   const struct {
     std::string PointFlags::*flag;
     const char* text;

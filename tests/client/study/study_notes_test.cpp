@@ -28,14 +28,15 @@ std::string value_notes(const std::string& model, const std::string& block) {
   return notes_of(note_unusual_values, model, block);
 }
 
-TEST(MeshNote, SaysInOneLineWhatThePublishedMeshCostsAndWhatPredicts) {
-  EXPECT_EQ(mesh_note("preset = 'paper'"),
-            "Note: 4 elements a link give errors of 3 % in forces, 12 % in durations, and another "
-            "sequence of states for 4 in 10 points, compared with 48; use preset = \"standard\" for "
-            "predictions\n");
+TEST(MeshNote, GivesTheErrorsOfThePublishedMeshInOneLine) {
+  EXPECT_EQ(
+      mesh_note("preset = 'paper'"),
+      "Note: 4 elements a link give errors of 3 % in forces, 12 % in durations, and another "
+      "sequence of states for 4 in 10 points, compared with 48; use preset = \"standard\" for "
+      "predictions\n");
 }
 
-TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNotMeasured) {
+TEST(MeshNote, IsForTheCoarsestMeshBelowEightElements) {
   const struct {
     const char* model;
     const char* axis;
@@ -59,7 +60,7 @@ TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNo
 
 const std::string kSample = "sample = { kind = 'lhs', count = 100 }\n";
 
-TEST(ValueNotes, NamesOnceEachKeyThatIsLikelyToBeInAnotherUnit) {
+TEST(ValueNotes, NamesEachKeyOnceThatIsProbablyInAnotherUnit) {
   EXPECT_EQ(value_notes("E = 7e4\nrho = 2.7\nlengths = [0.4, 400, 300]",
                         "H = 100\nmu = 0.4\ne = 1\nk = [27, 2.7e7, 3e11]\n"),
             "Note: E = 70000 Pa is softer than rubber; 7e10?\n"
@@ -69,7 +70,7 @@ TEST(ValueNotes, NamesOnceEachKeyThatIsLikelyToBeInAnotherUnit) {
             "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
 }
 
-TEST(ValueNotes, LooksAtTheEndsOfRangesAndAtWhatIsDrawn) {
+TEST(ValueNotes, CheckTheEndsOfRangesAndDistributions) {
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = 0.4\ne = 1\nE = { from = 60, to = 80, count = 3 }\n"),
             "Note: E = 60 Pa is softer than rubber; 6e10?\n");
   EXPECT_EQ(

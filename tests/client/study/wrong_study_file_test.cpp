@@ -16,7 +16,7 @@ struct Wrong {
   std::string says;   // a part of the message
 };
 
-/// The file of each case is `before`, the text and `after`.
+/// The file of each case consists of `before`, the text and `after`.
 template <typename Whole>
 void expect_refused(const std::vector<Wrong>& cases, Whole whole) {
   for (const auto& [text, place, says] : cases) {
