@@ -95,8 +95,8 @@ int wrong_usage(Console& console, const CLI::App& command, const std::string& me
   return kWrongUsage;
 }
 
-/// The name that a word from another program has here, when it is too different for a suggestion;
-/// empty if there is none.
+/// Our name for a command or flag of another program, if the nearest-name search cannot find it;
+/// else empty.
 std::string other_name_of(const std::string& command) {
   const std::map<std::string_view, const char*> names{
       {"server", "oblique-server"}, {"worker", "oblique-worker"}, {"list", "oblique studies"}};

@@ -49,8 +49,8 @@ std::vector<double> turn_times(const CaseResult& result) {
   return times;
 }
 
-// Times of sticks: start, end, start, ..., end. A contact that begins or ends in stick has these
-// ends too, so the number of times is even.
+// Start and end of each stick in turn. Touch and separation count as ends if P sticks then, so the
+// number of times is even.
 std::vector<double> stick_times(const CaseResult& result) {
   std::vector<double> times;
   for (const auto& stick : result.stick_intervals) {

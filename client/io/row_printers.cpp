@@ -113,7 +113,7 @@ std::optional<ordered_json> unpacked(const PackedList& packed, std::string_view 
   return std::optional<ordered_json>(std::in_place, std::move(list));
 }
 
-/// Escapes characters as \\u.... if a terminal would act on them; invalid UTF-8 becomes U+FFFD.
+/// Escapes characters as \u.... if a terminal would act on them; invalid UTF-8 becomes U+FFFD.
 void append_json(std::string& out, const ordered_json& value, bool only_ascii) {
   out += value.dump(-1, ' ', only_ascii, ordered_json::error_handler_t::replace);
 }

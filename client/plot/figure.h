@@ -55,7 +55,7 @@ struct Curve {
   std::vector<double> x = {};
   std::vector<double> y = {};
   std::size_t stroke = 0;         ///< number of colour, dash pattern and mark
-  std::optional<double> by = {};  ///< value of `by` for this line
+  std::optional<double> by = {};  ///< value of Panel::by_name on this line
   /// Values of the points on the colour scale; empty: the colour of `stroke`.
   std::vector<double> colours = {};
   Mark mark = Mark::kLine;

@@ -30,7 +30,7 @@ class CsvFile {
 
  private:
   struct Row {
-    std::size_t line;  ///< line of its beginning, from 1
+    std::size_t line;  ///< line where the row begins, from 1
     std::vector<std::string> fields;
   };
   void read_rows(std::string_view text);

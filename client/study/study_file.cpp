@@ -225,7 +225,7 @@ class BlockReader {
   }
 
  private:
-  /// Throws if a key resembles a key of a block more than an axis.
+  /// Throws if an unknown key is nearer to a key of a block than to an axis.
   void check_key(const toml::key& key) const {
     if (!protocol::nearest(key.str(), kBlockKeys).empty() && !protocol::is_axis_key(key.str())) {
       file_.fail(key, fmt::format("{}: besides its axes a block has {}",
