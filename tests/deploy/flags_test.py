@@ -1,5 +1,4 @@
-"""Every flag of every program and verb is in its help, in its manual page and in its completion; examples show flags that
-there are; pages are well made.
+"""Compares flags, help, manual pages and completion of every program and command.
 
   flags_test.py TREE FOLDER-OF-THE-PROGRAMS
 """
@@ -32,14 +31,14 @@ def help_of(words):
 
 
 def offered(words):
-    """The verbs and flags that completion offers behind these words."""
+    """The commands and flags that completion offers after these words."""
     done = subprocess.run(["bash", "-c", f'{output_of(words[0], "completion", "bash")}\n"_$1_offers" "${{*:2}}" && printf "%s\\n" "${{offers[@]}}"',
                            "bash", *words], capture_output=True, text=True, check=True)
     return done.stdout.split()
 
 
 def verbs_below(words):
-    """All verbs by their words, the program itself first."""
+    """All commands by their words, the program itself first."""
     listed = re.search(r"^Subcommands:\n((?:  .*\n)+)", help_of(words), re.M)
     names = re.findall(r"^  ([a-z][\w-]*)", listed[1], re.M) if listed else []
     return [words] + [verb for name in names for verb in verbs_below([*words, name])]

@@ -1,4 +1,4 @@
-"""What scripts of the build make: where a program was built from, and Debian's changelogs.
+"""Results of build scripts: the commit of a program, and Debian's changelogs.
 
   made_by_scripts_test.py TREE
 """

@@ -1,5 +1,5 @@
-"""Debian's packages, as cpack makes them of what is built: what they hold and ask for, and what dpkg does with
-them in a root of its own, which it does not change into.
+"""Debian's packages, made by cpack from the build: contents, dependencies, and installation by dpkg in a
+separate root without chroot.
 
   packages_test.py CPACK BUILD-FOLDER
 """
@@ -19,7 +19,7 @@ SERVICES = ("oblique-server", "oblique-worker")
 
 
 def run(*words, **more):
-    """What the command prints; it must end well."""
+    """The output of a command, which must succeed."""
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False, **more)
     if done.returncode != 0:
         raise AssertionError(f"{words}: {done.stdout}{done.stderr}")
@@ -27,14 +27,14 @@ def run(*words, **more):
 
 
 def pack(folder):
-    """Packages by name. Uncompressed, which is soon done."""
+    """Packages by name, uncompressed to save time."""
     run(CPACK, "--config", BUILD / "CPackConfig.cmake", "-G", "DEB", "-B", folder,
         "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=none", env={**os.environ, "SOURCE_DATE_EPOCH": "1800000000"})
     return {file.name.split("_")[0]: file for file in sorted(folder.glob("*.deb"))}
 
 
 def older(package, folder):
-    """The same package as an earlier version, with another configuration as installed."""
+    """The same package as an earlier version with another configuration."""
     tree = folder / package
     run("dpkg-deb", "--raw-extract", PACKAGES[package], tree)
     for name in ("control", "prerm"):
@@ -157,7 +157,7 @@ class Packages(unittest.TestCase):
 
 
 class AtWork(unittest.TestCase):
-    """dpkg installs, upgrades and removes in a root that has nothing else. Scripts see it as DPKG_ROOT."""
+    """dpkg installs, upgrades and removes in an empty root, which scripts see as DPKG_ROOT."""
 
     def setUp(self):
         if os.geteuid() != 0:

@@ -1,5 +1,4 @@
-"""Recipes of deploy/examples, as somebody runs them who has installed oblique: copied elsewhere, with the programs
-in PATH.
+"""Runs the recipes of deploy/examples as a user: copied to another folder, with the programs in PATH.
 
   recipes_test.py TREE FOLDER-OF-THE-PROGRAMS FOLDER-OF-THE-PYTHON-MODULE RECIPE
 
@@ -24,7 +23,7 @@ HANGS_S = 300  # ends what hangs
 
 
 def missing(modules):
-    """The first of these that Python cannot import; none: all are here."""
+    """The first module that Python cannot import; None: all are installed."""
     for module in modules:
         if subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False,
                           env=os.environ | {"PYTHONPATH": str(MODULE)}).returncode != 0:
@@ -72,7 +71,7 @@ class Recipe(unittest.TestCase):
         return self.wait_for(server, r"clients at (\S+), workers at (\S+),").groups()
 
     def wait_for(self, process, pattern):
-        """Waits until the process has printed it, and returns the match."""
+        """Waits until the process has printed a match, and returns it."""
         end = time.monotonic() + HANGS_S
         while not (found := re.search(pattern, printed := self.log_of(process).read_text())):
             self.assertIn(process.poll(), (None, 0), printed)
