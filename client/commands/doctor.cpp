@@ -107,7 +107,6 @@ void check_versions(Diagnosis& diagnosis) {
   }
 }
 
-/// Name of the processor, from /proc/cpuinfo.
 std::string processor_name() {
   std::ifstream lines("/proc/cpuinfo");
   for (std::string line; std::getline(lines, line);) {

@@ -40,7 +40,6 @@ Only the owner can read the files (mode 0600); existing files are never overwrit
 server's key and the list on its machine. Copy the worker's key to machines that solve, the client's
 key to people who submit studies, and the reader's key to people who only read results.)";
 
-/// Flags of `keygen` and of `keys`.
 struct KeysFlags {
   std::string folder;  // empty: not given
   std::string name;

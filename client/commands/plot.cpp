@@ -243,7 +243,6 @@ void exclude(CLI::Option* option, const std::vector<CLI::Option*>& others) {
   }
 }
 
-/// Flags for the kinds of pictures and their axes.
 void add_kinds_of_pictures(CLI::App& command, plot::PlotRequest& request) {
   auto* map = add_text(
       command, "--map", request.map,
@@ -286,7 +285,6 @@ void add_picture_flags(CLI::App& command, PictureFlags& flags) {
   command.add_flag("--show", flags.show, "draw on the terminal as text");
 }
 
-/// Flags for the time histories of one point.
 void add_flags_of_point(CLI::App& command, PlotFlags& flags) {
   const std::string group = "One point";
   command

@@ -24,9 +24,7 @@ namespace oblique::client {
 void add_study_argument(CLI::App& command, std::string& study);
 /// Adds --format for a short table.
 void add_format_flag(CLI::App& command, std::string& format);
-/// Adds --no-reuse.
 void add_no_reuse_flag(CLI::App& command, bool& no_reuse);
-/// Adds --allow-network-disk.
 void add_network_disk_flag(CLI::App& command, bool& allow);
 
 /// The study that the flags name or define, fully checked. Throws solver::InputError.

@@ -53,7 +53,6 @@ struct ShownPoint {
   std::vector<std::pair<std::string, double>> values;
 };
 
-/// Description of one block.
 struct BlockReport {
   protocol::BlockPlace place;
   protocol::PointsLeftIn left_in;

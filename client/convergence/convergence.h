@@ -42,7 +42,6 @@ struct ContactPoint {
   double e_star;
 };
 
-/// A level with the result of the point.
 struct SolvedLevel {
   Level level;
   solver::CaseResult result;
@@ -134,7 +133,6 @@ struct Output {
 /// (reaction_0_N at the pin, reaction_1_N at the first joint, ...).
 std::vector<Output> outputs_of(const solver::CaseResult& result);
 
-/// An output on all levels.
 struct OutputConvergence {
   std::string name;
   double scale;  ///< of the finest level
@@ -146,7 +144,6 @@ struct OutputConvergence {
   double finest() const { return *values.back(); }
 };
 
-/// The outputs of one point on all levels.
 struct PointConvergence {
   std::vector<OutputConvergence> outputs;
   std::vector<ContactChange> changes;  ///< differences between neighbouring levels
@@ -162,7 +159,6 @@ PointConvergence convergence_of(std::span<const solver::CaseResult> results, dou
 /// |value - limit| / |limit|; nothing if either is missing or the limit is 0.
 std::optional<double> relative_error(const std::optional<double>& value, double limit);
 
-/// One point refined in one way.
 struct Refinement {
   std::string what;  ///< "mesh" or "step"
   std::vector<SolvedLevel> levels;

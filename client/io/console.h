@@ -12,10 +12,8 @@
 
 namespace oblique::client {
 
-/// Value of an environment variable, if it is set.
 std::optional<std::string> environment_variable(const char* name);
 
-/// Columns and lines of a terminal.
 struct TerminalSize {
   std::size_t columns = 0;  ///< 0: not a terminal
   std::size_t lines = 0;    ///< 0: not a terminal
@@ -73,7 +71,6 @@ class Console {
 
   void set_verbosity(Verbosity verbosity) { verbosity_ = verbosity; }
 
-  /// Data.
   std::ostream& out() { return out_; }
   /// Errors; written at every verbosity.
   std::ostream& errors() { return err_; }

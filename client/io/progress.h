@@ -19,7 +19,6 @@
 
 namespace oblique::client {
 
-/// Progress of a study.
 struct ProgressState {
   std::string study;
   std::uint64_t points = 0;

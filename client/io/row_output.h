@@ -23,7 +23,6 @@ class ClosedPipe : public std::runtime_error {
   ClosedPipe() : std::runtime_error("the reader of the output has ended") {}
 };
 
-/// Destination of bytes.
 class Sink {
  public:
   Sink() = default;
@@ -180,7 +179,6 @@ class RowOutput {
   std::unique_ptr<RowPrinter> printer_;
 };
 
-/// Prints a whole table.
 void print(std::ostream& out, const protocol::Table& rows, Format format);
 /// Prints a whole table to standard output. In tables, and on a terminal, control characters are
 /// made visible (proto/text.h); in JSON they are escaped; CSV in a file or pipe contains texts

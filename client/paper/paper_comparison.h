@@ -28,7 +28,6 @@ struct CaseNumbers {
   std::optional<double> stick_ms;
 };
 
-/// Published numbers of one impact.
 struct PublishedCase : CaseNumbers {
   double H_m;
   double mu;
@@ -113,7 +112,6 @@ protocol::Table rows_of(const PublishedTable& table, const std::vector<Differenc
 /// Fitted model keys, which the paper omits or rounds.
 inline constexpr std::array<std::string_view, 4> kFittedKeys{"A", "I", "k", "eta2"};
 
-/// An iteration of the fit.
 struct FitStep {
   int iteration;                        ///< 0: the start
   solver::ModelParameters model;        ///< with the fitted parameters of this iteration

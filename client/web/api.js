@@ -23,10 +23,8 @@ export const json = async (path, signal) => (await request(path, { signal })).js
 export const rowsPath = (study, query) =>
   `/api/studies/${study}/rows?${new URLSearchParams(query)}`;
 
-/** Rows of a study: columns, units, rows. */
 export const rows = (study, query, signal) => json(rowsPath(study, query), signal);
 
-/** Posts a change. */
 export async function post(path, body = {}, signal = undefined) {
   const headers = { "Content-Type": "application/json" };
   return (

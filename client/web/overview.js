@@ -7,7 +7,6 @@ const pageSize = 1000;
 const mostRead = 10_000;
 const mostShown = 200;
 
-/** Condition for failed points. */
 export const failedCondition = "error IS NOT NULL";
 
 const changes = {

@@ -4,7 +4,6 @@ const viridis = "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 
 
 const rgb = (hex) => [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16));
 
-/** An opaque pixel of an ImageData. */
 const packed = ([r, g, b]) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 
 /** 256 pixels, from the smallest to the largest value. */

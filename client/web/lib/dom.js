@@ -64,7 +64,6 @@ export function checkbox(name, checked, toggle) {
   return h("label.tick", box, name);
 }
 
-/** A button that copies a text. */
 export function copyButton(label, text, settings = {}) {
   const copy = async (event) => {
     const done = navigator.clipboard?.writeText(text());
@@ -119,7 +118,6 @@ function replaceChanged(element, children) {
   while (element.childNodes.length > children.length) element.lastChild.remove();
 }
 
-/** Saves text or a Blob as a file. */
 export function saveFile(name, content, type = "text/csv;charset=utf-8") {
   const address = URL.createObjectURL(
     content instanceof Blob ? content : new Blob([content], { type }),

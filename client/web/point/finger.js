@@ -250,7 +250,6 @@ export function fingerOf(trace, moved) {
       set(0);
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) start();
     },
-    /** Stops at a row. */
     show(at) {
       pause();
       set(times[at]);

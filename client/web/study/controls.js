@@ -12,7 +12,6 @@ export function controlsOf(view) {
   const pickers = h("div.controls");
   const sliders = h("div.sliders");
 
-  /** Shows another picture. */
   function choose(changes) {
     view.set(changes, true);
     fillIn(view.fields, study);

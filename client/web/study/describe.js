@@ -49,7 +49,6 @@ function sliceFacts({ picture: { head, x, y }, study }) {
 const unitOfAxis = ({ blocks }, key) =>
   blocks.flatMap((block) => block.axes).find((axis) => axis.key === key)?.unit ?? "";
 
-/** Describes a cell. */
 export function sentenceOf({ x, y, z, head, dictionary, values, whyEmpty }, [column, row]) {
   const cell = row * x.values.length + column;
   const side = ({ name, unit, edges, values: all }, i) => {

@@ -36,7 +36,6 @@ function largestGrid(blocks) {
   return blocks.length > 0 && size(best) > 0 ? best : -1;
 }
 
-/** The default axes. */
 function usualAxes(keys) {
   const x = keys.includes("mu") ? "mu" : keys.at(-1);
   const others = keys.filter((key) => key !== x);

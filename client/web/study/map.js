@@ -268,7 +268,6 @@ export class MapCanvas {
     this.#drawTop();
   }
 
-  /** Chooses a cell, or none. */
   choose(cell, point = null) {
     this.chosen = cell;
     this.chosenPoint = point;

@@ -23,7 +23,6 @@ const mostLines = 8;
 const mostBins = 96;
 const mostForMedians = 100_000;
 
-/** Requests binary numbers of a study. */
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 

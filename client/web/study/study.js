@@ -69,7 +69,6 @@ function conditionFields(view) {
       h("div", where.label, where.said),
       h("div.marks", h("div.row", mark.label, buttons), mark.said),
     ),
-    /** Shows the conditions of the address. */
     show() {
       for (const [name, { input }] of Object.entries(fields)) input.value = view.field(name);
       buttons.hidden = !view.field("mark");
@@ -206,7 +205,6 @@ export class StudyView {
     this.status.element.after(modelLine(study, place.signal));
   }
 
-  /** A field of the address. */
   field(name) {
     return this.fields.get(name) ?? "";
   }
@@ -361,7 +359,6 @@ export class StudyView {
     this.table.load(); // if another part is shown
   }
 
-  /** Draws the picture with the colours and scales of the address. */
   draw() {
     const { picture } = this;
     if (!picture) return;
@@ -402,14 +399,12 @@ export class StudyView {
       if (hadFocus) this.#chart.place.focus({ preventScroll: true });
     }
   }
-  /** The picture for pngOf. */
   figure() {
     const title = this.study.name;
     if (this.hasMap) return { title, canvas: this.map.base, legend: this.legend };
     return { ...this.#chart.figure(), title: `${title}: ${this.#chart.lines.title}` };
   }
 
-  /** Changes the filter or the selection. */
   change(conditions) {
     this.set({ ...conditions, page: "" }, true);
     this.say("");

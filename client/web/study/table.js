@@ -81,7 +81,6 @@ export class PointTable {
     }
   }
 
-  /** Marks the row of a point; null: none. */
   choose(point) {
     this.#chosen = point;
     for (const row of this.table.querySelectorAll("tr[data-point]")) {
