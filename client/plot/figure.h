@@ -150,7 +150,6 @@ std::vector<double> edges_between(const std::vector<double>& values, bool is_log
 /// to the interval above it, the last edge to the last interval. SIZE_MAX: none.
 std::size_t interval_of(const std::vector<double>& edges, double value);
 
-/// One column of an answer.
 struct AnswerColumn {
   std::string name;
   std::string unit;                             ///< SI unit; empty: none or unknown
@@ -184,7 +183,6 @@ CellAxis cells_between(const FigureAxis& axis, std::size_t cells);
 /// Values of an axis of cells: those of the study, which ascend, and others in the rows.
 std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column);
 
-/// Rows as cells.
 struct Gathered {
   Cells cells;
   std::vector<std::uint64_t> counts = {};                    ///< points with a value by cell
@@ -200,7 +198,6 @@ Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y)
 /// Marks cells without a row that have one in an answer of x and y as excluded by the condition.
 void mark_filtered(Cells& cells, const Answer& answer);
 
-/// Rows as lines.
 struct GatheredLines {
   std::vector<Curve> curves = {};     ///< lines with their value of `by`
   std::uint64_t gaps = 0;             ///< number of gaps

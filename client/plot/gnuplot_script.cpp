@@ -273,7 +273,6 @@ class Script {
   void add(fmt::format_string<Values...> form, Values&&... values) {
     fmt::format_to(std::back_inserter(out_), form, std::forward<Values>(values)...);
   }
-  /// Adds an element to the plot command of the panel.
   template <class... Values>
   void plot(fmt::format_string<Values...> form, Values&&... values) {
     plots_.push_back(fmt::format(form, std::forward<Values>(values)...));

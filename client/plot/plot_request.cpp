@@ -32,7 +32,6 @@ std::string column_of_key(const std::string& key) {
   return server::column_of_key(key);
 }
 
-/// Sorts the values and removes duplicates.
 void sort_unique(std::vector<double>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
@@ -154,7 +153,6 @@ std::string values_in_words(const StudyAxis& axis) {
   return fmt::format("the values {}", fmt::join(texts, ", "));
 }
 
-/// The axis and value that an --at names.
 std::pair<const StudyAxis*, double> checked_at(const std::string& text, const StudyShape& shape) {
   const auto [key, value] = parsed_at(text);
   const auto refused = [&text](const std::string& why) {

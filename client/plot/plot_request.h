@@ -42,7 +42,6 @@ void check(const PlotRequest& request);
 /// range.
 std::optional<Range> range_given(const PlotRequest& request);
 
-/// The columns of --scatter.
 std::pair<std::string, std::string> scatter_columns(const PlotRequest& request);
 
 /// A key that has values in the study.
@@ -88,7 +87,6 @@ struct StudyShape {
 /// without points.
 StudyShape shape_for(const protocol::Recipe& recipe, const PlotRequest& request);
 
-/// An axis of a picture.
 struct ChosenAxis {
   std::string column;               ///< column in queries
   std::string name;                 ///< label
@@ -113,7 +111,6 @@ struct Condition {
 Condition condition_of(const PlotRequest& request, const StudyShape& shape,
                        const std::vector<ChosenAxis>& drawn, bool fixes_others);
 
-/// Whether --where mentions the axis.
 bool where_names(const PlotRequest& request, const StudyAxis& axis);
 /// Whether an --at fixes the axis.
 bool at_holds(const PlotRequest& request, const StudyAxis& axis);

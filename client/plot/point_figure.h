@@ -36,20 +36,17 @@ struct PointHistory {
 
 inline constexpr double kMicro = 1e6;
 
-/// A column of the time histories.
 using Column = double solver::TraceRow::*;
 
 /// A line of one column over another.
 Curve curve_of(const PointHistory& history, std::string name, std::size_t stroke, Column y,
                Column x = &solver::TraceRow::t_s);
 
-/// The time axis since touch.
 FigureAxis time_axis(double duration_s);
 
 /// Sets the range of an axis to all values of the curves and a margin.
 void fit(FigureAxis& axis, const std::vector<Curve>& curves, std::vector<double> Curve::*values);
 
-/// Kinds of panels.
 enum class PointPanel { kForces, kLoop, kDeformation, kVelocities, kEnergies, kShape };
 inline constexpr std::array<std::string_view, 6> kPointPanels{
     "forces", "loop", "deformation", "velocities", "energies", "shape"};

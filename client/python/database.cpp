@@ -29,7 +29,6 @@ namespace py = pybind11;
 using protocol::CellKind;
 using protocol::Value;
 
-/// One column of an answer.
 struct Column {
   std::string name;
   std::string unit;  ///< SI; empty for pure numbers and texts

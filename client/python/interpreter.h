@@ -36,7 +36,6 @@ class WithoutLock {
   WithoutLock(const WithoutLock&) = delete;
   WithoutLock& operator=(const WithoutLock&) = delete;
 
-  /// Runs `call` with the lock.
   void with_lock(const std::function<void()>& call) {
     take();
     const struct Release {

@@ -118,7 +118,6 @@ class Connection : public Source {
     std::vector<std::string> columns = {};
   };
 
-  /// A request without an answer.
   struct Outstanding {
     std::string frame;
     std::chrono::milliseconds resend_after;  ///< since `sent`

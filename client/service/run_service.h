@@ -108,7 +108,6 @@ void add_worker_flags(CLI::App& command, RunSettings& settings);
 /// rows.
 void check_settings(const RunSettings& settings);
 
-/// End of a study.
 struct RunEnd {
   protocol::StudyStatus status;
   std::vector<protocol::QueryReply> rows;  ///< chunks of the first results

@@ -71,7 +71,6 @@ void warn_if_insecure(Console& console, const std::string& access, const std::st
 /// "12 points reused: 7 from a, 5 from b"; else empty.
 std::string reused_points_note(const protocol::TakenOver& taken);
 
-/// Studies as a table for `status` and `studies`.
 protocol::Table table_of(const std::vector<protocol::StudyStatus>& studies);
 
 }  // namespace oblique::client

@@ -59,7 +59,7 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
 
 /// H, or the largest drop if the tip does not reach H. H also if enough falls have been solved.
 double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m) {
-  constexpr int kCoarse = 2;      // elements per link: nearly the same fall at a small part of the cost
+  constexpr int kCoarse = 2;      // elements per link: nearly the same fall at a small cost
   constexpr double kRoom = 0.98;  // safety margin of the drop on the coarse mesh
   const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
   if (H_m <= protocol::kSurelyReached * length_m) {

@@ -32,7 +32,6 @@ class ReachChecker {
   /// with an H that is not reached fail when they are solved.
   void operator()(const protocol::PointTable& study);
 
-  /// Number of falls solved so far.
   std::size_t falls_solved() const { return falls_solved_; }
 
  private:

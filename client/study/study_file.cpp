@@ -68,7 +68,6 @@ std::vector<double> numbers(const protocol::TomlReader& file, const ParameterKey
   return values;
 }
 
-/// Reads the table of one axis.
 class AxisTable {
  public:
   AxisTable(const protocol::TomlReader& file, const ParameterKey& key, const toml::table& table,
@@ -186,7 +185,6 @@ class AxisTable {
   BlockKind kind_;
 };
 
-/// One [[block]].
 class BlockReader {
  public:
   BlockReader(const protocol::TomlReader& file, const toml::table& table, CsvFiles& files)

@@ -69,7 +69,6 @@ struct TraceOptions {
   std::int64_t time_limit_ms = 0;  ///< 0: the server's default
 };
 
-/// A stored point, solved again.
 struct SolvedAgain {
   PointSpec point;
   std::optional<solver::CaseResult> result = {};  ///< none if a worker sent unknown outputs
