@@ -382,7 +382,7 @@ TEST(Verdict, NamesTheEventThatOnlySomeLevelsHave) {
   EXPECT_NE(shown(refinement)
                 .find("The step does not converge by dt/4: the mode differs on the finest three "
                       "levels; to blame: dt/4 has a compression of 1 us, from 200.00 to 201.00 us "
-                      "(V_n grazes 0); dt/2 has not."),
+                      "(V_n grazes 0); dt/2 does not."),
             std::string::npos)
       << shown(refinement);
   const auto json = json_of(refinement);

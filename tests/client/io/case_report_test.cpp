@@ -73,8 +73,7 @@ TEST(Summary, ShowsTheMarginAndWarnsOfASmallOne) {
   EXPECT_THAT(summary_of(result),
               HasSubstr("margin      0.036 (0 fragile, 1 safe), closest event: turn\n"));
   result.margin = 3e-7;
-  EXPECT_THAT(summary_of(result),
-              HasSubstr("closest event: turn; the mode is not to be trusted\n"));
+  EXPECT_THAT(summary_of(result), HasSubstr("closest event: turn; the mode is not reliable\n"));
 }
 
 TEST(Summary, MarksRipplesAndNeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) {

@@ -146,9 +146,9 @@ TEST_F(RowOutputTest, TheFormatFollowsFromTheFlagOrTheEnding) {
     }
   };
   for (const char* file : {"x.txt", "x", "x.table", "x.npz"}) {
-    EXPECT_THAT(refusal("", file), testing::HasSubstr(".csv, .json or .jsonl, or give"));
+    EXPECT_THAT(refusal("", file), testing::HasSubstr(".csv, .json or .jsonl, or add"));
   }
-  EXPECT_THAT(refusal("", "x.jsonl", kCsvAndJson), testing::HasSubstr(".csv or .json, or give"));
+  EXPECT_THAT(refusal("", "x.jsonl", kCsvAndJson), testing::HasSubstr(".csv or .json, or add"));
   EXPECT_THAT(refusal("jsn", ""), testing::HasSubstr("did you mean `json`?"));
   EXPECT_THAT(refusal("csv", "x.json"), testing::HasSubstr("contradict each other"));
   EXPECT_THAT(refusal("table", "x.csv"), testing::HasSubstr("contradict each other"));

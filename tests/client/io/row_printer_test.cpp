@@ -146,7 +146,7 @@ TEST(Table, FitsATerminalAndSaysWhatItLeavesOut) {
             "point  error         a_long_heading  …\n"
             "-----  ------------  --------------\n"
             "    1  µµµµµµµµµµµ…             0.5\n"
-            "Left out to fit 40 columns (csv and\njson have all): last\n");
+            "Left out to fit 40 columns (csv and json\nhave all): last\n");
   settings.width = 3;
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr("    1\n"))
       << "a column stays, however narrow the terminal";
