@@ -34,16 +34,15 @@ namespace {
 constexpr const char* kAutoscaleExamples = R"(Examples:
   oblique autoscale slurm --max 10 --script oblique-workers.sbatch
   oblique autoscale slurm --min 1 --max 20 --sbatch-args "--partition=short -A lab7"
-  oblique autoscale slurm --max 10 --points-per-job 500    for points that take long
-  oblique autoscale slurm --max 10 --dry-run               what it would submit now
+  oblique autoscale slurm --max 10 --points-per-job 500    for slow points
+  oblique autoscale slurm --max 10 --dry-run               print what would be submitted now
   oblique autoscale slurm --max 10 --once                  one round, for cron
-Before, for the workers of the jobs:
+Set these first, for the workers in the jobs:
   export OBLIQUE_WORKER_SERVER=tcp://head:7601 OBLIQUE_WORKER_KEYS=~/oblique/worker.key
 
-At every interval, counts the open points of the server and its own jobs in Slurm, and submits the
-jobs that are missing. Jobs end by themselves when their workers find no work (--idle-exit of
-oblique-worker; 10 minutes in deploy/slurm's script). Ctrl-C leaves the jobs in the queue; to end
-them: scancel --name NAME.)";
+In each round, counts the open points on the server and its own jobs in Slurm, and submits the
+missing jobs. A job ends when its worker finds no work (--idle-exit of oblique-worker; 10 minutes
+in the installed script). Ctrl-C leaves the jobs in the queue; scancel --name NAME ends them.)";
 
 constexpr std::array<std::string_view, 1> kSystems{"slurm"};
 
@@ -59,10 +58,10 @@ struct AutoscaleFlags {
   SourceFlags source;
 };
 
-/// Jobs of one name in Slurm, through `squeue` and `sbatch`.
+/// Finds and submits the Slurm jobs of one name through `squeue` and `sbatch`.
 class SlurmJobs {
  public:
-  /// `keep_waiting` may end the wait for `squeue`.
+  /// Waiting for `squeue` ends when `keep_waiting` returns false.
   SlurmJobs(std::string name, std::string script, const std::string& sbatch_arguments,
             std::function<bool()> keep_waiting)
       : name_(std::move(name)), keep_waiting_(std::move(keep_waiting)) {
@@ -93,27 +92,27 @@ class SlurmJobs {
     return answer.substr(0, answer.find_first_of(";\n"));
   }
 
-  /// The command of `submit`.
   std::string submission() const { return fmt::format("sbatch {}", fmt::join(arguments_, " ")); }
 
  private:
   std::string run(const std::string& program, const std::vector<std::string>& arguments,
                   bool may_stop) const {
     try {
-      // SQUEUE_PARTITION and similar variables would hide jobs, and more would be submitted.
+      // SQUEUE_PARTITION and similar variables would hide jobs, and too many would be submitted.
       return output_of({.program = program, .arguments = arguments, .hidden_variables = "SQUEUE_"},
                        may_stop ? keep_waiting_ : nullptr);
     } catch (const ProgramNotFound&) {
-      throw ProcessError(program + " is not in PATH: run this where Slurm's commands work");
+      throw ProcessError(program +
+                         " is not in PATH: run this command where Slurm's commands are installed");
     }
   }
 
   std::string name_;
-  std::vector<std::string> arguments_;  // of sbatch
+  std::vector<std::string> arguments_;
   std::function<bool()> keep_waiting_;
 };
 
-/// The script that is installed with the programs; empty where none is.
+/// The installed batch script; empty if none is installed.
 std::string installed_script() {
   const auto programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   const auto script =
@@ -121,7 +120,8 @@ std::string installed_script() {
   return std::filesystem::exists(script) ? script.string() : std::string();
 }
 
-/// Refuses a script whose jobs would fail for want of a variable, and warns of a missing key.
+/// Throws InputError if the script needs a variable that is not set; warns if a key file is
+/// missing.
 void check_variables(Console& console, const AutoscaleFlags& flags, const std::string& script) {
   constexpr const char* kServer = "OBLIQUE_WORKER_SERVER";
   constexpr const char* kKeys = "OBLIQUE_WORKER_KEYS";
@@ -143,19 +143,19 @@ void check_variables(Console& console, const AutoscaleFlags& flags, const std::s
   const bool has_keys = !flags.source.keys.empty() || is_set("OBLIQUE_KEYS");
   if (has_keys && text.find(kKeys) != std::string::npos && !is_given(kKeys)) {
     console.note(fmt::format(
-        "{} is not set, and this server has keys: it refuses workers without a key file.", kKeys));
+        "{} is not set, but this server has keys: it refuses workers without a key file.", kKeys));
   }
 }
 
-/// Checks what the flags say together and returns the batch script.
+/// Checks combinations of flags and returns the batch script.
 std::string checked_script(Console& console, const AutoscaleFlags& flags) {
   if (flags.limits.least > flags.limits.most) {
-    throw solver::InputError(fmt::format("--min {} is not allowed: it is more than --max {}",
+    throw solver::InputError(fmt::format("--min {} is not allowed: it must be at most --max {}",
                                          flags.limits.least, flags.limits.most));
   }
   if (flags.job_name.find(',') != std::string::npos) {
     throw solver::InputError(
-        fmt::format("--name {} is not allowed: squeue reads a name with a comma as several names",
+        fmt::format("--name {} is not allowed: squeue reads a comma as the end of a name",
                     protocol::visible(flags.job_name)));
   }
   for (const auto argument : protocol::split(flags.sbatch_arguments, ' ')) {
@@ -167,14 +167,14 @@ std::string checked_script(Console& console, const AutoscaleFlags& flags) {
   const std::string script = flags.script.empty() ? installed_script() : flags.script;
   if (script.empty()) {
     throw solver::InputError(
-        "--script FILE is needed: no script is installed with this program. The source tree has "
+        "--script FILE is missing: no script is installed with this program; the source tree has "
         "deploy/slurm/oblique-workers.sbatch");
   }
   check_variables(console, flags, script);
   return script;
 }
 
-/// One round: submits the jobs that are missing; with `dry_run`, prints the command instead.
+/// One round: submits the missing jobs; with `dry_run`, prints the sbatch command instead.
 void submit_missing(Console& console, Connection& connection, const SlurmJobs& slurm,
                     const AutoscaleFlags& flags) {
   const auto open = open_points(connection.full_status());
@@ -196,8 +196,8 @@ void submit_missing(Console& console, Connection& connection, const SlurmJobs& s
   }
 }
 
-/// Runs `round` until a signal comes. An error of the first round is thrown; later ones are
-/// reported once and retried, because server and Slurm may be away for a while.
+/// Runs `round` until a signal arrives. Throws an error of the first round. Reports later errors
+/// once and retries, because the server or Slurm may be unreachable for a while.
 void repeat(Console& console, const std::function<void()>& round, double interval_s,
             protocol::StopSignals& stop) {
   const std::chrono::nanoseconds interval(std::llround(interval_s * 1e9));
@@ -239,10 +239,8 @@ int autoscale(const AutoscaleFlags& flags, Console& console) {
       throw;
     }
   }
-  console.note(
-      fmt::format("Stopped. Jobs that are pending or running go on; to end them: "
-                  "scancel --name {}",
-                  slurm.name()));
+  console.note(fmt::format(
+      "Stopped. Pending and running jobs continue; to end them: scancel --name {}", slurm.name()));
   return stop.exit_code();
 }
 
@@ -251,7 +249,7 @@ int autoscale(const AutoscaleFlags& flags, Console& console) {
 std::uint64_t open_points(const protocol::StatusReply& status) {
   std::uint64_t open = 0;
   for (const auto& study : status.studies()) {
-    // The server's words for a study that any worker would help.
+    // The server's reason for waiting if a study only lacks workers.
     const bool needs_workers = study.waits_for().empty() || study.waits_for() == "a worker";
     if (study.state() == "running" && needs_workers) {
       open += study.points() - std::min(study.points(), protocol::completed_points(study));
@@ -269,9 +267,9 @@ std::size_t jobs_to_submit(std::uint64_t open_points, std::size_t jobs, const Jo
 
 void add_autoscale(CLI::App& app, Action& parsed) {
   constexpr double kDay_s = 86'400.0;
-  auto [command, flags] = new_command(app, parsed, "autoscale",
-                                      "Submit jobs with workers to a cluster while points are open",
-                                      kAutoscaleExamples, autoscale);
+  auto [command, flags] =
+      new_command(app, parsed, "autoscale", "Submit Slurm jobs with workers while points are open",
+                  kAutoscaleExamples, autoscale);
   auto* system = command.add_option("SYSTEM", flags.system, "batch system: slurm")->required();
   protocol::note_choices(system, kSystems)
       ->check([](const std::string& name) {
@@ -279,17 +277,16 @@ void add_autoscale(CLI::App& app, Action& parsed) {
                                    : fmt::format("`{}` is not allowed: it must be slurm", name);
       })
       ->type_name("");
-  command.add_option("--min", flags.limits.least, "least number of jobs, even without open points")
+  command
+      .add_option("--min", flags.limits.least, "minimum number of jobs, even without open points")
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();
-  command.add_option("--max", flags.limits.most, "largest number of jobs")
+  command.add_option("--max", flags.limits.most, "maximum number of jobs")
       ->required()
       ->check(protocol::whole_number_from(1))
       ->type_name("N");
-  command
-      .add_option("--points-per-job", flags.limits.points_per_job,
-                  "open points for each of which a job is wanted")
+  command.add_option("--points-per-job", flags.limits.points_per_job, "open points per job")
       ->check(protocol::whole_number_from(1))
       ->type_name("N")
       ->capture_default_str();
@@ -299,18 +296,18 @@ void add_autoscale(CLI::App& app, Action& parsed) {
       ->capture_default_str();
   command
       .add_option("--script", flags.script,
-                  "batch script that runs workers; default: the one installed with this program")
+                  "batch script that starts workers; default: the installed one")
       ->type_name("FILE");
   command
       .add_option("--sbatch-args", flags.sbatch_arguments,
-                  "more arguments of sbatch, separated by spaces")
+                  "additional arguments for sbatch, separated by spaces")
       ->type_name("ARGS");
   command
       .add_option("--name", flags.job_name,
-                  "name of the jobs, by which they are counted; default: oblique@HOST:PORT")
+                  "name of the jobs; jobs of this name are counted; default: oblique@HOST:PORT")
       ->type_name("NAME");
-  auto* once = command.add_flag("--once", flags.once, "one round, for cron");
-  command.add_flag("--dry-run", flags.dry_run, "one round that only prints what it would submit")
+  auto* once = command.add_flag("--once", flags.once, "run one round and exit, for cron");
+  command.add_flag("--dry-run", flags.dry_run, "print what would be submitted now and exit")
       ->excludes(once);
   add_server_flags(command, flags.source);
 }

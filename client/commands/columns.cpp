@@ -22,17 +22,16 @@ namespace {
 constexpr const char* kListColumnsExamples = R"(Examples:
   oblique columns
   oblique columns fn_peak_N
-  oblique columns "*peak*"                  names that match: * any text, ? any character
+  oblique columns "*peak*"                  a pattern: * is any text, ? any character
   oblique columns --format csv
-  oblique columns --trace                   those of the files that `oblique trace` writes
+  oblique columns --trace                   columns of the files that `oblique trace` writes
 
-Inputs and outputs: columns of `oblique query`, and where `oblique solve --json` has them; then
-elements of lists, counted from 0, and functions, which `oblique query` takes too. Values are in SI
-units; tables show short times in us or ms and slides in mm, and say so in the heading. x points
-from the pin to the released tip, y up; times of a contact count from touch.)";
+Lists the columns of `oblique query` and their names in `oblique solve --json`, then the elements
+of lists, counted from 0, and the functions that `oblique query` accepts. Values are in SI units.
+Tables show short times in us or ms and slides in mm; the heading gives the unit. x points from the
+pin to the released tip, y up. Times of a contact count from touch.)";
 
-/// Those that the pattern names; all for none. Throws solver::InputError for one that names
-/// nothing.
+/// The columns that match `pattern`, all if it is empty. Throws solver::InputError if none match.
 std::vector<server::Column> columns_like(const std::string& pattern) {
   auto columns = server::columns_and_functions();
   if (pattern.empty()) {
@@ -46,7 +45,7 @@ std::vector<server::Column> columns_like(const std::string& pattern) {
   std::vector<server::Column> found;
   std::copy_if(
       columns.begin(), columns.end(), std::back_inserter(found), [&](const server::Column& column) {
-        // A function goes by its name alone too.
+        // A function is also found by its name without arguments.
         return column.name == pattern || fnmatch(pattern.c_str(), column.name.c_str(), 0) == 0 ||
                column.name.starts_with(pattern + "(");
       });
@@ -57,7 +56,7 @@ std::vector<server::Column> columns_like(const std::string& pattern) {
   return found;
 }
 
-/// As files have them: "R0x_N, R0y_N, R1x_N, ..." for columns that are numbered.
+/// Numbered columns as files have them: "R0x_N, R0y_N, R1x_N, ...".
 std::string names_of(const solver::TraceColumn& column) {
   const std::size_t space = column.name.find(' ');
   if (space == std::string_view::npos) {
@@ -101,10 +100,9 @@ void add_columns(CLI::App& app, Action& parsed) {
   auto [command, flags] =
       new_command(app, parsed, "columns", "Name, unit and meaning of every input and output",
                   kListColumnsExamples, list_columns);
-  command
-      .add_option("COLUMN", flags.pattern, "a column, or a pattern of * and ?; all when left out")
+  command.add_option("COLUMN", flags.pattern, "a column, or a pattern with * and ?; default: all")
       ->type_name("");
-  command.add_flag("--trace", flags.trace, "those of a trace, as `oblique trace` writes it");
+  command.add_flag("--trace", flags.trace, "list the columns of `oblique trace`");
   add_format_flag(command, flags.format);
 }
 

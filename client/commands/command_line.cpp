@@ -27,19 +27,19 @@
 namespace oblique::client {
 namespace {
 
-/// Column of the descriptions of flags and commands.
+/// Column at which the descriptions of flags and commands begin.
 constexpr std::size_t kHelpColumn = 28;
 
 constexpr const char* kExamples = R"(Examples:
-  oblique solve --H 1 --mu 0.4 --e 1               one impact, here and now
-  oblique run deploy/studies/paper.toml            a study, solved here
+  oblique solve --H 1 --mu 0.4 --e 1               one impact, in this process
+  oblique run deploy/studies/paper.toml            a study, on this machine
   oblique query paper --where "mu > 0.5"           its results
   oblique COMMAND --help                           flags and examples of a command
 
-Exit codes: 0 done, 1 failed, 2 wrong usage; stopped by a signal: 128 and its number, 130 for Ctrl-C.)";
+Exit codes: 0 done, 1 failed, 2 wrong usage, 130 stopped by Ctrl-C (128 + number of the signal).)";
 
-/// A line whose meaning stands at `column`, which goes on below itself. In examples a remark beside
-/// a command looks the same; commands are left whole.
+/// Whether a line has a description at `column` that can be wrapped. Examples with a remark look
+/// the same; they begin with a command and are not wrapped.
 std::string fitted_meaning(const std::string& line, std::size_t width, std::size_t column) {
   if (line.size() <= width || width <= column || line.size() <= column || line[column - 1] != ' ' ||
       line[column] == ' ' || line.starts_with("  oblique ")) {
@@ -59,30 +59,30 @@ void add_commands(CLI::App& app, Action& parsed) {
   }
 }
 
-/// How much is printed beside the data; flags of every command.
+/// Flags that every command has.
 struct VerbosityFlags {
   bool quiet = false;
   bool verbose = false;
 };
 
 void add_verbosity_flags(CLI::App& command, VerbosityFlags& flags) {
-  command.add_flag("--quiet", flags.quiet, "print data and errors only");
+  command.add_flag("--quiet", flags.quiet, "print only data and errors");
   if (command.get_option_no_throw("--verbose") == nullptr) {
     command.add_flag("--verbose", flags.verbose,
-                     "also print what is done, where, and how long it took");
+                     "also print what is done, where, and how long it takes");
   }
   for (auto* each : command.get_subcommands({})) {
     add_verbosity_flags(*each, flags);
   }
 }
 
-/// The command that was parsed; of a command with commands the inner one; or the program itself.
+/// The innermost command that was parsed, or the program itself.
 CLI::App& parsed_command(CLI::App& app) {
   const auto commands = app.get_subcommands();
   return commands.empty() ? app : parsed_command(*commands.front());
 }
 
-/// As it is typed: "oblique keys list".
+/// The command as it is typed: "oblique keys list".
 std::string words_of(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   return parent == nullptr ? command.get_name() : words_of(*parent) + ' ' + command.get_name();
@@ -95,7 +95,8 @@ int wrong_usage(Console& console, const CLI::App& command, const std::string& me
   return kWrongUsage;
 }
 
-/// What is called otherwise here, where the nearest name does not help; empty for other names.
+/// Our name for a command or flag of another program, if the nearest-name search cannot find it;
+/// else empty.
 std::string other_name_of(const std::string& command) {
   const std::map<std::string_view, const char*> names{
       {"server", "oblique-server"}, {"worker", "oblique-worker"}, {"list", "oblique studies"}};
@@ -126,7 +127,7 @@ int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
-/// Exit code of a program that a broken pipe ended (SIGPIPE).
+/// Exit code of a program that SIGPIPE ended.
 constexpr int kReaderGone = 128 + SIGPIPE;
 
 int carry_out(Console& console, const std::string& words, const Action& action) {
@@ -159,7 +160,7 @@ int execute(Console& console, CLI::App& app, const Action& action, const Verbosi
   const bool verbose = flags.verbose || command.count("--verbose") > 0;
   if (flags.quiet && verbose) {
     return wrong_usage(console, command,
-                       "--quiet and --verbose contradict each other: give one of them");
+                       "--quiet and --verbose contradict each other: give only one");
   }
   console.set_verbosity(flags.quiet ? Verbosity::kQuiet
                         : verbose   ? Verbosity::kVerbose
@@ -173,7 +174,7 @@ int execute(Console& console, CLI::App& app, const Action& action, const Verbosi
   return code;
 }
 
-/// Columns complete the values that hold names of columns.
+/// Values that are column names are completed with the columns.
 protocol::ValueWords columns_of_values() {
   std::vector<std::string> names;
   for (const auto& column : server::all_columns()) {
@@ -217,7 +218,7 @@ std::string fitted_help(const std::string& help, std::size_t width, std::size_t 
 }
 
 int run_command_line(Console& console, int argc, const char* const* argv) {
-  CLI::App app("Studies of the oblique impact of a flexible robotic finger.", "oblique");
+  CLI::App app("Solves and studies the oblique impact of a flexible robotic finger.", "oblique");
   app.set_version_flag("--version", "oblique " + protocol::version_and_commit());
   app.footer(kExamples);
   app.require_subcommand(1);
@@ -231,7 +232,7 @@ int run_command_line(Console& console, int argc, const char* const* argv) {
     return *exit_code;
   }
   if (argc == 1) {
-    return wrong_usage(console, app, "no command given, as in `oblique run STUDY.toml`");
+    return wrong_usage(console, app, "no command given; an example: `oblique run STUDY.toml`");
   }
   const int code = parse(console, app, argc, argv);
   return action ? execute(console, app, action, verbosity) : code;

@@ -17,18 +17,18 @@ using protocol::kDone;
 using protocol::kFailed;
 using protocol::kWrongUsage;
 
-/// What the command line asks for; returns the exit code. Empty until a command is parsed.
+/// Carries out the parsed command and returns the exit code. Empty until a command is parsed.
 using Action = std::function<int(Console& console)>;
 
-/// A command and the variables for its flags, which live as long.
+/// A command with the variables of its flags, which live as long as the command.
 template <class Flags>
 struct NewCommand {
   CLI::App& command;
   Flags& flags;
 };
 
-/// Adds a command. When it is parsed, `parsed` becomes a call of `run`. Without `examples` the help
-/// has those of `app`.
+/// Adds a command. Parsing it sets `parsed` to a call of `run`. If `examples` is empty, the help
+/// shows those of `app`.
 template <class Flags>
 NewCommand<Flags> new_command(CLI::App& app, Action& parsed, const std::string& name,
                               const std::string& summary, const std::string& examples,
@@ -44,7 +44,7 @@ NewCommand<Flags> new_command(CLI::App& app, Action& parsed, const std::string& 
   return {*command, *flags};
 }
 
-// Each adds its commands with flags, help and examples to `app`.
+// Each function adds commands with flags, help and examples to `app`.
 void add_solve(CLI::App& app, Action& parsed);
 void add_run(CLI::App& app, Action& parsed);
 void add_study(CLI::App& app, Action& parsed);
@@ -70,12 +70,12 @@ void add_autoscale(CLI::App& app, Action& parsed);
 void add_keys(CLI::App& app, Action& parsed);
 void add_doctor(CLI::App& app, Action& parsed);
 
-/// Parses the command line and carries it out. Returns the exit code: 0 done, 1 failed, 2 wrong
-/// usage, 128 and its number for a signal that stopped a command which ends in order.
+/// Parses and carries out the command line. Returns the exit code: 0 done, 1 failed, 2 wrong usage,
+/// 128 + number of the signal that stopped the command.
 int run_command_line(Console& console, int argc, const char* const* argv);
 
-/// Help as CLI11 makes it, in lines of at most `width` characters where words allow it: meanings go
-/// on below themselves, at `column`, and sentences in the next line. Commands are left whole.
+/// Wraps the help text of CLI11 to `width` characters. Descriptions continue at `column`, other
+/// sentences on the next line. Commands are not wrapped.
 std::string fitted_help(const std::string& help, std::size_t width, std::size_t column);
 
 }  // namespace oblique::client

@@ -28,11 +28,11 @@ constexpr const char* kConvergeExamples = R"(Examples:
   oblique converge --H 1 --mu 0.6 --e 0.8 --finest 16 --json
   oblique converge --H 1 --mu 0.4 --e 1 --integrator generalized-alpha
 
-A finest mesh of 32 takes some seconds. The work of a contact grows with the cube of the mesh for the
-explicit integrator, that of a fall with the mesh.)";
+Takes some seconds with the default --finest 32. With the explicit integrator the time of a contact
+grows with the cube of the number of elements, the time of a fall linearly.)";
 
 constexpr int kCoarsest = 4;
-// The check of the mesh itself says what a model may have.
+// Upper limit of --finest. The range of elements_per_link is checked later.
 constexpr int kMostElements = 1024;
 
 struct ConvergeFlags {
@@ -48,11 +48,11 @@ void note_levels(Console& console, const char* what, const std::vector<Level>& l
                                  levels.front().name, levels.back().name);
 }
 
-/// One point refined in both ways, all levels side by side.
+/// Results of the mesh and step refinements, which are solved together.
 struct BothRefinements {
   Refinement mesh;
   Refinement step;
-  std::optional<SolvedLevel> exact_fall;  ///< where the fall has no step to halve
+  std::optional<SolvedLevel> exact_fall;  ///< empty if the fall has no fixed step
 };
 
 BothRefinements refined(Console& console, const std::vector<Level>& meshes,
@@ -67,7 +67,8 @@ BothRefinements refined(Console& console, const std::vector<Level>& meshes,
     levels.push_back(*exact_fall);
   }
   const auto all = solve_levels(levels, point, line, [&line](const SolvedLevel& level) {
-    line.print(fmt::format("{} solved in {}", level.level.name, format_duration(level.wall_s)));
+    line.print(fmt::format("{}: fall and contact took {}", level.level.name,
+                           format_duration(level.wall_s)));
   });
   const auto end_of_meshes = all.begin() + static_cast<std::ptrdiff_t>(meshes.size());
   const auto end_of_steps = end_of_meshes + static_cast<std::ptrdiff_t>(steps.size());
@@ -84,13 +85,12 @@ int converge(const ConvergeFlags& flags, Console& console) {
   }
   if (points != 1) {
     throw solver::InputError(fmt::format(
-        "the flags make {} points, and converge takes one: give one value each", points));
+        "the flags define {} points, but converge takes one: give one value per flag", points));
   }
   constexpr int kMostHalvings = 8;
   if (flags.halvings < 2 || flags.halvings > kMostHalvings) {
     throw solver::InputError(fmt::format(
-        "--halvings {} is not allowed: it must be from 2 to {}, for an order needs three "
-        "steps",
+        "--halvings {} is not allowed: it must be from 2 to {}, because an order needs three steps",
         flags.halvings, kMostHalvings));
   }
   constexpr int kFinest = 32;
@@ -111,12 +111,14 @@ int converge(const ConvergeFlags& flags, Console& console) {
     console.out() << json.dump(2) << '\n';
     return kDone;
   }
-  console.out() << fmt::format("H = {} m, mu = {}, e* = {}\n\nMesh: n elements a link, doubled\n\n",
-                               solver::exact_number(point.H_m), solver::exact_number(point.mu),
-                               solver::exact_number(point.e_star));
+  console.out() << fmt::format(
+      "H = {} m, mu = {}, e* = {}\n\nMesh: n elements a link, doubled from level to level\n\n",
+      solver::exact_number(point.H_m), solver::exact_number(point.mu),
+      solver::exact_number(point.e_star));
   print_refinement(console.out(), mesh);
-  console.out() << fmt::format("\nStep: steps of contact{}, halved, on n = {}\n\n",
-                               exact_fall ? "" : " and fall", model.elements_per_link);
+  console.out() << fmt::format(
+      "\nStep: steps of contact{}, halved from level to level, on n = {}\n\n",
+      exact_fall ? "" : " and fall", model.elements_per_link);
   print_refinement(console.out(), step);
   if (exact_fall) {
     console.out() << fall_sentence(step, *exact_fall);
@@ -129,19 +131,19 @@ int converge(const ConvergeFlags& flags, Console& console) {
 void add_converge(CLI::App& app, Action& parsed) {
   auto [command, flags] =
       new_command(app, parsed, "converge",
-                  "Refine mesh and step of one point and estimate the error of every output",
+                  "Refine mesh and step of one point and estimate the error of each output",
                   kConvergeExamples, converge);
   command.add_flag("--json", flags.json, "print one JSON object (SI units)");
-  command.add_option("--coarsest", flags.coarsest, "elements a link of the coarsest mesh")
+  command.add_option("--coarsest", flags.coarsest, "elements per link of the coarsest mesh")
       ->check(CLI::Range(1, kMostElements))
       ->type_name("N")
       ->capture_default_str();
   command
       .add_option("--finest", flags.finest,
-                  "elements a link of the finest mesh, at least 4 times the coarsest; default 32")
+                  "elements per link of the finest mesh, at least 4 times --coarsest; default: 32")
       ->check(CLI::Range(1, kMostElements))
       ->type_name("N");
-  command.add_option("--halvings", flags.halvings, "how often the step is halved")
+  command.add_option("--halvings", flags.halvings, "number of times the step is halved")
       ->type_name("N")
       ->capture_default_str();
   add_point_flags(command, flags.points, FlagValues::kMany);

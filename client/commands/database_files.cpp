@@ -28,29 +28,29 @@ constexpr const char* kMergeExamples = R"(Examples:
   oblique merge lab.db cluster.db --db all.db
   oblique merge cluster.db --db lab.db --rename-prefix cluster-
 
-Studies and results of the databases come into the one of --db, which is made when it is not there. A
-study is the one of the same name and recipe: their points are united, and where both have a result
-that of --db stays. One that grew in one of them is united with what it was. A database with a study
-of a name that is taken by another recipe is refused as a whole, with what differs. What is merged is
-only read, also while a server works on it; merged again it brings what is new since. No server may be
-at work on the database of --db.)";
+Copies studies and results into the database of --db, which is created if it does not exist. Studies
+of the same name and recipe, also if one of them has grown, become one study; if both have a result
+for a point, that of --db stays. A database is refused as a whole if one of its studies has the name
+of a study with another recipe; the error shows the difference. The merged databases are only read,
+also while a server uses them. Merging again adds what is new. No server may use the database of
+--db.)";
 
 constexpr const char* kBackupExamples = R"(Examples:
   oblique backup monday.db
   oblique backup /mnt/safe/friction.db --db friction.db
   oblique backup saved.db --db damaged.db --salvage
 
-A server may be at work on the database: the copy is the database as it was at one instant. It is
-checked, and has its name only when it is whole.)";
+The copy is the state of the database at one instant; a server may use the database meanwhile. The
+copy is checked, and appears under its name when it is complete.)";
 
 constexpr const char* kCheckExamples = R"(Examples:
   oblique check
   oblique check friction.db
 
-Reads the whole database: every page and index, every reference, every row against its checksum and
-the recipe of its study. It also says which studies are not finished, which is no damage: a copy made
-without the file that ends in -wal lacks rows in this way. Exit code 1 when something is wrong. What
-can still be read of a damaged file is saved by:  oblique backup saved.db --db damaged.db --salvage)";
+Reads the whole database: every page, index and reference, and every row, which is compared with its
+checksum and the recipe of its study. Unfinished studies are listed; they are no damage. A copy made
+without the file that ends in -wal lacks rows in this way. Exit code 1 if the database is damaged.
+To save what can be read of a damaged file:  oblique backup saved.db --db damaged.db --salvage)";
 
 struct MergeFlags {
   std::vector<std::string> sources;
@@ -64,23 +64,23 @@ bool are_one_file(const std::string& one, const std::string& other) {
   return std::filesystem::equivalent(one, other, missing) && !missing;
 }
 
-/// The databases to be merged, each once.
+/// The databases to merge, without repetitions.
 std::vector<std::string> checked_sources(const MergeFlags& flags, Console& console) {
   std::vector<std::string> sources;
   for (const std::string& source : flags.sources) {
-    if (!std::filesystem::exists(source)) {  // before a new target is made
+    if (!std::filesystem::exists(source)) {  // before a new target is created
       throw std::runtime_error(fmt::format("there is no file {}", source));
     }
     if (are_one_file(source, flags.target.file)) {
-      throw solver::InputError(fmt::format(
-          "{} is the database that the others are merged into: name it by --db alone", source));
+      throw solver::InputError(
+          fmt::format("{} is the database to merge into: name it only with --db", source));
     }
     bool is_known = false;
     for (const std::string& earlier : sources) {
       is_known = is_known || are_one_file(source, earlier);
     }
     if (is_known) {
-      console.notes() << fmt::format("{} is named twice, and merged once.\n", source);
+      console.notes() << fmt::format("{} is named twice and merged once.\n", source);
     } else {
       sources.push_back(source);
     }
@@ -92,17 +92,17 @@ std::vector<std::string> checked_sources(const MergeFlags& flags, Console& conso
 void note_merged(Console& console, const std::string& source, const std::string& target,
                  const server::Merged& merged) {
   auto& out = console.notes();
-  out << fmt::format("{}: {} new in {} and {} united with those there; {} added", source,
-                     counted(merged.studies_added, "study", "studies"), target,
+  out << fmt::format("{}: added {} to {}, united {} with studies of the same recipe; added {}",
+                     source, counted(merged.studies_added, "study", "studies"), target,
                      format_count(merged.studies_united),
                      counted(merged.results_added, "result", "results"));
   const auto add = [&out](std::uint64_t count, const char* text) {
     out << (count > 0 ? fmt::format(fmt::runtime(text), format_count(count)) : "");
   };
-  add(merged.studies_grown, "; studies that grew: {}");
   add(merged.failures_replaced, ", {} of them for points that had failed");
-  add(merged.results_known, "; {} were there already");
-  add(merged.results_differing, ", {} of these with other numbers: those of --db stay");
+  add(merged.results_known, "; {} existed already");
+  add(merged.results_differing, ", {} of these with other values: those of --db are kept");
+  add(merged.studies_grown, "; {} of the united studies grew");
   out << ".\n";
   for (const std::string& remark : merged.remarks) {
     out << "  " << protocol::visible(remark) << '\n';
@@ -113,8 +113,7 @@ void merge_one(Console& console, server::Merger& merger, const std::string& sour
                const MergeFlags& flags) {
   if (server::is_in_use(source)) {
     console.notes() << fmt::format(
-        "A server is at work on {}: what it stores from now on comes when it is merged again.\n",
-        source);
+        "A server uses {}: merge again later to add what it stores from now on.\n", source);
   }
   note_merged(console, source, flags.target.file, merger.merge(source, flags.rename_prefix));
 }
@@ -127,8 +126,8 @@ int merge(const MergeFlags& flags, Console& console) {
   }
   if (!merger.finish()) {
     console.notes() << fmt::format(
-        "Another program reads {0}: until it ends a copy needs {0}-wal too; `oblique backup` makes "
-        "one that is whole.\n",
+        "Another program reads {0}. Until it ends, a copy of the file needs {0}-wal, too; `oblique "
+        "backup` makes a complete copy.\n",
         flags.target.file);
   }
   return kDone;
@@ -143,8 +142,8 @@ struct BackupFlags {
 int salvage(const BackupFlags& flags, Console& console) {
   const auto saved = server::salvage(flags.database.file, flags.copy);
   console.notes() << fmt::format(
-      "{} has {} studies and {} results of {}; rows were passed over at {} places. A server that "
-      "goes on with it solves again what is missing.\n",
+      "{} contains {} studies and {} results of {}; rows at {} places could not be read. A server "
+      "that continues with the copy solves the missing points.\n",
       flags.copy, format_count(saved.studies), format_count(saved.results), flags.database.file,
       format_count(saved.unreadable_places));
   return kDone;
@@ -153,7 +152,7 @@ int salvage(const BackupFlags& flags, Console& console) {
 void check_copy(const std::string& copy) {
   std::error_code ignored;
   if (std::filesystem::exists(copy, ignored)) {
-    throw solver::InputError(copy + " exists already: name a file that does not");
+    throw solver::InputError(copy + " exists already: name a new file");
   }
   const auto folder = std::filesystem::absolute(copy).parent_path();
   if (!std::filesystem::is_directory(folder, ignored)) {
@@ -191,8 +190,7 @@ int check(const DatabaseCheckFlags& flags, Console& console) {
     return kDone;
   }
   console.errors() << fmt::format(
-      "{0} is damaged. What can be read is saved by:\n  oblique backup saved.db --db {0} "
-      "--salvage\n",
+      "{0} is damaged. To save what can be read:\n  oblique backup saved.db --db {0} --salvage\n",
       database);
   return kFailed;
 }
@@ -202,17 +200,15 @@ int check(const DatabaseCheckFlags& flags, Console& console) {
 void add_database_files(CLI::App& app, Action& parsed) {
   {
     auto [command, flags] =
-        new_command(app, parsed, "merge", "Bring studies and results of databases into one",
+        new_command(app, parsed, "merge", "Merge studies and results of several databases",
                     kMergeExamples, merge);
-    command.add_option("FILES", flags.sources, "the databases to be merged")
-        ->required()
-        ->type_name("");
-    command.add_option("--db", flags.target.file, "the database that they are merged into")
+    command.add_option("FILES", flags.sources, "databases to merge")->required()->type_name("");
+    command.add_option("--db", flags.target.file, "database to merge into")
         ->type_name("FILE")
         ->capture_default_str();
     command
         .add_option("--rename-prefix", flags.rename_prefix,
-                    "goes before the names of studies whose names other recipes have")
+                    "prefix for studies whose name is used for another recipe")
         ->type_name("PREFIX");
     add_network_disk_flag(command, flags.allow_network_disk);
   }
@@ -220,15 +216,16 @@ void add_database_files(CLI::App& app, Action& parsed) {
     auto [command, flags] =
         new_command(app, parsed, "backup", "Copy a database, also while a server writes to it",
                     kBackupExamples, backup);
-    command.add_option("FILE", flags.copy, "the copy; must not exist")->required()->type_name("");
+    command.add_option("FILE", flags.copy, "file for the copy; must not exist")
+        ->required()
+        ->type_name("");
     command.add_option("--db", flags.database.file, "the database")
         ->type_name("FILE")
         ->capture_default_str();
-    command.add_flag("--salvage", flags.salvage,
-                     "the database is damaged: save every row that can still be read");
+    command.add_flag("--salvage", flags.salvage, "save every readable row of a damaged database");
   }
   auto [command, flags] =
-      new_command(app, parsed, "check", "Look for damage in a database", kCheckExamples, check);
+      new_command(app, parsed, "check", "Search a database for damage", kCheckExamples, check);
   add_database_argument(command, flags.database);
 }
 

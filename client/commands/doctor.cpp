@@ -40,16 +40,16 @@ constexpr const char* kDoctorExamples = R"(Examples:
   oblique doctor --server tcp://hub:7600 --keys client.key
 
 Checks versions, processor, speed of the solver, the database and its disk, the key file and the
-server. Each line begins with ok, warning or error; warnings and errors name the remedy. Nothing is
-written or changed. Exit code 1 with an error: a server that does not answer or refuses the key, a
-database that cannot be read. `oblique check` searches a database for damage.)";
+server. Each line begins with ok, warning or error; warnings and errors include the remedy. Nothing
+is written or changed. Exit code 1 if there is an error: the server does not answer or refuses the
+key, or the database cannot be read. `oblique check` searches a database for damage.)";
 
 struct DoctorFlags {
   std::string database;  // empty: not given
   SourceFlags source;
 };
 
-/// Prints one line for each finding, at once.
+/// Prints each finding on a line as soon as it is made.
 class Diagnosis {
  public:
   explicit Diagnosis(std::ostream& out) : out_(out) {}
@@ -80,9 +80,11 @@ void check_program_beside(Diagnosis& diagnosis, const std::string& name) {
     if (line == fmt::format("{} {}", name, protocol::version_and_commit())) {
       diagnosis.ok(kCheck, name + " is of the same build");
     } else {
-      diagnosis.warning(kCheck, fmt::format("{} is of another build than this program: install all "
-                                            "programs of one version",
-                                            line));
+      diagnosis.warning(
+          kCheck,
+          fmt::format(
+              "{} and this program are of different builds: install all programs of one version",
+              line));
     }
   } catch (const ProcessError& error) {
     diagnosis.warning(
@@ -96,16 +98,15 @@ void check_versions(Diagnosis& diagnosis) {
                                        protocol::version_and_commit(), origin.compiler,
                                        origin.build_type, sqlite3_libversion()));
   if (origin.build_type != "Release") {
-    diagnosis.warning("versions",
-                      "a program that is not built as Release is slow: build it with "
-                      "-DCMAKE_BUILD_TYPE=Release");
+    diagnosis.warning(
+        "versions",
+        "a program that is not built as Release is slow: build it with -DCMAKE_BUILD_TYPE=Release");
   }
   for (const char* name : {"oblique-server", "oblique-worker"}) {
     check_program_beside(diagnosis, name);
   }
 }
 
-/// The processor's name, as /proc/cpuinfo has it.
 std::string processor_name() {
   std::ifstream lines("/proc/cpuinfo");
   for (std::string line; std::getline(lines, line);) {
@@ -122,14 +123,13 @@ void check_processor(Diagnosis& diagnosis) {
                                         processor_name(), std::thread::hardware_concurrency(),
                                         sysconf(_SC_NPROCESSORS_ONLN), set));
   if (set != "avx512" && set != "avx2") {
-    diagnosis.warning(
-        "processor",
-        "the solver is more than twice as fast with AVX2: in a virtual machine, let it "
-        "have the processor type of its host");
+    diagnosis.warning("processor",
+                      "the solver is more than twice as fast with AVX2: give the virtual machine "
+                      "the processor type of its host");
   }
 }
 
-/// Processor time of this thread [s]: other programs on the machine do not change it.
+/// Processor time of this thread [s], which other programs do not change.
 double cpu_time_s() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -137,7 +137,7 @@ double cpu_time_s() {
   return static_cast<double>(time.tv_sec) + kNano * static_cast<double>(time.tv_nsec);
 }
 
-/// Processor time of a point of the preset `paper` in vector lanes, without its fall [s].
+/// Processor time [s] of a point with the preset `paper` in vector lanes, without its fall.
 double measured_point_s() {
   constexpr std::uint64_t kPoints = 600;
   const solver::Finger finger(solver::preset("paper"));
@@ -150,7 +150,7 @@ double measured_point_s() {
   const double start_s = cpu_time_s();
   for (const solver::Outcome& outcome : solver::solve_points(finger, points)) {
     if (!outcome.result) {
-      throw std::runtime_error("a point of the preset paper fails: " + outcome.error);
+      throw std::runtime_error("a point with the preset paper fails: " + outcome.error);
     }
   }
   return (cpu_time_s() - start_s) / static_cast<double>(kPoints);
@@ -162,8 +162,9 @@ void check_solver(Diagnosis& diagnosis) {
   const double reference_s = set == "avx512" ? 0.07e-3 : set == "avx2" ? 0.12e-3 : 0.30e-3;
   constexpr double kSlow = 3.0;
   const double point_s = measured_point_s();
-  const auto text = fmt::format("{:.3f} ms of processor time a point; reference for {}: {:.2f} ms",
-                                1e3 * point_s, set, 1e3 * reference_s);
+  const auto text =
+      fmt::format("{:.3f} ms of processor time per point; reference for {}: {:.2f} ms",
+                  1e3 * point_s, set, 1e3 * reference_s);
   if (point_s > kSlow * reference_s) {
     diagnosis.warning("solver", text +
                                     ": the processor is old, throttled or shared with other "
@@ -173,7 +174,8 @@ void check_solver(Diagnosis& diagnosis) {
   }
 }
 
-/// The disk on which the database `file` is or would be; false if there is no such folder.
+/// Checks the disk of the database `file`, which need not exist; false if its folder does not
+/// exist.
 bool check_disk(Diagnosis& diagnosis, const std::string& file) {
   constexpr const char* kCheck = "disk";
   std::error_code error;
@@ -188,14 +190,14 @@ bool check_disk(Diagnosis& diagnosis, const std::string& file) {
   constexpr std::uint64_t kLittleSpace = 500'000'000;
   const bool exists = std::filesystem::exists(path, error);
   if (access(folder.c_str(), W_OK) != 0 || (exists && access(path.c_str(), W_OK) != 0)) {
-    diagnosis.warning(kCheck, fmt::format("this user cannot write to {}: to solve a study, name a "
-                                          "--db in another folder",
-                                          exists ? path.string() : folder.string()));
+    diagnosis.warning(
+        kCheck,
+        fmt::format("this user cannot write to {}: name a --db in another folder to solve a study",
+                    exists ? path.string() : folder.string()));
   } else if (space.available < kLittleSpace) {
-    diagnosis.warning(kCheck,
-                      fmt::format("{} has only {} free: a million results take about 650 MB, and "
-                                  "studies wait while the disk is full",
-                                  folder.string(), format_bytes(space.available)));
+    diagnosis.warning(kCheck, fmt::format("{} has only {} free: a million results take about 650 "
+                                          "MB; studies wait while the disk is full",
+                                          folder.string(), format_bytes(space.available)));
   } else {
     diagnosis.ok(kCheck, fmt::format("{} is writable and has {} free", folder.string(),
                                      format_bytes(space.available)));
@@ -242,7 +244,7 @@ bool check_key(Diagnosis& diagnosis, const DoctorFlags& flags) {
                                ? environment_variable("OBLIQUE_KEYS").value_or("")
                                : flags.source.keys;
   if (file.empty()) {
-    diagnosis.ok("key", "no key file is named; a server with keys needs --keys or OBLIQUE_KEYS");
+    diagnosis.ok("key", "no key file; a server with keys needs --keys or OBLIQUE_KEYS");
     return true;
   }
   try {
@@ -259,7 +261,7 @@ bool check_key(Diagnosis& diagnosis, const DoctorFlags& flags) {
 void check_server(Diagnosis& diagnosis, const DoctorFlags& flags, Console& console) {
   constexpr const char* kCheck = "server";
   if (flags.source.server.empty() && environment_variable("OBLIQUE_SERVER").value_or("").empty()) {
-    diagnosis.ok(kCheck, "not checked; --server URL or OBLIQUE_SERVER names one");
+    diagnosis.ok(kCheck, "not checked; name one with --server URL or OBLIQUE_SERVER");
     return;
   }
   try {
@@ -276,12 +278,12 @@ void check_server(Diagnosis& diagnosis, const DoctorFlags& flags, Console& conso
     }
     if (status.access() == "insecure") {
       diagnosis.warning(kCheck,
-                        "anyone who reaches the server may use it (--insecure): make keys "
-                        "with `oblique keygen`");
+                        "anyone who can reach the server may use it (--insecure): create keys with "
+                        "`oblique keygen`");
     }
     if (status.draining()) {
       diagnosis.warning(kCheck,
-                        "the server is about to end: studies go on when it is started again");
+                        "the server is shutting down: studies continue when it is started again");
     } else if (status.workers() == 0) {
       diagnosis.warning(kCheck, "studies wait for a worker: start oblique-worker");
     }
@@ -314,7 +316,7 @@ void add_doctor(CLI::App& app, Action& parsed) {
       ->type_name("FILE");
   add_server_flags(command, flags.source);
   command.get_option("--server")
-      ->description("address of a server to check; default: OBLIQUE_SERVER, else none");
+      ->description("server to check; default: OBLIQUE_SERVER, else none");
 }
 
 }  // namespace oblique::client

@@ -24,10 +24,10 @@ using solver::signed_number;
 constexpr const char* kFitExamples = R"(Examples:
   oblique fit
   oblique fit --from paper
-  oblique fit --elements-per-link 5       the same on another mesh, which fits far worse
+  oblique fit --elements-per-link 5       on another mesh, which fits far worse
   oblique fit --json > fit.json
 
-Three falls an iteration, those of A and I side by side: some seconds in all.)";
+Each iteration solves three falls, those for A and I side by side. Takes some seconds.)";
 
 struct FitFlags {
   std::string from{"printed"};
@@ -103,7 +103,7 @@ FitStep fitted(Console& console, const solver::ModelParameters& start) {
   std::atomic<int> iteration{0};
   StatusLine line(console);
   const auto fitting = line.begin([&] {
-    return fmt::format("iteration {}, falls on {} elements a link", iteration.load(),
+    return fmt::format("iteration {}: solving falls on {} elements a link", iteration.load(),
                        start.elements_per_link);
   });
   return fit_parameters(published_table(), start, [&](const FitStep& step) {
@@ -130,7 +130,7 @@ int fit(const FitFlags& flags, Console& console) {
 void add_fit(CLI::App& app, Action& parsed) {
   auto [command, flags] =
       new_command(app, parsed, "fit",
-                  "Recover the parameters that the paper does not print from the numbers it does",
+                  "Fit the parameters that the paper does not print to the numbers it prints",
                   kFitExamples, fit);
   auto* from = command
                    .add_option("--from", flags.from,
@@ -141,7 +141,7 @@ void add_fit(CLI::App& app, Action& parsed) {
   command.add_option("--elements-per-link", flags.elements_per_link, "mesh on which to fit")
       ->type_name("N")
       ->capture_default_str();
-  command.add_flag("--json", flags.json, "print the end as one JSON object");
+  command.add_flag("--json", flags.json, "print the result as one JSON object");
 }
 
 }  // namespace oblique::client

@@ -21,12 +21,12 @@ namespace {
 constexpr const char* kKeysExamples = R"(Examples:
   oblique keys list --dir keys
   oblique keys add alice --role client --dir keys          writes keys/alice.key
-  oblique keys add lab7 --role worker --public KEY         lists a key that was made elsewhere
+  oblique keys add lab7 --role worker --public KEY         lists a key made elsewhere
   oblique keys revoke alice --dir keys
 
-A running server heeds a change within a second; the connections of a revoked key are ended.)";
+A running server applies a change within a second and closes the connections of a revoked key.)";
 
-/// Roles that may be listed: all but the server's.
+/// Roles that a key in the list may have: all except the server's.
 constexpr std::array<std::string_view, 3> kRoles{"client", "worker", "reader"};
 
 constexpr const char* kKeygenExamples = R"(Examples:
@@ -36,16 +36,15 @@ constexpr const char* kKeygenExamples = R"(Examples:
   oblique-worker --server tcp://host:7601 --keys worker.key
   oblique status --server tcp://host:7600 --keys keys/client.key
 
-Each file is for its owner alone (mode 0600) and nothing is overwritten. The server's key and the
-list stay on its machine; a worker's goes to the machines that solve, a client's to people who
-submit studies, a reader's to those who only look.)";
+Only the owner can read the files (mode 0600); existing files are never overwritten. Keep the
+server's key and the list on its machine. Copy the worker's key to machines that solve, the client's
+key to people who submit studies, and the reader's key to people who only read results.)";
 
-/// Flags of `keygen` and of `keys`.
 struct KeysFlags {
   std::string folder;  // empty: not given
   std::string name;
   std::string role;
-  std::string public_key;  // empty: a new pair
+  std::string public_key;  // empty: create a new pair
   std::string format{"table"};
 };
 
@@ -65,7 +64,7 @@ std::optional<protocol::CurveKey> public_key_of(const std::string& text) {
   const auto key = protocol::parse_z85(text);
   if (!key) {
     throw solver::InputError(
-        fmt::format("--public {} is no key: one has {} characters, as `public` in a key file",
+        fmt::format("--public {} is not a key: a key has {} characters, as `public` in a key file",
                     protocol::visible(text), protocol::kKeyCharacters));
   }
   return key;
@@ -83,8 +82,8 @@ std::optional<protocol::KeyFile> key_in(const std::string& path) {
   }
 }
 
-/// A file with a key for this server that its list lacks is that of a revoked one: throws
-/// std::runtime_error with what to do about it.
+/// Throws std::runtime_error with the remedy if the file contains a key for this server that is not
+/// in the list, because it was revoked.
 void check_not_revoked(const std::string& folder, const std::string& name) {
   const std::string path = protocol::key_file_in(folder, name);
   const std::string list = protocol::authorized_keys_in(folder);
@@ -97,8 +96,8 @@ void check_not_revoked(const std::string& folder, const std::string& name) {
   if (server && key && key->server == server->pair.public_key &&
       listed.find(key->pair.public_key) == nullptr && listed.find(name) == nullptr) {
     throw std::runtime_error(fmt::format(
-        "{} is there already, and is the key of {}, which was revoked: remove the file for a new "
-        "key, or list this one again with oblique keys add {} --role {} --dir {} --public='{}'",
+        "{} exists and contains the revoked key of {}: remove the file to create a new key, or "
+        "admit this key again with oblique keys add {} --role {} --dir {} --public='{}'",
         path, key->name, name, name_of(key->role), shell_word(folder),
         protocol::z85(key->pair.public_key)));
   }
@@ -111,17 +110,15 @@ int keygen(const KeysFlags& flags, Console& console) {
   const std::string list = protocol::authorized_keys_in(flags.folder);
   if (is_there(list)) {
     throw std::runtime_error(
-        fmt::format("{} is there already, and is never overwritten; one more key for its server: "
-                    "oblique keys add NAME --role ROLE --dir {}",
+        fmt::format("{} exists and is never overwritten; to add a key for its server: oblique keys "
+                    "add NAME --role ROLE --dir {}",
                     list, shell_word(flags.folder)));
   }
   const auto server = protocol::make_key_folder(flags.folder);
   console.out() << fmt::format(
-      "{}  oblique-server --keys: stays on its machine\n"
-      "{}  workers\n"
-      "{}  clients: submit, change and read\n"
-      "{}  clients that only read\n"
-      "{}  the keys that the server admits; `oblique keys` changes it\n",
+      "{}  for oblique-server --keys: keep it on its machine\n{}  for workers\n{}  for clients: "
+      "submit, change and read\n{}  for clients that only read\n{}  the list of admitted keys; "
+      "`oblique keys` changes it\n",
       file_of("server"), file_of("worker"), file_of("client"), file_of("reader"), list);
   console.notes() << fmt::format("The server's public key is {}.\n", protocol::z85(server));
   return kDone;
@@ -159,21 +156,20 @@ int revoke(const KeysFlags& flags, Console& console) {
   const std::string path = protocol::authorized_keys_in(folder);
   protocol::change_authorized_keys(
       path, [&](protocol::AuthorizedKeys& keys) { keys.remove(flags.name); });
-  console.notes() << fmt::format("{} is revoked: its key is worth nothing from now on.\n",
+  console.notes() << fmt::format("{} is revoked: the server no longer admits this key.\n",
                                  flags.name);
   if (const auto file = protocol::key_file_in(folder, flags.name); is_there(file)) {
-    console.notes() << fmt::format("The file {} stays, and is worth nothing.\n", file);
+    console.notes() << fmt::format("The file {} still exists; it is useless.\n", file);
   }
   return kDone;
 }
 
-/// A command of `keys`.
 NewCommand<KeysFlags> add_action(CLI::App& keys, Action& parsed, const char* name,
                                  const char* summary, int (*run)(const KeysFlags&, Console&)) {
   auto added = new_command(keys, parsed, name, summary, "", run);
   added.command
       .add_option("--dir", added.flags.folder,
-                  "folder of the server's key and the list; default: this one, else keys")
+                  "folder with the server's key and the list; default: this folder, else keys")
       ->type_name("DIR");
   return added;
 }
@@ -183,18 +179,18 @@ NewCommand<KeysFlags> add_action(CLI::App& keys, Action& parsed, const char* nam
 void add_keys(CLI::App& app, Action& parsed) {
   {
     auto [command, flags] =
-        new_command(app, parsed, "keygen", "Make keys for a server and its clients and workers",
+        new_command(app, parsed, "keygen", "Create keys for a server and its workers and clients",
                     kKeygenExamples, keygen);
-    command.add_option("DIR", flags.folder, "folder to write them to; made if it is not there")
+    command.add_option("DIR", flags.folder, "folder for the files; created if it does not exist")
         ->required()
         ->type_name("");
   }
-  auto* keys = app.add_subcommand("keys", "Say whom a server with keys admits");
+  auto* keys = app.add_subcommand("keys", "Manage the keys that a server admits");
   keys->footer(kKeysExamples);
   keys->require_subcommand(1);
   {
-    auto [command, flags] = add_action(*keys, parsed, "add", "List one more key", add);
-    command.add_option("NAME", flags.name, "of the key, for people; also of its file, NAME.key")
+    auto [command, flags] = add_action(*keys, parsed, "add", "Add a key", add);
+    command.add_option("NAME", flags.name, "name of the key and of its file, NAME.key")
         ->required()
         ->type_name("");
     auto* role = command.add_option("--role", flags.role, "client, worker or reader")
@@ -203,16 +199,16 @@ void add_keys(CLI::App& app, Action& parsed) {
     protocol::note_choices(role, kRoles);
     command
         .add_option("--public", flags.public_key,
-                    "public key that was made elsewhere; default: a new pair, written to NAME.key")
+                    "public key that was made elsewhere; default: create a new pair and write it "
+                    "to NAME.key")
         ->type_name("KEY");
   }
   {
-    auto [command, flags] =
-        add_action(*keys, parsed, "list", "Show the keys that are listed", list);
+    auto [command, flags] = add_action(*keys, parsed, "list", "List the admitted keys", list);
     add_format_flag(command, flags.format);
   }
-  auto [command, flags] = add_action(*keys, parsed, "revoke", "List a key no more", revoke);
-  command.add_option("NAME", flags.name, "of the key")->required()->type_name("");
+  auto [command, flags] = add_action(*keys, parsed, "revoke", "Revoke a key", revoke);
+  command.add_option("NAME", flags.name, "name of the key")->required()->type_name("");
 }
 
 }  // namespace oblique::client

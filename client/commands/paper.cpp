@@ -25,7 +25,7 @@ namespace {
 
 constexpr const char* kPaperExamples = R"(Examples:
   oblique paper
-  oblique paper --preset converged --modes  where the paper's modes come of its mesh
+  oblique paper --preset converged --modes  shows which modes are due to the paper's mesh
   oblique paper --preset printed
   oblique paper --db oblique.db --study paper
   oblique paper --format csv > differences.csv
@@ -61,12 +61,12 @@ OwnCases cases_of(Console& console, const PublishedTable& published, const Paper
   return solved_cases(published, {&finger, 1}).front();
 }
 
-/// Writes the figures into the folder, which is made.
+/// Writes the figures into the folder, which is created.
 int draw_figures(const PaperFlags& flags, Console& console) {
   std::error_code failed;
   std::filesystem::create_directories(flags.figures, failed);
   if (failed) {
-    throw solver::InputError(fmt::format("--figures {}: this folder cannot be made: {}",
+    throw solver::InputError(fmt::format("--figures {}: this folder cannot be created: {}",
                                          flags.figures, failed.message()));
   }
   const auto published = published_table();
@@ -108,7 +108,7 @@ int paper(const PaperFlags& flags, Console& console) {
 
 void add_paper(CLI::App& app, Action& parsed) {
   auto [command, flags] =
-      new_command(app, parsed, "paper", "Put the paper's tables beside ours, with differences",
+      new_command(app, parsed, "paper", "Compare the paper's tables and figures with our results",
                   kPaperExamples, paper);
   auto* preset = command
                      .add_option("--preset", flags.preset,
@@ -116,21 +116,21 @@ void add_paper(CLI::App& app, Action& parsed) {
                      ->type_name("NAME")
                      ->capture_default_str();
   protocol::note_choices(preset, solver::preset_names());
-  auto* database = command
-                       .add_option("--db", flags.database,
-                                   "compare results of this database instead of solving now")
-                       ->type_name("FILE")
-                       ->excludes(preset);
-  command.add_option("--study", flags.study, "the study in that database")
+  auto* database =
+      command
+          .add_option("--db", flags.database, "compare results of this database instead of solving")
+          ->type_name("FILE")
+          ->excludes(preset);
+  command.add_option("--study", flags.study, "name of the study in that database")
       ->type_name("NAME")
       ->needs(database)
       ->capture_default_str();
-  auto* modes =
-      command.add_flag("--modes", flags.modes, "peaks and modes alone (in tables for people)");
+  auto* modes = command.add_flag("--modes", flags.modes, "print only peaks and modes (in tables)");
   add_format_flag(command, flags.format);
   command
-      .add_option("--figures", flags.figures,
-                  "draw the paper's figures 3 to 7 as SVG files in that folder, instead of tables")
+      .add_option(
+          "--figures", flags.figures,
+          "draw the paper's Figs. 3 to 7 as SVG files in this folder instead of printing tables")
       ->type_name("DIR")
       ->excludes(database)
       ->excludes(modes)

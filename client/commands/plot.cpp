@@ -29,7 +29,7 @@ namespace oblique::client {
 namespace {
 
 constexpr const char* kPlotExamples = R"(Examples:
-  oblique plot friction                                 what suits the study, on the terminal
+  oblique plot friction                                 a suitable picture, on the terminal
   oblique plot friction --map fn_peak_N --x mu --y H --at e=1 --out peak.svg
   oblique plot friction --map major_mode --out modes.svg
   oblique plot friction --lines duration_s --x mu --by e --log-x --out duration.png
@@ -37,21 +37,21 @@ constexpr const char* kPlotExamples = R"(Examples:
   oblique plot friction --histogram margin --log-x --show
   oblique plot friction --point 7 --out impact.svg      time histories of one point
   oblique plot friction --point 7 --panel loop --show
-  oblique plot --H 1 --mu 1.2 --e 1 --out impact.svg    of a point of no study
+  oblique plot --H 1 --mu 1.2 --e 1 --out impact.svg    a point that belongs to no study
 
-OUTPUT and COL are columns of `oblique query`, or SQL expressions over them, as ft_peak_N/fn_peak_N;
-KEY is an axis of the study. Axes without --at are held at their first value, and a message says
-which. Of several blocks a map and lines show one, and say so. Maps of texts, as of modes, name those
-that most points have. Cells without a result are hatched, failed ones crossed. Where points lie
-scattered, or are too many to draw each, cells gather them, and the picture says so. Pictures are
-drawn by gnuplot (Debian: gnuplot-nox); --out FILE.gp writes its script, and needs none. Without
---out the picture is drawn on the terminal. --range and --at are in SI units.
-A point is solved again for its time histories, here when the database is a file or the point is of
-no study, and by a worker of the server otherwise.)";
+OUTPUT and COL are columns of `oblique query` or SQL expressions, such as fn_peak_N/ft_peak_N. KEY
+is an axis of the study. An axis without --at is held at its first value; a message names it. A map
+or lines show one block of a study; a message says which. Maps of texts, such as modes, name the
+most frequent ones. Cells without a result are hatched, failed ones crossed. Scattered points, and
+points that are too many to draw, are gathered in cells; the picture says so. gnuplot draws the
+pictures (Debian: gnuplot-nox); --out FILE.gp writes its script and does not need it. Without --out
+the picture is drawn on the terminal. --range and --at are in SI units.
+Time histories are solved again: in this process if the database is a file or the point belongs to
+no study, else by a worker of the server.)";
 
-/// Where a picture goes, and how large it is.
+/// Where the picture is written, and its size.
 struct PictureFlags {
-  std::string size;  ///< empty: its own
+  std::string size;  ///< empty: the picture's own
   std::string out;
   std::string format;
   bool show = false;
@@ -60,13 +60,13 @@ struct PictureFlags {
 struct PlotFlags {
   plot::PlotRequest request;
   std::optional<std::int64_t> point;  ///< of the study
-  PointFlags values;                  ///< of a point of no study
+  PointFlags values;                  ///< of a point that belongs to no study
   std::string panel;                  ///< of a point; empty: all
   PictureFlags picture;
   PointSource source;
 };
 
-/// What the flags of a picture say together.
+/// What the flags mean together.
 struct PictureChoice {
   plot::PictureFormat format;
   std::optional<plot::Size> size;
@@ -74,13 +74,13 @@ struct PictureChoice {
   bool is_written;  ///< to a file or to standard output
 };
 
-/// Throws solver::InputError, naming the flag, for flags that contradict each other, and if they
-/// leave open where the picture goes and standard output is no terminal.
+/// Checks the combination of flags. Throws solver::InputError, naming the flag, for a
+/// contradiction, and if no output is named and standard output is no terminal.
 PictureChoice picture_choice(const PictureFlags& flags) {
   const auto format = plot::picture_format(flags.format, flags.out);
   if (flags.show && flags.out.empty() && !flags.format.empty()) {
     throw solver::InputError(
-        "--show draws on standard output: give the file for --format as --out FILE");
+        "--show draws on standard output: name a file for --format with --out FILE");
   }
   const auto size = flags.size.empty() ? std::nullopt : std::optional(plot::size_of(flags.size));
   const bool is_open = flags.out.empty() && flags.format.empty();
@@ -92,8 +92,8 @@ void refuse_pipe(const PictureFlags& flags) {
   if (flags.out.empty() && flags.format.empty() && !flags.show &&
       terminal_size(STDOUT_FILENO).lines == 0) {
     throw solver::InputError(
-        "standard output is no terminal: name a file for the picture with --out FILE.svg (or .pdf, "
-        ".png, .gp, .csv), or draw it in characters with --show");
+        "standard output is no terminal: write the picture to a file with --out FILE.svg (or .pdf, "
+        ".png, .gp, .csv), or draw it as text with --show");
   }
 }
 
@@ -111,9 +111,9 @@ int put_out(Console& console, const PictureFlags& flags, const plot::Figure& fig
   return kDone;
 }
 
-/// Takes the rows of the fall and keeps the finger's shape when its tip has dropped a quarter, a
-/// half and three quarters of H, interpolated between two rows. No shapes if a worker sent no such
-/// rows.
+/// Moves the rows of the fall out of the trace. Returns the finger's shape when its tip has dropped
+/// a quarter, a half and three quarters of H, interpolated between two rows; none if a worker sent
+/// no such rows.
 void take_falls(plot::PointHistory& history) {
   const auto fall = take_fall(history.rows);
   for (const double share : {0.25, 0.5, 0.75}) {
@@ -149,10 +149,10 @@ plot::PointHistory history_of_study(Console& console, const PlotFlags& flags) {
   history.result = solved.result;
   if (solved.every > 1) {
     history.remarks.push_back(
-        fmt::format("One of {} instants is drawn; with --local all are.", solved.every));
+        fmt::format("One of {} instants is drawn; --local draws all.", solved.every));
   }
   if (!solved.is_confirmed) {
-    history.remarks.push_back(fmt::format("Solved again, it is {}.", solved.comparison));
+    history.remarks.push_back(fmt::format("The point was solved again: {}.", solved.comparison));
     console.note(history.remarks.back());
   }
   return history;
@@ -161,9 +161,10 @@ plot::PointHistory history_of_study(Console& console, const PlotFlags& flags) {
 plot::PointHistory history_of_values(Console& console, const PlotFlags& flags) {
   const auto table = points_of_flags(flags.values, tip_reach(console));
   if (table.size() != 1) {
-    throw solver::InputError(fmt::format(
-        "the flags make {} points, and the time histories of one are drawn: give one value each",
-        table.size()));
+    throw solver::InputError(
+        fmt::format("the flags define {} points, but a plot of time histories shows one: give one "
+                    "value per flag",
+                    table.size()));
   }
   const auto point = table.point(0);
   plot::PointHistory history{.name = {},
@@ -201,23 +202,22 @@ bool is_point_meant(const PlotFlags& flags) {
   const std::string& study = flags.request.study;
   const bool has_values = !flags.values.axes.empty() || !flags.values.lengths.empty();
   if (study.empty() && flags.point) {
-    throw solver::InputError("--point is a number in a study: name the study");
+    throw solver::InputError("--point is the number of a point in a study: name the study");
   }
   if (study.empty() && !has_values) {
     throw solver::InputError(
-        "plot needs the name of a study, or the values of a point as --H 1 --mu 0.4 --e 1");
+        "plot needs the name of a study, or the values of a point such as --H 1 --mu 0.4 --e 1");
   }
   if (!study.empty() && has_values) {
     throw solver::InputError(fmt::format(
-        "{} is a study, and its points have their values: draw one of them with --point N, or "
-        "leave the study out",
+        "{} is a study whose points have values: choose one with --point N, or leave the study out",
         study));
   }
   static_cast<void>(plot::point_panel_named(flags.panel));
   const bool is_point = has_values || flags.point;
   if (!is_point && (!flags.panel.empty() || flags.source.is_local || flags.source.is_on_worker)) {
     throw solver::InputError(
-        "--panel, --local and --on-worker are of one point: name it with --point N");
+        "--panel, --local and --on-worker apply to one point: name it with --point N");
   }
   return is_point;
 }
@@ -234,7 +234,7 @@ CLI::Option* add_text(CLI::App& command, const std::string& flag, std::string& v
   return command.add_option(flag, value, help)->type_name(type);
 }
 
-/// Refuses flags that would have no effect beside the others.
+/// Throws InputError for flags that have no effect on this kind of picture.
 void exclude(CLI::Option* option, const std::vector<CLI::Option*>& others) {
   for (auto* other : others) {
     if (other != option) {
@@ -243,59 +243,60 @@ void exclude(CLI::Option* option, const std::vector<CLI::Option*>& others) {
   }
 }
 
-/// The kinds of pictures, and the axes that each has.
 void add_kinds_of_pictures(CLI::App& command, plot::PlotRequest& request) {
-  auto* map = add_text(command, "--map", request.map,
-                       "an output over two axes, in colours; of modes a map of them", "OUTPUT");
+  auto* map = add_text(
+      command, "--map", request.map,
+      "colour map of an output over two axes; of a text, such as the mode, a map of categories",
+      "OUTPUT");
   auto* lines = add_text(command, "--lines", request.lines,
-                         "an output over one axis, a line a value of another", "OUTPUT");
+                         "an output over one axis, with one line per value of another", "OUTPUT");
   auto* scatter = add_text(command, "--scatter", request.scatter, "points over two columns", "X,Y");
   auto* histogram = add_text(command, "--histogram", request.histogram,
-                             "how often values of a column are met", "COL");
+                             "how often the values of a column occur", "COL");
   for (auto* kind : {map, lines, scatter, histogram}) {
     exclude(kind, {map, lines, scatter, histogram});
   }
   exclude(add_text(command, "--x", request.x,
-                   "horizontal axis of --map and --lines; default: mu if that varies", "KEY"),
+                   "horizontal axis of --map and --lines; default: mu if it varies", "KEY"),
           {scatter, histogram});
-  exclude(add_text(command, "--y", request.y, "vertical axis of --map; default: H if that varies",
-                   "KEY"),
-          {lines, scatter, histogram});
-  exclude(add_text(command, "--by", request.by,
-                   "whose values are the lines of --lines; default: that with the fewest", "KEY"),
-          {map, scatter, histogram});
+  exclude(
+      add_text(command, "--y", request.y, "vertical axis of --map; default: H if it varies", "KEY"),
+      {lines, scatter, histogram});
+  exclude(
+      add_text(command, "--by", request.by,
+               "axis with one line per value in --lines; default: the one with the fewest values",
+               "KEY"),
+      {map, scatter, histogram});
   exclude(add_text(command, "--colour", request.colour,
-                   "column whose values colour the points of --scatter", "COL"),
+                   "column that colours the points of --scatter", "COL"),
           {map, lines, histogram});
 }
 
 void add_picture_flags(CLI::App& command, PictureFlags& flags) {
-  add_text(command, "--size", flags.size, "width and height in pixels, of PNG twice as many", "WxH")
+  add_text(command, "--size", flags.size, "width and height in pixels; PNG has twice as many",
+           "WxH")
       ->default_str("760x520");
   add_text(command, "--out", flags.out, "output file, written atomically", "FILE");
-  protocol::note_choices(
-      add_text(command, "--format", flags.format,
-               "svg, pdf, png, gp (a gnuplot script) or csv; default: as the name of "
-               "--out ends. Without --out it goes to standard output",
-               "FORMAT"),
-      plot::picture_format_names());
-  command.add_flag("--show", flags.show, "draw on the terminal");
+  protocol::note_choices(add_text(command, "--format", flags.format,
+                                  "svg, pdf, png, gp (gnuplot script) or csv; default: from the "
+                                  "name of --out; without --out written to standard output",
+                                  "FORMAT"),
+                         plot::picture_format_names());
+  command.add_flag("--show", flags.show, "draw on the terminal as text");
 }
 
-/// Flags for the time histories of one point.
 void add_flags_of_point(CLI::App& command, PlotFlags& flags) {
   const std::string group = "One point";
   command
       .add_option("--point", flags.point,
-                  "draw the time histories of that point of the study, solved again")
+                  "draw the time histories of this point, which is solved again")
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->group(group);
-  auto* panel = add_text(command, "--panel", flags.panel,
-                         "of a point one panel alone: forces, loop, deformation, "
-                         "velocities, energies or shape",
-                         "NAME")
-                    ->group(group);
+  auto* panel =
+      add_text(command, "--panel", flags.panel,
+               "draw one panel: forces, loop, deformation, velocities, energies or shape", "NAME")
+          ->group(group);
   protocol::note_choices(panel, plot::kPointPanels);
   add_point_source(command, flags.source);
   for (const char* flag : {"--local", "--on-worker"}) {
@@ -307,22 +308,22 @@ void add_flags_of_point(CLI::App& command, PlotFlags& flags) {
 }  // namespace
 
 void add_plot(CLI::App& app, Action& parsed) {
-  auto [command, flags] = new_command(app, parsed, "plot", "Draw results of a study, or one point",
-                                      kPlotExamples, plot_results);
+  auto [command, flags] =
+      new_command(app, parsed, "plot", "Draw results of a study or the time histories of a point",
+                  kPlotExamples, plot_results);
   auto& request = flags.request;
   add_text(command, "STUDY", request.study, "name of the study", "");
   add_kinds_of_pictures(command, request);
   add_text(command, "--where", request.where, "condition that points must meet", "EXPR");
-  command.add_option("--at", request.at, "value of another axis; may be given for several")
+  command.add_option("--at", request.at, "value of another axis; may be repeated")
       ->type_name("KEY=VALUE");
   add_text(command, "--block", request.block,
-           "which block of the study; default: that with the most points of those that fit",
-           "N|all");
-  command.add_flag("--log-x", request.is_x_logarithmic, "a logarithmic horizontal axis");
-  command.add_flag("--log-y", request.is_y_logarithmic, "a logarithmic vertical axis");
-  command.add_flag("--log-colour", request.is_colour_logarithmic, "colours by logarithms");
+           "block of the study to draw; default: the suitable block with the most points", "N|all");
+  command.add_flag("--log-x", request.is_x_logarithmic, "logarithmic horizontal axis");
+  command.add_flag("--log-y", request.is_y_logarithmic, "logarithmic vertical axis");
+  command.add_flag("--log-colour", request.is_colour_logarithmic, "logarithmic colours");
   add_text(command, "--range", request.range,
-           "values that colours span, or the vertical axis of --lines, or the bins of --histogram",
+           "range of the colours, of the vertical axis of --lines, or of the bins of --histogram",
            "FROM:TO");
   add_picture_flags(command, flags.picture);
   add_flags_of_point(command, flags);

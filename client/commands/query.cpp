@@ -23,19 +23,18 @@ constexpr const char* kQueryExamples = R"(Examples:
   oblique query friction --select "corr(mu, fn_peak_N) AS of_mu, corr(e, fn_peak_N) AS of_e"
   oblique query friction --select "mu, peaks[0].fn_N, phases.count" --where "e = 1"
 
-`oblique columns` lists columns, elements of lists (from 0) and functions, in the case in which they
-are written: e is the restitution coefficient, E_Pa Young's modulus. LIKE tells capitals apart, as
-in "mode LIKE 'SC%'": S is stick and s slip. EXPR and COLUMNS are SQL expressions, without comments
-and parameters, over values in SI units. Tables show some columns in other units, which stand in
-brackets in the heading.)";
+`oblique columns` lists the columns, elements of lists (counted from 0) and functions. Names are
+case-sensitive: e is the coefficient of restitution, E_Pa Young's modulus. So is LIKE, as in
+"mode LIKE 'SC%'": S is stick and s slip. EXPR and COLUMNS are SQL expressions in SI units, without
+comments and parameters. Tables show some columns in other units, which the heading gives.)";
 
 constexpr const char* kSqlExamples = R"(Examples:
   oblique sql "SELECT study, count(*), max(fn_peak_N) FROM runs GROUP BY study"
   oblique sql "SELECT * FROM peaks WHERE study_id = 1 AND major" --format csv
   oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
 
-One statement that only reads, in SQLite's SQL with median(x), stddev(x) and corr(x, y)
-beside its functions. What `oblique query` alone knows is written otherwise here:
+One statement in SQLite's SQL that only reads. median(x), stddev(x) and corr(x, y) are added.
+Forms of `oblique query` that are written differently here:
   peaks[0].fn_N           peaks ->> '$[0][1]', or the views peaks, phases, stick_intervals and
                           reaction_peaks
   count_mode('SC SR')     count(*) FILTER (WHERE major_mode = 'SC SR'))";
@@ -59,16 +58,16 @@ int query(const QueryFlags& flags, Console& console) {
   try {
     const auto answer = source->rows(request_for(flags.query));
     const auto rows = print_stream(console, *answer, flags.output, true,
-                                   "--select names columns, csv and json have all");
+                                   "choose columns with --select; csv and json have all");
     if (rows == 0 && flags.query.where.find("mode") != std::string::npos) {
       console.note(fmt::format(
-          "Note: no point of {0} meets the condition. A mode names the states in their order, as "
-          "in 'SC SR sR sC sR'; `oblique query {0} --group major_mode` lists those of the study.",
+          "Note: no point of {0} meets the condition. A mode lists the states in order, such as "
+          "'SC SR sR sC sR'; `oblique query {0} --group major_mode` lists the modes of the study.",
           flags.query.study));
     }
     return kDone;
   } catch (const solver::InputError&) {
-    // A study that does not exist fails with 1 instead: it is no wrong usage.
+    // Throws std::runtime_error (exit code 1) if the study does not exist, instead of wrong usage.
     (void)study_named(*source, flags.query.study);
     throw;
   }
@@ -85,7 +84,7 @@ int sql(const SqlFlags& flags, Console& console) {
 
 void add_sql(CLI::App& app, Action& parsed) {
   auto [command, flags] =
-      new_command(app, parsed, "sql", "Ask the database in SQL, reading only", kSqlExamples, sql);
+      new_command(app, parsed, "sql", "Run an SQL statement that only reads", kSqlExamples, sql);
   command.add_option("STATEMENT", flags.statement, "the statement, in quotes")
       ->required()
       ->type_name("");
@@ -103,18 +102,17 @@ void add_query(CLI::App& app, Action& parsed) {
   command.add_option("--where", asked.where, "condition that points must meet")->type_name("EXPR");
   command
       .add_option("--select", asked.select,
-                  "columns to show; default: the axes that vary in the study and the main "
-                  "outputs; `*` is all")
+                  "columns to show; `*`: all; default: the axes that vary and the main outputs")
       ->type_name("COLUMNS");
   command
       .add_option("--group", asked.group,
-                  "columns to gather rows by; others need a function, as avg(fn_peak_N)")
+                  "columns to group by; other columns need a function, such as avg(fn_peak_N)")
       ->type_name("COLUMNS");
   command
       .add_option("--order", asked.order,
-                  "columns to sort by, largest first with DESC; default: point")
+                  "columns to sort by; DESC sorts largest first; default: point")
       ->type_name("COLUMNS");
-  command.add_option("--limit", asked.limit, "most rows shown; all when left out")
+  command.add_option("--limit", asked.limit, "maximum number of rows; default: all")
       ->check(protocol::whole_number_from(0))
       ->type_name("N");
   add_output_flags(command, flags.output);

@@ -16,9 +16,8 @@ constexpr const char* kRunExamples = R"(Examples:
   oblique run --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
   oblique run sweep.toml --db sweep.db --workers 4
 
-Ctrl-C stops it and loses nothing: the same command again goes on where it stopped. Other studies of
-the database that are not finished wait meanwhile.
-The exit code is 1 when a point failed, too.)";
+Ctrl-C stops the run and loses nothing: the same command continues it. Other unfinished studies of
+the database wait meanwhile. The exit code is 1 if a point failed.)";
 
 struct RunFlags {
   StudyFlags study;
@@ -30,7 +29,7 @@ int run(const RunFlags& flags, Console& console) {
   const auto study = checked_study(console, flags.study);
   refuse_used_database(flags.settings.service.database);
   note_unusual_values(console.notes(), study.recipe);
-  // Before any thread is started; see StopSignals.
+  // before any thread starts; see StopSignals
   protocol::StopSignals stop;
   const auto end = run_study(console, study, flags.settings, stop);
   if (!end) {
@@ -45,18 +44,17 @@ int run(const RunFlags& flags, Console& console) {
 }  // namespace
 
 void add_run(CLI::App& app, Action& parsed) {
-  auto [command, flags] =
-      new_command(app, parsed, "run",
-                  "Run a study on this machine: server, workers and database in one command",
-                  kRunExamples, run);
+  auto [command, flags] = new_command(
+      app, parsed, "run", "Solve a study on this machine, with a temporary server and workers",
+      kRunExamples, run);
   auto& settings = flags.settings;
-  command.add_option("--db", settings.service.database, "database, made when it is not there")
+  command.add_option("--db", settings.service.database, "database; created if it does not exist")
       ->type_name("FILE")
       ->capture_default_str();
   add_network_disk_flag(command, settings.service.allow_network_disk);
   add_no_reuse_flag(command, settings.no_reuse);
   add_worker_flags(command, settings);
-  command.add_option("--limit", settings.rows, "most rows of the table shown at the end")
+  command.add_option("--limit", settings.rows, "number of rows shown at the end")
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();

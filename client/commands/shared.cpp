@@ -36,7 +36,7 @@ bool is_database(const fs::path& file) {
   return std::string_view(begin.data(), begin.size()) == kMagic;
 }
 
-/// Words of the command line of a process; empty if it cannot be read.
+/// The command line of a process as words; empty if it cannot be read.
 std::vector<std::string> words_of_process(const std::string& pid) {
   std::ifstream file("/proc/" + pid + "/cmdline");
   std::vector<std::string> words;
@@ -46,8 +46,9 @@ std::vector<std::string> words_of_process(const std::string& pid) {
   return words;
 }
 
-/// The oblique-server that has the file open, or the `oblique` that started it, as "`oblique view`
-/// (process 4711)"; "another server" if it is not found, as one of another user.
+/// The oblique-server that has the file open, or the `oblique` that started it, such as "`oblique
+/// view` (process 4711)"; "another server" if the process cannot be found, for example because
+/// another user runs it.
 std::string user_of(const fs::path& database) try {
   for (const auto& process : fs::directory_iterator("/proc")) {
     const std::string pid = process.path().filename().string();
@@ -69,7 +70,7 @@ std::string user_of(const fs::path& database) try {
                : fmt::format("`oblique {}` (process {})", parent[1], flag[1]);
   }
   return "another server";
-} catch (const fs::filesystem_error&) {  // a process has ended meanwhile
+} catch (const fs::filesystem_error&) {  // the process has ended meanwhile
   return "another server";
 }
 
@@ -87,21 +88,21 @@ void add_format_flag(CLI::App& command, std::string& format) {
 }
 
 void add_no_reuse_flag(CLI::App& command, bool& no_reuse) {
-  command.add_flag("--no-reuse", no_reuse,
-                   "solve every point, also those of which another study of the database has the "
-                   "result");
+  command.add_flag(
+      "--no-reuse", no_reuse,
+      "solve every point, also points of which another study in the database has the result");
 }
 
 void add_network_disk_flag(CLI::App& command, bool& allow) {
-  command.add_flag("--allow-network-disk", allow,
-                   "take a database on a network file system, where a second machine could damage "
-                   "it");
+  command.add_flag(
+      "--allow-network-disk", allow,
+      "allow a database on a network file system, where a second machine could damage it");
 }
 
 Study checked_study(Console& console, const StudyFlags& flags) {
   if (is_database(flags.file)) {
     throw solver::InputError(fmt::format(
-        "{0} is a database, not a study file (TOML): name it as --db {0} beside the study",
+        "{0} is a database, not a study file (TOML): pass it as --db {0} and name a study",
         flags.file.string()));
   }
   Study study = study_of_flags(flags, tip_reach(console));
@@ -123,22 +124,23 @@ void refuse_used_database(const fs::path& database) {
   if (!server::is_in_use(database.string())) {
     return;
   }
-  throw std::runtime_error(fmt::format(
-      "{} is in use by {}: end that first (Ctrl-C loses nothing), start the study on the page of "
-      "`oblique view`, submit it to an oblique-server with `oblique submit`, or name another --db",
-      database.string(), user_of(database)));
+  throw std::runtime_error(
+      fmt::format("{} is in use by {}: end that process first (Ctrl-C loses nothing), start the "
+                  "study on the page of `oblique view`, submit it to an oblique-server with "
+                  "`oblique submit`, or name another --db",
+                  database.string(), user_of(database)));
 }
 
 void add_output_flags(CLI::App& command, OutputFlags& flags) {
   auto* format = command
                      .add_option("--format", flags.format,
-                                 "table, csv, json or jsonl; default: as the name of --out "
-                                 "ends, else table; the Python module returns NumPy arrays")
+                                 "table, csv, json or jsonl; default: from the name of --out, else "
+                                 "table; the Python module returns NumPy arrays")
                      ->type_name("FORMAT");
   protocol::note_choices(format, format_names());
   command.add_option("--out", flags.file, "output file, written atomically")->type_name("FILE");
   command.add_flag("--no-pager", flags.no_pager,
-                   "print long tables on a terminal without $OBLIQUE_PAGER, $PAGER or less");
+                   "print long tables without $OBLIQUE_PAGER, $PAGER or less");
 }
 
 Format format_of(const OutputFlags& flags) {
@@ -148,7 +150,7 @@ Format format_of(const OutputFlags& flags) {
 std::uint64_t print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
                            bool in_shown_units, const std::string& way_to_all) {
   const Format format = format_of(flags);
-  // No output is begun before there is a first answer.
+  // The output file is not opened before the first part of the answer has arrived.
   protocol::QueryReply chunk = stream.next();
   RowOutput out({.format = format,
                  .file = flags.file,

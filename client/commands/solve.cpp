@@ -29,28 +29,28 @@ constexpr const char* kStandardOutput = "-";
 struct SolveFlags {
   PointFlags points;
   bool json = false;
-  std::optional<std::string> trace;  // where to; "-" is standard output
+  std::optional<std::string> trace;  // file; "-" is standard output
   bool trace_shape = false;
   bool errors = false;
 };
 
-/// Where the trace goes. Throws InputError when `where` is not a file that can be written, or
-/// standard output that `json` has already.
+/// Opens the output for the trace. Throws InputError if `where` cannot be written, or if it is
+/// standard output and `json` is set.
 TraceOutput trace_output(const std::string& where, bool json) {
   if (where == kStandardOutput && json) {
     throw solver::InputError(
-        "--trace - and --json both write to standard output: give the trace a file");
+        "--trace - and --json both write to standard output: name a file for the trace");
   }
   return {where == kStandardOutput ? "" : where, Format::kCsv, "--trace"};
 }
 
-/// Checked before the values themselves, whose errors would name the largest of them.
+/// Checked before the values, because an error about a value names the largest of a list.
 void check_one_value_each(const PointFlags& flags) {
   for (const auto& [key, text] : flags.axes) {
     const bool is_list = text.find(',') != std::string::npos && text.find('(') == std::string::npos;
     if (is_list || text.find(':') != std::string::npos || text.starts_with('@')) {
       throw solver::InputError(
-          fmt::format("{} {}: solve takes one value for each; `oblique run` takes lists and ranges",
+          fmt::format("{} {}: solve takes one value per flag; `oblique run` takes lists and ranges",
                       flag_of_key(key), text));
     }
   }
@@ -61,8 +61,8 @@ int solve(const SolveFlags& flags, Console& console) {
   const auto table = points_of_flags(flags.points, tip_reach(console));
   if (table.size() != 1) {
     throw solver::InputError(
-        fmt::format("the flags make {} points, and solve takes one: give one value each, or use "
-                    "`oblique run` for all of them",
+        fmt::format("the flags define {} points, but solve takes one: give one value per flag, or "
+                    "use `oblique run`",
                     table.size()));
   }
   note_unusual_values(console.notes(), table.recipe());
@@ -98,19 +98,19 @@ int solve(const SolveFlags& flags, Console& console) {
 
 void add_solve(CLI::App& app, Action& parsed) {
   auto [command, flags] =
-      new_command(app, parsed, "solve", "Solve one point, here and now", kSolveExamples, solve);
+      new_command(app, parsed, "solve", "Solve one point in this process", kSolveExamples, solve);
   command.add_flag("--json", flags.json, "print the result as one JSON object (SI units)");
   auto* trace = command
                     .add_option("--trace", flags.trace,
-                                "write the time histories of the contact to FILE (CSV, SI "
-                                "units); - is standard output")
+                                "write the time histories of the contact to FILE (CSV, SI units); "
+                                "- is standard output")
                     ->type_name("FILE");
   command
       .add_flag("--trace-shape", flags.trace_shape,
                 "add the positions of the chain's nodes to the trace")
       ->needs(trace);
   command.add_flag("--errors", flags.errors,
-                   "estimate errors: solve the point also on half the mesh and at twice the step");
+                   "estimate errors: also solve the point on half the mesh and at twice the step");
   add_point_flags(command, flags.points, FlagValues::kOne);
 }
 

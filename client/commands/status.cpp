@@ -27,7 +27,7 @@ constexpr const char* kStatusExamples = R"(Examples:
   oblique status paper
   oblique status --server tcp://127.0.0.1:7600 --format json
 
-Points in work and rates come from a server; a database file has none.)";
+Only a server reports points in progress and rates; a database file does not contain them.)";
 
 constexpr const char* kStudiesExamples = R"(Examples:
   oblique studies
@@ -38,8 +38,8 @@ constexpr const char* kWatchExamples = R"(Examples:
   oblique watch paper --db sweep.db
   oblique watch paper --server tcp://127.0.0.1:7600
 
-Ctrl-C ends the watching; the study goes on. A server that falls silent is waited for. The exit
-code is 1 when a point failed, or when the study is not done.)";
+Ctrl-C ends watching; the study continues. If the server stops answering, watch waits for it. The
+exit code is 1 if a point failed or the study is not done.)";
 
 struct StatusFlags {
   std::string study;  // empty: all
@@ -47,7 +47,7 @@ struct StatusFlags {
   SourceFlags source;
 };
 
-/// Pads headings and cells of these columns, which are texts, from the left to one width.
+/// Pads the headings and cells of these text columns on the right to one width.
 void align_right(protocol::Table& rows, const std::vector<std::string>& columns) {
   for (std::size_t column = 0; column < rows.columns.size(); ++column) {
     std::string& heading = rows.columns[column];
@@ -73,7 +73,7 @@ int percent_done(const StudyStatus& study) {
                              : static_cast<int>(100.0 * done / static_cast<double>(study.points()));
 }
 
-/// The main columns, in 80 characters.
+/// Columns that fit 80 characters.
 protocol::Table table_for_people(const std::vector<StudyStatus>& studies) {
   constexpr std::size_t kNameBytes = 18;
   const auto any = [&studies](auto&& is_so) {
@@ -95,7 +95,7 @@ protocol::Table table_for_people(const std::vector<StudyStatus>& studies) {
   add_column(true, "prio");
   add_column(any_version, "solver");
   for (const auto& study : studies) {
-    // A single study has room for its name.
+    // A single study has room for its whole name.
     auto& row = table.rows.emplace_back(protocol::Row{
         studies.size() == 1 ? study.name() : protocol::shortened(study.name(), kNameBytes),
         study.state(), format_count(study.points()), fmt::format("{} %", percent_done(study))});
@@ -115,7 +115,7 @@ protocol::Table table_for_people(const std::vector<StudyStatus>& studies) {
   return table;
 }
 
-/// All that is known, for programs.
+/// All columns, for programs.
 protocol::Table full_table(const std::vector<StudyStatus>& studies, const std::string& access) {
   auto table = table_of(studies);
   table.columns.insert(table.columns.end(), {"submitted_by", "access", "solver_version"});
@@ -170,7 +170,7 @@ int watch(const StatusFlags& flags, Console& console) {
   FollowedStudy followed(*source, flags.study);
   bool answered = false;
   const auto ask = [&](const Tell& tell) {
-    // Before the first answer the address may be wrong: waiting for ever would hide that.
+    // The first request does not wait for ever, because the address may be wrong.
     auto status = followed.status(answered ? tell : Tell());
     if (!std::exchange(answered, true)) {
       warn_if_insecure(console, source->access(), source->place());
@@ -183,9 +183,9 @@ int watch(const StatusFlags& flags, Console& console) {
       return print_end(console, status, [&](const std::string& sql) { return source->query(sql); });
     }
   } catch (const Interrupted&) {
-    // Reported below.
+    // The caller reports it.
   }
-  console.notes() << "No longer watching.\n";
+  console.notes() << "Watching ended; the study continues.\n";
   return stop.exit_code();
 }
 
@@ -193,9 +193,10 @@ int watch(const StatusFlags& flags, Console& console) {
 
 void add_status(CLI::App& app, Action& parsed) {
   {
-    auto [command, flags] = new_command(
-        app, parsed, "status", "Say how far a study is, or all of them", kStatusExamples, status);
-    command.add_option("STUDY", flags.study, "name of the study; all when left out")->type_name("");
+    auto [command, flags] =
+        new_command(app, parsed, "status", "Show the progress of a study or of all studies",
+                    kStatusExamples, status);
+    command.add_option("STUDY", flags.study, "name of the study; default: all")->type_name("");
     add_format_flag(command, flags.format);
     add_source_flags(command, flags.source);
   }

@@ -36,10 +36,10 @@ constexpr const char* kStudyCheckExamples = R"(Examples:
   oblique study check sweep.toml --json
   oblique study check --H 1 --mu 0.01:2:40:log --e 0.6,0.8,1 --where "mu > 0.5 * e"
 
-Nothing is submitted. The time is that of `oblique run` on this machine: (falls x time of a fall +
-points x time of a contact) / threads. Some falls and contacts of the study are timed for it, on all
-cores, which takes a few seconds on fine meshes. The size follows from what a result and a model
-take in a database on average.)";
+Nothing is submitted. The predicted time is that of `oblique run` on this machine:
+(falls x time of a fall + points x time of a contact) / threads. Some falls and contacts are timed
+for it on all cores, which takes a few seconds on fine meshes. The size is estimated from the
+average size of results and models.)";
 
 struct CheckFlags {
   StudyFlags study;
@@ -47,13 +47,12 @@ struct CheckFlags {
   bool no_rate = false;
 };
 
-/// A point with the values that it has in the axes of its block, in their order.
+/// A point with its values on the axes of its block, in their order.
 struct ShownPoint {
   std::uint64_t number;
   std::vector<std::pair<std::string, double>> values;
 };
 
-/// What one block is.
 struct BlockReport {
   protocol::BlockPlace place;
   protocol::PassingPoints left_in;
@@ -64,13 +63,13 @@ struct BlockReport {
 
 struct Report {
   std::string name;
-  std::uint64_t numbers;  ///< of points, with those that are left out
+  std::uint64_t numbers;  ///< number of points, including those that the filter leaves out
   protocol::StudySize size;
   std::vector<BlockReport> blocks;
   std::optional<StudyCost> cost;
 };
 
-/// By the axes, not by the model: of length and length1 both have a value.
+/// Values come from the axes, not from the model: with axes length and length1, both have a value.
 ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block& block,
                        std::uint64_t number) {
   ShownPoint shown{number, {}};
@@ -81,7 +80,7 @@ ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block&
   return shown;
 }
 
-/// "H (4) x mu (40) x e", the axes with their numbers of values, and what follows from them.
+/// "H (4) x mu (40) x e": the axes with their numbers of values, and the derived keys.
 std::string made_of(const protocol::Block& block) {
   const std::string_view between = block.zip() || block.has_sample() ? ", " : " x ";
   std::string axes;
@@ -100,8 +99,8 @@ std::string made_of(const protocol::Block& block) {
   return kind + axes + following;
 }
 
-/// The last point of the block that the filter keeps; the last of all if it keeps none of the last
-/// `most`.
+/// The last point of the block that the filter keeps; the last point if the filter keeps none of
+/// the last `most`.
 std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::BlockPlace& place,
                            std::uint64_t most) {
   const std::uint64_t last = place.first_point + place.points - 1;
@@ -151,7 +150,7 @@ void print(std::ostream& out, const Report& report, const protocol::Recipe& reci
   out << "study   " << report.name << (recipe.errors() ? ", with estimated errors" : "") << '\n';
   out << "points  " << (size.points_estimated ? "about " : "") << format_count(size.points);
   if (size.points != report.numbers) {
-    out << " of " << format_count(report.numbers) << ", left in by where";
+    out << " of " << format_count(report.numbers) << ", kept by where";
   }
   out << "\nmodels  " << format_count(size.models) << ", with "
       << (size.falls_estimated ? "about " : "") << counted(size.falls, "fall", "different falls")
@@ -169,13 +168,14 @@ void print(std::ostream& out, const Report& report, const protocol::Recipe& reci
     out << fmt::format("  last {}: {}\n", block.last.number, shown(block.last));
   }
   if (report.cost) {
-    out << fmt::format("time    {}\n        ({} and {} timed, as busy as this machine is now)\n",
-                       time_in_words(*report.cost, size, recipe),
-                       counted(report.cost->timed_falls, "fall", "falls"),
-                       counted(report.cost->timed_points, "contact", "contacts"));
+    out << fmt::format(
+        "time    {}\n        (timed {} and {}, at the present load of this machine)\n",
+        time_in_words(*report.cost, size, recipe),
+        counted(report.cost->timed_falls, "fall", "falls"),
+        counted(report.cost->timed_points, "contact", "contacts"));
   }
   constexpr std::uint64_t kEmptyDatabaseBytes = 127'000;
-  out << fmt::format("size    about {} in a database of its own, {} more in another\n",
+  out << fmt::format("size    about {} in a new database, {} more in an existing one\n",
                      format_bytes(kEmptyDatabaseBytes + size.bytes), format_bytes(size.bytes));
 }
 
@@ -238,15 +238,15 @@ int check_study(const CheckFlags& flags, Console& console) {
 }  // namespace
 
 void add_study(CLI::App& app, Action& parsed) {
-  auto* study = app.add_subcommand("study", "Look at a study before it is submitted");
+  auto* study = app.add_subcommand("study", "Check a study before it is submitted");
   study->footer(kStudyExamples);
   study->require_subcommand(1);
-  auto [command, flags] = new_command(
-      *study, parsed, "check",
-      "Say how many points a study has, which, and what they will cost; or what is wrong",
-      kStudyCheckExamples, check_study);
+  auto [command, flags] =
+      new_command(*study, parsed, "check",
+                  "Print points, predicted time and size of a study, or what is wrong with it",
+                  kStudyCheckExamples, check_study);
   command.add_flag("--json", flags.json, "print one JSON object");
-  command.add_flag("--no-rate", flags.no_rate, "solve no points, and predict no time");
+  command.add_flag("--no-rate", flags.no_rate, "do not solve points, and predict no time");
   add_study_flags(command, flags.study);
 }
 

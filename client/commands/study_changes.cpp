@@ -26,27 +26,26 @@ constexpr const char* kDescribeExamples = R"(Examples:
   oblique describe friction > friction.toml
   oblique describe friction --server tcp://127.0.0.1:7600
 
-Prints a study file that gives the same study: the same points, in the same order, of the same models.
-How it was first written, in a file or by flags, is not kept. Appended to, the file lets the study grow
-(`oblique submit --help`).)";
+Prints a study file that defines the same points in the same order. The original file or flags are
+not stored. Blocks appended to the file extend the study (`oblique submit --help`).)";
 
 constexpr const char* kRenameExamples = R"(Examples:
   oblique rename friction friction-paper
   oblique rename friction friction-paper --db lab.db
   oblique rename friction friction-paper --server tcp://127.0.0.1:7600
 
-The study keeps its number, its points and its results; who watches it goes on watching. A database
-file is changed directly, when no server works on it; else its server must be asked.)";
+The study keeps its number, points and results; `oblique watch` continues. A database file is
+changed directly if no server uses it; otherwise name the server.)";
 
 constexpr const char* kDeleteExamples = R"(Examples:
   oblique delete friction
   oblique delete friction --yes --db lab.db
   oblique delete friction --server tcp://127.0.0.1:7600
 
-The study and all its results are gone for good: `oblique backup` makes a copy first. On a terminal
-it asks; elsewhere it wants --yes. Workers drop what they have of a study that runs, its name is free
-at once, and a server deletes the rows meanwhile. The file keeps its size: later results use the room.
-A database file is changed directly, when no server works on it.)";
+Deletes the study and all its results; they cannot be restored, so make a copy with `oblique backup`
+first. Asks for confirmation on a terminal; elsewhere --yes is required. A running study is stopped.
+Its name is free at once; a server removes the rows in the background. The file keeps its size; later
+results use the space. A database file is changed directly if no server uses it.)";
 
 struct ChangeFlags {
   std::string study;
@@ -62,7 +61,7 @@ int change(const ChangeFlags& flags, Console& console) {
   const auto& status = reply.study();
   const std::string again =
       what == protocol::STUDY_CHANGE_RETRY
-          ? fmt::format(", {} failed ones to be solved again", format_count(reply.retried()))
+          ? fmt::format(", {} failed points will be solved again", format_count(reply.retried()))
           : "";
   console.out() << fmt::format("{}: {}, {} of {} points done{}\n", protocol::visible(status.name()),
                                protocol::visible(status.state()),
@@ -90,15 +89,15 @@ int rename(const ChangeFlags& flags, Console& console) {
     const auto study = study_named(*open_source(console, flags.source), flags.study);
     server::rename_study(database, study.study_id(), flags.new_name);
   }
-  console.out() << fmt::format("{} is called {} now\n", protocol::visible(flags.study),
+  console.out() << fmt::format("{} is now called {}\n", protocol::visible(flags.study),
                                protocol::visible(flags.new_name));
   return kDone;
 }
 
-/// Whether the person at the terminal says yes.
+/// Asks at the terminal; returns whether the answer is yes.
 bool is_confirmed(Console& console, const protocol::StudyStatus& study, const std::string& place) {
   console.errors() << fmt::format(
-      "Delete {}, {}, {} points of which {} have results, from {}? [y/N] ",
+      "Delete {}, {}, with {} points, {} of them with results, from {}? [y/N] ",
       protocol::visible(study.name()), protocol::visible(study.state()),
       format_count(study.points()), format_count(study.solved() + study.failed()), place);
   std::string answer;
@@ -109,7 +108,7 @@ bool is_confirmed(Console& console, const protocol::StudyStatus& study, const st
 int delete_study(const ChangeFlags& flags, Console& console) {
   if (!flags.yes && (isatty(STDIN_FILENO) == 0 || !console.can_redraw())) {
     throw solver::InputError(
-        "nobody can be asked here whether the study is to be deleted: --yes says so");
+        "deleting needs a confirmation, and standard input is no terminal: add --yes");
   }
   const std::string database = database_meant(flags.source);
   std::optional<Connection> connection;
@@ -119,7 +118,7 @@ int delete_study(const ChangeFlags& flags, Console& console) {
   auto study = connection ? study_named(*connection, flags.study)
                           : study_named(*open_source(console, flags.source), flags.study);
   if (!flags.yes && !is_confirmed(console, study, connection ? connection->url() : database)) {
-    console.notes() << "Nothing is deleted.\n";
+    console.notes() << "Nothing was deleted.\n";
     return kFailed;
   }
   if (connection) {
@@ -127,7 +126,7 @@ int delete_study(const ChangeFlags& flags, Console& console) {
         connection->change(study.name(), protocol::STUDY_CHANGE_DELETE, study.study_id()).study();
   } else if (!server::delete_study(database, study.study_id())) {
     console.note(fmt::format(
-        "Another program reads {}: the next server deletes what is left of the study.", database));
+        "Another program reads {}: the next server removes the remaining rows.", database));
   }
   console.out() << fmt::format("{} is deleted: {} points, {} results\n",
                                protocol::visible(study.name()), format_count(study.points()),
@@ -135,7 +134,7 @@ int delete_study(const ChangeFlags& flags, Console& console) {
   return kDone;
 }
 
-/// A command that changes a study at a server.
+/// Adds a command that changes the state of a study on a server.
 template <protocol::StudyChange what>
 void add_change(CLI::App& app, Action& parsed, const std::string& name, const std::string& summary,
                 const std::string& remark) {
@@ -154,30 +153,29 @@ void add_change(CLI::App& app, Action& parsed, const std::string& name, const st
 void add_study_changes(CLI::App& app, Action& parsed) {
   add_change<protocol::STUDY_CHANGE_CANCEL>(
       app, parsed, "cancel", "Stop solving a study",
-      "Workers drop what they have of it. What is solved stays in the database; `oblique\n"
-      "resume`, or submitting the same study again, goes on with it.");
+      "Workers drop its points. Results stay in the database; `oblique resume`, or\nsubmitting the "
+      "same study again, continues it.");
   add_change<protocol::STUDY_CHANGE_PAUSE>(
-      app, parsed, "pause", "Hand out no more points of a study",
-      "Points that are handed out are still solved and kept. `oblique resume` goes on.");
+      app, parsed, "pause", "Stop leasing points of a study",
+      "Points that workers already have are solved and stored. `oblique resume` continues.");
   add_change<protocol::STUDY_CHANGE_RESUME>(app, parsed, "resume",
-                                            "Go on with a paused or cancelled study",
+                                            "Continue a paused or cancelled study",
                                             "A study that runs or is done stays as it is.");
   add_change<protocol::STUDY_CHANGE_RETRY>(
       app, parsed, "retry", "Solve the failed points of a study again",
-      "Their rows are removed, and the points handed out like new ones. Points fail for a\n"
-      "reason, which `oblique query STUDY --where \"status = 'failed'\"` shows; retry once it\n"
-      "is gone.");
+      "Their rows are removed and the points become open again. The reasons of failures are shown "
+      "by\n`oblique query STUDY --where \"status = 'failed'\"`; remove the cause first.");
   {
-    auto [command, flags] = new_command(app, parsed, "describe", "Print the study file of a study",
+    auto [command, flags] = new_command(app, parsed, "describe", "Print a study as a study file",
                                         kDescribeExamples, describe);
     add_study_argument(command, flags.study);
     add_source_flags(command, flags.source);
   }
   {
     auto [command, flags] =
-        new_command(app, parsed, "rename", "Give a study another name", kRenameExamples, rename);
+        new_command(app, parsed, "rename", "Rename a study", kRenameExamples, rename);
     command.add_option("OLD", flags.study, "name of the study")->required()->type_name("");
-    command.add_option("NEW", flags.new_name, "its new name, which no other study may have")
+    command.add_option("NEW", flags.new_name, "new name, which no other study may have")
         ->required()
         ->type_name("");
     add_source_flags(command, flags.source);
@@ -185,7 +183,7 @@ void add_study_changes(CLI::App& app, Action& parsed) {
   auto [command, flags] = new_command(app, parsed, "delete", "Delete a study with all its results",
                                       kDeleteExamples, delete_study);
   add_study_argument(command, flags.study);
-  command.add_flag("-y,--yes", flags.yes, "do not ask");
+  command.add_flag("-y,--yes", flags.yes, "do not ask for confirmation");
   add_source_flags(command, flags.source);
 }
 

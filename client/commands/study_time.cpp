@@ -41,8 +41,7 @@ double thread_seconds(std::size_t count, const std::function<void(std::size_t)>&
   return std::accumulate(each_s.begin(), each_s.end(), 0.0);
 }
 
-/// The examples and their next neighbours, with which they may have much in common, where their
-/// falls are solved.
+/// The points after each example. They share falls with it, where falls are solved together.
 std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::PointTable& table,
                                      const protocol::StudySize& size) {
   constexpr std::uint64_t kNeighbours = 8;
@@ -61,10 +60,10 @@ std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::P
   return points;
 }
 
-/// The axes on which falls depend.
+/// Axes on which falls depend.
 struct FallAxes {
-  std::set<std::string> drawn;  ///< keys of those that have a distribution
-  double other_values = 1.0;    ///< product of the numbers of values of the others
+  std::set<std::string> drawn;  ///< keys with a distribution
+  double other_values = 1.0;    ///< product of the numbers of values of the other keys
 };
 
 FallAxes fall_axes(const protocol::Recipe& recipe) {
@@ -125,7 +124,8 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
   const std::vector<FingerPoint> points = points_over(falls, table, size);
   std::vector<std::size_t> begun(cost.threads);
   const double contacts_s = thread_seconds(cost.threads, [&](std::size_t thread) {
-    constexpr std::chrono::milliseconds kBatch{100};  // as workers get them, or a point a lane
+    constexpr std::chrono::milliseconds kBatch{100};  // as workers' batches; at least one point per
+                                                      // lane
     std::size_t& i = begun[thread];
     for (const auto start = Clock::now();
          i < points.size() && Clock::now() < start + std::chrono::seconds(1);) {
@@ -146,7 +146,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
     }
   });
   cost.timed_points = std::accumulate(begun.begin(), begun.end(), std::size_t{0});
-  constexpr double kStored_s = 15e-6;  // what messages and storing take of the same cores
+  constexpr double kStored_s = 15e-6;  // processor time of messages and storing
   cost.contact_s =
       contacts_s / static_cast<double>(std::max<std::size_t>(cost.timed_points, 1)) + kStored_s;
   return cost;
@@ -166,8 +166,10 @@ std::string time_in_words(const StudyCost& cost, const protocol::StudySize& size
   if (size.falls == 1 || falls_s < all_s / 2.0) {
     return words;
   }
-  words += fmt::format(": {:.0f} % of it is {} falls.\n        H, mu, e, k and eta2 share one fall",
-                       100.0 * falls_s / all_s, format_count(size.falls));
+  words += fmt::format(
+      ": {:.0f} % of it for {} falls.\n        Points that differ only in H, mu, e, k and eta2 "
+      "share one fall",
+      100.0 * falls_s / all_s, format_count(size.falls));
   const auto& [keys, other_values] = fall_axes(recipe);
   const int count = keys.size() < 2 ? 16 : keys.size() == 2 ? 8 : 4;
   const double falls = other_values * std::pow(count, static_cast<double>(keys.size()));

@@ -28,16 +28,17 @@ constexpr const char* kSubmitExamples = R"(Examples:
   oblique submit sweep.toml --limit 20     watch it, then show 20 points
   oblique submit --H 1 --mu 0.1:2.0:40 --e 0.6,0.8,1 --name friction
 
-A study is safe in the server's database once this returns. Submitting the same study again
-goes on with it. One whose blocks begin with those that the server has grows by the rest, and runs
-again, whether it was done, paused or cancelled; so does one whose last block is a random or Sobol
-sample with a larger count. Any other study under a taken name is refused, with what differs.)";
+When the command returns, the server has stored the study. Submitting the same study again continues
+it. A study may grow: if its blocks begin with those of the stored study of that name, or its last
+block is a random or Sobol sample with a larger count, the new points are added and it runs again,
+whether it was done, paused or cancelled. Any other study of a used name is refused with the
+difference.)";
 
 struct SubmitFlags {
   StudyFlags study;
   SourceFlags source;
   bool watch = false;
-  std::optional<std::int64_t> limit;  ///< of the table shown at the end; watches too
+  std::optional<std::int64_t> limit;  ///< rows of the table shown at the end; implies --watch
   SubmitSettings settings;
 };
 
@@ -46,14 +47,14 @@ void print_submitted(Console& console, const Study& study, const protocol::Submi
   std::string known;
   if (!reply.created()) {
     known = reply.appended() > 0
-                ? fmt::format("; {} points are appended to it, which was {}",
+                ? fmt::format("; {} points are added to the {} it had",
                               format_count(reply.appended()), protocol::visible(reply.was()))
-                : "; the server had it already";
+                : "; the server already had it";
     if (settings.priority) {
       known += fmt::format("; its priority is now {}", *settings.priority);
     }
   }
-  if (const std::string taken = taken_over(reply.reused()); !taken.empty()) {
+  if (const std::string taken = reused_points_note(reply.reused()); !taken.empty()) {
     known += "; " + taken;
   }
   console.out() << fmt::format("{}: {} points, {} done{}", study.name, format_count(reply.points()),
@@ -67,7 +68,7 @@ int watch(Console& console, const SubmitFlags& flags, const Study& study, Connec
   const auto ask = [&](const Tell& tell) { return followed.status(tell); };
   const auto status = watch_study(console, ask, stop);
   if (stop.requested()) {
-    throw Interrupted("no longer watching");
+    throw Interrupted("watching ended");
   }
   const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
   if (const auto rows = flags.limit.value_or(0); rows > 0) {
@@ -102,8 +103,9 @@ int submit(const SubmitFlags& flags, Console& console) {
     submitted = true;
     return flags.watch || flags.limit ? watch(console, flags, study, connection, stop) : kDone;
   } catch (const Interrupted&) {
-    console.notes() << (submitted ? "No longer watching; the study goes on at "
-                                  : "Stopped before the server answered; it may have the study: ")
+    console.notes() << (submitted
+                            ? "Watching ended; the study continues on "
+                            : "Stopped before the server answered; it may have stored the study: ")
                     << connection.url() << ".\n";
     return stop.exit_code();
   }
@@ -118,12 +120,12 @@ void add_submit(CLI::App& app, Action& parsed) {
   command.add_flag("--watch", flags.watch, "show the progress until the study is done");
   command
       .add_option("--limit", flags.limit,
-                  "watch, and show a table with so many rows at most when the study is done")
+                  "watch, and show a table with this many rows when the study is done")
       ->check(protocol::whole_number_from(0))
       ->type_name("N");
   command
       .add_option("--priority", flags.settings.priority,
-                  fmt::format("studies of a higher priority come first, {}; default: 0",
+                  fmt::format("studies of higher priority come first, {}; default: 0",
                               protocol::kPriorities))
       ->type_name("N");
   add_no_reuse_flag(command, flags.settings.no_reuse);

@@ -18,9 +18,9 @@ constexpr const char* kTraceExamples = R"(Examples:
   oblique trace paper 3 --format json > point3.json
   oblique trace paper 3 --server tcp://127.0.0.1:7600 --on-worker --out point3.csv
 
-The point is solved again with the model of its study, here when the database is a file and by a
-worker of the server otherwise, and held against the stored row: standard error says whether they
-are the same. `oblique columns --trace` says what the columns of a trace mean.)";
+The point is solved again: in this process if the database is a file, else by a worker of the
+server. The result is compared with the stored row; standard error shows whether they are equal.
+`oblique columns --trace` describes the columns.)";
 
 struct TraceFlags {
   std::string study;
@@ -51,29 +51,30 @@ int trace(const TraceFlags& flags, Console& console) {
 }  // namespace
 
 void add_trace(CLI::App& app, Action& parsed) {
-  auto [command, flags] =
-      new_command(app, parsed, "trace", "Time histories of one point of a study, solved again",
-                  kTraceExamples, trace);
+  auto [command, flags] = new_command(
+      app, parsed, "trace", "Write the time histories of one point of a study, solved again",
+      kTraceExamples, trace);
   add_study_argument(command, flags.study);
   command.add_option("POINT", flags.point, "number of the point, from 0")
       ->required()
       ->check(protocol::whole_number_from(0))
       ->type_name("");
-  command.add_option("--out", flags.out, "file that is written; standard output when left out")
+  command
+      .add_option("--out", flags.out, "output file, written atomically; default: standard output")
       ->type_name("FILE");
   auto* format = command
                      .add_option("--format", flags.format,
-                                 "csv or json; as the file's name ends when left out, else "
-                                 "csv; the Python module returns NumPy arrays")
+                                 "csv or json; default: from the name of --out, else csv; the "
+                                 "Python module returns NumPy arrays")
                      ->type_name("FORMAT");
   protocol::note_choices(format, kTraceFormats);
   command.add_flag("--shape", flags.options.with_shape, "add the positions of the chain's nodes");
   command.add_flag("--fall", flags.options.with_fall,
-                   "begin with 121 rows of the fall, from release to touch: times are negative "
-                   "there, the state is falling");
+                   "begin with 121 rows of the fall, from release to touch; their times are "
+                   "negative, their state is falling");
   command
       .add_option("--every", flags.options.every,
-                  "give each K-th instant of the contact and all ends of phases")
+                  "write each K-th instant of the contact and all ends of phases")
       ->check(protocol::whole_number_from(1))
       ->type_name("K");
   add_point_source(command, flags.source);

@@ -28,18 +28,18 @@ constexpr const char* kViewExamples = R"(Examples:
   oblique view friction.db
   oblique view big.db --port 8000
 
-Open the address that it prints in a browser on this machine; Ctrl-C ends it. Over ssh, forward the
-port: ssh -L 8000:127.0.0.1:8000 HOST. Studies that are not done go on meanwhile, as with a server.
-Others are started on the page: what changes the file, as `oblique run`, is refused until it ends.
-Links to views hold as long as the port is the same: give one that is kept.)";
+Prints an address to open in a browser on this machine, until Ctrl-C. Over ssh, forward the port:
+ssh -L 8000:127.0.0.1:8000 HOST. Unfinished studies continue meanwhile. Start other studies on the
+page: commands that change the file, such as `oblique run`, are refused until `oblique view` ends.
+Links to the page stay valid only with the same --port.)";
 
 struct ViewFlags {
   RunSettings settings;
   int port = 0;
-  std::string server;  // refused with what to do instead
+  std::string server;  // --server is refused with the remedy
 };
 
-/// Until it is told to stop. Throws ProcessError when server or workers end.
+/// Waits for a signal. Throws ProcessError when the server or the workers end.
 void wait_for_the_end(Console& console, EmbeddedService& service, protocol::StopSignals& stop) {
   constexpr std::chrono::milliseconds kLook{500};
   while (!stop.wait(kLook)) {
@@ -50,7 +50,7 @@ void wait_for_the_end(Console& console, EmbeddedService& service, protocol::Stop
   }
 }
 
-/// Whether the server ended because that port is taken; it says so in terms of its own flag.
+/// Whether the server ended because the port is in use; its message names a flag of its own.
 bool is_taken(int port, const ProcessError& error) {
   const auto taken = std::generic_category().message(EADDRINUSE);
   return port != 0 && std::string_view(error.what()).find(taken) != std::string_view::npos;
@@ -59,29 +59,29 @@ bool is_taken(int port, const ProcessError& error) {
 int view(const ViewFlags& flags, Console& console) {
   if (!flags.server.empty()) {
     throw solver::InputError(
-        "--server is not allowed: view shows a database file. A server has a page of its own: it "
-        "prints its address when it starts, and `oblique-server --http ADDRESS:PORT` sets it");
+        "--server is not allowed: view shows a database file. A server has its own page: it prints "
+        "the address when it starts; `oblique-server --http ADDRESS:PORT` sets it");
   }
   check_settings(flags.settings);
   ServiceSettings how = flags.settings.service;
   const std::string file = protocol::visible(how.database.string());
   if (!std::filesystem::exists(how.database)) {
     throw std::runtime_error(
-        fmt::format("there is no file {}: `oblique run` makes a database", file));
+        fmt::format("there is no file {}: `oblique run` creates a database", file));
   }
   if (::access(how.database.c_str(), W_OK) != 0) {
     throw std::runtime_error(
-        fmt::format("{0} may not be written to, and the page's server has to: show a copy, which "
-                    "`oblique backup copy.db --db {0}` makes",
+        fmt::format("{0} is read-only, but the server of the page must write to it: show a copy, "
+                    "made with `oblique backup copy.db --db {0}`",
                     file));
   }
   refuse_used_database(how.database);
   how.http = fmt::format("127.0.0.1:{}", flags.port);
-  // Before any thread is started; see StopSignals.
+  // before any thread starts; see StopSignals
   protocol::StopSignals stop;
   try {
     EmbeddedService service(how, stop);
-    // Whoever has this address may change studies: it is data, for the user alone.
+    // This address lets anyone change studies, so it is printed as data and not logged.
     console.out() << service.page_url() << std::endl;
     console.note("Open this address in a browser; Ctrl-C ends it.");
     wait_for_the_end(console, service, stop);
@@ -91,8 +91,7 @@ int view(const ViewFlags& flags, Console& console) {
   } catch (const ProcessError& error) {
     if (is_taken(flags.port, error)) {
       throw std::runtime_error(fmt::format(
-          "port {} is taken by another program: name another with --port, or none, and the system "
-          "picks one",
+          "port {} is in use: name another with --port, or omit it to let the system choose",
           flags.port));
     }
     throw;
@@ -103,13 +102,13 @@ int view(const ViewFlags& flags, Console& console) {
 }  // namespace
 
 void add_view(CLI::App& app, Action& parsed) {
-  auto [command, flags] = new_command(
-      app, parsed, "view",
-      "Show a database as a page in a browser: a server and a worker for as long as it is open",
-      kViewExamples, view);
+  auto [command, flags] =
+      new_command(app, parsed, "view",
+                  "Show a database as a page in the browser, with a temporary server and worker",
+                  kViewExamples, view);
   add_database_argument(command, flags.settings.service.database);
   constexpr double kLargestPort = 65535;
-  command.add_option("--port", flags.port, "port of the page; 0: the system picks one")
+  command.add_option("--port", flags.port, "port of the page; 0: chosen by the system")
       ->check(protocol::number_between(0, kLargestPort))
       ->type_name("N")
       ->capture_default_str();

@@ -29,12 +29,12 @@ struct WorkersFlags {
   SourceFlags source;
 };
 
-/// The cause of a refusal. A peer without a key uses another mechanism.
+/// The cause of a refusal in words. A peer without a key uses another mechanism.
 std::string shown_cause(const protocol::WorkersReply& reply, const std::string& reason) {
   const bool is_mechanism = reason == "other mechanism";
   return !is_mechanism              ? reason
          : reply.access() == "keys" ? "without a key"
-                                    : "with a key, where there are none";
+                                    : "with a key, but the server has none";
 }
 
 /// Prints how many peers were refused, and how many frames were malformed.
@@ -47,12 +47,12 @@ void note_access(Console& console, const protocol::WorkersReply& reply) {
     }
   }
   if (!refusals.empty()) {
-    console.note("turned away since the server began:" + refusals);
+    console.note("refused since the server started:" + refusals);
   }
   if (reply.bad_frames() > 0) {
     console.note(
-        fmt::format("{} came that no sound worker or client sends; the server's log says from whom",
-                    counted(reply.bad_frames(), "frame", "frames")));
+        fmt::format("{} arrived; the server's log names the senders",
+                    counted(reply.bad_frames(), "malformed message", "malformed messages")));
   }
 }
 
@@ -60,7 +60,7 @@ std::string standing_of(const protocol::WorkerStatus& worker) {
   return worker.set_aside() ? "set aside" : worker.proven() ? "proven" : "new";
 }
 
-/// All that is known, for programs.
+/// All columns, for programs.
 protocol::Table full_table(const protocol::WorkersReply& reply) {
   protocol::Table table{.columns = {"worker", "name", "threads", "instruction_set",
                                     "solver_version", "leased_points", "solved_points", "silent_ms",
@@ -76,7 +76,7 @@ protocol::Table full_table(const protocol::WorkersReply& reply) {
   return table;
 }
 
-/// What people look for, in 100 columns. A name that begins with the host goes on without it.
+/// The main columns, in 100 characters. The host is left out if the worker's name begins with it.
 protocol::Table table_for_people(const protocol::WorkersReply& reply) {
   constexpr double kMillisecondsASecond = 1000.0;
   const bool has_keys = std::any_of(reply.workers().begin(), reply.workers().end(),

@@ -30,7 +30,7 @@ constexpr double kRoundingFraction = 1e-9;
 Extrapolation monotone(double last, double before, double value, double highest_order) {
   const double order = std::log2(before / last);
   const double believed = std::min(order, highest_order);
-  // |last|, unless it is smaller than theory lets it be.
+  // |last|, or the smaller value that theory predicts.
   const double difference =
       std::copysign(std::max(std::abs(last), std::abs(before) * std::exp2(-highest_order)), last);
   const double correction = difference / (std::exp2(believed) - 1.0);
@@ -40,7 +40,7 @@ Extrapolation monotone(double last, double before, double value, double highest_
           .error = std::abs(correction)};
 }
 
-// Peak, valley, peak, ..., peak.
+// Forces at the turns: peak, valley, peak, ..., peak.
 std::vector<double> turn_times(const CaseResult& result) {
   std::vector<double> times;
   for (std::size_t i = 0; i + 1 < result.phases.size(); ++i) {
@@ -49,8 +49,8 @@ std::vector<double> turn_times(const CaseResult& result) {
   return times;
 }
 
-// Start, end, start, ..., end. A contact that begins or ends in stick has these ends too, so that
-// lengths are even whatever the first and the last state.
+// Start and end of each stick in turn. Touch and separation count as ends if P sticks then, so the
+// number of times is even.
 std::vector<double> stick_times(const CaseResult& result) {
   std::vector<double> times;
   for (const auto& stick : result.stick_intervals) {
@@ -68,8 +68,8 @@ void add_lone(std::vector<ContactChange>& changes, const std::vector<double>& co
   }
 }
 
-// The states of `mode` ("sC sR sC sR") up to the peak of that number, from 0: all up to the first
-// restitution after it, or up to the last one before compression starts again.
+// The states of `mode` ("sC sR sC sR") up to peak number `peak`, from 0: up to the first
+// restitution after it, or to the last one before compression starts again.
 std::string mode_to_peak(const std::string& mode, std::size_t peak, bool whole_restitution) {
   std::size_t restitutions = 0;
   bool in_restitution = false;
@@ -98,7 +98,7 @@ OutputConvergence output_convergence(const Output& finest,
     });
     output.values.push_back(same == level.end() ? std::nullopt : std::optional(same->value));
   }
-  // The finest levels that have the value, without a gap.
+  // The values of the finest levels that have the output, without a gap.
   std::vector<double> tail;
   for (auto value = output.values.rbegin(); value != output.values.rend() && *value; ++value) {
     tail.insert(tail.begin(), **value);
@@ -139,7 +139,8 @@ Extrapolation extrapolate(std::span<const double> values, double highest_order, 
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter) {
   const std::size_t columns = shorter.size() + 1;
-  // cost[i * columns + j]: the first i of `longer` against the first j of `shorter`.
+  // cost[i * columns + j]: least cost of the first i of `longer` matched with the first j of
+  // `shorter`.
   constexpr double kNever = std::numeric_limits<double>::infinity();
   std::vector<double> cost((longer.size() + 1) * columns, kNever);
   cost[0] = 0.0;
@@ -194,7 +195,7 @@ const char* name_of(Kind kind) {
 
 std::string described(const ContactChange& change) {
   if (change.kind == Kind::kRipple) {
-    return fmt::format("a peak of F_n at {} us, near the depth at which ripples are merged",
+    return fmt::format("a peak of F_n at {} us, near the depth below which ripples are merged",
                        fixed_number(change.t0_s * kMicro, 2));
   }
   const char* cause = change.kind == Kind::kStick  ? "P's velocity grazes 0"
@@ -271,7 +272,7 @@ std::optional<double> relative_error(const std::optional<double>& value, double 
 
 namespace {
 
-/// Whether the fall chooses its steps by the tolerance and has none to halve.
+/// Whether the tolerance controls the fall's steps, so that the fall has no step to halve.
 bool falls_by_accuracy(const solver::ModelParameters& model) {
   return model.integrator == solver::Integrator::kExplicit && model.dt_fall_s == 0.0;
 }
@@ -309,7 +310,7 @@ std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarses
     }
     levels.push_back(std::move(level));
   }
-  constexpr std::size_t kFewest = 3;  // for an order
+  constexpr std::size_t kFewest = 3;  // the order needs three levels
   if (levels.size() < kFewest || n != 2 * finest) {
     throw solver::InputError(fmt::format(
         "--finest {} is not allowed: it must be 4, 8, 16, ... times the {} elements a link of "
@@ -336,7 +337,7 @@ std::vector<Level> step_levels(const solver::ModelParameters& model, double e_st
 
 std::optional<Level> exact_fall_level(const Level& level) {
   constexpr double kPart = 0.1;
-  constexpr double kTightest = 1e-9;  // that models may have
+  constexpr double kTightest = 1e-9;  // the largest mesh of a model
   if (!falls_by_accuracy(level.model)) {
     return std::nullopt;
   }

@@ -19,8 +19,8 @@ using solver::readable_number;
 
 constexpr double kMicroseconds = 1e6;
 constexpr double kPercent = 100.0;
-/// Differences that do not fall count as settled below this part of the output's scale: a fine mesh
-/// carries ever faster vibrations, which leave outputs wavering at about this level.
+/// Outputs whose last difference is below this part of their scale count as settled, because a fine
+/// mesh has fast vibrations of about this size.
 constexpr double kSettled = 1e-3;
 
 bool is_settled(const OutputConvergence& output) {
@@ -31,7 +31,7 @@ bool is_settled(const OutputConvergence& output) {
   return extrapolation.trend != Trend::kTooFew;
 }
 
-/// What a trend is called in JSON, and the remark on it in the table.
+/// A trend in JSON and as a remark in the table.
 struct TrendNames {
   const char* name;
   const char* remark;
@@ -53,7 +53,7 @@ std::optional<double> times(const std::optional<double>& value, double factor) {
   return value ? std::optional(*value * factor) : std::nullopt;
 }
 
-// Two digits are all that an estimate has.
+// An estimate has two digits.
 void add_rough(protocol::Row& row, const std::optional<double>& value) {
   row.emplace_back(value ? readable_number(*value, 2) : std::string("-"));
 }
@@ -92,11 +92,11 @@ void print_outputs(std::ostream& out, const Refinement& refinement) {
 std::string change_sentence(const Refinement& refinement, const ContactChange& change) {
   const auto& finer = refinement.levels[change.finer_level].level.name;
   const auto& coarser = refinement.levels[change.finer_level - 1].level.name;
-  return fmt::format("{} has {}; {} has not", change.in_finer ? finer : coarser, described(change),
+  return fmt::format("{} has {}; {} does not", change.in_finer ? finer : coarser, described(change),
                      change.in_finer ? coarser : finer);
 }
 
-// The largest of relative errors.
+// The largest relative error.
 struct Worst {
   void add(const std::string& name, const std::optional<double>& error) {
     if (error && *error > largest) {
@@ -134,9 +134,9 @@ void print_verdict(std::ostream& out, const Refinement& refinement) {
       unsettled.push_back(output.name);
     }
   }
-  out << (convergence.has_one_mode
-              ? fmt::format("the mode settles, but not {}", fmt::join(unsettled, ", "))
-              : "the mode is not one on the finest three levels");
+  out << (convergence.has_one_mode ? fmt::format("the mode settles, but these outputs do not: {}",
+                                                 fmt::join(unsettled, ", "))
+                                   : "the mode differs on the finest three levels");
   if (!convergence.changes.empty()) {
     out << "; to blame: " << change_sentence(refinement, convergence.changes.back());
   }
@@ -168,7 +168,7 @@ double fall_tolerance(const Refinement& step) {
 
 using FallChanges = std::vector<std::pair<std::string, std::optional<double>>>;
 
-// Relative changes of the outputs; nothing when the mode is another one.
+// Relative changes of the outputs; nothing if the modes differ.
 std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {
   const auto& exact = exact_fall.result;
   if (step.levels.front().result.major_mode != exact.major_mode) {
@@ -220,16 +220,15 @@ std::string fall_sentence(const Refinement& step, const SolvedLevel& exact_fall)
   const auto exact = readable_number(exact_fall.level.model.tolerance, 2);
   if (!changes) {
     return fmt::format(
-        "The fall, solved for {}, does not settle the mode: one solved for {} gives another.\n",
+        "The mode depends on the tolerance of the fall: {1} gives another one than {0}.\n",
         solved_for, exact);
   }
   Worst worst;
   for (const auto& [name, change] : *changes) {
     worst.add(name, change);
   }
-  return fmt::format(
-      "The fall, solved for {}, changes outputs by {} at most beside one solved for {}.\n",
-      solved_for, worst.shown, exact);
+  return fmt::format("A fall solved for {2} instead of {0} changes outputs by at most {1}.\n",
+                     solved_for, worst.shown, exact);
 }
 
 ordered_json json_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {

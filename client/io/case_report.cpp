@@ -28,7 +28,7 @@ using solver::readable_number;
 
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
-/// Nearer than this, changes in the fifth digit of H, mu or e* change modes
+/// Below this margin, changes in the fifth digit of H, mu or e* change the mode
 /// (worker/solver/reference/theory.md).
 constexpr double kDoubtfulMargin = 1e-4;
 
@@ -107,7 +107,7 @@ void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>&
   }
 }
 
-/// Each as a percentage of its scale, which worker/solver/accuracy.md names.
+/// Each error in percent of the output's scale; see worker/solver/accuracy.md.
 void print_errors(std::ostream& out, const solver::ErrorEstimate& errors) {
   if (!errors.mode_same) {
     return;
@@ -160,7 +160,7 @@ void print_summary(std::ostream& out, const CaseResult& result) {
   if (result.margin && result.margin_event) {
     out << fmt::format("margin      {} (0 fragile, 1 safe), closest event: {}{}\n",
                        readable_number(*result.margin, 2), *result.margin_event,
-                       *result.margin < kDoubtfulMargin ? "; the mode is not to be trusted" : "");
+                       *result.margin < kDoubtfulMargin ? "; the mode is not reliable" : "");
   }
   out << '\n';
   print_peaks(out, result);
@@ -177,7 +177,7 @@ void print_summary(std::ostream& out, const CaseResult& result) {
       << fmt::format("energy      {} J in; friction takes {} J, restitution {} J\n",
                      fixed_number(energy.kinetic_in_J, 4), fixed_number(energy.friction_J, 6),
                      fixed_number(energy.restitution_J, 6))
-      << fmt::format("            balance error {} of the energy exchanged\n",
+      << fmt::format("            balance error {} of the exchanged energy\n",
                      readable_number(energy.closure, 2))
       << fmt::format("solver      {} {}, {} steps of {} us, {} ms\n", report.integrator,
                      report.version, report.steps, readable_number(report.dt_s * kMicro, 3),

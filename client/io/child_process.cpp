@@ -25,7 +25,7 @@ Descriptor memory_file(std::string_view text = {}) {
   Descriptor file(memfd_create("oblique", MFD_CLOEXEC));
   const auto written = ::write(file.number(), text.data(), text.size());
   if (written != static_cast<ssize_t>(text.size())) {
-    throw ProcessError(fmt::format("cannot make a file in memory: {}", std::strerror(errno)));
+    throw ProcessError(fmt::format("cannot create a file in memory: {}", std::strerror(errno)));
   }
   lseek(file.number(), 0, SEEK_SET);
   return file;
@@ -38,7 +38,7 @@ std::size_t bytes_in(const Descriptor& file) {
              : 0;
 }
 
-/// The bytes of a memory file after the first `from`.
+/// Reads a memory file from byte `from`.
 std::string text_in(const Descriptor& file, std::size_t from) {
   std::string text(bytes_in(file) - from, '\0');
   const auto got = pread(file.number(), text.data(), text.size(), static_cast<off_t>(from));
@@ -46,7 +46,7 @@ std::string text_in(const Descriptor& file, std::size_t from) {
   return text;
 }
 
-/// Our environment without the variables whose names begin with `hidden`, unless that is empty.
+/// Our environment without variables that begin with `hidden`; an empty `hidden` keeps all.
 std::vector<char*> environment_without(const std::string& hidden) {
   std::vector<char*> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {
@@ -58,8 +58,8 @@ std::vector<char*> environment_without(const std::string& hidden) {
   return variables;
 }
 
-/// Starts `settings.program` with these standard streams, -1 for /dev/null as input and for our
-/// own as outputs. No signal is blocked in it. Returns 0 or the error.
+/// Starts `settings.program` with these standard streams; -1 is /dev/null for input, ours for
+/// outputs. The child has no blocked signals. Returns 0 or an error number.
 int spawn(const ChildSettings& settings, int input, int output, int errors, pid_t& pid) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -103,7 +103,7 @@ int spawn(const ChildSettings& settings, int input, int output, int errors, pid_
 Pipe::Pipe() {
   std::array<int, 2> ends{};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) {
-    throw ProcessError(fmt::format("cannot make a pipe: {}", std::strerror(errno)));
+    throw ProcessError(fmt::format("cannot create a pipe: {}", std::strerror(errno)));
   }
   read = Descriptor(ends[0]);
   write = Descriptor(ends[1]);
@@ -117,7 +117,7 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
     output_ = memory_file();
   }
   const Descriptor text = settings.input ? memory_file(*settings.input) : Descriptor();
-  // Unless asked otherwise our standard output holds our data alone.
+  // By default our standard output contains only our data.
   const int output = settings.show_output ? -1
                      : output_.is_open()  ? output_.number()
                                           : STDERR_FILENO;
@@ -153,7 +153,7 @@ bool ChildProcess::has_ended(bool waits) {
 }
 
 void ChildProcess::send(int signal) {
-  // Reaped here and nowhere else, so the number cannot have passed to another process.
+  // Only this function reaps the child, so the number cannot belong to another process.
   if (is_running()) {
     kill(pid_, signal);
   }
@@ -174,7 +174,7 @@ std::string ChildProcess::ending() const {
   return fmt::format("ended with exit code {}", WEXITSTATUS(*status_));
 }
 
-std::string ChildProcess::last_words() const {
+std::string ChildProcess::last_output() const {
   constexpr std::size_t kMostBytes = 4000;
   constexpr int kMostLines = 12;
   const std::size_t bytes = bytes_in(errors_);
@@ -191,8 +191,7 @@ std::string ChildProcess::last_words() const {
 
 std::string ChildProcess::output(std::size_t most_bytes) const {
   if (const std::size_t bytes = bytes_in(output_); bytes > most_bytes) {
-    throw ProcessError(
-        fmt::format("it wrote {} bytes, more than the {} allowed", bytes, most_bytes));
+    throw ProcessError(fmt::format("it wrote {} bytes; at most {} are allowed", bytes, most_bytes));
   }
   return text_in(output_, 0);
 }
@@ -209,7 +208,7 @@ std::string output_of(ChildSettings settings, const std::function<bool()>& keep_
     std::this_thread::sleep_for(kPause);
   }
   if (!child.succeeded()) {
-    auto words = child.last_words();
+    auto words = child.last_output();
     std::replace(words.begin(), words.end(), '\n', ' ');
     throw ProcessError(fmt::format("{} {}{}{}", settings.program.string(), child.ending(),
                                    words.empty() ? "" : ": ", words));
@@ -222,8 +221,8 @@ std::filesystem::path sibling_program(const std::string& name) {
   auto program = own.parent_path() / name;
   if (access(program.c_str(), X_OK) != 0) {
     throw ProcessError(
-        fmt::format("cannot find {}: the programs oblique, oblique-server and oblique-worker must "
-                    "lie in one folder; of Debian's packages, {} has this one",
+        fmt::format("cannot find {}: oblique, oblique-server and oblique-worker must be in the "
+                    "same folder; Debian's package {} contains it",
                     program.string(), name));
   }
   return program;

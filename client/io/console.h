@@ -12,41 +12,38 @@
 
 namespace oblique::client {
 
-/// Value of an environment variable, if it is set.
 std::optional<std::string> environment_variable(const char* name);
 
-/// Columns and lines of a terminal.
 struct TerminalSize {
-  std::size_t columns = 0;  ///< 0: no terminal
-  std::size_t lines = 0;    ///< 0: no terminal
+  std::size_t columns = 0;  ///< 0: not a terminal
+  std::size_t lines = 0;    ///< 0: not a terminal
 };
-/// Size of the terminal behind a descriptor; 80 x 24 for a terminal that does not report its size.
+/// Size of the terminal behind a descriptor; 80 x 24 if the terminal does not report it.
 TerminalSize terminal_size(int descriptor);
 
-/// Whether colours may be written to a descriptor: it is a terminal, TERM names one that has
-/// colours, and NO_COLOR is not set.
+/// Whether the descriptor is a terminal that has colours by TERM, and NO_COLOR is not set.
 bool may_colour(int descriptor);
 
 /// Number of characters of a UTF-8 text.
 std::size_t width_of(std::string_view text);
-/// The words of a text in lines of at most `width` characters; a longer word has a line of its own.
-/// At least one line.
+/// Breaks a text between words into lines of at most `width` characters; longer words are not
+/// broken. Returns at least one line.
 std::vector<std::string> wrapped(std::string_view text, std::size_t width);
 
-// Numbers as people read them. Output for programs has all digits and SI units.
+// ---- Numbers for people; programs get all digits in SI units ----
 
-/// A length of time: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 04 h".
+/// A duration: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 04 h".
 std::string format_duration(double seconds);
 
-/// A number of things: "950", "14,300".
+/// A count: "950", "14,300".
 std::string format_count(std::uint64_t count);
-/// With its noun: "1 point", "14,300 points".
+/// A count with its noun: "1 point", "14,300 points".
 std::string counted(std::uint64_t count, std::string_view one, std::string_view many);
 
-/// A rate to three digits, whole from a hundred on: "0.31", "84.4", "14,300".
+/// A rate with three digits, or as a whole number from 100: "0.31", "84.4", "14,300".
 std::string format_rate(double per_s);
 
-/// A size: "120 bytes", "1.3 MB", "24 GB"; a kB has 1000 bytes.
+/// A size: "120 bytes", "1.3 MB", "24 GB"; 1 kB is 1000 bytes.
 std::string format_bytes(std::uint64_t bytes);
 
 enum class Verbosity {
@@ -55,13 +52,12 @@ enum class Verbosity {
   kVerbose  ///< also what is done, where, and how long it takes
 };
 
-/// Where a command writes, how much, and what the terminal of its error stream can do. `main` makes
-/// it and passes it on.
+/// Output streams of a command, its verbosity, and the terminal of its error stream.
 class Console {
  public:
-  /// What the terminal behind the error stream can do; the default is that of a file.
+  /// Abilities of the terminal behind the error stream; by default those of a file.
   struct Terminal {
-    bool is_terminal = false;  ///< a line can be drawn over itself
+    bool is_terminal = false;  ///< a line can be overwritten
     bool has_colours = false;
     std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< may change
   };
@@ -75,27 +71,26 @@ class Console {
 
   void set_verbosity(Verbosity verbosity) { verbosity_ = verbosity; }
 
-  /// Data.
   std::ostream& out() { return out_; }
   /// Errors; written at every verbosity.
   std::ostream& errors() { return err_; }
   /// Progress and notes; a stream that drops everything with kQuiet.
   std::ostream& notes() { return verbosity_ == Verbosity::kQuiet ? dropped_ : err_; }
 
-  /// Writes a line to `notes`; control characters of `sentence` are made visible (proto/text.h).
+  /// Writes a line to `notes` with control characters made visible (proto/text.h).
   void note(std::string_view sentence);
-  /// Likewise, with kVerbose only.
+  /// As `note`, only with kVerbose.
   void detail(std::string_view sentence);
-  /// Writes an error as "oblique query: ...", in several lines if `message` has them.
+  /// Writes an error as "oblique query: message"; the message may have several lines.
   void error(std::string_view command, std::string_view message);
 
-  /// Whether a line of `notes` can be drawn over itself.
+  /// Whether a line of `notes` can be overwritten.
   bool can_redraw() const { return terminal_.is_terminal; }
-  /// Writes `line` to `notes` over the one that was drawn before; an empty one erases that. Nothing
+  /// Overwrites the last redrawn line of `notes` with `line`; an empty line erases it. No effect
   /// without a terminal.
   void redraw(std::string_view line);
-  /// Most characters of a line to redraw: the last column of the terminal stays free, because some
-  /// terminals wrap the line there.
+  /// Maximum length of a redrawn line. The last column stays free, because some terminals wrap
+  /// there.
   std::size_t columns() const;
 
  private:

@@ -73,8 +73,8 @@ std::string progress_line(const ProgressState& state) {
 }
 
 void Progress::update(ProgressState state) {
-  // The rate of the last seconds: long enough to be steady, short enough to follow workers that
-  // come and go.
+  // Window of the rate: long enough to be steady, short enough to follow workers that join and
+  // leave.
   constexpr double kWindow_s = 10.0;
   const double now_s = state.elapsed_s;
   window_.emplace_back(now_s, state.completed);
@@ -94,7 +94,7 @@ void Progress::update(ProgressState state) {
   } else {
     console_.notes() << progress_line(*last_) << std::endl;
   }
-  next_s_ = now_s + (console_.can_redraw() ? 0.1 : 10.0);  // between bars, and between lines
+  next_s_ = now_s + (console_.can_redraw() ? 0.1 : 10.0);  // interval of bars and of lines
 }
 
 void Progress::finish() {

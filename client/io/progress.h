@@ -19,72 +19,71 @@
 
 namespace oblique::client {
 
-/// How far a study is.
 struct ProgressState {
   std::string study;
   std::uint64_t points = 0;
   std::uint64_t completed = 0;  ///< solved, failed or left out by a filter
   std::uint64_t failed = 0;
   std::uint64_t left_out = 0;
-  double elapsed_s = 0.0;                   ///< since the watching began
-  std::optional<double> points_per_s = {};  ///< unknown until a point was completed
+  double elapsed_s = 0.0;                   ///< since watching began
+  std::optional<double> points_per_s = {};  ///< unknown until a point is completed
 };
 
-/// "study [####----] 5/10 50 %, 3.1 points/s, 2 s left" in at most `columns` characters: where
-/// there is little room the bar gets shorter, then the name.
+/// "study [####----] 5/10 50 %, 3.1 points/s, 2 s left" in at most `columns` characters. First the
+/// bar is shortened, then the name.
 std::string progress_bar(const ProgressState& state, std::size_t columns = 1000);
 
 /// "study: 5 of 10 points (50 %), 3.1 points/s, 2 s left", for logs.
 std::string progress_line(const ProgressState& state);
 
-/// Draws the progress of one study on the console: a bar over itself on a terminal, else a plain
-/// line every ten seconds. The caller gives the time.
+/// Draws the progress of one study on the console: a bar that is overwritten on a terminal, else a
+/// line every ten seconds. The caller supplies the time.
 class Progress {
  public:
   explicit Progress(Console& console)
       : console_(console), next_s_(console.can_redraw() ? 0.0 : 2.0) {}
 
-  /// Draws the state if it is time to, ten times a second at most. `elapsed_s` must not fall; the
-  /// rate of the last seconds is filled in here.
+  /// Draws the state, at most ten times a second. `elapsed_s` must not decrease. Fills in the rate
+  /// of the last seconds.
   void update(ProgressState state);
 
-  /// Draws the last state, if there is one, a last time and ends the line.
+  /// Draws the last state once more and ends the line.
   void finish();
 
  private:
   Console& console_;
   std::optional<ProgressState> last_;
   std::deque<std::pair<double, std::uint64_t>> window_;  ///< recent (elapsed_s, completed)
-  double next_s_;                                        ///< when the next drawing is due
+  double next_s_;                                        ///< time of the next drawing
 };
 
-/// Shows what a long computation is doing, on a line of a terminal that is drawn over itself.
-/// Nothing is left of the line once no part is under way. Without a terminal nothing is drawn.
+/// Shows what a long computation does on one line of the terminal, which is overwritten and finally
+/// erased. Without a terminal nothing is drawn.
 class StatusLine {
  public:
-  /// Describes a part. Called from another thread while the part is under way.
+  /// Returns the text of a part. Called from another thread while the part is active.
   using Describe = std::function<std::string()>;
 
   struct Settings {
     bool is_shown = true;                    ///< false: the terminal is used for other output
-    std::chrono::milliseconds first{1000};   ///< computations that end sooner show nothing
-    std::chrono::milliseconds between{200};  ///< between two drawings
+    std::chrono::milliseconds first{1000};   ///< shorter computations show nothing
+    std::chrono::milliseconds between{200};  ///< interval of drawings
   };
 
-  /// `console` must outlive it; nothing else may write notes while a part is under way.
+  /// `console` must outlive it; nothing else may write notes while a part is active.
   explicit StatusLine(Console& console, Settings settings);
   explicit StatusLine(Console& console) : StatusLine(console, Settings()) {}
   ~StatusLine();
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;
 
-  /// A part of the computation, under way until the last copy of this is destroyed.
+  /// A part of the computation, active until the last copy of this is destroyed.
   using Part = std::shared_ptr<void>;
-  /// Begins a part. Parts are shown in the order in which they began. From any thread.
+  /// Begins a part; parts are shown in the order of their beginning. From any thread.
   [[nodiscard]] Part begin(Describe describe);
   [[nodiscard]] Part begin(std::string what);
 
-  /// Writes a line that stays. From any thread.
+  /// Writes a line that is not overwritten. From any thread.
   void print(const std::string& line);
 
  private:
@@ -100,7 +99,7 @@ class StatusLine {
   std::list<Describe> parts_;
   bool is_drawn_ = false;
   std::condition_variable_any stopped_;
-  std::jthread drawer_;  ///< last: it uses all members above
+  std::jthread drawer_;  ///< last, because it uses all members above
 };
 
 }  // namespace oblique::client

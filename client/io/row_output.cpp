@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 4> kFormatNames{"table", "csv", "json", "jsonl"};
 
-/// Whether a name ends in its unit, as vt_in_m_s and impulse_n_Ns do.
+/// Whether a name ends in its unit, such as vt_in_m_s and impulse_n_Ns.
 bool ends_in_unit(const std::string& name, const std::string& unit) {
   std::string suffix = "_";
   for (const char letter : unit) {
@@ -41,7 +41,7 @@ bool ends_in_unit(const std::string& name, const std::string& unit) {
 
 constexpr const char* kName = "standard output";
 
-/// Empty: no pager is wanted.
+/// The command of the pager; empty: none.
 std::string pager_command() {
   for (const char* name : {"OBLIQUE_PAGER", "PAGER"}) {
     if (const auto command = environment_variable(name)) {
@@ -64,14 +64,14 @@ std::string name_of(int descriptor) {
   return fmt::format("/proc/self/fd/{}", descriptor);
 }
 
-/// Where bytes for the name `path` go, which may be a link.
+/// Where bytes for `path`, which may be a link, are written.
 struct FilePlace {
-  std::string path;          // behind the links, as far as they lead to names
-  bool is_in_place = false;  // opened and written as it is: a device, a pipe, /dev/stdout
+  std::string path;          // behind the links
+  bool is_in_place = false;  // a device, a pipe or /dev/stdout: opened and written directly
 };
 
 FilePlace file_place(const std::string& path, std::string_view flag) {
-  constexpr int kMostLinks = 40;  // as Linux itself
+  constexpr int kMostLinks = 40;  // Linux's own limit
   FilePlace place{path};
   std::error_code ignored;
   for (int links = 0; fs::is_symlink(fs::symlink_status(place.path, ignored)); ++links) {
@@ -79,7 +79,8 @@ FilePlace file_place(const std::string& path, std::string_view flag) {
       refuse(flag, path, ELOOP);
     }
     const fs::path link = fs::absolute(place.path);
-    // Links of /proc, as behind /dev/stdout, lead to an open file, whatever name they show.
+    // Links in /proc, such as the target of /dev/stdout, lead to an open file; its name is
+    // irrelevant.
     if (fs::weakly_canonical(link.parent_path(), ignored).string().starts_with("/proc/")) {
       place.is_in_place = true;
       return place;
@@ -125,10 +126,10 @@ Format format_of_output(const std::string& flag, const std::string& file,
   if (!flag.empty()) {
     const Format format = format_named(flag, allowed);
     if (is_known && flag != meant) {
-      throw solver::InputError(fmt::format(
-          "--format {} and --out {} contradict each other: a name that ends so is for {}; leave "
-          "the flag out, or give the file another ending",
-          flag, file, meant));
+      throw solver::InputError(
+          fmt::format("--format {} and --out {} contradict each other: that file name means {}; "
+                      "omit the flag or change the ending",
+                      flag, file, meant));
     }
     return format;
   }
@@ -139,7 +140,7 @@ Format format_of_output(const std::string& flag, const std::string& file,
     return usual;
   }
   throw solver::InputError(
-      fmt::format("--out {} does not say in which format: end its name in {}, or give --format",
+      fmt::format("the ending of --out {} is not a format: end the name in {}, or add --format",
                   file, allowed.size() > 2 ? ".csv, .json or .jsonl" : ".csv or .json"));
 }
 
@@ -259,7 +260,7 @@ void StandardOutput::start_pager() {
   Pipe pipe;
   pager_ = std::make_unique<ChildProcess>(ChildSettings{
       .program = "sh",
-      // A program that is not installed does not page: its text is printed.
+      // If the pager is not installed, the text is printed without one.
       .arguments = {"-c", "command -v ${0%% *} >/dev/null 2>&1 || exec cat; eval \"$0\"",
                     pager_command_},
       .show_errors = true,
@@ -267,7 +268,7 @@ void StandardOutput::start_pager() {
       .input_from = pipe.read.number(),
       .show_output = true});
   to_pager_ = std::move(pipe.write);
-  // Writing fails once the user has left the pager. Ctrl-C belongs to the pager.
+  // Writing fails once the user has left the pager. Ctrl-C goes to the pager.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGINT, SIG_IGN);
 }
@@ -294,7 +295,7 @@ AtomicFile::AtomicFile(const std::string& path, std::string_view flag) : name_(p
   path_ = place.path;
   is_in_place_ = place.is_in_place;
   if (is_in_place_) {
-    // A file behind /dev/stdout keeps what it has.
+    // A file behind /dev/stdout keeps its contents.
     descriptor_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
   } else {
     open_draft();
@@ -304,13 +305,13 @@ AtomicFile::AtomicFile(const std::string& path, std::string_view flag) : name_(p
   }
 }
 
-/// Nameless where possible: then nothing is left, however the program ends.
+/// Without a name where possible: nothing is left if the program ends.
 void AtomicFile::open_draft() {
   draft_ = fmt::format("{}.part-{}", path_, ::getpid());
   descriptor_ = Descriptor(
       ::open(fs::absolute(path_).parent_path().c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666));
   if (descriptor_.is_open() && ::access(name_of(descriptor_.number()).c_str(), F_OK) != 0) {
-    descriptor_.close();  // without /proc it could not get a name
+    descriptor_.close();  // naming it later needs /proc
     errno = EOPNOTSUPP;
   }
   if (!descriptor_.is_open() && (errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL)) {
@@ -340,7 +341,7 @@ void AtomicFile::finish() {
     require(::close(descriptor_.release()) == 0);
     return;
   }
-  // A full disk may show only here.
+  // Some file systems report a full disk only here.
   require(::fsync(descriptor_.number()) == 0);
   if (!has_name_) {
     require(::linkat(AT_FDCWD, name_of(descriptor_.number()).c_str(), AT_FDCWD, draft_.c_str(),

@@ -16,13 +16,13 @@
 
 namespace oblique::client {
 
-/// The reader of the output has ended, as `head` does. This is no failure and needs no message.
+/// The reader of the output has closed it, for example `head`. This is no failure and needs no
+/// message.
 class ClosedPipe : public std::runtime_error {
  public:
   ClosedPipe() : std::runtime_error("the reader of the output has ended") {}
 };
 
-/// Receives the bytes of an output.
 class Sink {
  public:
   Sink() = default;
@@ -32,17 +32,17 @@ class Sink {
 
   /// Throws ClosedPipe, or std::runtime_error with the reason.
   virtual void append(std::string_view bytes) = 0;
-  /// The output is complete. Throws as `append` does.
+  /// Ends the output. Throws as `append` does.
   virtual void finish() {}
 };
 
-/// Writes all bytes to a descriptor, called `name` in errors. Throws as Sink::append.
+/// Writes all bytes to a descriptor; errors call it `name`. Throws as Sink::append does.
 void write_all(int descriptor, std::string_view bytes, const std::string& name);
 
-/// Standard output, after what std::cout was given. On a terminal control characters are made
-/// visible (proto/text.h) and, with `may_page`, text longer than the screen goes through a pager:
-/// $OBLIQUE_PAGER, else $PAGER, else `less -FRSX`; none where that is empty or `cat`. `finish` and
-/// the destructor wait until the user has left the pager, which gets Ctrl-C meanwhile.
+/// Standard output, written after the contents of std::cout. On a terminal control characters are
+/// made visible (proto/text.h). With `may_page`, text longer than the screen goes through a pager:
+/// $OBLIQUE_PAGER, else $PAGER, else `less -FRSX`; an empty value or `cat` means none. `finish` and
+/// the destructor wait until the user leaves the pager; Ctrl-C goes to the pager meanwhile.
 class StandardOutput : public Sink {
  public:
   explicit StandardOutput(bool may_page = false);
@@ -57,23 +57,22 @@ class StandardOutput : public Sink {
   void wait_for_pager();
 
   bool is_terminal_;
-  std::string pager_command_;  // empty: text is written at once
-  std::string first_screen_;   // held back until it is known to be longer than the screen
+  std::string pager_command_;  // empty: no pager
+  std::string first_screen_;   // held back until it exceeds the screen
   std::unique_ptr<ChildProcess> pager_;
   Descriptor to_pager_;
 };
 
-/// Whether output to that name is written as it comes: to a device, a pipe or /dev/stdout. Throws
-/// solver::InputError for a folder and for links that form a circle.
+/// Whether output to `path` is written directly, because it is a device, a pipe or /dev/stdout.
+/// Throws solver::InputError for a folder and for links that form a circle.
 bool is_written_in_place(const std::string& path);
 
-/// A file that appears under its name when it is finished. Until then, and if that never happens,
-/// the previous file stays, and nothing is left beside it on file systems that have nameless files
-/// (NFS has none). A link stays, and its target is the file. What is no regular file is written in
-/// place.
+/// A file that is written atomically: it appears under its name when finished; until then the
+/// previous file stays. An unfinished file leaves nothing behind on file systems with unnamed files
+/// (not NFS). A link stays and its target is replaced. Devices and pipes are written directly.
 class AtomicFile : public Sink {
  public:
-  /// Throws solver::InputError, which says that `flag` named it, when it cannot be created.
+  /// Throws solver::InputError with the name of the flag if the file cannot be created.
   explicit AtomicFile(const std::string& path, std::string_view flag = "--out");
   ~AtomicFile() override;
 
@@ -83,70 +82,69 @@ class AtomicFile : public Sink {
  private:
   void open_draft();
 
-  std::string name_;  // in errors
-  std::string path_;  // behind the links
+  std::string name_;  // named in errors
+  std::string path_;  // target of the links
   bool is_in_place_ = false;
   std::string draft_;      // temporary name beside the file
-  bool has_name_ = false;  // the draft has its temporary name
+  bool has_name_ = false;  // the file is visible under its temporary name
   Descriptor descriptor_;
 };
 
-/// Tables are for reading: numbers have six digits and are aligned at the point. CSV (RFC 4180, a
-/// header line), JSON (an array of objects) and JSON lines (an object a line) hold every number as
-/// the shortest text that reads back as the same bits; NULL is an empty field, respectively null.
-/// In JSON the second of two columns of one name is called name_2, and lists that columns store as
-/// text are arrays.
+/// Tables are for reading: numbers have six digits and are aligned at the point. CSV (RFC 4180,
+/// with a header line), JSON (an array of objects) and JSON lines (an object per line) contain
+/// every number as the shortest text that reads back as the same bits; NULL is an empty field or
+/// null. In JSON the second of two columns of one name is called name_2, and lists stored as text
+/// become arrays.
 enum class Format { kTable, kCsv, kJson, kJsonLines };
 
 /// `table`, `csv`, `json` and `jsonl`.
 std::span<const std::string_view> format_names();
-/// The index of `name` among `allowed`. Throws solver::InputError, which names the flag and the
-/// nearest, for another name.
+/// Index of `name` in `allowed`. Throws solver::InputError with the flag and the nearest name if it
+/// is not there.
 std::size_t choice_of(std::string_view flag, std::string_view name,
                       std::span<const std::string_view> allowed);
-/// The format of that name. Throws solver::InputError for names that are not `allowed`.
+/// The format called `name`. Throws solver::InputError if it is not in `allowed`.
 Format format_named(std::string_view name,
                     std::span<const std::string_view> allowed = format_names());
 
-/// The format that --format names or, where that is empty, the end of the file's name, as .csv;
-/// `usual` for standard output (`file` empty) and for what is written in place. Throws
-/// solver::InputError for other names and ends, and where the two contradict each other.
+/// The format of --format or, if that is empty, of the ending of `file`, such as .csv; `usual` for
+/// standard output (`file` empty) and files that are written directly. Throws solver::InputError
+/// for other names and endings, and if the two contradict each other.
 Format format_of_output(const std::string& flag, const std::string& file,
                         std::span<const std::string_view> allowed = format_names(),
                         Format usual = Format::kTable);
 
-/// What the letters of modes mean.
+/// Meaning of the letters in modes.
 inline constexpr const char* kModeLetters = "S stick, s slip; C compression, R restitution";
 
-/// How tables show a column.
 struct ShownColumn {
-  std::string heading;    ///< its name, with the unit in brackets where that is not the SI one
+  std::string heading;    ///< name, with the unit in brackets if it is not the SI unit
   double per_unit = 1.0;  ///< shown value of 1 in SI units
 };
-/// The column of that name, whose SI unit is `unit` (empty: none, or unknown): columns with small
-/// values are shown in the units of `solve`'s report, as microseconds.
+/// How tables show a column with SI unit `unit` (empty: none or unknown). Small values are shown in
+/// the units of the report of `solve`, such as microseconds.
 ShownColumn shown_column(const std::string& name, const std::string& unit = {});
-/// The same for all columns of an answer.
+/// How tables show all columns of an answer.
 std::vector<ShownColumn> shown_columns(const protocol::QueryReply& chunk);
 
 struct OutputSettings {
   Format format = Format::kTable;
   std::string file = {};  ///< empty: standard output
-  bool may_page = true;   ///< a long table on a terminal goes to a pager
-  /// A table that does not fit the terminal lacks columns; else sentences in the last column are
+  bool may_page = true;   ///< a long table on a terminal goes through a pager
+  /// True: columns of a table that do not fit the terminal are left out; false: the last column is
   /// wrapped.
   bool may_leave_out = true;
-  std::string way_to_all = "csv and json have all";  ///< how to see columns that were left out
-  std::vector<ShownColumn> shown = {};  ///< of a table; columns after these by their names
-  std::size_t width = 0;                ///< most characters of a line of a table; 0: no limit
-  std::size_t first_rows = 1000;        ///< of a table, which determine the widths of columns
+  std::string way_to_all = "csv and json have all";  ///< how to see the columns that were left out
+  std::vector<ShownColumn> shown = {};  ///< for tables; later columns have their names as headings
+  std::size_t width = 0;                ///< longest line of a table in characters; 0: no limit
+  std::size_t first_rows = 1000;        ///< rows of a table that determine the widths of columns
 };
 
-/// Formats the rows of one answer as they come. Its memory does not grow with them.
+/// Formats the rows of one answer as they arrive, in constant memory.
 class RowPrinter {
  public:
   virtual ~RowPrinter() = default;
-  /// Appends the rows of a sound chunk (proto/wire); the first one, with or without rows, names the
+  /// Appends the rows of a valid chunk (proto/wire). The first chunk, which may be empty, names the
   /// columns.
   virtual void print(const protocol::QueryReply& chunk, std::string& out) = 0;
   /// Appends what follows the last row.
@@ -154,27 +152,26 @@ class RowPrinter {
 };
 std::unique_ptr<RowPrinter> make_printer(const OutputSettings& settings);
 
-/// A whole answer as text; of the settings those for `make_printer` matter.
+/// A whole answer as text; uses the settings of `make_printer`.
 std::string text_of(const std::vector<protocol::QueryReply>& chunks,
                     const OutputSettings& settings);
 
-/// Where the rows of an answer go: standard output, a pager where that is a terminal, or a file,
-/// which appears when all is written (AtomicFile).
-///
-/// For rows that are computed here: write them into a protocol::ChunkWriter, `print` what it gives
-/// now and then, and `finish`.
+/// Writes the rows of an answer to standard output, a pager (on a terminal) or a file (AtomicFile).
+/// For rows that are computed here: write them into a protocol::ChunkWriter, `print` its chunks,
+/// and `finish`.
 class RowOutput {
  public:
-  /// A terminal sets `width` and `first_rows`. Throws solver::InputError for a file that cannot be
+  /// On a terminal sets `width` and `first_rows`. Throws solver::InputError if the file cannot be
   /// created.
   explicit RowOutput(OutputSettings settings);
 
-  /// Throws ClosedPipe when the reader has ended, std::runtime_error for a failed write.
+  /// Throws ClosedPipe when the reader has closed the output, std::runtime_error for a failed
+  /// write.
   void print(const protocol::QueryReply& chunk);
-  /// All rows were printed. Throws likewise. Without it no file appears.
+  /// Ends the output. Throws as `print` does. Without it no file appears.
   void finish();
 
-  /// Whether a pager shows it, which the user may leave at any time.
+  /// Whether the output goes through a pager, which the user may leave at any time.
   bool is_paged() const;
 
  private:
@@ -182,18 +179,18 @@ class RowOutput {
   std::unique_ptr<RowPrinter> printer_;
 };
 
-/// Prints a whole table.
 void print(std::ostream& out, const protocol::Table& rows, Format format);
-/// The same to standard output. In tables and on a terminal control characters are made visible
-/// (proto/text.h); in JSON they are escaped; CSV in a file or a pipe holds texts byte for byte.
+/// Prints a whole table to standard output. In tables, and on a terminal, control characters are
+/// made visible (proto/text.h); in JSON they are escaped; CSV in a file or pipe contains texts
+/// unchanged.
 void print_out(const protocol::Table& rows, Format format);
 
 /// Appends a number as the shortest text that reads back as the same bits.
 void append_number(std::string& out, double value);
 void append_number(std::string& out, std::int64_t value);
 
-/// Appends one field of CSV, in quotes where it needs them (RFC 4180); an empty text is quoted too,
-/// because an empty field is NULL.
+/// Appends a field of CSV, quoted if necessary (RFC 4180). An empty text is quoted, too, because an
+/// empty field means NULL.
 void append_csv_field(std::string& out, std::string_view text);
 
 }  // namespace oblique::client

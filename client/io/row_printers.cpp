@@ -66,10 +66,10 @@ class CsvPrinter : public RowPrinter {
 
 /// A list that a column stores as JSON text.
 struct PackedList {
-  std::span<const std::string_view> members;  // of an element; empty: they have no names
+  std::span<const std::string_view> members;  // names of the members of an element; empty: none
 };
 
-/// What the column of that name stores; nothing where that is no list.
+/// The list that a column stores; nothing if it stores none.
 std::optional<PackedList> packed_list(std::string_view column) {
   const auto* list = solver::find_result_list(column);
   bool is_part = false;
@@ -85,8 +85,8 @@ std::optional<PackedList> packed_list(std::string_view column) {
   return column == "lengths_m" ? std::optional(PackedList{}) : std::nullopt;
 }
 
-/// The elements of a list; those with names become objects, as in `solve --json`. Nothing where the
-/// text is no list of plain values or of lists of them.
+/// The elements of a list; elements with named members become objects, as in `solve --json`.
+/// Nothing if the text is no list of plain values or of lists of them.
 std::optional<ordered_json> unpacked(const PackedList& packed, std::string_view text) {
   auto list = ordered_json::parse(text.begin(), text.end(), nullptr, false);
   if (!list.is_array()) {
@@ -113,7 +113,7 @@ std::optional<ordered_json> unpacked(const PackedList& packed, std::string_view 
   return std::optional<ordered_json>(std::in_place, std::move(list));
 }
 
-/// As \u.... wherever a terminal would act on a character; bytes that are not UTF-8 become U+FFFD.
+/// Escapes characters as \u.... if a terminal would act on them; invalid UTF-8 becomes U+FFFD.
 void append_json(std::string& out, const ordered_json& value, bool only_ascii) {
   out += value.dump(-1, ' ', only_ascii, ordered_json::error_handler_t::replace);
 }
@@ -127,7 +127,8 @@ void append_json_text(std::string& out, std::string_view text) {
   }
 }
 
-/// A finite number so that readers of JSON take it for a real one: 7.0. Else `null`.
+/// A finite number with a point or exponent, so that JSON readers parse a real number: 7.0. Else
+/// `null`.
 void append_json_real(std::string& out, double value) {
   if (!std::isfinite(value)) {
     out += "null";
@@ -140,7 +141,7 @@ void append_json_real(std::string& out, double value) {
   }
 }
 
-/// The names of columns; of equal ones the second becomes name_2, and so on.
+/// Column names; of equal names the second becomes name_2, and so on.
 std::vector<std::string> distinct_names(const protocol::QueryReply& chunk) {
   std::vector<std::string> names;
   const auto contains = [](const auto& list, const std::string& name) {
@@ -222,13 +223,13 @@ class JsonPrinter : public RowPrinter {
 };
 
 constexpr std::size_t kGap = 2;     // between columns
-constexpr const char* kMore = "…";  // ends a heading that lacks columns
-/// Texts are not shortened below that.
+constexpr const char* kMore = "…";  // ends the heading if columns are left out
+/// Texts are not shortened below this length.
 constexpr std::size_t kShortestText = 12;
-/// Nor are sentences wrapped into less.
+/// Sentences are not wrapped below this width.
 constexpr std::size_t kNarrowestSentence = 16;
 
-/// A value on one line: six digits, NULL as a dash.
+/// A value on one line: six digits; NULL is a dash.
 std::string table_cell(const Cell& cell, double per_unit) {
   switch (cell.kind) {
     case CellKind::kInteger:
@@ -247,12 +248,12 @@ std::string table_cell(const Cell& cell, double per_unit) {
   return "-";
 }
 
-/// Characters before the point of a number, all when it has none.
+/// Number of characters before the point; all if there is none.
 std::size_t before_point(std::string_view number) {
   return std::min(number.find('.'), number.size());
 }
 
-/// The first `width` characters, the last one being an ellipsis when there are more.
+/// The first `width` characters; if more follow, the last is an ellipsis.
 std::string shortened_to(const std::string& text, std::size_t width) {
   if (width_of(text) <= width) {
     return text;
@@ -265,9 +266,9 @@ std::string shortened_to(const std::string& text, std::size_t width) {
   return text.substr(0, bytes) + "…";
 }
 
-/// Widths of columns are those of the first rows; a later value that is wider shifts the rest of
-/// its line. Where lines would be too long, texts are shortened, then columns left out from the
-/// right, which a line below the table says. Another one says what the letters of a mode mean.
+/// The first rows determine the widths of columns; a wider later value shifts the rest of its line.
+/// If lines are too long, texts are shortened first; then columns are left out from the right, and
+/// a line below the table names them. Another line explains the letters of modes.
 class TablePrinter : public RowPrinter {
  public:
   explicit TablePrinter(OutputSettings settings) : settings_(std::move(settings)) {}
@@ -285,7 +286,7 @@ class TablePrinter : public RowPrinter {
     double per_unit = 1.0;
     std::size_t width = 0;
     std::size_t before_point = 0;  // of numbers
-    std::size_t after_point = 0;   // the point included
+    std::size_t after_point = 0;   // including the point
     bool has_numbers = false;
   };
   using Line = std::vector<Value>;
@@ -304,7 +305,7 @@ class TablePrinter : public RowPrinter {
 
   OutputSettings settings_;
   std::vector<Column> columns_;
-  std::size_t shown_ = 0;    // of the columns, from the left; the others are left out
+  std::size_t shown_ = 0;    // number of columns shown, from the left
   std::vector<Line> first_;  // kept until the widths are known
   bool has_begun_ = false;
   bool has_head_ = false;
@@ -370,7 +371,7 @@ std::size_t TablePrinter::line_width() const {
   return all;
 }
 
-/// Whether sentences of the column go on in further lines.
+/// Whether sentences of the column are wrapped.
 bool TablePrinter::wraps(const Column& column) const {
   return !settings_.may_leave_out && settings_.width > 0 && !column.has_numbers &&
          &column == &columns_.back();
@@ -382,8 +383,8 @@ std::size_t TablePrinter::least_width(const Column& column) const {
                               : std::max(kShortestText, width_of(column.heading));
 }
 
-/// Makes lines fit: sentences in the last column are wrapped where all columns are kept, then the
-/// widest text is shortened, and at least one column stays.
+/// Makes lines fit. Wraps sentences in the last column if all columns are kept; then shortens the
+/// widest text; then leaves out columns, except the first.
 void TablePrinter::fit() {
   while (settings_.width > 0 && line_width() > settings_.width) {
     Column* widest = nullptr;
@@ -425,7 +426,7 @@ void TablePrinter::print_cells(const std::vector<std::string>& cells, std::strin
 
 void TablePrinter::print_line(const Line& line, std::string& out) const {
   std::vector<std::string> cells;
-  std::vector<std::string> sentence;  // lines of the last cell
+  std::vector<std::string> sentence;  // further lines of the last cell
   for (std::size_t i = 0; i < line.size(); ++i) {
     const auto& [text, is_number] = line[i];
     const Column& column = columns_[i];
@@ -485,7 +486,7 @@ void TablePrinter::end(std::string& out) {
     out += fmt::format("({})\n", kModeLetters);
   }
   if (!left_out.empty()) {
-    const auto lines = wrapped(fmt::format("Left out, for a width of {} ({}): {}", settings_.width,
+    const auto lines = wrapped(fmt::format("Left out to fit {} columns ({}): {}", settings_.width,
                                            settings_.way_to_all, fmt::join(left_out, ", ")),
                                settings_.width);
     out += fmt::format("{}\n", fmt::join(lines, "\n"));

@@ -54,8 +54,8 @@ PublishedCase case_of(const toml::table& table) {
           table["read"].value<std::string>().value()};
 }
 
-// Rows do not have F_n at valleys, so they do not say which turns a ripple takes with it: phases
-// are known up to the peak before the first ripple.
+// Rows do not store F_n at valleys, so the turns of a ripple are unknown: only the phases up to the
+// peak before the first ripple are used.
 CaseNumbers case_of_row(const protocol::Row& row) {
   CaseNumbers own;
   own.mode = std::get<std::string>(row[7]);
@@ -99,7 +99,7 @@ protocol::Value value_or_null(const std::optional<double>& value) {
   return value ? protocol::Value(*value) : protocol::Value();
 }
 
-// "5.058 / 5.07 / -0.24", or what there is of it.
+// "5.058 / 5.07 / -0.24"; missing values are dashes.
 std::string beside(const std::vector<Difference>& differences, std::size_t case_index,
                    Quantity quantity, std::size_t index, int decimals) {
   const auto found =
@@ -179,9 +179,9 @@ std::string place_of(const PublishedTable& published, const Difference& differen
 void print_differences_summary(std::ostream& out, const PublishedTable& published,
                                const std::vector<Difference>& differences) {
   const auto summary = summary_of(differences);
-  out << fmt::format("\n{} trustworthy published numbers", differences.size());
+  out << fmt::format("\n{} reliable published numbers", differences.size());
   if (summary.missing > 0) {
-    out << fmt::format(", {} of them without ours", summary.missing);
+    out << fmt::format(", {} of them not computed", summary.missing);
   }
   if (summary.largest) {
     out << fmt::format(
@@ -325,8 +325,7 @@ OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows) {
       }
       if (own[i]) {
         throw std::runtime_error(
-            fmt::format("the study has several points with {}: the comparison needs a study of one "
-                        "model",
+            fmt::format("the study has several points with {}: compare a study of one model",
                         place_of(table.cases[i])));
       }
       own[i] = case_of_row(row);
@@ -379,7 +378,7 @@ void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases&
   if (solved > 0) {
     out << fmt::format("\nThe mode is the published one in {} of {} cases solved", same_modes,
                        solved)
-        << (others.empty() ? ".\n" : ". It is another one, with other peaks, at\n\n" + others);
+        << (others.empty() ? ".\n" : ". The mode differs, and with it the peaks, at\n\n" + others);
   }
 }
 
@@ -390,7 +389,7 @@ void print_comparison(std::ostream& out, const PublishedTable& table, const OwnC
   out << '\n';
   print_modes(out, table, own);
   print_differences_summary(out, table, differences);
-  out << "\nNot counted, for they are misprinted:\n\n";
+  out << "\nNot counted, because they are misprints:\n\n";
   for (const auto& [where, printed, why] : table.misprints) {
     out << fmt::format("- {}: {}\n    {}\n", where, fmt::join(printed, "; "), why);
   }
@@ -405,11 +404,11 @@ using Eigen::VectorXd;
 constexpr int kMostIterations = 50;
 constexpr double kSmallestStep = 1e-5;
 constexpr double kSmallestGain = 1e-3;
-/// Of a parameter, for derivatives: the outputs are smooth to about 1e-7 of themselves.
+/// Relative step of a parameter for derivatives: outputs are smooth to about 1e-7 of their value.
 constexpr double kDifferenceStep = 1e-4;
 
-/// Every published number beside what each of the models gives. Falls that `falls` does not keep
-/// are solved together.
+/// Compares the published numbers with the results of each model. Missing falls are solved
+/// together.
 std::vector<std::vector<Difference>> differences_of(const PublishedTable& published,
                                                     std::span<const solver::ModelParameters> models,
                                                     solver::FallCache& falls) {
@@ -428,7 +427,7 @@ std::vector<std::vector<Difference>> differences_of(const PublishedTable& publis
   return differences;
 }
 
-/// r_i(x) = ours_i / published_i - 1 with the parameters start exp(x).
+/// r_i(x) = ours_i / published_i - 1 for the parameters start exp(x).
 class Residuals : public Eigen::DenseFunctor<double> {
  public:
   Residuals(const PublishedTable& published, const solver::ModelParameters& start, int values,
@@ -505,7 +504,7 @@ FitStep fit_parameters(const PublishedTable& published, const solver::ModelParam
          status == Eigen::LevenbergMarquardtSpace::Running) {
     if (step.iteration == kMostIterations) {
       throw solver::SolveError(
-          fmt::format("the fit has found no minimum after {} iterations", kMostIterations));
+          fmt::format("the fit found no minimum in {} iterations", kMostIterations));
     }
     status = method.minimizeOneStep(x);
     step = step_at(step.iteration + 1, residuals.model_at(x));

@@ -19,27 +19,26 @@
 
 namespace oblique::client {
 
-/// Numbers of one impact in the units that the paper prints, ripples merged.
+/// Numbers of one impact in the paper's units, ripples merged.
 struct CaseNumbers {
   std::string mode;
   std::vector<double> fn_kN;      ///< F_n at each major peak
   std::vector<double> ft_kN;      ///< largest |F_t| around each major peak
-  std::vector<double> phases_ms;  ///< how long each lasts
+  std::vector<double> phases_ms;  ///< duration of each phase
   std::optional<double> stick_ms;
 };
 
-/// What the paper publishes of one impact.
 struct PublishedCase : CaseNumbers {
   double H_m;
   double mu;
   double e_star;
-  std::string read;  ///< where the numbers are printed
+  std::string read;  ///< place in the paper
 
-  /// Whether it is the case of these values, which may have gone through decimal text.
+  /// Whether the values are those of this case, up to rounding in decimal text.
   bool is_at(double H, double friction, double e) const;
 };
 
-/// Something printed that cannot be read as it stands.
+/// A printed number that is wrong.
 struct Misprint {
   std::string where;
   std::vector<std::string> printed;
@@ -51,33 +50,33 @@ struct PublishedTable {
   std::vector<Misprint> misprints;
 };
 
-/// The table that this program was built with: client/paper/published.toml.
+/// The table client/paper/published.toml, which is compiled into the program.
 PublishedTable published_table();
 
-/// Peaks of F_n that the case's mode has: one each time that compression ends.
+/// Number of peaks of F_n in the case's mode: one per compression phase.
 int published_peaks(const PublishedCase& published);
 
-/// A case's numbers of a result.
+/// The numbers of a result that the paper publishes.
 CaseNumbers own_case(const solver::CaseResult& result);
 
-/// Our numbers for each published case; nothing for one that is not solved.
+/// Our numbers for each published case; nothing for a case that is not solved.
 using OwnCases = std::vector<std::optional<CaseNumbers>>;
 
 enum class Quantity { kFn, kFt, kPhase, kStick };
 
-/// One published number beside ours, in the unit that the paper prints (kN or ms).
+/// A published number and ours, in the paper's unit (kN or ms).
 struct Difference {
   std::size_t case_index;
   Quantity quantity;
-  std::size_t index;  ///< which peak or phase, from 0
+  std::size_t index;  ///< number of the peak or phase, from 0
   double published;
-  std::optional<double> ours;  ///< nothing where we have no such peak, phase or case
+  std::optional<double> ours;  ///< nothing if we have no such peak, phase or case
 
   /// (ours - published) / published, in percent.
   std::optional<double> percent() const;
 };
 
-/// Every counted published number beside ours; `own` has one entry a case.
+/// All counted published numbers and ours; `own` has one entry per case.
 std::vector<Difference> compare(const PublishedTable& table, const OwnCases& own);
 
 /// Root mean square and largest size of the differences [%].
@@ -90,44 +89,43 @@ struct DifferenceSummary {
 };
 DifferenceSummary summary_of(const std::vector<Difference>& differences);
 
-/// Solves the cases with each finger, all side by side: a list for each. Throws solver::SolveError
-/// when one cannot be solved.
+/// Solves the cases with each finger, in parallel; returns a list for each finger. Throws
+/// solver::SolveError if a case cannot be solved.
 std::vector<OwnCases> solved_cases(const PublishedTable& table,
                                    std::span<const solver::Finger> fingers);
 
 /// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
-/// stick_total_s and major_mode. A case without a solved point is nothing, and phases from the
-/// first ripple on are left out. Throws std::runtime_error when a case has several points.
+/// stick_total_s and major_mode. A case without a solved point gives nothing; phases from the first
+/// ripple on are left out. Throws std::runtime_error if a case has several points.
 OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows);
 
-/// Prints the tables for people: forces, durations, stick times, modes and where they are not the
-/// published ones, summary, misprints.
+/// Prints the tables: forces, durations, stick times, modes with the differing ones, summary,
+/// misprints.
 void print_comparison(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
-/// Of these, peaks and modes alone.
+/// Prints only peaks and modes.
 void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
-/// The differences as rows, one a published number, for CSV and JSON.
+/// The differences as rows, one per published number, for CSV and JSON.
 protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences);
 
-/// Model keys that the paper does not print, or prints rounded, and that are fitted.
+/// Fitted model keys, which the paper omits or rounds.
 inline constexpr std::array<std::string_view, 4> kFittedKeys{"A", "I", "k", "eta2"};
 
-/// Where a fit stands.
 struct FitStep {
   int iteration;                        ///< 0: the start
   solver::ModelParameters model;        ///< with the fitted parameters of this iteration
-  std::vector<Difference> differences;  ///< from every published number
+  std::vector<Difference> differences;  ///< all published numbers
   DifferenceSummary summary;
 };
 
-/// Fits the parameters of kFittedKeys, from where `start` has them, so that the sum of squared
-/// relative differences from all published numbers is least (Levenberg-Marquardt on the logarithms
-/// of the parameters, derivatives by differences). A published peak, phase or stick that the model
-/// lacks counts as a difference of 100 %. Stops when an iteration lowers the sum of squares by less
-/// than 1e-3 of itself, or moves the parameters by less than 1e-5 of the way from the start.
-/// `after_each` is called with the start and after each iteration. Gives the last step. Throws
-/// SolveError when no minimum is found within 50 iterations or a model on the way cannot be solved.
+/// Fits the parameters of kFittedKeys, beginning with `start`. Minimises the sum of squared
+/// relative differences from all published numbers by Levenberg-Marquardt on the logarithms of the
+/// parameters, with derivatives by differences. A published peak, phase or stick that the model
+/// lacks counts as a difference of 100 %. Stops when an iteration lowers the sum by less than 1e-3
+/// of itself, or moves the parameters by less than 1e-5 of their distance from the start. Calls
+/// `after_each` with the start and each iteration. Returns the last iteration. Throws SolveError if
+/// there is no minimum within 50 iterations or a model cannot be solved.
 FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,
                        const std::function<void(const FitStep&)>& after_each);
 

@@ -37,7 +37,7 @@ PaperCase solved_case(const PublishedCase& published, const solver::Finger& fing
   return one;
 }
 
-/// The value between the instants of the trace.
+/// Linear interpolation between instants of the trace.
 double value_at(const PaperCase& one, double t_s, plot::Column value) {
   const auto& rows = one.history.rows;
   const auto after =
@@ -50,10 +50,10 @@ double value_at(const PaperCase& one, double t_s, plot::Column value) {
   return before.*value + share * ((*after).*value - before.*value);
 }
 
-/// Adds the published numbers of a case to a curve of diamonds.
+/// Adds published numbers of a case to a curve as diamonds.
 using AddPublished = std::function<void(const PaperCase& one, Curve& diamonds)>;
 
-/// Peaks of F_n at the instants of ours, or of F_t when |F_t| is largest around these.
+/// Published peaks of F_n, or of F_t at the largest |F_t| around them, at our instants.
 void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   const auto& published = of_ft ? one.published.ft_kN : one.published.fn_kN;
   std::size_t next = 0;
@@ -71,7 +71,7 @@ void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   }
 }
 
-/// Where phases end, on our curve at the end of our phase of the same number.
+/// Published ends of phases, on our curve at the end of our phase of the same number.
 void add_phase_ends(const PaperCase& one, Curve& diamonds) {
   const CaseNumbers own = own_case(*one.history.result);
   double published_s = 0.0;
@@ -101,7 +101,7 @@ void add_if_any(Panel& panel, Curve curve) {
   }
 }
 
-/// What a panel draws of each case of a group: a column over time.
+/// What a panel draws for each case of a group: a column over time.
 struct PanelPlan {
   std::string label;
   std::string name;
@@ -123,13 +123,13 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
     longest_s = std::max(longest_s, t_s);
   }
   add_if_any(panel, std::move(published));
-  panel.x = plot::time_axis(1.03 * longest_s);  // marks at the end are whole
+  panel.x = plot::time_axis(1.03 * longest_s);  // include marks at the end
   panel.y = {.label = plan.label, .name = plan.name, .per_unit = plan.per_unit};
   plot::fit(panel.y, panel.curves, &Curve::y);
   return panel;
 }
 
-/// A figure with a column of panels for each group, lettered as the paper's, two groups a row.
+/// A figure with a column of panels for each group, two groups per row, lettered as in the paper.
 Figure over_time(const PaperGroups& groups, const std::string& title, const std::string& subtitle,
                  double panel_height, const std::vector<PanelPlan>& plans) {
   Figure figure{
@@ -152,12 +152,12 @@ Figure over_time(const PaperGroups& groups, const std::string& title, const std:
   return figure;
 }
 
-/// The loop of each e* on one scale.
+/// The hysteresis loops for all e* in one panel.
 Figure hysteresis(const PaperGroup& over_e) {
   Figure figure{.title = "Fig. 3: normal force against deformation",
                 .subtitle =
                     "H = 1 m, \u03bc = 0.4. Slopes are k in compression and k/e*\u00b2 in "
-                    "restitution. Diamonds: published peaks, at our deformation",
+                    "restitution. Diamonds: published peaks at our deformation",
                 .columns = 3,
                 .panel_size = {400.0, 360.0}};
   plot::Range x{0.0, 0.0};
@@ -183,10 +183,10 @@ Figure hysteresis(const PaperGroup& over_e) {
   return figure;
 }
 
-/// The paths of the tip, for which the paper has no group over H.
+/// The paths of the tip; the paper has no group over H for them.
 Figure trajectory(const PaperGroups& groups) {
   Figure figure{.title = "Fig. 7: path of the fingertip during contact",
-                .subtitle = "The tip touches at the right, and slides to the left",
+                .subtitle = "The tip touches on the right and slides to the left",
                 .columns = 3,
                 .panel_size = {400.0, 360.0}};
   for (std::size_t i = 1; i < groups.size(); ++i) {
@@ -240,27 +240,25 @@ PaperGroups solved_groups(const PublishedTable& table, const solver::Finger& fin
 }
 
 std::vector<PaperFigure> paper_figures(const PaperGroups& groups) {
-  return {
-      {"fig3_hysteresis", hysteresis(groups[1])},
-      {"fig4_forces",
-       over_time(groups, "Fig. 4: normal and tangential contact forces",
-                 "Diamonds: published peaks (Tab. 2), at the instants of ours", 250.0,
-                 {{"normal force F_n [N]", "fn_N", 1.0, &TraceRow::fn_N,
-                   std::bind_front(add_peaks, false)},
-                  {"tangential force F_t [N]", "ft_N", 1.0, &TraceRow::ft_N,
-                   std::bind_front(add_peaks, true)}})},
-      {"fig5_deformation",
-       over_time(groups, "Fig. 5: deformation of the normal element",
-                 "Diamonds: published ends of compression and restitution (section 4.2), at our "
-                 "deformation",
-                 340.0,
-                 {{"normal deformation u_y [\u00b5m]", "uy_m", plot::kMicro, &TraceRow::uy_m,
-                   add_phase_ends}})},
-      {"fig6_velocity_of_P",
-       over_time(groups, "Fig. 6: tangential velocity of P",
-                 "P sticks where it is 0. Diamonds: published ends of stick (section 4.3)", 340.0,
-                 {{"velocity of P [m/s]", "vP_m_s", 1.0, &TraceRow::vP_m_s, add_stick_end}})},
-      {"fig7_trajectory", trajectory(groups)}};
+  return {{"fig3_hysteresis", hysteresis(groups[1])},
+          {"fig4_forces", over_time(groups, "Fig. 4: normal and tangential contact forces",
+                                    "Diamonds: published peaks (Tab. 2) at our instants", 250.0,
+                                    {{"normal force F_n [N]", "fn_N", 1.0, &TraceRow::fn_N,
+                                      std::bind_front(add_peaks, false)},
+                                     {"tangential force F_t [N]", "ft_N", 1.0, &TraceRow::ft_N,
+                                      std::bind_front(add_peaks, true)}})},
+          {"fig5_deformation", over_time(groups, "Fig. 5: deformation of the normal element",
+                                         "Diamonds: published ends of compression and restitution "
+                                         "(section 4.2) at our deformation",
+                                         340.0,
+                                         {{"normal deformation u_y [\u00b5m]", "uy_m", plot::kMicro,
+                                           &TraceRow::uy_m, add_phase_ends}})},
+          {"fig6_velocity_of_P",
+           over_time(
+               groups, "Fig. 6: tangential velocity of P",
+               "P sticks where the velocity is 0. Diamonds: published ends of stick (section 4.3)",
+               340.0, {{"velocity of P [m/s]", "vP_m_s", 1.0, &TraceRow::vP_m_s, add_stick_end}})},
+          {"fig7_trajectory", trajectory(groups)}};
 }
 
 }  // namespace oblique::client

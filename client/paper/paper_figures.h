@@ -10,11 +10,11 @@
 
 namespace oblique::client {
 
-/// A published case with our time histories of it.
+/// A published case with its time histories, solved here.
 struct PaperCase {
   PublishedCase published;
-  plot::PointHistory history;  ///< with its result
-  std::string name;            ///< what tells it from others of its group: "H = 0.96 m"
+  plot::PointHistory history;  ///< including its result
+  std::string name;            ///< label within its group: "H = 0.96 m"
 };
 
 /// Cases that differ in one parameter.
@@ -23,21 +23,22 @@ struct PaperGroup {
   std::vector<PaperCase> cases;
 };
 
-/// The paper's groups in its order: over H, over e*, over small and over large mu.
+/// The paper's groups in its order: over H, over e*, over small mu and over large mu.
 using PaperGroups = std::vector<PaperGroup>;
 
-/// Solves each case once. Throws solver::SolveError when one cannot be solved, std::runtime_error
-/// when the table lacks one.
+/// Solves each case once. Throws solver::SolveError if a case cannot be solved, std::runtime_error
+/// if the table lacks a case.
 PaperGroups solved_groups(const PublishedTable& table, const solver::Finger& finger);
 
-/// One of the paper's figures as we draw it.
+/// One of the paper's figures, drawn with our results.
 struct PaperFigure {
-  std::string name;  ///< of its file, without ending: "fig4_forces"
+  std::string name;  ///< file name without ending: "fig4_forces"
   plot::Figure figure;
 };
 
-/// Figs. 3 to 7, each curve solved by us and published numbers as diamonds. The paper publishes no
-/// instants of peaks: diamonds are at ours. Ends of phases are sums of published durations.
+/// Figs. 3 to 7: our solutions as curves, published numbers as diamonds. The paper publishes no
+/// instants of peaks, so diamonds are drawn at ours. Ends of phases are sums of published
+/// durations.
 std::vector<PaperFigure> paper_figures(const PaperGroups& groups);
 
 }  // namespace oblique::client

@@ -26,7 +26,7 @@ Range around(double value, bool is_logarithmic) {
   return is_logarithmic ? Range{value / 1.25, value * 1.25} : Range{value - half, value + half};
 }
 
-/// The symbol of a quantity with its name, else the first words of what a column means, else its
+/// Label of a quantity: its symbol with a name, else the first words of its description, else its
 /// name.
 std::string label_of(const std::string& name) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kSymbols{{
@@ -128,7 +128,7 @@ std::vector<double> edges_between(const std::vector<double>& values, bool is_log
     edges.push_back(is_logarithmic ? std::sqrt(values[i - 1]) * std::sqrt(values[i])
                                    : 0.5 * (values[i - 1] + values[i]));
   }
-  // The outer cells reach as far outwards as inwards.
+  // The outer cells are symmetric.
   const auto mirrored = [is_logarithmic](double end, double inner) {
     return is_logarithmic ? end / inner * end : end + (end - inner);
   };
@@ -150,7 +150,7 @@ namespace {
 using protocol::CellKind;
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
-/// The cell of each row of an answer of x and y; SIZE_MAX: none.
+/// The cell of each row with x and y; SIZE_MAX: none.
 std::vector<std::size_t> places_in(const Cells& cells, const Answer& answer) {
   std::vector<std::size_t> places;
   for (std::size_t row = 0; row < answer[0].numbers.size(); ++row) {
@@ -162,11 +162,10 @@ std::vector<std::size_t> places_in(const Cells& cells, const Answer& answer) {
   return places;
 }
 
-/// A text in a cell.
+/// A text and its frequency in a cell.
 using WordOfCell = std::pair<std::size_t, std::uint32_t>;
 
-/// Names each cell by the text that it has most often; of those that are equally many by the first
-/// in the answer.
+/// Names each cell by its most frequent text; of equally frequent texts by the first in the answer.
 void name_cells(Gathered& gathered, std::vector<WordOfCell>& words, const AnswerColumn& column) {
   gathered.cells.names.resize(gathered.counts.size());
   std::vector<std::ptrdiff_t> most(gathered.counts.size(), 0);
@@ -194,7 +193,7 @@ void AnswerColumn::add(const protocol::Cell& cell) {
                     : cell.kind == CellKind::kInteger ? static_cast<double>(cell.integer)
                                                       : kNoNumber);
   if (cell.kind == CellKind::kText || !word_of_row.empty()) {
-    word_of_row.resize(numbers.size(), kNoWord);  // rows before the first text have none
+    word_of_row.resize(numbers.size(), kNoWord);  // rows before the first text
   }
   if (cell.kind == CellKind::kText) {
     const auto next = static_cast<std::uint32_t>(words.size());
@@ -222,7 +221,7 @@ Answer read_columns(RowStream& stream) {
     }
     if (!columns.empty() && columns.front().numbers.size() > kMostRows) {
       throw std::runtime_error(
-          fmt::format("a picture is made of at most {} points, and these are more: take fewer by "
+          fmt::format("a picture shows at most {} points, and these are more: select fewer with "
                       "--where or --at",
                       format_count(kMostRows)));
     }
@@ -253,7 +252,7 @@ std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn
   });
   of_study.insert(of_study.end(), others.begin(), others.end());
   std::sort(of_study.begin(), of_study.end());
-  // Another machine may have computed a value with another last bit.
+  // Another machine may have computed a value with a different last bit.
   const auto end = std::unique(of_study.begin(), of_study.end(), [](double a, double b) {
     return std::abs(b - a) <= 1e-12 * std::abs(b);
   });

@@ -21,7 +21,7 @@
 namespace oblique::client::plot {
 namespace {
 
-// Lines differ in lightness, dashes and marks, so that they are told apart in print too.
+// Lines differ in lightness, dashes and marks, so that they can be distinguished in print.
 constexpr std::size_t kLineStyles = 8;
 constexpr std::string_view kStyles = R"(set encoding utf8
 set border 15 lc rgb '#556070' lw 1
@@ -38,7 +38,7 @@ set style line 7 lw 1.7 ps 0.7 lc rgb '#666666' dt (2,5) pt 6
 set style line 8 lw 1.7 ps 0.7 lc rgb '#111111' dt (14,4,4,4) pt 4
 )";
 
-/// An axis: its letter, label and range.
+/// {0}: letter of the axis, {1}: label, {2} and {3}: range.
 constexpr std::string_view kAxis = R"(set {0}label {1} noenhanced
 unset logscale {0}
 set {0}tics autofreq
@@ -46,8 +46,8 @@ set format {0} '%h'
 set {0}range [{2}:{3}]
 )";
 
-/// Ticks of a logarithmic axis: its letter, and digits. gnuplot marks powers of ten alone. Ticks
-/// outside the range are not drawn.
+/// Ticks of a logarithmic axis. {0}: letter, {1}: digits. gnuplot marks only powers of ten by
+/// itself. Ticks outside the range are not drawn.
 constexpr std::string_view kLogTicks = R"(set logscale {0}
 set {0}tics ()
 do for [power=-9:9] {{ do for [digit in '{1}'] {{ set {0}tics add (digit*10.0**power) }} }}
@@ -57,40 +57,40 @@ constexpr std::array<std::uint32_t, 11> kViridis{0x440154, 0x482475, 0x414487, 0
                                                  0x2a788e, 0x21918c, 0x22a884, 0x44bf70,
                                                  0x7ad151, 0xbddf26, 0xfde725};
 
-// Compression is darker than restitution, in grey too; stick is hatched over both.
+// Compression is darker than restitution, also in grey; stick is hatched over both.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kSpanStyles{{
     {"compression", "fs solid 1 noborder fc rgb '#cfe1f3'"},
     {"restitution", "fs solid 1 noborder fc rgb '#fcf3e6'"},
     {"stick", "fs transparent pattern 5 noborder fc rgb '#939da7'"},
 }};
 
-/// How curves are drawn, by Curve::Mark.
+/// Styles of curves by Curve::Mark.
 constexpr std::array<std::string_view, 4> kMarks{
     "lines ls {}", "linespoints ls {}", "points ls {} pt 7 ps 0.4", "points ls {} pt 12 ps 1.0"};
 
-// Sizes of texts in pixels; a character of a terminal is counted as a letter.
-constexpr double kLetter = 6.5;  // width on average, rather too much
+// Sizes of text in pixels. On a terminal one character counts as a letter.
+constexpr double kLetter = 6.5;  // average width, rounded up
 constexpr double kLine = 17.0;
 constexpr double kTitle = 22.0;
 constexpr double kMargin = 12.0;
 
-/// A category of cells, or a kind of cells without a value, as maps and legends show it.
+/// A category of cells, or a kind of cells without a value, as drawn.
 struct Kind {
   std::uint32_t colour;
-  int pattern;           ///< gnuplot's; 0: none
+  int pattern;           ///< gnuplot's number; 0: none
   std::string_view ink;  ///< of the pattern
-  char letter;           ///< on terminals; pictures have the capitals
+  char letter;           ///< on terminals; pictures use capitals
   std::string text;      ///< in the legend
   std::uint64_t count;   ///< of points or cells
 
   bool has_capital() const { return std::isupper(static_cast<unsigned char>(letter)) != 0; }
 };
-constexpr int kNoKind = -1;  // a number from the scale of colours, or blank
+constexpr int kNoKind = -1;  // colour or value column of the data, or blank
 
-/// The categories, and behind them cells without a result, left out and failed.
+/// The categories, followed by cells without a result, excluded and failed ones.
 std::vector<Kind> kinds_of(const Cells& cells) {
-  // Light enough for hatching and letters in black: the scheme "light" of P. Tol, a brown, and four
-  // darker ones.
+  // Light enough for black patterns and letters: the scheme "light" of P. Tol, a brown, and four
+  // darker colours.
   static constexpr std::array<std::uint32_t, 12> kFills{0x77aadd, 0xeedd88, 0xee8866, 0x99ddff,
                                                         0xbbcc33, 0xffaabb, 0x44bb99, 0xb59a80,
                                                         0x5a88b5, 0xc2b25c, 0xc2694b, 0x70b3d1};
@@ -119,12 +119,12 @@ std::vector<Kind> kinds_of(const Cells& cells) {
     kinds.push_back(std::move(kind));
   };
   add_gap(CellState::kNoResult, {0xffffff, 5, "#9aa3ad", '/', "no result", 0});
-  add_gap(CellState::kFiltered, {0xeceff2, 6, "#c3cad2", '-', "left out by --where", 0});
+  add_gap(CellState::kFiltered, {0xeceff2, 6, "#c3cad2", '-', "excluded by --where", 0});
   add_gap(CellState::kFailed, {0xffffff, 1, "#c01c14", 'x', "failed", 0});
   return kinds;
 }
 
-/// The number of a cell's kind.
+/// Number of a cell's kind.
 int kind_of(const Cells& cells, std::size_t cell) {
   const auto categories = static_cast<int>(cells.categories.size());
   const CellState state = cells.states[cell];
@@ -137,7 +137,7 @@ int kind_of(const Cells& cells, std::size_t cell) {
                                          : kNoKind;
 }
 
-/// Equal parts of a panel, row by row from below, each with the cell at its middle.
+/// The panel divided into equal parts, by rows from below, each with the cell at its middle.
 struct Raster {
   std::size_t columns;
   std::size_t rows;
@@ -163,13 +163,13 @@ Raster raster_of(const Panel& panel, std::size_t columns, std::size_t rows) {
   return raster;
 }
 
-/// The parts of a raster where a letter names the category around: the middles of the largest
-/// squares of one category, far from each other.
+/// Places for the letter that names a category: the middles of its largest squares, far from each
+/// other.
 std::vector<std::size_t> letter_places(const Cells& cells, const Raster& raster) {
   const std::size_t columns = raster.columns;
   const auto kind_at = [&](std::size_t part) { return kind_of(cells, raster.cells[part]); };
   std::vector<std::size_t> sides(raster.cells.size(), 1);
-  std::vector<std::size_t> corners;  // upper right ones of squares with room for a letter
+  std::vector<std::size_t> corners;  // upper right corners of squares with room for a letter
   for (std::size_t i = columns + 1; i < sides.size(); ++i) {
     const int kind = kind_at(i);
     if (i % columns != 0 && kind == kind_at(i - 1) && kind == kind_at(i - columns) &&
@@ -204,12 +204,12 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.8g}", value) : "NaN";
 }
 
-/// Lines of at most that many letters, broken at spaces.
+/// Lines of at most `letters` characters, broken at spaces.
 std::vector<std::string> lines_of(const std::string& text, double letters) {
   return wrapped(text, static_cast<std::size_t>(std::max(letters, 8.0)));
 }
 
-/// `text` with `mark` before each of the letters.
+/// `text` with `mark` before each of `letters`.
 std::string marked(std::string_view text, std::string_view letters, char mark) {
   std::string out;
   for (const char letter : text) {
@@ -223,7 +223,7 @@ std::size_t rows_of(const Figure& figure) {
   return std::max<std::size_t>(1, (figure.panels.size() + figure.columns - 1) / figure.columns);
 }
 
-/// The script of one figure while it is written.
+/// Builds the script of one figure.
 class Script {
  public:
   Script(const Figure& figure, Size size, bool is_text)
@@ -262,7 +262,7 @@ class Script {
     out_ += is_multiplot ? "unset multiplot\n" : "";
     return std::move(out_);
   }
-  /// Height of what is above and below the panels.
+  /// Height of the texts above and below the panels.
   double above() const { return kMargin + kTitle + kLine * static_cast<double>(subtitle_.size()); }
   double below() const {
     return kLine * static_cast<double>(notes_.size()) + kMargin / 2.0 + (is_text_ ? kLine : 0.0);
@@ -273,16 +273,15 @@ class Script {
   void add(fmt::format_string<Values...> form, Values&&... values) {
     fmt::format_to(std::back_inserter(out_), form, std::forward<Values>(values)...);
   }
-  /// Adds an element to the plot command of the panel.
   template <class... Values>
   void plot(fmt::format_string<Values...> form, Values&&... values) {
     plots_.push_back(fmt::format(form, std::forward<Values>(values)...));
   }
-  /// A place that is counted from the upper left corner.
+  /// A position measured from the upper left corner.
   std::string screen(double x, double y) const {
     return fmt::format("screen {:.4f}, {:.4f}", x / size_.width, 1.0 - y / size_.height);
   }
-  /// Writes lines of text below each other and returns the place of the next.
+  /// Writes lines of text below each other and returns the position of the next.
   double label(const std::vector<std::string>& lines, double x, double y, std::string_view more) {
     for (const auto& line : lines) {
       add("set label {} at {} left noenhanced{}\n", gnuplot_text(line), screen(x, y), more);
@@ -302,7 +301,7 @@ class Script {
     }
     out_.back() = '\n';
   }
-  /// The title of an element, in the key.
+  /// Title of an element in the key; empty: none.
   std::string titled(const std::string& title) {
     titles_.push_back(title);
     return "title " + gnuplot_text(title);
@@ -318,7 +317,7 @@ class Script {
     if (is_text_) {
       label({figure_.title}, x, y, "");
     } else {
-      // Enhanced text, which bold letters need, shows these as they are behind a backslash.
+      // gnuplot needs enhanced text for bold letters; a backslash keeps these characters unchanged.
       const auto title = gnuplot_text(marked(protocol::visible(figure_.title), "\\_^{}@&~", '\\'));
       add("set label '{{/:Bold*1.25 {}}}' at {} left\n", title.substr(1, title.size() - 2),
           screen(x, y));
@@ -339,7 +338,7 @@ class Script {
     }
   }
 
-  /// Where the panel is in the picture, and its title.
+  /// Position of the panel in the picture, and its title.
   void write_frame(const Panel& panel, std::size_t index) {
     frame_.width = size_.width / static_cast<double>(figure_.columns);
     frame_.height = (size_.height - above() - below()) / static_cast<double>(rows_of(figure_));
@@ -358,8 +357,8 @@ class Script {
     }
   }
 
-  /// Puts the key of the titles beside the panel where the picture has room there, or where the
-  /// panel is narrow, else below it in as many columns as fit.
+  /// Places the key beside the panel if the picture has room there or the panel is narrow, else
+  /// below it in as many columns as fit.
   void write_key(const Panel& panel) {
     const bool is_alone = figure_.panels.size() == 1;
     const bool is_below = is_alone ? has_colours() || is_text_ : !panel.has_equal_aspect;
@@ -373,7 +372,7 @@ class Script {
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
     add("set key {} maxcols {}\n",
         !is_below  ? "rmargin top vertical"
-        : is_text_ ? "bmargin left horizontal"  // its letters would be drawn over each other
+        : is_text_ ? "bmargin left horizontal"  // without it letters would overlap
                    : "bmargin left horizontal width -1",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {
@@ -381,7 +380,7 @@ class Script {
           1.0 - (frame_.bottom - (1.15 * lines + 3.8) * kLine) / size_.height);
     }
     if (!is_alone) {
-      // The axes of panels below each other are aligned.
+      // Aligns the axes of panels below each other.
       add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\n",
           (frame_.left + 13.0 * kLetter) / size_.width,
           (frame_.left + frame_.width - (is_below ? 3.0 : 28.0) * kLetter) / size_.width);
@@ -423,8 +422,8 @@ class Script {
     out_ += figure_.panels.size() == 1 ? "" : "unset label\nunset object\n";
   }
 
-  /// Cells by their values and kinds: colours, patterns, borders between categories, and letters.
-  /// Neighbours of one kind in a row are one rectangle.
+  /// Draws cells by values and kinds: colours, patterns, borders between categories, and letters.
+  /// Equal neighbours in a row become one rectangle.
   void write_cells(const Panel& panel, const std::vector<Kind>& kinds) {
     const Cells& cells = *panel.cells;
     out_ += "\n# Cells: x y x0 x1 y0 y1 kind, and a colour or, of kind -1, a value\n";
@@ -448,7 +447,7 @@ class Script {
                            : static_cast<double>(kinds[static_cast<std::size_t>(kind)].colour)});
     }
     out_ += "EOD\n";
-    // The border closes the seams that viewers leave between rectangles.
+    // The border closes the gaps that viewers show between rectangles.
     constexpr std::string_view kRectangles =
         "{} using ($7{}0?$1:NaN):2:3:4:5:6:8 with boxxyerror fs solid 1 lc {} lw 0.3 notitle";
     if (has_colours()) {
@@ -467,7 +466,8 @@ class Script {
       }
     }
     if (has_borders) {
-      // A picture has room beside the map, so a part of the raster has about 5 pixels each way.
+      // The picture has room beside the map, so a part of the raster is about 5 pixels wide and
+      // high.
       const auto raster = raster_of(panel, static_cast<std::size_t>(0.13 * size_.width),
                                     static_cast<std::size_t>(0.13 * size_.height));
       for (const std::size_t place : letter_places(cells, raster)) {
@@ -480,8 +480,8 @@ class Script {
     }
   }
 
-  /// Lines between neighbours of different categories. Returns false, and writes none, where so
-  /// many differ that areas cannot be told apart by borders and patterns.
+  /// Draws lines between neighbours of different categories. Returns false and draws none if too
+  /// many differ to distinguish areas by borders and patterns.
   bool write_borders(const Panel& panel) {
     const Cells& cells = *panel.cells;
     const auto categories = static_cast<int>(cells.categories.size());
@@ -518,12 +518,12 @@ class Script {
     return true;
   }
 
-  /// A terminal fills no rectangles: a map is made of letters there, for categories their own, for
-  /// values from light to dark.
+  /// gnuplot fills no rectangles on a terminal: a map consists of characters, one per category or
+  /// from light to dark.
   void write_characters(const Panel& panel, const std::vector<Kind>& kinds) {
     constexpr std::string_view kLightToDark = ".:-=+*%#@";
     const Cells& cells = *panel.cells;
-    // More letters than the panel has room for: some are written over others.
+    // With more characters than columns, some overwrite others.
     const auto raster = raster_of(panel, static_cast<std::size_t>(size_.width / kLetter),
                                   static_cast<std::size_t>(size_.height / kLine));
     const auto data = begin_data();
@@ -548,8 +548,8 @@ class Script {
     plot("{} using 1:2:3:4 with labels tc rgb variable notitle", data);
   }
 
-  /// The legend of a map: entries of gnuplot's key, or for categories, which have a pattern over
-  /// their colour and a letter over both, drawn beside the map.
+  /// The legend of a map: entries of gnuplot's key or, for categories, which need colour, pattern
+  /// and letter, drawn beside the map.
   void write_legend(const Cells& cells, const std::vector<Kind>& kinds) {
     const bool is_key = is_text_ || cells.categories.empty();
     const double sample = 4.4 * kLetter;
@@ -602,7 +602,7 @@ class Script {
     if (!bars.names.empty()) {
       std::vector<std::string> ticks;
       for (const std::string& name : bars.names) {
-        // In a tick % begins a format.
+        // % begins a format in a tick.
         ticks.push_back(fmt::format("{} {}", gnuplot_text(marked(name, "%", '%')), ticks.size()));
       }
       add("set ytics ({}) noenhanced\nset yrange [{}:-0.7] noreverse\nset grid noytics\n",
@@ -630,7 +630,8 @@ class Script {
     for (const Curve& curve : panel.curves) {
       const bool is_coloured = !curve.colours.empty() && has_colours();
       const auto data = begin_data();
-      const std::size_t step = 1 + curve.x.size() / 1000;  // more points than pixels are not seen
+      const std::size_t step = 1 + curve.x.size() / 1000;  // more points than pixels are not
+                                                           // visible
       for (std::size_t i = 0; i < curve.x.size(); ++i) {
         if (curve.mark == Curve::Mark::kLine && i % step != 0 && i + 1 < curve.x.size() &&
             std::isfinite(curve.y[i])) {
@@ -669,10 +670,10 @@ class Script {
   struct {
     double left, bottom, width, height;
   } frame_{};                        // of the panel, from the upper left corner
-  std::vector<std::string> titles_;  // in the key of the panel
-  bool has_span_key_ = false;        // spans are named in the key of one panel
+  std::vector<std::string> titles_;  // titles in the key of the panel
+  bool has_span_key_ = false;        // only one panel's key names the spans
   std::string out_;
-  std::vector<std::string> plots_;  // elements of the plot command of the panel
+  std::vector<std::string> plots_;  // elements of the panel's plot command
   int blocks_ = 0;
 };
 
@@ -702,9 +703,9 @@ Size own_size(const Figure& figure) {
 
 std::string script_of(const Figure& figure, PictureFormat format, const Size& size,
                       const std::string& file) {
-  std::string out = "# A picture by `oblique plot`, for gnuplot 5.4 or later.\n";
+  std::string out = "# A picture made by `oblique plot`, for gnuplot 5.4 or later.\n";
   if (!file.empty()) {
-    out += "# Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.\n";
+    out += "# Run it with `gnuplot`; for PDF or PNG set the terminal to pdfcairo or pngcairo.\n";
   }
   out += fmt::format("set terminal {}\n", terminal_command(format, size));
   if (!file.empty()) {

@@ -25,14 +25,14 @@
 namespace oblique::client::plot {
 namespace {
 
-/// Names and endings, in the order of PictureFormat.
+/// Names and endings in the order of PictureFormat.
 constexpr std::array<std::string_view, 5> kFormats{"svg", "pdf", "png", "gp", "csv"};
 constexpr double kSmallestSide = 240.0;
 constexpr double kLargestSide = 10'000.0;
 constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
 constexpr std::chrono::seconds kTimeLimit{120};  // a map of 10^5 cells takes about 2 s
 
-/// NaN is NULL, an empty field.
+/// NaN becomes NULL, an empty field.
 protocol::Value value_of(double number) {
   return std::isnan(number) ? protocol::Value() : protocol::Value(number);
 }
@@ -108,8 +108,8 @@ PictureFormat picture_format(const std::string& name, const std::string& file) {
       std::find(kFormats.begin(), kFormats.end(), ending.substr(ending.empty() ? 0 : 1)) ==
           kFormats.end()) {
     throw solver::InputError(
-        fmt::format("--out {}: its ending is not a format; it must be .svg, .pdf, .png, .gp or "
-                    ".csv, or --format one of {}",
+        fmt::format("--out {}: the ending is not a format: use .svg, .pdf, .png, .gp or .csv, or "
+                    "--format with one of {}",
                     file, protocol::joined(kFormats)));
   }
   return static_cast<PictureFormat>(choice_of("--format",
@@ -121,7 +121,7 @@ PictureFormat picture_format(const std::string& name, const std::string& file) {
 
 std::string output_of_gnuplot(const std::string& script) {
   try {
-    // Without the settings of the user's ~/.gnuplot.
+    // Ignores the user's ~/.gnuplot.
     ChildProcess gnuplot({.program = "gnuplot",
                           .arguments = {"--default-settings", "-"},
                           .keep_output = true,
@@ -130,22 +130,22 @@ std::string output_of_gnuplot(const std::string& script) {
     const auto deadline = std::chrono::steady_clock::now() + kTimeLimit;
     while (gnuplot.is_running()) {
       if (std::chrono::steady_clock::now() > deadline) {
-        throw std::runtime_error(fmt::format(
-            "gnuplot took longer than {} s and was ended: draw fewer points", kTimeLimit.count()));
+        throw std::runtime_error(
+            fmt::format("gnuplot was stopped after {} s: draw fewer points", kTimeLimit.count()));
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    // gnuplot ends with 0 after some errors, and then has drawn nothing.
+    // gnuplot returns 0 after some errors, without output.
     std::string output = gnuplot.output(kMostBytes);
     if (!gnuplot.succeeded() || output.empty()) {
       throw std::runtime_error(
-          fmt::format("gnuplot {}: {}", gnuplot.ending(), gnuplot.last_words()));
+          fmt::format("gnuplot {}: {}", gnuplot.ending(), gnuplot.last_output()));
     }
     return output;
   } catch (const ProgramNotFound&) {
     throw std::runtime_error(
-        "pictures are made by gnuplot, which is not installed: install it (Debian: gnuplot-nox), "
-        "or write the script for it with --out FILE.gp");
+        "gnuplot, which draws the pictures, is not installed: install it (Debian: gnuplot-nox), or "
+        "write its script with --out FILE.gp");
   }
 }
 
@@ -181,7 +181,7 @@ std::string text_of(const Figure& figure) {
   if (figure.panels.size() > 1) {
     lines = 20 * figure.panels.size();
   } else if (!figure.panels.empty() && figure.panels.front().cells) {
-    lines += figure.panels.front().cells->categories.size();  // for the legend below
+    lines += figure.panels.front().cells->categories.size();  // the rest is for the legend
   }
   Figure below = figure;
   below.columns = 1;
@@ -207,8 +207,8 @@ void write_picture(const std::string& picture, PictureFormat format, const std::
   const bool is_binary = format == PictureFormat::kPng || format == PictureFormat::kPdf;
   if (is_binary && isatty(STDOUT_FILENO) == 1) {
     throw solver::InputError(
-        "PNG and PDF are no text, and standard output is a terminal: write them to a file with "
-        "--out FILE.png or FILE.pdf");
+        "PNG and PDF cannot be shown on a terminal: write to a file with --out FILE.png or "
+        "FILE.pdf");
   }
   StandardOutput out;
   out.append(picture);

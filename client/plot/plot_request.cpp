@@ -32,7 +32,6 @@ std::string column_of_key(const std::string& key) {
   return server::column_of_key(key);
 }
 
-/// Each value once, rising.
 void sort_unique(std::vector<double>& values) {
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
@@ -65,7 +64,7 @@ StudyShape shape_of_block(const protocol::Recipe& recipe, std::size_t number,
   return shape;
 }
 
-/// The same of all blocks: with the values that the others give to the same keys.
+/// The axes of all blocks, each with the values that any block gives to its key.
 StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   shape.is_one_block = false;
   for (const Block& block : recipe.blocks()) {
@@ -85,27 +84,27 @@ StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   return shape;
 }
 
-/// The key and the value of an --at; without a number NaN.
+/// The key and value of an --at; NaN if the value is not a number.
 std::pair<std::string, double> parsed_at(const std::string& text) {
   const std::size_t equals = std::min(text.find('='), text.size());
   const auto value = solver::number_of(text.substr(std::min(equals + 1, text.size())));
   return {text.substr(0, equals), value && std::isfinite(*value) ? *value : std::nan("")};
 }
 
-/// The value of the axis that is nearest to the one wanted.
+/// The value of the axis nearest to the given one.
 double nearest_value(const StudyAxis& axis, double wanted) {
   return *std::min_element(axis.values.begin(), axis.values.end(), [wanted](double a, double b) {
     return std::abs(a - wanted) < std::abs(b - wanted);
   });
 }
 
-/// Whether a typed value means that of the axis: tables show six digits.
+/// Whether a typed value means that of the axis: tables show only six digits.
 bool means(double typed, double value) {
   return std::abs(value - typed) <= 1e-5 * std::abs(typed);
 }
 
-/// Whether the picture can be one of that block alone: the axes that are asked for vary in it, it
-/// has the values of --at, and enough axes are left open.
+/// Whether the picture can show this block alone: the requested axes vary in it, it has the values
+/// of --at, and enough axes are open.
 bool suits(const StudyShape& shape, const PlotRequest& request) {
   for (const std::string& name : {request.x, request.y, request.by}) {
     const StudyAxis* axis = shape.find(name);
@@ -126,7 +125,7 @@ bool suits(const StudyShape& shape, const PlotRequest& request) {
   return open >= (!request.map.empty() ? 2 : request.lines.empty() ? 0 : 1);
 }
 
-/// The number of the block that --block names, from 0; none: it names none.
+/// The block that --block names, from 0; none if it names none.
 std::optional<std::size_t> block_named(const std::string& text, std::size_t blocks) {
   if (text.empty() || text == "all") {
     return std::nullopt;
@@ -154,30 +153,29 @@ std::string values_in_words(const StudyAxis& axis) {
   return fmt::format("the values {}", fmt::join(texts, ", "));
 }
 
-/// The axis and its value that an --at names.
 std::pair<const StudyAxis*, double> checked_at(const std::string& text, const StudyShape& shape) {
   const auto [key, value] = parsed_at(text);
   const auto refused = [&text](const std::string& why) {
     return InputError(fmt::format("--at {}: {}", protocol::excerpt(text), why));
   };
   if (key.empty() || std::isnan(value)) {
-    throw refused("it must be a key and a number, as e=1");
+    throw refused("it must be a key and a number, such as e=1");
   }
   const StudyAxis* axis = shape.find(key);
   if (axis == nullptr) {
-    throw refused(fmt::format("the study has no axis {}{}; it has {}", protocol::excerpt(key),
+    throw refused(fmt::format("the study has no axis {}{}; its axes are {}", protocol::excerpt(key),
                               protocol::did_you_mean(key, shape.keys()),
                               protocol::joined(shape.keys())));
   }
   if (!axis->is_listed) {
     throw refused(fmt::format(
-        "values of {} lie scattered, and hardly a point has that one; take a range, as --where "
-        "\"{} BETWEEN {} AND {}\"",
+        "the values of {} are scattered, and hardly any point has this one; use a range, such as "
+        "--where \"{} BETWEEN {} AND {}\"",
         key, axis->column, readable_number(value * 0.95), readable_number(value * 1.05)));
   }
   const double nearest = nearest_value(*axis, value);
   if (!means(value, nearest)) {
-    throw refused(fmt::format("no point has that {}; the nearest is {}={}. It has {}", key, key,
+    throw refused(fmt::format("no point has this {}; the nearest is {}={}. It has {}", key, key,
                               readable_number(nearest), values_in_words(*axis)));
   }
   return {axis, nearest};
@@ -187,7 +185,7 @@ void add_term(std::string& sql, const std::string& term) {
   sql += (sql.empty() ? "" : " AND ") + term;
 }
 
-/// Fixes the axis at a value, which the subtitle shows.
+/// Fixes the axis at a value; the subtitle shows it.
 void fix(Condition& condition, const StudyAxis& axis, double value) {
   if (axis.varies()) {
     const std::string term = fmt::format("{} = {}", axis.column, solver::exact_number(value));
@@ -205,8 +203,8 @@ std::string without_spaces(std::string_view text) {
              : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
 }
 
-/// Of two axes that are left open the one over which lines say more than a map: the other one has
-/// few values, and cells as tall as their distance would reach to values that it cannot have.
+/// Of two open axes the one whose values become lines, if lines are better than a map: the other
+/// axis has few values, and cells between them would cover values that the study does not have.
 const StudyAxis* axis_of_few_lines(const std::vector<const StudyAxis*>& open) {
   constexpr std::size_t kFew = 3;
   if (open.size() != 2 || !open[0]->is_listed || !open[1]->is_listed ||
@@ -340,7 +338,7 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
     const auto [axis, value] = checked_at(text, shape);
     if (is_drawn(*axis)) {
       throw InputError(fmt::format(
-          "--at {}: {} is an axis of the picture; take --where for a part of it", text, axis->key));
+          "--at {}: {} is an axis of the picture; use --where for a part of it", text, axis->key));
     }
     if (std::find(held.begin(), held.end(), axis) != held.end()) {
       throw InputError(fmt::format("--at {}: {} has a value already", text, axis->key));
@@ -355,7 +353,7 @@ Condition condition_of(const PlotRequest& request, const StudyShape& shape,
       fix(condition, axis, axis.values.front());
       if (axis.varies()) {
         condition.said.push_back(fmt::format(
-            "{} has {}; {} = {} is drawn, and --at {}=VALUE draws another.", axis.key,
+            "{} has {}; drawn: {} = {}. --at {}=VALUE draws another.", axis.key,
             values_in_words(axis), axis.key, readable_number(axis.values.front()), axis.key));
       }
     }
@@ -400,7 +398,7 @@ std::optional<Range> range_given(const PlotRequest& request) {
       colon == std::string::npos ? std::nullopt : solver::number_of(text.substr(colon + 1));
   if (!from || !to || !(*from < *to) || !std::isfinite(*from) || !std::isfinite(*to)) {
     throw InputError(fmt::format(
-        "--range {} is not allowed: it must be FROM:TO with FROM < TO, in SI units", text));
+        "--range {} is not allowed: it must be FROM:TO in SI units with FROM < TO", text));
   }
   return Range{*from, *to};
 }
@@ -409,8 +407,8 @@ std::pair<std::string, std::string> scatter_columns(const PlotRequest& request) 
   const std::string_view text = request.scatter;
   const auto comma = text.find(',');
   if (comma == std::string_view::npos || text.find(',', comma + 1) != std::string_view::npos) {
-    throw InputError(
-        fmt::format("--scatter {} is not allowed: it must be two columns, as mu,fn_peak_N", text));
+    throw InputError(fmt::format(
+        "--scatter {} is not allowed: it must be two columns, such as mu,fn_peak_N", text));
   }
   return {without_spaces(text.substr(0, comma)), without_spaces(text.substr(comma + 1))};
 }

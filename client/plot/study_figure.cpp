@@ -23,12 +23,12 @@ namespace {
 using solver::InputError;
 using solver::readable_number;
 
-constexpr std::size_t kMostCellsAlong = 320;  // an axis; beyond it cells gather values
-constexpr std::size_t kMostCategories = 12;   // with an entry of their own
-constexpr std::size_t kMostNamedLines = 8;    // more are coloured by their value
-constexpr std::size_t kMostMarked = 60;       // points of a line that has marks
-constexpr std::size_t kMostDots = 4000;       // more are gathered in cells
-constexpr std::size_t kMostNames = 16;        // of a histogram of texts
+constexpr std::size_t kMostCellsAlong = 320;  // values of an axis; for more, cells group values
+constexpr std::size_t kMostCategories = 12;   // categories with their own entry
+constexpr std::size_t kMostNamedLines = 8;    // lines; more are coloured by their value
+constexpr std::size_t kMostMarked = 60;       // points of a line with marks
+constexpr std::size_t kMostDots = 4000;       // points; more are grouped in cells
+constexpr std::size_t kMostNames = 16;        // bars of a histogram of texts
 
 bool is_drawable(double value, bool is_logarithmic) {
   return std::isfinite(value) && (!is_logarithmic || value > 0.0);
@@ -38,7 +38,7 @@ std::string counted(std::uint64_t count, const std::string& noun) {
   return client::counted(count, noun, noun + "s");
 }
 
-/// The categories by their points, largest first, with those that have next to none as one.
+/// Sorts categories by their points, largest first; those with very few points become one.
 std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& points,
                                     const std::string& plural) {
   std::vector<Category> categories;
@@ -53,10 +53,10 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   if (kept > kMostCategories) {
     kept = kMostCategories;
     while (kept > 1 && categories[kept - 1].points * 400 < whole) {
-      --kept;  // less than a quarter of a per cent cannot be seen
+      --kept;  // less than 0.25 % is not visible
     }
   }
-  if (kept + 1 >= categories.size()) {  // a single one has its own name
+  if (kept + 1 >= categories.size()) {  // a single category keeps its name
     return categories;
   }
   Category other{.name = fmt::format("{} other {}", format_count(categories.size() - kept), plural),
@@ -69,7 +69,7 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   return categories;
 }
 
-/// Edges at multiples of 1, 2 or 5 times a power of ten, about `bins` apart, around the range.
+/// Edges at multiples of 1, 2 or 5 times a power of ten around the range, about `bins` intervals.
 std::vector<double> round_edges(const Range& range, double bins) {
   const double raw = (range.to - range.from) / bins;
   const double decade = std::pow(10.0, std::floor(std::log10(raw)));
@@ -80,13 +80,13 @@ std::vector<double> round_edges(const Range& range, double bins) {
   std::vector<double> edges;
   for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
        ++i) {
-    // Below 1 a quotient of whole numbers is the double that people write.
+    // Below 1, dividing whole numbers gives the double that people write.
     edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
   }
   return edges;
 }
 
-/// Counts values in bins of one round width, or on a logarithmic axis of equal ratios.
+/// Counts values in bins of one round width, or of one ratio on a logarithmic axis.
 Bars binned(const std::vector<double>& values, const FigureAxis& axis) {
   const double bins =
       std::clamp(std::round(std::sqrt(2.0 * static_cast<double>(values.size()))), 10.0, 100.0);
@@ -101,7 +101,7 @@ Bars binned(const std::vector<double>& values, const FigureAxis& axis) {
   return bars;
 }
 
-/// The most frequent names, largest first, and the others together.
+/// The most frequent texts, largest first, and one bar for the others.
 Bars bars_of_names(const AnswerColumn& column) {
   std::vector<std::pair<double, std::string>> counts;
   for (const auto& word : column.words) {
@@ -109,7 +109,7 @@ Bars bars_of_names(const AnswerColumn& column) {
   }
   for (const std::uint32_t word : column.word_of_row) {
     if (word != AnswerColumn::kNoWord) {
-      counts[word].first -= 1.0;  // below 0, so that sorting puts the largest first
+      counts[word].first -= 1.0;  // negative, so that sorting puts the largest first
     }
   }
   std::sort(counts.begin(), counts.end());
@@ -129,12 +129,12 @@ Bars bars_of_names(const AnswerColumn& column) {
 /// Throws InputError for a column of texts, which an axis cannot show.
 void refuse_texts(const std::string& flag, const AnswerColumn& column) {
   if (column.has_texts()) {
-    throw InputError(fmt::format("{}{}: its values are texts; --map and --histogram take them",
-                                 flag, column.name));
+    throw InputError(
+        fmt::format("{}{}: its values are texts; use --map or --histogram", flag, column.name));
   }
 }
 
-/// Makes one figure with one panel from the rows of a source.
+/// Builds a figure with one panel from the rows of a source.
 class FigureBuilder {
  public:
   FigureBuilder(Source& source, const StudyShape& shape, const PlotRequest& request,
@@ -157,7 +157,7 @@ class FigureBuilder {
     note("Nothing to draw: " + why + ".");
   }
 
-  /// The rows of the columns where the condition holds; grouped: one for each pair of values.
+  /// Queries columns under a condition; grouped: one row per pair of values.
   Answer query(const std::vector<std::string>& columns, const std::string& where,
                bool is_grouped = false) {
     ResultQuery query;
@@ -169,14 +169,14 @@ class FigureBuilder {
     const auto stream = source_.rows(request_for(query));
     auto answer = read_columns(*stream);
     if (answer.size() != columns.size()) {
-      throw InputError(fmt::format("a picture takes one column a flag, and `{}` are {}",
+      throw InputError(fmt::format("a flag of a picture takes one column, but `{}` are {}",
                                    query.select, answer.size()));
     }
     return answer;
   }
 
-  /// The axis that a flag names, else the first that is neither taken nor held by --at. Throws
-  /// InputError with the remedy where there is none.
+  /// The axis of a flag, else the first that is neither taken nor fixed by --at. Throws InputError
+  /// with the remedy if there is none.
   ChosenAxis chosen_or(const std::string& flag, const std::string& text,
                        const std::vector<ChosenAxis>& taken, const std::string& remedy) const {
     if (!text.empty()) {
@@ -192,8 +192,8 @@ class FigureBuilder {
     throw InputError(fmt::format("{} {}", request_.study, remedy));
   }
 
-  /// Throws InputError, naming the flag, for texts, and for a logarithmic axis without a positive
-  /// value.
+  /// Throws InputError, with the flag, for texts, and for a logarithmic axis without positive
+  /// values.
   FigureAxis axis_for(const std::string& flag, const ChosenAxis& axis, const AnswerColumn& column,
                       bool is_logarithmic) const {
     refuse_texts("", column);
@@ -208,20 +208,21 @@ class FigureBuilder {
     return made;
   }
 
-  /// Sets the scale of colours for values, from --range or theirs; notes what lies outside.
+  /// Sets the colour scale from --range or the values; adds a note if values lie outside.
   void set_colours(FigureAxis axis, const std::vector<double>& values) {
     axis.is_logarithmic = request_.is_colour_logarithmic;
     const Range all = range_of(values, axis.is_logarithmic);
     axis.span(range_given(request_).value_or(all));
     if (all.from < axis.range.from || all.to > axis.range.to) {
-      note(fmt::format("Values from {} to {}; those outside the scale have the colour of its end.",
-                       readable_number(all.from * axis.per_unit, 4),
-                       readable_number(all.to * axis.per_unit, 4)));
+      note(fmt::format(
+          "Values range from {} to {}; those outside the scale have the colour of its nearest end.",
+          readable_number(all.from * axis.per_unit, 4),
+          readable_number(all.to * axis.per_unit, 4)));
     }
     figure_.colours = std::move(axis);
   }
 
-  /// Title and subtitle; tells what was chosen.
+  /// Sets title and subtitle; reports choices.
   void add_titles(const std::string& what, std::uint64_t points) {
     figure_.title = fmt::format("{}: {}", request_.study, what);
     for (const auto& shown : condition_.shown) {
@@ -234,8 +235,8 @@ class FigureBuilder {
                        shape_.blocks == 2 ? "the other" : "the others"));
       if (request_.block.empty()) {
         tell_(
-            fmt::format("The study has {} blocks; block {} is drawn. --block N draws another, and "
-                        "--block all draws all of them.",
+            fmt::format("The study has {} blocks; block {} is drawn. --block N draws another, "
+                        "--block all draws all.",
                         shape_.blocks, shape_.block + 1));
       }
     }
@@ -243,20 +244,20 @@ class FigureBuilder {
       tell_(sentence);
     }
     if (figure_.is_empty) {
-      tell_("No point of the picture has a value: nothing is drawn in it.");
+      tell_("No point has a value: the picture is empty.");
     }
   }
 
   // ---- Maps -------------------------------------------------------------------------------------
 
-  /// The values of an axis of cells; none where cells are to gather them.
+  /// The values of an axis of cells; empty if cells group values.
   std::vector<double> cell_values(const ChosenAxis& axis, const AnswerColumn& column) const {
     if (!shape_.is_grid || axis.axis == nullptr || !axis.axis->is_listed) {
       return {};
     }
     std::vector<double> of_study = axis.axis->values;
     if (where_names(request_, *axis.axis) && !column.numbers.empty()) {
-      // Only the part of the axis that has rows is drawn.
+      // Draws only the part of the axis that has rows.
       const Range part = range_of(column.numbers);
       std::erase_if(of_study, [&part](double v) { return v < part.from || v > part.to; });
     }
@@ -274,23 +275,24 @@ class FigureBuilder {
       auto gathered = gathered_in(answer, cells_around(x_values, panel_.x.is_logarithmic),
                                   cells_around(y_values, panel_.y.is_logarithmic));
       if (!request_.where.empty() && gathered.cells.count(CellState::kNoResult) > 0) {
-        // Cells without a row may have points that --where leaves out.
+        // Cells without a row may have points that --where excludes.
         mark_filtered(gathered.cells,
                       query({x.column, y.column}, condition_.sql_without_where, true));
       }
       return gathered;
     }
-    // About three points a cell.
+    // About three points per cell.
     const double side = std::sqrt(static_cast<double>(answer[0].numbers.size()) / 3.0);
     panel_.x.span(range_of(answer[0].numbers, panel_.x.is_logarithmic));
     panel_.y.span(range_of(answer[1].numbers, panel_.y.is_logarithmic));
     return gather_scattered(answer, static_cast<std::size_t>(std::clamp(side, 8.0, 320.0)));
   }
 
-  /// In cells of equal size, at most `most` along an axis; between points nothing is missing.
+  /// Groups points in cells of equal size, at most `most` along an axis. Empty cells are not marked
+  /// as missing.
   Gathered gather_scattered(const Answer& answer, std::size_t most) const {
-    // Of few different values, as of a grid, there are fewer cells than values: otherwise empty
-    // cells were stripes.
+    // For few different values, such as those of a grid, there are fewer cells than values;
+    // otherwise empty cells would form stripes.
     const auto cells_for = [most](const FigureAxis& axis, std::vector<double> values) {
       std::sort(values.begin(), values.end());
       const auto different =
@@ -304,7 +306,7 @@ class FigureBuilder {
     return gathered;
   }
 
-  /// Gives cells with numbers their scale of colours, and blanks those without a place on it.
+  /// Sets the colour scale of cells with numbers; clears values that are not on it.
   void colour_cells(Cells& cells, const FigureAxis& axis) {
     std::vector<double> values;
     for (std::size_t i = 0; i < cells.values.size(); ++i) {
@@ -337,19 +339,19 @@ class FigureBuilder {
       }
     }
     if (is_mode) {
-      note(fmt::format("{}: in the order of time.", kModeLetters));
+      note(fmt::format("{}, in order of time.", kModeLetters));
     }
     if (!cells.categories.empty() && cells.categories.back().is_other) {
-      note(fmt::format("The {} {} with the most points are named; --format csv has all {}.",
+      note(fmt::format("The {} {} with the most points are named; --format csv lists all {}.",
                        cells.categories.size() - 1, plural, format_count(points.size())));
     }
   }
 
   void draw_map() {
     const std::string remedy = fmt::format(
-        "has fewer than two axes{}: take --lines, --scatter or --histogram, or name --x and --y",
+        "has fewer than two axes{}: use --lines, --scatter or --histogram, or name --x and --y",
         request_.at.empty() ? "" : " that --at leaves open");
-    // The axis that --y names is not chosen for x.
+    // Excludes the axis of --y from the choice for x.
     std::vector<ChosenAxis> taken;
     if (!request_.y.empty()) {
       taken.push_back(chosen_axis("--y", request_.y, shape_));
@@ -379,17 +381,17 @@ class FigureBuilder {
       name_categories(cells, gathered.points_of_name);
     }
     if (const auto blank = cells.count(CellState::kNoValue); blank > 0) {
-      note(fmt::format("{} blank: solved, but without a value that can be drawn.",
+      note(fmt::format("{} blank: solved, but the output is missing or cannot be drawn.",
                        counted(blank, "cell") + (blank == 1 ? " is" : " are")));
     }
     if (cells.count(CellState::kSolved) == 0) {
       note_empty("no cell has a value");
     }
     if (gathered.most_in_a_cell > 1) {
-      note(fmt::format("Cells hold up to {} points and show {}.",
+      note(fmt::format("Cells contain up to {} points and show {}.",
                        format_count(gathered.most_in_a_cell),
                        cells.names.empty() ? "their mean"
-                                           : "what most of these have; percentages count points"));
+                                           : "the most frequent value; percentages count points"));
     }
     panel_.cells = std::move(cells);
     add_titles(answer[2].name, gathered.points);
@@ -397,12 +399,12 @@ class FigureBuilder {
 
   // ---- Lines ------------------------------------------------------------------------------------
 
-  /// The axis whose values are the lines; none: one line is drawn.
+  /// The axis whose values become lines; none: one line is drawn.
   std::optional<ChosenAxis> lines_by(const ChosenAxis& x) const {
     if (!request_.by.empty()) {
       return chosen_axis("--by", request_.by, shape_);
     }
-    // Of the others that with the fewest values has the fewest lines.
+    // The other axis with the fewest values gives the fewest lines.
     const StudyAxis* fewest = nullptr;
     for (const StudyAxis* axis : shape_.by_preference()) {
       const bool is_open = shape_.is_grid && axis != x.axis && axis->is_listed &&
@@ -469,7 +471,7 @@ class FigureBuilder {
                        counted(gathered.gaps, "point") + (gathered.gaps == 1 ? " is" : " are")));
     }
     if (gathered.most_at_a_place > 1) {
-      note(fmt::format("Where up to {} points share a place, their mean is drawn.",
+      note(fmt::format("Up to {} points share a place; their mean is drawn.",
                        format_count(gathered.most_at_a_place)));
     }
     add_titles(answer[1].name, answer[0].numbers.size());
@@ -507,7 +509,7 @@ class FigureBuilder {
       missing += is_drawn ? 0U : 1U;
     }
     if (missing > 0) {
-      note(fmt::format("{} of {} points lack a value that can be drawn.", format_count(missing),
+      note(fmt::format("{} of {} points have no value that can be drawn.", format_count(missing),
                        format_count(points)));
     }
     if (missing == points) {
@@ -527,7 +529,7 @@ class FigureBuilder {
       answer.resize(3, answer[0]);
       auto gathered = gather_scattered(answer, 130);
       Cells& cells = gathered.cells;
-      note(fmt::format("{} points, gathered in {} x {} cells; colours are {}.",
+      note(fmt::format("{} points, grouped in {} x {} cells; colours show {}.",
                        format_count(points), cells.columns(), cells.rows(),
                        has_colour ? "means of their points" : "the number of their points"));
       for (std::size_t i = 0; !has_colour && i < cells.values.size(); ++i) {
@@ -544,8 +546,9 @@ class FigureBuilder {
   void draw_histogram() {
     const ChosenAxis column = chosen_axis("--histogram", request_.histogram, shape_);
     if (server::is_list_column(column.column)) {
-      throw InputError(fmt::format(
-          "--histogram {0}: its values are lists; take an element, as {0}[0]", column.column));
+      throw InputError(
+          fmt::format("--histogram {0}: its values are lists; choose an element, such as {0}[0]",
+                      column.column));
     }
     condition_ = condition_of(request_, shape_, {column}, false);
     const auto answer = query({column.column}, condition_.sql);
@@ -577,7 +580,7 @@ class FigureBuilder {
                                                    : Range{0.0, std::max(tallest * 1.05, 1.0)};
     (answer[0].has_texts() ? panel_.x : panel_.y) = points_axis;
     if (const auto counted_points = static_cast<std::size_t>(drawn); counted_points < points) {
-      note(fmt::format("{} of {} points have no value, or one outside the axis.",
+      note(fmt::format("{} of {} points have no value or lie outside the axis.",
                        format_count(points - counted_points), format_count(points)));
     }
     if (drawn == 0.0) {
@@ -595,7 +598,7 @@ class FigureBuilder {
   Panel panel_ = {};
 };
 
-/// Throws InputError for a logarithm of a --range that reaches 0.
+/// Throws InputError for a logarithmic axis with a --range that reaches 0.
 void check_range(const PlotRequest& request) {
   const bool has_colours = !request.map.empty() || !request.scatter.empty();
   const auto [flag, is_logarithmic] =

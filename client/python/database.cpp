@@ -29,7 +29,6 @@ namespace py = pybind11;
 using protocol::CellKind;
 using protocol::Value;
 
-/// One column of an answer.
 struct Column {
   std::string name;
   std::string unit;  ///< SI; empty for pure numbers and texts
@@ -61,8 +60,7 @@ std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryReque
   return columns;
 }
 
-/// int64 where all values are whole numbers, else float64 with NaN for NULL; a list where some are
-/// texts.
+/// int64 if all values are integers; a list if some are texts; else float64 with NaN for NULL.
 py::object values_of(const Column& column) {
   const auto kind = server::kind_of_values(column.name);
   const bool has_real = column.has<double>();
@@ -88,7 +86,7 @@ py::object values_of(const Column& column) {
                       : py::object(array_of(std::move(reals)));
 }
 
-/// A database file. Every call opens it anew, so that calls of several threads share nothing.
+/// A database file. Every call opens it, so calls from several threads share nothing.
 class Database {
  public:
   explicit Database(const std::string& file) : file_(std::filesystem::absolute(file).string()) {
@@ -97,7 +95,7 @@ class Database {
       throw std::filesystem::filesystem_error(
           "", file_, std::make_error_code(std::errc::no_such_file_or_directory));
     }
-    const server::Reader reader(file_);  // throws if it is no database of oblique
+    const server::Reader reader(file_);  // throws if it is not a database of oblique
   }
 
   py::list query(const std::string& study, const std::string& where, const std::string& select,
@@ -124,7 +122,7 @@ class Database {
     return ask(request);
   }
 
-  /// A dict for each study.
+  /// Returns a dict for each study.
   py::list studies() {
     const auto found = with_reader<std::vector<protocol::StudyStatus>>(
         [](server::Reader& reader) { return reader.study_status(); });

@@ -14,11 +14,10 @@
 
 namespace oblique::python {
 
-/// Adds the functions and classes of the extension.
 void add_solving(pybind11::module_& module);
 void add_database(pybind11::module_& module);
 
-/// An array that takes over the values.
+/// An array that owns the values.
 template <class T>
 pybind11::array_t<T> array_of(std::vector<T>&& values) {
   auto* const owned = new std::vector<T>(std::move(values));  // the capsule deletes it
@@ -27,9 +26,9 @@ pybind11::array_t<T> array_of(std::vector<T>&& values) {
   return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(owned->size()), owned->data(), owner);
 }
 
-/// Releases the interpreter's lock while it exists. If Python ends meanwhile, as it does under a
-/// daemon thread, the thread blocks for good when it would take the lock again: Python ends such a
-/// thread by unwinding its stack, which destructors do not survive.
+/// Releases the interpreter's lock while it exists. If Python ends meanwhile, which can happen
+/// under a daemon thread, the thread blocks for ever instead of taking the lock again: Python would
+/// unwind its stack, and C++ destructors do not survive that.
 class WithoutLock {
  public:
   WithoutLock() : state_(PyEval_SaveThread()) {}
@@ -37,7 +36,6 @@ class WithoutLock {
   WithoutLock(const WithoutLock&) = delete;
   WithoutLock& operator=(const WithoutLock&) = delete;
 
-  /// Calls `call` with the lock.
   void with_lock(const std::function<void()>& call) {
     take();
     const struct Release {
@@ -53,17 +51,17 @@ class WithoutLock {
   PyThreadState* state_;
 };
 
-/// Throws an error that becomes RuntimeError in the child of a fork: threads and locks of the
-/// parent are not usable there. The module calls it first when it is imported.
+/// Throws an error that becomes RuntimeError in the child of a fork, where threads and locks of the
+/// parent are unusable. The module calls it first when it is imported.
 void refuse_forked_child();
 
-/// Thrown by work whose result is no longer wanted.
+/// Thrown by work that was stopped.
 class Stopped {};
 
-/// Runs `work` on a thread of its own, without the interpreter's lock, and returns its result.
-/// Meanwhile signals are handled and `meanwhile` is called every 50 ms. Where either raises, as
-/// Ctrl-C does, `stop` is set, `when_stopped` is called, and the exception is thrown soon after,
-/// even while `work` still runs: it must own all that it uses.
+/// Runs `work` on its own thread without the interpreter's lock and returns its result. Meanwhile
+/// signals are handled and `meanwhile` is called every 50 ms. If either raises, as Ctrl-C does,
+/// sets `stop`, calls `when_stopped` and throws the exception soon after. `work` may still run
+/// then, so it must own all that it uses.
 template <class Result>
 Result interruptibly(const std::function<Result(const std::atomic<bool>& stop)>& work,
                      const std::function<void()>& when_stopped = {},

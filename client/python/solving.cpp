@@ -42,18 +42,18 @@ py::str text_of(std::string_view text) {
   return {text.data(), text.size()};
 }
 
-/// The outputs of many points, an array each: NaN and no text where there is none.
+/// The outputs of many points as arrays; NaN and no text for a missing value.
 class ResultArrays {
  public:
   explicit ResultArrays(std::size_t points);
 
-  /// Not from two threads at once; without the interpreter's lock.
+  /// Not thread-safe; must be called without the interpreter's lock.
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// The names of `oblique solve --json` with an array for each number, (texts, index of each
-  /// point's text or -1) for each text, and `error`. `lists` has an array for each member of a
-  /// list, and the `offsets` of the points. Moves the numbers out.
+  /// Moves the outputs out, by the names of `oblique solve --json`: an array for each number,
+  /// (texts, index of each point's text or -1) for each text, and `error`. `lists` has an array for
+  /// each member of a list, and the `offsets` of the points.
   py::dict dict();
 
  private:
@@ -67,12 +67,12 @@ class ResultArrays {
     std::map<std::string, std::int32_t, std::less<>> known;
     std::vector<std::string> texts;
   };
-  /// One list of many points, in the order in which the points came.
+  /// One list of many points, in the order of their arrival.
   struct Elements {
     const solver::ResultList* list;
     std::vector<std::uint64_t> begin;  ///< of each point
     std::vector<std::uint32_t> count;
-    /// One a member; a text is the index of its first occurrence in `texts`.
+    /// one per member; a text is stored as the index of its first occurrence in `texts`
     std::vector<std::vector<double>> members;
     std::vector<std::string> texts;
   };
@@ -159,7 +159,7 @@ double ResultArrays::number_of(Elements& elements, const Cell& cell) {
   return static_cast<double>(place);
 }
 
-// The elements are brought into the order of the points.
+// Sorts the elements by points.
 py::dict ResultArrays::dict_of(const Elements& elements) {
   const std::size_t points = elements.begin.size();
   std::vector<std::int64_t> offsets{0};
@@ -210,10 +210,10 @@ py::dict ResultArrays::dict() {
   return all;
 }
 
-/// The points with their models.
+/// Points and their models.
 struct GivenPoints {
   std::vector<ModelParameters> models;
-  std::vector<std::string> faults;  // of each model; empty: the model can be solved
+  std::vector<std::string> faults;  // of each model; empty: the model is valid
   std::vector<ModelPoint> points;
 };
 
@@ -234,8 +234,8 @@ std::vector<double> values_of(std::string_view key, const py::handle& array) {
   return numbers;
 }
 
-/// Adds a key: one number of the model to `model`; a number of a point, a text (expression) and an
-/// array with a value for each point to `axes`, which are by key_number.
+/// Adds a key. One number of the model goes to `model`; a number of a point, a text (expression) or
+/// an array with one value per point goes to `axes`, which are ordered by key_number.
 void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>& axes,
              const std::string& name, const py::handle& value) {
   const std::size_t number = protocol::key_number(name);
@@ -260,7 +260,7 @@ void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>&
   axes[number] = std::move(axis);
 }
 
-/// Adds the model with these values of `keys`, or its fault.
+/// Adds the model with these values of `keys`, or its error.
 void add_model(GivenPoints& all, std::span<const double> values,
                const std::vector<std::size_t>& keys, const ModelParameters& base) {
   std::string fault;
@@ -275,8 +275,8 @@ void add_model(GivenPoints& all, std::span<const double> values,
       } else if (*link < model.lengths_m.size()) {
         model.lengths_m[*link] = values[i];
       } else {
-        throw InputError(fmt::format("{} is the length of a link that there is not: there are {}",
-                                     key.name, model.lengths_m.size()));
+        throw InputError(fmt::format("{} is not allowed: links are numbered from 1 to {}", key.name,
+                                     model.lengths_m.size()));
       }
     }
     solver::validate(model);
@@ -297,15 +297,16 @@ std::vector<double> lengths_of(const py::handle& value) {
 }
 
 /// Reads a dict of numbers, texts (expressions), arrays of `points` values, and a list `lengths`.
-/// Throws InputError, which names key, value and what is allowed, for a value that is wrong for all
-/// points, for an unknown key, with the nearest one, and for wrong combinations. A wrong value in
-/// an array makes a fault of its model, or fails when the point is solved.
+/// Throws InputError, with key, value and allowed range, for an unknown key (with the nearest one),
+/// a wrong combination, and a value that is wrong for all points. A wrong value in an array becomes
+/// an error of its model, or of the point when it is solved.
 GivenPoints points_of(const py::dict& keys, std::size_t points) {
   protocol::ModelInput model;
   std::map<std::size_t, protocol::Axis> keyed_axes;
   if (!py::isinstance<py::str>(keys["preset"])) {
-    throw InputError(fmt::format("preset = {} is not allowed: preset must be a name, as \"paper\"",
-                                 py::repr(keys["preset"]).cast<std::string>()));
+    throw InputError(
+        fmt::format("preset = {} is not allowed: preset must be a name, such as \"paper\"",
+                    py::repr(keys["preset"]).cast<std::string>()));
   }
   model.preset = keys["preset"].cast<std::string>();
   const bool has_lengths = keys.contains("lengths");
@@ -335,10 +336,10 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
   }
   protocol::Block block = protocol::block_of(std::move(axes));
   block.set_zip(true);
-  std::map<std::vector<std::uint64_t>, std::size_t> known;  // models, by the bits of their values
+  std::map<std::vector<std::uint64_t>, std::size_t> known;  // models by the bits of their values
   all.points.reserve(points);
   const auto add = [&](std::span<const double> values) {
-    std::vector<std::uint64_t> bits;  // of NaN too
+    std::vector<std::uint64_t> bits;  // also distinguishes NaN
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
       bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
     }
@@ -362,7 +363,7 @@ GivenPoints one_point(const py::dict& keys) {
   return given;
 }
 
-/// The outputs with H, mu and e of the points.
+/// The outputs, with H, mu and e.
 py::dict with_points(ResultArrays& arrays, const std::vector<ModelPoint>& points) {
   py::dict all = arrays.dict();
   const auto column = [&points](double Point::*member) {
@@ -398,7 +399,7 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
   return dict_of(one, result);
 }
 
-/// Instants of a trace: the numbers of one after those of the other, and the states.
+/// Instants of a trace: values by instants, and states.
 struct Instants {
   CaseResult result;
   std::vector<double> numbers;
@@ -432,7 +433,7 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
                         array_of(std::move(instants.states)));
 }
 
-/// What a call of solve_many works on; kept by its threads where it is ended early.
+/// State of a call of solve_many, shared with its threads, which may outlive the call.
 struct ManyPoints {
   ManyPoints(std::size_t points, GivenPoints with_models)
       : given(std::move(with_models)), arrays(points) {}

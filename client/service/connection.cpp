@@ -18,16 +18,16 @@
 namespace oblique::client {
 namespace {
 
-/// A server that is silent for this time counts as away.
+/// A server counts as unreachable after this silence.
 constexpr std::chrono::milliseconds kSilence{3'000};
 
 std::string seconds_of(std::chrono::milliseconds time) {
   return fmt::format("{} s", solver::exact_number(static_cast<double>(time.count()) / 1000.0));
 }
 
-/// An unsent request must not delay the end of the program. Nothing is queued for a server that is
-/// away, which would get every copy when it is back. The embedded service may be connected to
-/// before it listens: attempts follow each other closely.
+/// An unsent request must not delay the end of the program. Requests are not queued for an
+/// unreachable server, which would receive every copy later. The embedded service may be started
+/// after the first attempt to connect, so attempts follow quickly.
 protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
   return {.url = settings.server_url,
           .example_url = ConnectionSettings().server_url,
@@ -38,15 +38,14 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .key = settings.key};
 }
 
-/// Where the page after `requested` begins; 0: there is none. A page that does not come later than
-/// the one before would never end.
+/// First item of the page after `requested`; 0: none. A page that does not advance would never end.
 std::uint64_t next_page(std::uint64_t requested, std::uint64_t answered) {
   return answered > requested ? answered : 0;
 }
 
 }  // namespace
 
-/// The stream that a connection has under way.
+/// The stream of an answer in chunks.
 class ServerRows : public RowStream {
  public:
   ServerRows(Connection& connection, protocol::QueryRequest request) : connection_(connection) {
@@ -72,7 +71,7 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
 
 bool Connection::is_unsent(const Outstanding& outstanding) {
   const auto connections = monitor_.connections();
-  // What an earlier connection took may have been lost with it.
+  // A request that an earlier connection delivered may have been lost with it.
   return connections > 0 && outstanding.sent_over != connections;
 }
 
@@ -84,10 +83,9 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
     outstanding.sent = now;
     return;
   }
-  // A connection over which nothing comes may be dead without either end noticing.
+  // A silent connection may be broken without either end noticing.
   const bool has_connected = monitor_.connections() > connections_before_;
-  // Without an answer the next attempt gets more time: over a slow network a handshake takes
-  // seconds.
+  // The next attempt gets more time: a handshake over a slow network takes seconds.
   const auto patience =
       has_connected ? outstanding.resend_after : kSilence * (1U << std::min(failed_attempts_, 2U));
   if (now - std::max(outstanding.sent, connecting_since_) <= patience) {
@@ -109,13 +107,13 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
 
 void Connection::wait_a_slice(bool to_send) {
   constexpr std::chrono::milliseconds kLongest{50};
-  constexpr std::int64_t kSlices = 5;  // of a short patience
+  constexpr std::int64_t kSlices = 5;  // wait for a short time
   const auto slice = std::min(std::chrono::milliseconds(settings_.timeout_ms / kSlices), kLongest);
   if (keep_waiting_ && !keep_waiting_()) {
     throw Interrupted("stopped while waiting for the server");
   }
   const int events = ZMQ_POLLIN | (to_send ? ZMQ_POLLOUT : 0);
-  // The monitor first: the socket, polled after it, then has the same connection.
+  // The monitor is read first, so that the socket, polled after it, has the same connection.
   std::array<zmq::pollitem_t, 2> items{{{monitor_.handle(), 0, ZMQ_POLLIN, 0},
                                         {socket_.handle(), 0, static_cast<short>(events), 0}}};
   try {
@@ -135,10 +133,10 @@ std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_
   protocol::ClientReply reply;
   if (!protocol::decode(answer.to_string_view(), reply)) {
     throw ConnectionError(fmt::format(
-        "what answers at {} does not speak as oblique-server does: check the address and port",
+        "the reply from {} is not that of an oblique-server: check the address and port",
         settings_.server_url));
   }
-  // A late answer to an earlier request, or a second one, is passed over.
+  // A late or second answer to an earlier request is ignored.
   const bool is_word_of_it =
       reply.has_still_working() && reply.still_working().request_id() == request_id;
   if (reply.request_id() != request_id && reply.request_id() != 0 && !is_word_of_it) {
@@ -166,13 +164,13 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
       }
       outstanding.runs = reply->still_working().runs();
       outstanding.word = outstanding.sent = Clock::now();
-      // A trace may take long, and so may the check of all points of a study.
+      // A trace, or the check of all points of a study, may take long.
       if (tell || request.has_trace() || request.has_submit()) {
         outstanding.heard = outstanding.word;
       }
     }
     if (tell && !said_silent && Clock::now() - outstanding.heard > kSilence) {
-      tell(fmt::format("no answer from {} for {}: waiting until it is back", settings_.server_url,
+      tell(fmt::format("no answer from {} for {}: waiting for it", settings_.server_url,
                        seconds_of(kSilence)));
       said_silent = true;
     }
@@ -184,20 +182,19 @@ void Connection::throw_no_answer(const Outstanding& outstanding) const {
   const std::string timeout = seconds_of(std::chrono::milliseconds(settings_.timeout_ms));
   if (outstanding.runs && Clock::now() - outstanding.word < kSilence) {
     throw ConnectionError(fmt::format(
-        "the query took too long: after {} {} {} still. Narrow it, as with WHERE or LIMIT, or give "
-        "it more time with --timeout SECONDS",
+        "the query took too long: after {} {} {}. Narrow it, for example with WHERE or LIMIT, or "
+        "allow more time with --timeout SECONDS",
         timeout, settings_.server_url,
-        *outstanding.runs ? "works on it" : "is busy with the queries of others"));
+        *outstanding.runs ? "is still working on it" : "is busy with the queries of others"));
   }
   std::string guess = settings_.if_silent;
   if (guess.empty()) {
     const std::string host = protocol::host_of(settings_.server_url);
     const auto [has_v4, has_v6] = protocol::families_of(host);
-    guess =
-        fmt::format("{}, or say where it is with --server URL or OBLIQUE_SERVER",
-                    host.empty() || has_v4 || has_v6
-                        ? "is a server running there? Start one with `oblique-server`"
-                        : fmt::format("no address is known here for the name {}. Check it", host));
+    guess = fmt::format("{}, or name it with --server URL or OBLIQUE_SERVER",
+                        host.empty() || has_v4 || has_v6
+                            ? "is a server running there? Start one with `oblique-server`"
+                            : fmt::format("the name {} has no address. Check it", host));
   }
   throw ConnectionError(
       fmt::format("no answer from {} within {}: {}", settings_.server_url, timeout, guess));
@@ -209,12 +206,11 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
   request.set_request_id(++last_request_id_);
   auto frame = protocol::encode(request);
   if (frame.size() > protocol::kMaxFrameBytes) {
-    throw ConnectionError(
-        fmt::format("the request has {} bytes, more than the {} that a server takes: write long "
-                    "lists of values as ranges",
-                    frame.size(), protocol::kMaxFrameBytes));
+    throw ConnectionError(fmt::format(
+        "the request has {} bytes; a server takes at most {}: write long lists of values as ranges",
+        frame.size(), protocol::kMaxFrameBytes));
   }
-  // A trace may take long to arrive; a new connection would begin anew.
+  // A trace may take long, and a new connection would start it again.
   const std::chrono::milliseconds resend_after(request.has_trace() ? settings_.timeout_ms
                                                                    : settings_.resend_after_ms);
   auto reply = answer_to(request, {.frame = std::move(frame), .resend_after = resend_after}, tell);
@@ -229,11 +225,12 @@ void Connection::check(const protocol::ClientReply& reply, int kind) const {
   if (reply.has_error()) {
     throw ServerError(reply.error().message());
   }
-  // A reply has the number of its request's kind. Frames of other programs may decode as anything.
+  // A reply carries the number of its request's kind. Messages of other programs may decode as
+  // anything.
   if (static_cast<int>(reply.kind_case()) != kind) {
     throw ConnectionError(
-        fmt::format("what answers at {} does not speak as oblique-server does to clients: check "
-                    "the address and port ({} is for clients; the port for workers is another one)",
+        fmt::format("the reply from {} is not that of an oblique-server to a client: check the "
+                    "address and port ({} is for clients; workers have another port)",
                     settings_.server_url, ConnectionSettings().server_url));
   }
 }
@@ -273,7 +270,7 @@ protocol::QueryReply Connection::next_rows() {
   if (rows_->chunks > 0) {
     chunk = more_rows();
   } else {
-    // A call ends the stream under way.
+    // Every call ends the current stream.
     Rows rows = *std::exchange(rows_, std::nullopt);
     protocol::ClientRequest request;
     *request.mutable_query() = rows.request;
@@ -286,7 +283,7 @@ protocol::QueryReply Connection::next_rows() {
   if (chunk.chunk() != rows_->chunks + 1 || !protocol::is_sound(chunk) ||
       !std::equal(chunk.columns().begin(), chunk.columns().end(), rows_->columns.begin(),
                   rows_->columns.end())) {
-    broke_off(fmt::format("what came from {} is not its next part", settings_.server_url));
+    broke_off(fmt::format("{} sent a wrong part", settings_.server_url));
   }
   ++rows_->chunks;
   rows_->rows += chunk.chunk_rows();
@@ -301,7 +298,7 @@ protocol::QueryReply Connection::more_rows() {
   request.mutable_more_rows()->set_request_id(rows_->request_id);
   request.mutable_more_rows()->set_received(rows_->chunks);
   send_about_rows(std::move(request));
-  // Time in which this process was stopped, or its machine slept, does not count.
+  // The time in which this process was stopped or the machine slept does not count.
   constexpr std::chrono::milliseconds kLongestSlice{500};
   const std::chrono::milliseconds timeout(settings_.timeout_ms);
   Clock::duration waited{0};
@@ -322,9 +319,9 @@ protocol::QueryReply Connection::more_rows() {
 
 void Connection::send_about_rows(protocol::ClientRequest request) {
   request.set_protocol_version(protocol::kProtocolVersion);
-  // It has no reply of its own; errors come under the number of the query.
+  // This request has no reply of its own; errors arrive under the number of the query.
   request.set_request_id(rows_->request_id);
-  // If it cannot be sent, nothing more comes, which is noticed.
+  // If it cannot be sent, no chunk arrives and the wait times out.
   (void)socket_.send(zmq::buffer(protocol::encode(request)), zmq::send_flags::dontwait);
 }
 
@@ -339,7 +336,7 @@ void Connection::end_rows() {
 
 void Connection::broke_off(const std::string& why) const {
   throw ConnectionError(
-      fmt::format("the answer broke off after {} rows: {}. Ask again", rows_->rows, why));
+      fmt::format("the answer ended after {} rows: {}. Repeat the command", rows_->rows, why));
 }
 
 protocol::StatusReply Connection::full_status(const std::string& study, const Tell& tell) {
@@ -365,7 +362,7 @@ std::vector<protocol::StudyStatus> Connection::status(const std::string& study, 
 protocol::StudyStatus Connection::status_of(std::uint64_t study_id, const std::string& name,
                                             const Tell& tell) {
   protocol::ClientRequest request;
-  request.mutable_status()->set_study(name);  // for the server's error
+  request.mutable_status()->set_study(name);  // replaces the server's error
   request.mutable_status()->set_study_id(study_id);
   const auto reply = call(std::move(request), tell).status();
   if (reply.studies_size() != 1) {
@@ -442,7 +439,7 @@ std::int64_t timeout_of(const SourceFlags& flags, std::int64_t default_ms) {
   }
   if (!(*flags.timeout_s > 0.0 && *flags.timeout_s <= kLongest_s)) {
     throw solver::InputError(
-        fmt::format("--timeout {} is not allowed: it must be > 0 and at most {} s",
+        fmt::format("--timeout {} is not allowed: it must be greater than 0 and at most {} s",
                     solver::exact_number(*flags.timeout_s), solver::exact_number(kLongest_s)));
   }
   return std::llround(std::ceil(*flags.timeout_s * 1000.0));
@@ -470,8 +467,8 @@ void add_server_flags(CLI::App& command, SourceFlags& flags) {
 
 void add_source_flags(CLI::App& command, SourceFlags& flags) {
   auto* database = command.add_option("--db", flags.database,
-                                      fmt::format("database to read directly; default, unless a "
-                                                  "server is named: {} when it is in this folder",
+                                      fmt::format("database file to read directly; default, unless "
+                                                  "a server is named: {} if it is in this folder",
                                                   DatabaseSettings().file));
   database->type_name("FILE");
   flags.may_be_file = true;
@@ -485,7 +482,7 @@ void add_source_flags(CLI::App& command, SourceFlags& flags) {
 }
 
 void add_database_argument(CLI::App& command, std::filesystem::path& file) {
-  command.add_option("--db,FILE", file, "the database; --db may be left out")
+  command.add_option("--db,FILE", file, "database file; --db may be omitted")
       ->type_name("FILE")
       ->capture_default_str();
 }
@@ -503,7 +500,7 @@ ConnectionSettings connection_settings(Console& console, const SourceFlags& flag
   }
   const std::string keys =
       flags.keys.empty() ? environment_variable(kKeysVariable).value_or("") : flags.keys;
-  console.detail(fmt::format("asks the server at {}{}", settings.server_url,
+  console.detail(fmt::format("connecting to the server at {}{}", settings.server_url,
                              keys.empty() ? "" : fmt::format(" with the key {}", keys)));
   if (!keys.empty()) {
     settings.key = protocol::read_key_file(keys);
@@ -521,7 +518,7 @@ std::unique_ptr<Source> open_source(Console& console, const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting) {
   const auto database_timeout_ms = timeout_of(flags, DatabaseSettings().timeout_ms);
   if (const std::string database = database_meant(flags); !database.empty()) {
-    console.detail(fmt::format("reads the database {} itself", database));
+    console.detail(fmt::format("reading the database {}", database));
     return open_database(database, database_timeout_ms);
   }
   return std::make_unique<Connection>(connection_settings(console, flags), std::move(keep_waiting));

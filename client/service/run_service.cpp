@@ -35,18 +35,18 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A server with a large database reads what is done first.
+// A server with a large database first reads its completed points.
 constexpr std::chrono::seconds kReadyWithin{60};
-// A worker ends its point first, which on fine meshes takes long; the server commits.
+// A worker finishes its point, which takes long on fine meshes; the server commits.
 constexpr std::chrono::seconds kStopWithin{5};
 constexpr std::chrono::milliseconds kPause{1};
 
-std::string with_last_words(const std::string& what, const ChildProcess& child) {
-  const auto words = child.last_words();
-  return words.empty() ? what : fmt::format("{}; its last words:\n{}", what, words);
+std::string with_last_output(const std::string& what, const ChildProcess& child) {
+  const auto words = child.last_output();
+  return words.empty() ? what : fmt::format("{}; its last output:\n{}", what, words);
 }
 
-/// Waits until none of `children` runs, and kills those that still do at the end of the time.
+/// Waits until no child runs; kills those that still run after `time`.
 void end_all(const std::vector<std::unique_ptr<ChildProcess>>& children) {
   for (const auto& child : children) {
     child->send(SIGTERM);
@@ -61,8 +61,8 @@ void end_all(const std::vector<std::unique_ptr<ChildProcess>>& children) {
   }
 }
 
-/// The first line that the server writes to `ready`; empty when it closes the pipe without one.
-/// Throws ProcessError when none comes in time, and Interrupted when `stop` is requested.
+/// The first line that the server writes to `ready`; empty if it closes the pipe first. Throws
+/// ProcessError if no line arrives in time, and Interrupted when `stop` is requested.
 std::string first_line(const Descriptor& ready, const ChildProcess& server,
                        const std::filesystem::path& database, protocol::StopSignals& stop) {
   const auto deadline = Clock::now() + kReadyWithin;
@@ -72,7 +72,7 @@ std::string first_line(const Descriptor& ready, const ChildProcess& server,
       throw Interrupted("stopped before the server was ready");
     }
     if (Clock::now() > deadline) {
-      throw ProcessError(with_last_words(
+      throw ProcessError(with_last_output(
           fmt::format("no answer within {} s: {}", kReadyWithin.count(), why_silent(database)),
           server));
     }
@@ -91,11 +91,11 @@ std::string first_line(const Descriptor& ready, const ChildProcess& server,
   return text.substr(0, text.find('\n'));
 }
 
-/// Why the workers of this run do not solve the rest of a study, and what to do; or empty.
+/// Why the workers of this run cannot solve the rest of a study, with the remedy; else empty.
 std::string objection_to_waiting(const protocol::StudyStatus& status) {
   const std::string own = solver::solver_version();
   if (status.state() == "paused" && status.leased() == 0) {
-    return fmt::format("somebody has paused \"{}\": the same command again goes on with it",
+    return fmt::format("\"{}\" was paused by another command: run this command again to continue",
                        status.name());
   }
   if (status.state() != "running" || status.solver_version().empty() ||
@@ -103,9 +103,8 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
     return {};
   }
   return fmt::format(
-      "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
-      "solve its other {3} points. Go on with workers of {1}, or under another name, as --name "
-      "{0}-{2}",
+      "the results of \"{0}\" are of solver {1}, but the workers here have solver {2} and must not "
+      "solve its other {3} points. Use workers of {1}, or another name, for example --name {0}-{2}",
       status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
 }
 
@@ -127,11 +126,11 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
   if (submitted.created()) {
     note_coarse_mesh(console.notes(), study.recipe);
   } else {
-    console.notes() << fmt::format("Going on with \"{}\": {} of {} points are done.\n", study.name,
+    console.notes() << fmt::format("Continuing \"{}\": {} of {} points are done.\n", study.name,
                                    format_count(submitted.completed()),
                                    format_count(submitted.points()));
   }
-  if (const std::string taken = taken_over(submitted.reused()); !taken.empty()) {
+  if (const std::string taken = reused_points_note(submitted.reused()); !taken.empty()) {
     console.notes() << fmt::format("\"{}\": {}\n", study.name, taken);
   }
   FollowedStudy followed(connection, study.name);
@@ -159,8 +158,8 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
 
 std::string why_silent(const std::filesystem::path& database) {
   return fmt::format(
-      "the server that was started here runs, and waits for its database {0}, which is slow or "
-      "damaged. `oblique check --db {0}` examines it",
+      "the server runs, but waits for its database {0}, which is slow or damaged; `oblique check "
+      "--db {0}` examines it",
       database.string());
 }
 
@@ -168,7 +167,7 @@ EphemeralKeys::EphemeralKeys()
     : folder_((std::filesystem::temp_directory_path() / "oblique-run-XXXXXX").string()) {
   if (::mkdtemp(folder_.data()) == nullptr) {
     throw std::runtime_error(
-        fmt::format("cannot make a folder for keys, {}: {}", folder_, std::strerror(errno)));
+        fmt::format("cannot create a folder for keys, {}: {}", folder_, std::strerror(errno)));
   }
   try {
     protocol::make_key_folder(folder_);
@@ -188,7 +187,7 @@ std::string EphemeralKeys::file_of(protocol::Role role) const {
 }
 
 EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
-  static_cast<void>(sibling_program("oblique-worker"));  // missing before a server starts
+  static_cast<void>(sibling_program("oblique-worker"));  // checked before the server starts
   start_server(settings, stop);
   for (int i = 0; i < settings.workers; ++i) {
     start_worker(settings);
@@ -212,7 +211,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     child.arguments.emplace_back("--allow-network-disk");
   }
   server_ = std::make_unique<ChildProcess>(child);
-  ready.write.close();  // the server holds the only other end: its end shows on ours
+  ready.write.close();  // the server holds the only other end, so we notice when it ends
   const auto urls = nlohmann::json::parse(first_line(ready.read, *server_, settings.database, stop),
                                           nullptr, false);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker")) {
@@ -221,17 +220,17 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     page_url_ = urls.value("page", std::string());
     return;
   }
-  // It closed the pipe because it ends: then its last words are complete.
+  // It closes the pipe when it ends; then its output is complete.
   const auto deadline = Clock::now() + kStopWithin;
   while (server_->is_running() && Clock::now() < deadline) {
     std::this_thread::sleep_for(kPause);
   }
-  throw ProcessError(
-      with_last_words(fmt::format("the server did not start: it {}", server_->ending()), *server_));
+  throw ProcessError(with_last_output(
+      fmt::format("the server did not start: it {}", server_->ending()), *server_));
 }
 
 void EmbeddedService::start_worker(const ServiceSettings& settings) {
-  // Together the workers use the cores and the memory for falls.
+  // The workers share the cores and the memory for falls.
   const auto workers = static_cast<unsigned>(settings.workers);
   const unsigned threads = std::max(1U, std::thread::hardware_concurrency() / workers);
   const std::uint64_t all_bytes =
@@ -249,11 +248,11 @@ void EmbeddedService::start_worker(const ServiceSettings& settings) {
 
 void EmbeddedService::check() {
   if (!server_->is_running()) {
-    throw ProcessError(with_last_words(fmt::format("the server {}", server_->ending()), *server_));
+    throw ProcessError(with_last_output(fmt::format("the server {}", server_->ending()), *server_));
   }
   if (std::none_of(workers_.begin(), workers_.end(),
                    [](const auto& worker) { return worker->is_running(); })) {
-    throw ProcessError(with_last_words(
+    throw ProcessError(with_last_output(
         fmt::format("no worker is left: the last one {}", workers_.back()->ending()),
         *workers_.back()));
   }
@@ -264,7 +263,7 @@ std::string EmbeddedService::news() {
   for (const auto& worker : workers_) {
     if (!worker->is_running() && reported_.insert(worker->pid()).second) {
       text += text.empty() ? "" : "\n";
-      text += with_last_words(
+      text += with_last_output(
           fmt::format("a worker (process {}) {}", worker->pid(), worker->ending()), *worker);
     }
   }
@@ -295,17 +294,17 @@ void check_settings(const RunSettings& settings) {
 void add_worker_flags(CLI::App& command, RunSettings& settings) {
   command
       .add_option("--workers", settings.service.workers,
-                  "worker processes, which share the cores of this machine")
+                  "number of worker processes, which share the cores of this machine")
       ->type_name("N")
       ->capture_default_str();
   command
-      .add_option(
-          "--fall-memory", settings.service.fall_memory_bytes,
-          "memory of all workers for solved falls, as 2GB; the default is an eighth of what "
-          "is free")
+      .add_option("--fall-memory", settings.service.fall_memory_bytes,
+                  "memory for solved falls of all workers together, such as 2GB; default: an "
+                  "eighth of the free memory")
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false).description(""));
-  command.add_flag("--verbose", settings.service.verbose, "show what server and workers say");
+  command.add_flag("--verbose", settings.service.verbose,
+                   "print what the server and workers report");
 }
 
 std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
@@ -320,7 +319,7 @@ std::optional<RunEnd> run_study(Console& console, const Study& study, const RunS
     return end;
   } catch (const Interrupted&) {
     console.notes() << fmt::format(
-        "Stopped. What was solved of \"{}\" is in {}; the same command again goes on from there.\n",
+        "Stopped. Results of \"{}\" are stored in {}; the same command continues the study.\n",
         study.name, settings.service.database.string());
     return std::nullopt;
   }

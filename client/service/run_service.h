@@ -22,21 +22,22 @@
 
 namespace oblique::client {
 
-/// A server and workers on this machine, for as long as this object lives.
+/// Settings of a temporary server with workers.
 struct ServiceSettings {
   std::filesystem::path database;
   int workers = 1;                      ///< processes, which share the cores
-  bool allow_network_disk = false;      ///< the database may lie on a network file system
-  std::string http = "off";             ///< where its page is: ADDRESS:PORT
-  std::uint64_t fall_memory_bytes = 0;  ///< of all workers; 0: an eighth of what is free
-  std::string only_study{};             ///< the others of the database wait; empty: all are solved
+  bool allow_network_disk = false;      ///< allow a network file system
+  std::string http = "off";             ///< address of the page: ADDRESS:PORT
+  std::uint64_t fall_memory_bytes = 0;  ///< of all workers together; 0: an eighth of the free
+                                        ///< memory
+  std::string only_study{};             ///< solve only this study; empty: all studies
   bool verbose = false;                 ///< standard error of server and workers goes to ours
 };
 
-/// Why a server that was started on the database may not answer, as a sentence part.
+/// Why a server that was started on the database may not answer; a part of a sentence.
 std::string why_silent(const std::filesystem::path& database);
 
-/// Keys for as long as this object lives, in a folder below TMPDIR that only its owner can read.
+/// Temporary keys in a folder below TMPDIR that only its owner can read.
 class EphemeralKeys {
  public:
   /// Throws std::runtime_error when they cannot be written.
@@ -45,39 +46,39 @@ class EphemeralKeys {
   EphemeralKeys(const EphemeralKeys&) = delete;
   EphemeralKeys& operator=(const EphemeralKeys&) = delete;
 
-  /// The key file of the program with that role.
+  /// The key file for a role.
   std::string file_of(protocol::Role role) const;
 
  private:
   std::string folder_;
 };
 
-/// Starts `oblique-server` on loopback, at ports that the system picks, and workers; ends them all
-/// when destroyed. The same programs and messages as on many machines.
+/// Starts an `oblique-server` on loopback, with ports chosen by the system, and workers; the
+/// destructor ends them all.
 class EmbeddedService {
  public:
   /// Waits until the server listens, then starts the workers. Throws ProcessError with the last
-  /// words of what failed, Interrupted when `stop` is requested meanwhile.
+  /// output of a process that failed, Interrupted when `stop` is requested.
   EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop);
   ~EmbeddedService() { stop(); }
   EmbeddedService(const EmbeddedService&) = delete;
   EmbeddedService& operator=(const EmbeddedService&) = delete;
 
-  /// Where clients connect.
+  /// Address for clients.
   const std::string& client_url() const { return client_url_; }
-  /// Their key: other users of this machine reach the ports too.
+  /// The clients' key, needed because other users of this machine can reach the ports.
   protocol::KeyFile client_key() const {
     return protocol::read_key_file(keys_.file_of(protocol::Role::kClient));
   }
-  /// The address of the page, with the token that lets a browser in; empty without one.
+  /// The address of the page with its access token; empty: no page.
   const std::string& page_url() const { return page_url_; }
 
-  /// Throws ProcessError when the server or the last worker has ended.
+  /// Throws ProcessError if the server or the last worker has ended.
   void check();
-  /// The last words of workers that ended since the last call; or an empty text.
+  /// The last output of workers that ended since the last call; else empty.
   std::string news();
-  /// Ends the workers, then the server, which stores their results first; kills what does not end
-  /// in time.
+  /// Ends the workers, then the server, which first stores their results. Kills processes that do
+  /// not end in time.
   void stop();
 
  private:
@@ -87,36 +88,35 @@ class EmbeddedService {
   EphemeralKeys keys_;
   std::unique_ptr<ChildProcess> server_;
   std::vector<std::unique_ptr<ChildProcess>> workers_;
-  std::set<pid_t> reported_;  ///< workers whose end `news` has returned
+  std::set<pid_t> reported_;  ///< ended workers that `news` has reported
   std::string client_url_;
   std::string worker_url_;
   std::string page_url_;
 };
 
-/// How `run` runs a study, and `paper` its cases.
+/// How `run` solves a study and `paper` its cases.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};
   bool no_reuse = false;   ///< as in SubmitSettings
-  std::int64_t rows = 30;  ///< most rows of results fetched at the end
+  std::int64_t rows = 30;  ///< number of result rows fetched at the end
 };
 
 /// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `command`.
 void add_worker_flags(CLI::App& command, RunSettings& settings);
 
-/// Throws solver::InputError, naming the flag and what is allowed, for a number of workers or rows
-/// that cannot be.
+/// Throws solver::InputError, with the flag and what is allowed, for a wrong number of workers or
+/// rows.
 void check_settings(const RunSettings& settings);
 
-/// How a study ended.
 struct RunEnd {
   protocol::StudyStatus status;
   std::vector<protocol::QueryReply> rows;  ///< chunks of the first results
-  int exit_code;                           ///< kDone when every point is solved
+  int exit_code;                           ///< kDone if every point is solved
 };
 
-/// Starts server and workers here, submits the study, shows its progress and waits for its end;
-/// nothing is left running. When `stop` is requested, prints how to continue and returns nothing.
-/// Throws ProcessError when server or workers end too soon, ServerError when the study is refused.
+/// Starts server and workers, submits the study, shows its progress, waits for its end, and ends
+/// all processes. When `stop` is requested, prints how to continue and returns nothing. Throws
+/// ProcessError if the server or all workers end early, ServerError if the study is refused.
 std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop);
 

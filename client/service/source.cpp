@@ -14,7 +14,7 @@
 namespace oblique::client {
 namespace {
 
-/// Returns what `call` returns; a wrong statement is wrong usage.
+/// Returns the result of `call`; turns a wrong statement into wrong usage.
 template <class Call>
 auto answered(const Call& call) {
   try {
@@ -40,7 +40,8 @@ class Database : public Source {
   Database(std::string file, std::int64_t timeout_ms) : file_(std::move(file)), reader_(file_) {
     constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
     limits_.time_limit_ms = timeout_ms;
-    sqlite3_hard_heap_limit64(kHeapBytes);  // of this process, which uses SQLite for nothing else
+    sqlite3_hard_heap_limit64(kHeapBytes);  // the whole process, because nothing else in it uses
+                                            // SQLite
   }
 
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
@@ -53,7 +54,7 @@ class Database : public Source {
       const bool has_server = server::is_in_use(file_);
       for (auto& each : found) {
         if (!has_server && each.state() == "running") {
-          each.set_waits_for(fmt::format("a server: nobody is at work on {}", file_));
+          each.set_waits_for(fmt::format("a server; none uses {} now", file_));
         }
       }
       return found;

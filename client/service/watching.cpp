@@ -20,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-// The end of a short study shows at once; a long one needs few requests.
+// Short enough to notice the end of a short study; longer later, for few requests.
 Seconds pause_after(Seconds elapsed) {
   constexpr Seconds kShortest{0.004};
   constexpr Seconds kLongest{0.5};
@@ -54,7 +54,7 @@ std::string WaitMessages::update(const protocol::StudyStatus& status, Seconds el
     return {};
   }
   said_ = reason_;
-  return reason_.empty() ? "The study goes on." : fmt::format("The study waits for {}.", reason_);
+  return reason_.empty() ? "The study continues." : fmt::format("The study waits for {}.", reason_);
 }
 
 protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
@@ -104,7 +104,7 @@ protocol::StudyStatus FollowedStudy::status(const Tell& tell) {
   study_id_ = status.study_id();
   if (status.name() != name_) {
     if (tell) {
-      tell(fmt::format("{} is called {} now.", name_, status.name()));
+      tell(fmt::format("{} is now called {}.", name_, status.name()));
     }
     name_ = status.name();
   }
@@ -117,7 +117,7 @@ int print_end(Console& console, const protocol::StudyStatus& status,
     print_failures(console, status, query);
   }
   if (status.state() == "cancelled") {
-    console.errors() << "The study is cancelled; oblique resume goes on with it.\n";
+    console.errors() << "The study is cancelled; `oblique resume` continues it.\n";
   }
   return status.solved() + status.left_out() == status.points() ? protocol::kDone
                                                                 : protocol::kFailed;
@@ -125,31 +125,30 @@ int print_end(Console& console, const protocol::StudyStatus& status,
 
 void warn_if_insecure(Console& console, const std::string& access, const std::string& place) {
   if (access == "insecure") {
-    console.note(fmt::format(
-        "INSECURE: {} runs with --insecure: whoever reaches it can use it, and nothing is "
-        "encrypted.",
-        place));
+    console.note(
+        fmt::format("INSECURE: {} runs with --insecure: anyone who can reach it can use it, and "
+                    "nothing is encrypted.",
+                    place));
   }
 }
 
-std::string taken_over(const protocol::ReusedPoints& taken) {
+std::string reused_points_note(const protocol::ReusedPoints& taken) {
   if (taken.points() == 0 && !taken.cut_short()) {
     return {};
   }
-  std::string text = fmt::format("{} {} taken over{}", format_count(taken.points()),
-                                 taken.points() == 1 ? "point is" : "points are",
-                                 taken.under_way() ? " so far" : "");
+  std::string text =
+      counted(taken.points(), "point", "points") + " reused" + (taken.under_way() ? " so far" : "");
   std::uint64_t named = 0;
   for (int i = 0; i < taken.from_size(); ++i) {
     named += taken.from(i).points();
-    text += fmt::format("{} {} of {}", i == 0 ? ":" : ",", format_count(taken.from(i).points()),
+    text += fmt::format("{} {} from {}", i == 0 ? ":" : ",", format_count(taken.from(i).points()),
                         protocol::visible(taken.from(i).study()));
   }
   if (named < taken.points()) {
-    text += fmt::format(", {} of others", format_count(taken.points() - named));
+    text += fmt::format(", {} from others", format_count(taken.points() - named));
   }
   if (taken.cut_short()) {
-    text += "; to look for more would have taken too long";
+    text += "; the search for more was cut short";
   }
   return text;
 }

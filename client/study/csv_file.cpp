@@ -31,7 +31,7 @@ double number_of_field(std::string_view field, const solver::ParameterKey& key) 
   const auto value = solver::number_of(field.starts_with('+') ? field.substr(1) : field);
   if (!value) {
     throw InputError(field.empty()
-                         ? "the field is empty: a number is required"
+                         ? "the field is empty: it must be a number"
                          : fmt::format("\"{}\" is not a number", protocol::excerpt(field)));
   }
   solver::check_value(key, *value);
@@ -46,12 +46,12 @@ CsvFile::CsvFile(std::string_view text, std::string name) : name_(std::move(name
   }
   read_rows(text);
   if (rows_.size() < 2) {
-    throw InputError(name_ + ": it needs a line with the names of columns, and lines with values");
+    throw InputError(name_ + ": it needs a line with column names, and lines with values");
   }
   check_names();
   for (const Row& row : rows_) {
     if (row.fields.size() != columns().size()) {
-      fail(row.line, fmt::format("the line has {} fields, and the first line names {} columns",
+      fail(row.line, fmt::format("the line has {} fields, but the first line has {} column names",
                                  row.fields.size(), columns().size()));
     }
   }
@@ -90,7 +90,7 @@ void CsvFile::read_rows(std::string_view text) {
       follows_quote = true;
     } else if (is_quoted) {
       field += text[i];
-      i += text[i] == '"' ? std::size_t{1} : 0;  // a quote is written twice
+      i += text[i] == '"' ? std::size_t{1} : 0;  // a quote inside a field is doubled
     } else if (text[i] == '"' && trimmed(field).empty() && !follows_quote) {
       is_quoted = true;
     } else if (text[i] == ',') {
@@ -99,14 +99,14 @@ void CsvFile::read_rows(std::string_view text) {
       end_row();
     } else if (follows_quote && kBlank.find(text[i]) == std::string_view::npos && text[i] != '\r') {
       fail(line,
-           "text follows a field in quotes: a comma or the end of the line must, and a quote "
-           "inside a field is written twice");
+           "text follows a quoted field: write a comma or the end of the line after it, and double "
+           "a quote inside a field");
     } else if (text[i] != '\r') {
       field += text[i];
     }
   }
   if (is_quoted) {
-    fail(row.line, "a quote is opened and never closed");
+    fail(row.line, "a quote is not closed");
   }
   end_row();
 }
@@ -115,11 +115,11 @@ void CsvFile::check_names() const {
   const std::size_t line = rows_.front().line;
   const auto& names = columns();
   if (names.size() == 1 && names.front().find(';') != std::string::npos) {
-    fail(line, "there are semicolons between the columns: commas are needed");
+    fail(line, "columns are separated by semicolons: use commas");
   }
   if (std::all_of(names.begin(), names.end(),
                   [](const auto& name) { return solver::number_of(name).has_value(); })) {
-    fail(line, "the first line has numbers: it must name the columns");
+    fail(line, "the first line contains numbers: it must name the columns");
   }
   for (auto name = names.begin(); name != names.end(); ++name) {
     if (name->empty()) {

@@ -12,14 +12,14 @@
 
 namespace oblique::client {
 
-/// A table of numbers with names above its columns, as spreadsheets export it (RFC 4180): commas
-/// between fields, quotes around fields with commas, quotes (doubled) or line breaks. A byte order
-/// mark, empty lines and spaces around a field are ignored.
+/// A table of numbers with column names, as exported by spreadsheets (RFC 4180): fields are
+/// separated by commas; fields with commas, quotes (doubled) or line breaks are quoted. A byte
+/// order mark, empty lines and spaces around a field are ignored.
 class CsvFile {
  public:
-  /// Throws solver::InputError for a text that is not UTF-8, a quote that is not closed, rows of
-  /// different lengths, no row of values, and a column name that is missing or appears twice. It
-  /// begins with `name` and the line, like all errors below.
+  /// Throws solver::InputError, which begins with `name` and the line like all errors below, for
+  /// text that is not UTF-8, an unclosed quote, rows of different lengths, no rows, and a column
+  /// name that is missing or duplicate.
   CsvFile(std::string_view text, std::string name);
 
   const std::vector<std::string>& columns() const { return rows_.front().fields; }
@@ -30,7 +30,7 @@ class CsvFile {
 
  private:
   struct Row {
-    std::size_t line;  ///< where it begins, from 1
+    std::size_t line;  ///< line where the row begins, from 1
     std::vector<std::string> fields;
   };
   void read_rows(std::string_view text);
@@ -38,15 +38,15 @@ class CsvFile {
   [[noreturn]] void fail(std::size_t line, std::string_view message) const;
 
   std::string name_;
-  std::vector<Row> rows_;  ///< the first has the names of the columns
+  std::vector<Row> rows_;  ///< the first row contains the column names
 };
 
-/// The CSV files of one study, each read once.
+/// The CSV files of one study; each is read once.
 class CsvFiles {
  public:
-  /// Relative paths begin at `folder`.
+  /// Relative paths start at `folder`.
   explicit CsvFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  /// Throws InputError as CsvFile does, and unless it is a regular file of at most 64 MiB.
+  /// Throws InputError as CsvFile does, and if it is not a regular file of at most 64 MiB.
   const CsvFile& at(const std::string& path);
 
  private:

@@ -26,7 +26,7 @@ using protocol::BlockKind;
 using solver::InputError;
 using solver::ParameterKey;
 
-/// The number of a part of a flag's text.
+/// Parses a number in a flag's text.
 double flag_number(std::string_view part) {
   const auto value = solver::number_of(part);
   if (!value) {
@@ -68,8 +68,8 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
   if ((parts.size() != 3 && !has_spacing) ||
       (has_spacing && parts[3] != "log" && parts[3] != "linear")) {
     throw InputError(
-        "this is not a range: write from:to:count, as 0.1:2.0:40, from:to:count:log or "
-        "from:to:step=0.05; from:to alone only in a --sample");
+        "this is not a range: write from:to:count, such as 0.1:2.0:40, from:to:count:log or "
+        "from:to:step=0.05; from:to alone is allowed only in a --sample");
   }
   const double from = flag_number(parts[0]);
   const double to = flag_number(parts[1]);
@@ -85,7 +85,7 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
       has_spacing && parts[3] == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
 }
 
-/// @FILE:COLUMN, or @FILE for its only column or the one that is called as the key.
+/// @FILE:COLUMN, or @FILE for its only column or the one named as the key.
 protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, CsvFiles& files) {
   const auto colon = text.rfind(':');
   const CsvFile& file =
@@ -99,7 +99,7 @@ protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, Cs
   return protocol::listed_axis(key, file.values(column, key));
 }
 
-/// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with either end left empty, uniform(FROM,TO) or
+/// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with FROM or TO optional, uniform(FROM,TO) or
 /// log-uniform(FROM,TO).
 protocol::Distribution distribution_of_flag(std::string_view text) {
   const auto bracket = text.find('(');
@@ -108,7 +108,7 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   auto parts = protocol::split(text.substr(bracket + 1, text.size() - bracket - 2), ',');
   const bool is_normal = written.kind() == protocol::DISTRIBUTION_NORMAL;
   if (is_normal ? parts.size() < 2 || parts.size() > 4 : parts.size() != 2) {
-    throw InputError(is_normal ? "write normal(MEAN,SD), or normal(MEAN,SD,FROM,TO) to cut it off"
+    throw InputError(is_normal ? "write normal(MEAN,SD), or normal(MEAN,SD,FROM,TO) to truncate it"
                                : fmt::format("write {}(FROM,TO)", name_of(written.kind())));
   }
   if (is_normal) {
@@ -126,7 +126,7 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   return written;
 }
 
-/// Whether a text is NAME(...) with the name of a distribution or, in a sample, of no function.
+/// Whether a text is NAME(...), where NAME is a distribution or, in a sample, not a function.
 bool is_distribution(std::string_view text, BlockKind kind) {
   const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
   const auto functions = expressions::function_names();
@@ -139,7 +139,7 @@ bool is_distribution(std::string_view text, BlockKind kind) {
   return is_call && (is_in(distributions) || (kind == BlockKind::kSample && !is_in(functions)));
 }
 
-/// Whether a text that is no list of numbers is an expression: it computes, or names another key.
+/// Whether a text that is no list of numbers is an expression: it computes or names another key.
 bool is_expression(std::string_view text) {
   const auto parts = protocol::split(text, ',');
   return !std::all_of(parts.begin(), parts.end(),
@@ -165,8 +165,8 @@ protocol::Sample sample_of_flag(std::string_view text) {
   const auto seed = parts.size() > 2 ? whole_number(parts[2]) : protocol::kUsualSeed;
   if (parts.size() > 3 || !count || !seed) {
     throw InputError("sample",
-                     "this is no sample: write kind:count:seed, as sobol:100000:1; kinds are "
-                     "random, lhs and sobol, count and seed whole numbers");
+                     "this is not a sample: write kind:count:seed, such as sobol:100000:1; kinds "
+                     "are random, lhs and sobol; count and seed are integers");
   }
   return protocol::parse_sample(parts[0], *count, *seed);
 }
@@ -188,12 +188,12 @@ std::vector<double> lengths_of_flag(std::string_view text) {
   for (const auto part : protocol::split(text, ',')) {
     const auto length = solver::number_of(part);
     if (!length) {
-      throw InputError("lengths",
-                       fmt::format("{}; write the length of each link [m], as 0.4,0.3; --length1, "
-                                   "--length2, ... take more "
-                                   "for one link, as --length1 0.2:0.4:5 or --length1 mu",
-                                   part.empty() ? "a value is missing"
-                                                : fmt::format("\"{}\" is not a number", part)));
+      throw InputError(
+          "lengths",
+          fmt::format(
+              "{}; write the length of each link [m], such as 0.4,0.3; --length1, --length2, ... "
+              "set one link to several values, such as --length1 0.2:0.4:5 or --length1 mu",
+              part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)));
     }
     lengths.push_back(*length);
   }
@@ -208,7 +208,7 @@ std::string default_of(const ParameterKey& key) {
   return solver::exact_number(key.get(defaults));
 }
 
-/// What presets and other meshes differ in, for help.
+/// Accuracy of presets and other meshes, for help.
 std::string table_of_presets() {
   std::vector<std::pair<std::string_view, solver::ModelParameters>> rows;
   for (const std::string_view name : solver::preset_names()) {
@@ -225,8 +225,8 @@ std::string table_of_presets() {
     }
   }
   std::string table =
-      "Presets, against 48 elements a link over 400 random points:\n"
-      "  preset     elements  forces off  duration off  same mode\n";
+      "Presets, compared with 48 elements a link over 400 random points:\n  preset     elements  "
+      "force error  duration error  same mode\n";
   for (const auto& [name, model] : rows) {
     const auto mesh = std::find_if(meshes.begin(), meshes.end(),
                                    [elements = model.elements_per_link](const auto& each) {
@@ -241,34 +241,33 @@ std::string table_of_presets() {
                          percent(&solver::MeshAccuracy::same_mode));
   }
   return table +
-         "standard is to predict; paper has the published mesh and a round section, printed the\n"
-         "section as printed; converged is the reference.";
+         "Use standard for predictions. paper has the published mesh and a round section, printed "
+         "the\nsection as printed; converged is the reference.";
 }
 
-/// How the axes of the flags are put together.
+/// Adds the flags that combine axes.
 void add_block_flags(CLI::App& command, PointFlags& flags) {
   command
       .add_flag("--zip", flags.zip,
-                "take the axes side by side, the first value of each, the second of each, ..., "
-                "instead of multiplying them; single values serve all")
+                "combine the axes side by side instead of multiplying them: the first value of "
+                "each, the second of each, ...; single values apply to all points")
       ->group("Points");
   command
-      .add_option(
-          "--sample", flags.sample,
-          "draw points: KIND:COUNT:SEED with the kind random, lhs (Latin hypercube) or sobol; "
-          "axes are then FROM:TO, normal(MEAN,SD), normal(MEAN,SD,FROM,TO), "
-          "uniform(FROM,TO), log-uniform(FROM,TO) or one value")
+      .add_option("--sample", flags.sample,
+                  "draw points: KIND:COUNT:SEED with the kind random, lhs (Latin hypercube) or "
+                  "sobol; axes are then FROM:TO, normal(MEAN,SD), normal(MEAN,SD,FROM,TO), "
+                  "uniform(FROM,TO), log-uniform(FROM,TO) or one value")
       ->type_name("SAMPLE")
       ->group("Points");
   command
       .add_option("--where", flags.where,
-                  "leave out the points for which this is not true, as \"mu > 0.5 * e\"")
+                  "leave out points that do not meet this condition, such as \"mu > 0.5 * e\"")
       ->type_name("CONDITION")
       ->group("Points");
 }
 
-/// Help with 64 single lengths would have no end: those of `--lengths` name them. A hidden flag
-/// would have no name in messages.
+/// Removes the single lengths of 64 links from help; the text of `--lengths` names them. Hidden
+/// flags would have no name in messages.
 class BriefHelp : public CLI::Formatter {
  public:
   std::string make_group(std::string group, bool is_positional,
@@ -307,17 +306,16 @@ void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values) {
   auto* preset =
       command
           .add_option("--preset", flags.preset,
-                      "model to start from: " + protocol::joined(solver::preset_names()) +
-                          "; single flags override it")
+                      "preset of the model: " + protocol::joined(solver::preset_names()) +
+                          "; single flags override its values")
           ->type_name("NAME")
           ->group(group)
           ->capture_default_str();
   protocol::note_choices(preset, solver::preset_names());
   command
-      .add_option(
-          "--lengths", flags.lengths,
-          "length of each link, from the pin outwards [m]; > 0; --length1, --length2, ... set that "
-          "of one link")
+      .add_option("--lengths", flags.lengths,
+                  "length of each link, from the pin outwards [m]; > 0; --length1, --length2, ... "
+                  "set one link")
       ->type_name("L1,L2,...")
       ->group(group);
   for (const auto& key : solver::model_keys()) {
@@ -347,7 +345,7 @@ protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text, Bloc
     if (is_distribution(text, kind)) {
       return protocol::drawn_axis(key, distribution_of_flag(text));
     }
-    // The error of an expression with `a ? b : c` says how to choose.
+    // Adds advice to the error of an expression with `a ? b : c`.
     const bool chooses = text.find('?') != std::string_view::npos;
     if (!chooses && text.find(':') != std::string_view::npos) {
       return range_of_flag(key, text, kind);
@@ -374,7 +372,7 @@ Places places_of(const PointFlags& flags) {
 
 namespace {
 
-/// The recipe before its points are checked.
+/// The recipe; its points are not checked yet.
 protocol::Recipe written_recipe(const PointFlags& flags) {
   protocol::ModelInput model;
   model.preset = flags.preset;
@@ -435,20 +433,20 @@ std::string name_of_recipe(const protocol::Recipe& recipe) {
 
 void add_study_flags(CLI::App& command, StudyFlags& flags) {
   command
-      .add_option(
-          "STUDY.toml", flags.file,
-          "study file; or say the points by the flags below, whose VALUES are 0.4, 0.4,0.6, "
-          "FROM:TO:COUNT, FROM:TO:COUNT:log, FROM:TO:step=STEP, @FILE.csv:COLUMN or an "
-          "expression of other keys, as \"A^2/(4*pi)\"")
+      .add_option("STUDY.toml", flags.file,
+                  "study file; or define the points with the flags below, whose VALUES are 0.4, "
+                  "0.4,0.6, FROM:TO:COUNT, FROM:TO:COUNT:log, FROM:TO:step=STEP, @FILE.csv:COLUMN "
+                  "or an expression of other keys, such as \"A^2/(4*pi)\"")
       ->type_name("");
   command
-      .add_option("--name", flags.name,
-                  "name of the study; by default the file's, or `sweep-` and a hash of the flags")
+      .add_option(
+          "--name", flags.name,
+          "name of the study; default: that of the file, or `sweep-` and a hash of the flags")
       ->type_name("NAME");
   command
       .add_flag("--errors", flags.errors,
-                "estimate errors: solve each point also on half the mesh and at twice the step, at "
-                "a quarter more cost")
+                "estimate errors: also solve each point on half the mesh and at twice the step, "
+                "which costs a quarter more")
       ->group("Points");
   add_point_flags(command, flags.points, FlagValues::kMany);
 }

@@ -17,7 +17,7 @@ namespace oblique::client {
 
 namespace {
 
-/// The largest H of a block in which all models have the same; 0 if it depends on the point.
+/// The largest H of a block in which all models have the same H; 0 if it depends on the point.
 double largest_H_m(const protocol::Block& block, std::uint64_t models) {
   const protocol::Axis& H = *protocol::point_axes(block)[0];
   const bool is_shared =
@@ -44,8 +44,8 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
       const double drop_m = reached_m(study.model(place.first_model + i), H_m);
       if (H_m > drop_m) {
         solver::InputError::Fields fields{
-            .text = fmt::format("H = {} m is not allowed: the tip of this finger first turns back "
-                                "after a drop of {} m, so H must be at most that",
+            .text = fmt::format("H = {} m is not allowed: the tip of this finger turns back after "
+                                "a drop of {} m, so H must be at most that",
                                 solver::exact_number(H_m), solver::readable_number(drop_m, 10)),
             .key = "H"};
         if (blocks.size() > 1) {
@@ -57,10 +57,10 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
   }
 }
 
-/// H, or the largest drop if the tip does not reach H. H also if there are enough falls.
+/// H, or the largest drop if the tip does not reach H. H also if enough falls have been solved.
 double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m) {
-  constexpr int kCoarse = 2;      // elements a link: falls nearly alike at a small part of the cost
-  constexpr double kRoom = 0.98;  // of the drop on the coarse mesh
+  constexpr int kCoarse = 2;      // elements per link: nearly the same fall at a small cost
+  constexpr double kRoom = 0.98;  // safety margin of the drop on the coarse mesh
   const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
   if (H_m <= protocol::kSurelyReached * length_m) {
     return H_m;
@@ -77,7 +77,7 @@ double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m)
   if (falling.elements_per_link > kCoarse) {
     solver::ModelParameters coarse = falling;
     coarse.elements_per_link = kCoarse;
-    coarse.dt_fall_s = 0.0;  // chosen for the coarse mesh
+    coarse.dt_fall_s = 0.0;  // steps chosen for the coarse mesh
     if (H_m <= kRoom * solved_drop_m(coarse, fall->coarse_drop_m)) {
       return H_m;
     }

@@ -10,17 +10,17 @@
 
 namespace oblique::client {
 
-/// Largest drop [m] of the tip of a finger that falls from rest, before it turns back. Costs a
+/// Largest drop [m] of the tip of a finger that falls from rest, before it turns back. Solves a
 /// fall.
 using LargestDrop = std::function<double(const solver::ModelParameters& model)>;
 
 /// Checks that the tip reaches every H of a study. Throws solver::InputError with key and block.
 using ReachCheck = std::function<void(const protocol::PointTable& study)>;
 
-/// Checks H against solved falls. Remembers the falls, because most blocks share them.
+/// Checks H against solved falls, which it keeps because most blocks share them.
 class ReachChecker {
  public:
-  /// Most falls that are solved in all, and most models of a block that is checked.
+  /// Maximum number of solved falls, and of models in a checked block.
   static constexpr std::size_t kMostFalls = 8;
 
   explicit ReachChecker(LargestDrop largest_drop_m);
@@ -32,11 +32,10 @@ class ReachChecker {
   /// with an H that is not reached fail when they are solved.
   void operator()(const protocol::PointTable& study);
 
-  /// Number of falls solved so far.
   std::size_t falls_solved() const { return falls_solved_; }
 
  private:
-  /// The largest drops of one fall, if they are known.
+  /// The largest drops of a fall, if known.
   struct Fall {
     solver::ModelParameters model;
     std::optional<double> coarse_drop_m;

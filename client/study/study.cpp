@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-/// Elements a link on the coarsest mesh of the study, where no expression gives them.
+/// Elements per link of the coarsest mesh in the study, if no expression defines them.
 int coarsest_mesh(const protocol::Recipe& recipe) {
   constexpr int kUnknown = std::numeric_limits<int>::max();
   int coarsest = kUnknown;
@@ -69,15 +69,16 @@ void note_coarse_mesh(std::ostream& out, const protocol::Recipe& recipe) {
                                  : elements < coarse.elements_per_link ? "more than "
                                                                        : "up to ";
   out << fmt::format(
-      "Note: on {} elements a link forces are off by {}{} %, durations by {}{} %, and {}{:.0f} in "
-      "10 points get another sequence of states than on {}; to predict: preset = \"{}\"\n",
+      "Note: {} elements a link give errors of {}{} % in forces, {}{} % in durations, and another "
+      "sequence of states for {}{:.0f} in 10 points, compared with {}; use preset = \"{}\" for "
+      "predictions\n",
       elements, bound, coarse.forces_off, bound, coarse.duration_off, bound,
       (100.0 - coarse.same_mode) / 10.0, solver::preset("converged").elements_per_link,
       solver::preset_names().front());
 }
 
 void note_unusual_values(std::ostream& out, const protocol::Recipe& recipe) {
-  std::map<std::string_view, std::string> unusual;  // the first of each key
+  std::map<std::string_view, std::string> unusual;  // the first note for each key
   const auto check = [&unusual](const solver::ParameterKey& key, double value) {
     if (std::string note = solver::note_on_value(key, value); !note.empty()) {
       unusual.try_emplace(key.name, std::move(note));
@@ -102,8 +103,8 @@ void note_unusual_values(std::ostream& out, const protocol::Recipe& recipe) {
       check(key, protocol::largest_value(axis));
       const bool is_whole = !key.is_allowed(std::nextafter(axis.from(), axis.to()));
       if (block.has_sample() && axis.count() > 1 && !is_whole) {
-        lists += fmt::format("Note: {}: {} values; {}:{} draws between them.\n", axis.key(),
-                             axis.count(), solver::readable_number(axis.from()),
+        lists += fmt::format("Note: {} takes {} values; {}:{} draws any value between them.\n",
+                             axis.key(), axis.count(), solver::readable_number(axis.from()),
                              solver::readable_number(axis.to()));
       }
     }

@@ -45,7 +45,7 @@ constexpr std::string_view kAxisForms =
     "a number, a list of numbers, { from, to, count }, { from, to, step }, { csv, column }, "
     "{ distribution, ... } or an expression in quotes";
 
-/// The number of a single value; integrators have names.
+/// Parses a single value; integrators have names.
 double number(const protocol::TomlReader& file, const ParameterKey& key, const toml::node& value,
               std::string_view expected) {
   if (key.name != "integrator") {
@@ -57,7 +57,7 @@ double number(const protocol::TomlReader& file, const ParameterKey& key, const t
   return file.located(value, [&] { return static_cast<double>(solver::integrator_named(name)); });
 }
 
-/// The numbers of a list, each of which the key allows.
+/// The numbers of a list, all allowed for the key.
 std::vector<double> numbers(const protocol::TomlReader& file, const ParameterKey& key,
                             const toml::array& list, std::string_view expected) {
   std::vector<double> values;
@@ -68,7 +68,6 @@ std::vector<double> numbers(const protocol::TomlReader& file, const ParameterKey
   return values;
 }
 
-/// The table of one axis.
 class AxisTable {
  public:
   AxisTable(const protocol::TomlReader& file, const ParameterKey& key, const toml::table& table,
@@ -104,7 +103,7 @@ class AxisTable {
   protocol::Axis column(CsvFiles& files) const {
     check_parts(kCsvParts, "a column of a file is { csv = \"FILE.csv\", column = \"NAME\" }");
     if (!has("csv")) {
-      file_.fail(table_, fmt::format("{}: `column` needs `csv`, the file", key_.name));
+      file_.fail(table_, fmt::format("{}: `column` needs `csv`, the name of the file", key_.name));
     }
     const CsvFile& csv = files.at(text("csv", "the name of a file, in quotes"));
     std::string name(key_.name);
@@ -119,17 +118,18 @@ class AxisTable {
   protocol::Axis distribution() const {
     check_parts(kDistributionParts,
                 "a distribution is { distribution = \"uniform\", from, to }, the same with "
-                "\"log-uniform\", or { distribution = \"normal\", mean, sd } with `from` and `to` "
-                "where it is cut off");
+                "\"log-uniform\", or { distribution = \"normal\", mean, sd } with optional `from` "
+                "and `to` to truncate it");
     protocol::Distribution drawn;
     drawn.set_kind(protocol::distribution_named(
         text("distribution", "uniform, log-uniform or normal, in quotes")));
     const bool is_normal = drawn.kind() == protocol::DISTRIBUTION_NORMAL;
     if (is_normal != has("mean") || is_normal != has("sd")) {
-      file_.fail(table_, fmt::format("{}: a normal distribution needs mean and sd, its standard "
-                                     "deviation, and may have from and to, where it is cut off; "
-                                     "the others need from and to, and nothing else",
-                                     key_.name));
+      file_.fail(
+          table_,
+          fmt::format("{}: a normal distribution needs mean and sd (standard deviation) and may "
+                      "have from and to, which truncate it; the others need exactly from and to",
+                      key_.name));
     }
     drawn.set_mean(value("mean").value_or(0.0));
     drawn.set_sd(value("sd").value_or(0.0));
@@ -161,10 +161,9 @@ class AxisTable {
     const std::string spacing =
         has("spacing") ? text("spacing", "linear or log, in quotes") : "linear";
     if (spacing != "linear" && (spacing != "log" || has("step"))) {
-      file_.fail(*table_.get("spacing"),
-                 fmt::format("{}: spacing = \"{}\" is not allowed: it must be linear or log, and "
-                             "linear with `step`",
-                             key_.name, protocol::excerpt(spacing)));
+      file_.fail(*table_.get("spacing"), fmt::format("{}: spacing = \"{}\" is not allowed: it must "
+                                                     "be linear or log; with `step` only linear",
+                                                     key_.name, protocol::excerpt(spacing)));
     }
     const double from = *value("from");
     const double to = *value("to");
@@ -186,7 +185,6 @@ class AxisTable {
   BlockKind kind_;
 };
 
-/// One [[block]].
 class BlockReader {
  public:
   BlockReader(const protocol::TomlReader& file, const toml::table& table, CsvFiles& files)
@@ -198,7 +196,7 @@ class BlockReader {
     const auto* sampled = table_.get("sample");
     const bool is_zip = zip != nullptr ? file_.boolean("zip", *zip) : csv != nullptr;
     if (csv != nullptr && !is_zip) {
-      file_.fail(*zip, "zip = false is not allowed with csv: the lines of a file are points");
+      file_.fail(*zip, "zip = false is not allowed with csv: the lines of the file are points");
     }
     const BlockKind kind = sampled != nullptr ? BlockKind::kSample
                            : is_zip           ? BlockKind::kZip
@@ -218,16 +216,17 @@ class BlockReader {
       *block.mutable_sample() = sample(*sampled);
     }
     if (const auto* where = table_.get("where")) {
-      block.set_where(file_.text("where", *where, "a condition in quotes, as \"mu > 0.5 * e\""));
+      block.set_where(
+          file_.text("where", *where, "a condition in quotes, such as \"mu > 0.5 * e\""));
     }
     return block;
   }
 
  private:
-  /// Throws for a key that resembles one of a block and none of an axis.
+  /// Throws if an unknown key is nearer to a key of a block than to an axis.
   void check_key(const toml::key& key) const {
     if (!protocol::nearest(key.str(), kBlockKeys).empty() && !protocol::is_axis_key(key.str())) {
-      file_.fail(key, fmt::format("{}: beside its axes a block has {}",
+      file_.fail(key, fmt::format("{}: besides its axes a block has {}",
                                   protocol::unknown_key(key.str(), kBlockKeys),
                                   protocol::joined(kBlockKeys)));
     }
@@ -257,9 +256,11 @@ class BlockReader {
     const auto whole = [&](std::string_view part) {
       const auto& value = *parts.get(part);
       if (!value.is_integer()) {
-        file_.fail(value, fmt::format("sample: {} = {} is not allowed: it must be a whole number, "
-                                      "written without point and exponent",
-                                      part, protocol::shown(value)));
+        file_.fail(
+            value,
+            fmt::format(
+                "sample: {} = {} is not allowed: it must be an integer without point and exponent",
+                part, protocol::shown(value)));
       }
       return *value.value<std::int64_t>();
     };
@@ -272,13 +273,13 @@ class BlockReader {
         whole("count"), parts.contains("seed") ? whole("seed") : protocol::kUsualSeed);
   }
 
-  /// Adds the axes of the file `csv`: the columns that `columns` names, or all by their own names.
+  /// Adds the axes of the file `csv`: the columns in `columns`, or all columns by their own names.
   void add_columns(std::vector<protocol::Axis>& axes) const {
     const auto* node = table_.get("csv");
     const auto* columns = table_.get("columns");
     if (node == nullptr) {
       if (columns != nullptr) {
-        file_.fail(*columns, "columns needs `csv`, the file");
+        file_.fail(*columns, "columns needs `csv`, the name of the file");
       }
       return;
     }
@@ -299,18 +300,18 @@ class BlockReader {
     }
   }
 
-  /// Errors are about the key `from`.
+  /// Errors are reported for the key `from`.
   void add_column(std::vector<protocol::Axis>& axes, const CsvFile& csv, std::string_view name,
                   const std::string& column, std::string_view from) const {
     solver::with_key(from, [&] {
       if (table_.contains(name)) {
         throw InputError(
-            fmt::format("{} is given twice: by the block and by a column of the file", name));
+            fmt::format("{} is given twice: in the block and by a column of the file", name));
       }
       if (from == "csv" && !protocol::is_axis_key(name)) {
         throw InputError(
-            fmt::format("the column `{}` of the file has the name of no key: name the columns to "
-                        "use, as columns = {{ H = \"drop\", mu = \"friction\" }}",
+            fmt::format("the column `{}` of the file is not the name of a key: choose columns with "
+                        "columns = {{ H = \"drop\", mu = \"friction\" }}",
                         protocol::excerpt(name)));
       }
       const auto& key = protocol::axis_key(name);
@@ -323,7 +324,7 @@ class BlockReader {
   CsvFiles& files_;
 };
 
-/// The study's name: that of the key, or else that of the file.
+/// The study's name: the key `name`, else the name of the file.
 std::string name_of(const protocol::TomlReader& file, const toml::table& top) {
   const auto* node = top.get("name");
   const std::string name = node != nullptr ? file.text("name", *node, "a string")
@@ -331,7 +332,7 @@ std::string name_of(const protocol::TomlReader& file, const toml::table& top) {
   if (const auto objection = protocol::study_name_error(name); !objection.empty()) {
     throw node != nullptr
         ? InputError("name", objection)
-        : InputError({.text = "a study without `name` is called as its file: " + objection,
+        : InputError({.text = "a study without `name` is called like its file: " + objection,
                       .place = file.file()});
   }
   return name;
@@ -375,9 +376,11 @@ const toml::array& blocks_of(const protocol::TomlReader& file, const toml::table
                       .place = file.file()});
   }
   if (!blocks->is_array_of_tables()) {
-    file.fail(*blocks, fmt::format("block = {} is not allowed: write one or more [[block]], in "
-                                   "double brackets, and the axes below",
-                                   protocol::shown(*blocks)));
+    file.fail(
+        *blocks,
+        fmt::format(
+            "block = {} is not allowed: write [[block]] in double brackets, with its axes below",
+            protocol::shown(*blocks)));
   }
   return *blocks->as_array();
 }
@@ -528,8 +531,8 @@ std::vector<std::string> overrides(const solver::ModelParameters& model,
   return lines;
 }
 
-/// [model] with the preset that leaves the fewest keys to say. Also where that is the default,
-/// which another version may not have.
+/// [model] with the preset that needs the fewest keys. It is also written if it is the default,
+/// because another version may have another default.
 std::string model_text(const solver::ModelParameters& model) {
   std::string_view best;
   std::vector<std::string> fewest;

@@ -50,13 +50,13 @@ solver::CaseResult solve_with_status(Console& console, const solver::Finger& fin
   return finger.solve(point.H_m, point.mu, point.e_star, tracing);
 }
 
-/// Empty, with a note, if there is no coarser mesh or the point has no answer on it.
+/// The errors; empty, with a note, if there is no coarser mesh or the point has no answer on it.
 solver::ErrorEstimate estimate_errors(Console& console, const solver::ModelParameters& model,
                                       const PointToSolve& point, const solver::CaseResult& result,
                                       bool shows_status) {
   const solver::ModelParameters coarse = solver::companion_model(model);
   if (coarse.elements_per_link >= model.elements_per_link) {
-    console.note("Errors cannot be estimated: there is no coarser mesh than one element a link.");
+    console.note("Errors cannot be estimated: no mesh is coarser than one element a link.");
     return {};
   }
   try {
@@ -73,7 +73,7 @@ solver::ErrorEstimate estimate_errors(Console& console, const solver::ModelParam
   throw std::runtime_error(fmt::format("point {} of {} has no answer: {}", point, study, reason));
 }
 
-/// Passes on each K-th instant of the contact, all ends of phases, the fall and the last instant.
+/// Passes on every K-th instant of the contact, all ends of phases, the fall and the last instant.
 class EveryKth {
  public:
   EveryKth(std::uint64_t every, const solver::Tracing::Sink& row) : every_(every), row_(row) {}
@@ -99,7 +99,7 @@ class EveryKth {
  private:
   std::uint64_t every_;
   const solver::Tracing::Sink& row_;
-  std::optional<solver::TraceRow> last_;  // not passed on yet
+  std::optional<solver::TraceRow> last_;  // skipped so far
   std::string state_before_;
   std::uint64_t instants_ = 0;
 };
@@ -121,7 +121,8 @@ SolvedAgain solve_in_this_process(Console& console, const PointSpec& point,
     return {.point = point, .result = result, .solver = "here"};
   } catch (const solver::SolveError& error) {
     throw_unsolved(point.study, point.point, error.what());
-  } catch (const solver::InputError& error) {  // the study was accepted with it: no wrong usage
+  } catch (const solver::InputError& error) {  // the study was accepted with this value: not wrong
+                                               // usage
     throw_unsolved(point.study, point.point, error.what());
   }
 }
@@ -134,8 +135,8 @@ PointSpec point_of(const std::string& study, std::uint64_t point,
           protocol::from_message(reply.model())};
 }
 
-/// The point by the recipe in a database file. Throws as server::stored_recipe does, and
-/// std::runtime_error for a point that the study does not have.
+/// Reads the point from the recipe in a database file. Throws as server::stored_recipe does, and
+/// std::runtime_error if the study does not have the point.
 PointSpec point_in(const std::string& database, const protocol::StudyStatus& study,
                    std::uint64_t point) {
   const protocol::PointTable table(server::stored_recipe(database, study.study_id()));
@@ -157,7 +158,7 @@ PointSpec point_in(const std::string& database, const protocol::StudyStatus& stu
           table.model(values.model)};
 }
 
-/// The point as a server returns it; nothing is solved.
+/// Requests the point from a server, which does not solve it.
 PointSpec point_at(Connection& connection, const std::string& study, std::uint64_t point) {
   protocol::TraceRequest request;
   request.set_study(study);
@@ -166,24 +167,24 @@ PointSpec point_at(Connection& connection, const std::string& study, std::uint64
   return point_of(study, point, connection.trace(std::move(request)));
 }
 
-/// Throws ConnectionError for a reply that is no trace, ServerError for one that is too long.
+/// Throws ConnectionError if the reply is not a trace, ServerError if it is too long.
 void check_trace(const Connection& connection, const protocol::Trace& trace,
                  const solver::TraceShape& shape, bool with_fall) {
   if (const std::string fault = protocol::fault_of_trace(trace, shape, with_fall); !fault.empty()) {
     throw ConnectionError(
-        fmt::format("what {} sent is no trace: {}; --local solves the point in this process",
+        fmt::format("the trace from {} is invalid: {}; --local solves the point in this process",
                     connection.url(), fault));
   }
   if (trace.states().empty()) {
     const std::string every =
         trace.every() > trace.instants()
             ? std::string()
-            : fmt::format("--every {} gives one in {} and all ends of phases, ", trace.every(),
+            : fmt::format("--every {} writes one in {} and all ends of phases, ", trace.every(),
                           trace.every());
-    throw ServerError(fmt::format(
-        "the trace has {} instants, more than one message of a server can hold: {}--local solves "
-        "the point in this process and gives all",
-        trace.instants(), every));
+    throw ServerError(
+        fmt::format("the trace has {} instants, too many for one message: {}--local solves the "
+                    "point in this process and writes all",
+                    trace.instants(), every));
   }
 }
 
@@ -193,7 +194,7 @@ SolvedAgain solve_by_worker(Console& console, Connection& connection, const std:
                             const solver::Tracing::Sink& row, bool shows_status) {
   StatusLine line(console, {.is_shown = shows_status});
   const auto waiting = line.begin(
-      fmt::format("a worker of {} solves point {} of {}", connection.url(), point, study));
+      fmt::format("a worker of {} is solving point {} of {}", connection.url(), point, study));
   protocol::TraceRequest request;
   request.set_study(study);
   request.set_point(point);
@@ -232,7 +233,7 @@ SolvedAgain solve_by_worker(Console& console, Connection& connection, const std:
   return solved;
 }
 
-/// The row of one point in the view `runs`, by column; empty: the point is not solved yet.
+/// The row of a point in the view `runs`, by column; empty if the point is not solved.
 using StoredRow = std::map<std::string, Value>;
 
 StoredRow stored_row(Source& source, const std::string& study, std::uint64_t point) {
@@ -245,7 +246,7 @@ StoredRow stored_row(Source& source, const std::string& study, std::uint64_t poi
   return row;
 }
 
-/// The text of a column; empty where it is NULL or missing.
+/// The text of a column; empty if it is NULL or missing.
 std::string text_in(const StoredRow& row, const std::string& column) {
   const auto found = row.find(column);
   const auto* text = found == row.end() ? nullptr : std::get_if<std::string>(&found->second);
@@ -296,9 +297,9 @@ void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
   });
 }
 
-/// Names the outputs in which the stored row differs from `result`, the same point solved again:
-/// scalars in any bit, numbers in lists in one of the 8 digits that a database keeps; `wall_s` is
-/// left out. As "fn_peak_N, mode: stored by solver 0.1, now by 0.2"; empty: there are none.
+/// The outputs in which the stored row differs from `result`: "fn_peak_N, mode (stored by solver
+/// 0.1, now solved by 0.2)". Compares all bits of scalars, 8 digits of numbers in lists, and not
+/// `wall_s`. Empty if equal.
 std::string differences_in_words(const StoredRow& stored, const solver::CaseResult& result) {
   std::vector<std::string> columns;
   compare_scalars<double>(stored, result, columns);
@@ -315,9 +316,10 @@ std::string differences_in_words(const StoredRow& stored, const solver::CaseResu
   }
   const std::string before = text_in(stored, "solver_version");
   const std::string& now = result.solver.version;
-  return fmt::format("{}: {}", fmt::join(columns, ", "),
-                     before == now ? fmt::format("both by solver {}", now)
-                                   : fmt::format("stored by solver {}, now by {}", before, now));
+  return fmt::format("{} ({})", fmt::join(columns, ", "),
+                     before == now
+                         ? fmt::format("both by solver {}", now)
+                         : fmt::format("stored by solver {}, now solved by {}", before, now));
 }
 
 void compare(const StoredRow& stored, SolvedAgain& solved) {
@@ -329,9 +331,8 @@ void compare(const StoredRow& stored, SolvedAgain& solved) {
   solved.is_confirmed = solved.result && differing.empty();
   solved.comparison =
       solved.is_confirmed ? "same as stored"
-      : solved.result
-          ? "other than stored in " + differing
-          : "not compared with the stored row: the worker has outputs unknown to this program";
+      : solved.result     ? "differs from the stored row in " + differing
+                      : "not compared with the stored row, because the worker sent unknown outputs";
 }
 
 }  // namespace
@@ -347,7 +348,7 @@ ReachCheck tip_reach(Console& console) {
 double largest_drop_m(const solver::Finger& finger, StatusLine& line) {
   const auto falling = line.begin([&finger] {
     const auto& model = finger.model();
-    double length_m = 0.0;  // of the chain: the tip turns back near it
+    double length_m = 0.0;  // near the length of the chain the tip turns back
     for (const double each_m : model.lengths_m) {
       length_m += each_m;
     }
@@ -370,8 +371,7 @@ solver::CaseResult solve_here(Console& console, const solver::Finger& finger,
 
 void add_point_source(CLI::App& command, PointSource& flags) {
   auto* local = command.add_flag("--local", flags.is_local, "solve the point in this process");
-  command
-      .add_flag("--on-worker", flags.is_on_worker, "have a worker of the server solve the point")
+  command.add_flag("--on-worker", flags.is_on_worker, "let a worker of the server solve the point")
       ->excludes(local);
   add_source_flags(command, flags.source);
 }
@@ -383,7 +383,8 @@ SolvedAgain solve_again(Console& console, const PointSource& from, const std::st
   const std::string database = database_meant(from.source);
   if (!database.empty() && from.is_on_worker) {
     throw solver::InputError(
-        "--on-worker needs a server, and a database file is read here: name one with --server URL");
+        "--on-worker needs a server, but a database file is read here: name a server with --server "
+        "URL");
   }
   const auto source = open_source(console, from.source);
   std::optional<Connection> connection;
@@ -397,11 +398,11 @@ SolvedAgain solve_again(Console& console, const PointSource& from, const std::st
     }
   }
   const auto stored = stored_row(*source, study, point);
-  if (text_in(stored, "status") == "failed") {  // what killed its workers may kill this process too
-    throw std::runtime_error(fmt::format(
-        "point {} of {} failed and has no trace: {}. `oblique retry {}` solves it again, "
-        "`oblique solve --trace` with its values shows how far it comes",
-        point, study, text_in(stored, "error"), study));
+  if (text_in(stored, "status") == "failed") {  // it may also crash this process
+    throw std::runtime_error(
+        fmt::format("point {} of {} failed and has no trace: {}. `oblique retry {}` solves it "
+                    "again; `oblique solve --trace` with its values shows where it fails",
+                    point, study, text_in(stored, "error"), study));
   }
   TraceOptions limited = options;
   if (connection && from.source.timeout_s) {
@@ -426,7 +427,7 @@ std::vector<solver::TraceRow> take_fall(std::vector<solver::TraceRow>& rows) {
 
 namespace {
 
-/// One line of CSV for each instant.
+/// Writes each instant as a line of CSV.
 void append_csv_row(std::string& text, const solver::TraceRow& row) {
   std::string_view separator;
   const auto put = [&](double value) {

@@ -1,8 +1,8 @@
-// Requests to the server; server/web/page/README.md describes every path and field.
+// Requests to the server. server/web/page/README.md describes paths and fields.
 
 export const retryMs = 3000;
 
-/** Errors have the status of a refusal, or isSilence if there was no answer. */
+/** Errors have the HTTP status, or isSilence if there was no answer. */
 const failure = (text, fields) => Object.assign(new Error(text), fields);
 
 async function request(path, options) {
@@ -23,10 +23,8 @@ export const json = async (path, signal) => (await request(path, { signal })).js
 export const rowsPath = (study, query) =>
   `/api/studies/${study}/rows?${new URLSearchParams(query)}`;
 
-/** Rows of a study: columns, units, rows. */
 export const rows = (study, query, signal) => json(rowsPath(study, query), signal);
 
-/** Posts a change. */
 export async function post(path, body = {}, signal = undefined) {
   const headers = { "Content-Type": "application/json" };
   return (
@@ -34,7 +32,10 @@ export async function post(path, body = {}, signal = undefined) {
   ).json();
 }
 
-/** Numbers behind a head: the head, all bytes, and where the numbers begin. */
+/**
+ * Reads binary numbers after a JSON head. Returns the head, all bytes, and the offset of the
+ * numbers.
+ */
 export async function numbers(path, signal) {
   const bytes = await (await request(path, { signal })).arrayBuffer();
   const length = new DataView(bytes).getUint32(0, true);
@@ -44,7 +45,7 @@ export async function numbers(path, signal) {
 
 export const session = () => json("/api/session");
 
-/** Follows the server's overview while the page is visible. */
+/** Receives overviews of the server while the page is visible. */
 export function follow({ take, say, reconnected }) {
   let source = null;
   let timer = 0;
@@ -65,11 +66,11 @@ export function follow({ take, say, reconnected }) {
     });
     source.addEventListener("error", () => {
       isSilent = true;
-      say("The server does not answer; trying again.");
+      say("The server does not answer. Trying again …");
       if (source?.readyState !== EventSource.CLOSED) return;
-      close(); // browsers do not try again after a refusal
+      close(); // browsers do not reconnect after a refusal
       session().then(
-        (told) => told.may_look || say(`The server was restarted: ${told.how_to_enter}.`),
+        (update) => update.may_look || say(`The server was restarted: ${update.how_to_enter}.`),
         () => {},
       );
       timer = setTimeout(open, retryMs);

@@ -1,5 +1,6 @@
-// The view that an address means. A view is a function that fills an element and returns its handlers: `take` an overview
-// of the server, `goTo` another address of the same path, `reconnected`, `close`.
+// Shows the view that belongs to the address. A view is a function that fills an element and
+// returns its handlers: `take` receives an overview of the server, `goTo` another address of the
+// same path; further `reconnected` and `close`.
 import { follow, retryMs, session } from "./api.js";
 import { h } from "./lib/dom.js";
 import { newStudyView } from "./newStudy.js";
@@ -27,7 +28,7 @@ let leaving = new AbortController();
 /** The last address of each view. */
 const addresses = new Map();
 
-/** Browsers refuse more than some hundred changes of the address in ten seconds. */
+/** Browsers refuse more than a few hundred changes of the address in ten seconds. */
 const writeEveryMs = 150;
 let unwritten = "";
 let timer = 0;
@@ -48,7 +49,7 @@ function writeSoon() {
   }, writeEveryMs);
 }
 
-/** Writes what a view shows into its address. A step is undone by the browser's Back. */
+/** Writes the state of a view into its address. The browser's Back undoes a step. */
 function keep(of, fields, isStep) {
   const address = `#${of}${String(fields) && `?${fields}`}`;
   addresses.set(of, address);
@@ -68,7 +69,7 @@ function showTrail(parts) {
   document.title = last ? `${last.textContent ?? last} – oblique` : "oblique";
 }
 
-/** What a view may do with the frame around it, as long as it is shown. */
+/** Functions and data that a view may use while it is shown. */
 function placeOf(mine, own, fields, signal) {
   const whileShown =
     (act) =>
@@ -137,10 +138,13 @@ function say(text, isBad) {
   pace.className = isBad ? "bad" : "";
 }
 
-function take(told) {
-  now = told;
-  say(told.database_fault || `${Math.round(told.points_per_s)} points/s`, told.database_fault);
-  shown.take?.(told);
+function take(update) {
+  now = update;
+  say(
+    update.database_fault || `${Math.round(update.points_per_s)} points/s`,
+    update.database_fault,
+  );
+  shown.take?.(update);
 }
 
 async function begin() {
@@ -158,9 +162,9 @@ async function begin() {
     },
   });
   addEventListener("popstate", show);
-  // Links, and what copies the address, find it written.
+  // The address must be up to date before a click follows a link or copies it.
   document.addEventListener("click", writeAddress, { capture: true });
-  // Canvases keep the colours that they were drawn with.
+  // Canvases must be drawn again in the new colours.
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     writeAddress();
     if (!path.startsWith("/study/")) return;

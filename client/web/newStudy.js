@@ -1,4 +1,5 @@
-// The form of a new study: values as on the command line, its size as the server counts it, the command that makes it.
+// The form for a new study: values as on the command line, the size computed by the server, and the
+// equivalent command.
 import { post } from "./api.js";
 import { command, h, labelled, picker } from "./lib/dom.js";
 import { count, counted, dbFlag, quoted, withUnit } from "./lib/format.js";
@@ -7,9 +8,9 @@ const checkAfterMs = 250;
 const usualPreset = "standard";
 const presets = [
   ["standard", "standard: to predict"],
-  ["converged", "converged: the reference, slow"],
+  ["converged", "converged: reference, slow"],
   ["paper", "paper: as published, coarse mesh"],
-  ["printed", "printed: numbers as the paper prints them"],
+  ["printed", "printed: numbers as printed in the paper"],
 ];
 const samples = {
   random: "SAMPLE_RANDOM",
@@ -23,7 +24,9 @@ function numberOf(key, text) {
   throw new Error(`${key}: "${text.trim()}" is not a number`);
 }
 
-/** An axis of a recipe: 0.4 or 0.4,0.6 or FROM:TO:COUNT or FROM:TO:COUNT:log, of a sample also FROM:TO. */
+/**
+ * Parses an axis: 0.4 or 0.4,0.6 or FROM:TO:COUNT or FROM:TO:COUNT:log; in a sample also FROM:TO.
+ */
 function axisOf(key, text, isSample) {
   const [from, to, number, ...spacing] = text.split(":");
   const range = () => ({ from: numberOf(key, from), to: numberOf(key, to) });
@@ -34,41 +37,41 @@ function axisOf(key, text, isSample) {
     return { key, distribution: { kind: "DISTRIBUTION_UNIFORM", ...range() } };
   }
   if (number === undefined || !["", "log"].includes(spacing.join(":"))) {
-    const orEnds = isSample ? "; of a sample FROM:TO" : "";
+    const orEnds = isSample ? "; in a sample also FROM:TO" : "";
     throw new Error(`${key}: a range is FROM:TO:COUNT or FROM:TO:COUNT:log${orEnds}`);
   }
   const isLog = spacing.length > 0 ? { spacing: "SPACING_LOGARITHMIC" } : {};
   return { key, ...range(), count: numberOf(key, number), ...isLog };
 }
 
-/** KIND:COUNT:SEED as --sample has it; undefined: a grid. */
+/** Parses KIND:COUNT:SEED, as in --sample; undefined: a grid. */
 function sampleOf(text) {
   if (text === "") return undefined;
   const [kind, number, seed = "1", ...more] = text.split(":");
   if (!Object.hasOwn(samples, kind) || number === undefined || more.length > 0) {
     const known = Object.keys(samples).join(", ");
-    throw new Error(`sample: write KIND:COUNT:SEED, as sobol:1000:1; kinds are ${known}`);
+    throw new Error(`sample: write KIND:COUNT:SEED, such as sobol:1000:1; kinds are ${known}`);
   }
   const [size, start] = [number, seed].map((part) => numberOf("sample", part));
   return { kind: samples[kind], count: size, seed: start };
 }
 
-/** Model keys without a field of their own: [key, text]. */
+/** Model keys without their own field: [key, text]. */
 function otherKeys(form) {
   const lines = form.others.split("\n").map((line) => line.trim());
   return lines.filter(Boolean).map((line) => {
     const [key, text] = line.split("=", 2).map((part) => part.trim());
-    if (!text) throw new Error(`"${line}": write KEY=VALUES, one key a line`);
+    if (!text) throw new Error(`"${line}": write KEY=VALUES, one key per line`);
     return [key, text];
   });
 }
 
 function submissionOf(form) {
   const { name, where, preset } = form;
-  if (name === "") throw new Error("name: a study needs one");
+  if (name === "") throw new Error("the study needs a name");
   const sample = sampleOf(form.sample);
   const axis = ([key, text]) => axisOf(key, text, sample !== undefined);
-  // Single values belong to the model, as those of flags do; axes of the model come first, by name.
+  // Single values belong to the model, as with flags. Axes of the model come first, sorted by name.
   const others = otherKeys(form).map(axis);
   const isSingle = (one) => one.values?.length === 1 && !/^length\d/.test(one.key);
   const varied = others.filter((one) => !isSingle(one)).sort((a, b) => (a.key < b.key ? -1 : 1));
@@ -78,7 +81,7 @@ function submissionOf(form) {
   return { name, model: { preset, ...model }, recipe: { blocks: [block] } };
 }
 
-/** The flags of the study on a command line. */
+/** The form as flags of a command. */
 function flagsOf(form) {
   const flag = (name, value) => (value === "" ? [] : [`--${name.replaceAll("_", "-")}`, value]);
   const all = [
@@ -123,16 +126,20 @@ function fieldsOf(changed) {
     where: text("", "mu > 0.5 * e"),
   };
   const values =
-    "0.4, or 0.4,0.6,0.8, or FROM:TO:COUNT, or FROM:TO:COUNT:log; of a random sample also FROM:TO";
+    "0.4, or 0.4,0.6,0.8, or FROM:TO:COUNT, or FROM:TO:COUNT:log; in a random sample also FROM:TO";
   const elements = [
     labelled("name", fields.name),
     labelled("H, drop height [m]", fields.H, values),
     labelled("mu, friction", fields.mu, values),
     labelled("e, restitution", fields.e, values),
     labelled("preset of the model", fields.preset),
-    labelled("other keys of the model, one a line", fields.others, `KEY=VALUES; values: ${values}`),
+    labelled(
+      "other keys of the model, one per line",
+      fields.others,
+      `KEY=VALUES; values: ${values}`,
+    ),
     labelled("random sample", fields.sample, "KIND:COUNT:SEED; KIND is random, lhs or sobol"),
-    labelled("filter", fields.where, "a condition on the inputs that points must meet"),
+    labelled("filter", fields.where, "a condition on inputs; other points are left out"),
   ];
   const texts = () => Object.entries(fields).map(([name, field]) => [name, field.value.trim()]);
   return { elements, first: fields.name, read: () => Object.fromEntries(texts()) };
@@ -141,7 +148,7 @@ function fieldsOf(changed) {
 export function newStudyView(root, place) {
   place.trail(["new study"]);
   if (!place.mayChange) {
-    const how = "Open the address that the server or oblique view printed to submit studies.";
+    const how = "To submit studies, open the address that oblique-server or oblique view printed.";
     root.append(h("p", how));
     return {};
   }
@@ -178,7 +185,7 @@ export function newStudyView(root, place) {
     } catch (error) {
       if (signal.aborted) return;
       if (error.status === 400) show(error.message, true);
-      else show(`The study could not be checked: ${error.message}`);
+      else show(`The server could not check the study: ${error.message}`);
     }
   }
 
@@ -195,7 +202,7 @@ export function newStudyView(root, place) {
       const make = `oblique ${place.file ? "run" : "submit"} ${flagsOf(form)}${dbFlag(place.file)}`;
       commands.replaceChildren(
         command("the study", make),
-        h("p.weak", "Time that it takes, measured by solving some points:"),
+        h("p.weak", "To measure the time by solving some points:"),
         command("the time", `oblique study check ${flagsOf(form)}`),
       );
     } catch (error) {

@@ -7,7 +7,6 @@ const pageSize = 1000;
 const mostRead = 10_000;
 const mostShown = 200;
 
-/** The condition that failed points meet. */
 export const failedCondition = "error IS NOT NULL";
 
 const changes = {
@@ -17,7 +16,7 @@ const changes = {
   done: [],
 };
 
-/** Buttons that change the state of a study; `say` shows what came of it. */
+/** Buttons that change the state of a study; `say` shows the result. */
 export function studyButtons({ id, name, state, failed }, say) {
   const change = async (what) => {
     if (what === "cancel" && !confirm(`Cancel ${name}? Solved points stay.`)) return;
@@ -36,7 +35,7 @@ export function studyButtons({ id, name, state, failed }, say) {
   return h("span.buttons", ...wanted);
 }
 
-/** Points that are solved, failed or left out by a filter. */
+/** Number of points that are solved, failed or left out by a filter. */
 export const completed = (study) => study.solved + study.failed + study.left_out;
 
 export function progressOf(study) {
@@ -50,7 +49,7 @@ export function progressOf(study) {
   return h("span.share", bar, `${percent} %`);
 }
 
-/** A table of live rows; heads that begin with # are those of numbers. */
+/** A table that is updated; headings of numeric columns begin with #. */
 function liveTable(caption, heads) {
   const kind = (i) => (heads[i].startsWith("#") ? "number" : "");
   const head = (name, i) => h("th", { scope: "col", class: kind(i) }, name.replace("#", ""));
@@ -87,7 +86,7 @@ function studyCells(study, place, say) {
     state,
     progressOf(study),
     count(points),
-    failed > 0 ? h("a.bad", { href, title: "show them" }, count(failed)) : "0",
+    failed > 0 ? h("a.bad", { href, title: "show the failed points" }, count(failed)) : "0",
     points_per_s > 0 ? count(points_per_s) : "",
     isRunning ? timeLeft(left_s) : "",
     h("span.weak", isRunning ? waits_for : ""),
@@ -107,7 +106,7 @@ const workerCells = (worker) => [
   h("span.weak", `${worker.solver_version}, ${worker.instruction_set}`),
 ];
 
-/** Studies whose name has a text, running ones first, then the latest. */
+/** Studies whose name contains a text: running ones first, then the newest. */
 function inOrder(studies, text) {
   const rank = { running: 0, paused: 1 };
   return studies
@@ -175,7 +174,7 @@ export function overview(root, place) {
     const matching = inOrder([...studies.values()], filter.value);
     studyTable.show(matching.slice(0, mostShown).map((study) => studyCells(study, place, say)));
     const hidden = matching.length - mostShown;
-    const none = studies.size > 0 ? "No study has this name." : "There is no study yet.";
+    const none = studies.size > 0 ? "No study has this name." : "There are no studies yet.";
     const isEmpty = matching.length === 0 && readAt > 0;
     studyNote.textContent =
       hidden > 0 ? `${count(hidden)} more: filter by name.` : isEmpty ? none : "";
@@ -191,7 +190,7 @@ export function overview(root, place) {
         : "";
   }
 
-  /** Reads all studies again; one reading ends before the next begins. */
+  /** Reads all studies again; only one reading at a time. */
   async function read() {
     wantsAnother = true;
     if (isReading) return;
@@ -216,13 +215,14 @@ export function overview(root, place) {
 
   read();
   return {
-    take(told) {
-      now = told;
-      if (told.is_stopping) say("The server is stopping.");
-      for (const study of told.studies) studies.set(study.id, study);
-      // Events have only some of the studies; others are read when they change state, or every few seconds.
-      const isOld = told.unlisted > 0 && performance.now() - readAt > retryMs;
-      const changed = JSON.stringify(told.studies_by_state);
+    take(update) {
+      now = update;
+      if (update.is_stopping) say("The server is stopping.");
+      for (const study of update.studies) studies.set(study.id, study);
+      // Events contain only some studies. The others are read when a state changes, or every few
+      // seconds.
+      const isOld = update.unlisted > 0 && performance.now() - readAt > retryMs;
+      const changed = JSON.stringify(update.studies_by_state);
       if (changed !== states || isOld) read();
       states = changed;
       draw();

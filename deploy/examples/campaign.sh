@@ -1,14 +1,14 @@
 #!/bin/sh
-# A campaign on a Slurm cluster, from its login node: a server here, and jobs with workers while points are
-# open. Stopped with Ctrl-C and started again, it goes on where it was.
-#   sh campaign.sh STUDY.toml [MOST-JOBS]
-# HOST is the name by which the nodes reach this machine; the database must not lie on a network disk.
+# Runs a study on a Slurm cluster from its login node: a server here, and jobs with workers while
+# points are open. After Ctrl-C the same command continues.
+# sh campaign.sh STUDY.toml [MOST-JOBS]
+# HOST is this machine's name for the nodes; the database must not be on a network disk.
 set -eu
 file=${1:?"sh campaign.sh STUDY.toml [MOST-JOBS]"} most=${2:-4}
 host=${HOST:-$(hostname)}
 client_port=${OBLIQUE_SERVER_CLIENT_PORT:-7600} worker_port=${OBLIQUE_SERVER_WORKER_PORT:-7601}
 
-# Keys, once: nobody else on the cluster may read or write the results.
+# Creates keys on the first run, so that nobody else on the cluster can read or write results.
 [ -d keys ] || oblique keygen keys
 
 # The server ends with this script, after the jobs.
@@ -21,7 +21,7 @@ end() {
   code=$?
   [ "$code" = 0 ] || tail -n 3 server.log >&2
   [ -z "$scaling" ] || kill "$scaling" 2> /dev/null || true
-  # Workers deliver what they have solved before their job ends.
+  # Workers deliver their results before their job ends.
   scancel --quiet --name="$jobs" || true
   while [ -n "$(squeue --noheader --me --name="$jobs")" ]; do sleep 1; done
   kill "$server" 2> /dev/null || true
@@ -31,11 +31,12 @@ trap end EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-# A command that finds no server yet asks again, for 10 s.
+# Commands wait up to 10 s for a server that does not answer yet.
 study=$(basename "$file" .toml)
 oblique submit "$file" --name "$study"
 
-# More of sbatch's arguments, as a partition or an account: --sbatch-args "--partition=short --account=lab7"
+# Add more arguments of sbatch, such as a partition: --sbatch-args "--partition=short
+# --account=lab7"
 oblique autoscale slurm --name "$jobs" --max "$most" ${SBATCH_ARGS:+--sbatch-args "$SBATCH_ARGS"} 2> autoscale.log &
 scaling=$!
 

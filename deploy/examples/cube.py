@@ -1,4 +1,4 @@
-"""A grid as a labelled cube over H, mu and e: the same forces as forces.py, and where P sticks longest."""
+"""A grid as a labelled cube over H, mu and e: the forces of forces.py, and the longest stick of P."""
 import sqlite3
 import sys
 
@@ -10,13 +10,13 @@ runs = pandas.read_sql_query(
     " WHERE study_id = (SELECT min(study_id) FROM studies) AND status = 'solved'",
     database,
 )
-cube = runs.set_index(["H", "mu", "e"]).to_xarray()  # an xarray.Dataset; needs a grid's values
-# A study that has grown by a block may leave cells of the cube empty.
+cube = runs.set_index(["H", "mu", "e"]).to_xarray()  # an xarray.Dataset; the study must be a grid
+# If the study has grown, some cells of the cube may be empty.
 forces = cube.fn_peak_N.to_dataframe().dropna().reset_index().sort_values(["H", "mu", "e"])
 forces = forces.groupby(["H", "mu"], as_index=False).last()[["H", "mu", "fn_peak_N"]]
 print(forces.to_csv(index=False), end="")
 
-# Lists are views of their own: one row a span in which P does not move.
+# Lists have views: one row per interval in which P does not move.
 spans = pandas.read_sql_query(
     "SELECT point, t0_s, t1_s FROM stick_intervals WHERE study_id = (SELECT min(study_id) FROM studies)",
     database,

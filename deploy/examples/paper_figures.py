@@ -5,7 +5,7 @@ Cells begin with # %%: editors as VS Code, Spyder and Jupyter (jupytext) run the
 """
 # %% Groups of the paper: one quantity is varied, all else is H = 1 m, mu = 0.4, e* = 1
 import matplotlib
-matplotlib.use("Agg")  # in a notebook: without this line
+matplotlib.use("Agg")  # remove this line in a notebook
 import numpy as np
 from matplotlib import pyplot
 

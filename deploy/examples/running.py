@@ -1,4 +1,4 @@
-"""A picture of a study that is being solved, drawn again each second until it is done.
+"""Draws a picture of a running study each second until it is done.
 
   oblique run first.toml &
   python3 running.py oblique.db first          draws first.png
@@ -8,17 +8,17 @@ import sys
 import time
 
 import matplotlib
-matplotlib.use("Agg")  # into a file; without this line and with pyplot.pause(1): in a window
+matplotlib.use("Agg")  # draws into a file; for a window, remove this line and use pyplot.pause(1)
 import pandas
 from matplotlib import pyplot
 
 file, study = sys.argv[1:3]
-# Read-only: the server goes on writing meanwhile, and each look sees one moment of the study.
+# Read-only: the server continues writing; each connection sees the state at one instant.
 database = sqlite3.connect(f"file:{file}?mode=ro", uri=True)
 
 
 def look():
-    """The state of the study, how many points it has, and its results so far."""
+    """The state of the study, its number of points, and its results so far."""
     found = database.execute("SELECT state, points FROM studies WHERE name = ?", [study]).fetchone()
     if found is None:
         sys.exit(f"there is no study called {study} in {file}")

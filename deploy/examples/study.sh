@@ -1,16 +1,17 @@
 #!/bin/sh
-# A study from a script: submitted, waited for, asked. It needs a server and a worker, as from
+# Submits a study, waits for it and queries it. Needs a server and a worker, for example
 #   oblique-server & oblique-worker &
-# and OBLIQUE_SERVER (with keys OBLIQUE_KEYS too) where these are elsewhere.
-#   sh study.sh NAME
+# and OBLIQUE_SERVER (with keys also OBLIQUE_KEYS) if they run elsewhere.
+# sh study.sh NAME
 set -eu
 study=${1:?"sh study.sh NAME"}
 export OBLIQUE_SERVER="${OBLIQUE_SERVER:-tcp://127.0.0.1:7600}"
 
-# Said twice, it is the same study, which goes on where it was; with more points it grows.
+# Submitting it again continues the same study; with more points it grows.
 oblique submit --name "$study" --H 1 --mu 0.2:1.6:8 --e 0.8,1 --quiet
 
-# Until the last point is there. 0: all are solved. 1: some are not. 130: Ctrl-C, and the study goes on.
+# Waits for the end. 0: all points are solved. 1: some are not. 130: Ctrl-C, and the study
+# continues.
 code=0
 oblique watch "$study" --quiet || code=$?
 if [ "$code" = 1 ]; then
@@ -19,7 +20,7 @@ if [ "$code" = 1 ]; then
 fi
 [ "$code" = 0 ] || exit "$code"
 
-# Data is on standard output and all else on standard error: into a file, or into a variable.
+# Standard output contains only data.
 oblique query "$study" --where "e = 1" --select mu,fn_peak_N,ft_peak_N --format csv > "$study.csv"
 largest=$(oblique query "$study" --select "max(fn_peak_N)" --format csv | tail -n 1)
 echo "largest normal force of $study: $largest N"

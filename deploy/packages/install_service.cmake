@@ -1,12 +1,12 @@
-# Installs what `part` (server or worker) needs to run as a service: units, account, configuration.
-# Included by cmake --install and by cpack, which set CMAKE_INSTALL_PREFIX and DESTDIR. They also see, in
-# the environment, OBLIQUE_PREFIX: where the files will lie in the end, if that is elsewhere.
+# Installs units, account and configuration of a service, `part` (server or worker). cmake --install
+# and cpack include it and set CMAKE_INSTALL_PREFIX and DESTDIR. The environment variable
+# OBLIQUE_PREFIX gives the final folder if it differs.
 set(prefix "${CMAKE_INSTALL_PREFIX}")
 if(DEFINED ENV{OBLIQUE_PREFIX})
   set(prefix "$ENV{OBLIQUE_PREFIX}")
 endif()
 cmake_path(ABSOLUTE_PATH bin_folder BASE_DIRECTORY "${prefix}" OUTPUT_VARIABLE OBLIQUE_BIN)
-# What lies in /usr is configured in /etc; anything else beside the programs.
+# An installation in /usr is configured in /etc; any other in its prefix.
 set(configuration "${CMAKE_INSTALL_PREFIX}/etc/oblique")
 set(OBLIQUE_ETC "${prefix}/etc/oblique")
 if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
@@ -15,13 +15,13 @@ if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
 endif()
 
 set(systemd "${CMAKE_CURRENT_LIST_DIR}/../systemd")
-# fill_in(TEMPLATE FOLDER NAME): installs it with the folders of above, and INSTANCE.
+# fill_in(TEMPLATE FOLDER NAME): installs a template with these folders and INSTANCE filled in.
 function(fill_in template folder name)
   message(STATUS "Installing: $ENV{DESTDIR}${folder}/${name}")
   configure_file("${template}" "$ENV{DESTDIR}${folder}/${name}" @ONLY NO_SOURCE_PERMISSIONS NEWLINE_STYLE LF)
 endfunction()
 
-# install_filled_in(TEMPLATE FOLDER NAME): the same, and the manifest lists it.
+# install_filled_in(TEMPLATE FOLDER NAME): also adds it to the manifest.
 macro(install_filled_in template folder name)
   fill_in("${template}" "${folder}" "${name}")
   list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${folder}/${name}")
@@ -40,7 +40,7 @@ else()
                     oblique-server.conf)
 endif()
 
-# What somebody has changed stays, also where the rest is removed by the manifest.
+# Edited configuration stays, also when the other files are removed by the manifest.
 if(NOT EXISTS "$ENV{DESTDIR}${configuration}/${part}.toml")
   fill_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
 endif()

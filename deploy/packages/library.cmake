@@ -1,6 +1,6 @@
-# The solver for other programs, in two parts as Debian has them: `library` is what they run with,
-# `development` what they are built with. find_package(oblique) gives oblique::solver wherever it is put.
-# Optional: who has built the programs alone installs these.
+# The solver for other programs, in two parts as in Debian: `library` to run with, `development` to
+# build with. find_package(oblique) provides oblique::solver in any prefix. Optional, so that
+# installing works when only the programs were built.
 install(TARGETS oblique_shared EXPORT oblique-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library OPTIONAL NAMELINK_COMPONENT development)
 set(solver_folder ${PROJECT_SOURCE_DIR}/worker/solver/library)
@@ -17,6 +17,6 @@ cmake_path(RELATIVE_PATH CMAKE_SOURCE_DIR BASE_DIRECTORY ${CMAKE_SOURCE_DIR}/${p
 configure_file(${solver_folder}/oblique.pc.in oblique.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/oblique.pc DESTINATION ${pkgconfig_folder} COMPONENT development)
 
-# An example: a whole program.
+# An example program.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/tests/deploy/consumer
         DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/liboblique-dev/examples COMPONENT development)

@@ -1,5 +1,5 @@
-# What cpack makes of the parts: an archive that runs wherever it is unpacked, and Debian packages.
-# deploy/package calls it.
+# Packages by cpack: an archive that runs in any folder, and Debian packages. deploy/package calls
+# it.
 set(CPACK_PACKAGE_NAME oblique)
 set(CPACK_PACKAGE_VENDOR oblique)
 set(CPACK_PACKAGE_CONTACT "the oblique authors <maintainers@oblique.example>")
@@ -28,7 +28,8 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 
 include(${CMAKE_CURRENT_LIST_DIR}/descriptions.cmake)
-# Asked for by packages of any architecture. A field that this cpack does not know: it stands in the next line.
+# Allows packages of any architecture to depend on it. cpack has no such field, so it is put into
+# the next line.
 set(foreign "science\nMulti-Arch: foreign")
 set(scripts ${CMAKE_CURRENT_BINARY_DIR}/debian)
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME oblique-server)
@@ -50,9 +51,9 @@ set(CPACK_OBLIQUE_LIBDIR ${CMAKE_INSTALL_LIBDIR})
 set(CPACK_OBLIQUE_MULTIARCH ${CMAKE_LIBRARY_ARCHITECTURE})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME ${package_of_library})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION "libs\nMulti-Arch: same")
-# packing/debian_library.cmake asks it.
+# packing/debian_library.cmake reads it.
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS OFF)
-# What is built with it runs with any release of the same SONAME that is not older.
+# Programs built with it run with any release of the same SONAME that is not older.
 file(CONFIGURE OUTPUT debian/library/shlibs CONTENT "liboblique ${abi} ${package_of_library} (>= ${PROJECT_VERSION})\n")
 file(CONFIGURE OUTPUT debian/library/triggers CONTENT "activate-noawait ldconfig\n")
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${scripts}/library/shlibs ${scripts}/library/triggers)
@@ -63,7 +64,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "${package_of_library} (= ${PROJECT
 if(OBLIQUE_PYTHON_MODULE)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME ${package_of_python})
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
-  # The interpreter's version that the module is compiled for, as dh_python3 has it.
+  # The Python version that the module was compiled for, in dh_python3's format.
   get_target_property(suffix oblique_python SUFFIX)
   string(REGEX REPLACE "^.*cpython-3([0-9]+).*$" "\\1" minor "${suffix}")
   math(EXPR next "${minor} + 1")

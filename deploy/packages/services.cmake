@@ -1,9 +1,9 @@
-# What dpkg runs and knows of the services' packages: debian/SERVICE/ in the build folder.
+# Package scripts of the services, in debian/SERVICE/ of the build folder.
 set(UNITS_OF_server oblique-server.service)
-set(FIRST_OF_server "For a start now and with the machine:")
+set(FIRST_OF_server "To start it now and at every boot:")
 set(WAY_BACK_OF_server
-"A database
-  of another schema it leaves as it is, and says so: then go on from a copy of before.")
+"It refuses
+  a database of another schema and does not change it: then use an older copy.")
 set(KEPT_OF_server /var/lib/oblique)
 set(WHAT_IS_KEPT_OF_server "databases and keys")
 file(READ ${CMAKE_CURRENT_SOURCE_DIR}/debian/prepare_server PREPARATION_OF_server)

@@ -42,7 +42,7 @@ class Completion(unittest.TestCase):
         shutil.rmtree(cls.folder)
 
     def offers(self, program, *words, word=None):
-        """What a word may become; the last one, unless bash would hand over another part of it."""
+        """Completions of a word: the last one, unless bash would pass another part of it."""
         words = [program, *words]
         script = f"{'compdef() { : }; ' if self.shell == 'zsh' else ''}. '{self.folder / program}'; {DRIVER[self.shell]}"
         done = subprocess.run([self.shell, "-c", script, self.shell, words[-1] if word is None else word, *words],

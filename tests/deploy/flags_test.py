@@ -1,5 +1,4 @@
-"""Every flag of every program and verb is in its help, in its manual page and in its completion; examples show flags that
-there are; pages are well made.
+"""Compares flags, help, manual pages and completion of every program and command.
 
   flags_test.py TREE FOLDER-OF-THE-PROGRAMS
 """
@@ -32,14 +31,14 @@ def help_of(words):
 
 
 def offered(words):
-    """The verbs and flags that completion offers behind these words."""
+    """The commands and flags that completion offers after these words."""
     done = subprocess.run(["bash", "-c", f'{output_of(words[0], "completion", "bash")}\n"_$1_offers" "${{*:2}}" && printf "%s\\n" "${{offers[@]}}"',
                            "bash", *words], capture_output=True, text=True, check=True)
     return done.stdout.split()
 
 
 def verbs_below(words):
-    """All verbs by their words, the program itself first."""
+    """All commands by their words, the program itself first."""
     listed = re.search(r"^Subcommands:\n((?:  .*\n)+)", help_of(words), re.M)
     names = re.findall(r"^  ([a-z][\w-]*)", listed[1], re.M) if listed else []
     return [words] + [verb for name in names for verb in verbs_below([*words, name])]
@@ -78,10 +77,10 @@ class HelpAndCompletion(unittest.TestCase):
         for words in VERBS:
             self.assertEqual({word for word in offered(words) if word.startswith("-")}, flags_in_help(words), words)
 
-    def test_numbered_flags_are_told_of_once(self):
+    def test_numbered_flags_are_listed_once(self):
         self.assertGreater(sum(len(numbered_in_help(words)) for words in VERBS), 3)
 
-    def test_examples_show_flags_that_there_are(self):
+    def test_examples_use_existing_flags(self):
         seen = 0
         for words in VERBS:
             for example in examples_of(words):
@@ -142,14 +141,14 @@ class Pages(unittest.TestCase):
                 self.assertIn(section, sections, name)
             self.assertEqual("--db FILE" in page.replace("\\-", "-").replace("\\fR", ""), ".SH FILES" in page and "oblique.db" in page, name)
 
-    def test_pages_named_in_pages_are_there(self):
+    def test_pages_named_in_pages_exist(self):
         for name, page in self.pages.items():
             named = re.findall(r"\\fB([\w\\-]+)\\fR\(1\)", page)
             self.assertGreater(len(named), 0, name)
             for other in named:
                 self.assertIn(other.replace("\\-", "-"), self.pages, name)
 
-    def test_pages_name_neither_the_place_nor_the_time_at_which_they_are_made(self):
+    def test_pages_contain_neither_the_folder_nor_the_time_of_the_build(self):
         copied = self.folder / "elsewhere/bin"
         copied.parent.mkdir()
         copied.symlink_to(PROGRAMS.resolve())

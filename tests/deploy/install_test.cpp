@@ -1,4 +1,4 @@
-// What is installed and packed, whether it runs from there, and what systemd says of the units.
+// Installed and packed files, whether programs run from there, and systemd's opinion of the units.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -26,7 +26,7 @@ using ::testing::IsSupersetOf;
 using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
-/// Runs `program`, found by PATH unless it is one, to its end in `folder`.
+/// Runs `program` (searched in PATH) to its end in `folder`.
 Outcome run_tool(const TemporaryFolder& folder, const std::string& program,
                  const std::vector<std::string>& arguments, const Environment& environment = {}) {
   std::vector<std::string> line{program};
@@ -35,13 +35,13 @@ Outcome run_tool(const TemporaryFolder& folder, const std::string& program,
   return process.outcome();
 }
 
-/// Whether PATH has this program.
+/// Whether PATH contains this program.
 bool is_there(const TemporaryFolder& folder, const std::string& program) {
   return run_tool(folder, "which", {program}).exit_code == 0;
 }
 
-/// Installs `component`, or all where it is empty, for `prefix`, below `destination` where that is
-/// not empty. What cmake --install said.
+/// Installs `component`, or everything if it is empty, for `prefix`, below `destination` if that is
+/// not empty. Returns the output of cmake --install.
 Outcome install(const TemporaryFolder& folder, const std::string& prefix,
                 const std::string& component = "", const std::string& destination = "") {
   std::vector<std::string> arguments{"--install", OBLIQUE_BUILD_FOLDER, "--prefix", prefix};
@@ -67,14 +67,14 @@ std::string text_of(const std::string& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// The same without manual pages, which are there only where help2man was when all was built.
+/// The same without manual pages, which exist only if help2man was installed for the build.
 std::vector<std::string> files_beside_pages(const std::string& root) {
   auto files = files_below(root);
   std::erase_if(files, [](const std::string& file) { return file.starts_with("usr/share/man/"); });
   return files;
 }
 
-TEST(InstallTest, EachPartHasItsProgramAndWhatBelongsToItAndNothingElse) {
+TEST(InstallTest, EachPartHasOnlyItsProgramAndFiles) {
   const TemporaryFolder folder;
   for (const std::string part : {"server", "worker", "client"}) {
     ASSERT_EQ(install(folder, "/usr", part, folder.file(part)).exit_code, 0) << part;
@@ -138,7 +138,7 @@ TEST(InstallTest, AStudyRunsFromWhereverTheProgramsAreInstalled) {
   EXPECT_THAT(run.out(), HasSubstr("solved"));
 }
 
-TEST(InstallTest, AClientWithoutServerSaysWhatIsMissing) {
+TEST(InstallTest, AClientWithoutServerNamesTheMissingProgram) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("client");
   ASSERT_EQ(install(folder, prefix, "client").exit_code, 0);
@@ -165,7 +165,7 @@ TEST(InstallTest, UnitsNameTheProgramsAndTheConfigurationOfTheirPrefix) {
               HasSubstr(" --config " + prefix + "/etc/oblique/%i.toml\n"));
 }
 
-TEST(InstallTest, ProgramsHeedTheConfigurationOfTheirPrefix) {
+TEST(InstallTest, ProgramsReadTheConfigurationOfTheirPrefix) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("opt");
   ASSERT_EQ(install(folder, prefix).exit_code, 0);
@@ -178,7 +178,7 @@ TEST(InstallTest, ProgramsHeedTheConfigurationOfTheirPrefix) {
                                 HasSubstr("\nserver = \"tcp://lab:7601\"\n")));
 }
 
-TEST(InstallTest, WhatTheInstalledConfigurationSuggestsIsAllowed) {
+TEST(InstallTest, SettingsInInstalledConfigurationAreValid) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("opt");
   ASSERT_EQ(install(folder, prefix).exit_code, 0);
@@ -193,7 +193,7 @@ TEST(InstallTest, WhatTheInstalledConfigurationSuggestsIsAllowed) {
   }
 }
 
-TEST(InstallTest, ConfigurationThatSomebodyChangedStays) {
+TEST(InstallTest, EditedConfigurationStays) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("opt");
   ASSERT_EQ(install(folder, prefix, "server").exit_code, 0);
@@ -204,7 +204,7 @@ TEST(InstallTest, ConfigurationThatSomebodyChangedStays) {
   EXPECT_EQ(text_of(configuration), "# mine\n");
 }
 
-// What cpack makes of what is built.
+// The packages that cpack makes.
 std::vector<std::string> packages(const TemporaryFolder& folder, const std::string& generator) {
   const auto packing = run_tool(folder, OBLIQUE_CPACK,
                                 {"--config", OBLIQUE_BUILD_FOLDER "/CPackConfig.cmake", "-G",
@@ -247,7 +247,7 @@ TEST(PackagesTest, TheArchiveRunsWhereItIsUnpackedWithLibrariesOfItsOwn) {
 
 // ---- The library ----
 
-/// The parts library and development, installed and then moved elsewhere.
+/// The parts library and development, moved after installing.
 std::string installed_library(const TemporaryFolder& folder) {
   for (const std::string part : {"library", "development"}) {
     const auto installed = install(folder, folder.file("made here"), part);
@@ -257,7 +257,7 @@ std::string installed_library(const TemporaryFolder& folder) {
   return folder.file("used here");
 }
 
-/// What a program that uses the library has to print of the point that it solves.
+/// Expected output of a program that uses the library.
 std::string expected_of_consumer() {
   const auto solved = run_oblique(
       {"solve", "--preset", "printed", "--H", "1", "--mu", "0.4", "--e", "0.9", "--json"});
@@ -267,7 +267,7 @@ std::string expected_of_consumer() {
                      json["mode"].get<std::string>(), json["solver"]["version"].get<std::string>());
 }
 
-TEST(InstalledLibraryTest, AProgramOfSomebodyElseFindsItAndGetsTheBitsOfSolve) {
+TEST(InstalledLibraryTest, AUsersProgramFindsItAndGetsTheBitsOfSolve) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
   const std::string build = folder.file("build");
@@ -284,7 +284,7 @@ TEST(InstalledLibraryTest, AProgramOfSomebodyElseFindsItAndGetsTheBitsOfSolve) {
   EXPECT_EQ(run.out, expected_of_consumer() + "mu = -0.4 is not allowed: mu must be >= 0\n");
 }
 
-TEST(InstalledLibraryTest, PkgConfigKnowsWhereItIsAndThatItNeedsNothingElse) {
+TEST(InstalledLibraryTest, PkgConfigFindsItWithoutDependencies) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
   const auto asked = run_tool(
@@ -310,7 +310,7 @@ TEST(InstalledLibraryTest, ItsHeadersIncludeNothingButTheStandardLibraryAndEachO
             "#include <oblique/solver/version.h>\n");
 }
 
-TEST(InstalledLibraryTest, ItShowsNothingButWhatItsHeadersName) {
+TEST(InstalledLibraryTest, ItExportsOnlyTheNamesOfItsHeaders) {
   const TemporaryFolder folder;
   const auto shown = run_tool(
       folder, "sh",
@@ -330,13 +330,13 @@ std::vector<std::string> installed_units(const TemporaryFolder& folder) {
   const std::string prefix = folder.file("prefix");
   EXPECT_EQ(install(folder, prefix).exit_code, 0);
   const std::string units = prefix + "/lib/systemd/system/";
-  // The template, as one instance.
+  // The template as one instance.
   std::filesystem::rename(units + "oblique-worker@.service", units + "oblique-worker@lab.service");
   return {units + "oblique-server.service", units + "oblique-worker.service",
           units + "oblique-worker@lab.service"};
 }
 
-TEST(UnitsTest, SystemdFindsNothingWrongWithThemAndLittleThatTheyLeaveOpen) {
+TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
   const TemporaryFolder folder;
   if (!is_there(folder, "systemd-analyze")) {
     GTEST_SKIP() << "there is no systemd-analyze here";
@@ -345,7 +345,7 @@ TEST(UnitsTest, SystemdFindsNothingWrongWithThemAndLittleThatTheyLeaveOpen) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
     EXPECT_EQ(verified.err, "") << unit << ": what it ignores it prints and lets pass";
-    // Of 100: 1.2 of 10 for the network, local sockets and what libzmq asks of its threads.
+    // Of 100: 1.2 of 10 for the network, local sockets and libzmq's threads.
     const auto judged =
         run_tool(folder, "systemd-analyze",
                  {"security", "--offline=true", "--threshold=13", "--no-pager", unit});

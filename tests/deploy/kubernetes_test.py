@@ -1,4 +1,4 @@
-"""The manifests of deploy/kubernetes against each other, against the programs and against the container file.
+"""Compares the manifests of deploy/kubernetes with each other, the programs and the Containerfile.
 
   kubernetes_test.py TREE FOLDER-OF-THE-PROGRAMS
 """

@@ -1,4 +1,4 @@
-"""What scripts of the build make: where a program was built from, and Debian's changelogs.
+"""Results of build scripts: the commit of a program, and Debian's changelogs.
 
   made_by_scripts_test.py TREE
 """
@@ -56,7 +56,7 @@ class Origin(InAFolder):
         text = (self.folder / "origin.cpp").read_text()
         return re.search(r'return \{"0.2.0", "(.*?)", "(.*?)", (\w+),', text).groups()
 
-    def test_a_clone_knows_its_commit_and_whether_it_was_changed(self):
+    def test_a_clone_has_its_commit_and_whether_it_was_changed(self):
         tree = self.tree("clone")
         commit = self.committed(tree)[:12]
         self.assertEqual(self.origin_of(tree), (commit, "2026-11-20", "false"))
@@ -76,7 +76,7 @@ class Origin(InAFolder):
         self.origin_of(tree)
         self.assertEqual(file.stat().st_mtime, 1)
 
-    def test_an_archive_of_git_knows_its_commit(self):
+    def test_an_archive_of_git_contains_its_commit(self):
         tree = self.tree("clone")
         shutil.copy(TREE / ".gitattributes", tree)
         commit = self.committed(tree)[:12]
@@ -84,13 +84,13 @@ class Origin(InAFolder):
         self.run_here("tar", "-xf", "a.tar")
         self.assertEqual(self.origin_of(self.folder / "unpacked"), (commit, "2026-11-20", "false"))
 
-    def test_a_tree_without_either_or_inside_another_repository_knows_nothing(self):
+    def test_a_tree_without_either_or_inside_another_repository_has_no_commit(self):
         self.assertEqual(self.origin_of(self.tree("plain")), ("", "", "false"))
         self.tree("outer/inner", "$Format:%H %cs$")
         self.committed(self.folder / "outer")
         self.assertEqual(self.origin_of(self.folder / "outer/inner"), ("", "", "false"))
 
-    def test_who_packs_a_tree_without_git_may_say_its_commit(self):
+    def test_the_commit_of_a_tree_without_git_can_be_set(self):
         self.assertEqual(self.origin_of(self.tree("packed", f"{HASH} 2026-11-20")), (HASH[:12], "2026-11-20", "false"))
 
 
@@ -108,7 +108,7 @@ class DebiansChangelog(InAFolder):
         with gzip.open(self.folder / "out/client/usr/share/doc/a-client/changelog.gz", "rt") as file:
             return file.read()
 
-    def test_it_has_each_version_as_the_changelog_has_it(self):
+    def test_it_has_each_version_of_the_changelog(self):
         text = self.changelog_of("# Changelog\n\nFor people.\n\n## [Unreleased]\n\n- not yet\n\n## [1.1.0] - 2024-02-29\n\n"
                                        "One [word](x.md); two.\n\n### Added\n\n- `a`; b\n  goes on\n\n## [1.0.0] - 2000-01-01\n\n- first\n")
         self.assertEqual(text, "a-client (1.1.0) stable; urgency=medium\n\n  * One word; two.\n\n  [ Added ]\n  * a; b\n"

@@ -1,5 +1,5 @@
-"""Debian's packages, as cpack makes them of what is built: what they hold and ask for, and what dpkg does with
-them in a root of its own, which it does not change into.
+"""Debian's packages, made by cpack from the build: contents, dependencies, and installation by dpkg in a
+separate root without chroot.
 
   packages_test.py CPACK BUILD-FOLDER
 """
@@ -19,7 +19,7 @@ SERVICES = ("oblique-server", "oblique-worker")
 
 
 def run(*words, **more):
-    """What the command prints; it must end well."""
+    """The output of a command, which must succeed."""
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False, **more)
     if done.returncode != 0:
         raise AssertionError(f"{words}: {done.stdout}{done.stderr}")
@@ -27,14 +27,14 @@ def run(*words, **more):
 
 
 def pack(folder):
-    """Packages by name. Uncompressed, which is soon done."""
+    """Packages by name, uncompressed to save time."""
     run(CPACK, "--config", BUILD / "CPackConfig.cmake", "-G", "DEB", "-B", folder,
         "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=none", env={**os.environ, "SOURCE_DATE_EPOCH": "1800000000"})
     return {file.name.split("_")[0]: file for file in sorted(folder.glob("*.deb"))}
 
 
 def older(package, folder):
-    """The same package as an earlier version, with another configuration as installed."""
+    """The same package as an earlier version with another configuration."""
     tree = folder / package
     run("dpkg-deb", "--raw-extract", PACKAGES[package], tree)
     for name in ("control", "prerm"):
@@ -71,7 +71,7 @@ def script(package, name):
 
 
 class Packages(unittest.TestCase):
-    def test_programs_ask_for_what_they_are_linked_with_and_nothing_that_their_users_do_not_need(self):
+    def test_programs_depend_only_on_the_libraries_they_link(self):
         for package, library in ("oblique", "libsqlite3-0"), ("oblique-server", "libmicrohttpd12"), ("oblique-worker", "libzmq5"):
             self.assertIn(library, field(package, "Depends"))
             self.assertNotRegex(field(package, "Depends"), r"python|chromium|node|oblique")
@@ -81,7 +81,7 @@ class Packages(unittest.TestCase):
         self.assertNotRegex(field("oblique-worker", "Depends"), "sqlite|microhttpd|systemd")
         self.assertIn("systemd-sysusers", field("oblique-server", "Depends"))
 
-    def test_the_library_stands_beside_others_and_its_development_files_ask_for_its_very_version(self):
+    def test_the_library_is_coinstallable_and_its_development_files_need_the_same_version(self):
         library, = (package for package in PACKAGES if re.fullmatch(r"liboblique\d[\d.]*", package))
         self.assertEqual(field("liboblique-dev", "Depends"), f"{library} (= {VERSION})")
         self.assertRegex(field(library, "Depends"), r"^libc6 [^,]*, libgcc-s1 [^,]*, libstdc\+\+6 [^,]*$")
@@ -94,7 +94,7 @@ class Packages(unittest.TestCase):
             # One architecture's differ from another's only where the architecture is in the path.
             self.assertEqual([f for f in files(package) if re.match(r"/usr/lib/(?!%s/)" % triplet, f)], [])
 
-    def test_the_python_module_asks_for_its_interpreter_and_numpy_and_for_none_of_our_programs(self):
+    def test_the_python_module_depends_on_python_and_numpy_only(self):
         if "python3-oblique" not in PACKAGES:
             self.skipTest("the Python module is not built here")
         self.assertRegex(field("python3-oblique", "Depends"), r"^python3 \(>= 3\.\d+\), python3 \(<< 3\.\d+\), python3-numpy, libc6")
@@ -105,14 +105,14 @@ class Packages(unittest.TestCase):
     def test_the_command_line_brings_the_services_of_its_own_version(self):
         self.assertEqual(field("oblique", "Recommends"), ", ".join([*(f"{s} (= {VERSION})" for s in SERVICES), "gnuplot-nox"]))
 
-    def test_descriptions_fit_a_terminal_and_begin_with_what_the_package_is(self):
+    def test_descriptions_fit_a_terminal_and_begin_with_a_summary(self):
         for package in PACKAGES:
             synopsis, *text = field(package, "Description").splitlines()
             self.assertLessEqual(len(synopsis), 70, synopsis)
             self.assertGreater(len(text), 3)
             self.assertTrue(all(len(line) <= 80 for line in text), text)
 
-    def test_scripts_are_for_any_shell_and_filled_in(self):
+    def test_scripts_are_posix_and_filled_in(self):
         scripts = [(service, name) for service in SERVICES for name in ("postinst", "prerm", "postrm")]
         if "python3-oblique" in PACKAGES:
             scripts += [("python3-oblique", "postinst"), ("python3-oblique", "prerm")]
@@ -121,7 +121,7 @@ class Packages(unittest.TestCase):
             subprocess.run(["sh", "-n"], input=text, text=True, check=True)
             self.assertNotRegex(text, r"@[A-Za-z_]+@")
 
-    def test_what_a_removal_stopped_is_started_again_where_it_does_not_come_instances_too(self):
+    def test_a_cancelled_removal_starts_stopped_services_again(self):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             (folder / "run/systemd/system").mkdir(parents=True)
@@ -149,7 +149,7 @@ class Packages(unittest.TestCase):
         run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
             "uses-no-compression-for-data-tarball", *PACKAGES.values())
 
-    def test_what_is_packed_again_has_the_same_bytes(self):
+    def test_packing_again_gives_the_same_bytes(self):
         again = pack(pathlib.Path(FOLDER.name) / "elsewhere")
         self.assertEqual(again.keys(), PACKAGES.keys())
         for package, file in again.items():
@@ -157,7 +157,7 @@ class Packages(unittest.TestCase):
 
 
 class AtWork(unittest.TestCase):
-    """dpkg installs, upgrades and removes in a root that has nothing else. Scripts see it as DPKG_ROOT."""
+    """dpkg installs, upgrades and removes in an empty root, which scripts see as DPKG_ROOT."""
 
     def setUp(self):
         if os.geteuid() != 0:
@@ -184,7 +184,7 @@ class AtWork(unittest.TestCase):
         (wants / link).symlink_to(f"/usr/lib/systemd/system/{unit}")
         return wants / link
 
-    def test_an_installation_starts_and_enables_nothing_and_says_how_to(self):
+    def test_an_installation_starts_and_enables_nothing_and_prints_how_to(self):
         said = self.install(*SERVICES)
         for service in SERVICES:
             self.assertIn(f"{service} is installed and not started.", said)
@@ -195,7 +195,7 @@ class AtWork(unittest.TestCase):
         account = re.search(r"^oblique:x:(\d+):(\d+):.*:/var/lib/oblique:", (self.root / "etc/passwd").read_text(), re.M)
         self.assertEqual((str(state.stat().st_uid), str(state.stat().st_gid)), account.groups())
 
-    def test_an_upgrade_keeps_settings_that_somebody_edited_and_renews_others(self):
+    def test_an_upgrade_keeps_edited_settings_and_replaces_others(self):
         self.install(*(older(service, self.folder) for service in SERVICES))
         mine = self.root / "etc/oblique/server.toml"
         mine.write_text("# mine\n")
@@ -204,7 +204,7 @@ class AtWork(unittest.TestCase):
         self.assertNotIn("0.0.1", (self.root / "etc/oblique/worker.toml").read_text())
         self.assertNotIn("not started", said)
 
-    def test_what_databases_and_keys_hold_outlives_upgrade_removal_and_purge_which_says_where_they_are(self):
+    def test_databases_and_keys_survive_upgrade_removal_and_purge(self):
         self.install(older("oblique-server", self.folder), older("oblique-worker", self.folder))
         kept = [self.root / name for name in ("var/lib/oblique/oblique.db", "var/lib/oblique/keys", "etc/oblique/worker.key")]
         for file in kept:
@@ -214,21 +214,21 @@ class AtWork(unittest.TestCase):
         self.assertTrue((self.root / "etc/oblique/server.toml").exists())
         self.assertFalse((self.root / "usr/bin/oblique-server").exists())
         said = self.dpkg("--purge", *SERVICES)
-        self.assertIn("/var/lib/oblique is kept", said)
-        self.assertIn("/etc/oblique/worker.key is kept", said)
+        self.assertIn("/var/lib/oblique is not removed", said)
+        self.assertIn("/etc/oblique/worker.key is not removed", said)
         self.assertFalse((self.root / "etc/oblique/server.toml").exists())
         self.install(*SERVICES)
         self.assertEqual([file.read_text() for file in kept], [file.name for file in kept])
         self.assertTrue((self.root / "etc/oblique/server.toml").exists())
 
-    def test_who_goes_back_is_told_what_that_means(self):
+    def test_a_downgrade_prints_its_consequences(self):
         self.install(*SERVICES)
         said = self.install(*(older(service, self.folder) for service in SERVICES))
-        self.assertIn(f"oblique-server goes back from {VERSION} to 0.0.1.", said)
-        self.assertIn("from a copy of before", said)
-        self.assertNotIn("goes back", self.install(*SERVICES))
+        self.assertIn(f"oblique-server is downgraded from {VERSION} to 0.0.1.", said)
+        self.assertIn("then use an older copy", said)
+        self.assertNotIn("is downgraded", self.install(*SERVICES))
 
-    def test_what_was_enabled_is_so_after_removal_and_return_and_no_longer_after_purge(self):
+    def test_services_stay_enabled_after_a_removal_but_not_after_a_purge(self):
         self.install(*SERVICES)
         links = [self.enable("oblique-server.service", "oblique-server.service"),
                  self.enable("oblique-worker.service", "oblique-worker.service"),
@@ -242,7 +242,7 @@ class AtWork(unittest.TestCase):
         self.assertEqual([link for link in links if link.is_symlink()], [])
         self.assertTrue(other.is_symlink())
 
-    def test_a_purge_leaves_links_to_a_unit_that_somebody_wrote(self):
+    def test_a_purge_keeps_links_to_a_users_unit(self):
         self.install("oblique-worker")
         ours = self.enable("oblique-worker@.service", "oblique-worker@lab.service")
         own = self.root / "etc/systemd/system/oblique-worker@night.service"

@@ -1,4 +1,4 @@
-"""What deploy/README.md and the READMEs below it tell people to type, against programs, units and files.
+"""Checks the commands in deploy/README.md and the READMEs below it against programs, units and files.
 
   readme_test.py TREE FOLDER-OF-THE-PROGRAMS
 """
@@ -24,7 +24,7 @@ def blocks(text):
 
 
 def commands(text):
-    """Lines of fenced blocks and spans of code that call one of our programs: their words."""
+    """The words of commands of our programs in fenced blocks and code spans."""
     lines = [l for b in blocks(text) for l in b.replace("\\\n", " ").splitlines()]
     lines += re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S))
     for line in lines:
@@ -39,7 +39,7 @@ def commands(text):
 
 
 def help_of(words):
-    """The program's help, and that of the verb or verbs that the words name."""
+    """The help of the program and of the commands in the words."""
     text = ""
     for n in range(1, min(3, len(words)) + 1):
         if n > 1 and not re.fullmatch(r"[a-z]+", words[n - 1]):
@@ -50,7 +50,7 @@ def help_of(words):
 
 
 def settings():
-    """What oblique-server is set to where nothing is said."""
+    """The default settings of oblique-server."""
     return subprocess.run([PROGRAMS / "oblique-server", "--no-config", "--print-config"], text=True,
                           capture_output=True, check=True).stdout
 
@@ -63,7 +63,7 @@ class Readmes(unittest.TestCase):
         for readme in READMES:
             for words in commands(readme.read_text()):
                 text = help_of(words)
-                self.assertNotEqual(text, "", f"{readme}: {words}: not said what it does")
+                self.assertNotEqual(text, "", f"{readme}: {words}: no explanation")
                 for flag in (w.split("=")[0] for w in words if w.startswith("--")):
                     self.assertRegex(text, rf"(?<![\w-]){flag}(?![\w-])", f"{readme}: {' '.join(words)}: there is no {flag}")
                     seen += 1

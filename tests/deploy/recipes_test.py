@@ -1,5 +1,4 @@
-"""Recipes of deploy/examples, as somebody runs them who has installed oblique: copied elsewhere, with the programs
-in PATH.
+"""Runs the recipes of deploy/examples as a user: copied to another folder, with the programs in PATH.
 
   recipes_test.py TREE FOLDER-OF-THE-PROGRAMS FOLDER-OF-THE-PYTHON-MODULE RECIPE
 
@@ -24,7 +23,7 @@ HANGS_S = 300  # ends what hangs
 
 
 def missing(modules):
-    """The first of these that Python cannot import; none: all are here."""
+    """The first module that Python cannot import; None: all are installed."""
     for module in modules:
         if subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False,
                           env=os.environ | {"PYTHONPATH": str(MODULE)}).returncode != 0:
@@ -72,7 +71,7 @@ class Recipe(unittest.TestCase):
         return self.wait_for(server, r"clients at (\S+), workers at (\S+),").groups()
 
     def wait_for(self, process, pattern):
-        """Waits until the process has printed it, and returns the match."""
+        """Waits until the process has printed a match, and returns it."""
         end = time.monotonic() + HANGS_S
         while not (found := re.search(pattern, printed := self.log_of(process).read_text())):
             self.assertIn(process.poll(), (None, 0), printed)
@@ -86,7 +85,7 @@ class Recipe(unittest.TestCase):
 
 
 class StudyFromAScript(Recipe):
-    def test_it_submits_waits_and_asks_and_its_exit_code_says_what_became_of_the_study(self):
+    def test_it_submits_waits_and_queries_and_its_exit_code_is_the_studys(self):
         url, workers = self.start_server()
         self.start("oblique-worker", "--server", workers)
         said = self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url)
@@ -96,7 +95,7 @@ class StudyFromAScript(Recipe):
         self.assertEqual(max(float(r["fn_peak_N"]) for r in rows), float(said.split()[-2]))
         # Again: nothing is solved twice, and the answer is the same.
         self.assertEqual(self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url),
-                         said.replace(" 0 done", " 16 done; the server had it already"))
+                         said.replace(" 0 done", " 16 done; the server already had it"))
         # Cancelled, it is not done: 1.
         self.run_in_folder("oblique", "submit", "--name", "long", "--preset", "paper", "--H", "1", "--mu", "0.1:2:1000", "--e",
                            "0.5:1:1000", OBLIQUE_SERVER=url)

@@ -98,8 +98,7 @@ TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
       const int signal = i < 2 ? SIGINT : SIGTERM;
       clients[i]->send(signal);
       EXPECT_EQ(clients[i]->wait(), 128 + signal) << clients[i]->err();
-      EXPECT_NE(clients[i]->err().find("No longer watching"), std::string::npos)
-          << clients[i]->err();
+      EXPECT_NE(clients[i]->err().find("Watching ended"), std::string::npos) << clients[i]->err();
     }
   }
 }

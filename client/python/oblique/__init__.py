@@ -5,17 +5,17 @@
 >>> round(impact.fn_peak_N, 1), impact.mode
 (4909.4, 'sC sR sC sR sC sR')
 
-Units are SI and stand at the end of names: ``fn_peak_N``, ``duration_s``.
+Values are in SI units; names end with the unit: ``fn_peak_N``, ``duration_s``.
 
-* :func:`solve` solves one point, :func:`solve_many` any number of them on all cores, with arrays in
-  and out, and :func:`trace` gives the time histories of one.
-* :class:`Database` asks the results that studies have left, also while a server writes them.
+* :func:`solve` solves one point, :func:`solve_many` many points on all cores, with arrays for
+  parameters and results. :func:`trace` returns the time histories of one point.
+* :class:`Database` queries the results of studies, also while a server writes them.
 
-All of it may be called from several threads at once and lets other threads run meanwhile. Falls
-are kept for later calls, in an eighth of the free memory at most.
+All functions are thread-safe and let other threads run. Falls are cached for later calls, in at
+most an eighth of the free memory.
 
-The child of a fork cannot use it: calls raise RuntimeError there. Start processes with
-``multiprocessing.set_start_method("spawn")``; ``subprocess`` is not affected.
+The module cannot be used in the child of a fork, where calls raise RuntimeError. Start processes
+with ``multiprocessing.set_start_method("spawn")``; ``subprocess`` is not affected.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from ._results import Energy, Errors, ManyResults, Result, Solver, Trace, _core
 DatabaseError, SolveError = _core.DatabaseError, _core.SolveError
 
 for _error, _meaning in (
-    (SolveError, "A point that has no answer; the message says why."),
-    (DatabaseError, "A file that is no database of results, or one that cannot be read."),
+    (SolveError, "A point has no answer; the message gives the reason."),
+    (DatabaseError, "A file is not a database of results, or cannot be read."),
 ):
     _error.__module__, _error.__doc__ = __name__, _meaning
 

@@ -1,4 +1,4 @@
-"""Results that studies have left, asked as ``oblique query`` and ``oblique sql`` ask."""
+"""Results of studies, queried as by ``oblique query`` and ``oblique sql``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Study(Named):
-    """A study of a database and where it stands."""
+    """A study of a database and its progress."""
 
     study_id: int
     name: str
@@ -28,9 +28,9 @@ class Study(Named):
 
 
 class Answer(Arrays):
-    """Columns by name, as ``answer["fn_peak_N"]`` or ``answer.fn_peak_N``: NumPy arrays, whole
-    numbers as int64, others as float64 with NaN for NULL, texts as objects with None. ``units`` has
-    their units (SI) as far as they are known, ``len()`` counts rows."""
+    """Columns by name, ``answer["fn_peak_N"]`` or ``answer.fn_peak_N``. Integers are int64 arrays,
+    other numbers float64 arrays with NaN for NULL, texts object arrays with None. ``units`` has the
+    known SI units; ``len()`` is the number of rows."""
 
     def __init__(self, columns: list[tuple[str, str, Any]]) -> None:
         named: dict[str, Any] = {"_units": {}}
@@ -44,7 +44,7 @@ class Answer(Arrays):
 
     @property
     def units(self) -> dict[str, str]:
-        """Units (SI) by column; empty where there is none."""
+        """SI unit of each column; empty if it has none."""
         return dict(self.__dict__["_units"])
 
     def keys(self) -> list[str]:
@@ -58,16 +58,16 @@ class Answer(Arrays):
         return f"<{len(self)} rows: {', '.join(self)}>"
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """The same as a DataFrame; pandas is needed for this alone."""
+        """The columns as a pandas DataFrame."""
         import pandas
 
         return pandas.DataFrame(self._asdict())
 
 
 class Database:
-    """A database of results, opened for reading only: it may be asked while a server or a run
-    writes it. Raises FileNotFoundError where there is none, and DatabaseError where there is
-    something else.
+    """A database of results, opened for reading only, also while a server or a run writes it.
+    Raises FileNotFoundError if the file does not exist, and DatabaseError if it is not a database
+    of results.
 
         db = oblique.Database("oblique.db")
         friction = db.query("friction", where="e = 1", select="mu, fn_peak_N")
@@ -90,11 +90,11 @@ class Database:
         order: Union[str, Sequence[str]] = "",
         limit: Optional[int] = None,
     ) -> Answer:
-        """Results of a study: the answer of ``oblique query STUDY --where ...`` in full.
+        """All results of a study, as by ``oblique query STUDY --where ...``.
 
-        Texts are SQL over the columns that ``oblique columns`` lists, in SI units; ``select`` left
-        out has the axes that vary in the study and the main outputs, "*" has all. Raises ValueError
-        for a wrong name, with those that may have been meant.
+        Texts are SQL over the columns that ``oblique columns`` lists, in SI units. ``select`` is by
+        default the axes that vary and the main outputs; "*" is all columns. Raises ValueError for a
+        wrong name, with the nearest ones.
         """
         if limit is not None and limit < 0:
             raise ValueError(f"limit = {limit} is not allowed: limit must be >= 0")
@@ -102,17 +102,17 @@ class Database:
             columns = self._database.query(
                 study, where, _joined(select), _joined(group), _joined(order), limit
             )
-        except ValueError as error:  # which names the flags of the program
+        except ValueError as error:  # names flags of the program
             text = re.sub(r"--(where|select|group|order|limit)\b", r"\1", str(error))
             raise ValueError(text) from None
         return Answer(columns)
 
     def sql(self, statement: str) -> Answer:
-        """The answer to one statement of SQL that only reads, as of ``oblique sql``."""
+        """The answer to an SQL statement that only reads, as by ``oblique sql``."""
         return Answer(self._database.sql(statement))
 
     def studies(self) -> list[Study]:
-        """All studies, in the order in which they came."""
+        """All studies, oldest first."""
         return [Study(**study) for study in self._database.studies()]
 
 

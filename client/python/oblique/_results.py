@@ -1,4 +1,4 @@
-"""What solving gives: one result, many, and time histories."""
+"""One result, many results, and time histories."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import pandas
 
-_core: Any = import_module("._core", __package__)  # the extension, which has no types
+_core: Any = import_module("._core", __package__)  # the extension has no types
 
 
 class Named(SimpleNamespace):
@@ -22,7 +22,7 @@ class Named(SimpleNamespace):
         return SimpleNamespace.__new__, (type(self),), self.__dict__
 
     def _asdict(self) -> dict[str, Any]:
-        """All values by name, groups as dicts of their own."""
+        """All values by name; groups are dicts."""
         return {
             name: value._asdict() if isinstance(value, Named) else value
             for name, value in self.__dict__.items()
@@ -44,7 +44,7 @@ def text_array(texts: list[str], codes: npt.NDArray[np.int32]) -> npt.NDArray[np
 
 
 class Energy(Named):
-    """Energy balance of a contact [J]; what is lost is positive."""
+    """Energy balance of a contact [J]; losses are positive."""
 
     kinetic_in_J: float
     friction_J: float
@@ -57,7 +57,7 @@ class Energy(Named):
 
 
 class Errors(Named):
-    """Estimated errors, as fractions of the output's scale; None unless asked for."""
+    """Estimated errors as fractions of the output's scale; None unless requested."""
 
     mode_same: Optional[int]
     fn_peak: Optional[float]
@@ -81,9 +81,9 @@ class Solver(Named):
 
 
 class Result(Named):
-    """One impact, with the fields of ``oblique solve --json`` (``oblique columns`` tells them all).
+    """One impact, with the fields of ``oblique solve --json`` (``oblique columns`` lists them).
 
-    SI units; times count from touch. Fields are attributes, ``_asdict()`` gives all of them.
+    SI units; times count from touch. Fields are attributes; ``_asdict()`` returns all of them.
     """
 
     H: float
@@ -143,7 +143,7 @@ _GROUPS: dict[str, type[Named]] = {"energy": Energy, "errors": Errors, "solver":
 
 
 class Arrays(Named):
-    """Named arrays, as the groups ``energy``, ``errors`` and ``solver`` of many results."""
+    """Named arrays: the groups ``energy``, ``errors`` and ``solver`` of many results."""
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"there is no `{name}` here: there are {', '.join(self.__dict__)}")
@@ -153,10 +153,10 @@ class ManyResults(Arrays):
     """Many impacts: the fields of :class:`Result`, each an array of the shape of the input; groups
     have arrays by the names of :class:`Energy`, :class:`Errors` and :class:`Solver`.
 
-    Where a point has no result its numbers are NaN, its texts None, its lists empty, and ``error``
-    says why; ``failed`` marks such points. Lists are arrays of arrays (``fn_peaks_N``,
-    ``stick_intervals_s``), with named members where they have several (``phases["t0_s"]``);
-    :meth:`ragged` gives one without making an object for each point.
+    If a point has no result, its numbers are NaN, its texts None, its lists empty, and ``error``
+    contains the reason; ``failed`` marks such points. Lists are arrays of arrays (``fn_peaks_N``,
+    ``stick_intervals_s``); lists with several members have names (``phases["t0_s"]``).
+    :meth:`ragged` returns a list without an object for each point.
 
     >>> import oblique
     >>> sweep = oblique.solve_many(H=1, mu=[0.2, 0.4, -1], e=1)
@@ -175,7 +175,7 @@ class ManyResults(Arrays):
         named: dict[str, Any] = {key: shaped(values[key]) for key in ("H", "mu", "e")}
         for name, group, _, _, list_name, _, _ in _core.fields():
             if list_name:
-                named[name] = None  # its place; made when it is asked for
+                named[name] = None  # its place; the list is made on first use
             elif group:
                 named.setdefault(group, {})[name] = shaped(values[group][name])
             else:
@@ -215,7 +215,7 @@ class ManyResults(Arrays):
         return f"<{self.failed.size} results of shape {self.shape}{failed}: {names}>"
 
     def ragged(self, name: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
-        """A list of all points as one array: those of point i (of the flattened input) are
+        """A list of all points as one array: the elements of point i (of the flattened input) are
         ``values[offsets[i]:offsets[i + 1]]``.
 
         >>> import oblique
@@ -248,8 +248,8 @@ class ManyResults(Arrays):
         return lists.reshape(self.shape)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row a point: H, mu, e and all outputs that are one value, under the names that they
-        have in a database, and ``error``."""
+        """A pandas DataFrame with one row per point: H, mu, e and all scalar outputs, named as in a
+        database, and ``error``."""
         import pandas
 
         columns: dict[str, npt.NDArray[Any]] = {"H": self.H, "mu": self.mu, "e": self.e}
@@ -261,7 +261,7 @@ class ManyResults(Arrays):
 
 
 def _elements(list_name: str, packed: dict[str, Any]) -> npt.NDArray[Any]:
-    """Elements with named members, or pairs where they have no names."""
+    """Elements with named members, or pairs if they have no names."""
     members = [name for name in packed if name not in ("offsets", "texts")]
     if list_name == "stick_intervals":
         return np.stack([packed[name] for name in members], axis=-1)
@@ -276,8 +276,8 @@ def _elements(list_name: str, packed: dict[str, Any]) -> npt.NDArray[Any]:
 
 
 class Trace(Arrays):
-    """Time histories of one contact: an array a column (``t_s``, ``fn_N``, ``x_m``, ...; forces on
-    joints ``R0x_N`` ..., and where the shape was asked for ``node0x_m`` ...), and the ``result``.
+    """Time histories of one contact: an array per column (``t_s``, ``fn_N``, ``x_m``, ...; forces
+    on joints ``R0x_N`` ...; with ``shape`` also ``node0x_m`` ...), and the ``result``.
 
     ``state`` is SC, SR, sC or sR from each instant on, and "falling" before touch.
     """
@@ -286,7 +286,7 @@ class Trace(Arrays):
         return len(self.t_s)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """A row an instant."""
+        """A pandas DataFrame with one row per instant."""
         import pandas
 
         return pandas.DataFrame({k: v for k, v in self.__dict__.items() if k != "result"})

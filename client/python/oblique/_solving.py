@@ -1,4 +1,4 @@
-"""Points solved here."""
+"""Functions that solve points in this process."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy.typing as npt
 from ._results import ManyResults, Result, Trace, _core
 
 Number = Union[float, int, "np.floating[Any]", "np.integer[Any]"]
-#: One value, or an expression of other keys, as "A^2 / (4 * pi)".
+#: One value, or an expression of other keys, such as "A^2 / (4 * pi)".
 Value = Union[Number, str]
 
-_falls = _core.Falls()  # of all calls: a model's fall is solved once
-#: Threads that one call may have.
+_falls = _core.Falls()  # shared by all calls: a model's fall is solved once
+#: Maximum number of threads of a call.
 MOST_THREADS = 1024
 
 
@@ -31,21 +31,20 @@ def solve(
     errors: bool = False,
     **model: Value,
 ) -> Result:
-    """One impact: what ``oblique solve --json`` gives, with the same bits.
+    """One impact, with the same bits as from ``oblique solve --json``.
 
     H [m] is the drop of the tip, mu the coefficient of friction, e Stronge's coefficient of
-    restitution. The model is a preset ("standard", "paper", "printed" or "converged") with single keys
-    overridden, as on the command line: ``E``, ``A``, ``I``, ``rho``, ``g``, ``k``, ``eta2``,
+    restitution. The model is a preset ("standard", "paper", "printed" or "converged"); single keys
+    override it, as on the command line: ``E``, ``A``, ``I``, ``rho``, ``g``, ``k``, ``eta2``,
     ``tip_mass``, ``links``, ``length``, ``length1``, ``elements_per_link``, ``integrator``, ``dt``,
     ``dt_fall``, ``tolerance``, ...; ``lengths`` has one length a link. A value may be an expression
-    of other keys. ``errors`` asks for estimated errors too.
+    of other keys. ``errors`` also estimates errors.
 
-    The first point of a model takes half a second or so, for its fall, which is kept for others;
-    these take some 10 ms. Many points are ten times as fast in one call of
-    :func:`solve_many`.
+    The first point of a model takes about half a second for its fall, which is cached; further
+    points take about 10 ms. One call of :func:`solve_many` is ten times as fast for many points.
 
-    Raises ValueError, naming key, value and range, for what is not allowed, and SolveError for a
-    point that has no answer. Warns of a value that is likely to be in another unit.
+    Raises ValueError, with key, value and range, for a wrong argument, and SolveError for a point
+    without an answer. Warns of a value that is probably in another unit.
 
     >>> import oblique
     >>> impact = oblique.solve(H=1, mu=1.2, e=0.8)
@@ -73,7 +72,7 @@ def trace(
 ) -> Trace:
     """The time histories of one impact, from touch to separation; see :func:`solve`.
 
-    ``fall`` adds the fall before touch, at negative times; ``shape`` the positions of the nodes.
+    ``fall`` adds the fall before touch, at negative times; ``shape`` adds the positions of nodes.
 
     >>> import oblique
     >>> contact = oblique.trace(H=1, mu=0.4, e=1)
@@ -102,13 +101,12 @@ def solve_many(
 ) -> ManyResults:
     """Many impacts, on all cores (or ``threads``) and in all lanes of their vector registers.
 
-    All keys may be arrays, lists or single values, which are broadcast against each other, and
-    expressions; the results have their common shape. They are the bits that :func:`solve` gives.
-    A point of an array that has no answer fails alone, as one does whose value is NaN or masked:
-    see :class:`ManyResults`.
+    All keys may be expressions, or arrays, lists and single values, which are broadcast against
+    each other. The results have the common shape and the same bits as from :func:`solve`. A point
+    without an answer, or with a NaN or masked value, fails alone: see :class:`ManyResults`.
 
-    ``progress(done, all)`` is called every 50 ms or so; what it raises ends the work, as Ctrl-C
-    does. Other threads of Python run meanwhile.
+    ``progress(done, all)`` is called about every 50 ms; an exception in it stops the work, as
+    Ctrl-C does. Other Python threads run meanwhile.
 
     >>> import numpy as np, oblique
     >>> mu, e = np.meshgrid(np.linspace(0.1, 2, 20), [0.6, 0.8, 1.0])
@@ -135,9 +133,9 @@ def _keys(
     lengths: Optional[Sequence[Number]],
     one_for: Optional[str] = None,
 ) -> tuple[dict[str, Any], tuple[int, ...]]:
-    """What the extension takes, which checks it: floats, texts and flat arrays, and their common
-    shape. Warns of values that are likely to be in another unit. ``one_for`` names a function that
-    takes one value a key."""
+    """Arguments for the extension, which checks them: floats, texts and flat arrays, and their
+    common shape. Warns of values that are probably in another unit. ``one_for`` is the name of a
+    function that takes one value per key."""
     keys: dict[str, Any] = {**values, "preset": preset}
     arrays = {key: _array(key, v) for key, v in values.items() if not isinstance(v, str)}
     for key, array in arrays.items():
@@ -150,7 +148,7 @@ def _keys(
         shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
     except ValueError:
         shapes = ", ".join(f"{key} {array.shape}" for key, array in arrays.items() if array.ndim)
-        raise ValueError(f"these shapes do not fit each other: {shapes}") from None
+        raise ValueError(f"these shapes cannot be broadcast together: {shapes}") from None
     for key, array in arrays.items():
         _warn_of_units(key, array)
         keys[key] = np.broadcast_to(array, shape).ravel() if array.ndim else array.item()
@@ -171,7 +169,7 @@ def _warn_of_units(key: str, array: npt.NDArray[Any]) -> None:
 
 
 def _without_masks(value: Any) -> Any:
-    """NaN where a value is masked, or is the NA of pandas."""
+    """Replaces masked values and the NA of pandas by NaN."""
     if isinstance(value, (list, tuple)) and any(isinstance(v, np.ma.MaskedArray) for v in value):
         value = np.ma.stack(np.broadcast_arrays(*value, subok=True))
     kind = getattr(value, "dtype", None)

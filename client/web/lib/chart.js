@@ -1,22 +1,24 @@
-// Lines or bars over an axis, drawn by uPlot, with keys that move the cursor and a text that reads the values there.
+// Lines or bars over an axis, drawn by uPlot. Keys move the cursor; a text shows the values there.
 import { ink } from "./colours.js";
 import { h } from "./dom.js";
 import { shown } from "./format.js";
 import { scale, ticks, tickText } from "./scale.js";
 
 /**
- * What a chart shows, in the units that it shows: title; x {label, name, unit, values, isLog, ends}; y {label, unit, isLog,
- * ends}; series [{label, values, look, isThick}]; isBars; spans [{from, to, ink, isBand}] behind the lines, a band at their foot;
- * zoom(part) and select(part), where part is {x: [from, to], y: [from, to] or null}, or null for all and nothing;
- * dragSelects: dragging selects, and with Shift it zooms; moved(i): the cursor was moved to a value.
+ * The contents of a chart, in shown units: title; x {label, name, unit, values, isLog, ends}; y
+ * {label, unit, isLog, ends}; series [{label, values, look, isThick}]; isBars; spans [{from, to,
+ * ink, isBand}] behind the lines (a band is at their foot). Callbacks: zoom(part) and select(part),
+ * where part is {x: [from, to], y: [from, to] or null}, or null for everything (zoom) or nothing
+ * (select); moved(i): the cursor moved to value i. dragSelects: dragging selects, and with Shift
+ * zooms; otherwise the reverse.
  */
 
-// A script of its own, which runs before modules (index.html).
+// uPlot comes from a classic script, which runs before modules (index.html).
 const { uPlot } = globalThis;
 
 const dashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
 const fills = ["bar", "line1"];
-/** Fewer values are drawn as points too. */
+/** With fewer values, points are drawn too. */
 const fewValues = 60;
 const usualHeight = 220;
 
@@ -41,7 +43,7 @@ function legendOf({ series, isBars }) {
   return h("ul.legend", ...entries.map(entry));
 }
 
-/** What cannot be changed in a chart that is drawn. */
+/** Properties that cannot change after the chart is drawn. */
 const formOf = ({ title, x, y, series, isBars, spans }) =>
   JSON.stringify([
     [title, isBars, spans, x.label, x.isLog, y],
@@ -49,7 +51,7 @@ const formOf = ({ title, x, y, series, isBars, spans }) =>
     series.map((one) => [one.label, one.look]),
   ]);
 
-/** The ends of the axis: uPlot rounds those of logarithmic axes to powers of ten. */
+/** Ends of the axis. uPlot rounds those of logarithmic axes to powers of ten. */
 function endsOfAxis({ values, ends }, least, most) {
   const isAll = least === values[0] && most === values[values.length - 1];
   const [from, to] = isAll && ends ? ends : [least, most];
@@ -121,11 +123,11 @@ function drawSpans({ ctx, bbox, valToPos }, spans) {
 }
 
 export class Chart {
-  /** The value at the cursor; -1: none. */
+  /** Index of the value at the cursor; -1: none. */
   #at = -1;
   #isQuiet = false;
   #dragZooms = true;
-  /** Made as soon as the element has a width. */
+  /** Created as soon as the element has a width. */
   #plot = null;
 
   constructor(lines) {
@@ -146,7 +148,7 @@ export class Chart {
     this.watch.observe(this.place);
   }
 
-  /** Shows other values in the same chart; false: it must be made anew. */
+  /** Shows other values in the same chart. Returns false if a new chart is needed. */
   update(lines) {
     if (!this.#plot || formOf(lines) !== formOf(this.lines)) return false;
     this.lines = lines;
@@ -155,7 +157,7 @@ export class Chart {
     return true;
   }
 
-  /** Moves the cursor to a value without a call of `moved`. */
+  /** Moves the cursor to a value without calling `moved`. */
   pointAt(i) {
     this.#isQuiet = true;
     this.#move(i);
@@ -163,7 +165,7 @@ export class Chart {
     this.#at = i;
   }
 
-  /** What pngOf draws. */
+  /** The figure for pngOf. */
   figure() {
     return { title: this.lines.title, canvas: this.#plot.ctx.canvas, legend: this.legend };
   }

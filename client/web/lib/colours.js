@@ -1,13 +1,12 @@
-// Colours of values and of categories, readable by the colour-blind.
+// Colours of values and categories, suitable for colour-blind readers.
 
 const viridis = "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725";
 
 const rgb = (hex) => [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16));
 
-/** One opaque pixel of an ImageData. */
 const packed = ([r, g, b]) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 
-/** 256 pixels from the smallest to the largest value. */
+/** 256 pixels, from the smallest to the largest value. */
 export const palette = (() => {
   const stops = viridis.split(" ").map(rgb);
   return Uint32Array.from({ length: 256 }, (_, i) => {
@@ -20,7 +19,8 @@ export const palette = (() => {
 export const cssColour = (pixel) =>
   `rgb(${pixel & 255} ${(pixel >> 8) & 255} ${(pixel >> 16) & 255})`;
 
-// Colours and patterns of categories, as `oblique plot` has them; the last is that of all others.
+// Colours and patterns of categories, the same as in `oblique plot`. The last one is for all other
+// categories.
 const colours = "77aadd eedd88 ee8866 99ddff bbcc33 ffaabb 44bb99 b59a80".split(" ");
 const patterns = [
   () => false,
@@ -41,15 +41,15 @@ const looks = [
   isInked,
 }));
 
-/** The look of categories without one of their own. */
+/** The look of all other categories. */
 export const otherLook = looks.length - 1;
 const mostAtFirst = 12;
 
-/** Gives categories of a study their looks, which they keep as long as the page is open. */
+/** Assigns looks to the categories of a study; a category keeps its look while the page is open. */
 export class CategoryLooks {
   #looks = new Map();
 
-  /** Gives looks to frequent categories that have none: [{text, cells}], the most frequent first. */
+  /** Assigns looks to categories that have none: [{text, cells}], most frequent first. */
   assign(categories) {
     const all = categories.reduce((sum, one) => sum + one.cells, 0);
     const most =
@@ -67,7 +67,7 @@ export class CategoryLooks {
   }
 }
 
-/** The pixel at a place of a category's area. */
+/** The pixel at a position in a category's area. */
 export function categoryPixel(look, x, y) {
   const { plain, inked, isInked } = looks[look];
   return isInked(x, y) ? inked : plain;
@@ -75,7 +75,10 @@ export function categoryPixel(look, x, y) {
 
 export const categoryColour = (look) => cssColour(looks[look].plain);
 
-/** The pixel of a cell without a value: missing, failed, left_out, none (no such value) or filtered. */
+/**
+ * The pixel of a cell without a value. Kinds: missing, failed, left_out, none (no such value),
+ * filtered.
+ */
 export function emptyPixel(why, x, y, isDark) {
   const [ground, line, error] = isDark
     ? [0xff211e1c, 0xff5c5650, 0xff7d8aff]
@@ -91,7 +94,7 @@ export function emptyPixel(why, x, y, isDark) {
 
 export const isDark = () => matchMedia("(prefers-color-scheme: dark)").matches;
 
-/** A colour of the page's style, by the class ink-NAME. */
+/** A colour of the style sheet, from the class ink-NAME. */
 export function ink(name) {
   const probe = document.getElementById("ink");
   probe.className = `ink-${name}`;

@@ -1,10 +1,11 @@
-// Elements in one expression. Texts become text nodes, so nothing that a server sends is read as HTML.
+// Creates elements. Texts become text nodes, so text from a server is never parsed as HTML.
 
 const attributes = ["role", "for", "list", "scope"];
 
 /**
- * Makes an element of "TAG.CLASS...". Settings, which may be left out, are properties; those that start with "on" are
- * listeners, those with a dash and `attributes` are attributes. Children that are null, undefined or false are left out.
+ * Creates an element "TAG.CLASS...". The optional settings are properties; names that start with
+ * "on" are listeners; names with a dash and those in `attributes` are attributes. Children that are
+ * null, undefined or false are omitted.
  */
 export function h(selector, ...given) {
   const [tag, ...classes] = selector.split(".");
@@ -25,7 +26,7 @@ export function h(selector, ...given) {
 
 const isShown = (child) => child !== null && child !== undefined && child !== false;
 
-/** A line that says what happened: {element, say}. */
+/** A line for messages: {element, say}. */
 export function statusLine() {
   const element = h("p.said", { role: "status" });
   const say = (text, isBad = false) => {
@@ -35,14 +36,14 @@ export function statusLine() {
   return { element, say };
 }
 
-/** A field with its label above it; `help` is shown as a tooltip. */
+/** A field with a label above it; `help` is its tooltip. */
 export const labelled = (name, field, help) =>
   h("label.field", { title: help }, h("span", name), field);
 
 export const button = (text, onclick, settings = {}) =>
   h("button", { type: "button", onclick, ...settings }, text);
 
-/** Choices are [value, text, group] or values that are their text; an empty or missing group is none. */
+/** Choices are [value, text, group] or plain values; the group is optional. */
 export function picker(choices, chosen, pick) {
   const select = h("select", { onchange: () => pick(select.value) });
   let parent = select;
@@ -63,19 +64,18 @@ export function checkbox(name, checked, toggle) {
   return h("label.tick", box, name);
 }
 
-/** A button that copies a text. */
 export function copyButton(label, text, settings = {}) {
   const copy = async (event) => {
     const done = navigator.clipboard?.writeText(text());
     event.target.textContent = await Promise.resolve(done ?? Promise.reject()).then(
       () => "Copied",
-      () => "Copy it by hand",
+      () => "Copying failed: copy it by hand",
     );
   };
   return button(label, copy, settings);
 }
 
-/** A command line with a button that copies it; `name` says of what it is. */
+/** A command line with a button that copies it; `name` describes its result. */
 export const command = (name, text) =>
   h(
     "div.copied",
@@ -85,12 +85,12 @@ export const command = (name, text) =>
 
 const focusable = "a[href], button, input, select, [tabindex]";
 const containers = ["THEAD", "TBODY", "TR"];
-// Their state is no attribute, so that equal ones may show something else.
+// Their state is not an attribute, so equal elements may show different values.
 const withState = "input, select, canvas";
 
 /**
- * Changes the children of an element to these. Children that are equal stay, so that a button is not replaced while it is
- * pressed; the focus stays at its place among the controls of the element.
+ * Replaces the children of an element. Equal children are kept, so that a button is not replaced
+ * while it is pressed, and the focus stays at its position among the controls.
  */
 export function setChildren(element, ...children) {
   const place = [...element.querySelectorAll(focusable)].indexOf(document.activeElement);
@@ -118,7 +118,6 @@ function replaceChanged(element, children) {
   while (element.childNodes.length > children.length) element.lastChild.remove();
 }
 
-/** Saves text or a Blob as a file. */
 export function saveFile(name, content, type = "text/csv;charset=utf-8") {
   const address = URL.createObjectURL(
     content instanceof Blob ? content : new Blob([content], { type }),

@@ -1,12 +1,12 @@
 // Numbers, units and command lines as text.
 
-/** A whole number with its thousands apart. */
+/** An integer with separated thousands. */
 export const count = (value) => Math.round(value).toLocaleString("en").replaceAll(",", "\u202f");
 
 /** "1 point", "12 points". */
 export const counted = (value, noun) => `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
 
-/** A measured value, rounded to some digits. */
+/** A measured value with `digits` digits. */
 export function shown(value, digits = 5) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
@@ -19,7 +19,10 @@ export function shown(value, digits = 5) {
   return String(Number(value.toPrecision(digits)));
 }
 
-/** The unit in which values of a column are shown, as in the tables of `oblique query`, and how many make an SI unit. */
+/**
+ * The unit in which a column is shown, as in tables of `oblique query`, and the factor from the SI
+ * unit.
+ */
 export function shownUnit(name, unit) {
   const column = name.replace(/^mean of /, "");
   if (/^(duration_s|stick_total_s|dt_s|major_peak_\d_t_s)$/.test(column)) return ["µs", 1e6];
@@ -28,14 +31,14 @@ export function shownUnit(name, unit) {
   return [unit === "1" ? "" : (unit ?? ""), 1];
 }
 
-/** A column or axis with the unit that it is shown in; names that end with that unit stand alone. */
+/** A column or axis with its shown unit, which is omitted if the name ends with it. */
 export function heading(name, unit) {
   const [text, factor] = shownUnit(name, unit);
   const suffix = `_${text.replace("/", "_").replaceAll(" ", "")}`;
   return !text || (factor === 1 && name.endsWith(suffix)) ? name : `${name} [${text}]`;
 }
 
-/** A value of a column in SI units, with the unit that it is shown in. */
+/** A value in SI units, shown in the unit of its column. */
 export function withUnit(value, name, unit, digits = 5) {
   const [text, factor] = shownUnit(name, unit);
   return typeof value === "number"
@@ -43,7 +46,7 @@ export function withUnit(value, name, unit, digits = 5) {
     : (value ?? "–");
 }
 
-/** The time that is left, in seconds; null: not known. */
+/** Time left, from seconds; null: unknown. */
 export function timeLeft(seconds) {
   if (seconds === null) return "";
   if (seconds < 90) return `${Math.ceil(seconds)} s`;
@@ -53,11 +56,11 @@ export function timeLeft(seconds) {
     : `${Math.round(seconds / 86400)} days`;
 }
 
-/** An argument of a command line. */
+/** Quotes an argument of a command line. */
 export const quoted = (text) =>
   /^[A-Za-z0-9_.,:=/@%+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 
-/** The flag that names a database file; "" for commands that ask the server. */
+/** The flag of a database file; "" for commands that use the server. */
 export const dbFlag = (file) => (file ? ` --db ${quoted(file)}` : "");
 
 const csvField = (value) =>

@@ -1,10 +1,10 @@
-// Drawings as a PNG file: canvases below each other, each with its title and legend.
+// Drawings as a PNG file: canvases below each other, with titles and legends.
 import { ink } from "./colours.js";
 
 const margin = 12; // CSS pixels
 const lineHeight = 20;
 
-/** Entries of a legend: a sign, if there is one, and a text. */
+/** Entries of a legend: an optional sign and a text. */
 function entriesOf(legend) {
   const found = [...(legend?.querySelectorAll("p, .bar canvas, li") ?? [])];
   return found.map((one) => ({
@@ -14,7 +14,7 @@ function entriesOf(legend) {
   }));
 }
 
-/** Draws a legend from `y` on; returns where it ends. */
+/** Draws a legend below `y`; returns its end. */
 function drawLegend(context, legend, y, width) {
   let x = margin;
   for (const { sign, text, isWide } of entriesOf(legend)) {
@@ -34,7 +34,7 @@ function drawLegend(context, legend, y, width) {
   return x > margin ? y + lineHeight : y;
 }
 
-/** Draws figures below each other; returns where they end. */
+/** Draws figures below each other; returns their end. */
 function drawFigures(context, figures, width) {
   let y = margin;
   context.fillStyle = ink("text");
@@ -50,7 +50,7 @@ function drawFigures(context, figures, width) {
   return y;
 }
 
-/** Figures are {title, canvas, legend}, with canvas and legend (or null) as the page shows them. */
+/** Figures are {title, canvas, legend}; canvas and legend (or null) are elements of the page. */
 export function pngOf(figures) {
   const ratio = window.devicePixelRatio || 1;
   const width = Math.max(...figures.map(({ canvas }) => canvas.clientWidth));

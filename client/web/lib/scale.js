@@ -1,8 +1,8 @@
-// From values to places and back, linear or logarithmic, and round values for ticks.
+// Linear and logarithmic scales, and round values for ticks.
 
 const identity = (value) => value;
 
-/** Places run from 0 at `from` to 1 at `to`. */
+/** Maps `from` to 0 and `to` to 1. */
 export function scale(from, to, isLog) {
   const [inner, outer] = isLog ? [Math.log, Math.exp] : [identity, identity];
   const start = inner(from);
@@ -16,7 +16,7 @@ export function scale(from, to, isLog) {
   };
 }
 
-/** The smallest and largest number; null: there is none. */
+/** The smallest and largest number; null if there is none. */
 export function endsOf(values) {
   let [least, most] = [Infinity, -Infinity];
   for (const value of values) {
@@ -31,7 +31,7 @@ export function endsOf(values) {
 export function ticks({ from, to, isLog }, wanted) {
   const [least, most] = [Math.min(from, to), Math.max(from, to)];
   const width = most - least;
-  // Steps of a range of a few ulps would not move on.
+  // In a range of a few ulps, adding a step would not change the value.
   if (!(width < Infinity && width > 1e-12 * Math.max(Math.abs(least), Math.abs(most))))
     return [least];
   if (isLog && most / least >= 8) return logTicks(least, most, wanted);
@@ -63,7 +63,7 @@ export function tickText(value) {
   return text.replaceAll("-", "\u2212");
 }
 
-/** The value below which a share of rising numbers lies. */
+/** The quantile of ascending numbers. */
 export function quantile(sorted, share) {
   const at = (sorted.length - 1) * share;
   const low = Math.floor(at);

@@ -1,5 +1,6 @@
-// The finger during the contact: the whole of it from the side, its motion enlarged; and its tip at the ground, with the contact
-// particle P and the forces. A player moves both through time.
+// The finger during the contact: a side view of the whole finger with enlarged motion, and a view
+// of the tip at the ground with the contact particle P and the forces. A player moves both through
+// time.
 import { ink } from "../lib/colours.js";
 import { button, h } from "../lib/dom.js";
 import { shown } from "../lib/format.js";
@@ -16,7 +17,7 @@ function lengthText(metres) {
   return metres >= 1e-3 ? `${shown(metres * 1e3, 3)} mm` : `${shown(metres * 1e6, 3)} µm`;
 }
 
-/** An empty canvas as wide as its place; null: there is no room. */
+/** An empty canvas that fills its container; null if there is no room. */
 function begin(canvas, place) {
   const width = place.clientWidth;
   if (width < 60) return null;
@@ -54,7 +55,7 @@ function drawGround(context, width, level) {
   context.fillRect(0, level, width, 5);
 }
 
-/** A text with a border in the colour of the page, so that lines end around it. */
+/** A text with a border in the background colour, so that lines do not cross it. */
 function write(context, text, x, y, colour = "text", align = "left") {
   context.textAlign = align;
   context.strokeStyle = ink("page");
@@ -64,7 +65,7 @@ function write(context, text, x, y, colour = "text", align = "left") {
   context.fillText(text, x, y);
 }
 
-/** A bar of a round length. */
+/** A scale bar of a round length. */
 function drawLength(context, width, metresPerPixel) {
   const most = width * 0.3 * metresPerPixel;
   const power = 10 ** Math.floor(Math.log10(most));
@@ -89,7 +90,7 @@ function drawArrow(context, [x, y], [dx, dy], colour) {
   context.fill();
 }
 
-/** x and y by turns as pairs of pixels. */
+/** Converts alternating x and y to pairs of pixels. */
 const pixelsOf = (nodes, px, py) =>
   Array.from({ length: nodes.length / 2 }, (_, i) => [px(nodes[2 * i]), py(nodes[2 * i + 1])]);
 
@@ -103,7 +104,7 @@ function figureOf(caption, label) {
   };
 }
 
-/** The largest power of ten that shows motion as at most a quarter of the finger. */
+/** The largest power of ten that shows the motion as at most a quarter of the finger. */
 function enlargementOf(trace, size) {
   const rest = trace.nodes(0);
   let moved = 1e-12;
@@ -122,7 +123,7 @@ function wholeFinger(trace) {
   const [bottom, top] = endsOf([ground, ...rest.filter((_, i) => i % 2 === 1)]);
   const enlargement = enlargementOf(trace, Math.max(right - left, top - bottom));
   const caption = `Finger, motion since touch enlarged ${enlargement} times; dashed: at touch`;
-  const figure = figureOf(caption, "The finger, seen from the side");
+  const figure = figureOf(caption, "Side view of the finger");
   function draw(row) {
     const made = begin(figure.canvas, figure.place);
     if (!made) return;
@@ -146,8 +147,8 @@ function wholeFinger(trace) {
 
 function tipAtGround(trace) {
   const figure = figureOf(
-    "Tip at the ground, with the forces on it",
-    "The tip and the ground, enlarged",
+    "Tip at the ground with forces",
+    "Enlarged view of the tip and the ground",
   );
   const [x, y, xP, fn, ft] = ["x_m", "y_m", "xP_m", "fn_N", "ft_N"].map(trace.column);
   const ground = -trace.head.H;
@@ -168,7 +169,7 @@ function tipAtGround(trace) {
     drawGround(context, width, level);
     const past = Array.from({ length: row + 1 }, (_, i) => [px(x[i]), py(y[i])]);
     drawPath(context, past, "weak", 1);
-    // The direction of the last element, not its length.
+    // Only the direction of the last element is to scale.
     const [nx, ny] = trace.nodes(row).slice(-4);
     const [dx, dy] = [nx - x[row], ny - y[row]];
     const far = width / (Math.hypot(dx, dy) || 1);
@@ -187,7 +188,7 @@ function tipAtGround(trace) {
   return { ...figure, draw };
 }
 
-/** The finger and a player, whose `moved` gets the row that is shown. */
+/** The finger with a player; calls `moved` with each shown row. */
 export function fingerOf(trace, moved) {
   const times = trace.column("t_s");
   const last = times.at(-1) || 1e-9;
@@ -244,12 +245,11 @@ export function fingerOf(trace, moved) {
     tip: tip.element,
     whole: whole.element,
     player: h("div.row.player", play, h("span.scrub", slider, output)),
-    /** Plays from touch on, unless the reader prefers little motion. */
+    /** Plays from touch, unless the reader prefers reduced motion. */
     begin() {
       set(0);
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) start();
     },
-    /** Stops at a row. */
     show(at) {
       pause();
       set(times[at]);

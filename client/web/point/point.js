@@ -1,4 +1,4 @@
-// A point: its time histories, the finger moving, all its numbers.
+// A point: time histories, moving finger, and all numbers.
 import { json, rows, rowsPath } from "../api.js";
 import { Chart } from "../lib/chart.js";
 import { button, command, h, saveFile, statusLine } from "../lib/dom.js";
@@ -24,7 +24,7 @@ const origin =
   );
 const hidden = "study study_id point model_id worker_id worker_name attempt reused_from".split(" ");
 
-/** The values of a list, which a row holds as JSON. */
+/** The values of a list, which a row contains as JSON. */
 function listOf(text) {
   try {
     return JSON.parse(text);
@@ -43,19 +43,19 @@ function textOf(value, { name, unit }) {
   return `${list.map(text).join(", ")} ${unit}`;
 }
 
-/** The point, its row if it has a result, and what is known of it. */
+/** Reads the point with its row, if it has a result. */
 async function readPoint(study, point, signal) {
   const select = study.columns.map((column) => column.name).join(",");
-  const [told, answer] = await Promise.all([
+  const [update, answer] = await Promise.all([
     json(`/api/studies/${study.id}/points/${point}`, signal),
     rows(study.id, { select, where: `point = ${point}` }, signal),
   ]);
   const values = answer.rows[0];
   const row = values && Object.fromEntries(answer.columns.map((name, i) => [name, values[i]]));
-  return { ...told, row };
+  return { ...update, row };
 }
 
-/** Main numbers in a row of figures, and why there are no others. */
+/** The main numbers, or why there are none. */
 function mainFacts({ row, fault, left_out: isLeftOut, ...point }, columns) {
   const source = row ?? point;
   const known = mainNumbers.filter((name) => source[name] !== undefined && source[name] !== null);
@@ -67,14 +67,14 @@ function mainFacts({ row, fault, left_out: isLeftOut, ...point }, columns) {
   let state = fault;
   if (!fault && isLeftOut && !row) state = "The study's filter leaves this point out.";
   else if (!fault && !row) state = "This point is not solved yet.";
-  else if (row?.error) state = `It failed: ${row.error}`;
+  else if (row?.error) state = `The point failed: ${row.error}`;
   return [
     h("dl.figures", ...known.map(figure)),
     state && h("p", { class: row?.error ? "bad" : "weak" }, state),
   ].filter(Boolean);
 }
 
-/** All numbers of a row, by kind, with their meaning as a tooltip. */
+/** All numbers of a row in groups; tooltips give their meaning. */
 function allNumbers(row, columns) {
   const list = (title, names) => {
     const entry = (column) =>
@@ -98,7 +98,7 @@ function allNumbers(row, columns) {
   ];
 }
 
-/** Charts of the time histories, the forces first. `moved` gets the row at a cursor. */
+/** Charts of the time histories, forces first. `moved` receives the row at the cursor. */
 function chartsOf(trace, moved) {
   const micro = (name) => trace.column(name).map((value) => value * 1e6);
   const change = (name) => {
@@ -155,7 +155,7 @@ function saveTrace(trace, name) {
   saveFile(`${name}.csv`, csv([head, ...Array.from({ length: trace.rows }, row)]));
 }
 
-/** Shows the time histories of a trace; returns what has to be closed. */
+/** Shows the time histories of a trace; returns the objects to close. */
 function showTrace(place, trace, name) {
   const charts = chartsOf(trace, (row) => finger.show(row));
   const finger = fingerOf(trace, (row) => charts.forEach((chart) => chart.pointAt(row)));
@@ -163,7 +163,7 @@ function showTrace(place, trace, name) {
   const shades = {
     compression: "compression",
     restitution: "restitution",
-    stick: "stick (bar at the foot)",
+    stick: "stick (bar at the bottom)",
   };
   const key = Object.entries(shades).map(([kind, text]) =>
     h("li", h("span", { class: `shade ink-${kind}` }), text),
@@ -171,7 +171,7 @@ function showTrace(place, trace, name) {
   const savePng = async () =>
     saveFile(`${name}.png`, await pngOf(charts.map((chart) => chart.figure())));
   const { rows: shownRows, head } = trace;
-  const thinned = shownRows < head.instants ? ` of ${count(head.instants)}, evenly chosen` : "";
+  const thinned = shownRows < head.instants ? ` of ${count(head.instants)}, evenly spaced` : "";
   place.replaceChildren(
     h("div.row", finger.player, h("ul.legend", ...key)),
     h("div.two", forces, finger.tip, others[0], finger.whole, others[1], others[2]),
@@ -204,7 +204,7 @@ export async function pointView(root, place, id, point) {
   const study = await json(`/api/studies/${id}`, signal);
   const back = h("a", { href: place.last(`/study/${id}`) }, study.name);
   place.trail([back, `point ${count(point)}`]);
-  let told = await readPoint(study, point, signal);
+  let update = await readPoint(study, point, signal);
   const { element: said, say } = statusLine();
   const [facts, numbers] = [h("div"), h("div")];
   const pictures = h("section", { "aria-label": "Time histories" }, said);
@@ -214,8 +214,8 @@ export async function pointView(root, place, id, point) {
   let isAsking = false;
 
   function show() {
-    facts.replaceChildren(...mainFacts(told, study.columns));
-    numbers.replaceChildren(...(told.row ? allNumbers(told.row, study.columns) : []));
+    facts.replaceChildren(...mainFacts(update, study.columns));
+    numbers.replaceChildren(...(update.row ? allNumbers(update.row, study.columns) : []));
   }
   show();
   root.replaceChildren(
@@ -234,18 +234,18 @@ export async function pointView(root, place, id, point) {
     .then((trace) => open.push(...showTrace(pictures, trace, `${study.name}-${point}`)))
     .catch((error) => signal.aborted || say(`No time histories: ${error.message}`, true));
   return {
-    /** Reads the point again when points of its study were completed, until it is solved. */
+    /** Until the point is solved, reads it again when points of its study are completed. */
     async take(now) {
       const listed = now.studies.find((one) => one.id === id);
       const completedNow = listed ? completed(listed) : -1;
-      if (told.row || isAsking || completedNow === done) return;
+      if (update.row || isAsking || completedNow === done) return;
       isAsking = true;
       try {
-        told = await readPoint(study, point, signal);
-        if (told.row) show();
+        update = await readPoint(study, point, signal);
+        if (update.row) show();
         done = completedNow;
       } catch {
-        // the next overview asks again
+        // the next overview tries again
       }
       isAsking = false;
     },

@@ -1,12 +1,12 @@
-// The time histories of a point's contact, column by column.
+// Time histories of a point's contact as columns.
 import { numbers, retryMs } from "../api.js";
 
-/** Whether the same request may be answered later: no worker, too many requests, no answer. */
+/** Whether the request may succeed later: no worker, too many requests, or no answer. */
 const isTemporary = (error) => error.isSilence || [409, 503].includes(error.status);
 
-/** Waits until a worker has solved the point again; `say` shows why it does not come. */
+/** Waits until a worker has solved the point again; `say` shows the reason for waiting. */
 export async function loadTrace(study, point, signal, say) {
-  say("Waiting for a worker to solve this point again.");
+  say("Waiting for a worker to solve the point again.");
   for (;;) {
     try {
       return parse(await numbers(`/api/studies/${study}/points/${point}/trace?shape=1`, signal));
@@ -19,7 +19,10 @@ export async function loadTrace(study, point, signal, say) {
   }
 }
 
-/** Columns in SI units, nodes (x and y by turns, the pin first) and state of each row, and spans of phases and stick [s]. */
+/**
+ * Columns in SI units, nodes (alternating x and y, from the pin) and state of each row, and spans
+ * of phases and stick [s].
+ */
 function parse({ head, bytes, begin }) {
   const { rows, row_numbers: width } = head;
   const all = new Float64Array(bytes, begin, rows * width);
@@ -52,7 +55,7 @@ function parse({ head, bytes, begin }) {
     column,
     nodes: (row) => all.subarray(row * width + nodes, row * width + nodes + 2 * head.nodes),
     state: (row) => head.states[states[row]],
-    // Bits of the codes: 1 is restitution, 2 is slip.
+    // Bit 1 of a code is restitution, bit 2 is slip.
     spans: [
       ...spansOf((code) => (code & 1 ? "restitution" : "compression")),
       ...spansOf((code) => (code & 2 ? "" : "stick")),
@@ -60,7 +63,7 @@ function parse({ head, bytes, begin }) {
   };
 }
 
-/** The last row whose time is at or before `t`. */
+/** The last row with a time of at most `t`. */
 export function rowAt(times, t) {
   let [low, high] = [0, times.length - 1];
   while (low < high) {

@@ -1,18 +1,18 @@
-// Conditions of the query language, made from parts of a picture.
+// Makes conditions of the query language from parts of a picture.
 import { columnOfAxis } from "./fields.js";
 
-/** The conjunction of conditions; empty ones are left out. */
+/** Joins conditions with AND; empty ones are left out. */
 export function joined(...conditions) {
   const given = conditions.filter(Boolean);
   if (given.length < 2) return given[0] ?? "";
   return given.map((one) => (/\bor\b/i.test(one) ? `(${one})` : one)).join(" AND ");
 }
 
-/** A range of a column; an end that is missing or "" is open. */
+/** A range of a column; a missing or "" end is open. */
 export const within = (column, from = "", to = "") =>
   joined(from === "" ? "" : `${column} >= ${from}`, to === "" ? "" : `${column} <= ${to}`);
 
-/** The number with the fewest digits between two. */
+/** The number with the fewest digits between two numbers. */
 function shortBetween(a, b) {
   const [least, most] = [Math.min(a, b), Math.max(a, b)];
   for (let digits = 1; digits < 17; ++digits) {
@@ -22,7 +22,10 @@ function shortBetween(a, b) {
   return (least + most) / 2;
 }
 
-/** An end of a part of a scale, rounded to a 500th of the part, or of itself at the foot of a logarithmic scale. */
+/**
+ * Rounds an end of a range to 1/500 of the range, or of itself near the lower end of a logarithmic
+ * scale.
+ */
 export function rounded(value, width) {
   if (!(width > 0)) return value;
   const wide = Math.min(width, Math.abs(value) * 2 || width);
@@ -30,7 +33,7 @@ export function rounded(value, width) {
   return Number((Math.round(value / step) * step).toPrecision(12));
 }
 
-/** The values of a side that lie in a range, rising; the one in its middle, if none does. */
+/** The values of a side within a range, ascending; if none, the one nearest to its middle. */
 function valuesIn({ values }, [from, to]) {
   const sorted = Array.from(values).sort((a, b) => a - b);
   const inside = sorted.filter((value) => value >= from && value <= to);
@@ -39,7 +42,7 @@ function valuesIn({ values }, [from, to]) {
   return [sorted.reduce((best, value) => (distance(value) < distance(best) ? value : best))];
 }
 
-/** A range of a side as the address has it: ends of bins, or numbers of values on the axis. */
+/** A range of a side in the form of the address: ends of bins, or indices of values on the axis. */
 export function addressOf(side, range) {
   const width = range[1] - range[0];
   if (side.edges) return range.map((end) => String(rounded(end, width)));
@@ -64,7 +67,7 @@ function partOf(side, range) {
   return within(column, shortBetween(before, sorted[first]), shortBetween(sorted[last], after));
 }
 
-/** All that a side shows, if that is a part of the axis. */
+/** The condition for the shown values of a side, if it shows only a part of the axis. */
 export function shownPart(side, isZoomed) {
   if (!isZoomed || !side.name) return "";
   return partOf(
@@ -73,7 +76,7 @@ export function shownPart(side, isZoomed) {
   );
 }
 
-/** What a picture holds fixed: the values of other axes, and its block. */
+/** The conditions that hold for the whole picture: values of other axes, and its block. */
 function heldPart(blocks, { head }) {
   const varied = (head.at ?? []).filter((one) => one.of > 1);
   const held = varied.map((one) => `${columnOfAxis(one.key)} = ${one.value}`);
@@ -82,7 +85,7 @@ function heldPart(blocks, { head }) {
   return joined(...held, isOfBlock ? `point >= ${first} AND point < ${first + points}` : "");
 }
 
-/** The lines of a picture, and a range of its output. */
+/** The condition for the shown lines and a range of their output. */
 function linesPart({ y, z, least, most }, range) {
   const isSome = y.name && !y.isWhole;
   const lines = isSome ? `${columnOfAxis(y.name)} IN (${Array.from(y.values).join(", ")})` : "";
@@ -90,7 +93,10 @@ function linesPart({ y, z, least, most }, range) {
   return joined(lines, range ? within(z.name, ...range.map((end) => rounded(end, width))) : "");
 }
 
-/** The points in a part of a picture: {x: [from, to], y: [from, to]}; y of lines is a range of the output, or null. */
+/**
+ * The condition for a part of a picture: {x: [from, to], y: [from, to]}. In a picture of lines, y
+ * is a range of the output or null.
+ */
 export function conditionOf(blocks, picture, { x, y }, isMap) {
   const upwards = isMap ? partOf(picture.y, y) : linesPart(picture, y);
   const all = joined(partOf(picture.x, x), upwards, heldPart(blocks, picture));

@@ -1,4 +1,5 @@
-// What a picture is of: pickers, sliders, scales. A choice is written into the address, and shown from there.
+// Pickers, sliders and scales of a picture. A choice is written into the address and read from
+// there.
 import { button, checkbox, h, labelled, picker, setChildren } from "../lib/dom.js";
 import { heading, shown, shownUnit, withUnit } from "../lib/format.js";
 import { axisValue, fillIn, varyingAxes } from "./fields.js";
@@ -11,7 +12,6 @@ export function controlsOf(view) {
   const pickers = h("div.controls");
   const sliders = h("div.sliders");
 
-  /** Shows the picture of another choice. */
   function choose(changes) {
     view.set(changes, true);
     fillIn(view.fields, study);
@@ -20,10 +20,10 @@ export function controlsOf(view) {
     view.load();
   }
 
-  /** Draws the same data in another way, or loads it again where it depends on the scale. */
+  /** Draws the same data with other settings; loads data again if it depends on the scale. */
   function redraw(changes) {
     view.set(changes);
-    if (view.is("pic") === "map") view.draw();
+    if (view.field("pic") === "map") view.draw();
     else view.load();
   }
 
@@ -33,14 +33,14 @@ export function controlsOf(view) {
       (kind) => kind !== "map" || mayMap,
     );
     const isOfGrid = (kind) => grids.length > 0 && ["map", "lines"].includes(kind);
-    return picker(kinds, view.is("pic"), (pic) => {
-      const keepsX = isOfGrid(pic) && isOfGrid(view.is("pic"));
-      const z = view.is("z") === "" ? {} : { z: view.is("z") };
+    return picker(kinds, view.field("pic"), (pic) => {
+      const keepsX = isOfGrid(pic) && isOfGrid(view.field("pic"));
+      const z = view.field("z") === "" ? {} : { z: view.field("z") };
       choose({ pic, ...zoomedOut, ...z, ...(keepsX ? {} : { x: "" }), y: "", from: "", to: "" });
     });
   }
 
-  /** Columns that a picture can show, with the one that it shows. */
+  /** Columns that a picture can show, including the present one. */
   function columnChoices(shownColumn, mayBeCategory) {
     const found = view.columns.filter(
       ([name]) => mayBeCategory || view.columnOf(name).picture === "numbers",
@@ -51,11 +51,11 @@ export function controlsOf(view) {
   }
 
   function outputPicker() {
-    const kind = view.is("pic");
-    const outputs = columnChoices(view.is("z"), kind === "map" || kind === "scatter");
+    const kind = view.field("pic");
+    const outputs = columnChoices(view.field("z"), kind === "map" || kind === "scatter");
     const none = kind === "scatter" ? [["", "none"]] : [];
-    const z = picker([...none, ...outputs], view.is("z"), (name) => {
-      view.fields.set("z", name); // "" is a choice too
+    const z = picker([...none, ...outputs], view.field("z"), (name) => {
+      view.fields.set("z", name); // "" is a valid choice
       choose({ ...(name ? { z: name } : {}), from: "", to: "" });
     });
     return labelled(kind === "scatter" ? "colour" : "output", z);
@@ -66,12 +66,15 @@ export function controlsOf(view) {
       ? varyingAxes(view.block).map((axis) => [axis.key, heading(axis.key, axis.unit)])
       : null;
     const axisPicker = (name, none = []) =>
-      picker([...none, ...(axes ?? columnChoices(view.is(name), false))], view.is(name), (key) =>
-        choose({
-          [name]: key,
-          ...(name === "x" && view.is("y") === key ? { y: "" } : {}),
-          ...zoomedOut,
-        }),
+      picker(
+        [...none, ...(axes ?? columnChoices(view.field(name), false))],
+        view.field(name),
+        (key) =>
+          choose({
+            [name]: key,
+            ...(name === "x" && view.field("y") === key ? { y: "" } : {}),
+            ...zoomedOut,
+          }),
       );
     const found = [labelled("x axis", axisPicker("x"))];
     if (view.hasMap) found.push(labelled("y axis", axisPicker("y")));
@@ -87,13 +90,13 @@ export function controlsOf(view) {
     });
     return labelled(
       "block",
-      picker(choices, view.is("block"), (block) => choose({ block, ...zoomedOut })),
+      picker(choices, view.field("block"), (block) => choose({ block, ...zoomedOut })),
     );
   }
 
   function scaleBoxes() {
-    const kind = view.is("pic");
-    const isOn = (name) => view.is(name) !== "";
+    const kind = view.field("pic");
+    const isOn = (name) => view.field(name) !== "";
     const box = (name, text) =>
       checkbox(text, isOn(name), (is) => redraw({ [name]: is ? "1" : "" }));
     return h(
@@ -105,21 +108,21 @@ export function controlsOf(view) {
   }
 
   function mousePicker() {
-    const drags = picker(["zoom", "select"], view.is("drag") || "zoom", (drag) => {
+    const drags = picker(["zoom", "select"], view.field("drag") || "zoom", (drag) => {
       view.set({ drag: drag === "select" ? drag : "" });
       view.map.dragSelects = drag === "select";
       view.draw();
     });
-    return labelled("mouse", drags, "Dragging over the picture; with Shift the other one");
+    return labelled("mouse", drags, "While dragging; with Shift the other action");
   }
 
-  const hasColourBar = () => view.hasMap && view.columnOf(view.is("z"))?.picture === "numbers";
+  const hasColourBar = () => view.hasMap && view.columnOf(view.field("z"))?.picture === "numbers";
 
-  /** The range of colours, in shown units. */
+  /** The range of colours in shown units. */
   function rangeFields() {
-    const [, factor] = shownUnit(view.is("z"), view.unitOf(view.is("z")));
+    const [, factor] = shownUnit(view.field("z"), view.unitOf(view.field("z")));
     const end = (name) => {
-      const value = view.is(name) === "" ? "" : shown(Number(view.is(name)) * factor);
+      const value = view.field(name) === "" ? "" : shown(Number(view.field(name)) * factor);
       const settings = { type: "text", inputMode: "decimal", value, placeholder: "auto", size: 7 };
       const field = h("input", settings);
       field.addEventListener("change", () => {
@@ -165,7 +168,7 @@ export function controlsOf(view) {
   }
 
   function show() {
-    const isHistogram = view.is("pic") === "histogram";
+    const isHistogram = view.field("pic") === "histogram";
     setChildren(
       pickers,
       labelled("picture", kindPicker()),
@@ -176,7 +179,7 @@ export function controlsOf(view) {
       ...(hasColourBar() ? rangeFields() : []),
       scaleBoxes(),
     );
-    const isShown = ({ key }) => key === view.is("x") || key === view.is("y");
+    const isShown = ({ key }) => key === view.field("x") || key === view.field("y");
     const held = view.block ? varyingAxes(view.block).filter((axis) => !isShown(axis)) : [];
     sliders.replaceChildren(...held.map(sliderOf));
   }

@@ -1,9 +1,9 @@
-// Pictures in words and as CSV.
+// Describes pictures in words and as CSV.
 import { count, counted, csv, withUnit } from "../lib/format.js";
 import { emptyTexts } from "./legend.js";
 import { mostDots } from "./picture.js";
 
-/** What a picture shows, and what it leaves out. */
+/** What a picture shows and leaves out. */
 export function factsOf(view) {
   const { picture } = view;
   const { head, x, y, dots } = picture;
@@ -11,7 +11,7 @@ export function factsOf(view) {
   if (dots) {
     const without = counted(head.without, "other point");
     const rest = head.without > 0 ? ` ${without} without these values.` : "";
-    return `${counted(head.points, "point")}, each drawn.${rest}`;
+    return `${counted(head.points, "point")}, drawn one by one.${rest}`;
   }
   if (picture.labels) {
     const cut = head.isCut
@@ -21,9 +21,9 @@ export function factsOf(view) {
   }
   const outside = head.outside > 0 ? `, ${count(head.outside)} outside` : "";
   const bins = `${counted(head.points, "point")} in ${counted(picture.values.length, "bin")}${outside}.`;
-  const isMode = view.columnOf(view.is("z"))?.picture === "categories" && view.hasMap;
-  const why = y.name ? ` More than ${count(mostDots)} points are gathered in bins.` : "";
-  return bins + why + (isMode ? ` ${view.is("z")} is shown of single points only.` : "");
+  const isMode = view.columnOf(view.field("z"))?.picture === "categories" && view.hasMap;
+  const why = y.name ? ` More than ${count(mostDots)} points are grouped in bins.` : "";
+  return bins + why + (isMode ? ` ${view.field("z")} is shown only for single points.` : "");
 }
 
 function sliceFacts({ picture: { head, x, y }, study }) {
@@ -49,7 +49,6 @@ function sliceFacts({ picture: { head, x, y }, study }) {
 const unitOfAxis = ({ blocks }, key) =>
   blocks.flatMap((block) => block.axes).find((axis) => axis.key === key)?.unit ?? "";
 
-/** What a cell shows. */
 export function sentenceOf({ x, y, z, head, dictionary, values, whyEmpty }, [column, row]) {
   const cell = row * x.values.length + column;
   const side = ({ name, unit, edges, values: all }, i) => {
@@ -66,7 +65,7 @@ export function sentenceOf({ x, y, z, head, dictionary, values, whyEmpty }, [col
   return `${place}: ${z.name} ${text}${points && !why ? `, ${points}` : ""}`;
 }
 
-/** The numbers of a picture as CSV in SI units, a cell or point a line. */
+/** The numbers of a picture as CSV in SI units, one line per cell or point. */
 export function csvOf({ x, y, z, dots, dictionary, labels, values, whyEmpty, point }) {
   const text = (code) => (z.isCategory ? (dictionary[code]?.text ?? "") : (code ?? ""));
   if (dots) {

@@ -1,4 +1,4 @@
-// The picture as files, the view as a link, and the commands that make both.
+// The picture as files, the view as a link, and equivalent commands.
 import { button, command, copyButton, h, saveFile, setChildren } from "../lib/dom.js";
 import { dbFlag, quoted } from "../lib/format.js";
 import { pngOf } from "../lib/png.js";
@@ -6,43 +6,43 @@ import { joined } from "./conditions.js";
 import { csvOf } from "./describe.js";
 import { spanOf } from "./legend.js";
 
-/** The flags of `oblique plot` that draw the picture of a view. */
+/** Flags of `oblique plot` for the picture of a view. */
 function plotFlags(view) {
-  const is = (name) => view.is(name);
+  const field = (name) => view.field(name);
   const { head } = view.picture;
-  const x = ["x", is("x")];
+  const x = ["x", field("x")];
   const main = {
-    map: [["map", is("z")], x, ["y", is("y")]],
-    lines: [["lines", is("z")], x, ["by", is("y")]],
+    map: [["map", field("z")], x, ["y", field("y")]],
+    lines: [["lines", field("z")], x, ["by", field("y")]],
     scatter: [
-      ["scatter", `${is("x")},${is("y")}`],
-      ["colour", view.picture.z.isCategory ? "" : is("z")], // oblique plot colours by numbers
+      ["scatter", `${field("x")},${field("y")}`],
+      ["colour", view.picture.z.isCategory ? "" : field("z")], // oblique plot colours only by numbers
     ],
-    histogram: [["histogram", is("x")]],
-  }[is("pic")];
-  const isHistogram = is("pic") === "histogram";
-  let range = isHistogram && is("x0") ? [is("x0"), is("x1")] : [];
-  if (!isHistogram && is("z") && view.hasSpan) range = spanOf(view, view.picture);
+    histogram: [["histogram", field("x")]],
+  }[field("pic")];
+  const isHistogram = field("pic") === "histogram";
+  let range = isHistogram && field("x0") ? [field("x0"), field("x1")] : [];
+  if (!isHistogram && field("z") && view.hasSpan) range = spanOf(view, view.picture);
   const held = view.block ? head.at.filter((one) => one.of > 1) : [];
   const isBlock = view.block && view.study.blocks.length > 1;
   return [
     ...main,
-    ["block", isBlock ? String(Number(is("block")) + 1) : ""],
+    ["block", isBlock ? String(Number(field("block")) + 1) : ""],
     ...held.map((one) => ["at", `${one.key}=${one.value}`]),
-    ["where", joined(is("where"), ...(isHistogram ? [] : view.shownParts()))],
+    ["where", joined(field("where"), ...(isHistogram ? [] : view.shownParts()))],
     ["range", range.join(":")],
   ].filter(([, value]) => value !== "");
 }
 
 function plotCommand(view) {
   const flags = plotFlags(view).map(([flag, value]) => `--${flag} ${quoted(value)}`);
-  const isHistogram = view.is("pic") === "histogram";
+  const isHistogram = view.field("pic") === "histogram";
   const logs = {
     xlog: "x",
     ...(!isHistogram && { ylog: "y" }),
     ...(view.hasMap && { zlog: "colour" }),
   };
-  const isOn = ([name]) => view.is(name);
+  const isOn = ([name]) => view.field(name);
   const given = Object.entries(logs)
     .filter(isOn)
     .map(([, axis]) => `--log-${axis}`);
@@ -52,7 +52,7 @@ function plotCommand(view) {
 
 function queryCommand(view) {
   const where = view.table.condition();
-  const order = view.is("order");
+  const order = view.field("order");
   const parts = [
     "oblique query",
     quoted(view.study.name),
@@ -71,12 +71,12 @@ export function showExports(view) {
     h(
       "div.row.files",
       button("PNG", () => savePng().catch((error) => view.complain(error)), {
-        title: "the picture as it is shown",
+        title: "the picture as shown",
       }),
       button("CSV", saveCsv, { title: "the numbers of the picture" }),
       copyButton("Copy link", () => location.href, { title: "the address of this view" }),
     ),
-    h("p", "The picture and the table on a command line:"),
+    h("p", "Commands for this picture and table:"),
     command("the picture", plotCommand(view)),
     command("the table", queryCommand(view)),
   );

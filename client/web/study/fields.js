@@ -1,7 +1,7 @@
-// What the address of a study says: of which picture, over which axes. What it leaves open, or what does not fit the study,
-// is filled in here.
+// Parameters in the address of a study: picture and axes. Missing and unsuitable ones get defaults
+// here.
 
-/** Axes of a grid that have values of their own. */
+/** The axes of a grid that have their own values. */
 export const ownAxes = (block) =>
   block.kind === "grid" ? block.axes.filter((axis) => !axis.expression && !axis.distribution) : [];
 
@@ -17,33 +17,32 @@ export function axisValue({ list, range }, i) {
   return spacing === "log" ? from * (to / from) ** share : from + share * (to - from);
 }
 
-/** The column of queries that holds the values of an axis. */
+/** The column in queries for the values of an axis. */
 export function columnOfAxis(key) {
   const link = /^length([1-9]\d*)$/.exec(key);
   return key === "E" ? "E_Pa" : link ? `lengths_m[${Number(link[1]) - 1}]` : key;
 }
 
-/** As many lines say more than a map of as many rows. */
+/** With more lines, a map is clearer. */
 const fewLines = 3;
 const gridPictures = ["map", "lines"];
 const pictures = [...gridPictures, "scatter", "histogram"];
 const mainOutput = "fn_peak_N";
 
-/** The number of the grid with most points; -1: the study has no grid. */
+/** Index of the grid with the most points; -1: the study has no grid. */
 function largestGrid(blocks) {
   const size = (i) => (varyingAxes(blocks[i]).length > 0 ? blocks[i].points : -1);
   const best = blocks.reduce((most, _, i) => (size(i) > size(most) ? i : most), 0);
   return blocks.length > 0 && size(best) > 0 ? best : -1;
 }
 
-/** The axes that a reader looks at first. */
 function usualAxes(keys) {
   const x = keys.includes("mu") ? "mu" : keys.at(-1);
   const others = keys.filter((key) => key !== x);
   return [x, others.includes("H") ? "H" : others[0]];
 }
 
-/** Columns of a study for pickers: [name, group], what varies first, then the main outputs. */
+/** Columns of a study for pickers: [name, group]; first those that vary, then the main outputs. */
 export function pickedColumns({ columns, usual_columns: usual, errors }) {
   const isDrawn = (name) => columns.some((one) => one.name === name && one.picture !== "none");
   const status = usual.indexOf("status");
@@ -61,7 +60,7 @@ export function pickedColumns({ columns, usual_columns: usual, errors }) {
   ];
 }
 
-/** Completes the fields of an address. */
+/** Adds defaults to the fields of an address. */
 export function fillIn(fields, study) {
   const is = (name) => fields.get(name) ?? "";
   const columnOf = (name) => study.columns.find((one) => one.name === name);

@@ -1,4 +1,4 @@
-// What colours mean: a bar with its range, or the list of categories; and what empty cells mean.
+// Legends: a colour bar with its range or a list of categories, and the kinds of empty cells.
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
 import { count, counted, heading, withUnit } from "../lib/format.js";
@@ -7,7 +7,7 @@ import { drawTicksBelow } from "./map.js";
 
 const barHeight = 44;
 
-/** What cells without a value are. */
+/** Kinds of cells without a value. */
 export const emptyTexts = {
   missing: "not solved",
   failed: "failed",
@@ -16,11 +16,11 @@ export const emptyTexts = {
   filtered: "filtered out",
 };
 
-/** What colours span: an end that the address does not say is that of the picture. */
+/** Range of the colours; ends that the address does not give come from the picture. */
 export function spanOf(view, { least, most }) {
   const end = (name) => {
-    const isNumber = view.is(name) !== "" && Number.isFinite(Number(view.is(name)));
-    return isNumber ? Number(view.is(name)) : null;
+    const isNumber = view.field(name) !== "" && Number.isFinite(Number(view.field(name)));
+    return isNumber ? Number(view.field(name)) : null;
   };
   const [from, to] = [end("from"), end("to")];
   // Values of slices and bins have single precision.
@@ -33,7 +33,7 @@ export function spanOf(view, { least, most }) {
   return first <= last ? [first, last] : [last, first];
 }
 
-/** Draws the bar on a canvas as wide as it is shown. */
+/** Draws the bar on a canvas of its displayed width. */
 function drawBar(canvas, z, { from, to, zLog }) {
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth;
@@ -61,7 +61,7 @@ function colourBar({ z }, look) {
   return h("div.bar", h("p", heading(z.name, z.unit)), canvas);
 }
 
-/** A small area of a pattern. */
+/** A sample of a pattern. */
 function swatch(pixel) {
   const canvas = h("canvas", { width: 26, height: 16, class: "swatch", "aria-hidden": "true" });
   const context = canvas.getContext("2d");
@@ -118,7 +118,7 @@ function emptyList({ head }) {
   );
 }
 
-/** The legend of a map or of points. */
+/** The legend of a map or of single points. */
 export function legendOf({ picture }, look) {
   const { z, least, dots } = picture;
   const isPlain = dots && !dots.z;

@@ -1,5 +1,5 @@
-// A map on a canvas: each pixel shows the cell that it lies in, so that axes may be uneven or logarithmic. Single points are
-// drawn one by one, and keys move over cells.
+// A map on a canvas. Each pixel shows its cell, so axes may be uneven or logarithmic. Single points
+// are drawn individually; keys move from cell to cell.
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
 import { heading, shownUnit } from "../lib/format.js";
@@ -10,7 +10,7 @@ const margin = { left: 64, right: 14, top: 10, bottom: 46 };
 const leastDrag = 6; // pixels
 const clickReach = 14;
 
-/** Where the cells of a side begin and end, rising: {order of the values, edges, scale}. */
+/** Ascending edges of the cells of a side: {order of the values, edges, scale}. */
 function cellsOf(side, wantsLog) {
   const order = [...side.values.keys()].sort((a, b) => side.values[a] - side.values[b]);
   const sorted = order.map((i) => side.values[i]);
@@ -28,13 +28,13 @@ function cellsOf(side, wantsLog) {
   return { order, edges, scale: scale(edges[0], edges.at(-1), isLog) };
 }
 
-/** The cell at a place from 0 to 1. */
+/** The cell at a position from 0 to 1. */
 function cellAt({ order, edges, scale: { place } }, at) {
   const next = edges.slice(1, -1).findIndex((edge) => place(edge) > at);
   return order[next < 0 ? order.length - 1 : next];
 }
 
-/** For each pixel the cell that it lies in. */
+/** The cell of each pixel. */
 function cellOfPixels({ order, edges, scale: { place } }, pixels) {
   const ends = edges.map(place);
   let k = 0;
@@ -44,13 +44,13 @@ function cellOfPixels({ order, edges, scale: { place } }, pixels) {
   });
 }
 
-/** Where a cell begins and ends, from 0 to 1. */
+/** Ends of a cell, from 0 to 1. */
 function reachOf({ order, edges, scale: { place } }, i) {
   const k = order.indexOf(i);
   return [place(edges[k]), place(edges[k + 1])];
 }
 
-/** Ticks and values below an area, as far as they fit. */
+/** Ticks and their values below an area, where they fit. */
 export function drawTicksBelow(context, area, of, { name, unit }, most) {
   const [, factor] = shownUnit(name, unit);
   context.font = "12px system-ui, sans-serif";
@@ -97,17 +97,17 @@ function drawAxes(context, area, { x, y }, cells) {
   context.restore();
 }
 
-/** The place of a value among 256 colours. */
+/** Index of a value among 256 colours. */
 function colourOf({ place }, value) {
   const at = place(value);
   return Number.isNaN(at) ? 0 : Math.min(Math.max(Math.round(at * 255), 0), 255);
 }
 
-/** A colour halfway to that of the page. */
+/** The middle between a colour and the background. */
 const pale = (pixel, dark) =>
   (((pixel >>> 1) & 0x7f7f7f) + (dark ? 0x0b0b0b : 0x7f7f7f)) | 0xff000000;
 
-/** The pixels of all cells; where some are selected, others are pale. */
+/** The pixels of all cells; unselected cells are pale if some are selected. */
 function cellImage(picture, look, cells, selected, width, height) {
   const image = new ImageData(width, height);
   const pixels = new Uint32Array(image.data.buffer);
@@ -116,7 +116,8 @@ function cellImage(picture, look, cells, selected, width, height) {
   const dark = colours.isDark();
   const nx = picture.x.values.length;
   const of = scale(look.from, look.to, look.zLog);
-  // Looked up once a cell, not once a pixel: a colour, a look, or -1 - the kind of an empty cell.
+  // Computed once per cell instead of once per pixel: a colour, a look, or -1 - the kind of an
+  // empty cell.
   const codes = Int32Array.from(picture.values, (value, i) => {
     const why = picture.whyEmpty(i);
     if (why) return -1 - emptyKinds.indexOf(why);
@@ -136,7 +137,7 @@ function cellImage(picture, look, cells, selected, width, height) {
   return image;
 }
 
-/** Draws single points; those that are selected lie above the others. */
+/** Draws single points, selected ones above the others. */
 function drawDots(context, area, picture, look, cells, selected) {
   const { dots, z } = picture;
   const number = dots.points.length;
@@ -188,7 +189,10 @@ const steps = {
   End: [1e9, 0],
 };
 
-/** Draws pictures over two axes. Handlers: hover(cell), choose(cell, point or null), open(), zoom(part), select(part). */
+/**
+ * Draws pictures over two axes. Handlers: hover(cell), choose(cell, point or null), open(),
+ * zoom(part), select(part).
+ */
 export class MapCanvas {
   picture = null;
   chosen = null; // the cell [column, row]
@@ -214,7 +218,7 @@ export class MapCanvas {
       onkeydown: (event) => this.#key(event),
     });
     const keys =
-      "Arrow keys move the cell, Enter opens its point, plus and minus zoom, 0 shows all, Escape selects nothing.";
+      "Arrow keys move the cell, Enter opens its point, plus and minus zoom, 0 shows all, Escape clears the selection.";
     this.element = h("div.map", this.base, this.top);
     this.element.append(h("p", { id: "map-keys", class: "unseen" }, keys));
     this.watch = new ResizeObserver(() => this.draw());
@@ -225,7 +229,10 @@ export class MapCanvas {
     this.watch.disconnect();
   }
 
-  /** `look`: from, to, zLog, xLog, yLog, categories (the look of each); `selected` as askSelected returns it. */
+  /**
+   * `look`: from, to, zLog, xLog, yLog, categories (their looks); `selected`: the result of
+   * askSelected.
+   */
   show(picture, look, selected) {
     Object.assign(this, { picture, look, selected });
     const z = picture.dots ? "points" : picture.z.name;
@@ -261,7 +268,6 @@ export class MapCanvas {
     this.#drawTop();
   }
 
-  /** Chooses a cell of the picture, or none. */
   choose(cell, point = null) {
     this.chosen = cell;
     this.chosenPoint = point;
@@ -270,7 +276,7 @@ export class MapCanvas {
 
   #frame([x, y, width, height], thick) {
     const context = this.top.getContext("2d");
-    // Small cells are framed with some room.
+    // Adds room to the frame of a small cell.
     const grow = Math.max(0, 5 - Math.min(width, height));
     const line = (colour, lineWidth) => {
       context.strokeStyle = colour;
@@ -289,7 +295,7 @@ export class MapCanvas {
     this.#frame([...corner, (x1 - x0) * area.w, (y1 - y0) * area.h], thick);
   }
 
-  /** Draws what changes while the pointer moves. */
+  /** Draws the parts that change while the pointer moves. */
   #drawTop() {
     if (!this.#area) return;
     const context = this.top.getContext("2d");
@@ -311,7 +317,7 @@ export class MapCanvas {
     this.#frame([Math.min(x, toX), Math.min(y, toY), Math.abs(toX - x), Math.abs(toY - y)], 1);
   }
 
-  /** A place of the pointer in the canvas. */
+  /** Position of the pointer in the canvas. */
   #at(event) {
     const box = this.top.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -325,7 +331,7 @@ export class MapCanvas {
     return [cellAt(this.cells.x, x), cellAt(this.cells.y, y)];
   }
 
-  /** The point next to a place; null: none is near. */
+  /** The point nearest to a position; null if none is near. */
   #dotAt([left, top]) {
     const { dots } = this.picture;
     let [best, least] = [null, clickReach];
@@ -352,7 +358,7 @@ export class MapCanvas {
 
   #press(event) {
     const at = this.#at(event);
-    // A finger scrolls the page unless it selects.
+    // Touch scrolls the page unless it selects.
     const mayDrag = event.pointerType === "mouse" || this.dragSelects;
     if (event.button !== 0 || !mayDrag || !this.#cellAt(at)) return;
     this.#drag = [...at, ...at];
@@ -380,7 +386,7 @@ export class MapCanvas {
     this.handlers.choose(cell, point);
   }
 
-  /** The values that a rectangle spans. */
+  /** The values within a rectangle. */
   #partOf([x, y, toX, toY]) {
     const area = this.#area;
     const inside = (share) => Math.min(Math.max(share, 0), 1);
@@ -395,7 +401,7 @@ export class MapCanvas {
     };
   }
 
-  /** The half of a side around a cell, in values. */
+  /** Half of a side's range around a cell, in values. */
   #around({ order, edges }, i) {
     const k = order.indexOf(i);
     const half = Math.max(Math.floor(order.length / 4), 1);

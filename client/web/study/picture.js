@@ -1,20 +1,21 @@
-// The data of a picture: slices, bins, single points and medians in one form, asked for as the address says.
+// Data of a picture: slices, bins, single points and medians in one form.
 import { numbers, rows } from "../api.js";
 import { endsOf, quantile, scale } from "../lib/scale.js";
 import { joined, within } from "./conditions.js";
 import { ownAxes } from "./fields.js";
 
 /**
- * A side has name, unit (SI), values, isWhole (no value between the ends is left out), and edges of bins or the numbers of
- * the values on their axis. A picture has x and y, z {name, unit, isCategory} with its ends least and most, values row by
- * row (of categories indices into the dictionary [{text, cells}]), the head of the server's answer, point(column, row),
- * whyEmpty(cell): "" or one of emptyKinds, and dots {points, x, y, z}: single points, or labels of lines.
+ * A side has name, unit (SI), values, isWhole (the values between the ends are complete), and edges
+ * of bins or indices of the values on their axis. A picture has sides x and y; z {name, unit,
+ * isCategory} and its range least to most; values by rows (for categories indices into the
+ * dictionary [{text, cells}]); the head of the server's answer; point(column, row); whyEmpty(cell):
+ * "" or one of emptyKinds; and dots {points, x, y, z} for single points, or labels for lines.
  */
 
 /** Kinds of cells without a value, by their bits. */
 export const emptyKinds = ["missing", "failed", "left_out", "none", "filtered"];
 
-/** Points that are drawn one by one; more are gathered in bins. */
+/** Maximum number of points drawn one by one; more are grouped in bins. */
 export const mostDots = 20_000;
 const mostCells = 256; // a side
 const firstCells = 96;
@@ -22,11 +23,10 @@ const mostLines = 8;
 const mostBins = 96;
 const mostForMedians = 100_000;
 
-/** Asks for numbers of a study behind a head. */
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
-/** The numbers of the values that the server shows of an axis. */
+/** Indices of the values of an axis that the server shows. */
 function numbersOf({ first, last }, shown) {
   const steps = Math.max(shown - 1, 1);
   const number = (i) => first + Math.floor((2 * i * (last - first) + steps) / (2 * steps));
@@ -71,7 +71,7 @@ async function slice(view, query, signal) {
   };
 }
 
-/** A side of bins of equal width, or one bin around the only value. */
+/** A side of equal bins, or one bin around a single value. */
 function binSide(name, unit, least, most, bins, isLog) {
   if (!(most > least)) {
     const half = Math.abs(least) * 0.05 || 0.5;
@@ -92,13 +92,13 @@ function binSide(name, unit, least, most, bins, isLog) {
 
 const noSide = { name: "", unit: "", values: new Float64Array(1), isWhole: true };
 
-/** In which bin of a side a value lies. */
+/** The bin of a value. */
 function binOf({ edges, values }, value, isLog) {
   const place = scale(edges[0], edges.at(-1), isLog).place(value);
   return Math.min(Math.max(Math.floor(place * values.length), 0), values.length - 1);
 }
 
-/** How many points lie in cells over one or two columns, or the mean of a third there. */
+/** Number of points by cell over one or two columns, or the mean of a third column. */
 async function bins(view, query, signal) {
   const { head, bytes, begin } = await ask(view.study.id, "bins", query, signal);
   const side = (of) =>
@@ -128,7 +128,7 @@ async function bins(view, query, signal) {
   };
 }
 
-/** The categories of values, the most frequent first, and the index of each value. */
+/** The categories, most frequent first, and the index of each value. */
 function categoriesOf(values) {
   const cells = new Map();
   for (const text of values) if (text !== null) cells.set(text, (cells.get(text) ?? 0) + 1);
@@ -139,10 +139,10 @@ function categoriesOf(values) {
   return { dictionary, codes: values.map((text) => places.get(text) ?? null) };
 }
 
-/** Single points; null: there are more than mostDots. */
+/** Single points; null if there are more than mostDots. */
 async function dots(view, signal) {
-  const [xName, yName, zName] = ["x", "y", "z"].map((name) => view.is(name));
-  const isLog = { x: view.is("xlog") !== "", y: view.is("ylog") !== "" };
+  const [xName, yName, zName] = ["x", "y", "z"].map((name) => view.field(name));
+  const isLog = { x: view.field("xlog") !== "", y: view.field("ylog") !== "" };
   const select = ["point", xName, yName, ...(zName ? [zName] : [])].join(",");
   const query = { select, where: shownWhere(view), limit: mostDots + 1 };
   const answer = await rows(view.study.id, query, signal);
@@ -160,7 +160,7 @@ async function dots(view, signal) {
   };
   const side = (name, column) => {
     const [least, most] = endsOf(all[name]);
-    const end = (which, usual) => Number(view.is(name + which) || (usual ?? 0));
+    const end = (which, usual) => Number(view.field(name + which) || (usual ?? 0));
     const [from, to] = [end("0", least), end("1", most)];
     return binSide(column, view.unitOf(column), from, to, 1, isLog[name]);
   };
@@ -181,13 +181,13 @@ async function dots(view, signal) {
   };
 }
 
-/** The median of an output, and the quartiles around it, in bins over a column. */
+/** Median and quartiles of an output in bins over a column. */
 async function medians(view, signal) {
-  const [x, z] = [view.is("x"), view.is("z")];
+  const [x, z] = [view.field("x"), view.field("z")];
   const where = joined(shownWhere(view), `${z} IS NOT NULL`);
   const query = { select: `${x},${z}`, where, order: "point", limit: mostForMedians };
   const answer = await rows(view.study.id, query, signal);
-  const isLog = view.is("xlog") !== "";
+  const isLog = view.field("xlog") !== "";
   const found = answer.rows.filter(([value]) => typeof value === "number" && (!isLog || value > 0));
   const [least, most] = endsOf(found.map(([value]) => value));
   const number = Math.min(Math.max(Math.round(Math.sqrt(found.length) / 2), 4), 40);
@@ -214,32 +214,34 @@ async function medians(view, signal) {
   };
 }
 
-/** The filter and the part that a picture of columns is zoomed into. */
+/** The filter and the zoomed part of a picture of columns. */
 function shownWhere(view) {
-  const part = (name) => within(view.is(name), view.is(`${name}0`), view.is(`${name}1`));
-  return joined(view.is("where"), part("x"), view.is("pic") === "scatter" ? part("y") : "");
+  const part = (name) => within(view.field(name), view.field(`${name}0`), view.field(`${name}1`));
+  return joined(view.field("where"), part("x"), view.field("pic") === "scatter" ? part("y") : "");
 }
 
 const given = (view, ...names) =>
-  Object.fromEntries(names.filter((name) => view.is(name)).map((name) => [name, view.is(name)]));
+  Object.fromEntries(
+    names.filter((name) => view.field(name)).map((name) => [name, view.field(name)]),
+  );
 
 function sliceQuery(view, cells) {
   const keys = ownAxes(view.block).map((axis) => axis.key);
-  const isHeld = ([key]) => keys.includes(key) && ![view.is("x"), view.is("y")].includes(key);
+  const isHeld = ([key]) => keys.includes(key) && ![view.field("x"), view.field("y")].includes(key);
   const at = [...view.places()].filter(isHeld).map(([key, number]) => `${key}@${number}`);
   return {
     ...given(view, "z", "x", "y", "block", "x0", "x1", "y0", "y1", "where"),
     ...(at.length > 0 ? { at: at.join(",") } : {}),
     nx: cells,
-    ny: view.is("pic") === "lines" ? mostLines : cells,
+    ny: view.field("pic") === "lines" ? mostLines : cells,
   };
 }
 
 function binsQuery(view) {
-  const isScatter = view.is("pic") === "scatter";
-  // A few points a bin.
+  const isScatter = view.field("pic") === "scatter";
+  // A few points per bin.
   const side = Math.round(Math.min(Math.max(Math.sqrt(view.study.points / 3), 6), mostBins));
-  const z = view.columnOf(view.is("z"))?.picture === "numbers" ? ["z"] : [];
+  const z = view.columnOf(view.field("z"))?.picture === "numbers" ? ["z"] : [];
   return {
     ...given(view, "x", "xlog", "x0", "x1", "where"),
     nx: isScatter ? side : Math.min(side * 2, 64),
@@ -254,26 +256,31 @@ async function scatter(view, signal) {
   return (gathered.head.points <= mostDots && (await dots(view, signal))) || gathered;
 }
 
-/** How many cells a side a picture has, one picture after the other: large maps come coarse first. */
+/**
+ * Numbers of cells per side, in the order of loading: large maps are first shown with fewer cells.
+ */
 export function stepsTo(view, isRefresh) {
-  if (view.is("pic") !== "map" || isRefresh) return [mostCells];
+  if (view.field("pic") !== "map" || isRefresh) return [mostCells];
   const sides = ownAxes(view.block).filter((axis) =>
-    [view.is("x"), view.is("y")].includes(axis.key),
+    [view.field("x"), view.field("y")].includes(axis.key),
   );
   const cells = sides.reduce((all, axis) => all * Math.min(axis.values, mostCells), 1);
   return cells > 4 * firstCells ** 2 ? [firstCells, mostCells] : [mostCells];
 }
 
-/** The picture that the address of a view says. */
+/** The picture described by the address of a view. */
 export function askPicture(view, cells, signal) {
-  if (view.is("pic") === "scatter") return scatter(view, signal);
-  if (view.is("pic") === "histogram") return bins(view, binsQuery(view), signal);
+  if (view.field("pic") === "scatter") return scatter(view, signal);
+  if (view.field("pic") === "histogram") return bins(view, binsQuery(view), signal);
   return view.block ? slice(view, sliceQuery(view, cells), signal) : medians(view, signal);
 }
 
-/** Which cells, bins or points of a picture have points that meet a condition too: {cells, counts, points}. */
+/**
+ * The cells, bins or points of a picture that have points under another condition: {cells, counts,
+ * points}.
+ */
 export async function askSelected(view, picture, condition, signal) {
-  const where = joined(view.is("where"), condition);
+  const where = joined(view.field("where"), condition);
   if (picture.labels) return { cells: new Uint8Array(picture.values.length) };
   if (picture.dots) {
     const query = {
@@ -294,7 +301,7 @@ export async function askSelected(view, picture, condition, signal) {
     return { cells: head.counts.map((number) => Math.min(number, 1)), counts: head.counts };
   }
   const side = Math.max(picture.x.values.length, picture.y.values.length);
-  const told = await slice(view, { ...sliceQuery(view, side), where }, signal);
-  const isOut = (cell) => ["missing", "left_out", "filtered"].includes(told.whyEmpty(cell));
+  const update = await slice(view, { ...sliceQuery(view, side), where }, signal);
+  const isOut = (cell) => ["missing", "left_out", "filtered"].includes(update.whyEmpty(cell));
   return { cells: Uint8Array.from(picture.values, (_, cell) => (isOut(cell) ? 0 : 1)) };
 }

@@ -1,30 +1,30 @@
-// Submits the part that a map shows as a study of its own, with more values along both axes.
+// Submits the part that a map shows as a new study with more values along both axes.
 import { post } from "../api.js";
 import { button, h, labelled } from "../lib/dom.js";
 import { count } from "../lib/format.js";
 
-/** Steps along an axis are halved, or divided further until there are this many. */
+/** Steps along an axis are halved, or divided further to get at least this number of values. */
 const leastSteps = 64;
 
 const integrators = ["explicit", "generalized-alpha"];
 
-/** The model as a recipe has it: its names end with their units. */
+/** The model of a recipe; its names end with their units. */
 function modelOf(model) {
   const nameOf = ({ key, unit }) =>
     unit ? `${key}_${unit.replace("/", "_").replaceAll("^", "")}` : key;
-  const own = model.filter(({ key }) => key !== "links" && key !== "length"); // lengths says both
+  const own = model.filter(({ key }) => key !== "links" && key !== "length"); // lengths gives both
   const values = Object.fromEntries(own.map((one) => [nameOf(one), one.value]));
   return { ...values, integrator: Math.max(integrators.indexOf(values.integrator), 0) };
 }
 
-/** An axis from the smallest to the largest value that is shown of it. */
+/** An axis from the smallest to the largest shown value. */
 function finerAxis(view, name, axis) {
   const { values } = view.picture[name];
   const { first, last } = view.picture.head[name];
   const [from, to] = [Math.min(...values), Math.max(...values)];
   const steps = last - first;
   if (steps === 0) return { key: axis.key, values: [from] };
-  const isLog = axis.range ? axis.range.spacing === "log" : view.is(`${name}log`) && from > 0;
+  const isLog = axis.range ? axis.range.spacing === "log" : view.field(`${name}log`) && from > 0;
   return {
     key: axis.key,
     from,
@@ -34,12 +34,12 @@ function finerAxis(view, name, axis) {
   };
 }
 
-/** The axes of the block that is shown; other axes are held where they are. */
+/** The axes of the shown block; other axes keep their selected values. */
 function finerAxes(view) {
   const held = new Map(view.picture.head.at.map((one) => [one.key, one.value]));
   return view.block.axes.map((axis) => {
     const { key, expression } = axis;
-    const name = ["x", "y"].find((one) => view.is(one) === key);
+    const name = ["x", "y"].find((one) => view.field(one) === key);
     if (name) return finerAxis(view, name, axis);
     return expression ? { key, expression } : { key, values: [held.get(key)] };
   });
@@ -51,11 +51,12 @@ function nextName(name) {
   return base === undefined ? `${name}-refined` : `${base}-refined-${Number(number) + 1}`;
 }
 
-/** A field for the name of the new study, and the button. */
+/** The button and a field for the name of the new study. */
 export function refineRow(view) {
   const settings = { type: "text", value: nextName(view.study.name), spellcheck: false };
   const name = h("input", { ...settings, autocomplete: "off" });
-  const title = "Submits the shown part with more values along both axes as a study, and shows it";
+  const title =
+    "Submits the shown part with more values along both axes as a new study and shows it";
   const submitButton = button("Refine", () => submit(), { class: "refine", title });
   const element = h("div.row", { hidden: true }, labelled("new study", name), submitButton);
 
@@ -67,7 +68,7 @@ export function refineRow(view) {
       const recipe = { errors: study.errors, model: modelOf(study.model), blocks: [axes] };
       const made = await post("/api/studies", { name: name.value.trim(), recipe });
       const kept = ["z", "x", "y", "xlog", "ylog", "zlog", "from", "to"]
-        .map((one) => [one, view.is(one)])
+        .map((one) => [one, view.field(one)])
         .filter(([, value]) => value !== "");
       view.place.go(`#/study/${made.id}?${new URLSearchParams([["pic", "map"], ...kept])}`);
     } catch (error) {
@@ -77,14 +78,14 @@ export function refineRow(view) {
   }
   return {
     element,
-    /** Offers the button for the picture that is shown. */
+    /** Shows the button if the picture can be refined. */
     offer() {
-      const isMap = view.is("pic") === "map" && view.picture.head.x?.stride;
+      const isMap = view.field("pic") === "map" && view.picture.head.x?.stride;
       element.hidden = !view.place.mayChange || !isMap;
       if (element.hidden) return;
       const axes = finerAxes(view);
       const size = ["x", "y"].map(
-        (side) => axes.find(({ key }) => key === view.is(side))?.count ?? 1,
+        (side) => axes.find(({ key }) => key === view.field(side))?.count ?? 1,
       );
       submitButton.textContent = `Refine to ${size.map(count).join(" × ")} points`;
     },

@@ -1,14 +1,16 @@
-// How far a study is, why points failed, and what its model is.
+// Progress of a study, reasons of failures, and its model.
 import { json, retryMs, rows } from "../api.js";
 import { h, setChildren } from "../lib/dom.js";
 import { count, counted, withUnit } from "../lib/format.js";
 import { completed, failedCondition, progressOf, studyButtons } from "../overview.js";
 import { axisValue, columnOfAxis } from "./fields.js";
 
-/** On fewer elements a link forces are off by more than a fifth of a per cent, and a tenth of the modes are others. */
+/**
+ * With fewer elements per link, forces are off by more than 0.2 %, and a tenth of the modes differ.
+ */
 const enoughElements = 8;
 
-/** The values of an axis in short; `ends` are those of drawn values. */
+/** The values of an axis in short; `ends` are those of sampled values. */
 function valuesOf(axis, ends) {
   const { key, unit, values, distribution, expression } = axis;
   if (expression) return `${key} = ${expression}`;
@@ -19,7 +21,7 @@ function valuesOf(axis, ends) {
   return `${key} ${listed[0]} to ${text(axisValue(axis, values - 1))} (${count(values)})`;
 }
 
-/** The smallest and largest values of drawn axes in results: {key: [least, most]}. */
+/** The range of sampled axes in the results: {key: [least, most]}. */
 async function drawnEnds({ id, blocks }, signal) {
   const keys = blocks[0]?.axes.filter((axis) => axis.distribution).map((axis) => axis.key) ?? [];
   if (keys.length === 0) return {};
@@ -28,7 +30,7 @@ async function drawnEnds({ id, blocks }, signal) {
   return Object.fromEntries(keys.map((key, i) => [key, row.slice(2 * i, 2 * i + 2)]));
 }
 
-/** Axes, mesh and model of a study, the keys of the model to be opened. */
+/** Axes and mesh of a study; opening it shows the keys of the model. */
 export function modelLine(study, signal) {
   const { blocks, model } = study;
   const meshAxis = blocks
@@ -53,7 +55,7 @@ export function modelLine(study, signal) {
   return h("details.model", line, h("ul", ...model.map((one) => h("li", textOf(one)))));
 }
 
-/** Why points failed, by the first of them, and a link to all. */
+/** The reason of the first failure, and a link to all failed points. */
 function failureLine(view) {
   const { id } = view.study;
   const element = h("p.failure", { hidden: true });
@@ -77,7 +79,7 @@ function failureLine(view) {
   };
 }
 
-/** State, progress and buttons of a study; `moved` is called when points were completed. */
+/** State, progress and buttons of a study; calls `moved` when points are completed. */
 export function statusRow(view, moved) {
   const { study, place } = view;
   const status = h("div.row.standing");
@@ -89,27 +91,29 @@ export function statusRow(view, moved) {
   let states = "";
   let askedAt = 0;
 
-  function show(told) {
-    const waitsFor = told.state === "running" && told.waits_for;
+  function show(update) {
+    const waitsFor = update.state === "running" && update.waits_for;
     const parts = [
-      told.state,
-      progressOf(told),
-      counted(told.points, "point"),
-      told.failed > 0 && h("span.bad", `${count(told.failed)} failed`),
-      told.left_out > 0 && h("span.weak", `${count(told.left_out)} filtered out`),
-      told.state === "running" && told.waits_for && h("span.weak", `waiting for ${told.waits_for}`),
+      update.state,
+      progressOf(update),
+      counted(update.points, "point"),
+      update.failed > 0 && h("span.bad", `${count(update.failed)} failed`),
+      update.left_out > 0 && h("span.weak", `${count(update.left_out)} left out by where`),
+      update.state === "running" &&
+        update.waits_for &&
+        h("span.weak", `waiting for ${update.waits_for}`),
     ];
     setChildren(status, ...parts.filter(Boolean).map((one) => h("span", one)));
     if (place.mayChange)
       setChildren(
         buttons,
-        studyButtons(told, (...said) => view.say(...said)),
+        studyButtons(update, (...said) => view.say(...said)),
       );
-    failure.show(told);
-    // Points may have come while the view was opened.
-    const hasMoved = done === null ? study.state === "running" : completed(told) !== done;
-    ({ state } = told);
-    done = completed(told);
+    failure.show(update);
+    // Points may have been completed while the view was loading.
+    const hasMoved = done === null ? study.state === "running" : completed(update) !== done;
+    ({ state } = update);
+    done = completed(update);
     if (hasMoved) moved();
   }
 
@@ -118,19 +122,19 @@ export function statusRow(view, moved) {
     const page = await json(`/api/studies?limit=1&after=${study.id - 1}`, place.signal).catch(
       () => null,
     );
-    const told = page?.studies[0];
-    if (told?.id === study.id) show(told);
+    const update = page?.studies[0];
+    if (update?.id === study.id) show(update);
   }
 
   ask();
   return {
     element,
-    /** Takes an overview, which may not list the study. */
+    /** Receives an overview, which may not contain the study. */
     take(now) {
-      const told = now.studies.find((one) => one.id === study.id);
+      const update = now.studies.find((one) => one.id === study.id);
       const byState = JSON.stringify(now.studies_by_state);
       const isLive = ["running", "paused"].includes(state);
-      if (told) show(told);
+      if (update) show(update);
       else if (byState !== states || (isLive && performance.now() - askedAt > retryMs)) ask();
       states = byState;
     },

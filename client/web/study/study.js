@@ -1,4 +1,4 @@
-// A study: its picture, its points, and what they have in common: the address, a filter, a selection, a chosen point.
+// A study: picture, points, filter, selection and chosen point.
 import { json, retryMs } from "../api.js";
 import { CategoryLooks } from "../lib/colours.js";
 import { Chart } from "../lib/chart.js";
@@ -18,7 +18,7 @@ import { PointTable } from "./table.js";
 
 const refreshEveryMs = 1500;
 
-/** Looks of the categories of a study's columns: they stay while the page is open. */
+/** Looks of the categories of a study's columns, kept while the page is open. */
 const looksOfColumns = new Map();
 
 function looksOf(study, column) {
@@ -33,7 +33,7 @@ export async function studyView(root, place, id) {
   return new StudyView(root, place, study);
 }
 
-/** Fields for the filter and the selection, with what the server finds wrong with them. */
+/** Fields for filter and selection, with the server's errors. */
 function conditionFields(view) {
   const field = (name, text, placeholder, help) => {
     const said = h("p", { role: "status", class: "bad said", id: `said-${name}` });
@@ -47,18 +47,19 @@ function conditionFields(view) {
     "where",
     "Filter",
     "mu > 0.5 AND fn_peak_N > 20",
-    `${language}: others are not shown`,
+    `${language}: other points are not shown`,
   );
   const mark = field(
     "mark",
     "Select",
-    "drag with Shift, or a condition",
-    `${language}: these are marked`,
+    "drag with Shift, or enter a condition",
+    `${language}: these points are marked`,
   );
-  const keep = () => view.change({ where: joined(view.is("where"), view.is("mark")), mark: "" });
+  const keep = () =>
+    view.change({ where: joined(view.field("where"), view.field("mark")), mark: "" });
   const buttons = h(
     "span.buttons",
-    button("Filter to selection", keep),
+    button("Use selection as filter", keep),
     button("Clear", () => view.change({ mark: "" })),
   );
   const fields = { where, mark };
@@ -68,10 +69,9 @@ function conditionFields(view) {
       h("div", where.label, where.said),
       h("div.marks", h("div.row", mark.label, buttons), mark.said),
     ),
-    /** Shows the conditions of the address. */
     show() {
-      for (const [name, { input }] of Object.entries(fields)) input.value = view.is(name);
-      buttons.hidden = !view.is("mark");
+      for (const [name, { input }] of Object.entries(fields)) input.value = view.field(name);
+      buttons.hidden = !view.field("mark");
       this.say("where", "");
       this.say("mark", "");
     },
@@ -82,11 +82,11 @@ function conditionFields(view) {
   };
 }
 
-/** Lines or bars of a picture, in shown units. */
+/** The contents of a chart of lines or bars, in shown units. */
 function linesOf(view, picture) {
   const { x, y, z, head, labels } = picture;
-  const isBars = view.is("pic") === "histogram";
-  const isLog = view.is("ylog") !== "" && !isBars;
+  const isBars = view.field("pic") === "histogram";
+  const isLog = view.field("ylog") !== "" && !isBars;
   const [[xUnit, xFactor], [zUnit, zFactor]] = [x, z].map((one) => shownUnit(one.name, one.unit));
   const order = orderOf(x);
   const valuesOf = (row) =>
@@ -126,7 +126,7 @@ function linesOf(view, picture) {
       unit: xUnit,
       values,
       ends,
-      isLog: view.is("xlog") !== "" && values[0] > 0,
+      isLog: view.field("xlog") !== "" && values[0] > 0,
     },
     y: {
       label: isBars ? "points" : heading(z.name, z.unit),
@@ -136,7 +136,7 @@ function linesOf(view, picture) {
     },
     series,
     isBars,
-    dragSelects: view.is("drag") === "select",
+    dragSelects: view.field("drag") === "select",
     height: 380,
     zoom: (part) => view.zoom(inUnits(part)),
     select: (part) => view.selectPart(inUnits(part)),
@@ -147,7 +147,7 @@ const orderOf = ({ values }) => [...values.keys()].sort((a, b) => values[a] - va
 
 export class StudyView {
   picture = null;
-  /** Which cells or points of the picture are selected, as askSelected returns it. */
+  /** The selected cells or points of the picture, as from askSelected. */
   selected = null;
   #asked = null;
   #askedSelected = null;
@@ -169,7 +169,7 @@ export class StudyView {
     this.map = new MapCanvas({
       hover: (cell) => this.#speak(cell ?? this.map.chosen),
       choose: (cell, point) => this.choose(point ?? this.picture.point(...cell), cell),
-      open: () => this.is("cell") && place.go(this.pointAddress(this.is("cell"))),
+      open: () => this.field("cell") && place.go(this.pointAddress(this.field("cell"))),
       zoom: (part) => this.zoom(part),
       select: (part) => this.selectPart(part),
     });
@@ -201,16 +201,15 @@ export class StudyView {
       h("section", h("h2", "Export"), this.exports),
     );
     this.#showAddress();
-    // After picture and table, as queries are answered in their order.
+    // Requested after picture and table, because the server answers in order.
     this.status.element.after(modelLine(study, place.signal));
   }
 
-  /** A field of the address. */
-  is(name) {
+  field(name) {
     return this.fields.get(name) ?? "";
   }
 
-  /** Changes fields of the address; a step is undone by the browser's Back. */
+  /** Changes fields of the address. The browser's Back undoes a step. */
   set(changes, isStep = false) {
     for (const [name, value] of Object.entries(changes)) {
       if (value === "") this.fields.delete(name);
@@ -219,23 +218,23 @@ export class StudyView {
     this.place.keep(this.fields, isStep);
   }
 
-  /** The block of a grid that the picture is of; undefined: it is of columns. */
+  /** The block of the grid in the picture; undefined: the picture is of columns. */
   get block() {
-    const isOfGrid = ["map", "lines"].includes(this.is("pic")) && this.is("block") !== "";
-    return isOfGrid ? this.study.blocks[Number(this.is("block"))] : undefined;
+    const isOfGrid = ["map", "lines"].includes(this.field("pic")) && this.field("block") !== "";
+    return isOfGrid ? this.study.blocks[Number(this.field("block"))] : undefined;
   }
   get hasMap() {
-    return ["map", "scatter"].includes(this.is("pic"));
+    return ["map", "scatter"].includes(this.field("pic"));
   }
-  /** Whether the address says what colours span, or the axis of lines. */
+  /** Whether the address gives the range of the colours or of the axis of lines. */
   get hasSpan() {
     return ["from", "to"].some(
-      (end) => this.is(end) !== "" && Number.isFinite(Number(this.is(end))),
+      (end) => this.field(end) !== "" && Number.isFinite(Number(this.field(end))),
     );
   }
-  /** Numbers of the values at which other axes are held. */
+  /** Indices of the values of fixed axes. */
   places() {
-    const held = this.is("at")
+    const held = this.field("at")
       .split(",")
       .filter((one) => one.includes("@"));
     return new Map(held.map((one) => one.split("@")).map(([key, number]) => [key, Number(number)]));
@@ -250,13 +249,13 @@ export class StudyView {
   pointAddress(point) {
     return `#/study/${this.study.id}/point/${point}`;
   }
-  /** The part that the picture is zoomed into, as conditions on x and y. */
+  /** The zoomed part of the picture as conditions on x and y. */
   shownParts() {
     if (!this.picture) return [];
-    return ["x", "y"].map((name) => shownPart(this.picture[name], this.is(`${name}0`) !== ""));
+    return ["x", "y"].map((name) => shownPart(this.picture[name], this.field(`${name}0`) !== ""));
   }
 
-  /** Another address of the same study. */
+  /** Shows another address of the same study. */
   goTo(fields) {
     this.fields = fields;
     fillIn(this.fields, this.study);
@@ -264,7 +263,7 @@ export class StudyView {
     this.#showAddress();
   }
   #showAddress() {
-    this.map.dragSelects = this.is("drag") === "select";
+    this.map.dragSelects = this.field("drag") === "select";
     this.conditions.show();
     this.controls.show();
     this.load();
@@ -288,20 +287,20 @@ export class StudyView {
     this.#chart?.close();
   }
 
-  /** Shows an error: beside the condition that the server refuses, if it is one. */
+  /** Shows an error; the server's error about a condition is shown beside it. */
   complain(error, condition = "") {
     if (error.isSilence) {
       if (!this.#isStale) setTimeout(() => this.reconnected(), retryMs);
       this.#isStale = true;
-      this.say("The server does not answer: the last answer is shown.", true);
-    } else if (error.status === 400 && condition && this.is(condition)) {
+      this.say("The server does not answer. The last answer is shown.", true);
+    } else if (error.status === 400 && condition && this.field(condition)) {
       this.conditions.say(condition, error.message);
     } else {
       this.say(error.message, true);
     }
   }
 
-  /** New results have come: picture and table are loaded again, one refresh after the other. */
+  /** Loads picture and table again after new results; one refresh at a time. */
   async #refresh() {
     this.#isOld = true;
     if (this.#isRefreshing) return;
@@ -317,7 +316,10 @@ export class StudyView {
     this.#isRefreshing = false;
   }
 
-  /** Loads the picture. What is under way is given up, or waited for, so that a slider that moves shows pictures. */
+  /**
+   * Loads the picture. A running request is cancelled or awaited, so that pictures appear while a
+   * slider moves.
+   */
   async load({ waits = false, isRefresh = false } = {}) {
     if (this.#asked && waits) {
       this.#wantsMore = true;
@@ -354,10 +356,9 @@ export class StudyView {
     this.draw();
     this.#showChoice();
     this.refine.offer();
-    this.table.load(); // if the part that is shown is another
+    this.table.load(); // if another part is shown
   }
 
-  /** Draws the picture with the colours and scales of the address. */
   draw() {
     const { picture } = this;
     if (!picture) return;
@@ -370,7 +371,8 @@ export class StudyView {
       this.#drawLines();
     }
     setChildren(this.legend, ...(this.hasMap ? legendOf(this, this.#look()) : []));
-    const isPart = this.is("x0") || this.is("y0") || (this.is("pic") === "lines" && this.hasSpan);
+    const isPart =
+      this.field("x0") || this.field("y0") || (this.field("pic") === "lines" && this.hasSpan);
     const showAll = isPart && button("Show all", () => this.zoom(null));
     setChildren(this.facts, factsOf(this), showAll && " Zoomed. ", showAll);
     showExports(this);
@@ -381,9 +383,9 @@ export class StudyView {
     return {
       from,
       to,
-      zLog: this.is("zlog") !== "" && from > 0,
-      xLog: this.is("xlog") !== "",
-      yLog: this.is("ylog") !== "",
+      zLog: this.field("zlog") !== "" && from > 0,
+      xLog: this.field("xlog") !== "",
+      yLog: this.field("ylog") !== "",
       categories: this.picture.dictionary.map(({ text }) => looks.of(text)),
     };
   }
@@ -397,14 +399,12 @@ export class StudyView {
       if (hadFocus) this.#chart.place.focus({ preventScroll: true });
     }
   }
-  /** The picture as pngOf draws it. */
   figure() {
     const title = this.study.name;
     if (this.hasMap) return { title, canvas: this.map.base, legend: this.legend };
     return { ...this.#chart.figure(), title: `${title}: ${this.#chart.lines.title}` };
   }
 
-  /** Changes the filter or the selection. */
   change(conditions) {
     this.set({ ...conditions, page: "" }, true);
     this.say("");
@@ -415,7 +415,7 @@ export class StudyView {
   }
   /** Selects the points that meet a condition; null: none. */
   select(condition) {
-    if ((condition ?? "") !== this.is("mark")) this.change({ mark: condition ?? "" });
+    if ((condition ?? "") !== this.field("mark")) this.change({ mark: condition ?? "" });
   }
   /** Selects the points in a part of the picture; null: none. */
   selectPart(part) {
@@ -425,7 +425,7 @@ export class StudyView {
   async #loadSelected() {
     this.#askedSelected?.abort();
     const { picture } = this;
-    const condition = this.is("mark");
+    const condition = this.field("mark");
     if (!picture || (!condition && !this.selected)) return;
     const { signal } = (this.#askedSelected = new AbortController());
     try {
@@ -440,16 +440,16 @@ export class StudyView {
     }
   }
 
-  /** Shows a part of the picture; null: all of it. */
+  /** Zooms to a part of the picture; null: shows all. */
   zoom(part) {
     const { picture } = this;
     if (!picture) return;
     const zoomed = { x0: "", x1: "", y0: "", y1: "", page: "" };
-    const isLines = this.is("pic") === "lines";
+    const isLines = this.field("pic") === "lines";
     if (!part && isLines) Object.assign(zoomed, { from: "", to: "" });
     if (part) {
       [zoomed.x0, zoomed.x1] = addressOf(picture.x, part.x);
-      if (!this.hasMap && zoomed.x0 === zoomed.x1) return; // one value is no line
+      if (!this.hasMap && zoomed.x0 === zoomed.x1) return; // a single value is no line
       if (this.hasMap) [zoomed.y0, zoomed.y1] = addressOf(picture.y, part.y);
       const width = part.y ? part.y[1] - part.y[0] : 0;
       if (isLines && part.y)
@@ -465,7 +465,7 @@ export class StudyView {
       cell && this.picture && !this.picture.dots && cell[0] < this.picture.x.values.length;
     this.reading.textContent = isThere ? sentenceOf(this.picture, cell) : "";
   }
-  /** Chooses a point: it is marked in picture and table, and can be opened. */
+  /** Chooses a point: marks it in picture and table and offers to open it. */
   choose(point, cell = this.#cellOf(point)) {
     this.map.choose(cell, this.picture?.dots ? point : null);
     this.#speak(cell);
@@ -475,10 +475,10 @@ export class StudyView {
     setChildren(this.choice, point !== null && link(`Open point ${count(point)}`));
   }
   #showChoice() {
-    if (this.is("cell")) this.choose(Number(this.is("cell")));
+    if (this.field("cell")) this.choose(Number(this.field("cell")));
     else if (!this.map.chosen || this.picture.x.edges) this.choose(null, null);
   }
-  /** The cell of a point in the picture; null: it has none. */
+  /** The cell of a point in the picture; null: none. */
   #cellOf(point) {
     const { picture } = this;
     if (!picture || point === null) return null;

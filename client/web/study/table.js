@@ -1,5 +1,4 @@
-// Points of a study: those that meet the filter and the selection and lie in the part that the picture shows, a page at a
-// time.
+// The points of a study that meet the filter and the selection and lie in the shown part, in pages.
 import { rows, rowsPath } from "../api.js";
 import { button, h, setChildren } from "../lib/dom.js";
 import { count, heading, shown, shownUnit } from "../lib/format.js";
@@ -35,15 +34,15 @@ export class PointTable {
     });
   }
 
-  /** The columns of the table: what varies, what the picture shows, the main outputs. */
+  /** Columns of the table: those that vary, those of the picture, the main outputs. */
   columns() {
     const { view } = this;
     const usual = view.study.usual_columns;
     const status = usual.indexOf("status");
     const shownNames = ["x", "y", "z"]
-      .map((name) => view.is(name))
+      .map((name) => view.field(name))
       .filter((name) => view.columnOf(name));
-    const asksForErrors = /\b(error|status)\b/.test(`${view.is("where")} ${view.is("mark")}`);
+    const asksForErrors = /\b(error|status)\b/.test(`${view.field("where")} ${view.field("mark")}`);
     const state = asksForErrors ? ["status", "error"] : [];
     return [
       ...new Set([...usual.slice(0, status), ...state, ...shownNames, ...usual.slice(status + 1)]),
@@ -51,17 +50,17 @@ export class PointTable {
   }
 
   condition() {
-    return joined(this.view.is("where"), this.view.is("mark"), ...this.view.shownParts());
+    return joined(this.view.field("where"), this.view.field("mark"), ...this.view.shownParts());
   }
 
-  /** Loads the page of the address, if the query is another one or results have come. */
+  /** Loads the page of the address if the query or the results have changed. */
   async load(isRefresh = false) {
     const { view } = this;
-    const page = Math.min(Math.max(Math.floor(Number(view.is("page"))) || 1, 1), mostPages);
+    const page = Math.min(Math.max(Math.floor(Number(view.field("page"))) || 1, 1), mostPages);
     const first = (page - 1) * pageSize;
     const query = {
       where: this.condition(),
-      order: view.is("order") || "point",
+      order: view.field("order") || "point",
       select: this.columns().join(","),
     };
     const text = JSON.stringify([page, query]);
@@ -82,7 +81,6 @@ export class PointTable {
     }
   }
 
-  /** Marks the row of a point; null: none. */
   choose(point) {
     this.#chosen = point;
     for (const row of this.table.querySelectorAll("tr[data-point]")) {
@@ -98,8 +96,9 @@ export class PointTable {
     this.#query = "";
     if (!error.isSilence) this.table.replaceChildren();
     this.said.textContent = "";
-    // A wrong condition is shown beside its field.
-    const isOfCondition = error.status === 400 && (this.view.is("where") || this.view.is("mark"));
+    // An error in a condition is shown beside its field.
+    const isOfCondition =
+      error.status === 400 && (this.view.field("where") || this.view.field("mark"));
     if (!isOfCondition) this.view.complain(error);
   }
 
@@ -107,7 +106,7 @@ export class PointTable {
     const page = found.slice(first, first + pageSize);
     const isNumber = (i) => page.some((row) => typeof row[i] === "number");
     const kind = (i) => (isNumber(i) ? "number" : "");
-    const order = this.view.is("order");
+    const order = this.view.field("order");
     const head = columns.map((name, i) => {
       const isDown = order === `${name} DESC`;
       const sorted = order === name ? "ascending" : isDown ? "descending" : "none";
@@ -134,20 +133,20 @@ export class PointTable {
     const last = Math.min(first + pageSize, total);
     const range =
       total > 0 ? `${count(first + 1)} to ${count(last)} of ${count(total)} rows.` : "No rows.";
-    const cut = total > mostInFile ? ` The CSV has the first ${count(mostInFile)}.` : "";
+    const cut = total > mostInFile ? ` The CSV contains the first ${count(mostInFile)}.` : "";
     this.said.textContent = range + cut;
   }
 
   #turn(by) {
-    const page = (Number(this.view.is("page")) || 1) + by;
+    const page = (Number(this.view.field("page")) || 1) + by;
     this.view.set({ page: page > 1 ? String(page) : "" });
     this.load();
   }
-  /** Sorts by a column, then the other way round, then by point again. */
+  /** Sorts by a column: ascending, descending, then by point again. */
   #sort(name) {
-    const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.is("order")] ?? name;
+    const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });
     this.load();
-    this.view.draw(); // its commands name the order
+    this.view.draw(); // the commands contain the order
   }
 }

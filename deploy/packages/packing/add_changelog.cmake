@@ -1,13 +1,13 @@
-# Debian's packages say what changed, in Debian's form: made of deploy/CHANGELOG.md.
+# Converts deploy/CHANGELOG.md to Debian's changelog format.
 find_program(GZIP gzip REQUIRED)
 
-# as_debian_has_it(VARIABLE DATE): "2026-11-22" as "Sun, 22 Nov 2026 00:00:00 +0000".
-function(as_debian_has_it variable date)
+# debian_date(VARIABLE DATE): "2026-11-22" as "Sun, 22 Nov 2026 00:00:00 +0000".
+function(debian_date variable date)
   string(REGEX MATCH "^([0-9]+)-0?([0-9]+)-0?([0-9]+)$" whole "${date}")
   set(year ${CMAKE_MATCH_1})
   set(month ${CMAKE_MATCH_2})
   set(day ${CMAKE_MATCH_3})
-  # Sakamoto's: the year begins in March.
+  # Sakamoto's method: the year begins in March.
   set(shifts 0 3 2 5 0 3 5 1 4 6 2 4)
   set(days Sun Mon Tue Wed Thu Fri Sat)
   set(months Jan Feb Mar Apr May Jun Jul Aug Sep Oct Nov Dec)
@@ -26,10 +26,10 @@ function(as_debian_has_it variable date)
   set(${variable} "${day_name}, ${day} ${month_name} ${year} 00:00:00 +0000" PARENT_SCOPE)
 endfunction()
 
-# debian_changelog(VARIABLE PACKAGE): all versions that are numbered, the newest first, as CHANGELOG.md has them.
+# debian_changelog(VARIABLE PACKAGE): all numbered versions of CHANGELOG.md, newest first.
 function(debian_changelog variable package)
   file(READ "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../CHANGELOG.md" text)
-  # A list of CMake is parted by semicolons, and brackets keep them from it.
+  # CMake splits lists at semicolons outside brackets.
   string(ASCII 31 semicolon)
   string(REPLACE ";" "${semicolon}" text "${text}")
   string(REGEX REPLACE "\n## \\[([0-9][^]]*)\\] - ([0-9-]+)" "\n## \\1 \\2" text "${text}")
@@ -42,7 +42,7 @@ function(debian_changelog variable package)
   foreach(line IN LISTS lines)
     if(line MATCHES "^## ([0-9][^ ]*) ([0-9-]+)$")
       set(version ${CMAKE_MATCH_1})
-      as_debian_has_it(date ${CMAKE_MATCH_2})
+      debian_date(date ${CMAKE_MATCH_2})
       string(APPEND changelog "${trailer}${package} (${version}) stable; urgency=medium\n\n")
       set(gap "")
       set(trailer "\n -- ${CPACK_PACKAGE_CONTACT}  ${date}\n\n")
@@ -57,7 +57,7 @@ function(debian_changelog variable package)
     elseif(open AND line MATCHES "^  (.*)$")
       string(APPEND changelog "    ${CMAKE_MATCH_1}\n")
     elseif(open AND NOT line STREQUAL "")
-      # Sentences before the first list: an entry of their own.
+      # Sentences before the first list become an entry.
       if(before_was_text)
         string(APPEND changelog "    ${line}\n")
       else()

@@ -1,5 +1,5 @@
-# Run by cpack when all is installed into a package's tree and before it is packed: adds what only this
-# kind of package has.
+# Run by cpack after installing into a package's tree and before packing: adds files for this kind
+# of package.
 include(${CMAKE_CURRENT_LIST_DIR}/../../../proto/program/manual/compress_pages.cmake)
 if(CPACK_GENERATOR STREQUAL "DEB")
   include(${CMAKE_CURRENT_LIST_DIR}/add_changelog.cmake)

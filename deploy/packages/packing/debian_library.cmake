@@ -1,14 +1,15 @@
-# Debian has libraries of several architectures beside each other: what others build with says where. Also what
-# dpkg-shlibdeps says of the library, for cpack would call ldconfig where it asks, which dpkg's trigger does.
+# Moves the library to the folder of its architecture, as Debian's Multi-Arch requires, and updates
+# the development files. Also writes the information for dpkg-shlibdeps and the trigger of ldconfig;
+# cpack's own would call ldconfig.
 set(lib usr/${CPACK_OBLIQUE_LIBDIR})
 set(multiarch usr/lib/${CPACK_OBLIQUE_MULTIARCH})
 
-# change(FILE WHAT INTO): every WHAT of it, which must be there.
+# change(FILE WHAT INTO): replaces every WHAT, which must exist.
 function(change file what into)
   file(READ "${file}" text)
   string(FIND "${text}" "${what}" at)
   if(at EQUAL -1)
-    message(FATAL_ERROR "${file} does not have \"${what}\", to be another for Debian")
+    message(FATAL_ERROR "${file} does not contain \"${what}\", which must be changed for Debian")
   endif()
   string(REPLACE "${what}" "${into}" text "${text}")
   file(WRITE "${file}" "${text}")
@@ -25,7 +26,7 @@ if(NOT lib STREQUAL multiarch)
   endforeach()
   file(GLOB targets "${development}/${multiarch}/cmake/oblique/oblique-targets-*.cmake")
   change("${targets}" "\${_IMPORT_PREFIX}/${CPACK_OBLIQUE_LIBDIR}/" "\${_IMPORT_PREFIX}/lib/${CPACK_OBLIQUE_MULTIARCH}/")
-  # One folder more to the top.
+  # One folder deeper.
   set(up "get_filename_component(_IMPORT_PREFIX \"\${_IMPORT_PREFIX}\" PATH)\nif(")
   change("${development}/${multiarch}/cmake/oblique/oblique-targets.cmake" "${up}"
          "get_filename_component(_IMPORT_PREFIX \"\${_IMPORT_PREFIX}\" PATH)\n${up}")

@@ -1,12 +1,12 @@
-# Read by cpack for each kind of package, before anything is installed into it.
+# Read by cpack for each kind of package before installing into it.
 if(CPACK_GENERATOR STREQUAL "DEB")
-  # /etc and /usr, not folders below one prefix.
+  # Installs into /etc and /usr instead of folders below one prefix.
   set(CPACK_SET_DESTDIR ON)
   set(CPACK_INSTALL_PREFIX /usr)
   unset(ENV{OBLIQUE_PREFIX})
-  # Each package has its own, in the first line of its description.
+  # Descriptions are set per package; the first line of each is its summary.
   set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")
 else()
-  # Programs run wherever the archive is unpacked. Units must name a place.
+  # The programs run in any folder, but units need a fixed one.
   set(ENV{OBLIQUE_PREFIX} /opt/oblique)
 endif()

@@ -1,4 +1,4 @@
-# cpack puts files into an archive as the disk lists them, which is another order on each: by name instead.
+# Sorts the files of an archive by name; cpack uses the order on the disk, which varies.
 if(NOT CPACK_GENERATOR STREQUAL "TGZ")
   return()
 endif()

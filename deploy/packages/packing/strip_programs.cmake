@@ -1,4 +1,4 @@
-# Debian's programs do not say by which compilers they were made, so that builds by others can be compared.
+# Removes the compiler's version from Debian's programs, so that builds can be compared.
 find_program(STRIP strip REQUIRED)
 file(GLOB programs "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/*/usr/bin/oblique*"
      "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/library/usr/*/lib*.so.*.*.*"

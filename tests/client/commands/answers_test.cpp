@@ -1,4 +1,4 @@
-// What the program makes of a server's answers, honest ones and others.
+// Valid and invalid answers of a server.
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -15,7 +15,7 @@
 namespace oblique::client {
 namespace {
 
-/// A chunk of an answer: rows of one number, `point`.
+/// A chunk with rows of one column, `point`.
 protocol::QueryReply chunk_of(std::uint64_t number, const std::vector<std::int64_t>& points,
                               bool ends) {
   protocol::ChunkWriter rows({"point"});
@@ -36,7 +36,7 @@ std::string frame_of(std::uint64_t request_id, const protocol::QueryReply& chunk
   return protocol::encode(reply);
 }
 
-/// A server that gives two rows for a query, and then what `more` gives to each wish for more.
+/// A server that returns two rows for a query; `more` makes its answer to each request for more.
 ScriptedServer::Answer gives(
     std::function<std::vector<std::string>(std::uint64_t request_id, std::uint64_t taken)> more) {
   return [more](const protocol::ClientRequest& request) -> std::vector<std::string> {
@@ -68,7 +68,7 @@ test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) 
   return test::run_oblique(words);
 }
 
-TEST(Answers, OfSeveralPartsArePutTogether) {
+TEST(Answers, OfSeveralPartsAreJoined) {
   const ScriptedServer server(gives([](std::uint64_t id, std::uint64_t taken) {
     return std::vector{frame_of(id, chunk_of(taken + 1, {2}, taken == 3))};
   }));
@@ -80,7 +80,7 @@ TEST(Answers, OfSeveralPartsArePutTogether) {
   }
 }
 
-TEST(Answers, ThatBreakOffSaySoAndEndWithOne) {
+TEST(Answers, ThatAreIncompleteEndWithOne) {
   const auto error = [](std::uint64_t id, std::uint64_t) {
     protocol::ClientReply reply;
     reply.set_request_id(id);
@@ -101,7 +101,7 @@ TEST(Answers, ThatBreakOffSaySoAndEndWithOne) {
     wider.set_ends(true);
     return std::vector{frame_of(id, wider)};
   };
-  const std::string broke_off = "the answer broke off after 2 rows";
+  const std::string broke_off = "the answer ended after 2 rows";
   for (const auto& [answer, says] : {std::pair{gives(error), std::string("disk is \\x1b[2J gone")},
                                      {gives(lacking), broke_off},
                                      {gives(unsound), broke_off},
@@ -113,25 +113,25 @@ TEST(Answers, ThatBreakOffSaySoAndEndWithOne) {
   }
 }
 
-TEST(Answers, ThatComeNoFurtherEndWithOne) {
+TEST(Answers, ThatStopEndWithOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
-  do {  // again where the first part was too late
+  do {  // again if the first part was too late
     csv = ask(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);
-  EXPECT_THAT(csv.err, testing::HasSubstr("broke off after 2 rows: nothing came from"));
+  EXPECT_THAT(csv.err, testing::HasSubstr("ended after 2 rows: nothing came from"));
 }
 
 TEST(Watch, EndsWithZeroForADoneStudyAndWithOneForACancelledOne) {
   EXPECT_EQ(ask(ScriptedServer(has_study("done")), {"watch", "s"}).exit_code, 0);
   const auto watch = ask(ScriptedServer(has_study("cancelled")), {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
-  EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; oblique resume goes on"));
+  EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; `oblique resume` continues"));
 }
 
-TEST(Watch, TellsHowManyPointsFailedAndWhyAndEndsWithOne) {
+TEST(Watch, ReportsFailedPointsWithReasonsAndEndsWithOne) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     if (request.has_status()) {
@@ -162,7 +162,7 @@ TEST(Watch, TellsHowManyPointsFailedAndWhyAndEndsWithOne) {
 
 constexpr const char* kSteering = "\x1b[2J\u009b2J\u202e\x7f";
 
-/// Steers with every text that a reply has.
+/// Fills every text of a reply with control sequences.
 std::vector<std::string> steering(const protocol::ClientRequest& request) {
   auto reply = reply_to(request);
   if (request.has_status() && request.status().study() == "error") {
@@ -193,7 +193,7 @@ std::vector<std::string> steering(const protocol::ClientRequest& request) {
   return {protocol::encode(reply)};
 }
 
-TEST(TextsOfAServer, DoNotSteerTheTerminalWhateverTheCommand) {
+TEST(TextsOfAServer, CannotControlTheTerminal) {
   const ScriptedServer server(steering);
   const std::vector<std::vector<std::string>> all{{"status"},
                                                   {"status", "--format", "json"},

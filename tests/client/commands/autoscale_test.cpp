@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(JobsToSubmit, AreOneForEachShareOfTheOpenPointsWithinTheLimitsLessThoseThatAreThere) {
+TEST(JobsToSubmit, AreOnePerShareOfOpenPointsWithinLimitsMinusExistingJobs) {
   const struct {
     std::uint64_t open;
     std::size_t jobs;
@@ -29,17 +29,17 @@ TEST(JobsToSubmit, AreOneForEachShareOfTheOpenPointsWithinTheLimitsLessThoseThat
     std::size_t submitted;
   } cases[] = {
       {0, 0, 0, 5, 0},      // nothing to do
-      {1, 0, 0, 5, 1},      // any open point wants a job
-      {100, 0, 0, 5, 1},    // 100 points a job
+      {1, 0, 0, 5, 1},      // any open point needs a job
+      {100, 0, 0, 5, 1},    // 100 points per job
       {101, 0, 0, 5, 2},    // rounded up
-      {101, 1, 0, 5, 1},    // one job is there
-      {101, 2, 0, 5, 0},    // as many as wanted
+      {101, 1, 0, 5, 1},    // one job exists
+      {101, 2, 0, 5, 0},    // the wanted number exists
       {101, 4, 0, 5, 0},    // more than wanted: they end by themselves
       {1'000, 0, 0, 5, 5},  // the maximum
-      {1'000, 3, 0, 5, 2},  // the maximum, with jobs that are there
-      {1'000, 9, 0, 5, 0},  // more than the maximum
+      {1'000, 3, 0, 5, 2},  // the maximum, some of which exist
+      {1'000, 9, 0, 5, 0},  // more than the maximum exist
       {0, 0, 2, 5, 2},      // the minimum
-      {0, 1, 2, 5, 1},      // the minimum, with a job that is there
+      {0, 1, 2, 5, 1},      // the minimum, one of which exists
       {~std::uint64_t{0}, 0, 0, 10'000, 10'000},
   };
   for (const auto& each : cases) {
@@ -61,7 +61,7 @@ TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
       {"running", 100, 30, "the database, which accepts no results: disk full", 0},
       {"paused", 100, 30, "", 0},
       {"done", 100, 95, "", 0},
-      {"running", 10, 30, "", 0},  // counts of a server that miscounts
+      {"running", 10, 30, "", 0},  // wrong counts of a server
   };
   protocol::StatusReply all;
   std::uint64_t sum = 0;
@@ -81,7 +81,7 @@ TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
   EXPECT_EQ(open_points(all), sum);
 }
 
-/// The program with a server and with pretended `squeue` and `sbatch`.
+/// The program with a server and fake `squeue` and `sbatch`.
 class Autoscale : public testing::Test {
  protected:
   Autoscale() {
@@ -117,7 +117,7 @@ class Autoscale : public testing::Test {
   test::Server server_{folder_, folder_.file("a.db")};
 };
 
-TEST_F(Autoscale, SubmitsTheScriptForJobsThatAreMissing) {
+TEST_F(Autoscale, SubmitsTheScriptForMissingJobs) {
   pretend("squeue",
           "echo \"$@\" > squeue.log\n"
           "printf 'RUNNING\\nPENDING\\nCOMPLETING\\n%s' \"${SQUEUE_PARTITION+FILTERED}\"");
@@ -145,7 +145,7 @@ TEST_F(Autoscale, SubmitsTheScriptForJobsThatAreMissing) {
               HasSubstr("--me --array --name=oblique@" + server_.client_url().substr(6)));
 }
 
-TEST_F(Autoscale, FailsAtOnceWhenSlurmDoesAndSubmitsNothing) {
+TEST_F(Autoscale, FailsAtOnceIfSlurmFails) {
   const auto error = [this](const test::Environment& environment = {}) {
     const auto outcome = started({}, environment)->outcome();
     EXPECT_EQ(outcome.exit_code, 1);
@@ -160,7 +160,7 @@ TEST_F(Autoscale, FailsAtOnceWhenSlurmDoesAndSubmitsNothing) {
   EXPECT_THAT(error(), HasSubstr("sbatch ended with exit code 1: invalid partition"));
 }
 
-TEST_F(Autoscale, GoesOnWhenSlurmIsAwayForAWhileAndEndsWithASignal) {
+TEST_F(Autoscale, ContinuesAfterAFailureOfSlurmAndEndsWithASignal) {
   pretend("squeue", "[ ! -e away ] || exit 1; [ ! -e sbatch.log ] || cat jobs.now");
   std::ofstream(folder_.file("jobs.now")) << "RUNNING\nRUNNING\nPENDING\n";
   const auto client = started({"--interval", "0.1"});
@@ -193,7 +193,7 @@ TEST(AutoscaleFlags, ThatCannotWorkAreWrongUsage) {
   } wrong[] = {
       {{"slurm"}, "--max is required"},
       {{"pbs", "--max", "1"}, "it must be slurm"},
-      {{"slurm", "--min", "3", "--max", "2", "--script", "jobs"}, "it is more than --max 2"},
+      {{"slurm", "--min", "3", "--max", "2", "--script", "jobs"}, "it must be at most --max 2"},
       {{"slurm", "--max", "2", "--script", "jobs", "--name", "a,b"}, "--name a,b is not allowed"},
       {{"slurm", "--max", "2", "--script", "jobs", "--sbatch-args", "--array=1-3"}, "is one job"},
       {{"slurm", "--max", "2", "--script", "jobs"}, "OBLIQUE_WORKER_SERVER is not set"},

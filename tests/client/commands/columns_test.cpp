@@ -23,7 +23,7 @@ std::set<std::string> described_columns() {
   return names;
 }
 
-// The members of a JSON object, those of objects in it as energy.friction_J.
+// The members of a JSON object; members of nested objects as energy.friction_J.
 std::set<std::string> members_of(const nlohmann::ordered_json& json) {
   std::set<std::string> names;
   for (const auto& [name, value] : json.items()) {
@@ -38,7 +38,7 @@ std::set<std::string> members_of(const nlohmann::ordered_json& json) {
   return names;
 }
 
-// One point by `solve --json`, and the same by `run` and `query` with every column.
+// One point solved by `solve --json` and by `run`, with every column of `query`.
 class TwoWays : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -79,7 +79,7 @@ TEST_F(TwoWays, EveryMemberOfSolveJsonIsDescribedAndNoOther) {
   EXPECT_EQ(names, members_of(solved));
 }
 
-// Rows have all digits of scalars and eight of numbers in lists.
+// Rows contain all digits of scalars and eight of numbers in lists.
 void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_json& member,
                  const std::string& name, bool is_in_list = false) {
   if (member.is_structured()) {
@@ -96,7 +96,7 @@ void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_j
   }
 }
 
-TEST_F(TwoWays, ColumnsAndMembersOfOneNameAreTheSameToTheDigitsThatRowsKeep) {
+TEST_F(TwoWays, ColumnsAndMembersOfOneNameAgreeInTheStoredDigits) {
   for (const auto& column : server::all_columns()) {
     if (column.solve_json.empty() || column.name == "wall_s") {
       continue;

@@ -50,7 +50,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {"study check --H 1 --mu 0.4 --e 1 --k 0-mu",
        "--k 0-mu: point 0: k = -0.4 N/m is not allowed"},
       {"submit --H 1 --mu 0.4 --e 1 --priority 1001", "--priority: priority = 1001 is not allowed"},
-      {"solve --H 1,1.1 --mu 0.4 --e 1", "solve takes one value for each"},
+      {"solve --H 1,1.1 --mu 0.4 --e 1", "solve takes one value per flag"},
       {"solve --H 1 --mu 0.4 --e 1 --trace /nowhere/x.csv", "/nowhere/x.csv"},
       {"solve --elements-per-lnk=3", "(did you mean `--elements-per-link`?)"},
       {"solve --H 1 --mu 0.4 --e 1 --dt 0.1000000000000001", "dt = 0.1000000000000001 s"},
@@ -60,9 +60,9 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {"submit --H 1 --mu 0.4 --e 1 --server nowhere", "tcp://HOST:PORT"},
       {"status --timeout -1", "--timeout -1"},
       {"status --db a.db --server tcp://127.0.0.1:1", "--server"},
-      {"view --server tcp://127.0.0.1:1", "A server has a page of its own"},
+      {"view --server tcp://127.0.0.1:1", "A server has its own page"},
       {"paper --study x", "--db"},
-      {"converge --H 1 --mu 0.4,0.6 --e 1", "2 points, and converge takes one"},
+      {"converge --H 1 --mu 0.4,0.6 --e 1", "2 points, but converge takes one"},
       {"converge --H 1 --mu 0.4 --e 1 --finest 24", "--finest 24"},
       {"solve --H 1 --mu 0.4 --e 1 --tolerance 0.1", "tolerance = 0.1"},
       {"fit --from papre", "papre"},
@@ -78,7 +78,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   }
 }
 
-TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
+TEST(CommandLine, ConvergesWithTheModelOfThePointThatTheFilterKeeps) {
   const auto converged = [](const std::vector<std::string>& more) {
     std::vector<std::string> words{"converge", "--preset", "paper", "--H",   "0.9",
                                    "--mu",     "0.4",      "--e",   "1",     "--coarsest",
@@ -91,13 +91,13 @@ TEST(CommandLine, ConvergesWithTheModelOfThePointThatItsFilterLeavesIn) {
   EXPECT_EQ(converged({"--k", "1e7,2e7", "--where", "k > 1.5e7"}), converged({"--k", "2e7"}));
 }
 
-TEST(CommandLine, SaysOfACoarseMeshWhatItCostsBesideTheDataAndOfAStudyOnce) {
+TEST(CommandLine, NotesTheErrorsOfACoarseMeshOnceOnStandardError) {
   const test::TemporaryFolder folder;
   const auto err_of = [&](std::vector<std::string> words) {
     words.insert(words.end(), {"--H", "0.6", "--mu", "0.4", "--e", "1"});
     return test::run_oblique(folder, words).err;
   };
-  const std::string note = "Note: on 4 elements a link forces are off by 3 %";
+  const std::string note = "Note: 4 elements a link give errors of 3 % in forces";
   EXPECT_THAT(err_of({"solve", "--preset", "paper", "--json"}), HasSubstr(note));
   EXPECT_THAT(err_of({"study", "check", "--preset", "paper", "--no-rate"}), HasSubstr(note));
   EXPECT_THAT(err_of({"run", "--preset", "paper"}), HasSubstr(note));
@@ -112,7 +112,7 @@ TEST(CommandLine, SaysOfACoarseMeshWhatItCostsBesideTheDataAndOfAStudyOnce) {
   }
 }
 
-TEST(CommandLine, RefusesFilesThatAreNotRegularAndSaysWhatTheyAre) {
+TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(mkfifo(folder.file("pipe").c_str(), 0600), 0);
   std::ofstream(folder.path() / "pipe.toml") << "[[block]]\ncsv = 'pipe'\n";
@@ -158,7 +158,7 @@ TEST(CommandLine, RepeatsAtMostEightyCharactersOfAWrongKey) {
   }
 }
 
-TEST(CommandLine, WhatIsNotThereFailsWithOneAndSaysWhatToDo) {
+TEST(CommandLine, MissingThingsFailWithOneAndTheRemedy) {
   const struct {
     const char* line;
     const char* says;
@@ -176,7 +176,7 @@ TEST(CommandLine, WhatIsNotThereFailsWithOneAndSaysWhatToDo) {
   }
 }
 
-TEST(CommandLine, ADatabaseThatIsGivenAsAStudyFileIsNamedSo) {
+TEST(CommandLine, ADatabaseGivenAsAStudyFileIsRecognised) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "camp.db") << "SQLite format 3 and so on";
   const auto run = test::run_oblique(folder, {"run", "camp.db"});
@@ -195,7 +195,7 @@ TEST(CommandLine, FailsWhenStandardOutputCannotBeWritten) {
   EXPECT_EQ(WEXITSTATUS(status), 1);
 }
 
-TEST(HelpText, GoesOnBelowAMeaning) {
+TEST(HelpText, WrapsDescriptionsAtTheirColumn) {
   EXPECT_EQ(fitted_help("  --at N    one two three four\n  --b       five\n", 20, 12),
             "  --at N    one two\n"
             "            three\n"
@@ -203,7 +203,7 @@ TEST(HelpText, GoesOnBelowAMeaning) {
             "  --b       five\n");
 }
 
-TEST(HelpText, MovesTheRestOfASentenceToTheNextLine) {
+TEST(HelpText, WrapsSentences) {
   EXPECT_EQ(fitted_help("one two three\nfour five\n\nsix seven eight\n", 10, 12),
             "one two\nthree four\nfive\n\nsix seven\neight\n");
 }

@@ -1,4 +1,4 @@
-// Questions to a database file, by the program itself.
+// Queries of a database file, by the program itself.
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// A folder with oblique.db, which has four results of the study `a`.
+/// A folder with oblique.db, which contains four results of the study `a`.
 class DatabaseQuery : public testing::Test {
  protected:
   DatabaseQuery() {
@@ -31,7 +31,7 @@ class DatabaseQuery : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(DatabaseQuery, AStatementHasItsTime) {
+TEST_F(DatabaseQuery, AStatementHasATimeLimit) {
   const auto outcome =
       ask({"sql",
            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n",
@@ -41,7 +41,7 @@ TEST_F(DatabaseQuery, AStatementHasItsTime) {
   EXPECT_THAT(outcome.err, HasSubstr("took too long (more than 0.2 s)"));
 }
 
-TEST_F(DatabaseQuery, AStatementThatNeedsMuchMemoryFailsAndSaysSo) {
+TEST_F(DatabaseQuery, AStatementHasAMemoryLimit) {
   EXPECT_THAT(ask({"sql", "SELECT hex(zeroblob(450000000))"}).err,
               HasSubstr("more than the 64 MiB allowed"));
   const auto outcome =
@@ -71,7 +71,7 @@ TEST_F(DatabaseQuery, AWrongStatementIsWrongUsage) {
   }
 }
 
-TEST_F(DatabaseQuery, AModeThatNoPointHasIsSaid) {
+TEST_F(DatabaseQuery, AModeThatNoPointHasIsReported) {
   const auto unknown = ask({"query", "a", "--where", "mu < 2 AND major_mode = 'SC SR SR'"});
   EXPECT_EQ(unknown.exit_code, 0) << unknown.err;
   EXPECT_THAT(unknown.err, testing::AllOf(HasSubstr("no point of a meets the condition"),
@@ -81,12 +81,12 @@ TEST_F(DatabaseQuery, AModeThatNoPointHasIsSaid) {
   EXPECT_EQ(ask({"query", "a", "--where", "mode == '" + mode + "'", "--format", "csv"}).err, "");
 }
 
-TEST_F(DatabaseQuery, AFileIsOfTheFormatThatItsNameSays) {
+TEST_F(DatabaseQuery, AFileHasTheFormatOfItsEnding) {
   EXPECT_EQ(ask({"query", "a", "--select", "point", "--limit", "1", "--out", "x.csv"}).exit_code,
             0);
   std::ifstream file(folder_.path() / "x.csv");
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "point\n0\n");
-  EXPECT_THAT(ask({"sql", "SELECT 1", "--out", "x.txt"}).err, HasSubstr("end its name in .csv"));
+  EXPECT_THAT(ask({"sql", "SELECT 1", "--out", "x.txt"}).err, HasSubstr("end the name in .csv"));
   EXPECT_THAT(ask({"query", "a", "--select", "point", "--out", "/dev/stdout"}).out,
               testing::StartsWith("point\n"));
 }

@@ -1,4 +1,4 @@
-// oblique doctor: what a user sends along with a defect report.
+// `oblique doctor`, whose output belongs to a defect report.
 #include <sys/stat.h>
 
 #include <filesystem>
@@ -29,13 +29,13 @@ class Doctor : public testing::Test {
     flags.insert(flags.begin(), "doctor");
     return test::run_oblique(folder_, flags);
   }
-  /// What it prints with exit code 0.
+  /// Its output, with exit code 0.
   std::string healthy(const std::vector<std::string>& flags) const {
     const auto outcome = outcome_of(flags);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
     return outcome.out;
   }
-  /// The lines that begin with error; the exit code is 1.
+  /// Its lines with errors, with exit code 1.
   std::string errors(const std::vector<std::string>& flags) const {
     const auto outcome = outcome_of(flags);
     EXPECT_EQ(outcome.exit_code, 1) << outcome.out << outcome.err;
@@ -50,13 +50,13 @@ class Doctor : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Doctor, ReportsEachCheckOnALineOfItsOwn) {
+TEST_F(Doctor, ReportsEachCheckOnOneLine) {
   const auto out = healthy({});
   for (const char* says : {"versions   oblique ", "oblique-server is of the same build\n",
                            "oblique-worker is of the same build\n", "processor  ",
                            "threads may be used; the solver uses ", "solver     ",
-                           "ms of processor time a point; reference for ", "disk       ",
-                           "there is no database oblique.db yet", "key        no key file is named",
+                           "ms of processor time per point; reference for ", "disk       ",
+                           "there is no database oblique.db yet", "key        no key file",
                            "server     not checked"}) {
     EXPECT_THAT(out, HasSubstr(says));
   }
@@ -71,7 +71,7 @@ TEST_F(Doctor, ReadsADatabaseWhoseServerWasKilled) {
   {
     server::Store store(folder_.file("data/alive.db"));
     test::add_study(store, "friction", 4, 2);
-    // As a killed server leaves them.
+    // Files of a killed server.
     std::filesystem::copy(folder_.file("data/alive.db"), folder_.file("data/dead.db"));
     std::filesystem::copy(folder_.file("data/alive.db-wal"), folder_.file("data/dead.db-wal"));
     EXPECT_THAT(healthy({"--db", "data/alive.db"}), HasSubstr("1 study, in use by a server"));
@@ -79,7 +79,7 @@ TEST_F(Doctor, ReadsADatabaseWhoseServerWasKilled) {
   EXPECT_THAT(healthy({"--db", "data/dead.db"}), HasSubstr("1 study, not in use by a server"));
 }
 
-TEST_F(Doctor, NamesADatabaseThatIsMissingOrIsNone) {
+TEST_F(Doctor, NamesAMissingOrInvalidDatabase) {
   std::ofstream(folder_.file("text.db")) << "no database, but long enough to be looked at\n";
   EXPECT_THAT(errors({"--db", "missing.db"}), HasSubstr("there is no database missing.db"));
   EXPECT_THAT(errors({"--db", "text.db"}), HasSubstr("text.db"));
@@ -87,7 +87,7 @@ TEST_F(Doctor, NamesADatabaseThatIsMissingOrIsNone) {
   EXPECT_THAT(errors({"--db", "/nowhere/a.db"}), HasSubstr("there is no folder /nowhere"));
 }
 
-TEST_F(Doctor, SaysWhetherAServerAnswers) {
+TEST_F(Doctor, ReportsWhetherAServerAnswers) {
   EXPECT_THAT(errors({"--server", "hub"}), HasSubstr("tcp://"));
   const test::ReservedPort port;
   EXPECT_THAT(errors({"--server", port.url(), "--timeout", "0.05"}),
@@ -98,7 +98,7 @@ TEST_F(Doctor, SaysWhetherAServerAnswers) {
                     HasSubstr("start oblique-worker"), Not(HasSubstr("install one version"))));
 }
 
-TEST_F(Doctor, SaysWhetherAKeyFileCanBeUsedAndTheServerAdmitsItAndNothingThatItHolds) {
+TEST_F(Doctor, ReportsWhetherAKeyIsAdmittedWithoutPrintingIt) {
   ASSERT_EQ(test::run_oblique(folder_, {"keygen", "keys"}).exit_code, 0);
   const std::string key = folder_.file("keys/client.key");
   const test::Server server(folder_, folder_.file("a.db"),

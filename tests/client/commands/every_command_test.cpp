@@ -1,4 +1,4 @@
-// What holds for every command that the program lists, those to come included.
+// Properties of every command, including future ones.
 #include <algorithm>
 #include <regex>
 #include <set>
@@ -34,7 +34,7 @@ Words with(Words words, const Words& more) {
   return words;
 }
 
-/// The program's command line, in this process: for what is printed before anything is done.
+/// Runs the command line in this process and returns its output.
 test::Outcome parse(const Words& words) {
   std::vector<const char*> arguments{"oblique"};
   for (const auto& word : words) {
@@ -59,10 +59,10 @@ void expect_wrong_usage(const Words& words, const std::string& says) {
   EXPECT_THAT(outcome.err, AllOf(StartsWith("oblique"), HasSubstr(says))) << typed;
 }
 
-/// A command, or one of the commands that a command has.
+/// A command, or a command of a command.
 struct Listed {
-  Words words;       ///< as they are typed
-  std::string help;  ///< that it prints
+  Words words;       ///< as typed
+  std::string help;  ///< its help
 };
 
 /// The names listed under "Subcommands:".
@@ -75,7 +75,7 @@ Words listed_in(const std::string& help) {
   while (std::getline(lines, line) && line.starts_with("  ")) {
     std::string name;
     std::istringstream(line) >> name;
-    if (line[2] != ' ') {  // not a description that goes on
+    if (line[2] != ' ') {  // a wrapped description
       names.push_back(name);
     }
   }
@@ -103,13 +103,13 @@ const std::vector<Listed>& every_command() {
   return commands;
 }
 
-/// The line of the help that says how it is called.
+/// The usage line of the help.
 std::string usage_of(const Listed& command) {
   const auto at = command.help.find("Usage: ");
   return command.help.substr(at, command.help.find('\n', at) - at);
 }
 
-/// A word for each argument that it must have, and the flags that it must have.
+/// A word for each required argument, and the required flags.
 Words needed_words(const Listed& command) {
   Words words;
   std::istringstream usage(usage_of(command).substr(std::string("Usage: oblique").size()));
@@ -129,7 +129,7 @@ Words needed_words(const Listed& command) {
   return words;
 }
 
-/// The flags with a value, by the name that the help gives the value.
+/// Flags with a value, by the value's name in the help.
 std::vector<std::pair<std::string, std::string>> flags_with_values(const Listed& command) {
   std::vector<std::pair<std::string, std::string>> flags;
   const std::regex line("\n  (--[A-Za-z0-9-]+) ([A-Z]+)(?![a-z|])");
@@ -143,7 +143,7 @@ std::vector<std::pair<std::string, std::string>> flags_with_values(const Listed&
 TEST(EveryCommand, HasAtLeastTwoExamplesInItsHelp) {
   ASSERT_GT(every_command().size(), 20U);
   for (const auto& command : every_command()) {
-    // The commands of a command share its examples.
+    // Commands of a command share its examples.
     const std::string call = "\n  oblique " + command.words.front();
     std::size_t examples = 0;
     for (auto at = command.help.find(call); at != std::string::npos;
@@ -166,7 +166,7 @@ TEST(EveryCommand, CanBeQuietOrVerboseAndNotBoth) {
   }
 }
 
-TEST(EveryCommand, AnswersUnknownWordsWithTheNearestThatItHasAndMissingOnesWithTheirNames) {
+TEST(EveryCommand, NamesTheNearestOfUnknownWordsAndMissingArguments) {
   for (const auto& command : every_command()) {
     expect_wrong_usage(with(command.words, {"--hlep"}), "(did you mean `--help`?)");
     Words words = command.words;
@@ -178,7 +178,7 @@ TEST(EveryCommand, AnswersUnknownWordsWithTheNearestThatItHasAndMissingOnesWithT
   }
 }
 
-TEST(EveryCommand, RefusesValuesThatItsFlagsCannotHaveAndEmptyOnes) {
+TEST(EveryCommand, RefusesInvalidAndEmptyValuesOfFlags) {
   const std::set<std::string> checked{"N", "SECONDS", "FLOAT", "INT", "UINT", "FORMAT"};
   int flags = 0;
   for (const auto& command : every_command()) {
@@ -194,7 +194,7 @@ TEST(EveryCommand, RefusesValuesThatItsFlagsCannotHaveAndEmptyOnes) {
   EXPECT_GT(flags, 200);
 }
 
-TEST(Flags, OfParametersRefuseWhatIsNoNumberOfTheirRange) {
+TEST(Flags, OfParametersRefuseValuesOutsideTheirRange) {
   const auto refuse = [](const solver::ParameterKey& key) {
     for (const char* value :
          {"nan", "-nan", "inf", "-inf", "-1", "1e999", "abc", "0x1p", "1,", ":"}) {
@@ -218,7 +218,7 @@ TEST(Flags, OfParametersRefuseWhatIsNoNumberOfTheirRange) {
   }
 }
 
-TEST(Flags, ThatTakeNumbersRefuseThoseThatTheyCannotMean) {
+TEST(Flags, WithNumbersRefuseInvalidNumbers) {
   const Words point{"--H", "1", "--mu", "0.4", "--e", "1"};
   const struct {
     Words words;
@@ -252,7 +252,7 @@ TEST(Flags, ThatTakeNumbersRefuseThoseThatTheyCannotMean) {
   }
 }
 
-TEST(Flags, ShowWhatIsWrongWithoutSteeringTheTerminal) {
+TEST(Flags, ShowErrorsThatCannotControlTheTerminal) {
   for (const Words& words : {Words{"so\x1blve"},
                              {"run", "--name", "a\u202eb", "--H", "1", "--mu", "1", "--e", "1"},
                              {"solve", "--H", "\x1b[2J"},
@@ -268,7 +268,7 @@ TEST(Flags, ShowWhatIsWrongWithoutSteeringTheTerminal) {
   }
 }
 
-/// A folder with oblique.db, which has the study `friction`.
+/// A folder with oblique.db, which contains the study `friction`.
 class EveryCommandThatReads : public testing::Test {
  protected:
   EveryCommandThatReads() {
@@ -279,7 +279,7 @@ class EveryCommandThatReads : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyAndFailsWithOneWhereAStudyIsNotThere) {
+TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingOneAndFailsWithOne) {
   int commands = 0;
   for (const auto& command : every_command()) {
     const bool has_study = std::regex_search(usage_of(command), std::regex(" \\[?STUDY\\]?( |$)"));
@@ -291,7 +291,7 @@ TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyAndFailsWithOneWhereAStudyI
     if (const Words rest = needed_words(command); rest.size() > 1) {
       words = with(words, {rest.begin() + 1, rest.end()});
     }
-    for (const char* flag : {"--yes", "--show"}) {  // without these, some refuse to go on in a pipe
+    for (const char* flag : {"--yes", "--show"}) {  // some commands need these in a pipe
       if (command.help.find(flag + std::string(" ")) != std::string::npos) {
         words.emplace_back(flag);
       }
@@ -304,7 +304,7 @@ TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyAndFailsWithOneWhereAStudyI
   EXPECT_GE(commands, 4);
 }
 
-TEST_F(EveryCommandThatReads, PrintsDataAloneWhenQuietAndWhereAndHowLongWhenVerbose) {
+TEST_F(EveryCommandThatReads, PrintsOnlyDataWhenQuietAndPlacesAndTimesWhenVerbose) {
   const auto query = [this](const std::string& study, const Words& more) {
     return test::run_oblique(folder_, with({"query", study, "--format", "csv"}, more));
   };
@@ -340,7 +340,7 @@ TEST_F(EveryCommandThatReads, StatusHasRoomInEightyColumns) {
   EXPECT_LE(line.size(), 80U);
   EXPECT_THAT(status.out,
               AllOf(HasSubstr("50 %"),
-                    HasSubstr("friction waits for a server: nobody is at work on oblique.db.")));
+                    HasSubstr("friction waits for a server; none uses oblique.db now.")));
 }
 
 }  // namespace

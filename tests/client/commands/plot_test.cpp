@@ -1,4 +1,4 @@
-// `oblique plot` and `oblique paper --figures`, as people call them.
+// `oblique plot` and `oblique paper --figures`.
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
@@ -29,14 +29,14 @@ std::string contents_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// A folder with oblique.db: a study `a` of which 4 of 12 points have a result.
+/// A folder with oblique.db: a study `a` with results for 4 of 12 points.
 class Plot : public testing::Test {
  protected:
   Plot() {
     server::Store store(folder_.file("oblique.db"));
     test::add_study(store, "a", 12, 4);
   }
-  /// As SVG on standard output, where the arguments do not say otherwise.
+  /// Draws SVG on standard output, unless the arguments say otherwise.
   test::Outcome plot(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "plot");
     const auto says_where = [](const std::string& word) {
@@ -52,7 +52,7 @@ class Plot : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Plot, WritesWhatTheFilesEndingSaysAndAsksForAFileInAPipe) {
+TEST_F(Plot, WritesTheFormatOfTheEndingAndNeedsAFileInAPipe) {
   const auto unasked = plot({"a"});
   EXPECT_EQ(unasked.exit_code, 0) << unasked.err;
   EXPECT_THAT(unasked.out, AllOf(StartsWith("<?xml"), HasSubstr("a: fn"), HasSubstr("</svg>")));
@@ -103,11 +103,11 @@ TEST_F(Plot, ShowsAsciiInAPipe) {
   EXPECT_THAT(outcome.out, Not(HasSubstr("<svg")));
 }
 
-TEST_F(Plot, OfNoValueSaysSoOnStandardErrorAndHasNoColours) {
+TEST_F(Plot, WithoutValuesReportsItOnStandardError) {
   const auto outcome =
       plot({"a", "--scatter", "mu,fn_peak_N", "--colour", "duration_s", "--where", "mu > 5"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("No point of the picture has a value"));
+  EXPECT_THAT(outcome.err, HasSubstr("No point has a value"));
   EXPECT_THAT(outcome.out, Not(HasSubstr("gradient")));
   EXPECT_THAT(plot({"a", "--histogram", "fn_peak_N"}).err, Not(HasSubstr("No point")));
 }
@@ -139,7 +139,7 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
                           {{"a", "--panel", "loop"}, "--point N"},
                           {{"a", "--point", "3", "--map", "fn_peak_N"}, "--map"},
                           {{"a", "--point", "3", "--on-worker"}, "--server"},
-                          {{"--H", "0.5,1", "--mu", "1", "--e", "1"}, "one value each"},
+                          {{"--H", "0.5,1", "--mu", "1", "--e", "1"}, "one value per flag"},
                           {{"a", "--point", "12"}, "0 to 11", 1}}) {
     const auto outcome = plot(wrong.arguments);
     EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.says << outcome.err;
@@ -148,13 +148,13 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
   }
 }
 
-TEST_F(Plot, DrawsAPointSolvedAgainAndSaysWhereItIsOtherThanStored) {
+TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
   const auto other = plot({"a", "--point", "0"});
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_THAT(other.out, AllOf(HasSubstr("Point 0 of a"), HasSubstr("Shape of the finger")));
-  EXPECT_THAT(other.err, HasSubstr("Solved again, it is other than stored in "));
+  EXPECT_THAT(other.err, HasSubstr("The point was solved again: differs from the stored row in "));
   EXPECT_THAT(other.err, HasSubstr("fn_peak_N"));
-  EXPECT_THAT(other.out, HasSubstr("it is other than stored in")) << "in the picture too";
+  EXPECT_THAT(other.out, HasSubstr("differs from the stored row in")) << "in the picture too";
   const auto not_stored = plot({"a", "--point", "11"});
   EXPECT_EQ(not_stored.exit_code, 0) << not_stored.err;
   EXPECT_THAT(not_stored.err, Not(HasSubstr("stored")));
@@ -166,7 +166,7 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndSaysWhereItIsOtherThanStored) {
   EXPECT_THAT(same.err + same.out, Not(HasSubstr("stored")));
 }
 
-TEST_F(Plot, OfAServerHasTheShapesThatAWorkerSends) {
+TEST_F(Plot, OfAServerHasTheShapesFromAWorker) {
   const test::Server server(folder_, "oblique.db");
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
   const auto ask = [&](const std::string& more) {
@@ -197,7 +197,7 @@ TEST_F(Plot, DrawsPanelsOfAPointOfNoStudy) {
               HasSubstr("compression"));
 }
 
-TEST(PaperFigures, AreFiveFilesInAFolderOfTheirOwn) {
+TEST(PaperFigures, AreFiveFilesInOneFolder) {
   const test::TemporaryFolder folder;
   const auto outcome = test::run_oblique(folder, {"paper", "--figures", "made/here"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -17,7 +17,7 @@ std::string text_of(const std::string& name) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// What stands between the mark of `command` and the end mark.
+// The text between the mark of `command` and the end mark.
 std::string shown(const std::string& text, const std::string& command) {
   const std::string mark = "<!-- $ " + command + " -->\n";
   const auto begin = text.find(mark);
@@ -28,7 +28,7 @@ std::string shown(const std::string& text, const std::string& command) {
   return text.substr(from, text.find("<!-- end -->", from) - from);
 }
 
-// A command and what it prints, as .ci/tables writes them.
+// A command and its output as .ci/tables writes them.
 std::string block_of(const std::string& command, const std::string& printed) {
   return "\n```\n$ " + command + "\n" + printed + "```\n\n";
 }
@@ -59,13 +59,12 @@ TEST(Readme, ShowsTheTablesThatCommandsPrint) {
   }
 }
 
-TEST(Readme, SummarisesTheComparisonInTheNumbersThatItsCommandPrints) {
+TEST(Readme, HasTheNumbersOfTheComparison) {
   const auto printed = test::run_oblique({"paper"});
   std::smatch number;
   ASSERT_TRUE(std::regex_search(
       printed.out, number,
-      std::regex(
-          "(\\d+) trustworthy published numbers: rms difference (\\S+ %), largest (\\S+ %)")));
+      std::regex("(\\d+) reliable published numbers: rms difference (\\S+ %), largest (\\S+ %)")));
   const std::string summary = text_of("README.md");
   EXPECT_NE(summary.find("The " + number.str(1) + " trustworthy numbers"), std::string::npos);
   EXPECT_NE(summary.find("rms difference of " + number.str(2)), std::string::npos);

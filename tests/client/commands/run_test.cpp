@@ -25,7 +25,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// So long that a signal meets it at work.
+// Long enough that a signal arrives before its end.
 void write_study(const test::TemporaryFolder& folder, int points) {
   std::ofstream(folder.path() / "study.toml")
       << "name = 'many'\n[model]\npreset = 'paper'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, "
@@ -33,7 +33,7 @@ void write_study(const test::TemporaryFolder& folder, int points) {
       << points << " }\ne = 0.9\n";
 }
 
-// Waits for something that must come; the test's own time limit is what ends a wait in vain.
+// Waits for a condition; the test's time limit ends a wait without success.
 void wait_for(const std::function<bool()>& condition) {
   while (!condition()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -46,11 +46,11 @@ std::uint64_t solved(const test::TemporaryFolder& folder) {
     const auto studies = reader.study_status();
     return studies.empty() ? 0 : studies.front().solved();
   } catch (const std::exception&) {
-    return 0;  // not made yet
+    return 0;  // not created yet
   }
 }
 
-// Started, with results coming in.
+// Starts the program and waits for the first results.
 void wait_until_at_work(const test::TemporaryFolder& folder, const test::Process& program) {
   wait_for([&] { return solved(folder) > 0; });
   ASSERT_EQ(test::children_of(program.pid()).size(), 3U);
@@ -66,7 +66,7 @@ std::vector<std::string> run_arguments() {
   return {"run", "study.toml", "--workers", "2"};
 }
 
-TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryCommandThatReads) {
+TEST(Run, SolvesAStudyWhoseResultsEveryCommandCanRead) {
   const test::TemporaryFolder folder;
   const auto paper = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
   const auto run = test::run_oblique(folder, {"run", paper});
@@ -94,10 +94,10 @@ TEST(Run, SolvesAStudyAndItsResultsAreThereForEveryCommandThatReads) {
 
   const auto compared = test::run_oblique(folder, {"paper", "--db", "oblique.db"});
   EXPECT_EQ(compared.exit_code, 0) << compared.err;
-  EXPECT_NE(compared.out.find("63 trustworthy published numbers: rms"), std::string::npos);
+  EXPECT_NE(compared.out.find("63 reliable published numbers: rms"), std::string::npos);
 }
 
-TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
+TEST(Run, EstimatesErrorsOfAllPointsOrNone) {
   const test::TemporaryFolder folder;
   const auto run = [&folder](const std::vector<std::string>& more) {
     std::vector<std::string> words{"run", "--preset", "paper", "--elements-per-link",
@@ -114,20 +114,20 @@ TEST(Run, WithErrorsGivesThemToEveryPointAndWithoutToNone) {
                " FROM runs GROUP BY study ORDER BY study",
                "--format", "csv"});
   EXPECT_THAT(sql.out, HasSubstr("with,2,2,2,2\nwithout,2,0,0,0\n"));
-  // The same name with another choice is another study.
+  // The same name with another definition is another study.
   const auto refused = run({"--name", "with"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.err, HasSubstr("errors: stored true, given false"));
 }
 
-TEST(Run, OfAStudyThatIsPausedElsewhereSaysHowToGoOnAndEndsWithOne) {
+TEST(Run, OfAStudyPausedElsewhereNamesTheRemedyAndEndsWithOne) {
   const test::TemporaryFolder folder;
   write_study(folder, 10'000'000);
   auto arguments = run_arguments();
   arguments.push_back("--verbose");
   test::Process program(folder, test::client_program(), arguments);
   wait_until_at_work(folder, program);
-  // The server's log says where it awaits clients, and where the keys of this run are.
+  // The server's log contains its address for clients and the folder with the keys.
   const auto said = program.err();
   const auto word_after = [&said](const std::string& words) {
     const auto rest = said.substr(said.find(words) + words.size());
@@ -144,14 +144,15 @@ TEST(Run, OfAStudyThatIsPausedElsewhereSaysHowToGoOnAndEndsWithOne) {
   EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(outcome.out, "");
-  EXPECT_THAT(outcome.err,
-              HasSubstr("somebody has paused \"many\": the same command again goes on with it"));
+  EXPECT_THAT(
+      outcome.err,
+      HasSubstr("\"many\" was paused by another command: run this command again to continue"));
   const auto before = solved(folder);
   test::Process again(folder, test::client_program(), run_arguments());
   wait_for([&] { return solved(folder) > before; });
 }
 
-TEST(Run, SolvesItsStudyAloneAndLeavesUnfinishedOnesAsTheyAre) {
+TEST(Run, SolvesOnlyItsStudyAndDoesNotChangeOthers) {
   const test::TemporaryFolder folder;
   write_study(folder, 10'000'000);
   {
@@ -169,7 +170,7 @@ TEST(Run, SolvesItsStudyAloneAndLeavesUnfinishedOnesAsTheyAre) {
       << "nothing is paused in the database";
 }
 
-TEST(Run, GoesOnWithTheWorkersThatAreLeftAndEndsWithoutWorkersOrServer) {
+TEST(Run, ContinuesWithRemainingWorkersAndEndsWithoutWorkersOrServer) {
   for (const bool ends_server : {false, true}) {
     const test::TemporaryFolder folder;
     write_study(folder, 10'000'000);
@@ -188,7 +189,7 @@ TEST(Run, GoesOnWithTheWorkersThatAreLeftAndEndsWithoutWorkersOrServer) {
   }
 }
 
-TEST(Run, SaysWhatTheServerSaidWhenItDoesNotStart) {
+TEST(Run, PrintsTheOutputOfAServerThatDoesNotStart) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "oblique.db") << "this is no database, but some text in a file\n";
   const auto outcome = test::run_oblique(
@@ -207,7 +208,7 @@ mu = [0.2, 0.4, 0.6]
 e = 0.8
 )";
 
-TEST(Run, OfAStudyThatAnotherSolverBeganIsNotWaitedForAndTheWaysOutAreNamed) {
+TEST(Run, OfAStudyOfAnotherSolverEndsWithTheRemedies) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "begun.toml") << kBegun;
   {
@@ -223,7 +224,7 @@ TEST(Run, OfAStudyThatAnotherSolverBeganIsNotWaitedForAndTheWaysOutAreNamed) {
   const auto outcome = test::run_oblique(folder, {"run", "begun.toml"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(outcome.out, "");
-  EXPECT_THAT(outcome.err, HasSubstr("are of solver 0.1, and the workers here have "));
+  EXPECT_THAT(outcome.err, HasSubstr("are of solver 0.1, but the workers here have solver "));
   EXPECT_THAT(outcome.err, HasSubstr("its other 2 points"));
   EXPECT_THAT(outcome.err, HasSubstr("--name begun-"));
   EXPECT_THAT(test::run_oblique(folder, {"status"}).out, HasSubstr("0.1\n"))

@@ -1,4 +1,4 @@
-// Studies that grow, get another name and are deleted, from the command line.
+// Studies that grow, are renamed and deleted, from the command line.
 #include <fstream>
 #include <string>
 #include <vector>
@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// A study file with so many points, of which the first ones are always the same.
+/// A study file with that many points; the first ones are always the same.
 std::string study_text(int blocks) {
   std::string text = "name = \"friction\"\n[model]\npreset = \"paper\"\n";
   for (int block = 0; block < blocks; ++block) {
@@ -39,7 +39,7 @@ class StudyChanges : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(StudyChanges, AStudyThatIsRunAgainWithMoreBlocksIsSolvedForTheRestAlone) {
+TEST_F(StudyChanges, AStudyWithMoreBlocksSolvesOnlyTheNewPoints) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto grown = run_study(2);
   EXPECT_EQ(grown.exit_code, 0) << grown.err;
@@ -50,7 +50,7 @@ TEST_F(StudyChanges, AStudyThatIsRunAgainWithMoreBlocksIsSolvedForTheRestAlone) 
   EXPECT_THAT(shorter.err, HasSubstr("stored 2 blocks, given 1"));
 }
 
-TEST_F(StudyChanges, OfAnotherStudyUnderItsNameTheDifferenceIsShownInLines) {
+TEST_F(StudyChanges, ADifferentStudyOfTheSameNameIsRefusedWithTheDifferences) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto other = ask({"run", "--H", "1", "--mu", "0.1,0.3", "--e", "1", "--preset", "printed",
                           "--name", "friction"});
@@ -59,7 +59,7 @@ TEST_F(StudyChanges, OfAnotherStudyUnderItsNameTheDifferenceIsShownInLines) {
   EXPECT_THAT(other.err, HasSubstr("\nblock 1 differs\n"));
 }
 
-TEST_F(StudyChanges, AStudyGetsAnotherName) {
+TEST_F(StudyChanges, AStudyIsRenamed) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   EXPECT_EQ(ask({"rename", "friction", "slip"}).out, "friction is called slip now\n");
   EXPECT_EQ(ask({"query", "slip", "--select", "point", "--format", "csv"}).out, "point\n0\n1\n");
@@ -69,7 +69,7 @@ TEST_F(StudyChanges, AStudyGetsAnotherName) {
   EXPECT_EQ(ask({"rename", "slip", std::string(500, 'x')}).exit_code, 2);
 }
 
-TEST_F(StudyChanges, AStudyIsDescribedAsTheFileThatGivesItAgain) {
+TEST_F(StudyChanges, AStudyIsDescribedAsAFileThatDefinesIt) {
   ASSERT_EQ(run_study(2).exit_code, 0);
   const auto described = ask({"describe", "friction"});
   EXPECT_EQ(described.exit_code, 0) << described.err;
@@ -79,7 +79,7 @@ TEST_F(StudyChanges, AStudyIsDescribedAsTheFileThatGivesItAgain) {
   EXPECT_EQ(ask({"describe", "frictoin"}).exit_code, 1);
 }
 
-TEST_F(StudyChanges, AStudyIsDeletedWhenSomebodySaysYes) {
+TEST_F(StudyChanges, AStudyIsDeletedAfterConfirmation) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto asked = ask({"delete", "friction"});
   EXPECT_EQ(asked.exit_code, 2) << "nobody is there to be asked";
@@ -91,7 +91,7 @@ TEST_F(StudyChanges, AStudyIsDeletedWhenSomebodySaysYes) {
   EXPECT_EQ(run_study(2).exit_code, 0) << "the name is free";
 }
 
-TEST_F(StudyChanges, OfAServerThatDoesNotKnowTheStudyFailAndSayWhichIsNotThere) {
+TEST_F(StudyChanges, OfAMissingStudyFailAndNameIt) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     EXPECT_TRUE(request.has_status()) << "nothing is changed";
     auto reply = reply_to(request);

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 const std::string kExampleStudies = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
 
-/// What `study check --json` prints with these arguments.
+/// The output of `study check --json` with these arguments.
 nlohmann::json checked(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {"study", "check", "--json"});
   const auto outcome = test::run_oblique(arguments);
@@ -23,7 +23,7 @@ nlohmann::json checked(std::vector<std::string> arguments) {
   return nlohmann::json::parse(outcome.out, nullptr, false);
 }
 
-TEST(StudyCheck, SaysPointsBlocksModelsFallsTimeAndSize) {
+TEST(StudyCheck, PrintsPointsBlocksModelsFallsTimeAndSize) {
   const auto json = checked({kExampleStudies + "sticking.toml"});
   EXPECT_EQ(json["study"], "sticking");
   EXPECT_EQ(json["points"], 615);
@@ -41,7 +41,7 @@ TEST(StudyCheck, SaysPointsBlocksModelsFallsTimeAndSize) {
   EXPECT_GT(json["bytes"], 0.0);
 }
 
-TEST(StudyCheck, ShowsTheFirstAndTheLastPointThatItsFilterLeavesIn) {
+TEST(StudyCheck, ShowsTheFirstAndTheLastPointThatTheFilterKeeps) {
   const auto json = checked({"--no-rate", "--H", "0.9", "--mu", "0.1:1:10", "--e", "1", "--where",
                              "(mu - 0.45)^2 < 0.03"});
   EXPECT_FALSE(json.contains("time_s"));
@@ -53,7 +53,7 @@ TEST(StudyCheck, ShowsTheFirstAndTheLastPointThatItsFilterLeavesIn) {
   EXPECT_DOUBLE_EQ(block["last"]["mu"], 0.6);
 }
 
-TEST(StudyCheck, ShowsTheValuesOfTheAxesAlsoWhereOneOverridesAnother) {
+TEST(StudyCheck, ShowsTheValuesOfAllAxesIfOneOverridesAnother) {
   const auto block = checked({"--no-rate", "--length", "0.4,0.5", "--length1", "0.3", "--H", "0.9",
                               "--mu", "1", "--e", "0.9"})["blocks"][0];
   EXPECT_EQ(block["first"]["length"], 0.4);
@@ -62,7 +62,7 @@ TEST(StudyCheck, ShowsTheValuesOfTheAxesAlsoWhereOneOverridesAnother) {
   EXPECT_EQ(block["last"]["H"], 0.9);
 }
 
-TEST(StudyCheck, TimesFallsOfTheStudysOwnMeshAndForErrorsOfHalfOfIt) {
+TEST(StudyCheck, TimesFallsOnTheStudysMeshAndForErrorsOnHalfOfIt) {
   const std::vector<std::string> study{"--preset", "paper", "--H", "1",   "--mu",
                                        "0.4",      "--e",   "1",   "--E", "6e10:8e10:3"};
   const auto plain = checked(study);
@@ -73,7 +73,7 @@ TEST(StudyCheck, TimesFallsOfTheStudysOwnMeshAndForErrorsOfHalfOfIt) {
   EXPECT_EQ(checked(with_errors)["solved_falls"], 6);
 }
 
-TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
+TEST(StudyCheck, TakesNoLongerForABillionPoints) {
   const auto outcome =
       test::run_oblique({"study", "check", "--no-rate", "--sample", "sobol:1000000000:1", "--H",
                          "0.3:1.1", "--mu", "normal(0.4,0.05,0,)", "--e", "0.9"});
@@ -83,7 +83,7 @@ TEST(StudyCheck, OfAThousandMillionPointsCostsNoMoreThanOfAFew) {
   EXPECT_THAT(outcome.out, HasSubstr("size    about 970 GB"));
 }
 
-TEST(StudyCheck, EndsWithTwoAndThePlaceForWhatIsWrong) {
+TEST(StudyCheck, EndsWithTwoAndThePlaceOfAnError) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "wrong.toml")
       << "[[block]]\nH = 1\nmu = 0.4\ne = 1\nwhere = \"mu > f\"\n";

@@ -37,13 +37,14 @@ TEST(StudyTime, IsThatOfEachFallOnceAndOfEachContactOverTheThreads) {
       << "while one thread solves the last fall, the other one waits";
 }
 
-TEST(StudyTime, WhereFallsDominateNamesWhatSharesOneAndWhatWouldBeCheaper) {
+TEST(StudyTime, IfFallsDominateNamesParametersThatShareAFallAndACheaperStudy) {
   const auto recipe = sample_of(
       "H = { from = 0.8, to = 1 }\nE = { from = 6e10, to = 8e10 }\n"
       "k = { distribution = 'log-uniform', from = 1e7, to = 1e8 }\n");
   EXPECT_EQ(time_in_words(kCost, size_of(20'000, 20'000), recipe),
-            "about 33 min 30 s on 2 threads: 100 % of it is 20,000 falls.\n"
-            "        H, mu, e, k and eta2 share one fall; E with count = 16: about 12 s");
+            "about 33 min 30 s on 2 threads: 100 % of it for 20,000 falls.\n"
+            "        Points that differ only in H, mu, e, k and eta2 share one fall; E with count "
+            "= 16: about 12 s");
 }
 
 TEST(StudyTime, NamesAllDrawnKeysOfFallsAndCountsTheValuesOfTheOthers) {
@@ -54,14 +55,14 @@ TEST(StudyTime, NamesAllDrawnKeysOfFallsAndCountsTheValuesOfTheOthers) {
               HasSubstr("; A, E with count = 8 each: about 23 s"));  // 128 falls
 }
 
-TEST(StudyTime, SaysNothingOfFallsWhereContactsTakeMostOfTheTime) {
+TEST(StudyTime, DoesNotMentionFallsIfContactsDominate) {
   const auto recipe = sample_of("H = 1\nE = { from = 6e10, to = 8e10, count = 21 }\n");
   EXPECT_EQ(time_in_words(kCost, size_of(20'000, 21), recipe), "about 13 s on 2 threads");
   EXPECT_EQ(time_in_words(kCost, size_of(1, 1), recipe), "about 1.6 s on 2 threads")
       << "nothing would be cheaper than one fall";
 }
 
-TEST(StudyTime, ProposesNoCountWhereNoKeyOfTheFallIsDrawn) {
+TEST(StudyTime, SuggestsNoCountIfNoKeyOfTheFallIsSampled) {
   const auto words = time_in_words(
       kCost, size_of(2'000, 2'000),
       sample_of(

@@ -1,4 +1,4 @@
-// Points looked at again, by the program itself: here, by a worker, and when neither can.
+// Points solved again by the program itself: in this process, by a worker, and when both fail.
 #include <algorithm>
 #include <csignal>
 #include <fstream>
@@ -22,7 +22,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// A study over models, with errors, and one by steps; both coarse, for they are solved here.
+/// A study over models with errors, and one with fixed steps; both on coarse meshes to save time.
 const std::map<std::string, const char*> kStudies{{"models", R"(name = "models"
 errors = true
 [model]
@@ -48,13 +48,13 @@ class TraceCommand : public testing::Test {
   test::Outcome run(const std::vector<std::string>& arguments) {
     return test::run_oblique(folder_, arguments);
   }
-  /// Has that study solved in oblique.db.
+  /// Solves that study in oblique.db.
   void solve_study(const std::string& name) {
     write_file(name);
     const auto outcome = run({"run", name + ".toml"});
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   }
-  /// Puts that study into oblique.db with no point solved.
+  /// Stores that study in oblique.db without results.
   void store_study(const std::string& name) {
     write_file(name);
     const Study study = parse_study(kStudies.at(name), name + ".toml", pretended_reach());
@@ -76,7 +76,7 @@ class TraceCommand : public testing::Test {
   }
 };
 
-TEST_F(TraceCommand, APointSolvedHereIsTheStoredOneWhateverStudyAndIntegratorItHas) {
+TEST_F(TraceCommand, APointSolvedInThisProcessEqualsTheStoredOne) {
   solve_study("models");
   solve_study("steps");
   for (const auto& [study, point] : {std::pair{"models", "0"}, {"models", "15"}, {"steps", "1"}}) {
@@ -112,7 +112,7 @@ TEST_F(TraceCommand, HasTheRowsOfSolve) {
   EXPECT_THAT(to_output.err, HasSubstr("contact ")) << "the summary";
 }
 
-TEST_F(TraceCommand, WhatIsNotThereOrCannotBeWrittenIsNamed) {
+TEST_F(TraceCommand, MissingPointsAndUnwritableFilesAreNamed) {
   store_study("models");
   const auto says = [&](std::vector<std::string> words, int exit_code, const char* sentence) {
     words.insert(words.begin(), "trace");
@@ -127,13 +127,13 @@ TEST_F(TraceCommand, WhatIsNotThereOrCannotBeWrittenIsNamed) {
   says({"models", "first"}, 2, "POINT");
   says({"models"}, 2, "POINT");
   says({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
-  says({"models", "0", "--out", "x.jsn"}, 2, "end its name in .csv");
+  says({"models", "0", "--out", "x.jsn"}, 2, "end the name in .csv");
   says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
   says({"models", "0", "--local", "--on-worker"}, 2, "--local");
   says({"models", "0", "--every", "0"}, 2, "--every");
 }
 
-TEST_F(TraceCommand, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers) {
+TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
   {
     server::Store store((folder_.path() / "oblique.db").string());
     const auto table = server::table_of(2);
@@ -152,7 +152,7 @@ TEST_F(TraceCommand, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers)
   }
   const auto outcome = run({"trace", "made-up", "0", "--out", "x.csv"});
   EXPECT_EQ(outcome.exit_code, 0) << "the trace is what was asked for";
-  EXPECT_THAT(outcome.err, HasSubstr("other than stored"));
+  EXPECT_THAT(outcome.err, HasSubstr("differs from the stored row"));
   EXPECT_THAT(outcome.err, HasSubstr("fn_peak_N"));
   EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now by "));
 
@@ -162,7 +162,7 @@ TEST_F(TraceCommand, ARowThatIsNotThePointsIsToldWithTheColumnsInWhichItDiffers)
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "failed.csv"));
 }
 
-TEST_F(TraceCommand, AWorkerSolvesForWhoAsksAServer) {
+TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   solve_study("models");
   const test::Server server(folder_, "oblique.db");
   const auto ask = [&](std::vector<std::string> words) {
@@ -192,7 +192,7 @@ TEST_F(TraceCommand, AWorkerSolvesForWhoAsksAServer) {
   }
   EXPECT_THAT(text_of("fall_here.csv"), testing::AllOf(StartsWith("t_s,"), HasSubstr(",falling,")));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
-  // Each 50th instant, the ends of phases and the last instant, whoever solves it.
+  // Rows of each 50th instant, the ends of phases and the last instant, whoever solves the point.
   const auto thinned = ask({"models", "3", "--every", "50"});
   EXPECT_EQ(thinned.out, ask({"models", "3", "--every", "50", "--local"}).out);
   const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
@@ -201,7 +201,7 @@ TEST_F(TraceCommand, AWorkerSolvesForWhoAsksAServer) {
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
   EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
-  // A study that is held back: its points are solved for those who look, and stored later.
+  // A paused study: its points are solved for a trace, and stored only later.
   std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"
 [model]
 elements_per_link = 12

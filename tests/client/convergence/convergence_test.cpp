@@ -54,7 +54,7 @@ TEST(Richardson, ErrorEstimateIsRightToLeadingOrderWhenAHigherTermIsPresent) {
   EXPECT_NEAR(found.order.value(), 2.0, 0.1);
 }
 
-TEST(Richardson, DoesNotBelieveALastDifferenceThatIsSmallByLuck) {
+TEST(Richardson, DoesNotTrustALastDifferenceThatIsSmallByChance) {
   // Differences 16 and 1e-6: an order of 24, which no method of order 2 has.
   const std::vector<double> values{0.0, 16.0, 16.000001};
   const auto found = extrapolate(values, 2.0, kNoRounding);
@@ -62,7 +62,7 @@ TEST(Richardson, DoesNotBelieveALastDifferenceThatIsSmallByLuck) {
   EXPECT_DOUBLE_EQ(found.error.value(), 16.0 / 4.0 / 3.0);
 }
 
-TEST(Richardson, ExtrapolatesNoValuesThatDoNotSettleMonotonically) {
+TEST(Richardson, ExtrapolatesOnlyMonotoneValues) {
   struct {
     std::vector<double> values;
     double resolution;
@@ -110,7 +110,7 @@ CaseResult with_sticks(const std::vector<solver::StickInterval>& sticks) {
   return result;
 }
 
-TEST(LonePairs, AreThoseWhoseLeavingOutBringsTheOthersClosest) {
+TEST(LonePairs, AreChosenToBringTheOtherTimesClosest) {
   using Pairs = std::vector<std::size_t>;
   EXPECT_EQ(lone_pairs({}, {}), Pairs{});
   EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0}, {1.1, 2.1, 3.1}), Pairs{});
@@ -122,13 +122,13 @@ TEST(LonePairs, AreThoseWhoseLeavingOutBringsTheOthersClosest) {
   EXPECT_EQ(lone_pairs({1.0, 4.0, 6.0, 8.0}, {4.0, 6.0}), Pairs{0}) << "never two single ones";
 }
 
-TEST(ContactChanges, AreNoneWhereOnlyTimesDiffer) {
+TEST(ContactChanges, AreNoneIfOnlyTimesDiffer) {
   EXPECT_TRUE(changes_between(with_turns({20, 50, 80}), with_turns({22, 57, 79})).empty());
   EXPECT_TRUE(
       changes_between(with_sticks({{1e-5, 2e-5}}), with_sticks({{1.2e-5, 2.2e-5}})).empty());
 }
 
-TEST(ContactChanges, FindWhatOneLevelHasAndTheOtherHasNot) {
+TEST(ContactChanges, FindEventsThatOnlyOneLevelHas) {
   auto ripple = with_turns({20, 50, 60});
   ripple.peaks[1].major = false;
   struct {
@@ -189,7 +189,7 @@ const OutputConvergence& named(const PointConvergence& point, const std::string&
                        [&](const auto& output) { return output.name == name; });
 }
 
-TEST(Outputs, HaveOneMajorPeakEachAndNoRipples) {
+TEST(Outputs, HaveOneOutputPerMajorPeakWithoutRipples) {
   auto result = second_order(0.0);
   result.peaks.insert(result.peaks.begin() + 1, {2e-5, 3900.0, 1900.0, false});
   std::vector<std::string> names;
@@ -204,7 +204,7 @@ TEST(Outputs, HaveOneMajorPeakEachAndNoRipples) {
                                              "vn_out_m_s", "reaction_0_N", "reaction_1_N"}));
 }
 
-TEST(Outputs, AreTheSameQuantityUpToWhereModesPart) {
+TEST(Outputs, AreTheSameQuantityUntilTheModesDiffer) {
   const auto outputs = outputs_of(second_order(0.0));
   const auto mode_of = [&](const std::string& name) {
     return std::find_if(outputs.begin(), outputs.end(),
@@ -231,7 +231,7 @@ TEST(Convergence, FindsOrderAndLimitOfEveryOutput) {
   }
 }
 
-TEST(Convergence, ComparesOnlyWhatHasTheSameModeBefore) {
+TEST(Convergence, ComparesOnlyOutputsWithTheSameModeBeforeThem) {
   // The coarsest mesh ends after one peak.
   auto coarsest = second_order(0.2);
   coarsest.major_mode = "SC SR sR";
@@ -246,7 +246,7 @@ TEST(Convergence, ComparesOnlyWhatHasTheSameModeBefore) {
   EXPECT_NEAR(named(point, "duration_s").extrapolation.order.value(), 2.0, 1e-6);
 }
 
-TEST(Convergence, IsDeniedWhereTheModeChangesOnTheFinestLevels) {
+TEST(Convergence, IsNotReachedIfTheModeChangesOnTheFinestLevels) {
   auto middle = second_order(0.05);
   middle.major_mode = "SC SR sR";
   middle.peaks.pop_back();
@@ -274,12 +274,12 @@ TEST(MeshLevels, DoubleTheMeshAndChooseStepsForEach) {
   EXPECT_EQ(mesh_levels(model, 2, 8)[2].model.dt_s, 1e-6) << "its steps do not depend on the mesh";
 }
 
-TEST(StepLevels, HalveBothStepsFromTheShortestTheModelTakes) {
+TEST(StepLevels, StartAtTheShortestStepOfTheModelAndHalveBothSteps) {
   const auto levels = step_levels({}, 0.2, 2);
   ASSERT_EQ(levels.size(), 3U);
   EXPECT_EQ(levels[1].name, "dt/2");
   EXPECT_DOUBLE_EQ(levels[1].model.dt_s, levels[0].model.dt_s / 2.0);
-  // Restitution at e* = 0.2 steps shorter than compression.
+  // Restitution at e* = 0.2 takes shorter steps than compression.
   EXPECT_LT(levels[0].model.dt_s, step_levels({}, 1.0, 2)[0].model.dt_s);
   solver::ModelParameters model = solver::preset("paper");
   model.dt_fall_s = 2e-6;
@@ -291,7 +291,7 @@ TEST(StepLevels, HalveBothStepsFromTheShortestTheModelTakes) {
   EXPECT_EQ(implicit[2].model.tolerance, model.tolerance);
 }
 
-TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
+TEST(StepLevels, ShareTheFallIfTheToleranceControlsItsSteps) {
   solver::ModelParameters model = solver::preset("paper");
   model.tolerance = 1e-4;
   const auto levels = step_levels(model, 1.0, 2);
@@ -307,15 +307,15 @@ TEST(StepLevels, ShareTheFallThatChoosesItsStepsByTheTolerance) {
   EXPECT_FALSE(exact_fall_level({"dt", model})) << "its step is halved";
 }
 
-TEST(FallSentence, NamesTheOutputThatTheFallMovesMost) {
+TEST(FallSentence, NamesTheOutputThatTheFallChangesMost) {
   Refinement step{.what = "step", .levels = {}, .convergence = {}};
   step.levels.push_back({.level = {"dt", {}}, .result = second_order(0.0), .wall_s = 0.0});
   SolvedLevel exact{.level = {"exact fall", {}}, .result = second_order(0.0), .wall_s = 0.0};
   exact.level.model.tolerance = 1e-6;
   exact.result.vt_out_m_s *= 1.0 + 1e-6;
   EXPECT_EQ(fall_sentence(step, exact),
-            "The fall, solved for 1e-05, changes outputs by 0.0001 % (vt_out_m_s) at most beside "
-            "one solved for 1e-06.\n");
+            "A fall solved for 1e-06 instead of 1e-05 changes outputs by at most 0.0001 % "
+            "(vt_out_m_s).\n");
   EXPECT_EQ(json_of_fall(step, exact)["same_mode"], true);
   exact.result.major_mode = "sC sR";
   EXPECT_NE(fall_sentence(step, exact).find("gives another"), std::string::npos);
@@ -332,7 +332,7 @@ TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
       "step",
       solve_levels(step_levels(model, 1.0, 2), {1.0, 0.4, 1.0}, line, [](const SolvedLevel&) {}));
   EXPECT_TRUE(converges(refinement));
-  // The exit speed converges last and is far above rounding; 3.8 is what is asked of the method.
+  // The exit speed converges last and is far above rounding; the order must be at least 3.8.
   const auto& vn_out = named(refinement.convergence, "vn_out_m_s");
   EXPECT_GT(vn_out.extrapolation.order.value(), 3.8);
   EXPECT_LT(vn_out.extrapolation.error.value(), 1e-5);
@@ -364,7 +364,7 @@ TEST(Verdict, GivesTheLargestErrorsOfThePointThatConverges) {
   EXPECT_NE(text.find("on dt/1: 1 %"), std::string::npos) << text;
 }
 
-TEST(Verdict, BlamesTheEventThatComesAndGoes) {
+TEST(Verdict, NamesTheEventThatOnlySomeLevelsHave) {
   auto finest = second_order(0.025);
   finest.major_mode = "SC SR sR sC sR sC sR";
   using solver::PhaseKind;
@@ -380,9 +380,9 @@ TEST(Verdict, BlamesTheEventThatComesAndGoes) {
   const auto refinement = refinement_with({coarsest, middle, finest});
   EXPECT_FALSE(converges(refinement));
   EXPECT_NE(shown(refinement)
-                .find("The step does not converge by dt/4: the mode is not one on the finest three "
+                .find("The step does not converge by dt/4: the mode differs on the finest three "
                       "levels; to blame: dt/4 has a compression of 1 us, from 200.00 to 201.00 us "
-                      "(V_n grazes 0); dt/2 has not."),
+                      "(V_n grazes 0); dt/2 does not."),
             std::string::npos)
       << shown(refinement);
   const auto json = json_of(refinement);
@@ -397,7 +397,8 @@ TEST(Verdict, NamesOutputsThatGoOnChangingByMoreThanAThousandthOfTheirScale) {
   finest.vt_out_m_s = -3.0;
   const auto refinement = refinement_with({second_order(0.1), second_order(0.05), finest});
   EXPECT_FALSE(converges(refinement));
-  EXPECT_NE(shown(refinement).find("the mode settles, but not vt_out_m_s"), std::string::npos)
+  EXPECT_NE(shown(refinement).find("the mode settles, but these outputs do not: vt_out_m_s"),
+            std::string::npos)
       << shown(refinement);
   auto coarsest = second_order(0.1);
   auto middle = second_order(0.05);

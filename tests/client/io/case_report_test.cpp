@@ -28,7 +28,7 @@ solver::CaseResult some_result() {
   return result;
 }
 
-TEST(SolveJson, HasExactlyTheFieldsThatAreDocumented) {
+TEST(SolveJson, HasExactlyTheDocumentedFields) {
   std::string names;
   const auto json = json_of(some_result());
   for (const auto& [name, value] : json.items()) {
@@ -42,7 +42,7 @@ TEST(SolveJson, HasExactlyTheFieldsThatAreDocumented) {
             "stick_intervals_s phases reaction_peaks energy errors solver ");
 }
 
-TEST(SolveJson, HasListsOfAllPeaksAndReactionsAndNullForWhatAResultLacks) {
+TEST(SolveJson, HasListsOfPeaksAndReactionsAndNullForMissingValues) {
   auto result = some_result();
   result.reaction_peaks = {{2e-5, 900.0}, {3e-5, 1800.0}};
   const auto json = json_of(result);
@@ -65,7 +65,7 @@ std::string summary_of(const solver::CaseResult& result) {
   return out.str();
 }
 
-TEST(Summary, SaysHowNearAnotherModeIsAndWhenThatIsTooNear) {
+TEST(Summary, ShowsTheMarginAndWarnsOfASmallOne) {
   auto result = some_result();
   EXPECT_THAT(summary_of(result), Not(HasSubstr("margin")));
   result.margin_event = "turn";
@@ -73,8 +73,7 @@ TEST(Summary, SaysHowNearAnotherModeIsAndWhenThatIsTooNear) {
   EXPECT_THAT(summary_of(result),
               HasSubstr("margin      0.036 (0 fragile, 1 safe), closest event: turn\n"));
   result.margin = 3e-7;
-  EXPECT_THAT(summary_of(result),
-              HasSubstr("closest event: turn; the mode is not to be trusted\n"));
+  EXPECT_THAT(summary_of(result), HasSubstr("closest event: turn; the mode is not reliable\n"));
 }
 
 TEST(Summary, MarksRipplesAndNeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) {
@@ -90,7 +89,7 @@ TEST(Summary, MarksRipplesAndNeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) 
   EXPECT_THAT(text, HasSubstr("123 ms"));
 }
 
-TEST(Summary, HasErrorsWhereTheyWereEstimated) {
+TEST(Summary, HasErrorsIfTheyWereEstimated) {
   auto result = some_result();
   EXPECT_THAT(summary_of(result), Not(HasSubstr("errors")));
   result.errors.mode_same = 0;

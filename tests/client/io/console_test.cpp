@@ -8,7 +8,7 @@
 namespace oblique::client {
 namespace {
 
-/// Everything that a command may write, at that verbosity.
+/// All output that a command can write at a verbosity.
 std::string written_at(Verbosity verbosity) {
   std::ostringstream out;
   std::ostringstream err;
@@ -29,7 +29,7 @@ TEST(Console, WritesWhatTheVerbosityAllows) {
   EXPECT_EQ(written_at(Verbosity::kVerbose), "progress\nnote\ndetail\noblique query: wrong\n");
 }
 
-TEST(Console, MakesControlCharactersVisibleAndColoursErrorsOnlyWhereThatIsAllowed) {
+TEST(Console, MakesControlCharactersVisibleAndColoursErrorsOnlyIfAllowed) {
   std::ostringstream out;
   std::ostringstream err;
   Console console(out, err, {.is_terminal = true, .has_colours = true});
@@ -38,7 +38,7 @@ TEST(Console, MakesControlCharactersVisibleAndColoursErrorsOnlyWhereThatIsAllowe
   EXPECT_EQ(err.str(), "a\\x1b[2J\\nb\n\x1b[1;31moblique:\x1b[0m c\\x1b\nd\n");
 }
 
-TEST(Units, AreThoseThatFit) {
+TEST(Units, AreChosenToFit) {
   EXPECT_EQ(format_duration(0.42), "0.4 s");
   EXPECT_EQ(format_duration(185), "3 min 05 s");
   EXPECT_EQ(format_duration(7800), "2 h 10 min");

@@ -30,13 +30,13 @@ TEST(Progress, ShowsRateAndTimeLeftInTheBar) {
             "paper [###############---------------] 5/10 50 %, 1 failed, 2 points/s, 2.5 s left");
 }
 
-TEST(Progress, HasNoUnknownRateAndCallsNoUnfinishedStudyFinished) {
+TEST(Progress, ShowsNoUnknownRateAndNo100PercentBeforeTheEnd) {
   EXPECT_THAT(progress_line({.study = "s", .points = 100000, .completed = 99999}),
               HasSubstr("(99 %)"));
   EXPECT_EQ(progress_line({.study = "paper", .points = 10}), "paper: 0 of 10 points (0 %)");
 }
 
-TEST(Progress, DrawsPlainLinesNowAndThenWhereThereIsNoTerminal) {
+TEST(Progress, DrawsPlainLinesWithoutATerminal) {
   std::ostringstream out;
   Console console(out, out);
   Progress progress(console);
@@ -87,7 +87,7 @@ TEST(Progress, FollowsTheRateOfTheLastSeconds) {
   EXPECT_THAT(bar.at(611.0, 2161), HasSubstr(" 100 points/s, 28 s left"));
 }
 
-TEST(Progress, KeepsToTheWidthOfTheTerminalTheBarFirst) {
+TEST(Progress, ShortensTheBarFirstToFitTheTerminal) {
   const ProgressState state{.study = "abc\u00e9",
                             .points = 1'000'000,
                             .completed = 500'000,
@@ -134,7 +134,7 @@ class StatusLineTest : public testing::Test {
   Console terminal_{out_, err_, {.is_terminal = true, .columns = [this] { return columns_; }}};
 };
 
-/// A description of a part that counts how often it was drawn.
+/// A description that counts how often it is drawn.
 class Description {
  public:
   explicit Description(std::string what) : what_(std::move(what)) {}
@@ -155,7 +155,7 @@ class Description {
   std::atomic<int> drawn_{0};
 };
 
-/// What a terminal shows at the end of what was written to it.
+/// The final screen of a terminal after this output.
 std::string on_screen(const std::string& written) {
   std::string screen;
   std::string line;
@@ -164,7 +164,7 @@ std::string on_screen(const std::string& written) {
       screen += line + '\n';
       line.clear();
     } else if (written[i] == '\r') {
-      line.clear();  // every drawing begins with this, and clears the rest
+      line.clear();  // every drawing begins with this and erases the rest
     } else if (written.compare(i, 3, "\x1b[K") == 0) {
       i += 2;
     } else {
@@ -174,7 +174,7 @@ std::string on_screen(const std::string& written) {
   return screen + line;
 }
 
-TEST_F(StatusLineTest, ShowsThePartsUnderWayAndLeavesNothingBehind) {
+TEST_F(StatusLineTest, ShowsActivePartsAndErasesItself) {
   {
     StatusLine line(terminal_, kAtOnce);
     Description fine("n = 32: fall 0.3 of 1.2 m");
@@ -188,7 +188,7 @@ TEST_F(StatusLineTest, ShowsThePartsUnderWayAndLeavesNothingBehind) {
   EXPECT_EQ(out_.str(), "");
 }
 
-TEST_F(StatusLineTest, IsNotDrawnWithoutATerminalNorWhereThatIsUsedOtherwise) {
+TEST_F(StatusLineTest, IsNotDrawnWithoutAFreeTerminal) {
   Console file(out_, err_);
   const auto refuse = []() -> std::string { throw std::logic_error("drawn"); };
   {
@@ -221,7 +221,7 @@ TEST_F(StatusLineTest, StaysWithinTheTerminalsWidth) {
   EXPECT_THAT(err_.str(), Not(HasSubstr("fall")));
 }
 
-TEST_F(StatusLineTest, LinesThatArePrintedStayAndAnEndedPartIsErasedAtOnce) {
+TEST_F(StatusLineTest, KeepsPrintedLinesAndErasesAnEndedPartAtOnce) {
   StatusLine line(terminal_, kAtOnce);
   {
     Description contact("n = 32: contact");

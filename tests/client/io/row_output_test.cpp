@@ -1,4 +1,4 @@
-// Where rows go: files that appear when they are whole.
+// Destinations of rows: files that are written atomically.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -57,7 +57,7 @@ class RowOutputTest : public testing::Test {
   std::string file_ = folder_.file("rows.csv");
 };
 
-TEST_F(RowOutputTest, AFileAppearsWhenItIsFinishedOnly) {
+TEST_F(RowOutputTest, AFileAppearsOnlyWhenItIsFinished) {
   std::ofstream(file_) << "of before";
   {
     RowOutput out({.format = Format::kCsv, .file = file_});
@@ -73,7 +73,7 @@ TEST_F(RowOutputTest, AFileAppearsWhenItIsFinishedOnly) {
   EXPECT_EQ(files(), 1U);
 }
 
-TEST_F(RowOutputTest, ALinkStaysAndWhatItLeadsToIsTheFile) {
+TEST_F(RowOutputTest, ALinkStaysAndItsTargetIsReplaced) {
   namespace fs = std::filesystem;
   const std::string link = folder_.file("link.csv");
   for (const std::string target : {"target.csv", "not there yet.csv"}) {
@@ -102,10 +102,10 @@ TEST_F(RowOutputTest, ALinkToADeviceOrInACircleIsNotReplaced) {
   EXPECT_THROW(write(circle), solver::InputError);
 }
 
-TEST_F(RowOutputTest, WhatIsOpenAlreadyIsWrittenBehindWhatStandsThere) {
+TEST_F(RowOutputTest, AnOpenFileIsAppendedTo) {
   const int open_file = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   ASSERT_EQ(::write(open_file, "b\n", 2), 2);
-  const std::string link = folder_.file("stdout");  // as /dev/stdout is one
+  const std::string link = folder_.file("stdout");  // as for /dev/stdout
   std::filesystem::create_symlink("/proc/self/fd/" + std::to_string(open_file), link);
   write(link);
   write(link, Format::kJsonLines);
@@ -115,7 +115,7 @@ TEST_F(RowOutputTest, WhatIsOpenAlreadyIsWrittenBehindWhatStandsThere) {
   close(open_file);
 }
 
-TEST_F(RowOutputTest, NothingIsLeftOfAFileWhoseProgramIsKilled) {
+TEST_F(RowOutputTest, AKilledProgramLeavesNoFile) {
   const pid_t child = fork();
   if (child == 0) {
     RowOutput out({.format = Format::kCsv, .file = file_});
@@ -128,7 +128,7 @@ TEST_F(RowOutputTest, NothingIsLeftOfAFileWhoseProgramIsKilled) {
   EXPECT_EQ(files(), 0U);
 }
 
-TEST_F(RowOutputTest, TheFormatIsWhatTheFlagOrTheEndOfTheNameSays) {
+TEST_F(RowOutputTest, TheFormatFollowsFromTheFlagOrTheEnding) {
   EXPECT_EQ(format_of_output("", ""), Format::kTable);
   EXPECT_EQ(format_of_output("", "/dev/null"), Format::kTable);
   EXPECT_EQ(format_of_output("", "", kCsvAndJson, Format::kCsv), Format::kCsv);
@@ -146,15 +146,15 @@ TEST_F(RowOutputTest, TheFormatIsWhatTheFlagOrTheEndOfTheNameSays) {
     }
   };
   for (const char* file : {"x.txt", "x", "x.table", "x.npz"}) {
-    EXPECT_THAT(refusal("", file), testing::HasSubstr(".csv, .json or .jsonl, or give"));
+    EXPECT_THAT(refusal("", file), testing::HasSubstr(".csv, .json or .jsonl, or add"));
   }
-  EXPECT_THAT(refusal("", "x.jsonl", kCsvAndJson), testing::HasSubstr(".csv or .json, or give"));
+  EXPECT_THAT(refusal("", "x.jsonl", kCsvAndJson), testing::HasSubstr(".csv or .json, or add"));
   EXPECT_THAT(refusal("jsn", ""), testing::HasSubstr("did you mean `json`?"));
   EXPECT_THAT(refusal("csv", "x.json"), testing::HasSubstr("contradict each other"));
   EXPECT_THAT(refusal("table", "x.csv"), testing::HasSubstr("contradict each other"));
 }
 
-TEST_F(RowOutputTest, AFolderOrAFileThatCannotBeMadeIsWrongUsage) {
+TEST_F(RowOutputTest, AFolderOrAFileThatCannotBeCreatedIsWrongUsage) {
   EXPECT_THROW(write(folder_.path().string()), solver::InputError);
   EXPECT_THROW(write(folder_.file("no/such.csv")), solver::InputError);
 }
@@ -163,7 +163,7 @@ TEST_F(RowOutputTest, AFullDiskIsAnErrorAndNoFile) {
   EXPECT_THROW(write("/dev/full"), std::runtime_error);
 }
 
-TEST_F(RowOutputTest, APipeThatNobodyReadsIsNoFailureWithWordsOfItsOwn) {
+TEST_F(RowOutputTest, AClosedPipeIsNoFailure) {
   const std::string pipe = folder_.file("pipe");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);

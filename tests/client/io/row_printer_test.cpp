@@ -38,7 +38,7 @@ protocol::QueryReply points(std::int64_t from, std::int64_t to) {
   return chunk_of({"point", "H"}, rows);
 }
 
-TEST(Formats, PrintTheSameWhateverTheChunks) {
+TEST(Formats, DoNotDependOnTheChunks) {
   const auto whole = points(0, 100);
   const std::vector parts{points(0, 1), points(1, 1), points(1, 60), points(60, 100)};
   for (const Format format : {Format::kTable, Format::kCsv, Format::kJson, Format::kJsonLines}) {
@@ -46,7 +46,7 @@ TEST(Formats, PrintTheSameWhateverTheChunks) {
   }
 }
 
-TEST(Formats, OfNoRowsHaveWhatTheyMustHave) {
+TEST(Formats, AreValidWithoutRows) {
   const std::vector none{chunk_of({"a", "b"}, {})};
   EXPECT_EQ(printed(Format::kTable, none), "a  b\n-  -\n");
   EXPECT_EQ(printed(Format::kCsv, none), "a,b\n");
@@ -62,14 +62,14 @@ TEST(JsonLines, HaveAnObjectALine) {
       "{\"n\":null,\"x\":1e-300,\"s\":\"\\\"\"}\n");
 }
 
-/// The value of a column with that text in JSON.
+/// The JSON value of a column with that text.
 std::string json_value(const std::string& column, const std::string& text) {
   const std::string line = printed(Format::kJsonLines, {chunk_of({column}, {{text}})});
   const std::size_t begin = column.size() + 4;
   return line.substr(begin, line.size() - begin - 2);
 }
 
-TEST(Json, HasListsOfColumnsAsSolveJsonHasThem) {
+TEST(Json, HasListsAsInSolveJson) {
   for (const auto& [column, text, json] : std::vector<std::array<std::string, 3>>{
            {"phases", R"([["compression",0.0,1e-05]])",
             R"([{"kind":"compression","t0_s":0.0,"t1_s":1e-05}])"},
@@ -84,7 +84,7 @@ TEST(Json, HasListsOfColumnsAsSolveJsonHasThem) {
   }
 }
 
-TEST(Json, LeavesATextAloneThatIsNoSuchList) {
+TEST(Json, KeepsATextThatIsNoList) {
   const std::string deep(1000000, '[');
   for (const std::string& text :
        {std::string(), std::string("[1,2"), std::string("17"), std::string("{}"),
@@ -146,7 +146,7 @@ TEST(Table, FitsATerminalAndSaysWhatItLeavesOut) {
             "point  error         a_long_heading  …\n"
             "-----  ------------  --------------\n"
             "    1  µµµµµµµµµµµ…             0.5\n"
-            "Left out, for a width of 40 (csv and\njson have all): last\n");
+            "Left out to fit 40 columns (csv and json\nhave all): last\n");
   settings.width = 3;
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr("    1\n"))
       << "a column stays, however narrow the terminal";

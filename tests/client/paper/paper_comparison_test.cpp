@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-// Two cases: one with two peaks, two phases and a stick time, one with nothing to count.
+// Two cases: one with two peaks, two phases and a stick time, one without numbers.
 PublishedTable small_table() {
   PublishedCase counted;
   counted.H_m = 1.0;
@@ -49,7 +49,7 @@ protocol::Table rows_of_point(double H_m, double mu, const std::string& peaks = 
   return rows;
 }
 
-TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
+TEST(Comparison, ComparesMajorPeaksPhasesAndStickWithThePaper) {
   const auto table = small_table();
   const auto rows = rows_of_point(1.0, 1.2);
   const auto differences = compare(table, own_cases(table, rows));
@@ -65,7 +65,7 @@ TEST(Comparison, PutsMajorPeaksPhasesAndStickBesideWhatIsPublished) {
   EXPECT_NEAR(summary.rms_percent, std::sqrt((1.0 + 1.0 + 100.0) / 7.0), 1e-9);
 }
 
-TEST(Comparison, LeavesOutPhasesOfARowFromTheFirstRippleOn) {
+TEST(Comparison, IgnoresPhasesOfARowFromTheFirstRippleOn) {
   const auto table = small_table();
   const auto rows =
       rows_of_point(1.0, 1.2, "[[1e-5,4040,2020,1],[2e-5,4000,2000,0],[3e-5,1000,500,1]]");
@@ -85,7 +85,7 @@ TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
   EXPECT_EQ(own_case(result).phases_ms, (std::vector<double>{1e3, 2e3, 6e3, 7e3}));
 }
 
-TEST(Comparison, HasARowForEachNumberAndCountsWhatWeDoNotHaveAsMissing) {
+TEST(Comparison, HasARowForEachNumberAndCountsMissingOnes) {
   const auto table = small_table();
   const auto differences = compare(table, own_cases(table, {}));
   EXPECT_EQ(summary_of(differences).counted, 0U);
@@ -95,7 +95,7 @@ TEST(Comparison, HasARowForEachNumberAndCountsWhatWeDoNotHaveAsMissing) {
   EXPECT_EQ(rows.rows[0].size(), rows.columns.size());
 }
 
-TEST(Comparison, RefusesAStudyWithSeveralAnswersToOneCase) {
+TEST(Comparison, RefusesAStudyWithSeveralPointsForOneCase) {
   auto rows = rows_of_point(1.0, 1.2);
   rows.rows.push_back(rows.rows.front());
   EXPECT_THROW(own_cases(small_table(), rows), std::runtime_error);
@@ -109,13 +109,13 @@ TEST(Comparison, IsPrintedWithDifferencesSummaryAndMisprints) {
   const auto text = out.str();
   for (const char* part :
        {"4.040 / 4.00 / +1.00", "0.1100 / 0.100 / +10.00", "not solved", "the same",
-        "7 trustworthy published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
+        "7 reliable published numbers", "largest 10.00 % (time in stick at H = 1, mu = 1.2",
         "The mode is the published one in 1 of 1 cases", "column 3: 7.0 kN", "it is column 2"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
   }
 }
 
-TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
+TEST(Comparison, ListsCasesWhoseModeDiffersFromThePublishedOne) {
   auto table = small_table();
   table.cases[0].mode = "sC sR";
   std::ostringstream out;
@@ -127,7 +127,7 @@ TEST(Comparison, SaysPlainlyWhereTheModeIsNotThePublishedOne) {
   }
 }
 
-TEST(PublishedTable, HoldsTheSixtyThreeTrustworthyNumbers) {
+TEST(PublishedTable, Contains63ReliableNumbers) {
   std::size_t fn = 0;
   std::size_t ft = 0;
   std::size_t phases = 0;
@@ -144,7 +144,7 @@ TEST(PublishedTable, HoldsTheSixtyThreeTrustworthyNumbers) {
   EXPECT_EQ(sticks, 3U);
 }
 
-TEST(PublishedTable, HasTheCasesOfTheExampleStudyInItsOrder) {
+TEST(PublishedTable, HasTheCasesOfTheExampleStudyInTheSameOrder) {
   const auto published = published_table().cases;
   std::ostringstream dropped;
   Console console(dropped, dropped);

@@ -1,4 +1,4 @@
-// The paper's figures as we draw them.
+// The paper's figures, drawn with our results.
 #include "client/paper/paper_figures.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ const std::vector<PaperFigure>& figures() {
   return all;
 }
 
-/// The diamonds of a panel; none where nothing is published.
+/// The diamonds of a panel; empty if nothing is published.
 plot::Curve published_in(const plot::Panel& panel) {
   return panel.curves.back().mark == plot::Curve::Mark::kDiamonds ? panel.curves.back()
                                                                   : plot::Curve{};
@@ -34,7 +34,8 @@ std::size_t published_in(const PaperFigure& figure) {
   return count;
 }
 
-/// The nearest that a line of the panel comes to the point, as a share of its height.
+/// The smallest distance between a line of the panel and the point, as a share of the panel's
+/// height.
 double nearest_share(const plot::Panel& panel, double x, double y) {
   double nearest = 1e9;
   for (const auto& curve : panel.curves) {
@@ -47,7 +48,7 @@ double nearest_share(const plot::Panel& panel, double x, double y) {
   return nearest;
 }
 
-TEST(PaperFigures, AreThreeToSevenWithTheGroupsOfThePaper) {
+TEST(PaperFigures, AreFigures3To7WithTheGroupsOfThePaper) {
   ASSERT_EQ(figures().size(), 5U);
   const std::vector<std::pair<std::string, std::size_t>> expected{{"fig3_hysteresis", 3},
                                                                   {"fig4_forces", 8},
@@ -68,7 +69,7 @@ TEST(PaperFigures, MarkEveryPublishedNumberOfTheirGroups) {
   EXPECT_EQ(published_in(figures()[4]), 0U);   // nothing is published
 }
 
-TEST(PaperFigures, PublishedForcesLieOnOurLines) {
+TEST(PaperFigures, PublishedForcesAreOnOurCurves) {
   for (const auto& panel : figures()[1].figure.panels) {
     const auto published = published_in(panel);
     for (std::size_t i = 0; i < published.x.size(); ++i) {

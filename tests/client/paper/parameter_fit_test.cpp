@@ -11,7 +11,7 @@
 namespace oblique::client {
 namespace {
 
-TEST(ParameterFit, OfWhatThePaperDoesNotPrintEndsWithinOnePercentOfThePreset) {
+TEST(ParameterFit, EndsWithinOnePercentOfThePresetPaper) {
   std::vector<FitStep> steps;
   const auto end = fit_parameters(published_table(), solver::preset("printed"),
                                   [&](const FitStep& step) { steps.push_back(step); });
@@ -22,7 +22,7 @@ TEST(ParameterFit, OfWhatThePaperDoesNotPrintEndsWithinOnePercentOfThePreset) {
   }
   EXPECT_EQ(end.differences.size(), 63U);
   EXPECT_EQ(end.summary.missing, 0U);
-  // The numbers are printed with two or three digits: 0.6 % rms is what their rounding leaves.
+  // The numbers are printed with two or three digits; their rounding alone gives 0.6 % rms.
   EXPECT_LT(end.summary.rms_percent, 0.6);
   ASSERT_GT(steps.size(), 1U);
   EXPECT_EQ(steps.front().iteration, 0);

@@ -23,7 +23,7 @@ inline Panel panel_over_mu_and_H() {
   return panel;
 }
 
-/// Cells n by m, all solved, with the values 0, 1, 2, ...
+/// n by m cells, all solved, with the values 0, 1, 2, ...
 inline Cells counted_cells(std::size_t columns, std::size_t rows) {
   const auto along = [](double from, double step, std::size_t count) {
     return cells_between({.range = {from, from + step * static_cast<double>(count)}}, count);
@@ -52,8 +52,7 @@ inline Figure map_of(Cells cells) {
   return figure;
 }
 
-/// A map of numbers with a cell that is not solved, one that is left out, one that failed and one
-/// without a value.
+/// A map of numbers with one unsolved, one excluded and one failed cell, and one without a value.
 inline Figure gappy_map() {
   Cells cells = counted_cells(6, 4);
   const std::vector<std::pair<std::size_t, CellState>> gaps{{3, CellState::kNoResult},
@@ -67,7 +66,7 @@ inline Figure gappy_map() {
   return map_of(std::move(cells));
 }
 
-/// A map of three categories, the last of which stands for others, with one cell not solved.
+/// A map of three categories, the last of which is for others, with one unsolved cell.
 inline Figure category_map(const std::string& name = "SC sR") {
   Cells cells = counted_cells(30, 20);
   for (std::size_t i = 0; i < cells.values.size(); ++i) {
@@ -131,7 +130,7 @@ inline Figure named_bars(const std::string& name = "SC sR") {
   return figure_with(std::move(panel));
 }
 
-/// Two panels as of a point: with spans, curves with a gap, published numbers, and one scale.
+/// Two panels as for a point: spans, curves with a gap, published numbers, and one scale.
 inline Figure panels() {
   Panel forces;
   forces.title = "Forces";

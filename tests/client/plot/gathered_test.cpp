@@ -1,4 +1,4 @@
-// Rows of answers gathered in cells and lines.
+// Rows of answers grouped in cells and lines.
 #include "client/plot/figure.h"
 
 #include <cmath>
@@ -27,7 +27,7 @@ AnswerColumn numbers(std::vector<double> values) {
   return {.name = "v", .unit = {}, .numbers = std::move(values)};
 }
 
-/// Of one text a row; empty: none.
+/// One text per row; empty: none.
 AnswerColumn texts(const std::vector<std::string>& values) {
   AnswerColumn column{.name = "t", .unit = {}};
   for (const auto& value : values) {
@@ -37,7 +37,7 @@ AnswerColumn texts(const std::vector<std::string>& values) {
   return column;
 }
 
-/// Chunks that were made before.
+/// A stream of prepared chunks.
 class Chunks : public RowStream {
  public:
   explicit Chunks(std::vector<protocol::QueryReply> chunks) : chunks_(std::move(chunks)) {
@@ -50,7 +50,7 @@ class Chunks : public RowStream {
   std::size_t next_ = 0;
 };
 
-TEST(Answers, AreTheSameWhateverTheChunks) {
+TEST(Answers, DoNotDependOnTheChunks) {
   std::vector<protocol::QueryReply> chunks;
   protocol::Table table{.columns = {"mu", "mode"}};
   table.rows = {{0.1, {}}};
@@ -74,7 +74,7 @@ TEST(Answers, AreTheSameWhateverTheChunks) {
               ElementsAre(AnswerColumn::kNoWord, 0U, 1U, AnswerColumn::kNoWord, 0U));
 }
 
-TEST(Cells, OfAGridAreWhereTheirValuesAreAndUnsolvedOnesSaySo) {
+TEST(Cells, OfAGridFollowItsValuesAndMarkUnsolvedOnes) {
   const Answer answer{numbers({1, 2, 1, 2, 2}), numbers({10, 10, 20, 20, 20}),
                       numbers({5, kNone, 7, kNone, kNone}),
                       texts({"solved", "failed", "solved", "solved", "solved"})};
@@ -89,7 +89,7 @@ TEST(Cells, OfAGridAreWhereTheirValuesAreAndUnsolvedOnesSaySo) {
   EXPECT_EQ(gathered.most_in_a_cell, 1U);
 }
 
-TEST(Cells, WithSeveralPointsHaveTheirMean) {
+TEST(Cells, WithSeveralPointsHaveTheMean) {
   const Answer answer{numbers({1, 1, 1}), numbers({1, 1, 1}), numbers({1, 3, kNone}),
                       texts({"solved", "solved", "failed"})};
   const auto gathered = gathered_in(answer, cells_around({1}, false), cells_around({1}, false));
@@ -98,7 +98,7 @@ TEST(Cells, WithSeveralPointsHaveTheirMean) {
   EXPECT_EQ(gathered.cells.states[0], CellState::kSolved);
 }
 
-TEST(Cells, OfTextsHaveThatOfMostOfTheirPointsAndCountThePointsOfEach) {
+TEST(Cells, OfTextsHaveTheMostFrequentTextAndCounts) {
   const Answer answer{numbers({1, 1, 1, 1, 2, 2, 3, 4}), numbers({1, 1, 1, 1, 1, 1, 1, 1}),
                       texts({"rare", "SC", "", "SC", "SC", "rare", "SC", ""}),
                       texts(std::vector<std::string>(8, "solved"))};
@@ -111,7 +111,7 @@ TEST(Cells, OfTextsHaveThatOfMostOfTheirPointsAndCountThePointsOfEach) {
   EXPECT_THAT(gathered.points_of_name, ElementsAre(Pair("SC", 4U), Pair("rare", 2U)));
 }
 
-TEST(Cells, OfEqualSizeHoldAllScatteredPointsThoseAtTheEndsIncluded) {
+TEST(Cells, OfEqualSizeContainAllScatteredPoints) {
   std::vector<double> xs;
   std::vector<double> ys;
   for (int i = 0; i < 1000; ++i) {
@@ -132,7 +132,7 @@ TEST(AxisValues, AreThoseOfTheStudyAndOthersThatRowsHave) {
       << "the same value, computed by another machine";
 }
 
-TEST(GatheredLines, RiseAndHaveGapsWherePointsFailedOrAreNotSolvedYet) {
+TEST(GatheredLines, AreSortedAndHaveGapsForFailedAndUnsolvedPoints) {
   const Answer answer{numbers({4, 1, 2, 1, 4}), numbers({40, 10, kNone, 1, 4}),
                       numbers({0.5, 0.5, 0.5, 1, 1})};
   const auto gathered = gathered_lines(answer, {1, 2, 3, 4, 5});
@@ -144,7 +144,7 @@ TEST(GatheredLines, RiseAndHaveGapsWherePointsFailedOrAreNotSolvedYet) {
   EXPECT_EQ(gathered.most_at_a_place, 1U);
 }
 
-TEST(GatheredLines, OfSeveralPointsAtAPlaceHaveTheirMean) {
+TEST(GatheredLines, OfSeveralPointsAtOnePlaceHaveTheMean) {
   const auto gathered = gathered_lines({numbers({1, 1, 2}), numbers({2, 4, 7})}, {});
   ASSERT_EQ(gathered.curves.size(), 1U);
   EXPECT_THAT(gathered.curves[0].y, ElementsAre(3, 7));

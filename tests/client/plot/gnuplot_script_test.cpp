@@ -1,4 +1,4 @@
-// Figures as scripts for gnuplot, what gnuplot makes of them, and figures as CSV.
+// Figures as gnuplot scripts, gnuplot's pictures of them, and figures as CSV.
 #include "client/plot/picture_file.h"
 
 #include <algorithm>
@@ -51,8 +51,8 @@ std::vector<std::pair<std::string, Figure>> all_figures() {
 
 TEST(GnuplotScript, OfALineIsShortAndReadable) {
   const auto text = script_of(test::lines_of(1, 2), PictureFormat::kSvg, {400, 300}, "picture.svg");
-  EXPECT_THAT(text, StartsWith(R"(# A picture by `oblique plot`, for gnuplot 5.4 or later.
-# Run it with `gnuplot`; for PDF or PNG set terminal pdfcairo or pngcairo instead.
+  EXPECT_THAT(text, StartsWith(R"(# A picture made by `oblique plot`, for gnuplot 5.4 or later.
+# Run it with `gnuplot`; for PDF or PNG set the terminal to pdfcairo or pngcairo.
 set terminal svg size 400,300 font 'DejaVu Sans,12' background '#ffffff'
 set output 'picture.svg'
 )"));
@@ -80,7 +80,7 @@ plot $data1 using 1:2 with linespoints ls 1 notitle
 )"));
 }
 
-TEST(GnuplotScript, LeavesTextsFromOutsideAsTheyAre) {
+TEST(GnuplotScript, DoesNotChangeTextsFromOutside) {
   EXPECT_EQ(gnuplot_text("it's\n`rm` \"x\" $y"), "'it\u2019s\\n`rm` \"x\" $y'");
   Figure figure = test::lines_of(1, 2);
   figure.title = "a_b^c {x} `rm` it's";
@@ -88,9 +88,9 @@ TEST(GnuplotScript, LeavesTextsFromOutsideAsTheyAre) {
   EXPECT_THAT(script(test::named_bars("100 % a_b")), HasSubstr("('100 %% a_b' 0, "));
 }
 
-TEST(GnuplotScript, TellsCellsWithoutAValueApart) {
+TEST(GnuplotScript, DistinguishesCellsWithoutAValue) {
   const auto text = script(test::gappy_map());
-  EXPECT_THAT(text, AllOf(HasSubstr("'no result (1)'"), HasSubstr("'left out by --where (1)'"),
+  EXPECT_THAT(text, AllOf(HasSubstr("'no result (1)'"), HasSubstr("'excluded by --where (1)'"),
                           HasSubstr("'failed (1)'")));
   for (const char* number : {"0", "1", "2"}) {
     EXPECT_THAT(text, HasSubstr("using ($7==" + std::string(number) +
@@ -107,7 +107,7 @@ TEST(GnuplotScript, OfCategoriesHasPatternsLettersBordersAndPercentages) {
   EXPECT_THAT(text, HasSubstr("# Borders of categories: x y dx dy\n"));
 }
 
-TEST(GnuplotScript, OfCategoriesLikeNoiseHasColoursAlone) {
+TEST(GnuplotScript, OfCategoriesLikeNoiseHasOnlyColours) {
   Figure figure = test::category_map();
   for (std::size_t i = 0; i < figure.panels[0].cells->values.size(); ++i) {
     figure.panels[0].cells->values[i] = static_cast<double>((i % 30 * 7 + i / 30 * 11) % 3);
@@ -165,7 +165,7 @@ TEST(GnuplotScript, IsDrawnByGnuplotInEveryFormat) {
   }
 }
 
-TEST(GnuplotScript, RunsNothingThatTextsSay) {
+TEST(GnuplotScript, DoesNotExecuteTexts) {
   if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
     GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
   }
@@ -193,7 +193,7 @@ TEST(GnuplotScript, RunsNothingThatTextsSay) {
   }
 }
 
-TEST(Gnuplot, ThatFailsSaysWhy) {
+TEST(Gnuplot, ReportsTheReasonOfAFailure) {
   if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
     GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
   }
@@ -205,7 +205,7 @@ TEST(Gnuplot, ThatFailsSaysWhy) {
   }
 }
 
-TEST(PictureFormat, IsThatOfTheFileUnlessItIsNamed) {
+TEST(PictureFormat, FollowsFromTheFileUnlessItIsNamed) {
   EXPECT_EQ(picture_format("", "a.svg"), PictureFormat::kSvg);
   EXPECT_EQ(picture_format("", "a.b/c.png"), PictureFormat::kPng);
   EXPECT_EQ(picture_format("", "a.gp"), PictureFormat::kScript);
@@ -221,7 +221,7 @@ TEST(PictureSize, IsTwoWholeNumbersThatCanBeRead) {
   }
 }
 
-TEST(FigureTable, OfAMapHasARowACellWithItsState) {
+TEST(FigureTable, OfAMapHasOneRowPerCellWithItsState) {
   const auto csv = csv_of(test::gappy_map());
   EXPECT_TRUE(csv.starts_with("mu,H,duration_s,state\n")) << csv.substr(0, 80);
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 25);
@@ -230,7 +230,7 @@ TEST(FigureTable, OfAMapHasARowACellWithItsState) {
   }
 }
 
-TEST(FigureTable, OfAMapHasTheValuesOfTheStudyWhereItHasAny) {
+TEST(FigureTable, OfAMapHasTheValuesOfTheStudyIfThereAreAny) {
   Cells cells = test::counted_cells(2, 1);
   cells.x.values = {0.03, 0.1};
   cells.y.values = {0.7};
@@ -238,7 +238,7 @@ TEST(FigureTable, OfAMapHasTheValuesOfTheStudyWhereItHasAny) {
             "mu,H,duration_s,state\n0.03,0.7,0,solved\n0.1,0.7,1,solved\n");
 }
 
-TEST(FigureTable, OfLinesHasWhatTellsThemApart) {
+TEST(FigureTable, OfLinesHasTheColumnThatDistinguishesThem) {
   EXPECT_EQ(
       csv_of(test::lines_of(2, 2)),
       "e,mu,duration_s\n0.1,0.01,0.0001\n0.1,0.02,0.0002\n0.2,0.01,0.0002\n0.2,0.02,0.0004\n");

@@ -1,4 +1,4 @@
-// What pictures of one point show.
+// Pictures of a point.
 #include <cmath>
 #include <string>
 
@@ -16,8 +16,8 @@ using testing::ElementsAre;
 using testing::Field;
 using testing::HasSubstr;
 
-/// A made-up contact of 200 us at rising and falling force: it sticks for a quarter of the time, is
-/// compressed for a half, and e* = 0.5 makes restitution four times as stiff.
+/// An invented contact of 200 us with rising and falling force: it sticks for a quarter of the
+/// time, is compressed for a half, and e* = 0.5 makes restitution four times as stiff.
 PointHistory small_history() {
   PointHistory history{.name = "Point 3 of a study",
                        .model = solver::preset("paper"),
@@ -57,7 +57,7 @@ PointHistory small_history() {
   return history;
 }
 
-TEST(PointSpans, ArePhasesAndOverThemStick) {
+TEST(PointSpans, ArePhasesFollowedByStick) {
   const auto spans = panel_of(small_history(), PointPanel::kForces).spans;
   ASSERT_EQ(spans.size(), 3U);
   EXPECT_EQ(spans[0].kind, Span::Kind::kCompression);
@@ -70,7 +70,7 @@ TEST(PointSpans, ArePhasesAndOverThemStick) {
   EXPECT_DOUBLE_EQ(spans[2].to, 5e-5);
 }
 
-TEST(PointPanels, HysteresisPartsBranchesAndJoinsThemAtTheTurn) {
+TEST(PointPanels, HysteresisSeparatesBranchesThatMeetAtTheTurn) {
   const auto curves = panel_of(small_history(), PointPanel::kLoop).curves;
   ASSERT_EQ(curves.size(), 2U);
   EXPECT_EQ(curves[0].name, "compression");
@@ -81,23 +81,23 @@ TEST(PointPanels, HysteresisPartsBranchesAndJoinsThemAtTheTurn) {
   EXPECT_GT(curves[1].x[10], 0.0) << "an indentation is left";
 }
 
-TEST(PointEnergies, WhatTheTipGivesIsLostByPOrIsInTheElement) {
+TEST(PointEnergies, AreLostByPOrStoredInTheElement) {
   const auto history = small_history();
   const auto curves = panel_of(history, PointPanel::kEnergies).curves;
   ASSERT_EQ(curves.size(), 5U);
   const auto& friction = curves[3].y;
   const auto& element = curves[4].y;
   EXPECT_DOUBLE_EQ(friction[5], 0.0) << "P sticks";
-  // While it sticks both elements are springs: a half of force times deformation each.
+  // In stick both elements are springs: energy is half of force times deformation.
   const auto& stuck = history.rows[5];
   EXPECT_NEAR(element[5], 0.5 * stuck.fn_N * (-stuck.uy_m - stuck.ux_m), 1e-12);
-  // In the end the tangential spring is empty, and the normal one has lost 1 - e*^2 of its work.
+  // At the end the tangential spring is empty, and the normal one has lost 1 - e*^2 of its work.
   EXPECT_NEAR(element.back(), 0.5 * 1000.0 * 1e-4 * (1.0 - 0.25), 1e-12);
   EXPECT_GT(friction.back(), 0.0);
   EXPECT_DOUBLE_EQ(curves[0].y.back(), -1.0);
 }
 
-TEST(PointShape, HasOneScaleUpwardsAndSideways) {
+TEST(PointShape, HasEqualScales) {
   const Figure figure = point_figure(small_history(), PointPanel::kShape);
   EXPECT_TRUE(figure.panels[0].has_equal_aspect);
   EXPECT_THAT(figure.panels[0].curves,
@@ -106,7 +106,7 @@ TEST(PointShape, HasOneScaleUpwardsAndSideways) {
                           Field(&Curve::name, "ground")));
 }
 
-TEST(PointFigure, HasSixPanelsOrTheOneThatIsAskedFor) {
+TEST(PointFigure, HasSixPanelsOrTheRequestedOne) {
   const Figure all = point_figure(small_history(), {});
   EXPECT_EQ(all.panels.size(), 6U);
   EXPECT_EQ(all.columns, 2U);
@@ -117,7 +117,7 @@ TEST(PointFigure, HasSixPanelsOrTheOneThatIsAskedFor) {
   EXPECT_FALSE(one.panels[0].spans.empty());
 }
 
-TEST(PointFigure, IsDrawnOfAContactThatIsNone) {
+TEST(PointFigure, IsDrawnForAContactWithoutForce) {
   auto history = small_history();
   history.rows.resize(1);
   EXPECT_THAT(script_of(point_figure(history, {}), PictureFormat::kSvg, {}), HasSubstr("plot "));

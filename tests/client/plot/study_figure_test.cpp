@@ -1,4 +1,4 @@
-// From the rows of a source to a figure.
+// From rows of a source to a figure.
 #include "client/plot/plot_request.h"
 
 #include <cmath>
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 
 using Rows = std::vector<protocol::Row>;
 
-/// Answers each query with rows that were made before.
+/// A source that answers each query with prepared rows.
 class MadeRows : public Source {
  public:
   MadeRows(std::vector<std::string> columns, Rows rows)
@@ -49,7 +49,7 @@ class MadeRows : public Source {
   protocol::QueryReply answer_;
 };
 
-/// The figure that rows make, of a study of H in {0.5, 1} and mu in {1, 2, 3}.
+/// The figure of these rows, for a study of H in {0.5, 1} and mu in {1, 2, 3}.
 Figure figure_from(PlotRequest request, const std::vector<std::string>& columns, const Rows& rows) {
   const auto study = parse_study("name = \"s\"\n[[block]]\nH = [0.5, 1]\nmu = [1, 2, 3]\ne = 1\n",
                                  "s.toml", [](const auto&...) {});
@@ -68,7 +68,7 @@ Rows rows_of_numbers(std::size_t count) {
 
 const std::vector<std::string> kMapColumns{"mu", "H", "fn_peak_N", "status"};
 
-TEST(Map, OfNumbersHasACellAPointAndTheScaleOfItsValues) {
+TEST(Map, OfNumbersHasOneCellPerPointAndAColourScale) {
   const Figure figure = figure_from(
       {.map = "fn_peak_N"}, kMapColumns,
       {{1.0, 0.5, 10.0, "solved"}, {2.0, 0.5, {}, "failed"}, {3.0, 1.0, 30.0, "solved"}});
@@ -83,7 +83,7 @@ TEST(Map, OfNumbersHasACellAPointAndTheScaleOfItsValues) {
   EXPECT_EQ(figure.subtitle, "e = 1, 3 points");
 }
 
-TEST(Map, WithARangeSaysThatThereIsMoreBeyond) {
+TEST(Map, WithARangeMentionsValuesOutside) {
   const Figure figure = figure_from({.map = "fn_peak_N", .range = "2:20"}, kMapColumns,
                                     {{1.0, 0.5, 1.0, "solved"}, {2.0, 0.5, 30.0, "solved"}});
   EXPECT_EQ(figure.colours->range, (Range{2.0, 20.0}));
@@ -96,7 +96,7 @@ TEST(Map, OfNothingSaysSo) {
   EXPECT_THAT(empty.notes, Contains("Nothing to draw: no cell has a value."));
 }
 
-TEST(Map, OfModesNamesThemByTheirPoints) {
+TEST(Map, OfModesSortsThemByTheirPoints) {
   const Figure figure = figure_from(
       {.map = "mode"}, {"mu", "H", "mode", "status"},
       {{1.0, 0.5, "sC", "solved"}, {2.0, 0.5, "SC", "solved"}, {3.0, 1.0, "SC", "solved"}});
@@ -109,7 +109,7 @@ TEST(Map, OfModesNamesThemByTheirPoints) {
   EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("S stick, s slip")));
 }
 
-TEST(Map, OfManyModesGathersThoseWithNextToNoPoints) {
+TEST(Map, OfManyModesCombinesThoseWithVeryFewPoints) {
   Rows rows;
   for (int i = 0; i < 20; ++i) {
     const std::size_t points = i < 15 ? 100 - static_cast<std::size_t>(i) : 1;
@@ -121,10 +121,10 @@ TEST(Map, OfManyModesGathersThoseWithNextToNoPoints) {
   EXPECT_TRUE(categories.back().is_other);
   EXPECT_EQ(categories.back().name, "8 other modes");
   EXPECT_EQ(categories.back().points, 88U + 87U + 86U + 5U);
-  EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv has all 20")));
+  EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv lists all 20")));
 }
 
-TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
+TEST(Lines, HaveNamesIfFewAndColoursByValueIfMany) {
   Rows rows;
   for (int i = 0; i < 9; ++i) {
     rows.push_back({1.0, 5.0 + i, 0.1 * i});
@@ -142,7 +142,7 @@ TEST(Lines, FewHaveNamesAndManyAreColouredByTheirValue) {
   EXPECT_EQ(few.panels[0].curves[2].name, "e = 0.2");
 }
 
-TEST(Outputs, ThatThereAreNotAreNamedWithTheirFlag) {
+TEST(Outputs, AreRefusedWithTheFlagIfUnknown) {
   for (const auto& [flag, request] :
        {std::pair<std::string, PlotRequest>{"--lines", {.lines = "fn_peak"}},
         {"--map", {.map = "fn_peak"}},
@@ -156,18 +156,18 @@ TEST(Outputs, ThatThereAreNotAreNamedWithTheirFlag) {
   }
 }
 
-TEST(Lines, CountTheirGaps) {
+TEST(Lines, ReportTheNumberOfGaps) {
   const Figure figure = figure_from({.lines = "fn_peak_N", .x = "mu", .by = "H"},
                                     {"mu", "fn_peak_N", "H"}, {{1.0, 4.0, 1.0}, {3.0, 5.0, 1.0}});
   EXPECT_TRUE(std::isnan(figure.panels[0].curves[0].y[1]));
   EXPECT_THAT(figure.notes, Contains("Gaps in the lines: 1 point is without a value."));
 }
 
-TEST(Scatter, DrawsFewPointsEachAndSaysHowManyLackAValue) {
+TEST(Scatter, DrawsFewPointsOneByOneAndCountsThoseWithoutAValue) {
   const Figure figure = figure_from({.scatter = "mu,slide_m"}, {"mu", "slide_m"},
                                     {{1.0, 1.0}, {2.0, {}}, {3.0, 2.0}});
   EXPECT_EQ(figure.panels[0].curves[0].x.size(), 3U);
-  EXPECT_THAT(figure.notes, ElementsAre("1 of 3 points lack a value that can be drawn."));
+  EXPECT_THAT(figure.notes, ElementsAre("1 of 3 points have no value that can be drawn."));
 }
 
 TEST(Scatter, CountsManyPointsInCells) {
@@ -180,10 +180,10 @@ TEST(Scatter, CountsManyPointsInCells) {
   }
   EXPECT_EQ(points, 10'000.0);
   EXPECT_EQ(figure.panels[0].cells->count(CellState::kNoResult), 0U);
-  EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("10,000 points, gathered in ")));
+  EXPECT_THAT(figure.notes, ElementsAre(HasSubstr("10,000 points, grouped in ")));
 }
 
-TEST(Histogram, HoldsEachValueOnceInTheBinThatBeginsAtIt) {
+TEST(Histogram, CountsEachValueOnceInTheBinThatBeginsAtIt) {
   Rows rows(30, {0.5});
   rows.insert(rows.end(), 30, {0.8});
   rows.insert(rows.end(), 40, {1.0});
@@ -198,14 +198,14 @@ TEST(Histogram, HoldsEachValueOnceInTheBinThatBeginsAtIt) {
   }
 }
 
-TEST(Histogram, OfLogarithmsAndOfNothingSaysWhatIsLeftOut) {
+TEST(Histogram, WithALogarithmicAxisOrWithoutValuesReportsWhatIsLeftOut) {
   const Figure figure = figure_from({.histogram = "margin", .is_x_logarithmic = true}, {"margin"},
                                     {{0.0}, {0.1}, {1.0}, {10.0}});
-  EXPECT_THAT(figure.notes, ElementsAre("1 of 4 points have no value, or one outside the axis."));
+  EXPECT_THAT(figure.notes, ElementsAre("1 of 4 points have no value or lie outside the axis."));
   EXPECT_TRUE(figure_from({.histogram = "margin"}, {"margin"}, {}).is_empty);
 }
 
-TEST(Histogram, OfTextsIsLargestFirstAndGathersTheRare) {
+TEST(Histogram, OfTextsIsSortedAndCombinesTheRareOnes) {
   Rows rows;
   for (int i = 0; i < 40; ++i) {
     rows.insert(rows.end(), static_cast<std::size_t>(i + 1), {"mode " + std::to_string(i)});
@@ -233,7 +233,7 @@ TEST(Edges, LieHalfwayBetweenValues) {
   EXPECT_THAT(edges_between({}, false), testing::IsEmpty());
 }
 
-TEST(Ranges, LeaveOutWhatHasNoPlaceAndDoNotCrossZeroWhenTheyAreWidened) {
+TEST(Ranges, IgnoreInfiniteValuesAndAreNotExtendedAcrossZero) {
   EXPECT_EQ(range_of({2.0, std::nan(""), -1.0, INFINITY}), (Range{-1.0, 2.0}));
   EXPECT_EQ(range_of({-1.0, 0.0, 3.0, 5.0}, true), (Range{3.0, 5.0}));
   FigureAxis axis;
@@ -282,7 +282,7 @@ TEST(StudyShape, HasTheAxesOfTheBlockWithTheMostPoints) {
   EXPECT_EQ(axes[1]->key, "e");
 }
 
-TEST(Blocks, AreChosenByTheAxesAndValuesThatAreAskedFor) {
+TEST(Blocks, AreChosenByTheRequestedAxesAndValues) {
   const auto number_for = [](const PlotRequest& request) {
     const auto shape = shape_of_study(kThreeBlocks, request);
     return shape.is_one_block ? shape.block + 1 : 0;
@@ -296,7 +296,7 @@ TEST(Blocks, AreChosenByTheAxesAndValuesThatAreAskedFor) {
   EXPECT_EQ(number_for({.map = "slide_m", .x = "H", .y = "e"}), 0U) << "none has both";
 }
 
-TEST(Blocks, AreAllDrawnWhereNoneIsMeant) {
+TEST(Blocks, AreAllDrawnIfNoneIsChosen) {
   EXPECT_FALSE(shape_of_study(kThreeBlocks, {.histogram = "mu"}).is_one_block);
   EXPECT_FALSE(shape_of_study(kThreeBlocks, {.scatter = "mu,H"}).is_one_block);
   EXPECT_TRUE(shape_of_study(kThreeBlocks, {.scatter = "mu,H", .block = "3"}).is_one_block);
@@ -308,7 +308,7 @@ TEST(Blocks, AreAllDrawnWhereNoneIsMeant) {
   EXPECT_FALSE(points.is_one_block) << "single points are no picture each";
 }
 
-TEST(Blocks, ThatThereAreNotAreRefused) {
+TEST(Blocks, AreRefusedIfUnknown) {
   for (const std::string block : {"0", "4", "-1", "1.5", "first", ""}) {
     try {
       (void)shape_of_study(kThreeBlocks, {.block = block + (block.empty() ? " " : "")});
@@ -319,7 +319,7 @@ TEST(Blocks, ThatThereAreNotAreRefused) {
   }
 }
 
-TEST(Blocks, OfAHundredThousandAreUnitedAtOnce) {
+TEST(Blocks, OfAHundredThousandAreCombinedQuickly) {
   protocol::Recipe recipe;
   const auto study = parse_study("name = \"s\"\n[[block]]\nH = 1\nmu = [1, 2]\ne = 1\n", "s.toml",
                                  [](const auto&...) {});
@@ -330,7 +330,7 @@ TEST(Blocks, OfAHundredThousandAreUnitedAtOnce) {
   EXPECT_EQ(shape_for(recipe, {.block = "all"}).find("mu")->values.size(), 100'001U);
 }
 
-TEST(StudyShape, KnowsModelKeysByTheirColumns) {
+TEST(StudyShape, FindsModelKeysByTheirColumns) {
   const auto shape =
       shape_of_study("[[block]]\nE = [6e10, 7e10]\nlength1 = [0.3, 0.4]\nH = 0.5\nmu = 1\ne = 1\n");
   EXPECT_EQ(shape.find("E")->column, "E_Pa");
@@ -347,7 +347,7 @@ TEST(StudyShape, OfASampleIsNoGridAndHasNoListedValues) {
   EXPECT_THAT(error_of({.at = {"H=0.5"}}, shape), HasSubstr("lie scattered"));
 }
 
-TEST(Condition, TakesTheFirstValueOfAnAxisThatIsLeftOpenAndSaysSo) {
+TEST(Condition, HoldsAnOpenAxisAtItsFirstValueAndSaysSo) {
   const auto condition = condition_of({}, grid(), {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "H = 0.5 AND e = 0.5");
   EXPECT_THAT(condition.said,
@@ -355,13 +355,13 @@ TEST(Condition, TakesTheFirstValueOfAnAxisThatIsLeftOpenAndSaysSo) {
                           HasSubstr("e has the values 0.5, 0.8, 1; e = 0.5 is drawn")));
 }
 
-TEST(Condition, LeavesOpenWhatWhereSpeaksOf) {
+TEST(Condition, LeavesAxesOpenThatWhereMentions) {
   const auto condition = condition_of({.where = "e > 0.6 OR slide_m > 1"}, grid(),
                                       {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "(e > 0.6 OR slide_m > 1) AND H = 0.5");
 }
 
-TEST(At, TakesAValueAsTablesShowIt) {
+TEST(At, AcceptsARoundedValueFromATable) {
   const auto condition =
       condition_of({.at = {"e=0.8", "H=1"}}, grid(), {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "e = 0.8 AND H = 1");
@@ -372,7 +372,7 @@ TEST(At, TakesAValueAsTablesShowIt) {
               testing::StartsWith("H = 0.43333333"));
 }
 
-TEST(At, NamesTheNearestOfAValueThatThereIsNot) {
+TEST(At, NamesTheNearestValueForAnUnknownOne) {
   EXPECT_THAT(error_of({.at = {"e=0.79"}}, grid()),
               HasSubstr("the nearest is e=0.8. It has the values 0.5, 0.8, 1"));
   EXPECT_THAT(error_of({.at = {"mu=1"}}, grid()), HasSubstr("is an axis of the picture"));
@@ -383,7 +383,7 @@ TEST(At, NamesTheNearestOfAValueThatThereIsNot) {
   EXPECT_THAT(error_of({.at = {"e=1", "e=0.5"}}, grid()), HasSubstr("has a value already"));
 }
 
-TEST(Axes, ThatThereAreNotAreNamedWithTheNearest) {
+TEST(Axes, AreRefusedWithTheNearestIfUnknown) {
   try {
     (void)chosen_axis("--x", "muu", grid());
     FAIL();

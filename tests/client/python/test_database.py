@@ -27,7 +27,7 @@ def rows_of_program(*arguments):
         {"where": "mu > 100"},
     ],
 )
-def test_answers_are_those_of_the_program(database, keys):
+def test_answers_equal_those_of_the_program(database, keys):
     flags = [text for key, value in keys.items() for text in ("--" + key, str(value))]
     rows = rows_of_program("query", "sweep", "--db", database, *flags)
     answer = oblique.Database(database).query("sweep", **keys)
@@ -41,7 +41,7 @@ def test_answers_are_those_of_the_program(database, keys):
                 assert text == value if isinstance(value, str) else float(text) == value
 
 
-def test_columns_are_arrays_of_what_they_hold_with_their_units(database):
+def test_columns_are_arrays_with_types_and_units(database):
     answer = oblique.Database(pathlib.Path(database)).query(
         "sweep", select=["point", "mu", "fn_peak_N", "mode", "error", "ft_peak_error"]
     )
@@ -55,7 +55,7 @@ def test_columns_are_arrays_of_what_they_hold_with_their_units(database):
         answer["fn"]
 
 
-def test_results_are_what_solving_here_gives_as_far_as_a_database_keeps_it(database):
+def test_results_equal_those_of_solve_in_the_stored_digits(database):
     answer = oblique.Database(database).query("sweep", select="H, mu, e, fn_peak_N, slide_m, mode")
     here = oblique.solve_many(answer.H, answer.mu, answer.e)
     assert np.allclose(here.fn_peak_N, answer.fn_peak_N, rtol=1e-8, atol=0)
@@ -72,7 +72,7 @@ def test_sql_is_answered_and_cannot_change_anything(database):
             asked.sql(statement)
 
 
-def test_a_database_is_read_wherever_one_goes(database, tmp_path, monkeypatch):
+def test_a_database_is_read_after_a_change_of_folder(database, tmp_path, monkeypatch):
     (tmp_path / "copy.db").write_bytes(pathlib.Path(database).read_bytes())
     monkeypatch.chdir(tmp_path)
     asked = oblique.Database("copy.db")
@@ -80,7 +80,7 @@ def test_a_database_is_read_wherever_one_goes(database, tmp_path, monkeypatch):
     assert len(asked.query("sweep", limit=2)) == 2
 
 
-def test_studies_say_where_they_stand(database):
+def test_studies_have_their_progress(database):
     (study,) = oblique.Database(database).studies()
     assert (study.name, study.state, study.points, study.solved) == ("sweep", "done", 36, 36)
 
@@ -94,13 +94,13 @@ def test_studies_say_where_they_stand(database):
         ("sweep", {"limit": -1}, "limit = -1 is not allowed"),
     ],
 )
-def test_wrong_names_are_value_errors_that_say_what_may_have_been_meant(database, study, keys, sentence):
+def test_wrong_names_are_value_errors_with_the_nearest_names(database, study, keys, sentence):
     with pytest.raises(ValueError) as error:
         oblique.Database(database).query(study, **keys)
     assert sentence in str(error.value)
 
 
-def test_what_is_no_database_is_told_by_what_it_is(tmp_path):
+def test_other_files_are_refused_with_their_kind(tmp_path):
     with pytest.raises(FileNotFoundError, match="nothing.db"):
         oblique.Database(tmp_path / "nothing.db")
     assert not list(tmp_path.iterdir())
@@ -110,7 +110,7 @@ def test_what_is_no_database_is_told_by_what_it_is(tmp_path):
             oblique.Database(tmp_path / wrong)
 
 
-def test_rows_that_are_written_meanwhile_are_seen_by_the_next_question(database, tmp_path):
+def test_new_rows_are_visible_to_the_next_query(database, tmp_path):
     file = str(tmp_path / "copy.db")
     with sqlite3.connect(database) as one, sqlite3.connect(file) as other:
         one.backup(other)

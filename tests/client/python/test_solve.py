@@ -39,7 +39,7 @@ def test_a_point_has_all_fields_and_the_bits_of_solve_json(keys):
     assert without_time(oblique.solve(**keys)._asdict()) == solved_by_program(*flags)
 
 
-def test_a_value_that_is_likely_in_another_unit_is_warned_of_once_for_each_key():
+def test_a_value_probably_in_another_unit_is_warned_of_once_per_key():
     with pytest.warns(UserWarning) as warned:
         oblique.solve_many(1, 0.4, 1, rho=[2.7, 2700], tip_mass=20)
     assert [str(one.message) for one in warned] == [
@@ -85,7 +85,7 @@ def test_a_wrong_value_is_a_value_error_that_names_key_value_and_range(keys, sen
     assert sentence in str(error.value)
 
 
-def test_a_point_without_an_answer_is_an_error_of_its_own():
+def test_a_point_without_an_answer_is_a_solve_error():
     with pytest.raises(oblique.SolveError, match="too short") as error:
         oblique.solve(1, 0.4, 1, dt=1e-25)
     assert error.type.__module__ == "oblique" and error.type.__doc__
@@ -137,14 +137,14 @@ def test_examples_in_doc_strings_hold(name):
     assert doctest.testmod(module, optionflags=doctest.ELLIPSIS).failed == 0
 
 
-def test_the_session_in_the_readme_is_what_one_sees():
+def test_the_session_in_the_readme_is_correct():
     with open(os.environ["OBLIQUE_README"]) as file:
         text = file.read().replace("```", "")
     session = doctest.DocTestParser().get_doctest(text, {}, "README.md", "README.md", 0)
     assert doctest.DocTestRunner().run(session) == (0, 5)
 
 
-def test_types_name_the_fields_that_there_are():
+def test_types_name_the_existing_fields():
     fields = {"": ["H", "mu", "e"], "energy": [], "errors": [], "solver": []}
     for name, group, *_ in oblique._core.fields():
         fields[group].append(name)

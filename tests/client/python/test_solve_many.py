@@ -69,7 +69,7 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
 @pytest.mark.parametrize(
     "keys, sentence",
     [
-        ({"mu": [0.1, 0.2], "e": [1, 1, 1]}, "these shapes do not fit each other: mu (2,), e (3,)"),
+        ({"mu": [0.1, 0.2], "e": [1, 1, 1]}, "these shapes cannot be broadcast together: mu (2,), e (3,)"),
         ({"mu": ["a", "b"]}, "mu = ['a', 'b'] is not allowed: mu must be a number or numbers"),
         ({"e": 2}, "e = 2 is not allowed: e must be in [0.001, 1]"),
         ({"threads": 0}, "threads = 0 is not allowed"),
@@ -80,13 +80,13 @@ def test_points_that_fail_are_nan_with_their_reason_and_leave_the_others_alone()
         ({"integrator": ["euler"]}, 'integrator = "euler" is not allowed'),
     ],
 )
-def test_what_is_wrong_with_all_points_is_a_value_error(keys, sentence):
+def test_an_error_in_all_points_is_a_value_error(keys, sentence):
     with pytest.raises(ValueError) as error:
         oblique.solve_many(**{"H": 1, "mu": 0.4, "e": 1, **keys})
     assert sentence in str(error.value)
 
 
-def test_values_that_are_masked_fail_alone_whatever_lies_below_the_mask():
+def test_masked_values_fail_alone():
     mu = np.ma.array([0.2, 0.4, 0.6], mask=[False, True, False])
     many = oblique.solve_many(1, mu, 1)
     assert many.failed.tolist() == [False, True, False]
@@ -97,7 +97,7 @@ def test_values_that_are_masked_fail_alone_whatever_lies_below_the_mask():
     assert oblique.solve_many(1, 0.4, 1, k=np.ma.array([1e7, 2e7], mask=[True, False])).failed[0]
 
 
-def test_what_pandas_has_no_value_for_fails_alone():
+def test_missing_values_of_pandas_fail_alone():
     pandas = pytest.importorskip("pandas")
     for values in (pandas.array([0.4, None], dtype="Float64"), pandas.Series([1, None], dtype="Int64")):
         assert oblique.solve_many(1, values, 1).failed.tolist() == [False, True]
@@ -105,7 +105,7 @@ def test_what_pandas_has_no_value_for_fails_alone():
     assert oblique.solve_many(**rows).shape == (2,)
 
 
-def test_progress_is_told_up_to_the_end_on_any_number_of_threads_and_may_end_the_work():
+def test_progress_is_reported_to_the_end_and_may_stop_the_work():
     told = []
     mu = np.linspace(0, 1, 500)
     one = oblique.solve_many(1, mu, 1, progress=lambda *counts: told.append(counts), threads=np.int64(1))
@@ -119,7 +119,7 @@ def test_progress_is_told_up_to_the_end_on_any_number_of_threads_and_may_end_the
         oblique.solve_many(1, np.linspace(0, 1, 100_000), 1, progress=enough)
 
 
-def test_progress_may_solve_and_ask_itself():
+def test_progress_may_solve_and_query():
     inner = []
     oblique.solve_many(
         1, np.linspace(0, 1, 500), 1, progress=lambda *_: inner.append(oblique.solve(1, 0.4, 1).mu)
@@ -127,7 +127,7 @@ def test_progress_may_solve_and_ask_itself():
     assert set(inner) == {0.4}
 
 
-def test_fields_are_taken_by_name_as_columns_of_an_answer_are():
+def test_fields_are_accessible_by_name():
     many = oblique.solve_many(1, [0.4, 1.2], 1)
     assert many["fn_peak_N"] is many.fn_peak_N and many["energy"]["closure"] is many.energy.closure
     assert many["fn_peaks_N"] is many.fn_peaks_N
@@ -137,7 +137,7 @@ def test_fields_are_taken_by_name_as_columns_of_an_answer_are():
         many["fn"]
 
 
-def test_errors_are_estimated_where_they_are_asked_for():
+def test_errors_are_estimated_on_request():
     assert np.isnan(oblique.solve_many(1, [0.4], 1, elements_per_link=2).errors.fn_peak).all()
     many = oblique.solve_many(1, [0.4], 1, elements_per_link=2, errors=True)
     one = oblique.solve(1, 0.4, 1, elements_per_link=2, errors=True)

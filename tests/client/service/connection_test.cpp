@@ -23,7 +23,7 @@ ConnectionSettings at(const std::string& url, std::int64_t timeout_ms) {
 
 constexpr std::int64_t kLong_ms = 600'000;
 
-TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
+TEST(Connection, WithoutAnAnswerNamesTheAddressAndTheRemedy) {
   const oblique::test::ReservedPort nobody;
   const auto url = nobody.url();
   Connection connection(at(url, 100));
@@ -46,11 +46,11 @@ TEST(Connection, SaysWhereItLookedAndWhatToDoWhenNobodyAnswers) {
   }
 }
 
-TEST(Connection, RefusesAnAddressThatIsNone) {
+TEST(Connection, RefusesAnInvalidAddress) {
   EXPECT_THROW(Connection(at("localhost", 100)), solver::InputError);
 }
 
-TEST(Connection, StopsWaitingWhenToldTo) {
+TEST(Connection, StopsWaitingWhenKeepWaitingReturnsFalse) {
   const oblique::test::ReservedPort nobody;
   int asked = 0;
   Connection connection(at(nobody.url(), kLong_ms), [&asked] { return ++asked < 3; });
@@ -69,7 +69,7 @@ TEST(Connection, SendsTheStudyAndReadsTheReply) {
   EXPECT_EQ(connection.submit({.name = "sweep", .recipe = {}}).points(), 7U);
 }
 
-TEST(Connection, HandsOnTheServersOwnErrors) {
+TEST(Connection, ThrowsTheServersErrors) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     reply.mutable_error()->set_message("no study called \"x\"");
@@ -84,7 +84,7 @@ TEST(Connection, HandsOnTheServersOwnErrors) {
   }
 }
 
-/// Frames with one reply to a status question, which says that there are so many workers.
+/// A reply to a status request with that number of workers.
 std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
                                        std::uint32_t workers) {
   auto reply = reply_to(request);
@@ -92,7 +92,7 @@ std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
   return {protocol::encode(reply)};
 }
 
-TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
+TEST(Connection, SendsARequestAgainIfTheServerDied) {
   const oblique::test::ReservedPort port;
   std::atomic<std::uint64_t> taken{0};
   auto server = std::make_unique<ScriptedServer>(
@@ -115,14 +115,14 @@ TEST(Connection, SendsARequestAgainThatTheServerTookWithItWhenItDied) {
     }
     return true;
   };
-  // So long that only the new connection is a reason to send again.
+  // Long enough that only the new connection causes another request.
   Connection connection(
       {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
       replace_when_taken);
   EXPECT_EQ(connection.full_status().workers(), 3U);
 }
 
-TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) {
+TEST(Connection, SendsARequestAgainOverASilentConnection) {
   std::vector<std::uint64_t> ids;
   std::mutex mutex;
   const ScriptedServer server([&](const protocol::ClientRequest& request) {
@@ -137,7 +137,7 @@ TEST(Connection, SendsARequestAgainWhenNothingIsHeardOverAConnectionThatStands) 
   EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
 }
 
-TEST(Connection, SendsARequestOnceToAServerThatAnswersAndPassesOverASecondAnswer) {
+TEST(Connection, SendsARequestOnceAndIgnoresASecondAnswer) {
   std::atomic<unsigned> requests{0};
   const ScriptedServer server([&](const protocol::ClientRequest& request) {
     auto replies = workers_reply(request, ++requests);
@@ -152,7 +152,7 @@ TEST(Connection, SendsARequestOnceToAServerThatAnswersAndPassesOverASecondAnswer
   }
 }
 
-TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
+TEST(Connection, WithATellReportsSilenceAndTheNextAnswer) {
   const oblique::test::ReservedPort port;
   std::unique_ptr<ScriptedServer> server;
   std::vector<std::string> sentences;
@@ -168,7 +168,7 @@ TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
           port.url());
     }
   };
-  // Far longer than the time-out of an answer that is not waited for.
+  // Far longer than the timeout of an answer.
   Connection connection(at(port.url(), 10));
   EXPECT_EQ(connection.status("", tell).at(0).points(), 5U);
   ASSERT_EQ(sentences.size(), 2U);
@@ -176,7 +176,7 @@ TEST(Connection, ThatIsToWaitSaysThatTheServerIsSilentAndThatItIsBack) {
   EXPECT_NE(sentences[1].find("answers again"), std::string::npos) << sentences[1];
 }
 
-/// What a server says while a query waits or runs.
+/// StillWorking, which a server sends while a query waits or runs.
 std::string still_working(const protocol::ClientRequest& request, bool runs) {
   protocol::ClientReply word;
   word.set_request_id(UINT64_MAX);
@@ -185,14 +185,14 @@ std::string still_working(const protocol::ClientRequest& request, bool runs) {
   return protocol::encode(word);
 }
 
-TEST(Connection, SaysThatAQueryTookTooLongWhenTheServerWorksOnItStill) {
+TEST(Connection, ReportsAQueryThatTheServerHasNotFinishedInTime) {
   for (const bool runs : {true, false}) {
     const ScriptedServer server([runs](const protocol::ClientRequest& request) {
       EXPECT_EQ(request.query().time_limit_ms(), 500U);
       return std::vector{still_working(request, runs)};
     });
     std::string message;
-    do {  // again where the word of the server was too late
+    do {  // again if the message of the server was too late
       Connection connection(at(server.url(), 500));
       try {
         connection.query("SELECT 1");
@@ -202,13 +202,14 @@ TEST(Connection, SaysThatAQueryTookTooLongWhenTheServerWorksOnItStill) {
       }
     } while (message.starts_with("no answer from"));
     EXPECT_NE(message.find("the query took too long: after 0.5 s"), std::string::npos) << message;
-    EXPECT_NE(message.find(runs ? "works on it still" : "queries of others"), std::string::npos)
+    EXPECT_NE(message.find(runs ? "is still working on it" : "queries of others"),
+              std::string::npos)
         << message;
     EXPECT_NE(message.find("--timeout"), std::string::npos) << message;
   }
 }
 
-TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
+TEST(Connection, ReturnsTheAnswerAfterStillWorking) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     protocol::ClientRequest another = request;
     another.set_request_id(request.request_id() + 1);
@@ -223,7 +224,7 @@ TEST(Connection, TakesTheAnswerThatFollowsWordsOfWorkAndOnlyThat) {
   EXPECT_EQ(connection.query("SELECT 1").columns.at(0), "a");
 }
 
-TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {
+TEST(Connection, RequestsEveryPageOfALongListAndStopsAtARepeatedPage) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     const std::uint64_t after = request.status().after_study_id();
@@ -239,7 +240,7 @@ TEST(Connection, AsksForEveryPageOfALongListAndForNoneThatDoesNotCome) {
   EXPECT_EQ(all.workers(), 3U);
 }
 
-TEST(Connection, TellsAForeignServerFromOurs) {
+TEST(Connection, RecognisesAServerOfAnotherProgram) {
   const ScriptedServer server(
       [](const protocol::ClientRequest&) { return std::vector<std::string>{"HTTP/1.1 400"}; });
   Connection connection(at(server.url(), kLong_ms));
@@ -247,7 +248,8 @@ TEST(Connection, TellsAForeignServerFromOurs) {
     connection.query("SELECT 1");
     FAIL();
   } catch (const ConnectionError& error) {
-    EXPECT_NE(std::string(error.what()).find("does not speak"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("is not that of an oblique-server"),
+              std::string::npos);
   }
 }
 

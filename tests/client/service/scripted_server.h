@@ -14,11 +14,11 @@
 
 namespace oblique::client {
 
-/// A server that answers each request with what `answer` makes of it, until destroyed. Connections
-/// to it end with it, as when a process is killed.
+/// A server that answers each request with the result of `answer` until it is destroyed. Then its
+/// connections end, as when a process is killed.
 class ScriptedServer {
  public:
-  /// Frames to send back, each a reply; none: the request is passed over.
+  /// Returns replies to send; none: the request is ignored.
   using Answer = std::function<std::vector<std::string>(const protocol::ClientRequest&)>;
 
   explicit ScriptedServer(Answer answer, const std::string& endpoint = "tcp://127.0.0.1:*")
@@ -53,7 +53,7 @@ class ScriptedServer {
         }
       }
     } catch (const zmq::error_t&) {
-      // The context was shut down; it waits until its socket is closed.
+      // The context was shut down; it waits for its socket to be closed.
       socket_.close();
     }
   }

@@ -28,7 +28,7 @@
 namespace oblique::client {
 namespace {
 
-/// A folder to be in, with OBLIQUE_SERVER as the test sets it.
+/// A current folder; the test sets OBLIQUE_SERVER.
 class SourceTest : public ::testing::Test {
  protected:
   SourceTest() {
@@ -59,7 +59,7 @@ class SourceTest : public ::testing::Test {
   }
 
   std::unique_ptr<Source> open(const SourceFlags& flags) { return open_source(console_, flags); }
-  /// Where the one study comes from that a source names: a file's is called after it.
+  /// The name of a source's only study; a file's study is named after the file.
   std::string study_of(const SourceFlags& flags) { return open(flags)->status({}).at(0).name(); }
 
   std::ostringstream err_;
@@ -79,7 +79,7 @@ class SourceTest : public ::testing::Test {
   }
 };
 
-TEST_F(SourceTest, IsWhatIsNamedThenTheServerOfTheEnvironmentThenTheFileInThisFolder) {
+TEST_F(SourceTest, IsNamedByFlagsThenTheEnvironmentThenTheFileInThisFolder) {
   make_database("oblique.db", "default");
   make_database("other.db", "other");
   EXPECT_EQ(study_of({}), "default");
@@ -91,19 +91,18 @@ TEST_F(SourceTest, IsWhatIsNamedThenTheServerOfTheEnvironmentThenTheFileInThisFo
   EXPECT_EQ(study_of({.database = {}, .server = named_.url(), .timeout_s = {}}), "named");
 }
 
-TEST_F(SourceTest, IsTheServerAtItsDefaultAddressWhenThereIsNoFileEither) {
+TEST_F(SourceTest, IsTheServerAtItsDefaultAddressWithoutAFile) {
   EXPECT_EQ(open({})->place(), ConnectionSettings().server_url);
 }
 
-TEST_F(SourceTest, SaysOfAFileThatNobodyWorksOnItUnlessAServerHasIt) {
+TEST_F(SourceTest, ReportsThatAFileHasNoServer) {
   make_database("oblique.db", "default");
-  EXPECT_EQ(open({})->status("default").at(0).waits_for(),
-            "a server: nobody is at work on oblique.db");
+  EXPECT_EQ(open({})->status("default").at(0).waits_for(), "a server; none uses oblique.db now");
   const server::Store at_work("oblique.db");
   EXPECT_EQ(open({})->status("default").at(0).waits_for(), "");
 }
 
-TEST_F(SourceTest, KeepsNoServerFromItsFileByLookingAtIt) {
+TEST_F(SourceTest, DoesNotBlockAServerByReadingItsFile) {
   make_database("oblique.db", "default");
   std::atomic<bool> goes_on{true};
   std::thread looking([&goes_on] {
@@ -118,7 +117,7 @@ TEST_F(SourceTest, KeepsNoServerFromItsFileByLookingAtIt) {
   looking.join();
 }
 
-TEST_F(SourceTest, CallsAWrongStatementWrongUsageWhereverItIsAsked) {
+TEST_F(SourceTest, ReportsAWrongStatementAsWrongUsageForFilesAndServers) {
   make_database("oblique.db", "default");
   EXPECT_THROW(open({})->query("SELEC 1"), solver::InputError);
   EXPECT_THROW(open({})->query("DELETE FROM results"), solver::InputError);
@@ -170,17 +169,17 @@ std::string update(WaitMessages& messages, double elapsed_s, const std::string& 
   return messages.update(status, WaitMessages::Seconds{elapsed_s});
 }
 
-TEST(WaitMessages, NameOnceWhatAStudyWaitsForAndThatItGoesOn) {
+TEST(WaitMessages, ReportAReasonForWaitingOnceAndThatTheStudyContinues) {
   WaitMessages messages;
   EXPECT_EQ(update(messages, 0, "a worker"), "");
   EXPECT_EQ(update(messages, 1.9, "a worker"), "");
   EXPECT_EQ(update(messages, 2, "a worker"), "The study waits for a worker.");
   EXPECT_EQ(update(messages, 100, "a worker"), "");
-  EXPECT_EQ(update(messages, 101, ""), "The study goes on.");
+  EXPECT_EQ(update(messages, 101, ""), "The study continues.");
   EXPECT_EQ(update(messages, 102, ""), "");
 }
 
-TEST(WaitMessages, PassOverAWaitThatIsSoonOver) {
+TEST(WaitMessages, IgnoreAShortWait) {
   WaitMessages messages;
   EXPECT_EQ(update(messages, 0, "a worker"), "");
   EXPECT_EQ(update(messages, 1, ""), "");
@@ -189,7 +188,7 @@ TEST(WaitMessages, PassOverAWaitThatIsSoonOver) {
   EXPECT_EQ(update(messages, 4, ""), "");
 }
 
-TEST(WaitMessages, NameAReasonThatChanged) {
+TEST(WaitMessages, ReportAChangedReason) {
   WaitMessages messages;
   update(messages, 0, "a worker");
   EXPECT_NE(update(messages, 3, "a worker"), "");
@@ -216,7 +215,7 @@ class OneStudy : public Source {
   protocol::StudyStatus held;
 };
 
-TEST(FollowedStudy, IsFoundUnderItsNewNameAndNotReplacedByAnotherStudyOfItsName) {
+TEST(FollowedStudy, IsFollowedByItsNumberAfterARename) {
   OneStudy source;
   source.held.set_study_id(7);
   source.held.set_name("first");
@@ -227,7 +226,7 @@ TEST(FollowedStudy, IsFoundUnderItsNewNameAndNotReplacedByAnotherStudyOfItsName)
   source.held.set_name("other");
   EXPECT_EQ(followed.status(tell).name(), "other");
   EXPECT_EQ(followed.status(tell).name(), "other");
-  EXPECT_EQ(said, "first is called other now.") << "it is said once";
+  EXPECT_EQ(said, "first is now called other.") << "it is said once";
   source.held.set_study_id(8);
   EXPECT_THROW(followed.status(tell), std::runtime_error) << "study 7 was deleted";
 }

@@ -33,7 +33,7 @@ TEST(CsvFile, GivesTheNumbersOfAColumn) {
   EXPECT_EQ(column("speed,drop\n1,0.4"), (std::vector{0.4})) << "without a line break at the end";
 }
 
-TEST(CsvFile, TakesWhatSpreadsheetsWrite) {
+TEST(CsvFile, ReadsFilesOfSpreadsheets) {
   EXPECT_EQ(column("\xef\xbb\xbf"
                    "drop\r\n0.4\r\n\r\n0.6\r\n"),
             (std::vector{0.4, 0.6}))
@@ -43,7 +43,7 @@ TEST(CsvFile, TakesWhatSpreadsheetsWrite) {
       << "quotes, commas, doubled quotes and line breaks in them; spaces; signs and exponents";
 }
 
-TEST(CsvFile, TakesLinesThatEndAsOldMacsEndThem) {
+TEST(CsvFile, ReadsLinesThatEndWithCarriageReturns) {
   EXPECT_EQ(column("drop,speed\r0.4,1\r\r0.6,2\r"), (std::vector{0.4, 0.6}));
   EXPECT_THAT(csv_error("drop\r0.4\r0.x\r"), HasSubstr("measured.csv:3: column `drop`"));
 }
@@ -53,7 +53,7 @@ TEST(CsvFile, TakesIntegratorsByName) {
   EXPECT_EQ(file.values("integrator", protocol::axis_key("integrator")), (std::vector{0.0, 1.0}));
 }
 
-// A line is that of the file, also behind line breaks in quotes.
+// Lines are counted in the file, including line breaks in quotes.
 TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(csv_error("drop\n0.4\n0.x\n"),
               HasSubstr("measured.csv:3: column `drop`: \"0.x\" is not a number"));
@@ -64,13 +64,13 @@ TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(csv_error("drop\ninf\n"), HasSubstr("mu = inf"));
   EXPECT_THAT(csv_error("drop,b\n1\n"), HasSubstr("measured.csv:2: the line has 1 fields"));
   EXPECT_THAT(csv_error("drop\n0,4\n"), HasSubstr("measured.csv:2: the line has 2 fields"));
-  EXPECT_THAT(csv_error("drop\n\"1\n"), HasSubstr("measured.csv:2: a quote is opened"));
+  EXPECT_THAT(csv_error("drop\n\"1\n"), HasSubstr("measured.csv:2: a quote is not closed"));
   EXPECT_THAT(csv_error("drop\n\"1\"2\n"), HasSubstr("measured.csv:2: text follows"));
   EXPECT_THAT(csv_error("drop\n\x1b[2J\n"), HasSubstr("\\x1b[2J"));
 }
 
-TEST(CsvFile, WantsNamesAboveItsColumns) {
-  EXPECT_THAT(csv_error(""), HasSubstr("it needs a line with the names of columns"));
+TEST(CsvFile, NeedsColumnNames) {
+  EXPECT_THAT(csv_error(""), HasSubstr("it needs a line with column names"));
   EXPECT_THAT(csv_error("drop\n"), HasSubstr("and lines with values"));
   EXPECT_THAT(csv_error("0.4,0.5\n0.6,0.7\n"), HasSubstr("it must name the columns"));
   EXPECT_THAT(csv_error("drop;mu\n1;2\n"), HasSubstr("semicolons"));

@@ -160,15 +160,15 @@ TEST(PointFlags, RefuseWrongValuesWithTheFlagAsItWasTyped) {
   }
 }
 
-TEST(PointFlags, NameTheOtherFlagsThatAreWrong) {
+TEST(PointFlags, NameOtherWrongFlags) {
   const struct {
     std::string PointFlags::*flag;
     const char* text;
     const char* says;
   } wrong[] = {
-      {&PointFlags::sample, "sobol", "--sample sobol: this is no sample: write kind:count:seed"},
-      {&PointFlags::sample, "sobol:x", "--sample sobol:x: this is no sample"},
-      {&PointFlags::sample, "sobol:1:2:3", "--sample sobol:1:2:3: this is no sample"},
+      {&PointFlags::sample, "sobol", "--sample sobol: this is not a sample: write kind:count:seed"},
+      {&PointFlags::sample, "sobol:x", "--sample sobol:x: this is not a sample"},
+      {&PointFlags::sample, "sobol:1:2:3", "--sample sobol:1:2:3: this is not a sample"},
       {&PointFlags::sample, "lhs:10:-1", "--sample lhs:10:-1: sample: seed = -1"},
       {&PointFlags::sample, "sobl:10", "--sample sobl:10: the sample \"sobl\" is not known (did"},
       {&PointFlags::where, "mu >", "--where mu >: a value is missing at its end"},

@@ -14,7 +14,7 @@ TEST(Reach, AFallIsSolvedOnceForAllBlocksThatShareIt) {
   std::string text;
   for (int i = 0; i < 50; ++i) {
     text += "[[block]]\nH = 1.1\nmu = 0." + std::to_string(100 + i) + "\ne = 1\n";
-    text += "k = [1e7, 2e7]\n";  // a stiffness of the contact: the fall is the same
+    text += "k = [1e7, 2e7]\n";  // the contact's stiffness does not change the fall
   }
   ReachChecker checker(pretended_drop_m);
   EXPECT_EQ(parse_study(text, "x.toml", std::ref(checker)).recipe.blocks_size(), 50);
@@ -32,7 +32,7 @@ TEST(Reach, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
   EXPECT_EQ(checker.falls_solved(), ReachChecker::kMostFalls);
 }
 
-TEST(Reach, ADropBelowTheLargestByFarIsSettledOnACoarseMesh) {
+TEST(Reach, ASmallDropIsCheckedOnACoarseMesh) {
   ReachChecker checker(pretended_drop_m);
   parse_study(block_with("H = 1.08"), "x.toml", std::ref(checker));
   EXPECT_EQ(checker.falls_solved(), 0U) << "every finger reaches it";
@@ -45,7 +45,7 @@ TEST(Reach, ADropBelowTheLargestByFarIsSettledOnACoarseMesh) {
   EXPECT_EQ(checker.falls_solved(), 2U) << "it is remembered";
 }
 
-TEST(Reach, ADropThatDependsOnThePointIsNotLookedInto) {
+TEST(Reach, ADropThatDependsOnThePointIsNotChecked) {
   ReachChecker checker(pretended_drop_m);
   for (const char* text :
        {"[[block]]\nH = [1, 1.19]\nmu = 0.4\ne = 1\nwhere = 'H < 1.1'\n",

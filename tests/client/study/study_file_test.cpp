@@ -79,11 +79,11 @@ TEST(StudyFile, TakesEveryModelKeyWithItsOwnDefault) {
   EXPECT_EQ(protocol::from_message(study.recipe.model()), defaults);
 }
 
-TEST(StudyFile, WithoutANameIsCalledAsTheFile) {
+TEST(StudyFile, WithoutANameIsNamedAfterTheFile) {
   EXPECT_EQ(parsed(kPoint, "some/where/sweep.toml").name, "sweep");
 }
 
-/// The message of the error of reading a file.
+/// The message of an error while reading a file.
 std::string error_of_file(const std::string& path) {
   try {
     read_study_file(path, pretended_reach());
@@ -93,7 +93,7 @@ std::string error_of_file(const std::string& path) {
   }
 }
 
-TEST(StudyFile, ThatCannotBeReadIsNamed) {
+TEST(StudyFile, IsNamedIfItCannotBeRead) {
   const test::TemporaryFolder folder;
   const std::string empty = folder.file("empty.toml");
   { const std::ofstream file(empty); }
@@ -105,7 +105,7 @@ TEST(StudyFile, ThatCannotBeReadIsNamed) {
   EXPECT_THAT(error_of_file(folder.file("-x.toml")), testing::HasSubstr("name = \"-x\""));
 }
 
-/// A folder with a CSV file, for studies beside it.
+/// A folder with a CSV file for studies.
 class StudyBesideAFile : public testing::Test {
  protected:
   StudyBesideAFile() {
@@ -195,7 +195,7 @@ TEST(StudyFile, TakesExpressionsFiltersAndSingleLengths) {
   EXPECT_EQ(protocol::size_of(table).points, 4U);
 }
 
-TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
+TEST(ExampleStudies, HaveTheNumberOfPointsInTheirComments) {
   const std::string folder = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
   const auto points = [&](const std::string& name) {
     const auto study = read_study_file(folder + name + ".toml", pretended_reach());
@@ -213,7 +213,7 @@ TEST(ExampleStudies, HaveThePointsThatTheirCommentsPromise) {
   EXPECT_EQ(points("mesh"), 6U);
 }
 
-TEST(StudyFile, NamesThePlaceOfValuesThatOnlyPointsShow) {
+TEST(StudyFile, NamesThePlaceOfWrongValuesThatDependOnThePoint) {
   const struct {
     std::string text;
     const char* key;

@@ -28,14 +28,15 @@ std::string value_notes(const std::string& model, const std::string& block) {
   return notes_of(note_unusual_values, model, block);
 }
 
-TEST(MeshNote, SaysInOneLineWhatThePublishedMeshCostsAndWhatPredicts) {
-  EXPECT_EQ(mesh_note("preset = 'paper'"),
-            "Note: on 4 elements a link forces are off by 3 %, durations by 12 %, and 4 in 10 "
-            "points get another sequence of states than on 48; to predict: preset = "
-            "\"standard\"\n");
+TEST(MeshNote, GivesTheErrorsOfThePublishedMeshInOneLine) {
+  EXPECT_EQ(
+      mesh_note("preset = 'paper'"),
+      "Note: 4 elements a link give errors of 3 % in forces, 12 % in durations, and another "
+      "sequence of states for 4 in 10 points, compared with 48; use preset = \"standard\" for "
+      "predictions\n");
 }
 
-TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNotMeasured) {
+TEST(MeshNote, IsForTheCoarsestMeshBelowEightElements) {
   const struct {
     const char* model;
     const char* axis;
@@ -45,7 +46,7 @@ TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNo
       {"preset = 'converged'", "", ""},
       {"elements_per_link = 8", "", ""},
       {"preset = 'paper'", "elements_per_link = [8, 16]\n", ""},
-      {"elements_per_link = 7", "", "on 7 elements a link forces are off by up to 3"},
+      {"elements_per_link = 7", "", "7 elements a link give errors of up to 3"},
       {"elements_per_link = 2", "", "durations by more than 12"},
       {"", "elements_per_link = [16, 4]\n", "on 4 elements"},
       {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "on 2 elements"},
@@ -59,7 +60,7 @@ TEST(MeshNote, IsAboutTheCoarsestMeshBelowEightElementsAndBoundsErrorsThatWereNo
 
 const std::string kSample = "sample = { kind = 'lhs', count = 100 }\n";
 
-TEST(ValueNotes, NamesOnceEachKeyThatIsLikelyToBeInAnotherUnit) {
+TEST(ValueNotes, NamesEachKeyOnceThatIsProbablyInAnotherUnit) {
   EXPECT_EQ(value_notes("E = 7e4\nrho = 2.7\nlengths = [0.4, 400, 300]",
                         "H = 100\nmu = 0.4\ne = 1\nk = [27, 2.7e7, 3e11]\n"),
             "Note: E = 70000 Pa is softer than rubber; 7e10?\n"
@@ -69,7 +70,7 @@ TEST(ValueNotes, NamesOnceEachKeyThatIsLikelyToBeInAnotherUnit) {
             "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
 }
 
-TEST(ValueNotes, LooksAtTheEndsOfRangesAndAtWhatIsDrawn) {
+TEST(ValueNotes, CheckTheEndsOfRangesAndDistributions) {
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = 0.4\ne = 1\nE = { from = 60, to = 80, count = 3 }\n"),
             "Note: E = 60 Pa is softer than rubber; 6e10?\n");
   EXPECT_EQ(
@@ -82,7 +83,7 @@ TEST(ValueNotes, LooksAtTheEndsOfRangesAndAtWhatIsDrawn) {
 TEST(ValueNotes, SaysThatARangeOfASampleIsAListOfValues) {
   EXPECT_EQ(value_notes("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
                                       "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
-            "Note: mu: 5 values; 0.1:1 draws between them.\n")
+            "Note: mu takes 5 values; 0.1:1 draws any value between them.\n")
       << "numbers of elements are drawn from a list alone";
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
 }

@@ -9,7 +9,7 @@ namespace oblique::client {
 
 inline const std::string kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
 
-/// A block of one point, with a line of it replaced or one added.
+/// A block of one point with one line replaced or added.
 inline std::string block_with(const std::string& line) {
   std::string text = "[[block]]\n";
   for (const std::string key : {"H = 1\n", "mu = 0.4\n", "e = 1\n"}) {

@@ -17,10 +17,10 @@ namespace {
 
 using protocol::BlockKind;
 
-/// What is left out: whether the tip reaches H.
+/// Does not check whether the tip reaches H.
 void no_reach_check(const protocol::PointTable&) {}
 
-/// Recipes of every kind, drawn.
+/// Random recipes of every kind.
 class DrawnRecipe {
  public:
   explicit DrawnRecipe(unsigned seed) : random_(seed) {}
@@ -94,7 +94,7 @@ class DrawnRecipe {
   protocol::Block block() {
     const auto kind = static_cast<BlockKind>(below(3));
     std::vector<protocol::Axis> axes{axis("H", kind, 0.2, 0.8), axis("mu", kind, 0.1, 2.0)};
-    // At least one that is drawn, and none that asks for itself.
+    // At least one sampled axis, and no expression of itself.
     axes.push_back(kind == BlockKind::kSample
                        ? protocol::uniform("e", 0.5, 1.0)
                        : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0)));
@@ -146,7 +146,7 @@ std::string written(const std::string& text, const std::string& name = "x") {
   return study_toml(name, parse_study(text, "x.toml", no_reach_check).recipe);
 }
 
-TEST(StudyToml, IsAsAPersonWouldWriteIt) {
+TEST(StudyToml, IsWrittenAsByAPerson) {
   EXPECT_EQ(written("[[block]]\nH=1\nmu={from=0.1,to=2,step=0.1}\ne=[0.5,1]\n", "friction"),
             "name = \"friction\"\n\n[model]\npreset = \"standard\"\n\n[[block]]\nH = 1\nmu = { "
             "from = 0.1, to = 2, count = 20 }\n"

@@ -16,7 +16,7 @@ struct Wrong {
   std::string says;   // a part of the message
 };
 
-/// The file of each case is `before`, the text and `after`.
+/// The file of each case consists of `before`, the text and `after`.
 template <typename Whole>
 void expect_refused(const std::vector<Wrong>& cases, Whole whole) {
   for (const auto& [text, place, says] : cases) {
@@ -45,8 +45,8 @@ TEST(WrongStudyFile, IsRefusedWithThePlace) {
        {"name = \"a\\u202eb\"\n" + point, "1:8", "a\\u202eb"},
        {"name = 'x'\n", "", "no [[block]]: a study needs at least one, with H, mu and e"},
        {"block = []\n", "1:9", "block = []"},
-       {"block = [3]\n", "1:9", "write one or more [[block]]"},
-       {"[block]\nH = 1\nmu = 0.4\ne = 1\n", "1:1", "write one or more [[block]]"},
+       {"block = [3]\n", "1:9", "write [[block]]"},
+       {"[block]\nH = 1\nmu = 0.4\ne = 1\n", "1:1", "write [[block]]"},
        {"model = 3\n" + point, "1:9", "write [model]"},
        {point + block_with("H = 1.3"), "6:5", "H = 1.3"},
        {"[[block]]\nmu = 0.4\ne = 1\n", "1:1", "H is missing: every block needs H, mu and e"},

@@ -1,4 +1,4 @@
-// Where a trace goes, and what of it is the fall.
+// Output of a trace, and separation of its fall.
 #include "client/trace/solve_again.h"
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-TEST(TracedFall, IsTakenOffTheFrontAndLeavesTheContact) {
+TEST(TracedFall, IsMovedOutOfTheTraceBeforeTheContact) {
   const auto taken = [](std::size_t falling, std::size_t touching) {
     std::vector<solver::TraceRow> rows(falling + touching);
     for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -1,4 +1,4 @@
-// A server of a database, and a browser that records all that it objects to.
+// Starts a server for a database, and a browser that records errors.
 import { spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -9,10 +9,10 @@ const need = createRequire(join(process.env.OBLIQUE_NODE_MODULES, "x"));
 const puppeteer = need("puppeteer-core");
 const axeSource = need("axe-core").source;
 
-/** Ends a wait only where something hangs. */
+/** Only ends a wait that hangs. */
 const hangMs = 300_000;
 
-/** Shows a database as `oblique view` does, until `stop`. */
+/** Shows a database with `oblique view` until `stop`. */
 export class Server {
   constructor(oblique) {
     this.oblique = oblique;
@@ -42,7 +42,7 @@ export class Server {
   }
 }
 
-/** A browser in which every objection is an entry of `objections`. */
+/** A browser that adds every error to `objections`. */
 export class Browser {
   objections = [];
 
@@ -67,8 +67,8 @@ export class Browser {
   }
 
   /**
-   * A tab at a view. `early` runs before the scripts of the page; `isHurried`: no timer of the page takes long; lines of the
-   * console that match `expected` are no objections.
+   * A tab with a view. `early` runs before the page's scripts; with `isHurried` the page's timers
+   * are short; console lines that match `expected` are not errors.
    */
   async open(view, { isHurried = false, expected = /^$/, early = () => {}, ...look } = {}) {
     const page = await this.#tab();
@@ -97,7 +97,7 @@ export class Browser {
     return page;
   }
 
-  /** The window of a tab, and what its reader prefers. */
+  /** The window of a tab and the reader's preferences. */
   async look(page, { width = 1400, height = 900, scheme = "light", motion = "reduce" }) {
     await page.setViewport({ width, height });
     await page.emulateMediaFeatures([
@@ -106,7 +106,7 @@ export class Browser {
     ]);
   }
 
-  /** What axe-core finds wrong with what a tab shows. */
+  /** Errors that axe-core finds in a tab. */
   async faults(page) {
     if (!(await page.evaluate(() => "axe" in window))) await page.evaluate(axeSource);
     return page.evaluate(async () => {
@@ -121,7 +121,7 @@ export class Browser {
   }
 }
 
-/** Waits until `look` returns something in the tab, and returns that. It may throw until then. */
+/** Waits until `look` returns a value in the tab, and returns it. `look` may throw before. */
 export async function until(page, look, ...given) {
   let cause;
   for (const end = Date.now() + hangMs; Date.now() < end;) {

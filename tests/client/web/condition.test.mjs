@@ -27,7 +27,7 @@ test("cells that do not meet the filter are greyed and counted, and the filter i
   await page.close();
 });
 
-test("what the language objects to stands beside its field", async () => {
+test("errors in a condition appear beside its field", async () => {
   const page = await web.study("#/study/1", { expected: /status of 400/ });
   await web.write(page, web.whereField, "muu > 1");
   await web.shows(page, "#said-where", /did you mean `mu`\?/);
@@ -55,7 +55,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   await web.rowsSaid(page, new RegExp(`of ${selected} rows`));
   await page.select(".controls select", "histogram");
   await web.shows(page, ".lines .legend", /selected/);
-  await web.press(page, "Filter to selection");
+  await web.press(page, "Use selection as filter");
   await web.until(page, () => document.querySelector(".marks input").value === "");
   assert.equal(await web.fieldOf(page, "where"), condition);
   await page.goBack();
@@ -66,7 +66,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   await page.close();
 });
 
-test("Escape selects nothing, and Shift makes dragging select where it zooms, over a map, lines and bars", async () => {
+test("Escape clears the selection, and Shift makes dragging select instead of zoom, on a map, lines and bars", async () => {
   const range = String.raw`[\d.]+ AND \w+ <= [\d.]+`;
   const conditions = {
     "1?at=e@2": `mu >= ${range} AND H >= ${range} AND e = 1`,
@@ -90,7 +90,7 @@ test("Escape selects nothing, and Shift makes dragging select where it zooms, ov
   }
 });
 
-test("lines show what is selected elsewhere, and are read by keys", async () => {
+test("lines show a selection made elsewhere, and keys read their values", async () => {
   const page = await web.study("#/study/1?pic=lines&x=mu&y=H&at=e@2&mark=fn_peak_N>4000");
   await hasSelected(page, "fn_peak_N>4000");
   await page.focus(".plot[role=application]");

@@ -1,4 +1,4 @@
-// Files, links and commands of a view; the study that refines it.
+// Files, links and commands of a view, and refining.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { readFileSync } from "node:fs";
@@ -51,7 +51,7 @@ test("each kind of view has a command that draws it, a CSV of its numbers, and a
   }
 });
 
-test("the CSV of the table is what the command of the table gives", async () => {
+test("the CSV of the table equals the output of its command", async () => {
   const page = await web.study("#/study/1?at=e@2&where=mu<1&order=mu%20DESC");
   const table = await page.evaluate(async () => {
     const { href } = document.querySelector(".rows a[download]");
@@ -70,7 +70,7 @@ test("the CSV of the table is what the command of the table gives", async () => 
   await page.close();
 });
 
-test("the part that a map shows is refined by a study of its own, which is shown as it is solved", async () => {
+test("Refine submits the shown part of a map as a new study and shows it as it is solved", async () => {
   const view = "#/study/1?pic=map&z=slide_m&x=mu&y=H&at=e@1&x0=2&x1=4&y0=1&y1=3&from=0&to=1";
   const page = await web.study(view, { expected: /status of 409/ });
   assert.equal(await web.textOf(page, ".refine"), "Refine to 65 × 65 points");
@@ -86,13 +86,13 @@ test("the part that a map shows is refined by a study of its own, which is shown
   ends.forEach((end, i) => assert.ok(Math.abs(end / expected[i] - 1) < 1e-12, `${ends}`));
   const name = ".picture .row input";
   assert.equal(await page.$eval(name, (one) => one.value), "friction-refined-2");
-  await web.write(page, name, "scattered"); // there is one
+  await web.write(page, name, "scattered"); // the browser has a saved file
   await page.click(".refine");
   await web.shows(page, "p.said.bad", /scattered/);
   await page.close();
 });
 
-test("the address of a view is all of it", async () => {
+test("the address describes the whole view", async () => {
   const page = await web.study(
     "#/study/1?pic=map&z=mode&at=e@2&where=mu>0.2&mark=H>0.8&order=mu%20DESC&drag=select",
   );

@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-/** Addresses, and what is there when they are drawn. */
+/** Addresses, and elements that exist when they are drawn. */
 const views = {
   overview: ["#/", "tbody tr"],
   map: ["#/study/1?cell=3", ".choice a"],
@@ -47,7 +47,7 @@ test("axe-core finds nothing wrong with any view, light or dark, and nothing is 
   assert.deepEqual(faults, []);
 });
 
-test("in a window of 1400 x 900 pixels a map and what its colours mean are seen without scrolling", async () => {
+test("in a window of 1400 x 900 pixels a map and its legend are visible without scrolling", async () => {
   for (const z of ["fn_peak_N", "mode"]) {
     const page = await web.study(`#/study/1?pic=map&z=${z}&at=e@2`);
     const ends = await page.$$eval(".colours, .map", (all) =>

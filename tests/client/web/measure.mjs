@@ -28,7 +28,10 @@ function say(part, what, times, wanted) {
   );
 }
 
-/** Run in a tab before its scripts: painted_ms is when the first picture was painted, `next` when the next one is. */
+/**
+ * Runs in a tab before its scripts: painted_ms is the time of the first picture, `next` that of the
+ * next one.
+ */
 function watchPictures() {
   const painted = () =>
     new Promise((resolve) =>
@@ -63,7 +66,7 @@ async function opening(part, what, view) {
   await page.close();
 }
 
-/** Each step of a slider, from its event to the picture that is painted. */
+/** Times from each step of a slider to its picture. */
 async function sliding(view) {
   const page = await browser.open(view, { early: watchPictures });
   await until(page, () => window.paintedMs);
@@ -84,7 +87,7 @@ async function sliding(view) {
   await page.close();
 }
 
-/** A study of 10^9 points, of which some are solved. */
+/** A study of 10^9 points with some results. */
 const beginLarge = (page) =>
   page.evaluate(async () => {
     const axis = (key, from, to) => ({ key, from, to, count: 1000 });

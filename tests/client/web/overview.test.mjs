@@ -1,15 +1,15 @@
-// Studies and workers, the form of a new study, and what is not there.
+// Studies and workers, the form for a new study, and missing pages.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { join } from "node:path";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-/** Text fields of the form, by their place. */
+/** Text fields of the form, by position. */
 const fields = { name: 0, H: 1, mu: 2, e: 3, sample: 4, where: 5 };
 
 async function form(how = {}) {
-  // Whatever is written is checked, also when it is no study.
+  // All input is checked, also if it is not a study.
   const page = await web.browser.open("#/new", { expected: /status of 4/, ...how });
   await page.waitForSelector("form");
   return page;
@@ -50,11 +50,11 @@ test("the overview follows a study that is submitted on the page, live, and stud
   await page.close();
 });
 
-test("a form that is wrong says what is allowed, and cannot be submitted", async () => {
+test("a form with an error shows what is allowed and cannot be submitted", async () => {
   const page = await form();
   for (const [values, sentence] of [
     [{ mu: "0.1:2" }, /FROM:TO:COUNT/],
-    [{ mu: "-1" }, /mu/], // only the server knows what a recipe may have
+    [{ mu: "-1" }, /mu/], // only the server can check this
     [{ mu: "1:2:x" }, /"x" is not a number/],
     [{ mu: "1", H: "0.5:1.25:4" }, /H = 1.25 m is not allowed: the tip drops at most the length/],
     [{ H: "1", sample: "some:10" }, /kinds are random, lhs, sobol/],
@@ -66,7 +66,7 @@ test("a form that is wrong says what is allowed, and cannot be submitted", async
   await page.close();
 });
 
-test("a form says points, models, falls and size, where a fall decides, and what a server refuses", async () => {
+test("the form shows points, models, falls and size, and the errors of the server", async () => {
   const page = await form();
   await says(page, /^40 points, 1 model with 1 fall, about 39 kB in the database\.$/);
   await page.type("form textarea", "rho=2600:2700:3\nk=1e7:3e7:5");
@@ -89,7 +89,7 @@ test("a form says points, models, falls and size, where a fall decides, and what
   await page.close();
 });
 
-test("the command of a form makes the study that the form submits: model and sample", async () => {
+test("the command of a form submits the same study as the form: model and sample", async () => {
   const page = await form();
   await page.type("form textarea", "tolerance=1e-3\nk=2e7");
   const values = {
@@ -115,7 +115,7 @@ test("the command of a form makes the study that the form submits: model and sam
   assert.equal(points(web.server.database), points(other));
 });
 
-/** A server with many studies, whose events a test sends. */
+/** A server with many studies; a test sends its events. */
 function manyStudies() {
   const real = window.fetch;
   const study = {
@@ -154,7 +154,7 @@ function manyStudies() {
 
 const names = (page) => page.$$eval("tbody th", (all) => all.map((one) => one.textContent));
 
-test("of many studies the latest are shown, others are found by name, and changed ones are read again", async () => {
+test("of many studies the newest are shown, others are found by name, and changed ones are read again", async () => {
   const how = { early: manyStudies, isHurried: true, expected: /status of 503/ };
   const page = await web.browser.open("#/", how);
   await web.until(page, () => document.querySelectorAll("tbody tr").length === 200);
@@ -175,7 +175,7 @@ test("of many studies the latest are shown, others are found by name, and change
   await page.close();
 });
 
-test("an address that is nothing, and a study and a point that are not there, are said", async () => {
+test("unknown addresses, studies and points show an error", async () => {
   const page = await web.browser.open("#/study/999", { expected: /status of 404/ });
   await web.shows(page, "main [role=alert]", /no such study/);
   await web.goTo(page, "#/study/1/point/99999");
@@ -185,7 +185,7 @@ test("an address that is nothing, and a study and a point that are not there, ar
   await page.close();
 });
 
-test("a page that is hidden holds no stream of events, and one that is seen again holds one", async () => {
+test("a hidden page closes its stream of events and opens one when it is visible again", async () => {
   const early = () => {
     window.streams = 0;
     window.EventSource = class extends EventTarget {

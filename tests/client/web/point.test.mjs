@@ -1,4 +1,4 @@
-// A point: its time histories, the finger moving, its numbers.
+// A point: time histories, moving finger, numbers.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
@@ -6,7 +6,7 @@ import * as web from "./setup.mjs";
 const time = (page) => web.textOf(page, ".player output");
 const finger = (page) => page.$eval(".two canvas[role=img]", (canvas) => canvas.toDataURL());
 
-/** Run in a tab before its scripts: frames come, and time goes by, only when `goOn` says how long. */
+/** Runs in a tab before its scripts: time and frames advance only by `goOn`. */
 function framesByHand() {
   let now = 0;
   let next = 0;
@@ -86,7 +86,7 @@ test("the plots of a point are saved as one PNG and its time histories as CSV", 
   await page.close();
 });
 
-test("a trace that was refused is asked for again, and the page says why it does not come", async () => {
+test("a refused trace is requested again, and the page shows the reason", async () => {
   const page = await web.browser.open("#/study/1/point/7", {
     isHurried: true,
     early: () => {
@@ -108,7 +108,7 @@ test("a trace that was refused is asked for again, and the page says why it does
   await page.close();
 });
 
-test("a point that is solved while it is looked at shows its numbers then", async () => {
+test("a point that is solved while it is shown gets its numbers", async () => {
   const page = await web.browser.open("#/", {
     early: () => {
       const real = window.fetch;

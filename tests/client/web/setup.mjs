@@ -12,12 +12,15 @@ export { until };
 export const server = new Server(join(process.env.OBLIQUE_BIN, "oblique"));
 export const browser = new Browser();
 export const mapCanvas = ".map canvas[tabindex]";
-/** What a view drags over. */
+/** Area that a test drags over. */
 export const pictureIn = (view) => (/pic=(lines|histogram)/.test(view) ? ".u-over" : mapCanvas);
 export const whereField = ".conditions > div:first-child input";
 export const markField = ".marks input";
 
-/** Studies by their numbers: a grid, scattered points, more of these than are drawn one by one, a single point. */
+/**
+ * Studies by number: a grid, scattered points, more scattered points than are drawn one by one, a
+ * single point.
+ */
 export const studies = { grid: 1, scattered: 2, many: 3, one: 4 };
 
 before(async () => {
@@ -34,7 +37,7 @@ after(async () => {
 
 export const textOf = (page, selector) => page.$eval(selector, (one) => one.textContent);
 
-/** Waits until an element has a text that matches. */
+/** Waits until the text of an element matches. */
 export const shows = (page, selector, pattern) =>
   until(
     page,
@@ -44,12 +47,12 @@ export const shows = (page, selector, pattern) =>
   );
 
 export const facts = (page, pattern) => shows(page, ".facts", pattern);
-/** Waits until the table says how many rows it has. */
+/** Waits until the table shows its number of rows. */
 export const rowsSaid = (page, pattern) => shows(page, ".rows p[role=status]", pattern);
 export const fieldOf = (page, name) =>
   page.evaluate((of) => new URLSearchParams(location.hash.split("?")[1]).get(of) ?? "", name);
 
-/** A tab that shows the picture and the table of a study. */
+/** A tab with the picture and the table of a study. */
 export async function study(view = "#/study/1", how = {}) {
   const page = await browser.open(view, how);
   await facts(page, /solved|points?[ ,]/);
@@ -57,14 +60,14 @@ export async function study(view = "#/study/1", how = {}) {
   return page;
 }
 
-/** A tab whose point has been solved again. */
+/** A tab with a point that has been solved again. */
 export async function point(how = {}) {
   const page = await browser.open("#/study/1/point/100", how);
   await until(page, () => document.querySelectorAll(".uplot").length === 4);
   return page;
 }
 
-/** Requests JSON of the server as the page does. */
+/** Requests JSON from the server. */
 export const api = (page, path, body) =>
   page.evaluate(
     async (of, text) => {
@@ -86,13 +89,13 @@ export async function submit(page, name, axes) {
   return (await api(page, "/api/studies", { name, model: { preset: "paper" }, recipe })).id;
 }
 
-/** A study that is solved for minutes. */
+/** A study that takes minutes. */
 export const longAxes = { H: [0.2, 1.1, 200], mu: [0.1, 2, 200], e: [0.5, 1, 50] };
 
 /** Goes to another view in the same tab. */
 export const goTo = (page, view) => page.evaluate((to) => void (location.hash = to), view);
 
-/** Fills a field and leaves it by Enter. */
+/** Fills a field and presses Enter. */
 export async function write(page, selector, text) {
   await page.click(selector, { clickCount: 3 });
   await page.keyboard.press("Backspace");
@@ -116,7 +119,10 @@ export const slideTo = (page, selector, value) =>
     value,
   );
 
-/** Drags the mouse between shares of an element; those of a map are shares of the area in its margins. */
+/**
+ * Drags the mouse between positions in an element, given as shares of its size (of the area within
+ * the margins for maps).
+ */
 export async function drag(page, selector, [x0, y0], [x1, y1]) {
   const box = await (await page.waitForSelector(selector)).boundingBox();
   const [left, right, top, bottom] = selector === mapCanvas ? [64, 14, 10, 46] : [0, 0, 0, 0];
@@ -130,14 +136,14 @@ export async function drag(page, selector, [x0, y0], [x1, y1]) {
   await page.mouse.up();
 }
 
-/** A command that the page shows, as its program gets it. */
+/** A command on the page, split as a shell does. */
 export const wordsOf = (command) =>
   command
     .match(/'(?:[^']|'\\'')*'|\S+/g)
     .map((word) => word.replace(/^'|'$/g, "").replaceAll("'\\''", "'"))
     .slice(1);
 
-/** Run in a tab before its scripts: keeps what the page saves. */
+/** Runs in a tab before its scripts: keeps the files that the page saves. */
 export function keepSaved() {
   const make = URL.createObjectURL;
   URL.createObjectURL = (blob) => {

@@ -14,11 +14,11 @@ const optionsOf = (page, label) =>
   );
 const plotCommand = (page) => web.textOf(page, ".commands code");
 
-test("a map tells the value of a cell; a click chooses it, two open its point, and Back has it chosen", async () => {
+test("a map shows the value of a cell; a click chooses it, a double click opens its point, and Back keeps it chosen", async () => {
   const page = await web.study("#/study/1");
   await web.facts(page, /12 × 7 cells, 84 solved/);
   const box = await (await page.$(web.mapCanvas)).boundingBox();
-  const first = [box.x + 75, box.y + box.height - 60]; // at the foot on the left
+  const first = [box.x + 75, box.y + box.height - 60]; // at the bottom left
   await page.mouse.move(...first);
   await web.shows(page, ".reading", /mu 0.1, H 0.5 m: fn_peak_N [\d.]+ N/);
   const told = Number((await web.textOf(page, ".reading")).match(/fn_peak_N ([\d.]+)/)[1]);
@@ -51,7 +51,7 @@ test("keys move over a map, its values are spoken, Enter opens the point, and Ba
   await page.close();
 });
 
-test("pickers have what varies first, then the main outputs, by the names of conditions, each once", async () => {
+test("pickers list the columns that vary, then the main outputs, each once", async () => {
   const page = await web.study(`#/study/${web.studies.scattered}`);
   const options = await optionsOf(page, "colour");
   const first = "none,H [m],mu,e,fn_peak_N,ft_peak_N,duration_s [µs],slide_m [mm]".split(",");
@@ -62,7 +62,7 @@ test("pickers have what varies first, then the main outputs, by the names of con
   await page.close();
 });
 
-test("a study shows its axes with their ranges, its mesh, whether that predicts, and its model", async () => {
+test("a study shows its axes with their ranges, its mesh with a warning if coarse, and its model", async () => {
   const page = await web.study("#/study/1");
   const summary =
     /H 0\.5 m to 1\.1 m \(7\); mu 0\.1 to 2 \(12\); e 0\.6, 0\.8, 1; 4 elements a link – not converged/;
@@ -73,7 +73,7 @@ test("a study shows its axes with their ranges, its mesh, whether that predicts,
   await page.close();
 });
 
-test("tables, maps and lines show the units of the tables of oblique, and points in the part that is shown", async () => {
+test("tables, maps and lines have the units of the tables of oblique, and the table has the points of the shown part", async () => {
   const page = await web.study(
     "#/study/1?pic=map&z=duration_s&x=mu&y=H&at=e@2&x0=2&x1=4&y0=1&y1=3",
   );
@@ -181,7 +181,7 @@ test("a slider shows other values, and writes the address a few times, however f
       slider.value = String(i % 3);
       slider.dispatchEvent(new Event("input"));
     }
-    document.querySelector("h2.name").click(); // any click finds it written
+    document.querySelector("h2.name").click(); // a click updates it
     return [written, location.hash];
   });
   assert.ok(times <= 3, `${times} times`);
@@ -196,7 +196,7 @@ test("rows are turned a page at a time and sorted, by keys too, and the page is 
   await web.press(page, "Next");
   await web.rowsSaid(page, /^26 to 50 of 252 rows\.$/);
   await web.until(page, () => location.hash.includes("page=2"));
-  await web.write(page, web.whereField, "mu > 1"); // other rows begin at the first page
+  await web.write(page, web.whereField, "mu > 1"); // other rows start at the first page
   await web.rowsSaid(page, /^1 to 25 of 126 rows/);
   await page.evaluate(() =>
     [...document.querySelectorAll("th button")].find((one) => one.textContent === "mu").focus(),
@@ -217,7 +217,7 @@ test("all modules are preloaded, and no others", async () => {
     const links = [...document.querySelectorAll("link[rel=modulepreload]")];
     const found = new Set(["/main.js"]);
     for (const module of found) {
-      const text = await (await fetch(module)).text(); // `found` grows meanwhile
+      const text = await (await fetch(module)).text(); // `found` grows
       for (const [, wanted] of text.matchAll(/ from "([^"]+)";$/gm)) {
         found.add(new URL(wanted, `${location.origin}${module}`).pathname);
       }
@@ -229,7 +229,7 @@ test("all modules are preloaded, and no others", async () => {
   await page.close();
 });
 
-test("addresses that do not fit a study show what is usual there", async () => {
+test("unsuitable addresses show the default view", async () => {
   const page = await web.browser.open("#/");
   for (const [view, picture] of [
     ["1?pic=map&block=99", "map"],
@@ -272,7 +272,7 @@ test("a map shows one block of a study, says so, and another one is chosen", asy
   await page.close();
 });
 
-test("colours span what is said at one end, in shown units, and what is there at the other", async () => {
+test("colours span a given end, in shown units, and the other end of the data", async () => {
   const page = await web.study("#/study/1?z=slide_m&from=0.0002");
   assert.match(await plotCommand(page), /--range 0\.0002:0\.00\d+/);
   const from = "input[inputmode=decimal]";
@@ -284,7 +284,7 @@ test("colours span what is said at one end, in shown units, and what is there at
   await page.close();
 });
 
-test("a study some of whose points failed says why, how many, and shows them in its table", async () => {
+test("a study with failed points shows their number and the reason, and lists them in its table", async () => {
   const page = await web.browser.open("#/");
   const axes = { H: [1.15, 1.19, 3], mu: [0.5, 1, 2], e: [0.9, 1, 2] };
   const id = await web.submit(page, "too far", axes);
@@ -298,7 +298,7 @@ test("a study some of whose points failed says why, how many, and shows them in 
   await page.close();
 });
 
-test("a server that does not answer is told of, and what it was asked meanwhile is asked again", async () => {
+test("a server that does not answer is reported, and requests to it are repeated", async () => {
   const page = await web.study("#/study/1", {
     isHurried: true,
     expected: /ERR_INTERNET_DISCONNECTED/,
@@ -349,7 +349,7 @@ test("a picture that is no longer wanted does not hold up the next, and a large 
   await page.close();
 });
 
-test("ticks of ranges without an end, of a few ulps and of the widest are some round values", async () => {
+test("ticks of infinite, tiny and huge ranges are a few round values", async () => {
   const page = await web.browser.open("#/");
   const told = await page.evaluate(async () => {
     const { scale, ticks } = await import("/lib/scale.js");

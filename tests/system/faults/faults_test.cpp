@@ -126,7 +126,7 @@ TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   const auto children = started_by(run);
   kill(-run.pid(), SIGINT);  // to the whole group, as a terminal does
   EXPECT_EQ(run.wait(), 128 + SIGINT);
-  EXPECT_NE(run.err().find("the same command again"), std::string::npos) << run.err();
+  EXPECT_NE(run.err().find("the same command continues"), std::string::npos) << run.err();
   EXPECT_EQ(run.out(), "");
   for (const pid_t child : children) {
     EXPECT_FALSE(is_running(child));

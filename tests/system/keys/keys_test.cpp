@@ -96,7 +96,7 @@ TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
   wait_until_said(server_->process(), "has the role worker, but this port is for clients");
   wait_until_said(server_->process(), "another public key of the server");
   const Outcome seen = ask({"workers"}, key("reader"));
-  EXPECT_THAT(seen.err, AllOf(HasSubstr("turned away since the server began: "),
+  EXPECT_THAT(seen.err, AllOf(HasSubstr("refused since the server started: "),
                               HasSubstr("key of another role (1)")));
   EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2) << "nobody but the server uses that";
 }
@@ -198,10 +198,10 @@ TEST_F(KeysTest, AFailedChangeLeavesTheListUnchanged) {
 TEST_F(KeysTest, TheFileOfARevokedKeyIsKeptAndNamedWhenItsNameIsAddedAgain) {
   ASSERT_EQ(change_keys({"add", "anna", "--role", "client"}).exit_code, 0);
   EXPECT_THAT(change_keys({"revoke", "anna"}).err,
-              HasSubstr("The file " + key("anna") + " stays, and is worth nothing"));
+              HasSubstr("The file " + key("anna") + " still exists; it is useless"));
   const Outcome again = change_keys({"add", "anna", "--role", "client"});
   EXPECT_EQ(again.exit_code, 1);
-  EXPECT_THAT(again.err, AllOf(HasSubstr("the key of anna, which was revoked: remove the file"),
+  EXPECT_THAT(again.err, AllOf(HasSubstr("the revoked key of anna: remove the file"),
                                HasSubstr("--public='")));
   std::filesystem::remove(key("anna"));
   EXPECT_EQ(change_keys({"add", "anna", "--role", "client"}).exit_code, 0);

@@ -92,7 +92,7 @@ TEST(View, APortThatIsTakenIsToldByTheFlagOfTheVerb) {
   const Outcome second = run_oblique(
       folder, {"view", "second.db", "--port", url.substr(port, url.find('/', port) - port)});
   EXPECT_EQ(second.exit_code, 1);
-  EXPECT_THAT(second.err, HasSubstr("is taken by another program: name another with --port"));
+  EXPECT_THAT(second.err, HasSubstr("is in use: name another with --port"));
   EXPECT_THAT(second.err, testing::Not(HasSubstr("--http")));
 }
 
