@@ -89,7 +89,7 @@ TEST_F(GrowingStudyTest, ContinuesWithinARoundThatASignalStopped) {
     raise(SIGINT);
     EXPECT_THROW(study.solve(drops({1.0, 0.5}), "fn_peak_N", "round 1"), Interrupted);
   }
-  EXPECT_TRUE(stop_.requested() || stop_.exit_code() == 128 + SIGINT);
+  EXPECT_EQ(stop_.exit_code(), 128 + SIGINT);
   worker_.emplace(folder_, server_.worker_url());
   protocol::StopSignals other;
   GrowingStudy again(console_, flags_, "growing", solver::preset("paper"), other);
@@ -111,6 +111,25 @@ TEST_F(GrowingStudyTest, RefusesAnotherBlockOrModelUnderTheSameName) {
   EXPECT_THROW(again.solve(drops({1.0, 0.6}), "fn_peak_N", "round 1"), solver::InputError);
   EXPECT_THROW(open("growing", solver::preset("standard")), solver::InputError);
   EXPECT_EQ(solved(), 2.0);
+}
+
+TEST(GrowingStudyHere, SolvesWithoutAServerAndContinues) {
+  const test::TemporaryFolder folder;
+  std::ostringstream out;
+  std::ostringstream err;
+  Console console(out, err);
+  ExploreFlags flags;
+  flags.source.database = folder.file("here.db");
+  protocol::StopSignals stop;
+  const auto solve = [&] {
+    GrowingStudy study(console, flags, "growing", solver::preset("paper"), stop);
+    return study.solve(drops({1.0, 0.5}), "fn_peak_N", "round 1").rows;
+  };
+  const auto rows = solve();
+  EXPECT_EQ(solve(), rows);
+  EXPECT_NE(err.str().find("Continuing \"growing\": 2 of 2 points"), std::string::npos)
+      << err.str();
+  EXPECT_EQ(test::Database(flags.source.database).rows(), 2.0);
 }
 
 TEST(ExploredName, IsTheSameForTheSameSettingsUnlessGiven) {
