@@ -56,10 +56,11 @@ AnswerChoice choice_of(const AnswerFlags& flags) {
 
 void put_out(Console& console, const AnswerFlags& flags, const Answer& answer) {
   const AnswerChoice choice = choice_of(flags);
-  const std::string text = choice.format == Format::kTable ? answer.tables
-                           : choice.format == Format::kJson
-                               ? answer.json + '\n'
-                               : text_of({protocol::chunk_of(answer.rows)}, {.format = Format::kCsv});
+  const std::string text =
+      choice.format == Format::kTable ? answer.tables
+      : choice.format == Format::kJson
+          ? answer.json + '\n'
+          : text_of({protocol::chunk_of(answer.rows)}, {.format = Format::kCsv});
   if (choice.picture) {
     plot::write_picture(plot::picture_of(answer.figure, *choice.picture), *choice.picture,
                         flags.file);
@@ -83,6 +84,16 @@ std::string text_of(const protocol::Table& table) {
 
 nlohmann::ordered_json json_of(const Estimate& estimate) {
   return {{"value", estimate.value}, {"from", estimate.from}, {"to", estimate.to}};
+}
+
+nlohmann::ordered_json json_of(const std::vector<Estimate>& estimates) {
+  auto json = nlohmann::ordered_json::object();
+  for (const Estimate& estimate : estimates) {
+    json["value"].push_back(estimate.value);
+    json["from"].push_back(estimate.from);
+    json["to"].push_back(estimate.to);
+  }
+  return json;
 }
 
 std::string interval_in_words(const Estimate& estimate, int significant) {

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json_fwd.hpp>
@@ -35,8 +36,8 @@ AnswerChoice choice_of(const AnswerFlags& flags);
 
 /// The answer of an exploration in each form.
 struct Answer {
-  std::string tables = {};     ///< for people
-  protocol::Table rows = {};   ///< CSV: every number with all digits
+  std::string tables = {};    ///< for people
+  protocol::Table rows = {};  ///< CSV: every number with all digits
   std::string json = {};
   plot::Figure figure = {};
 };
@@ -49,8 +50,9 @@ void put_out(Console& console, const AnswerFlags& flags, const Answer& answer);
 protocol::Value value_of(double number);
 /// A table as people read it.
 std::string text_of(const protocol::Table& table);
-/// {"value", "from", "to"}; NaN becomes null.
+/// {"value", "from", "to"} of one estimate, or as arrays of several; NaN becomes null.
 nlohmann::ordered_json json_of(const Estimate& estimate);
+nlohmann::ordered_json json_of(const std::vector<Estimate>& estimates);
 /// "0.30 to 0.33" with so many significant digits; empty without either end.
 std::string interval_in_words(const Estimate& estimate, int significant = 4);
 

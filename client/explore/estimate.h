@@ -4,11 +4,13 @@
 
 namespace oblique::client {
 
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
 /// An estimate with its 95 % interval; NaN: undefined.
 struct Estimate {
-  double value = std::numeric_limits<double>::quiet_NaN();
-  double from = std::numeric_limits<double>::quiet_NaN();
-  double to = std::numeric_limits<double>::quiet_NaN();
+  double value = kNaN;
+  double from = kNaN;
+  double to = kNaN;
 
   double half_width() const { return (to - from) / 2.0; }
 };

@@ -84,8 +84,8 @@ std::vector<Output> outputs_of_flag(std::string_view flag, std::string_view text
   std::vector<Output> outputs;
   for (const std::string& part : parts_of(text)) {
     if (part.empty()) {
-      throw solver::InputError(fmt::format("{} {}: an output is missing", flag,
-                                           protocol::excerpt(text)));
+      throw solver::InputError(
+          fmt::format("{} {}: an output is missing", flag, protocol::excerpt(text)));
     }
     std::string sql = mode_condition(part);
     if (sql.empty()) {

@@ -15,7 +15,8 @@ struct Output {
 };
 
 inline constexpr std::string_view kOutputsHelp =
-    "outputs, with commas between them: columns of `oblique columns`, SQL over them, or, of a mode, "
+    "outputs, with commas between them: columns of `oblique columns`, SQL over them, or, of a "
+    "mode, "
     "1 where a point has it and else 0, as mode:'sC sR' or major_mode:'sC sR'";
 
 /// The outputs of a flag's text; commas inside quotes and brackets separate nothing. Throws

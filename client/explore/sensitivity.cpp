@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -13,7 +12,6 @@
 namespace oblique::client {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kReplicates = 1000;
 constexpr std::uint64_t kLevels = 8;
 
@@ -48,7 +46,8 @@ double percentile(std::vector<double>& values, double share) {
   if (values.empty()) {
     return kNaN;
   }
-  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  const auto place =
+      static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), values.begin() + place, values.end());
   return values[static_cast<std::size_t>(place)];
 }
@@ -97,7 +96,8 @@ std::vector<Estimate> bootstrap(const RowTerms& rows, const Statistics& statisti
 }
 
 bool are_finite(std::span<const double> values) {
-  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  return std::all_of(values.begin(), values.end(),
+                     [](double value) { return std::isfinite(value); });
 }
 
 std::vector<Estimate> part_of(const std::vector<Estimate>& estimates, std::size_t part,
@@ -172,8 +172,8 @@ SobolIndices sobol_indices(std::span<const double> outputs, std::size_t inputs,
     }
     return values;
   };
-  auto estimates = rows.empty() ? std::vector<Estimate>(1 + 2 * inputs)
-                                : bootstrap(terms, statistics, seed);
+  auto estimates =
+      rows.empty() ? std::vector<Estimate>(1 + 2 * inputs) : bootstrap(terms, statistics, seed);
   indices.variance = estimates[0].value;
   estimates.erase(estimates.begin());
   indices.first = part_of(estimates, 0, inputs);
@@ -216,8 +216,8 @@ MorrisEffects morris_effects(std::span<const double> outputs, std::size_t inputs
     std::vector<double> row(terms.width);
     for (std::size_t step = 0; step < inputs; ++step) {
       const std::size_t input = trajectory.changed[step];
-      const double change = trajectory.points[(step + 1) * inputs + input] -
-                            trajectory.points[step * inputs + input];
+      const double change =
+          trajectory.points[(step + 1) * inputs + input] - trajectory.points[step * inputs + input];
       const double effect = (values[step + 1] - values[step]) / change;
       row[input] = effect;
       row[inputs + input] = std::abs(effect);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -8,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -19,6 +21,9 @@
 #include "client/explore/growing_study.h"
 #include "client/explore/outputs.h"
 #include "client/explore/sensitivity.h"
+#include "client/io/console.h"
+#include "client/io/row_output.h"
+#include "client/plot/figure.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
 #include "proto/program/usage.h"
@@ -33,7 +38,7 @@
 namespace oblique::client {
 namespace {
 
-constexpr const char* kSensitivityExamples = R"(Examples:
+constexpr const char* kSensitivityExamples = R"help(Examples:
   oblique sensitivity --H 0.3:1.1 --mu 0.05:1.9 --e "normal(0.8,0.05,0.5,1)"
   oblique sensitivity --H 1 --mu 0.05:1.9 --e 0.5:1 --k "log-uniform(1e7,1e8)" --out indices.svg
   oblique sensitivity --H 1 --mu 0.05:1.9 --e 0.5:1 --of "stick_total_s,major_mode:'sC sR'"
@@ -46,15 +51,15 @@ independent. sobol needs d + 2 points a row for d inputs and gives the parts of 
 input explains alone (first order) and with all others (total); morris needs d + 1 points a
 trajectory and shows which inputs matter at all. Intervals are 95 %.
 Values of keys other than H, mu, e, k and eta2 cost a fall each: give them as levels, as 6e10:8e10:16.
-Ctrl-C stops it and loses nothing: the same command again goes on where it stopped.)";
+Ctrl-C stops it and loses nothing: the same command again goes on where it stopped.)help";
 
-enum class Method { kSobol, kMorris };
-constexpr std::array<std::string_view, 2> kMethods{"sobol", "morris"};
+enum class SensitivityMethod { kSobol, kMorris };
+constexpr std::array<std::string_view, 2> kSensitivityMethods{"sobol", "morris"};
 
 struct SensitivityFlags {
   PointFlags points;
   std::string of{"fn_peak_N,duration_s"};
-  std::string method{kMethods.front()};
+  std::string method{kSensitivityMethods.front()};
   std::uint64_t rows = 0;  ///< of the first round; 0: by the method
   double interval = 0.02;
   std::uint64_t most_points = 500'000;
@@ -64,56 +69,62 @@ struct SensitivityFlags {
 };
 
 /// An input: a key whose values are drawn.
-struct Input {
+struct DrawnInput {
   protocol::Axis axis;
   std::optional<sampling::Quantiles> quantiles = {};  ///< none: it has levels
 
   /// The value at coordinate 0 < u < 1.
   double at(double u) const {
     const std::uint64_t levels = protocol::axis_size(axis);
-    return quantiles ? quantiles->value_at(u)
-                     : protocol::axis_value(axis, std::min(static_cast<std::uint64_t>(
-                                                               u * static_cast<double>(levels)),
-                                                           levels - 1));
+    return quantiles
+               ? quantiles->value_at(u)
+               : protocol::axis_value(
+                     axis, std::min(static_cast<std::uint64_t>(u * static_cast<double>(levels)),
+                                    levels - 1));
   }
 };
 
 /// What is analysed, checked.
-struct Problem {
-  Method method = Method::kSobol;
+struct SensitivityProblem {
+  SensitivityMethod method = SensitivityMethod::kSobol;
   protocol::Recipe sample;  ///< a sample with the distributions of the inputs
-  std::vector<Input> inputs = {};
+  std::vector<DrawnInput> inputs = {};
   std::vector<Output> outputs = {};
   std::uint64_t first_rows = 0;
   std::uint64_t seed = 1;
 
-  std::size_t points_of_row() const { return inputs.size() + (method == Method::kSobol ? 2 : 1); }
+  std::size_t points_of_row() const {
+    return inputs.size() + (method == SensitivityMethod::kSobol ? 2 : 1);
+  }
   /// Coordinates of the points of a row of the design.
   std::vector<double> row(std::uint64_t number) const {
-    return method == Method::kSobol ? saltelli_row(inputs.size(), seed, number)
-                                    : morris_trajectory(inputs.size(), seed, number).points;
+    return method == SensitivityMethod::kSobol
+               ? saltelli_row(inputs.size(), seed, number)
+               : morris_trajectory(inputs.size(), seed, number).points;
   }
 };
 
-std::uint64_t first_rows_of(const SensitivityFlags& flags, Method method) {
+std::uint64_t first_rows_of(const SensitivityFlags& flags, SensitivityMethod method) {
   constexpr std::uint64_t kSobolRows = 512;
   constexpr std::uint64_t kTrajectories = 32;
   if (flags.rows == 0) {
-    return method == Method::kSobol ? kSobolRows : kTrajectories;
+    return method == SensitivityMethod::kSobol ? kSobolRows : kTrajectories;
   }
-  if (method == Method::kSobol && !std::has_single_bit(flags.rows)) {
-    throw solver::InputError(fmt::format(
-        "--points {} is not allowed: points of Sobol's sequence are balanced in powers of two only; "
-        "take {} or {}",
-        flags.rows, std::bit_floor(flags.rows), std::bit_ceil(flags.rows)));
+  if (method == SensitivityMethod::kSobol && !std::has_single_bit(flags.rows)) {
+    throw solver::InputError(
+        fmt::format("--points {} is not allowed: points of Sobol's sequence are balanced in powers "
+                    "of two only; "
+                    "take {} or {}",
+                    flags.rows, std::bit_floor(flags.rows), std::bit_ceil(flags.rows)));
   }
   return flags.rows;
 }
 
 /// Throws solver::InputError for what the flags say wrong.
-Problem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach) {
-  Problem problem;
-  problem.method = static_cast<Method>(choice_of("--method", flags.method, kMethods));
+SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach) {
+  SensitivityProblem problem;
+  problem.method =
+      static_cast<SensitivityMethod>(choice_of("--method", flags.method, kSensitivityMethods));
   problem.first_rows = first_rows_of(flags, problem.method);
   problem.outputs = outputs_of_flag("--of", flags.of);
   for (const Output& output : problem.outputs) {
@@ -139,7 +150,7 @@ Problem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach)
         "no value is drawn: give at least one key a distribution or several values, as --mu "
         "0.05:1.9");
   }
-  if (problem.method == Method::kSobol && problem.inputs.size() > kMostSobolInputs) {
+  if (problem.method == SensitivityMethod::kSobol && problem.inputs.size() > kMostSobolInputs) {
     throw solver::InputError(fmt::format(
         "{} inputs are more than the {} that sobol can have: find those that matter with --method "
         "morris, and give the others one value",
@@ -149,7 +160,8 @@ Problem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach)
 }
 
 /// The points of rows [begin, end) of the design, side by side.
-protocol::Block block_of_rows(const Problem& problem, std::uint64_t begin, std::uint64_t end) {
+protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t begin,
+                              std::uint64_t end) {
   const std::size_t d = problem.inputs.size();
   std::vector<std::vector<double>> values(d);
   for (std::uint64_t number = begin; number < end; ++number) {
@@ -171,7 +183,7 @@ protocol::Block block_of_rows(const Problem& problem, std::uint64_t begin, std::
 }
 
 /// Says so where most of the time of these points goes to falls that levels would share.
-void note_falls(Console& console, const Problem& problem, const protocol::Block& block) {
+void note_falls(Console& console, const SensitivityProblem& problem, const protocol::Block& block) {
   constexpr std::uint64_t kFew = 100;  // points a fall, which cost more than that on any mesh
   protocol::Recipe recipe = problem.sample;
   recipe.clear_blocks();
@@ -181,9 +193,10 @@ void note_falls(Console& console, const Problem& problem, const protocol::Block&
   const auto model = protocol::from_message(recipe.model());
   std::vector<std::string> keys;
   std::string flag;
-  for (const Input& input : problem.inputs) {
+  for (const DrawnInput& input : problem.inputs) {
     const auto& key = protocol::axis_key(input.axis.key());
-    if (input.quantiles && solver::changes_fall(key, model)) {
+    if (input.quantiles && !protocol::is_point_key(protocol::key_number(key.name)) &&
+        solver::changes_fall(key, model)) {
       keys.push_back(input.axis.key());
       flag = fmt::format("{} {}:{}:16", flag_of_key(key.name),
                          solver::readable_number(input.at(1.0 / 32.0)),
@@ -234,16 +247,16 @@ struct OutputMeasures {
   }
 };
 
-OutputMeasures measures_of(const Problem& problem, const Output& output,
+OutputMeasures measures_of(const SensitivityProblem& problem, const Output& output,
                            const std::vector<double>& values) {
   const std::size_t d = problem.inputs.size();
-  if (problem.method == Method::kMorris) {
+  if (problem.method == SensitivityMethod::kMorris) {
     auto effects = morris_effects(values, d, problem.seed);
     return {&output,
             effects.trajectories,
             effects.dropped,
-            std::nan(""),
-            std::nan(""),
+            kNaN,
+            kNaN,
             {{"mu_star", "mean of magnitudes", std::move(effects.mu_star)},
              {"sigma", "deviation", std::move(effects.sigma)},
              {"mu", "mean", std::move(effects.mu)}}};
@@ -259,7 +272,7 @@ OutputMeasures measures_of(const Problem& problem, const Output& output,
 }
 
 /// The design solved so far.
-struct Solved {
+struct SolvedDesign {
   std::uint64_t rows = 0;
   std::uint64_t points = 0;
   std::uint64_t failed = 0;
@@ -275,11 +288,12 @@ struct Solved {
   }
 };
 
-void add_rows(Solved& solved, const Problem& problem, const protocol::Table& table) {
+void add_rows(SolvedDesign& solved, const SensitivityProblem& problem,
+              const protocol::Table& table) {
   solved.values.resize(problem.outputs.size());
   for (const auto& row : table.rows) {
     ++solved.points;
-    solved.failed += std::holds_alternative<std::monostate>(row.front()) ? 1 : 0;
+    solved.failed += std::holds_alternative<std::monostate>(row.front()) ? 1U : 0U;
     for (std::size_t i = 0; i < problem.outputs.size(); ++i) {
       solved.values[i].push_back(number_of(row.at(i + 1), "--of", problem.outputs[i]));
     }
@@ -292,23 +306,25 @@ void add_rows(Solved& solved, const Problem& problem, const protocol::Table& tab
 
 /// Solves round after round, each with as many rows as all before, until the intervals are narrow
 /// enough or the next round would exceed a limit.
-Solved solved_design(Console& console, const Problem& problem, const SensitivityFlags& flags,
-                     GrowingStudy& study) {
-  constexpr std::uint64_t kListedBytes = 15'000'000;  // of 16 MiB that a study's definition may have
+SolvedDesign solved_design(Console& console, const SensitivityProblem& problem,
+                           const SensitivityFlags& flags, GrowingStudy& study) {
+  constexpr std::uint64_t kListedBytes =
+      15'000'000;  // of 16 MiB that a study's definition may have
   const std::uint64_t most_points =
       std::min(flags.most_points, kListedBytes / (8 * problem.inputs.size()));
   std::vector<std::string> columns{"H"};  // NULL where the point failed
   for (const Output& output : problem.outputs) {
     columns.push_back(output.sql);
   }
-  Solved solved;
+  SolvedDesign solved;
   std::string of_rounds;
   for (std::uint64_t end = problem.first_rows; solved.rows < end; end = 2 * solved.rows) {
     if (end * problem.points_of_row() > most_points) {
       if (solved.rows == 0) {
         throw solver::InputError(fmt::format(
             "--points {} needs {} points for {} inputs, more than {}", problem.first_rows,
-            end * problem.points_of_row(), problem.inputs.size(), most_points));
+            format_count(end * problem.points_of_row()), problem.inputs.size(),
+            format_count(most_points)));
       }
       console.note(fmt::format(
           "Note: the widest interval is +-{} instead of +-{}: twice as many points would be more "
@@ -325,7 +341,7 @@ Solved solved_design(Console& console, const Problem& problem, const Sensitivity
              study.solve(block, fmt::format("{}", fmt::join(columns, ", ")),
                          fmt::format("round {}{}", study.rounds() + 1, of_rounds)));
     solved.rows = end;
-    if (problem.method == Method::kMorris || solved.widest() <= flags.interval) {
+    if (problem.method == SensitivityMethod::kMorris || solved.widest() <= flags.interval) {
       break;
     }
     // The width falls as the root of the rows.
@@ -335,15 +351,15 @@ Solved solved_design(Console& console, const Problem& problem, const Sensitivity
   return solved;
 }
 
-std::vector<std::string> names_of(const Problem& problem) {
+std::vector<std::string> names_of(const SensitivityProblem& problem) {
   std::vector<std::string> names;
-  for (const Input& input : problem.inputs) {
+  for (const DrawnInput& input : problem.inputs) {
     names.push_back(input.axis.key());
   }
   return names;
 }
 
-std::string tables_of(const Problem& problem, const Solved& solved) {
+std::string tables_of(const SensitivityProblem& problem, const SolvedDesign& solved) {
   const auto names = names_of(problem);
   std::string text;
   for (const auto& each : solved.measures) {
@@ -352,7 +368,8 @@ std::string tables_of(const Problem& problem, const Solved& solved) {
       text += fmt::format("mean {}, deviation {}, ", solver::readable_number(each.mean),
                           solver::readable_number(std::sqrt(each.variance), 4));
     }
-    const std::string_view noun = problem.method == Method::kSobol ? "rows" : "trajectories";
+    const std::string_view noun =
+        problem.method == SensitivityMethod::kSobol ? "rows" : "trajectories";
     text += fmt::format("{} {}", format_count(each.rows), noun);
     text += each.dropped == 0 ? "\n"
                               : fmt::format(", {} left out, in which a point has no value\n",
@@ -365,7 +382,7 @@ std::string tables_of(const Problem& problem, const Solved& solved) {
       auto& row = table.rows.emplace_back(protocol::Row{names[i]});
       for (const auto& measure : each.measures) {
         const Estimate& of_input = measure.of_inputs[i];
-        const bool is_index = problem.method == Method::kSobol;
+        const bool is_index = problem.method == SensitivityMethod::kSobol;
         row.push_back(std::isnan(of_input.value) ? protocol::Value()
                       : is_index ? protocol::Value(solver::fixed_number(of_input.value, 3))
                                  : protocol::Value(solver::readable_number(of_input.value, 4)));
@@ -380,7 +397,7 @@ std::string tables_of(const Problem& problem, const Solved& solved) {
   return text;
 }
 
-protocol::Table rows_of(const Problem& problem, const Solved& solved) {
+protocol::Table rows_of(const SensitivityProblem& problem, const SolvedDesign& solved) {
   const auto names = names_of(problem);
   protocol::Table table{.columns = {"output", "input"}};
   for (const auto& measure : solved.measures.front().measures) {
@@ -404,29 +421,25 @@ protocol::Table rows_of(const Problem& problem, const Solved& solved) {
   return table;
 }
 
-std::string json_of(const Problem& problem, const Solved& solved, const GrowingStudy& study) {
-  nlohmann::ordered_json json{{"study", study.name()},
-                              {"method", kMethods.at(static_cast<std::size_t>(problem.method))},
-                              {"seed", problem.seed},
-                              {"rows", solved.rows},
-                              {"points", solved.points},
-                              {"failed", solved.failed},
-                              {"inputs", names_of(problem)}};
+std::string json_of(const SensitivityProblem& problem, const SolvedDesign& solved,
+                    const GrowingStudy& study) {
+  nlohmann::ordered_json json{
+      {"study", study.name()},
+      {"method", kSensitivityMethods.at(static_cast<std::size_t>(problem.method))},
+      {"seed", problem.seed},
+      {"rows", solved.rows},
+      {"points", solved.points},
+      {"failed", solved.failed},
+      {"inputs", names_of(problem)}};
   for (const auto& each : solved.measures) {
     nlohmann::ordered_json output{
         {"name", each.output->name}, {"rows", each.rows}, {"dropped", each.dropped}};
-    if (problem.method == Method::kSobol) {
+    if (problem.method == SensitivityMethod::kSobol) {
       output["mean"] = each.mean;
       output["variance"] = each.variance;
     }
     for (const auto& measure : each.measures) {
-      nlohmann::ordered_json of_inputs = nlohmann::ordered_json::object();
-      for (const Estimate& estimate : measure.of_inputs) {
-        of_inputs["value"].push_back(estimate.value);
-        of_inputs["from"].push_back(estimate.from);
-        of_inputs["to"].push_back(estimate.to);
-      }
-      output[measure.name] = std::move(of_inputs);
+      output[measure.name] = json_of(measure.of_inputs);
     }
     json["outputs"].push_back(std::move(output));
   }
@@ -434,11 +447,12 @@ std::string json_of(const Problem& problem, const Solved& solved, const GrowingS
 }
 
 /// A panel of bars a measure, one row of panels an output.
-plot::Figure figure_of(const Problem& problem, const Solved& solved) {
-  plot::Figure figure{.title = problem.method == Method::kSobol ? "Sobol\u2019 indices"
-                                                                : "Morris\u2019 elementary effects",
-                      .columns = 2,
-                      .panel_size = {400.0, 90.0 + 26.0 * static_cast<double>(names_of(problem).size())}};
+plot::Figure figure_of(const SensitivityProblem& problem, const SolvedDesign& solved) {
+  plot::Figure figure{
+      .title = problem.method == SensitivityMethod::kSobol ? "Sobol\u2019 indices"
+                                                           : "Morris\u2019 elementary effects",
+      .columns = 2,
+      .panel_size = {400.0, 90.0 + 26.0 * static_cast<double>(names_of(problem).size())}};
   figure.subtitle = fmt::format("{} points, intervals of 95 %", format_count(solved.points));
   for (const auto& each : solved.measures) {
     for (std::size_t measure = 0; measure < 2; ++measure) {
@@ -447,7 +461,7 @@ plot::Figure figure_of(const Problem& problem, const Solved& solved) {
       panel.x = {.label = heading, .name = name};
       panel.y = {.name = "input"};
       panel.bars = plot::Bars{.names = names_of(problem)};
-      plot::Range range{0.0, problem.method == Method::kSobol ? 1.0 : 0.0};
+      plot::Range range{0.0, problem.method == SensitivityMethod::kSobol ? 1.0 : 0.0};
       for (const Estimate& estimate : of_inputs) {
         panel.bars->heights.push_back(std::isnan(estimate.value) ? 0.0 : estimate.value);
         panel.bars->intervals.push_back({estimate.from, estimate.to});
@@ -462,20 +476,19 @@ plot::Figure figure_of(const Problem& problem, const Solved& solved) {
 
 int sensitivity(const SensitivityFlags& flags, Console& console) {
   static_cast<void>(choice_of(flags.answer));
-  const Problem problem = problem_of(flags, tip_reach(console));
-  const std::string settings =
-      fmt::format("{} {} {} {}", protocol::recipe_digest(problem.sample), flags.method,
-                  problem.first_rows, problem.seed);
+  const SensitivityProblem problem = problem_of(flags, tip_reach(console));
+  const std::string settings = fmt::format("{} {} {} {}", protocol::recipe_digest(problem.sample),
+                                           flags.method, problem.first_rows, problem.seed);
   return run_exploration(console, [&](protocol::StopSignals& stop) {
     GrowingStudy study(console, flags.explore,
                        explored_name(flags.explore, "sensitivity", settings),
                        protocol::from_message(problem.sample.model()), stop);
-    const Solved solved = solved_design(console, problem, flags, study);
+    const SolvedDesign solved = solved_design(console, problem, flags, study);
     if (solved.failed > 0) {
-      console.note(fmt::format("Note: {} of {} points failed; `oblique query {} --where \"status = "
-                               "'failed'\" --select point,error` shows why.",
-                               format_count(solved.failed), format_count(solved.points),
-                               study.name()));
+      console.note(
+          fmt::format("Note: {} of {} points failed; `oblique query {} --where \"status = "
+                      "'failed'\" --select point,error` shows why.",
+                      format_count(solved.failed), format_count(solved.points), study.name()));
     }
     put_out(console, flags.answer,
             {.tables = tables_of(problem, solved),
@@ -500,7 +513,7 @@ void add_sensitivity(CLI::App& app, Action& parsed) {
                                  "sobol: indices; morris: elementary effects, for many inputs")
                      ->type_name("NAME")
                      ->capture_default_str();
-  protocol::note_choices(method, kMethods);
+  protocol::note_choices(method, kSensitivityMethods);
   command
       .add_option("--points", flags.rows,
                   "rows of the first round, a power of two, or trajectories; default: 512, or 32")

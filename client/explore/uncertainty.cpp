@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace oblique::client {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 /// The 97.5 % quantile of the standard normal distribution.
 constexpr double kZ = 1.959963984540054;
 
@@ -109,8 +107,7 @@ Estimate probability_of(std::uint64_t hits, std::uint64_t n) {
   const auto draws = static_cast<double>(n);
   const double q = static_cast<double>(hits) / draws;
   const double middle = q + kZ * kZ / (2.0 * draws);
-  const double half =
-      kZ * std::sqrt(q * (1.0 - q) / draws + kZ * kZ / (4.0 * draws * draws));
+  const double half = kZ * std::sqrt(q * (1.0 - q) / draws + kZ * kZ / (4.0 * draws * draws));
   const double scale = 1.0 + kZ * kZ / draws;
   return {q, std::max(0.0, (middle - half) / scale), std::min(1.0, (middle + half) / scale)};
 }

@@ -19,8 +19,6 @@ namespace {
 using testing::DoubleNear;
 using testing::Each;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 /// A function on the unit cube.
 using Function = std::function<double(std::span<const double> u)>;
 
@@ -179,8 +177,8 @@ TEST(SobolIndicesTest, ARowWithAFailedPointIsDroppedWholeAndCounted) {
   auto outputs = sobol_outputs(known.f, 3, 1, 64);
   std::vector<double> without(outputs.begin() + 5, outputs.end());
   without.erase(without.begin() + 5 * 30, without.begin() + 5 * 31);
-  outputs[3] = kNaN;                                             // A_B^2 of row 0
-  outputs[5 * 31] = std::numeric_limits<double>::infinity();     // A of row 31
+  outputs[3] = kNaN;                                          // A_B^2 of row 0
+  outputs[5 * 31] = std::numeric_limits<double>::infinity();  // A of row 31
   const auto dropped = sobol_indices(outputs, 3, 1);
   const auto never = sobol_indices(without, 3, 1);
   EXPECT_EQ(dropped.rows, 62U);
@@ -208,7 +206,8 @@ TEST(SobolIndicesTest, OutputsWithoutVarianceOrRowsHaveNoIndices) {
 TEST(SaltelliDesignTest, ARowIsAAndBAndAWithEachCoordinateOfB) {
   const auto row = saltelli_row(2, 1, 5);
   ASSERT_EQ(row.size(), 8U);
-  const std::vector<double> expected{row[0], row[1], row[2], row[3], row[2], row[1], row[0], row[3]};
+  const std::vector<double> expected{row[0], row[1], row[2], row[3],
+                                     row[2], row[1], row[0], row[3]};
   EXPECT_EQ(row, expected);
   EXPECT_EQ(std::set<double>(row.begin(), row.begin() + 4).size(), 4U);
   EXPECT_THROW(saltelli_row(kMostSobolInputs + 1, 1, 0), std::out_of_range);
@@ -218,8 +217,7 @@ TEST(SaltelliDesignTest, TheFirstRowsOfAPowerOfTwoHaveOneCoordinateInEachStratum
   for (std::size_t coordinate = 0; coordinate < 2 * kMostSobolInputs; ++coordinate) {
     std::set<int> strata;
     for (std::uint64_t number = 0; number < 64; ++number) {
-      strata.insert(
-          static_cast<int>(64.0 * saltelli_row(kMostSobolInputs, 3, number)[coordinate]));
+      strata.insert(static_cast<int>(64.0 * saltelli_row(kMostSobolInputs, 3, number)[coordinate]));
     }
     EXPECT_EQ(strata.size(), 64U) << coordinate;
   }
