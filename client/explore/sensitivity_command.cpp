@@ -135,7 +135,16 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
   }
   PointFlags points = flags.points;
   points.sample = fmt::format("sobol:{}:{}", problem.first_rows, flags.seed);
-  problem.sample = recipe_of_flags(points, check_reach);
+  try {
+    problem.sample = recipe_of_flags(points, check_reach);
+  } catch (const solver::InputError& error) {
+    if (error.fields().key == "sample") {  // it is not among the flags
+      throw solver::InputError(
+          "no value is drawn: give at least one key a distribution or several values, as --mu "
+          "0.05:1.9");
+    }
+    throw;
+  }
   problem.seed = problem.sample.blocks(0).sample().seed();
   for (const auto& axis : problem.sample.blocks(0).axes()) {
     if (protocol::is_drawn(axis)) {
@@ -144,11 +153,6 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
         problem.inputs.back().quantiles.emplace(axis);
       }
     }
-  }
-  if (problem.inputs.empty()) {
-    throw solver::InputError(
-        "no value is drawn: give at least one key a distribution or several values, as --mu "
-        "0.05:1.9");
   }
   if (problem.method == SensitivityMethod::kSobol && problem.inputs.size() > kMostSobolInputs) {
     throw solver::InputError(fmt::format(
@@ -182,42 +186,50 @@ protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t b
   return block;
 }
 
+/// Sixteen equally likely levels instead of a distribution, as a flag.
+std::string levels_flag(const DrawnInput& input) {
+  constexpr int kSuggested = 16;
+  std::vector<std::string> levels;
+  for (int level = 0; level < kSuggested; ++level) {
+    levels.push_back(solver::readable_number(input.at((level + 0.5) / kSuggested), 5));
+  }
+  const bool is_uniform =
+      input.axis.distribution().kind() == protocol::DistributionKind::DISTRIBUTION_UNIFORM;
+  return fmt::format("{} {}", flag_of_key(input.axis.key()),
+                     is_uniform ? fmt::format("{}:{}:{}", levels.front(), levels.back(), kSuggested)
+                                : fmt::format("{}", fmt::join(levels, ",")));
+}
+
 /// Says so where most of the time of these points goes to falls that levels would share.
 void note_falls(Console& console, const SensitivityProblem& problem, const protocol::Block& block) {
-  constexpr std::uint64_t kFew = 100;  // points a fall, which cost more than that on any mesh
-  protocol::Recipe recipe = problem.sample;
-  recipe.clear_blocks();
-  *recipe.add_blocks() = block;
-  const protocol::PointTable table(recipe);
-  const auto size = protocol::size_of(table);
-  const auto model = protocol::from_message(recipe.model());
-  std::vector<std::string> keys;
-  std::string flag;
+  constexpr std::uint64_t kFew = 100;  // contacts, which take less time than a fall on any mesh
+  const auto model = protocol::from_message(problem.sample.model());
+  std::vector<std::string> flags;
   for (const DrawnInput& input : problem.inputs) {
-    const auto& key = protocol::axis_key(input.axis.key());
-    if (input.quantiles && !protocol::is_point_key(protocol::key_number(key.name)) &&
-        solver::changes_fall(key, model)) {
-      keys.push_back(input.axis.key());
-      flag = fmt::format("{} {}:{}:16", flag_of_key(key.name),
-                         solver::readable_number(input.at(1.0 / 32.0)),
-                         solver::readable_number(input.at(31.0 / 32.0)));
+    const std::size_t key = protocol::key_number(input.axis.key());
+    if (input.quantiles && !protocol::is_point_key(key) &&
+        solver::changes_fall(protocol::key_numbered(key), model)) {
+      flags.push_back(levels_flag(input));
     }
   }
-  if (keys.empty() || size.falls * kFew < size.points) {
+  protocol::Recipe recipe = problem.sample;
+  *recipe.mutable_blocks(0) = block;
+  const protocol::PointTable table(recipe);
+  const auto size = protocol::size_of(table);
+  if (flags.empty() || size.falls * kFew < size.points) {
     return;
   }
   const auto cost = measured_cost(table, size);
-  auto without = size;
-  without.falls = 1;
-  const double share = 1.0 - time_s(cost, without) / time_s(cost, size);
-  if (share < 0.5) {
-    return;
+  auto with_one_fall = size;
+  with_one_fall.falls = 1;
+  const double share = 1.0 - time_s(cost, with_one_fall) / time_s(cost, size);
+  if (share > 0.5) {
+    console.note(fmt::format(
+        "Note: {:.0f} % of the time, about {} for the first round, is {} falls: each drawn value "
+        "needs its own. Levels share them: {}.",
+        100.0 * share, format_duration(time_s(cost, size)), format_count(size.falls),
+        fmt::join(flags, " ")));
   }
-  console.note(fmt::format(
-      "Note: {:.0f} % of the time is {} falls: each drawn value of {} has its own, {} in the first "
-      "round. Levels share them: {}.",
-      100.0 * share, format_count(size.falls), fmt::join(keys, ", "),
-      format_duration(time_s(cost, size)), flag));
 }
 
 /// One measure of all inputs.
@@ -321,10 +333,10 @@ SolvedDesign solved_design(Console& console, const SensitivityProblem& problem,
   for (std::uint64_t end = problem.first_rows; solved.rows < end; end = 2 * solved.rows) {
     if (end * problem.points_of_row() > most_points) {
       if (solved.rows == 0) {
-        throw solver::InputError(fmt::format(
-            "--points {} needs {} points for {} inputs, more than {}", problem.first_rows,
-            format_count(end * problem.points_of_row()), problem.inputs.size(),
-            format_count(most_points)));
+        throw solver::InputError(
+            fmt::format("--points {} needs {} points for {} inputs, more than {}",
+                        problem.first_rows, format_count(end * problem.points_of_row()),
+                        problem.inputs.size(), format_count(most_points)));
       }
       console.note(fmt::format(
           "Note: the widest interval is +-{} instead of +-{}: twice as many points would be more "
@@ -361,6 +373,10 @@ std::vector<std::string> names_of(const SensitivityProblem& problem) {
 
 std::string tables_of(const SensitivityProblem& problem, const SolvedDesign& solved) {
   const auto names = names_of(problem);
+  const bool is_sobol = problem.method == SensitivityMethod::kSobol;
+  const auto shown = [is_sobol](double value) {
+    return is_sobol ? solver::fixed_number(value, 3) : solver::readable_number(value, 4);
+  };
   std::string text;
   for (const auto& each : solved.measures) {
     text += fmt::format("{}{}: ", text.empty() ? "" : "\n", each.output->name);
@@ -368,9 +384,7 @@ std::string tables_of(const SensitivityProblem& problem, const SolvedDesign& sol
       text += fmt::format("mean {}, deviation {}, ", solver::readable_number(each.mean),
                           solver::readable_number(std::sqrt(each.variance), 4));
     }
-    const std::string_view noun =
-        problem.method == SensitivityMethod::kSobol ? "rows" : "trajectories";
-    text += fmt::format("{} {}", format_count(each.rows), noun);
+    text += fmt::format("{} {}", format_count(each.rows), is_sobol ? "rows" : "trajectories");
     text += each.dropped == 0 ? "\n"
                               : fmt::format(", {} left out, in which a point has no value\n",
                                             format_count(each.dropped));
@@ -381,15 +395,10 @@ std::string tables_of(const SensitivityProblem& problem, const SolvedDesign& sol
     for (std::size_t i = 0; i < names.size(); ++i) {
       auto& row = table.rows.emplace_back(protocol::Row{names[i]});
       for (const auto& measure : each.measures) {
-        const Estimate& of_input = measure.of_inputs[i];
-        const bool is_index = problem.method == SensitivityMethod::kSobol;
-        row.push_back(std::isnan(of_input.value) ? protocol::Value()
-                      : is_index ? protocol::Value(solver::fixed_number(of_input.value, 3))
-                                 : protocol::Value(solver::readable_number(of_input.value, 4)));
-        row.emplace_back(is_index && !std::isnan(of_input.from)
-                             ? fmt::format("{} to {}", solver::fixed_number(of_input.from, 3),
-                                           solver::fixed_number(of_input.to, 3))
-                             : interval_in_words(of_input));
+        const auto& [value, from, to] = measure.of_inputs[i];
+        const bool is_known = !std::isnan(value);
+        row.push_back(is_known ? protocol::Value(shown(value)) : protocol::Value());
+        row.emplace_back(is_known ? fmt::format("{} to {}", shown(from), shown(to)) : "");
       }
     }
     text += text_of(table);
@@ -529,6 +538,7 @@ void add_sensitivity(CLI::App& app, Action& parsed) {
       ->type_name("N")
       ->capture_default_str();
   command.add_option("--seed", flags.seed, "of the scrambling, or of the trajectories")
+      ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();
   add_answer_flags(command, flags.answer);

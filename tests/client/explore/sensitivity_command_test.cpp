@@ -90,6 +90,19 @@ TEST(Sensitivity, RowsWithFailedPointsAreLeftOutAndCounted) {
   EXPECT_THAT(outcome.err, testing::Not(HasSubstr("Note: 0 of")));
 }
 
+TEST(Sensitivity, InputsThatNeedAFallForEachValueAreNotedWithLevelsThatShareThem) {
+  const test::TemporaryFolder folder;
+  const std::vector<std::string> flags{"--points", "16", "--interval", "9"};
+  auto drawn = flags;
+  drawn.insert(drawn.end(), {"--E", "6e10:8e10", "--rho", "normal(2700,20,2600,)"});
+  const auto falls = sensitivity(folder, drawn).err;
+  EXPECT_THAT(falls, HasSubstr("is 64 falls"));
+  EXPECT_THAT(falls, HasSubstr("--E 6.0625e+10:7.9375e+10:16 --rho 2662"));
+  auto levels = flags;
+  levels.insert(levels.end(), {"--E", "6e10:8e10:4"});
+  EXPECT_THAT(sensitivity(folder, levels).err, testing::Not(HasSubstr("falls")));
+}
+
 TEST(Sensitivity, MorrisScreensInputsAndDrawsThem) {
   const test::TemporaryFolder folder;
   const auto outcome = sensitivity(

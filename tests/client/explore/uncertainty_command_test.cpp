@@ -23,8 +23,8 @@ class Uncertainty : public ::testing::Test {
 
   void run(const std::string& sample, const std::string& name) const {
     const auto outcome = test::run_oblique(
-        folder_, {"run", "--H", "0.9", "--mu", "0.1:1.8", "--e", "normal(0.8,0.02)", "--preset",
-                  "paper", "--sample", sample, "--name", name, "--quiet"});
+        folder_, {"run", "--H", "0.9", "--mu", "0.1:1.8", "--e", "normal(0.8,0.02,0.7,0.9)",
+                  "--preset", "paper", "--sample", sample, "--name", name, "--quiet"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   }
 

@@ -1,18 +1,15 @@
 """Explorations: the commands of the program, as arrays."""
 
-import os
-
 import numpy as np
 import pytest
 
 import oblique
-from conftest import PROGRAMS, run_oblique
+from conftest import run_oblique
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PATH", PROGRAMS + os.pathsep + os.environ["PATH"])
     return tmp_path
 
 
