@@ -63,6 +63,8 @@ void add_columns(CLI::App& app, Action& parsed);
 void add_paper(CLI::App& app, Action& parsed);
 void add_converge(CLI::App& app, Action& parsed);
 void add_fit(CLI::App& app, Action& parsed);
+void add_sensitivity(CLI::App& app, Action& parsed);
+void add_uncertainty(CLI::App& app, Action& parsed);
 /// `merge`, `backup` and `check`.
 void add_database_files(CLI::App& app, Action& parsed);
 void add_autoscale(CLI::App& app, Action& parsed);

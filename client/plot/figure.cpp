@@ -50,6 +50,23 @@ std::string label_of(const std::string& name) {
   return name;
 }
 
+/// Edges at multiples of 1, 2 or 5 times a power of ten, about `bins` apart, around the range.
+std::vector<double> round_edges(const Range& range, double bins) {
+  const double raw = (range.to - range.from) / bins;
+  const double decade = std::pow(10.0, std::floor(std::log10(raw)));
+  double step = 10.0 * decade;
+  for (const double times : {5.0, 2.0, 1.0}) {
+    step = times * decade >= raw * 0.999 ? times * decade : step;
+  }
+  std::vector<double> edges;
+  for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
+       ++i) {
+    // Below 1 a quotient of whole numbers is the double that people write.
+    edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
+  }
+  return edges;
+}
+
 }  // namespace
 
 Range range_of(const std::vector<double>& values, bool positive_only) {
@@ -143,6 +160,20 @@ std::size_t interval_of(const std::vector<double>& edges, double value) {
   }
   const auto above = std::upper_bound(edges.begin() + 1, edges.end() - 1, value);
   return static_cast<std::size_t>(above - edges.begin()) - 1;
+}
+
+Bars binned(const std::vector<double>& values, const FigureAxis& axis) {
+  const double bins =
+      std::clamp(std::round(std::sqrt(2.0 * static_cast<double>(values.size()))), 10.0, 100.0);
+  Bars bars;
+  bars.edges = axis.is_logarithmic ? cells_between(axis, static_cast<std::size_t>(bins)).edges
+                                   : round_edges(axis.range, bins);
+  bars.heights.assign(bars.edges.size() - 1, 0.0);
+  for (const double value : values) {
+    const double inside = std::clamp(value, bars.edges.front(), bars.edges.back());
+    bars.heights[interval_of(bars.edges, inside)] += 1.0;
+  }
+  return bars;
 }
 
 namespace {

@@ -111,7 +111,12 @@ struct Bars {
   std::vector<double> edges = {};
   std::vector<double> heights = {};
   std::vector<std::string> names = {};
+  std::vector<Range> intervals =
+      {};  ///< of the heights of named bars, NaN: none; empty: no bar has one
 };
+
+/// Counts values in bins of one round width, or on a logarithmic axis of equal ratios.
+Bars binned(const std::vector<double>& values, const FigureAxis& axis);
 
 struct Panel {
   std::string title = {};

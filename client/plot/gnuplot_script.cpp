@@ -357,6 +357,17 @@ class Script {
     }
   }
 
+  /// Width, in letters, for the numbers or names left of panels, the same for all.
+  double left_letters() const {
+    std::size_t longest = 10;
+    for (const Panel& panel : figure_.panels) {
+      for (const std::string& name : panel.bars ? panel.bars->names : std::vector<std::string>()) {
+        longest = std::max(longest, name.size());
+      }
+    }
+    return static_cast<double>(longest + 3);
+  }
+
   /// Places the key beside the panel if the picture has room there or the panel is narrow, else
   /// below it in as many columns as fit.
   void write_key(const Panel& panel) {
@@ -382,7 +393,7 @@ class Script {
     if (!is_alone) {
       // Aligns the axes of panels below each other.
       add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\n",
-          (frame_.left + 13.0 * kLetter) / size_.width,
+          (frame_.left + left_letters() * kLetter) / size_.width,
           (frame_.left + frame_.width - (is_below ? 3.0 : 28.0) * kLetter) / size_.width);
     }
   }
@@ -616,7 +627,8 @@ class Script {
         row({from, 0.0, from, bars.edges[i + 1] * panel.x.per_unit, panel.y.range.from,
              std::max(bars.heights[i], panel.y.range.from)});
       } else {
-        row({0.0, at, 0.0, bars.heights[i], at - 0.36, at + 0.36});
+        row({0.0, at, std::min(0.0, bars.heights[i]), std::max(0.0, bars.heights[i]), at - 0.36,
+             at + 0.36});
       }
     }
     out_ += "EOD\n";
@@ -624,6 +636,15 @@ class Script {
         "{} using 1:2:3:4:5:6 with boxxyerror fs solid 1 border lc rgb '#ffffff' lw 0.5 fc rgb "
         "'#0067a5' notitle",
         data);
+    if (bars.intervals.empty()) {
+      return;
+    }
+    const auto intervals = begin_data();
+    for (std::size_t i = 0; i < bars.intervals.size(); ++i) {
+      row({bars.heights[i], static_cast<double>(i), bars.intervals[i].from, bars.intervals[i].to});
+    }
+    out_ += "EOD\n";
+    plot("{} using 1:2:3:4 with xerrorbars pt -1 lw 1.7 lc rgb '#111111' notitle", intervals);
   }
 
   void write_curves(const Panel& panel) {

@@ -58,7 +58,10 @@ protocol::Table bars_table(const Panel& panel, const Bars& bars) {
   if (bars.names.empty()) {
     table.columns = {panel.x.name + "_from", panel.x.name + "_to", "points"};
   } else {
-    table.columns = {panel.y.name, "points"};
+    table.columns = {panel.y.name, panel.x.name};
+    if (!bars.intervals.empty()) {
+      table.columns.insert(table.columns.end(), {panel.x.name + "_from", panel.x.name + "_to"});
+    }
   }
   for (std::size_t i = 0; i < bars.heights.size(); ++i) {
     auto& row = table.rows.emplace_back();
@@ -68,6 +71,10 @@ protocol::Table bars_table(const Panel& panel, const Bars& bars) {
       row.emplace_back(bars.names[i]);
     }
     row.emplace_back(bars.heights[i]);
+    if (!bars.intervals.empty()) {
+      row.push_back(value_of(bars.intervals[i].from));
+      row.push_back(value_of(bars.intervals[i].to));
+    }
   }
   return table;
 }

@@ -69,38 +69,6 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   return categories;
 }
 
-/// Edges at multiples of 1, 2 or 5 times a power of ten around the range, about `bins` intervals.
-std::vector<double> round_edges(const Range& range, double bins) {
-  const double raw = (range.to - range.from) / bins;
-  const double decade = std::pow(10.0, std::floor(std::log10(raw)));
-  double step = 10.0 * decade;
-  for (const double times : {5.0, 2.0, 1.0}) {
-    step = times * decade >= raw * 0.999 ? times * decade : step;
-  }
-  std::vector<double> edges;
-  for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
-       ++i) {
-    // Below 1, dividing whole numbers gives the double that people write.
-    edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
-  }
-  return edges;
-}
-
-/// Counts values in bins of one round width, or of one ratio on a logarithmic axis.
-Bars binned(const std::vector<double>& values, const FigureAxis& axis) {
-  const double bins =
-      std::clamp(std::round(std::sqrt(2.0 * static_cast<double>(values.size()))), 10.0, 100.0);
-  Bars bars;
-  bars.edges = axis.is_logarithmic ? cells_between(axis, static_cast<std::size_t>(bins)).edges
-                                   : round_edges(axis.range, bins);
-  bars.heights.assign(bars.edges.size() - 1, 0.0);
-  for (const double value : values) {
-    const double inside = std::clamp(value, bars.edges.front(), bars.edges.back());
-    bars.heights[interval_of(bars.edges, inside)] += 1.0;
-  }
-  return bars;
-}
-
 /// The most frequent texts, largest first, and one bar for the others.
 Bars bars_of_names(const AnswerColumn& column) {
   std::vector<std::pair<double, std::string>> counts;

@@ -91,23 +91,6 @@ std::string first_line(const Descriptor& ready, const ChildProcess& server,
   return text.substr(0, text.find('\n'));
 }
 
-/// Why the workers of this run cannot solve the rest of a study, with the remedy; else empty.
-std::string objection_to_waiting(const protocol::StudyStatus& status) {
-  const std::string own = solver::solver_version();
-  if (status.state() == "paused" && status.leased() == 0) {
-    return fmt::format("\"{}\" was paused by another command: run this command again to continue",
-                       status.name());
-  }
-  if (status.state() != "running" || status.solver_version().empty() ||
-      status.solver_version() == own || status.leased() > 0) {
-    return {};
-  }
-  return fmt::format(
-      "the results of \"{0}\" are of solver {1}, but the workers here have solver {2} and must not "
-      "solve its other {3} points. Use workers of {1}, or another name, for example --name {0}-{2}",
-      status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
-}
-
 RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& settings,
                        EmbeddedService& service, protocol::StopSignals& stop) {
   const auto keep_waiting = [&] {
@@ -155,6 +138,22 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
 }
 
 }  // namespace
+
+std::string objection_to_waiting(const protocol::StudyStatus& status) {
+  const std::string own = solver::solver_version();
+  if (status.state() == "paused" && status.leased() == 0) {
+    return fmt::format("\"{}\" was paused by another command: run this command again to continue",
+                       status.name());
+  }
+  if (status.state() != "running" || status.solver_version().empty() ||
+      status.solver_version() == own || status.leased() > 0) {
+    return {};
+  }
+  return fmt::format(
+      "the results of \"{0}\" are of solver {1}, but the workers here have solver {2} and must not "
+      "solve its other {3} points. Use workers of {1}, or another name, for example --name {0}-{2}",
+      status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
+}
 
 std::string why_silent(const std::filesystem::path& database) {
   return fmt::format(

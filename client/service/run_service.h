@@ -94,6 +94,9 @@ class EmbeddedService {
   std::string page_url_;
 };
 
+/// Why the workers of this service cannot solve the rest of a study, with the remedy; else empty.
+std::string objection_to_waiting(const protocol::StudyStatus& status);
+
 /// How `run` solves a study and `paper` its cases.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};

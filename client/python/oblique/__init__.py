@@ -9,6 +9,8 @@ Values are in SI units; names end with the unit: ``fn_peak_N``, ``duration_s``.
 
 * :func:`solve` solves one point, :func:`solve_many` many points on all cores, with arrays for
   parameters and results. :func:`trace` returns the time histories of one point.
+* :func:`sensitivity` shows which inputs matter, :func:`uncertainty` how the outputs of a sampled
+  study are distributed.
 * :class:`Database` queries the results of studies, also while a server writes them.
 
 All functions are thread-safe and let other threads run. Falls are cached for later calls, in at
@@ -22,6 +24,7 @@ from __future__ import annotations
 
 from ._database import Answer, Database, Study
 from ._solving import solve, solve_many, trace
+from .explore import sensitivity, uncertainty
 from ._results import Energy, Errors, ManyResults, Result, Solver, Trace, _core
 
 DatabaseError, SolveError = _core.DatabaseError, _core.SolveError
@@ -46,7 +49,9 @@ __all__ = [
     "Solver",
     "Study",
     "Trace",
+    "sensitivity",
     "solve",
     "solve_many",
     "trace",
+    "uncertainty",
 ]

@@ -1,0 +1,91 @@
+"""Explorations: the commands ``oblique map``, ``sensitivity``, ``fit`` and ``uncertainty``.
+
+They run the program ``oblique``, which solves the points as a study of a database or server: a call
+that was stopped continues when it is made again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+from typing import Any, Optional
+
+import numpy as np
+
+from ._results import Named
+
+
+def program() -> str:
+    """The program ``oblique`` beside this module, as built or installed; else that of PATH."""
+    here = pathlib.Path(__file__).resolve()
+    for folder in (here.parents[2], here.parents[4]):
+        beside = folder / "bin" / "oblique"
+        if os.access(beside, os.X_OK):
+            return str(beside)
+    found = shutil.which("oblique")
+    if found is None:
+        raise FileNotFoundError("cannot find the program oblique: its folder must be in PATH")
+    return found
+
+
+def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
+    """The JSON that ``oblique VERB [STUDY] --flag value ... --format json`` prints.
+
+    ``tip_mass=0.1`` is ``--tip-mass 0.1``, a list or tuple repeats the flag, True is a flag without
+    a value; None and False leave it out. Raises ValueError for wrong usage and RuntimeError for
+    other failures, with the sentences of the program.
+    """
+    words = [program(), verb, *([study] if study is not None else []), "--format", "json", "--quiet"]
+    for name, value in flags.items():
+        flag = "--" + name.replace("_", "-")
+        for each in value if isinstance(value, (list, tuple)) else [value]:
+            if each is True:
+                words.append(flag)
+            elif each is not None and each is not False:
+                words.append(f"{flag}={each}")
+    ended = subprocess.run(words, capture_output=True, text=True, check=False)
+    if ended.returncode != 0:
+        raise (ValueError if ended.returncode == 2 else RuntimeError)(ended.stderr.strip())
+    return json.loads(ended.stdout)
+
+
+def arrays_of(value: Any) -> Any:
+    """Objects of JSON as Named, and lists of numbers as arrays with NaN for null."""
+    if isinstance(value, dict):
+        return Named(**{name: arrays_of(each) for name, each in value.items()})
+    if isinstance(value, list):
+        try:
+            return np.array(value, dtype=float)
+        except (TypeError, ValueError):  # texts
+            return value
+    return value
+
+
+def _with_outputs(found: dict[str, Any]) -> Named:
+    outputs = {output["name"]: arrays_of(output) for output in found.pop("outputs")}
+    return Named(**arrays_of(found).__dict__, outputs=outputs)
+
+
+def sensitivity(**flags: Any) -> Named:
+    """Which inputs matter, as ``oblique sensitivity``: ``sensitivity(H=1, mu="0.05:1.9", e="0.5:1",
+    of="fn_peak_N", preset="paper").outputs["fn_peak_N"].total["value"]``.
+
+    ``inputs`` names the inputs; each output has ``first`` and ``total`` (with ``method="morris"``
+    ``mu``, ``mu_star`` and ``sigma``): arrays ``["value"]``, ``["from"]`` and ``["to"]`` in the order
+    of the inputs.
+    """
+    return _with_outputs(run("sensitivity", **flags))
+
+
+def uncertainty(study: str, **flags: Any) -> Named:
+    """How the outputs of a sampled study are distributed, as ``oblique uncertainty``:
+    ``uncertainty("spread", of="e").outputs["e"].statistics["mean"]["value"][-1]``.
+
+    ``statistics`` has "mean", "sd", "quantile 0.05", "pearson mu", "spearman mu", ..., or of texts
+    the probability of each: arrays ``["value"]``, ``["from"]`` and ``["to"]`` over the first
+    ``points`` of the study, the last of which are all.
+    """
+    return _with_outputs(run("uncertainty", study, **flags))

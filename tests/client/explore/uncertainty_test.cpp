@@ -1,0 +1,173 @@
+#include "client/explore/uncertainty.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/recipe/sampling.h"
+
+namespace oblique::client {
+namespace {
+
+using testing::ElementsAre;
+
+/// Draws `first`, `first` + 1, ... of a random sequence in (0, 1).
+std::vector<double> uniform_draws(std::size_t n, std::uint64_t seed) {
+  protocol::Sample random;
+  random.set_kind(protocol::SAMPLE_RANDOM);
+  random.set_count(n);
+  random.set_seed(seed);
+  std::vector<double> draws;
+  for (std::size_t i = 0; i < n; ++i) {
+    draws.push_back(sampling::fraction(random, 0, i));
+  }
+  return draws;
+}
+
+std::vector<double> normal_draws(std::size_t n, std::uint64_t seed, double mean, double sd) {
+  auto draws = uniform_draws(n, seed);
+  for (double& draw : draws) {
+    draw = mean + sd * sampling::normal_quantile(draw);
+  }
+  return draws;
+}
+
+bool covers(const Estimate& estimate, double truth) {
+  return estimate.from <= truth && truth <= estimate.to;
+}
+
+// 2000 intervals of 95 %: 1900 cover, with a deviation of 10. Six of them on either side.
+constexpr int kIntervals = 2000;
+constexpr double kExpected = 1900.0;
+constexpr double kSlack = 60.0;
+
+TEST(MomentsTest, MeanAndDeviationAreThoseOfTheValues) {
+  const auto moments = moments_of(std::vector<double>{2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0});
+  EXPECT_DOUBLE_EQ(moments.mean.value, 5.0);
+  EXPECT_DOUBLE_EQ(moments.sd, std::sqrt(32.0 / 7.0));
+  EXPECT_NEAR(moments.mean.half_width(), 1.96 * std::sqrt(32.0 / 7.0 / 8.0), 1e-4);
+  EXPECT_TRUE(std::isnan(moments_of({}).mean.value));
+  const auto single = moments_of(std::vector<double>{3.0});
+  EXPECT_EQ(single.mean.value, 3.0);
+  EXPECT_TRUE(std::isnan(single.sd));
+}
+
+TEST(MomentsTest, IntervalsCoverTheMeanOfNormalDrawsAsOftenAsTheySay) {
+  int covered = 0;
+  for (int i = 0; i < kIntervals; ++i) {
+    const auto moments = moments_of(normal_draws(100, static_cast<std::uint64_t>(i), 0.4, 0.05));
+    covered += covers(moments.mean, 0.4) ? 1 : 0;
+  }
+  EXPECT_NEAR(covered, kExpected, kSlack);
+}
+
+TEST(QuantileTest, ItIsInterpolatedBetweenTheValuesAround) {
+  const std::vector<double> rising{1.0, 2.0, 4.0, 8.0};
+  EXPECT_DOUBLE_EQ(quantile_of(rising, 0.5).value, 3.0);
+  EXPECT_DOUBLE_EQ(quantile_of(rising, 0.25).value, 1.75);
+  EXPECT_TRUE(std::isnan(quantile_of({}, 0.5).value));
+}
+
+// Tables of order statistics: for the median of 20 values the sixth and the fifteenth.
+TEST(QuantileTest, ItsIntervalIsThatOfOrderStatistics) {
+  std::vector<double> rising;
+  for (int i = 1; i <= 20; ++i) {
+    rising.push_back(i);
+  }
+  const auto median = quantile_of(rising, 0.5);
+  EXPECT_EQ(median.from, 6.0);
+  EXPECT_EQ(median.to, 15.0);
+  const auto high = quantile_of(rising, 0.95);
+  EXPECT_EQ(high.from, 17.0);
+  EXPECT_TRUE(std::isnan(high.to)) << "twenty values have no upper bound for it: 0.95^20 > 0.025";
+}
+
+TEST(QuantileTest, IntervalsCoverTheQuantileOfAnyDistribution) {
+  for (const double p : {0.05, 0.5, 0.9}) {
+    int covered = 0;
+    for (int i = 0; i < kIntervals; ++i) {
+      auto draws = uniform_draws(200, static_cast<std::uint64_t>(i));
+      std::sort(draws.begin(), draws.end());
+      covered += covers(quantile_of(draws, p), p) ? 1 : 0;
+    }
+    EXPECT_GE(covered, kExpected - kSlack) << p;  // binomial steps make them rather too wide
+    EXPECT_LE(covered, kExpected + kSlack) << p;
+  }
+}
+
+TEST(QuantileTest, AMillionValuesAreCountedExactly) {
+  std::vector<double> rising;
+  for (int i = 1; i <= 1'000'000; ++i) {
+    rising.push_back(i);
+  }
+  const auto median = quantile_of(rising, 0.5);
+  EXPECT_NEAR(median.from, 500'000.0 - 980.0, 1.0);  // 1.96 sqrt(n)/2
+  EXPECT_NEAR(median.to, 500'000.0 + 981.0, 1.0);
+}
+
+// The example of R. G. Newcombe, Two-sided confidence intervals for the single proportion, Stat.
+// Med. 17 (1998), table I, method 3.
+TEST(ProbabilityTest, WilsonsIntervalIsThePublishedOne) {
+  const auto some = probability_of(81, 263);
+  EXPECT_NEAR(some.from, 0.2553, 5e-5);
+  EXPECT_NEAR(some.to, 0.3662, 5e-5);
+  const auto few = probability_of(15, 148);
+  EXPECT_NEAR(few.from, 0.0624, 5e-5);
+  EXPECT_NEAR(few.to, 0.1605, 5e-5);
+  const auto none = probability_of(0, 20);
+  EXPECT_EQ(none.from, 0.0);
+  EXPECT_NEAR(none.to, 0.1611, 5e-5);
+  const auto one = probability_of(1, 29);
+  EXPECT_NEAR(one.from, 0.0061, 5e-5);
+  EXPECT_NEAR(one.to, 0.1718, 5e-5);
+  EXPECT_EQ(probability_of(20, 20).to, 1.0);
+  EXPECT_TRUE(std::isnan(probability_of(0, 0).value));
+}
+
+TEST(RanksTest, EqualValuesShareTheMeanOfTheirRanks) {
+  EXPECT_THAT(ranks_of(std::vector<double>{7.0, 1.0, 7.0, 3.0, 7.0}),
+              ElementsAre(4.0, 1.0, 4.0, 2.0, 4.0));
+}
+
+TEST(CorrelationTest, PearsonSeesLinesAndSpearmanAnythingThatRises) {
+  const std::vector<double> x{1.0, 2.0, 3.0, 4.0, 5.0};
+  const std::vector<double> line{-2.0, -4.0, -6.0, -8.0, -10.0};
+  const std::vector<double> curve{1.0, 16.0, 81.0, 256.0, 625.0};
+  EXPECT_DOUBLE_EQ(pearson(x, line).value, -1.0);
+  EXPECT_DOUBLE_EQ(spearman(x, curve).value, 1.0);
+  EXPECT_LT(pearson(x, curve).value, 0.95);
+  EXPECT_TRUE(std::isnan(pearson(x, std::vector<double>(5, 3.0)).value));
+  EXPECT_TRUE(std::isnan(spearman({}, {}).value));
+}
+
+TEST(CorrelationTest, IntervalsCoverTheCorrelationOfNormalPairs) {
+  constexpr double rho = 0.6;
+  // Spearman's correlation of normal pairs is 6/pi asin(rho/2).
+  const double rank_rho = 6.0 / std::acos(-1.0) * std::asin(rho / 2.0);
+  int covered = 0;
+  int rank_covered = 0;
+  for (int i = 0; i < kIntervals; ++i) {
+    const auto x = normal_draws(100, 2 * static_cast<std::uint64_t>(i), 0.0, 1.0);
+    auto y = normal_draws(100, 2 * static_cast<std::uint64_t>(i) + 1, 0.0, 1.0);
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      y[k] = rho * x[k] + std::sqrt(1.0 - rho * rho) * y[k];
+    }
+    covered += covers(pearson(x, y), rho) ? 1 : 0;
+    rank_covered += covers(spearman(x, y), rank_rho) ? 1 : 0;
+  }
+  EXPECT_NEAR(covered, kExpected, kSlack);
+  EXPECT_NEAR(rank_covered, kExpected, kSlack);
+}
+
+TEST(GrowingPartsTest, AnEighthAQuarterHalfAndAll) {
+  EXPECT_THAT(growing_parts(1000), ElementsAre(125U, 250U, 500U, 1000U));
+  EXPECT_THAT(growing_parts(20), ElementsAre(10U, 20U));
+  EXPECT_THAT(growing_parts(3), ElementsAre(3U));
+}
+
+}  // namespace
+}  // namespace oblique::client
