@@ -109,12 +109,12 @@ std::vector<Estimate> part_of(const std::vector<Estimate>& estimates, std::size_
 }  // namespace
 
 std::vector<double> saltelli_row(std::size_t inputs, std::uint64_t seed, std::uint64_t number) {
-  if (inputs > kMostSobolInputs) {
+  if (inputs > kMaxSobolInputs) {
     throw std::out_of_range("Saltelli's design has too many inputs");
   }
   protocol::Sample sobol;
   sobol.set_kind(protocol::SAMPLE_SOBOL);
-  sobol.set_count(sampling::kMostPoints);
+  sobol.set_count(sampling::kMaxSamples);
   sobol.set_seed(seed);
   std::vector<double> a_and_b(2 * inputs);
   for (std::size_t i = 0; i < a_and_b.size(); ++i) {

@@ -154,11 +154,11 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
       }
     }
   }
-  if (problem.method == SensitivityMethod::kSobol && problem.inputs.size() > kMostSobolInputs) {
+  if (problem.method == SensitivityMethod::kSobol && problem.inputs.size() > kMaxSobolInputs) {
     throw solver::InputError(fmt::format(
         "{} inputs are more than the {} that sobol can have: find those that matter with --method "
         "morris, and give the others one value",
-        problem.inputs.size(), kMostSobolInputs));
+        problem.inputs.size(), kMaxSobolInputs));
   }
   return problem;
 }

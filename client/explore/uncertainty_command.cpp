@@ -263,20 +263,20 @@ plot::Panel histogram_of(const SampledStudy& study, const OutputStatistics& outp
 }
 
 plot::Panel bars_of_texts(const OutputStatistics& output) {
-  constexpr std::size_t kMostBars = 12;
+  constexpr std::size_t kMaxBars = 12;
   plot::Panel panel{.title = output.name,
                     .x = {.label = "probability", .name = "probability"},
                     .y = {.name = output.name},
                     .bars = plot::Bars{}};
-  for (std::size_t i = 0; i < std::min(kMostBars, output.statistics.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(kMaxBars, output.statistics.size()); ++i) {
     const Estimate& probability = output.statistics[i].of_parts.back();
     panel.bars->names.push_back(output.statistics[i].name);
     panel.bars->heights.push_back(probability.value);
     panel.bars->intervals.push_back({probability.from, probability.to});
     panel.x.range.to = i == 0 ? std::min(1.0, 1.1 * probability.to) : panel.x.range.to;
   }
-  if (output.statistics.size() > kMostBars) {
-    panel.title += fmt::format(": the {} most probable of {}", kMostBars, output.statistics.size());
+  if (output.statistics.size() > kMaxBars) {
+    panel.title += fmt::format(": the {} most probable of {}", kMaxBars, output.statistics.size());
   }
   return panel;
 }

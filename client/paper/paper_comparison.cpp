@@ -401,7 +401,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostIterations = 50;
+constexpr int kMaxIterations = 50;
 constexpr double kSmallestStep = 1e-5;
 constexpr double kSmallestGain = 1e-3;
 /// Relative step of a parameter for derivatives: outputs are smooth to about 1e-7 of their value.
@@ -502,9 +502,9 @@ FitStep fit_parameters(const PublishedTable& published, const solver::ModelParam
   auto status = method.minimizeInit(x);
   while (status == Eigen::LevenbergMarquardtSpace::NotStarted ||
          status == Eigen::LevenbergMarquardtSpace::Running) {
-    if (step.iteration == kMostIterations) {
+    if (step.iteration == kMaxIterations) {
       throw solver::SolveError(
-          fmt::format("the fit found no minimum in {} iterations", kMostIterations));
+          fmt::format("the fit found no minimum in {} iterations", kMaxIterations));
     }
     status = method.minimizeOneStep(x);
     step = step_at(step.iteration + 1, residuals.model_at(x));

@@ -27,26 +27,26 @@ using solver::TipState;
 struct KnownState {
   double H_m;
   double t_s;
-  double x_m;  ///< NaN: not known
+  double x_m;  ///< NaN if not known
   double vx_m_s;
   double vy_m_s;
 };
 
-/// Largest errors over some known states.
+/// Largest errors over known states.
 struct FallErrors {
   double t_s = 0.0;
   double x_m = 0.0;
   double v_m_s = 0.0;
 };
 
-/// An independent explicit solution of order 4 of the preset `paper`, converged to nine digits and
-/// printed to the digits here.
+/// An independent explicit solution of order 4 for the preset `paper`, converged to nine digits and
+/// rounded to the digits given here.
 constexpr std::array<KnownState, 3> kKnown{{{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
                                             {1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
                                             {1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}};
 const std::string kKnownFrom = "independent explicit solution, converged";
 
-/// Three rigid links, whatever A and I: minimal coordinates, Runge-Kutta.
+/// Three rigid links in minimal coordinates, by a Runge-Kutta method; independent of A and I.
 constexpr std::array<KnownState, 1> kRigid{
     {{1.00, 0.430188812, std::numeric_limits<double>::quiet_NaN(), -5.738072, -5.234437}}};
 
@@ -80,7 +80,7 @@ FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
                 known);
 }
 
-TEST(FreeFall, ExplicitWayReachesTheKnownStates) {
+TEST(FreeFall, ExplicitIntegratorReachesTheKnownStates) {
   const FallErrors worst = explicit_errors(solver::preset("paper"), 2.5e-6, kKnown);
   expect_at_most({"fall, explicit, 2.5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom, worst.t_s,
                   1e-8, "digits of the reference"});

@@ -119,11 +119,11 @@ struct SolvedPoint {
 std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
                                     bool& ended) {
   using Clock = std::chrono::steady_clock;
-  constexpr std::size_t kMostPoints = 256;
+  constexpr std::size_t kMaxPoints = 256;
   constexpr std::chrono::seconds kLongest{1};
   std::vector<SolvedPoint> points;
   const auto next = [&, begun = Clock::now()]() -> std::optional<FingerPoint> {
-    if (points.size() >= kMostPoints || Clock::now() - begun > kLongest) {
+    if (points.size() >= kMaxPoints || Clock::now() - begun > kLongest) {
       return std::nullopt;
     }
     auto point = source();

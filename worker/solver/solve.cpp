@@ -170,8 +170,8 @@ class PointSolver {
 
   /// The state at touch, found once for neighbours.
   const ChainState& touch_of(const Finger::Parts& finger, double H_m) {
-    constexpr std::size_t kMostTouches = 16;
-    if (fallen_ != finger.fallen() || touches_.size() >= kMostTouches) {
+    constexpr std::size_t kMaxTouches = 16;
+    if (fallen_ != finger.fallen() || touches_.size() >= kMaxTouches) {
       fallen_ = finger.fallen();
       touches_.clear();
     }

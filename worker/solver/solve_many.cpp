@@ -66,11 +66,11 @@ class FingerSource {
  private:
   /// Fall models of that point and of those after it, without repetitions in a row.
   std::vector<ModelParameters> models_from(std::uint64_t number) {
-    constexpr int kMostRuns = 4096;
-    constexpr std::size_t kMostFalls = 64;
+    constexpr int kMaxRuns = 4096;
+    constexpr std::size_t kMaxFalls = 64;
     std::vector<ModelParameters> models;
     std::optional<std::uint64_t> at = number;
-    for (int i = 0; at && i < kMostRuns && models.size() < kMostFalls; ++i) {
+    for (int i = 0; at && i < kMaxRuns && models.size() < kMaxFalls; ++i) {
       const PointSource::Run run = source_.run_of(*at);
       ModelParameters falling = fall_model(source_.model(run.model));
       if (models.empty() || !(models.back() == falling)) {

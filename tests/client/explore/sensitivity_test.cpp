@@ -215,14 +215,14 @@ TEST(SaltelliDesignTest, ARowIsAAndBAndAWithEachCoordinateOfB) {
                                      row[2], row[1], row[0], row[3]};
   EXPECT_EQ(row, expected);
   EXPECT_EQ(std::set<double>(row.begin(), row.begin() + 4).size(), 4U);
-  EXPECT_THROW(saltelli_row(kMostSobolInputs + 1, 1, 0), std::out_of_range);
+  EXPECT_THROW(saltelli_row(kMaxSobolInputs + 1, 1, 0), std::out_of_range);
 }
 
 TEST(SaltelliDesignTest, TheFirstRowsOfAPowerOfTwoHaveOneCoordinateInEachStratum) {
-  for (std::size_t coordinate = 0; coordinate < 2 * kMostSobolInputs; ++coordinate) {
+  for (std::size_t coordinate = 0; coordinate < 2 * kMaxSobolInputs; ++coordinate) {
     std::set<int> strata;
     for (std::uint64_t number = 0; number < 64; ++number) {
-      strata.insert(static_cast<int>(64.0 * saltelli_row(kMostSobolInputs, 3, number)[coordinate]));
+      strata.insert(static_cast<int>(64.0 * saltelli_row(kMaxSobolInputs, 3, number)[coordinate]));
     }
     EXPECT_EQ(strata.size(), 64U) << coordinate;
   }

@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t kStages = GaussCollocation::kStages;
 /// Numbers in the states that a fall keeps at most: 16 MB. With fewer a state at a drop costs more
 /// than it should beside a contact; more leave room for fewer falls.
-constexpr std::size_t kMostOfStates = (std::size_t{16} << 20) / sizeof(double);
+constexpr std::size_t kMaxOfStates = (std::size_t{16} << 20) / sizeof(double);
 /// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
 /// length): collocation.md.
 constexpr double kUnresolved = 1.5;
@@ -35,9 +35,9 @@ constexpr double kLongestStep = 1.0 / 100.0;
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 /// Steps in a fall beyond which it is given up.
-constexpr std::size_t kMostSteps = 2'000'000;
+constexpr std::size_t kMaxSteps = 2'000'000;
 /// Halvings in a row after which a fall is given up.
-constexpr int kMostHalvings = 30;
+constexpr int kMaxHalvings = 30;
 
 /// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is a way to
 /// fall, with
@@ -289,7 +289,7 @@ class CollocationFall : public Fall {
 
   /// Keeps every second state once they are too many.
   void thin_states() {
-    if (states_.size() * states_.front().size() <= kMostOfStates) {
+    if (states_.size() * states_.front().size() <= kMaxOfStates) {
       return;
     }
     for (std::size_t i = 1; 2 * i < states_.size(); ++i) {
@@ -375,7 +375,7 @@ class StepControl {
     }
     return true;
   }
-  bool is_hopeless() const { return halvings_ > kMostHalvings; }
+  bool is_hopeless() const { return halvings_ > kMaxHalvings; }
 
  private:
   static constexpr double kRefused = 4.0;
@@ -442,9 +442,9 @@ class FallingChain {
       throw SolveError("the tip did not turn back within " + readable_number(longest_s_) +
                        " s of falling");
     }
-    if (fall_->steps() >= kMostSteps) {
+    if (fall_->steps() >= kMaxSteps) {
       throw SolveError("the fall would take more than " +
-                       exact_number(static_cast<double>(kMostSteps)) + " steps");
+                       exact_number(static_cast<double>(kMaxSteps)) + " steps");
     }
     if (progress_ != nullptr) {
       progress_->store(-tip_y.at.q, std::memory_order_relaxed);

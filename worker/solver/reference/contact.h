@@ -24,9 +24,9 @@ class Contact {
   /// Time within which a contact must end [s].
   static constexpr double kLongest_s = 20e-3;
   /// More events mean that states follow each other without time passing.
-  static constexpr int kMostEvents = 10'000;
+  static constexpr int kMaxEvents = 10'000;
   /// Ten thousand times the steps that a contact takes by default.
-  static constexpr std::int64_t kMostSteps = 5'000'000;
+  static constexpr std::int64_t kMaxSteps = 5'000'000;
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
 
@@ -36,7 +36,7 @@ class Contact {
   const ContactLaw& law() const { return law_; }
 
   /// True when the step is accepted. Throws SolveError when the tip's state is not finite, the
-  /// contact outlasts kLongest_s, or has more than kMostEvents events or kMostSteps steps.
+  /// contact outlasts kLongest_s, or has more than kMaxEvents events or kMaxSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
   /// Whether the last accepted step ended at the first turn. Up to there e* has no effect.

@@ -12,9 +12,9 @@ namespace oblique::solver {
 namespace {
 
 /// Most states kept. A state has 32 bytes a row; when there are more, every other one is dropped.
-constexpr std::size_t kMostKept = 4096;
+constexpr std::size_t kMaxKept = 4096;
 /// More steps in sqrt(2 length/g) would take hours.
-constexpr double kMostSteps = 1e9;
+constexpr double kMaxSteps = 1e9;
 
 }  // namespace
 
@@ -34,8 +34,8 @@ ChainState Fall::state_at(double H_m) const {
 SteppedFall::SteppedFall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
                          FallProgress* progress)
     : motion_(std::move(motion)), dt_s_(dt_s), longest_s_(longest_s), progress_(progress) {
-  if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
-    throw SolveError("the fall would take more than " + exact_number(kMostSteps) +
+  if (!(longest_s <= kLongestFall * kMaxSteps * dt_s)) {
+    throw SolveError("the fall would take more than " + exact_number(kMaxSteps) +
                      " steps of dt_fall = " + exact_number(dt_s) + " s");
   }
   kept_.push_back(motion_->at_rest());
@@ -82,7 +82,7 @@ void SteppedFall::keep(ChainState state) {
   state.t_s = time_s(step_);
   kept_.push_back(std::move(state));
   next_kept_ += steps_kept_;
-  if (kept_.size() < kMostKept) {
+  if (kept_.size() < kMaxKept) {
     return;
   }
   for (std::size_t i = 1; 2 * i < kept_.size(); ++i) {

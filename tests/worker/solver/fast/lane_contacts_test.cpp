@@ -19,7 +19,7 @@
 namespace oblique::solver {
 namespace {
 
-/// A coarse model with its fall, as solve_contacts() needs them.
+/// A coarse model with its fall, for solve_contacts().
 struct Coarse {
   ModelParameters model = coarse_model();
   Chain chain{model};
@@ -51,13 +51,13 @@ std::map<std::uint64_t, ContactOutcome> solved(
       [&](ContactOutcome&& outcome) {
         const std::uint64_t tag = outcome.tag;
         const bool is_new = outcomes.emplace(tag, std::move(outcome)).second;
-        EXPECT_TRUE(is_new) << "case " << tag << " came twice";
+        EXPECT_TRUE(is_new) << "case " << tag << " was delivered twice";
       },
       {}, kernel);
   return outcomes;
 }
 
-/// Models that differ in all that a chain is made of but its shape, and one in k alone.
+/// Models whose chains have one shape and differ otherwise; one differs from the first in k only.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());
@@ -67,17 +67,17 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
     models[2].I_m4 *= 1.3;
     models[3].rho_kg_m3 *= 0.9;
     models[3].A_m2 *= 1.1;
-    models[4].k_N_m *= 0.7;  // a chain of its own that equals that of the first
+    models[4].k_N_m *= 0.7;  // an equal copy of the chain of the first model
     std::vector<std::unique_ptr<Coarse>> list;
     for (const ModelParameters& model : models) {
-      list.emplace_back(new Coarse{model});  // in place: its parts point at each other
+      list.emplace_back(new Coarse{model});  // in place, because its members point to each other
     }
     return list;
   }();
   return all;
 }
 
-TEST(LaneContacts, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
+TEST(LaneContacts, ACaseHasTheSameBitsBesideCasesOfOtherChains) {
   std::vector<ChainState> touches;
   for (const auto& model : unlike_models()) {
     touches.push_back(model->fall->state_at(0.9));
@@ -104,7 +104,7 @@ TEST(LaneContacts, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
   }
 }
 
-TEST(LaneContacts, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAreLeftAlone) {
+TEST(LaneContacts, WhenASharedContactFailsEachOfItsCasesFailsAndNoOther) {
   const Coarse& other = *unlike_models()[2];
   const ChainState sound = other.fall->state_at(0.9);
   ChainState broken = coarse().fall->state_at(0.9);
@@ -131,7 +131,7 @@ TEST(LaneContacts, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAre
   }
 }
 
-TEST(LaneContacts, AChainMayGoOnceItsCaseIsDone) {
+TEST(LaneContacts, AChainMayBeDestroyedAfterItsCaseIsDone) {
   std::vector<std::unique_ptr<Chain>> chains;
   const ChainState touch = coarse().fall->state_at(0.5);
   std::size_t done = 0;
@@ -156,7 +156,7 @@ TEST(LaneContacts, AChainMayGoOnceItsCaseIsDone) {
   EXPECT_EQ(done, chains.size());
 }
 
-TEST(LaneContacts, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
+TEST(LaneContacts, PeaksOfReactionsFromMomentaAgreeWithThoseFromAccelerations) {
   const ExplicitMotion motion(coarse().chain);
   std::vector<ChainState> touches;
   for (const double H_m : {0.01, 0.5, 0.9, 1.04}) {
@@ -167,7 +167,7 @@ TEST(LaneContacts, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
     for (const double mu : {0.0, 0.4, 1.4}) {
       for (const double e_star : {1.0, 0.6, 0.1}) {
         ContactCase one = coarse().contact(cases.size(), cases.size() / 3, mu, e_star, touch);
-        // A single element's link vibrates fast: steps that resolve it.
+        // Steps that resolve the fast vibrations of a link with a single element.
         one.steps = {0.25 * one.steps.compression_s, 0.25 * one.steps.restitution_s};
         cases.push_back(one);
       }

@@ -13,7 +13,7 @@ std::string note(const char* key, double value) {
   return note_on_value(*find_model_key(key), value);
 }
 
-TEST(UsualRanges, AValueOutsideIsNamedWithTheOneThatItIsInAnotherUnit) {
+TEST(UsualRanges, AnUnusualValueIsNamedWithItsValueInTheLikelyUnit) {
   EXPECT_EQ(note("E", 7e4), "E = 70000 Pa is softer than rubber; 7e10?") << "MPa";
   EXPECT_EQ(note("E", 210), "E = 210 Pa is softer than rubber; 2.1e11?") << "GPa";
   EXPECT_EQ(note("rho", 2.7), "rho = 2.7 kg/m^3 is lighter than cork; 2700?");
@@ -26,7 +26,7 @@ TEST(UsualRanges, AValueOutsideIsNamedWithTheOneThatItIsInAnotherUnit) {
   EXPECT_EQ(note("tip_mass", 20), "tip_mass = 20 kg is outside the usual 1e-6 to 10 kg; 0.02?");
 }
 
-TEST(UsualRanges, AllPresetsEndsOfRangesAndZerosAreUsual) {
+TEST(UsualRanges, PresetsEndsOfRangesAndZeroAreUsual) {
   for (const auto name : preset_names()) {
     const ModelParameters model = preset(name);
     EXPECT_EQ(with_likely_cause("", model), "") << name;
@@ -38,11 +38,11 @@ TEST(UsualRanges, AllPresetsEndsOfRangesAndZerosAreUsual) {
   EXPECT_EQ(note("E", 1e12), "");
   EXPECT_EQ(note("tip_mass", 0), "");
   EXPECT_EQ(note("E", std::numeric_limits<double>::infinity()), "") << "the end of a distribution";
-  EXPECT_EQ(note("E", -70), "") << "is refused";
-  EXPECT_EQ(note("dt", 1e9), "") << "has no usual values";
+  EXPECT_EQ(note("E", -70), "") << "is invalid";
+  EXPECT_EQ(note("dt", 1e9), "") << "has no usual range";
 }
 
-TEST(UsualRanges, EachParameterOutsideIsALikelyCause) {
+TEST(UsualRanges, EachUnusualParameterIsALikelyCause) {
   ModelParameters model;
   model.E_Pa = 70;
   model.lengths_m = {0.4, 400, 0.3};
