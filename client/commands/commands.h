@@ -69,6 +69,8 @@ void add_autoscale(CLI::App& app, Action& parsed);
 /// `keygen` and `keys`.
 void add_keys(CLI::App& app, Action& parsed);
 void add_doctor(CLI::App& app, Action& parsed);
+// In client/explore:
+void add_map(CLI::App& app, Action& parsed);
 
 /// Parses the command line and carries it out. Returns the exit code: 0 done, 1 failed, 2 wrong
 /// usage, 128 and its number for a signal that stopped a command which ends in order.
