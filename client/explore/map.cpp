@@ -16,7 +16,7 @@ constexpr std::uint32_t kSideHalvings = 3;
 constexpr std::uint32_t kCornerHalvings = 6;
 
 /// A border is to be closer to the middle of its chord than this part of its cell.
-constexpr double kChordTolerance = 1.0 / 32;
+constexpr double kChordTolerance = 1.0 / 128;
 
 std::uint64_t key_of(const LatticePoint& point) {
   return (std::uint64_t{point.y} << 32U) | point.x;
@@ -173,9 +173,7 @@ bool BorderSearch::refine(const Leaf& leaf) {
     for (const auto& crossing : side) {
       is_mixed = true;
       if (crossing.width > 1) {
-        LatticePoint middle = crossing.vertex.low;
-        (crossing.vertex.is_along_x ? middle.x : middle.y) += crossing.width / 2;
-        request(middle);
+        open_brackets_.push_back(crossing);
       }
     }
   }
@@ -195,6 +193,26 @@ void BorderSearch::refine_all() {
       mixed_.push_back(leaf);
     }
   }
+}
+
+void BorderSearch::request_sections() {
+  // A round costs as much as some hundred points: few brackets are divided into more parts.
+  constexpr std::size_t kPointsWorthARound = 1000;
+  constexpr std::uint32_t kMostParts = 16;
+  std::uint32_t parts = 2;
+  while (parts < kMostParts && open_brackets_.size() * (2 * parts - 1) < kPointsWorthARound) {
+    parts *= 2;
+  }
+  for (const auto& bracket : open_brackets_) {
+    const std::uint32_t own_parts = std::min(parts, bracket.width);
+    for (std::uint32_t part = 1; part < own_parts; ++part) {
+      LatticePoint point = bracket.vertex.low;
+      (bracket.vertex.is_along_x ? point.x : point.y) +=
+          static_cast<std::uint32_t>(std::uint64_t{bracket.width} * part / own_parts);
+      request(point);
+    }
+  }
+  open_brackets_.clear();
 }
 
 void BorderSearch::request_probes() {
@@ -236,6 +254,7 @@ std::vector<LatticePoint> BorderSearch::next() {
   }
   do {  // a split whose corners are all known needs no point
     refine_all();
+    request_sections();
   } while (requested_.empty() && is_any_split_);
   if (requested_.empty()) {
     request_probes();

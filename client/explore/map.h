@@ -146,6 +146,10 @@ class BorderSearch {
   /// Requests what the leaf needs, or halves it. True if it stays and has crossings.
   bool refine(const Leaf& leaf);
   void refine_all();
+  /// Requests points inside the brackets that are too wide.
+  void request_sections();
+  /// Requests points on both sides of the middles of chords, which show whether these are close to
+  /// their borders.
   void request_probes();
   std::vector<Arc> arcs_of(const Leaf& leaf, const Sides& sides) const;
   /// The region between two crossings whose neighbours are one region is cut off by a chord, the
@@ -160,6 +164,7 @@ class BorderSearch {
   std::unordered_map<std::uint32_t, Line> columns_;          ///< by x
   std::unordered_map<std::uint64_t, std::uint32_t> leaves_;  ///< size by lower corner
   std::vector<Leaf> mixed_;                                  ///< leaves with crossings
+  std::vector<Crossing> open_brackets_;                      ///< both leaves of a side have it
   bool is_any_split_ = true;                                 ///< since all leaves were looked at
   std::unordered_set<std::uint64_t> must_split_;             ///< lower corners of leaves
   std::unordered_set<std::uint64_t> probed_;                 ///< lower corners of leaves

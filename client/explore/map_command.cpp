@@ -75,6 +75,10 @@ struct AxisFlag {
 };
 
 AxisFlag axis_flag(const char* flag, const std::string& text) {
+  if (text.empty()) {
+    throw InputError(
+        fmt::format("{} is missing: give the axes of the map as --x mu=0.05:2 --y H=0.3:1", flag));
+  }
   const auto equals = text.find('=');
   const auto parts = protocol::split(
       std::string_view(text).substr(equals == std::string::npos ? text.size() : equals + 1), ':');
@@ -164,12 +168,11 @@ struct Plane {
 };
 
 /// The model and the keys with one value of a stored study, and what the flags override.
-protocol::Recipe recipe_of_study(Console& console, const MapFlags& flags,
+protocol::Recipe recipe_of_study(const MapFlags& flags, const protocol::Recipe& stored,
                                  const std::map<std::string, std::string>& overriding) {
   if (flags.points.preset != PointFlags().preset || !flags.points.lengths.empty()) {
     throw InputError("--preset and --lengths are those of the study: leave them out");
   }
-  const auto stored = stored_recipe(console, flags.explore.source, flags.study);
   std::map<std::string, protocol::Axis> axes;
   CsvFiles files(".");
   for (const auto& [key, text] : overriding) {
@@ -197,7 +200,9 @@ protocol::Recipe recipe_of_study(Console& console, const MapFlags& flags,
 }
 
 /// Throws InputError for values that no point may have, those at the ends of the axes included.
-Plane plane_of(Console& console, const MapFlags& flags, const std::array<AxisFlag, 2>& axes) {
+/// `stored`: the recipe of the study that the flags name.
+Plane plane_of(Console& console, const MapFlags& flags, const protocol::Recipe& stored,
+               const std::array<AxisFlag, 2>& axes) {
   auto points = flags.points;
   for (const auto& axis : axes) {
     const auto [place, is_new] = points.axes.try_emplace(
@@ -210,7 +215,7 @@ Plane plane_of(Console& console, const MapFlags& flags, const std::array<AxisFla
   }
   const auto check_reach = tip_reach(console);
   const auto recipe = flags.study.empty() ? recipe_of_flags(points, check_reach)
-                                          : recipe_of_study(console, flags, points.axes);
+                                          : recipe_of_study(flags, stored, points.axes);
   const protocol::PointTable table(recipe);
   check_reach(table);
   check_points(table, flags.study.empty() ? places_of(points) : Places{});
@@ -256,15 +261,15 @@ class MapSolver {
 
  private:
   std::string what() const {
-    constexpr std::uint32_t kUsualHalvings = 10;  // of single cells, and the first on another mesh
+    constexpr std::uint32_t kOtherRounds = 30;  // of single cells, and on another mesh
     return fmt::format("round {} of about {}", study_.rounds() + 1,
-                       map_.grid.halvings + kUsualHalvings);
+                       map_.grid.halvings + kOtherRounds);
   }
 
   protocol::Block block_of_lists(const std::vector<double>& x, const std::vector<double>& y) const {
     std::vector<protocol::Axis> axes{
-        protocol::listed_axis(protocol::axis_key(map_.axes[0].key), x),
-        protocol::listed_axis(protocol::axis_key(map_.axes[1].key), y)};
+        protocol::listed_axis(protocol::axis_key(map_.axes[0].key()), x),
+        protocol::listed_axis(protocol::axis_key(map_.axes[1].key()), y)};
     axes.insert(axes.end(), plane_.constants.begin(), plane_.constants.end());
     return protocol::block_of(std::move(axes));
   }
@@ -282,7 +287,7 @@ class MapSolver {
     const auto rows = study_.solve(block_of_lists(values[0], values[1]), columns, what()).rows;
     // The first axis of a block varies slowest.
     const bool is_x_slow =
-        protocol::key_number(map_.axes[0].key) < protocol::key_number(map_.axes[1].key);
+        protocol::key_number(map_.axes[0].key()) < protocol::key_number(map_.axes[1].key());
     std::vector<int> found;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto& row = rows[is_x_slow ? i % side * side + i / side : i];
@@ -385,19 +390,19 @@ std::string settings_text(const MapFlags& flags, const Plane& plane,
 }
 
 MapAxis map_axis(const AxisFlag& flag, const MapGrid& grid) {
-  const auto range = protocol::counted_axis(
-      *flag.key, flag.from, flag.to, std::int64_t{grid.last()} + 1,
-      flag.is_logarithmic ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
-  return {std::string(flag.key->name), flag.is_logarithmic, protocol::RangeValues(range)};
+  return {*flag.key, flag.from, flag.to, flag.is_logarithmic, grid};
 }
 
 FoundMap find_map(Console& console, const MapFlags& flags, protocol::StopSignals& stop) {
+  const auto stored = flags.study.empty()
+                          ? protocol::Recipe()
+                          : stored_recipe(console, flags.explore.source, flags.study);
   const std::array<AxisFlag, 2> axes{axis_flag("--x", flags.x), axis_flag("--y", flags.y)};
   auto regions = regions_of(flags.of);
   if (!flags.over.empty()) {
     check_number_column("--over", flags.over);
   }
-  const Plane plane = plane_of(console, flags, axes);
+  const Plane plane = plane_of(console, flags, stored, axes);
   const auto grid = MapGrid::of(flags.cells, flags.bracket);
   FoundMap map{.study = explored_name(flags.explore, "map", settings_text(flags, plane, axes)),
                .of = flags.of,
@@ -436,16 +441,16 @@ std::optional<Format> data_format(const std::string& file) {
   return std::nullopt;
 }
 
-std::string text_of(const FoundMap& map, Format format) {
+std::string map_text(const FoundMap& map, Format format) {
   return format == Format::kCsv    ? map_csv(map)
          : format == Format::kJson ? map_json(map)
                                    : map_table(map);
 }
 
-void write_file(const FoundMap& map, const std::string& file) {
+void write_map(const FoundMap& map, const std::string& file) {
   if (const auto format = data_format(file)) {
     AtomicFile out(file);
-    out.append(text_of(map, *format));
+    out.append(map_text(map, *format));
     out.finish();
     return;
   }
@@ -453,7 +458,7 @@ void write_file(const FoundMap& map, const std::string& file) {
   plot::write_picture(plot::picture_of(map_figure(map), format), format, file);
 }
 
-void check_flags(const MapFlags& flags) {
+void check_map_flags(const MapFlags& flags) {
   constexpr std::uint32_t kMostCells = 1024;
   constexpr double kLeastBracket = 1e-8;
   if (flags.cells < 2 || flags.cells > kMostCells) {
@@ -471,14 +476,14 @@ void check_flags(const MapFlags& flags) {
   }
 }
 
-int map(const MapFlags& flags, Console& console) {
-  check_flags(flags);
+int run_map(const MapFlags& flags, Console& console) {
+  check_map_flags(flags);
   return run_exploration(console, [&](protocol::StopSignals& stop) {
     const auto found = find_map(console, flags, stop);
     for (const auto& file : flags.out) {
-      write_file(found, file);
+      write_map(found, file);
     }
-    console.out() << text_of(found, format_named(flags.format, kFormats));
+    console.out() << map_text(found, format_named(flags.format, kFormats));
     console.note(fmt::format("The points are the study {}.", found.study));
     return kDone;
   });
@@ -489,13 +494,13 @@ int map(const MapFlags& flags, Console& console) {
 void add_map(CLI::App& app, Action& parsed) {
   auto [command, flags] =
       new_command(app, parsed, "map", "Find where the motion changes, on a plane of two keys",
-                  kMapExamples, map);
+                  kMapExamples, run_map);
   command
       .add_option("STUDY", flags.study,
                   "study whose model and single values the map takes; or give them by flags")
       ->type_name("");
-  command.add_option("--x", flags.x, "horizontal axis")->required()->type_name("KEY=FROM:TO[:log]");
-  command.add_option("--y", flags.y, "vertical axis")->required()->type_name("KEY=FROM:TO[:log]");
+  command.add_option("--x", flags.x, "horizontal axis")->type_name("KEY=FROM:TO[:log]");
+  command.add_option("--y", flags.y, "vertical axis")->type_name("KEY=FROM:TO[:log]");
   command
       .add_option(
           "--of", flags.of,

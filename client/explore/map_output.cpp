@@ -10,6 +10,7 @@
 
 #include "client/io/console.h"
 #include "client/io/row_output.h"
+#include "proto/recipe/model_message.h"
 #include "proto/wire/chunk.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/number.h"
@@ -24,7 +25,7 @@ struct ShownVertex {
   double width;
 };
 
-ShownVertex shown(const FoundMap& map, const BorderVertex& vertex) {
+ShownVertex shown_vertex(const FoundMap& map, const BorderVertex& vertex) {
   const auto& along = map.axes[vertex.is_along_x ? 0 : 1];
   const std::uint32_t place = vertex.is_along_x ? vertex.low.x : vertex.low.y;
   const double low = along.value(place);
@@ -66,7 +67,7 @@ std::string range_of_curve(const FoundMap& map, const BorderCurve& curve, bool i
   double least = std::numeric_limits<double>::infinity();
   double largest = -least;
   for (const auto number : curve.vertices) {
-    const auto vertex = shown(map, map.borders.vertices[number]);
+    const auto vertex = shown_vertex(map, map.borders.vertices[number]);
     least = std::min(least, is_x ? vertex.x : vertex.y);
     largest = std::max(largest, is_x ? vertex.x : vertex.y);
   }
@@ -75,7 +76,7 @@ std::string range_of_curve(const FoundMap& map, const BorderCurve& curve, bool i
 }
 
 /// A part as a percentage with two digits.
-std::string percent(double part) {
+std::string percent_of_axis(double part) {
   return solver::readable_number(100.0 * part, 2);
 }
 
@@ -90,14 +91,15 @@ protocol::Table table_of_regions(const FoundMap& map) {
 }
 
 protocol::Table table_of_curves(const FoundMap& map) {
-  protocol::Table table{{"curve", "between", "vertices", map.axes[0].key, map.axes[1].key}};
+  protocol::Table table{{"curve", "between", "vertices", map.axes[0].key(), map.axes[1].key()}};
   if (!map.shifts.empty()) {
     table.columns.insert(table.columns.end(), {"median shift [%]", "largest shift [%]", "lost"});
   }
   for (std::size_t i = 0; i < map.borders.curves.size(); ++i) {
     const auto& curve = map.borders.curves[i];
     const auto& vertex = map.borders.vertices[curve.vertices.front()];
-    auto sides = std::minmax(letter_of_region(map, vertex.from), letter_of_region(map, vertex.to));
+    const auto sides =
+        std::minmax({letter_of_region(map, vertex.from), letter_of_region(map, vertex.to)});
     auto& row = table.rows.emplace_back(protocol::Row{
         static_cast<std::int64_t>(i), fmt::format("{} | {}", sides.first, sides.second),
         static_cast<std::int64_t>(curve.vertices.size() - (curve.is_closed() ? 1 : 0)),
@@ -105,8 +107,8 @@ protocol::Table table_of_curves(const FoundMap& map) {
     if (!map.shifts.empty()) {
       const auto& shift = map.shifts[i];
       const bool is_found = shift.checked > shift.lost;
-      row.emplace_back(is_found ? percent(shift.median) : "-");
-      row.emplace_back(is_found ? percent(shift.largest) : "-");
+      row.emplace_back(is_found ? percent_of_axis(shift.median) : "-");
+      row.emplace_back(is_found ? percent_of_axis(shift.largest) : "-");
       row.emplace_back(fmt::format("{} of {}", shift.lost, shift.checked));
     }
   }
@@ -119,6 +121,23 @@ protocol::Table table_of_curves(const FoundMap& map) {
 
 }  // namespace
 
+MapAxis::MapAxis(const solver::ParameterKey& key, double from, double to, bool is_logarithmic,
+                 const MapGrid& grid)
+    : key_(key.name),
+      is_logarithmic_(is_logarithmic),
+      cell_(grid.cell()),
+      values_(protocol::counted_axis(
+          key, from, to, std::int64_t{grid.last()} + 1,
+          is_logarithmic ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR)) {
+  constexpr int kBits = 44;  // far finer than any bracket, and 9 less than a double has
+  grain_ = std::ldexp(1.0, std::ilogb(std::max(std::abs(from), std::abs(to))) - kBits);
+}
+
+double MapAxis::value(std::uint32_t place) const {
+  const double value = values_.at(place);
+  return place % cell_ == 0 ? value : std::round(value / grain_) * grain_;
+}
+
 std::string region_letter(std::size_t place) {
   constexpr std::size_t kLetters = 26;
   std::string letter(1, static_cast<char>('A' + place % kLetters));
@@ -128,13 +147,14 @@ std::string region_letter(std::size_t place) {
 std::string missed_sentence(const FoundMap& map) {
   const auto size = [&](const MapAxis& axis) {
     const double ends[2]{axis.value(0), axis.value(map.grid.last())};
-    if (axis.is_logarithmic) {
+    if (axis.is_logarithmic()) {
       return fmt::format(
           "a factor of {} in {}",
-          solver::readable_number(std::pow(ends[1] / ends[0], 1.0 / map.grid.cells), 5), axis.key);
+          solver::readable_number(std::pow(ends[1] / ends[0], 1.0 / map.grid.cells), 5),
+          axis.key());
     }
     return fmt::format("{} in {}", solver::readable_number((ends[1] - ends[0]) / map.grid.cells, 3),
-                       axis.key);
+                       axis.key());
   };
   return fmt::format(
       "An island or sliver of another region that is smaller than a cell, {} by {}, may be missed.",
@@ -174,7 +194,7 @@ std::string map_csv(const FoundMap& map) {
   protocol::Table table{{"vertex", "curve", "x", "y", "from", "to", "width", "along"}};
   for (std::size_t i = 0; i < map.borders.vertices.size(); ++i) {
     const auto& vertex = map.borders.vertices[i];
-    const auto at = shown(map, vertex);
+    const auto at = shown_vertex(map, vertex);
     table.rows.push_back({static_cast<std::int64_t>(i), static_cast<std::int64_t>(curves[i]), at.x,
                           at.y, map.names[static_cast<std::size_t>(vertex.from)],
                           map.names[static_cast<std::size_t>(vertex.to)], at.width,
@@ -189,10 +209,12 @@ std::string map_json(const FoundMap& map) {
   using Json = nlohmann::ordered_json;
   const auto name = [&map](int region) { return map.names[static_cast<std::size_t>(region)]; };
   Json json{
-      {"x", map.axes[0].key}, {"y", map.axes[1].key}, {"of", map.of}, {"bracket", map.bracket}};
+      {"x", map.axes[0].key()}, {"y", map.axes[1].key()}, {"of", map.of}, {"bracket", map.bracket}};
+  json["x_range"] = {map.axes[0].value(0), map.axes[0].value(map.grid.last())};
+  json["y_range"] = {map.axes[1].value(0), map.axes[1].value(map.grid.last())};
   json["vertices"] = Json::array();
   for (const auto& vertex : map.borders.vertices) {
-    const auto at = shown(map, vertex);
+    const auto at = shown_vertex(map, vertex);
     json["vertices"].push_back({{"x", at.x},
                                 {"y", at.y},
                                 {"from", name(vertex.from)},
@@ -246,8 +268,8 @@ std::string map_json(const FoundMap& map) {
 namespace {
 
 plot::FigureAxis figure_axis(const MapAxis& axis, const MapGrid& grid) {
-  auto shown = plot::axis_of(axis.key, server::unit_of_column(server::column_of_key(axis.key)));
-  shown.is_logarithmic = axis.is_logarithmic;
+  auto shown = plot::axis_of(axis.key(), server::unit_of_column(server::column_of_key(axis.key())));
+  shown.is_logarithmic = axis.is_logarithmic();
   shown.range = {axis.value(0), axis.value(grid.last())};
   return shown;
 }
@@ -301,8 +323,8 @@ plot::Cells cells_of_numbers(const FoundMap& map) {
     cells.x.values.push_back(map.axes[0].value(i * map.grid.cell()));
     cells.y.values.push_back(map.axes[1].value(i * map.grid.cell()));
   }
-  cells.x.edges = plot::edges_between(cells.x.values, map.axes[0].is_logarithmic);
-  cells.y.edges = plot::edges_between(cells.y.values, map.axes[1].is_logarithmic);
+  cells.x.edges = plot::edges_between(cells.x.values, map.axes[0].is_logarithmic());
+  cells.y.edges = plot::edges_between(cells.y.values, map.axes[1].is_logarithmic());
   for (const double value : map.over) {
     cells.states.push_back(std::isfinite(value) ? plot::CellState::kSolved
                                                 : plot::CellState::kFailed);
@@ -339,7 +361,7 @@ plot::Figure map_figure(const FoundMap& map) {
     };
     add_corner(curve.begins_at);
     for (const auto number : curve.vertices) {
-      const auto vertex = shown(map, map.borders.vertices[number]);
+      const auto vertex = shown_vertex(map, map.borders.vertices[number]);
       line.x.push_back(vertex.x);
       line.y.push_back(vertex.y);
     }

@@ -10,16 +10,29 @@
 #include "client/explore/map.h"
 #include "client/plot/figure.h"
 #include "proto/recipe/blocks.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 
-/// An axis of a map.
-struct MapAxis {
-  std::string key;
-  bool is_logarithmic = false;
-  protocol::RangeValues values;  ///< one for each step of the lattice
+/// An axis of a map, with a value for each step of its lattice.
+class MapAxis {
+ public:
+  /// Throws solver::InputError for ends that the key cannot have.
+  MapAxis(const solver::ParameterKey& key, double from, double to, bool is_logarithmic,
+          const MapGrid& grid);
 
-  double value(std::uint32_t place) const { return values.at(place); }
+  /// Points of the coarse grid have the values of a range. Others have some trailing bits of zero,
+  /// so that the middle of a bracket minus and plus half its width gives its ends to the bit.
+  double value(std::uint32_t place) const;
+  const std::string& key() const { return key_; }
+  bool is_logarithmic() const { return is_logarithmic_; }
+
+ private:
+  std::string key_;
+  bool is_logarithmic_;
+  std::uint32_t cell_;  ///< steps of the lattice
+  double grain_;        ///< values between the grid's are multiples of it
+  protocol::RangeValues values_;
 };
 
 /// A region of a map, of those with a part of its area.

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -43,7 +45,7 @@ Solved solved(const Regions& regions, std::uint32_t cells = 32) {
     ++all.rounds;
     all.points += points.size();
     for (const auto& point : points) {
-      all.solved_twice += known.emplace(point.x, point.y).second ? 0 : 1;
+      all.solved_twice += known.emplace(point.x, point.y).second ? 0U : 1U;
     }
     all.search.set_regions(regions_of(regions, all.grid, points));
   }
@@ -110,11 +112,12 @@ TEST(BorderSearch, ADiscHasOneClosedCurveOfItsLengthAndArea) {
   }
   // Chords of length h are shorter than their arcs by a part (h/r)^2/24.
   const double h = std::sqrt(2.0) / found.grid.cells;
-  EXPECT_NEAR(length, 2.0 * M_PI * 0.3, 2.0 * M_PI * 0.3 * std::pow(h / 0.3, 2) / 24.0);
+  EXPECT_NEAR(length, 2.0 * std::numbers::pi * 0.3,
+              2.0 * std::numbers::pi * 0.3 * std::pow(h / 0.3, 2) / 24.0);
   const double cells = static_cast<double>(found.grid.cells) * found.grid.cells;
-  EXPECT_NEAR(found.search.areas().at(1) / cells, M_PI * 0.09,
-              M_PI * 0.09 * std::pow(h / 0.3, 2) / 6.0);
-  EXPECT_NEAR(found.search.areas().at(0) / cells, 1.0 - M_PI * 0.09, 1e-3);
+  EXPECT_NEAR(found.search.areas().at(1) / cells, std::numbers::pi * 0.09,
+              std::numbers::pi * 0.09 * std::pow(h / 0.3, 2) / 6.0);
+  EXPECT_NEAR(found.search.areas().at(0) / cells, 1.0 - std::numbers::pi * 0.09, 1e-3);
 }
 
 TEST(BorderSearch, ThreeRegionsMeetInACornerAtTheEndOfThreeCurves) {
@@ -203,7 +206,8 @@ TEST(ShiftSearch, FindsTheShiftOfEachSampleToAnotherBorder) {
     ++rounds;
   }
   EXPECT_LT(rounds, 30U);
-  EXPECT_NEAR(static_cast<double>(shifts.shifts().size()), borders.vertices.size() / 16.0, 1.0);
+  EXPECT_NEAR(static_cast<double>(shifts.shifts().size()),
+              static_cast<double>(borders.vertices.size()) / 16.0, 1.0);
   for (const auto& shift : shifts.shifts()) {
     const auto& vertex = borders.vertices[shift.vertex];
     ASSERT_TRUE(shift.shift);
