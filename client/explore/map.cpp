@@ -555,10 +555,10 @@ std::vector<LatticePoint> ShiftSearch::next() {
   for (auto& sample : samples_) {
     sample.places.clear();
     if (!sample.is_bracketed && !sample.is_done) {
-      // Ever further from the vertex, up to a cell to both sides.
+      // Ever further from the vertex, up to an eighth of the axis to both sides.
       const std::int64_t own = sample.vertex.is_along_x ? sample.vertex.low.x : sample.vertex.low.y;
       std::set<std::int64_t> places{own, own + 1};
-      for (std::int64_t reach = grid_.cell() / 64; reach <= grid_.cell(); reach *= 4) {
+      for (std::int64_t reach = grid_.cell() / 64; reach <= grid_.last() / 8; reach *= 4) {
         places.insert(std::max<std::int64_t>(own - reach, 0));
         places.insert(std::min<std::int64_t>(own + reach, grid_.last()));
       }

@@ -183,7 +183,7 @@ std::string map_table(const FoundMap& map) {
   if (!map.shifts.empty()) {
     out << "Shifts are those of the curve on twice as many elements a link, in percent of the "
            "axis; "
-           "lost: no such border within a cell.\n";
+           "lost: no such border within an eighth of the axis.\n";
   }
   out << missed_sentence(map) << '\n';
   return out.str();

@@ -44,7 +44,7 @@ struct MapRegion {
 /// How far a curve is from that on the finer mesh, as parts of an axis.
 struct CurveShift {
   std::size_t checked = 0;  ///< vertices
-  std::size_t lost = 0;     ///< of these: no such border within a cell
+  std::size_t lost = 0;     ///< of these: no such border within an eighth of the axis
   double median = 0.0;      ///< of the others
   double largest = 0.0;
 };

@@ -179,10 +179,12 @@ TEST(BorderSearch, RandomPointsAreInTheRegionsThatTheCurvesSay) {
   }
 }
 
-TEST(BorderSearch, SolvesTheGridAndAFewPointsAVertex) {
-  const auto found = solved(disc);
-  EXPECT_LT(found.points, 33U * 33U + 25U * found.search.borders().vertices.size());
-  EXPECT_LT(found.rounds, 40U);
+TEST(BorderSearch, SolvesTheGridThenAPointForEachHalvingOfABracketAndTwoForEachChord) {
+  const auto found = solved(disc, 256);
+  const std::size_t vertices = found.search.borders().vertices.size();
+  ASSERT_GT(vertices, 500U);  // so many that brackets are halved, not divided into more parts
+  EXPECT_LT(found.points, 257U * 257U + (found.grid.halvings + 4U) * vertices);
+  EXPECT_LT(found.rounds, 3U * found.grid.halvings);
   EXPECT_EQ(found.solved_twice, 0U);
   EXPECT_EQ(solved([](double, double) { return 7; }).rounds, 1U);
 }
