@@ -81,7 +81,7 @@ TEST(MapCommand, JsonAndCsvHaveTheSameVerticesAndFilesEndAsTheyAreWritten) {
   EXPECT_EQ(map["shifts"].size(), map["curves"].size());
 }
 
-TEST(MapCommand, KilledAtTenRandomInstantsItContinuesToTheSameMapToTheBit) {
+TEST(MapCommand, EndedAtTenRandomInstantsItContinuesToTheSameMapToTheBit) {
   const test::TemporaryFolder whole;
   const auto undisturbed = test::run_oblique(whole, map_words({"--format", "json"}));
   ASSERT_EQ(undisturbed.exit_code, 0) << undisturbed.err;
