@@ -261,7 +261,7 @@ class MapSolver {
 
  private:
   std::string what() const {
-    constexpr std::uint32_t kOtherRounds = 30;  // of single cells, and on another mesh
+    constexpr std::uint32_t kOtherRounds = 60;  // of single cells, and on another mesh
     return fmt::format("round {} of about {}", study_.rounds() + 1,
                        map_.grid.halvings + kOtherRounds);
   }

@@ -32,6 +32,10 @@ def wrong_sides(found, keys):
     return int(wrong.sum())
 
 
+def distance(one, other):
+    return np.hypot(one[0] - other[0], one[1] - other[1])
+
+
 def segments(found):
     """Chords as rows x0, y0, x1, y1, and the regions to the left and the right of each."""
     vertices, corners = found["vertices"], found["corners"]
@@ -39,13 +43,11 @@ def segments(found):
     for number, curve in enumerate(found["curves"]):
         points = [(vertices[vertex]["x"], vertices[vertex]["y"]) for vertex in curve]
         ends = [(corner["x"], corner["y"]) for corner in corners for each in corner["curves"] if each == number]
-        if len(ends) == 2 and np.hypot(*np.subtract(points[0], ends[0])) > np.hypot(*np.subtract(points[0], ends[1])):
+        if len(ends) == 2 and distance(points[0], ends[0]) > distance(points[0], ends[1]):
             ends.reverse()
-        at_begin = ends and (
-            len(ends) == 2
-            or np.hypot(*np.subtract(points[0], ends[0])) <= np.hypot(*np.subtract(points[-1], ends[0]))
-        )
-        path = ([ends[0]] if at_begin else []) + points + ([ends[-1]] if len(ends) == 2 or (ends and not at_begin) else [])
+        is_nearer = ends and distance(points[0], ends[0]) <= distance(points[-1], ends[0])
+        at_begin = len(ends) == 2 or is_nearer
+        path = ends[:1] + points + ends[1:] if at_begin else points + ends
         vertex = vertices[curve[len(curve) // 2]]
         middle = points.index((vertex["x"], vertex["y"])) + (1 if at_begin else 0)
         before, behind = path[max(middle - 1, 0)], path[min(middle + 1, len(path) - 1)]
@@ -72,12 +74,12 @@ def judged(found, x, y):
         these = order[begin:end]
         if len(these) == 0:
             continue
-        distance = x0 + (y[these] - y0) / (y1 - y0) * (x1 - x0) - x[these]
+        offset = x0 + (y[these] - y0) / (y1 - y0) * (x1 - x0) - x[these]
         for sign in (1, -1):
             # A chord that goes up has its left side towards lower x.
             name = left if (y1 > y0) == (sign == 1) else right
-            closer = (sign * distance > 0) & (sign * distance < nearest[sign][these])
-            nearest[sign][these[closer]] = sign * distance[closer]
+            closer = (sign * offset > 0) & (sign * offset < nearest[sign][these])
+            nearest[sign][these[closer]] = sign * offset[closer]
             region[sign][these[closer]] = names.index(name)
     both = np.where(region[1] >= 0, region[1], region[-1])
     return both, names, np.minimum(nearest[1], nearest[-1])
@@ -99,13 +101,15 @@ def main():
     low_x, high_x = found["x_range"]
     low_y, high_y = found["y_range"]
     x, y = random.uniform(low_x, high_x, known.points), random.uniform(low_y, high_y, known.points)
-    regions, names, distance = judged(found, x, y)
+    regions, names, nearest = judged(found, x, y)
     solved = modes(found, keys, x, y)
-    counts = (regions >= 0) & (distance > found["bracket"] * (high_x - low_x))
+    counts = (regions >= 0) & (nearest > found["bracket"] * (high_x - low_x))
     wrong = counts & (solved != np.array([*names, None], dtype=object)[regions])
-    print(f"{known.points} random points, {int(wrong.sum())} misjudged, {int((regions < 0).sum())} in rows without a border")
+    unknown = int((regions < 0).sum())
+    print(f"{known.points} random points, {int(wrong.sum())} misjudged, {unknown} in rows without a border")
     for i in np.flatnonzero(wrong)[:20]:
-        print(f"  {found['x']} = {x[i]:.6f}, {found['y']} = {y[i]:.6f}: {solved[i]}, not {names[regions[i]]}; {distance[i]:.1e} from a chord")
+        where = f"{found['x']} = {x[i]:.6f}, {found['y']} = {y[i]:.6f}"
+        print(f"  {where}: {solved[i]}, not {names[regions[i]]}; {nearest[i]:.1e} from a chord")
     return 1 if sides else 0
 
 
