@@ -52,6 +52,34 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     return json.loads(ended.stdout)
 
 
+class Map(Named):
+    """Borders on a plane. ``x``, ``y``, ``width`` (NumPy arrays), ``region_from``, ``region_to`` and
+    ``along`` (arrays of objects) have an entry for each vertex; ``curves`` are arrays of vertex numbers,
+    ``corners``, ``regions`` and ``shifts`` lists of dicts as in the JSON of ``oblique map``."""
+
+
+def map(study: Optional[str] = None, **flags: Any) -> Map:
+    """``oblique map``: ``oblique.map(x="mu=0.05:2", y="H=0.3:1.05", e=1, preset="paper")``."""
+    found = run("map", study, **flags)
+    vertices = found.pop("vertices")
+
+    def column(name: str, kind: Any) -> Any:
+        return np.array([vertex[name] for vertex in vertices], dtype=kind)
+
+    return Map(
+        x=column("x", float),
+        y=column("y", float),
+        width=column("width", float),
+        region_from=column("from", object),
+        region_to=column("to", object),
+        along=column("along", object),
+        curves=[np.array(curve, dtype=np.int64) for curve in found.pop("curves")],
+        x_key=found.pop("x"),
+        y_key=found.pop("y"),
+        **found,
+    )
+
+
 def arrays_of(value: Any) -> Any:
     """Objects of JSON as Named, and lists of numbers as arrays with NaN for null."""
     if isinstance(value, dict):
