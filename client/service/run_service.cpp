@@ -92,24 +92,6 @@ std::string first_line(const Descriptor& ready, const ChildProcess& server,
   return text.substr(0, text.find('\n'));
 }
 
-/// Why the workers of this run do not solve the rest of a study, and what to do; or empty.
-std::string objection_to_waiting(const protocol::StudyStatus& status) {
-  const std::string own = solver::solver_version();
-  if (status.state() == "paused" && status.leased() == 0) {
-    return fmt::format("somebody has paused \"{}\": the same command again goes on with it",
-                       status.name());
-  }
-  if (status.state() != "running" || status.solver_version().empty() ||
-      status.solver_version() == own || status.leased() > 0) {
-    return {};
-  }
-  return fmt::format(
-      "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
-      "solve its other {3} points. Go on with workers of {1}, or under another name, as --name "
-      "{0}-{2}",
-      status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
-}
-
 RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& settings,
                        EmbeddedService& service, protocol::StopSignals& stop) {
   const auto keep_waiting = [&] {
@@ -157,6 +139,23 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
 }
 
 }  // namespace
+
+std::string objection_to_waiting(const protocol::StudyStatus& status) {
+  const std::string own = solver::solver_version();
+  if (status.state() == "paused" && status.leased() == 0) {
+    return fmt::format("somebody has paused \"{}\": the same command again goes on with it",
+                       status.name());
+  }
+  if (status.state() != "running" || status.solver_version().empty() ||
+      status.solver_version() == own || status.leased() > 0) {
+    return {};
+  }
+  return fmt::format(
+      "the results of \"{0}\" are of solver {1}, and the workers here have {2}: nobody here may "
+      "solve its other {3} points. Go on with workers of {1}, or under another name, as --name "
+      "{0}-{2}",
+      status.name(), status.solver_version(), own, format_count(protocol::open_points(status)));
+}
 
 std::string why_silent(const std::filesystem::path& database) {
   return fmt::format(

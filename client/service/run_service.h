@@ -93,6 +93,10 @@ class EmbeddedService {
   std::string page_url_;
 };
 
+/// Why the workers of an EmbeddedService do not solve the rest of a study, and what to do; or
+/// empty.
+std::string objection_to_waiting(const protocol::StudyStatus& status);
+
 /// How `run` runs a study, and `paper` its cases.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};

@@ -1,0 +1,204 @@
+#include "client/explore/growing_study.h"
+
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "client/commands/shared.h"
+#include "client/service/watching.h"
+#include "client/study/study.h"
+#include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
+#include "proto/text.h"
+#include "server/query/sql_text.h"
+#include "worker/solver/model/errors.h"
+
+namespace oblique::client {
+namespace {
+
+/// Whether a server that runs already solves the points.
+bool is_elsewhere(const ExploreFlags& flags) {
+  return flags.source.database.empty() &&
+         !(flags.source.server + environment_variable("OBLIQUE_SERVER").value_or("")).empty();
+}
+
+std::filesystem::path database_of(const ExploreFlags& flags) {
+  return flags.source.database.empty() ? DatabaseSettings().file : flags.source.database;
+}
+
+}  // namespace
+
+void add_explore_flags(CLI::App& command, ExploreFlags& flags) {
+  command
+      .add_option("--name", flags.name,
+                  "name of the study that holds the points; default: made from the settings")
+      ->type_name("NAME");
+  add_source_flags(command, flags.source);
+  command.get_option("--db")->description(
+      fmt::format("database for the points, made when it is not there; default, unless a server is "
+                  "named: {}",
+                  DatabaseSettings().file));
+  add_no_reuse_flag(command, flags.run.no_reuse);
+  add_worker_flags(command, flags.run);
+}
+
+std::string explored_name(const ExploreFlags& flags, std::string_view verb,
+                          std::string_view settings) {
+  constexpr std::size_t kDigits = 8;
+  if (flags.name.empty()) {
+    return fmt::format("{}-{}", verb, protocol::sha256_of(settings).substr(0, kDigits));
+  }
+  if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {
+    throw solver::InputError("--name: " + objection);
+  }
+  return flags.name;
+}
+
+int run_exploration(Console& console, const std::function<int(protocol::StopSignals& stop)>& work) {
+  protocol::StopSignals stop;
+  try {
+    return work(stop);
+  } catch (const Interrupted&) {
+    console.notes() << "Stopped. What was solved is stored; the same command continues.\n";
+    return stop.exit_code();
+  }
+}
+
+GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::string name,
+                           const solver::ModelParameters& model, protocol::StopSignals& stop)
+    : console_(console), stop_(stop), name_(std::move(name)), no_reuse_(flags.run.no_reuse) {
+  ConnectionSettings where;
+  if (is_elsewhere(flags)) {
+    where = connection_settings(console, flags.source);
+  } else {
+    check_settings(flags.run);
+    ServiceSettings settings = flags.run.service;
+    settings.database = database_of(flags);
+    settings.only_study = name_;
+    refuse_used_database(settings.database);
+    service_ = std::make_unique<EmbeddedService>(settings, stop);
+    where.server_url = service_->client_url();
+    where.key = service_->client_key();
+    where.if_silent = why_silent(settings.database);
+  }
+  connection_ = std::make_unique<Connection>(where, [this] { return keep_waiting(); });
+  *recipe_.mutable_model() = protocol::to_message(model);
+  read_stored();
+}
+
+GrowingStudy::~GrowingStudy() = default;
+
+bool GrowingStudy::keep_waiting() {
+  if (service_) {
+    service_->check();
+    if (const auto news = service_->news(); !news.empty()) {
+      console_.notes() << protocol::visible_lines(news) << '\n';
+    }
+  }
+  return !stop_.requested();
+}
+
+void GrowingStudy::read_stored() {
+  const auto found = connection_->query(
+      fmt::format("SELECT count(*) FROM studies WHERE name = {}", server::sql_text(name_)));
+  if (std::get<std::int64_t>(found.rows.at(0).at(0)) == 0) {
+    return;
+  }
+  stored_ = connection_->describe(name_);
+  const bool has_same_model =
+      protocol::canonical_model(protocol::unjudged_from_message(stored_.model())) ==
+      protocol::canonical_model(protocol::from_message(recipe_.model()));
+  if (!has_same_model || stored_.errors()) {
+    throw solver::InputError(fmt::format(
+        "the study \"{}\" exists and has {}: give another --name", name_,
+        has_same_model ? "estimated errors, which this command does not use" : "another model"));
+  }
+}
+
+void GrowingStudy::submit(const protocol::Recipe& recipe) {
+  protocol::check_size(recipe);
+  const auto reply =
+      connection_->submit({.name = name_, .recipe = recipe}, {.no_reuse = no_reuse_});
+  if (!is_submitted_ && reply.created()) {
+    note_coarse_mesh(console_.notes(), recipe);
+    note_unusual_values(console_.notes(), recipe);
+  } else if (!is_submitted_) {
+    console_.notes() << fmt::format("Continuing \"{}\": {} of {} points are done.\n", name_,
+                                    format_count(reply.settled()), format_count(reply.points()));
+  }
+  is_submitted_ = true;
+}
+
+void GrowingStudy::wait(const std::string& what) {
+  FollowedStudy followed(*connection_, name_);
+  const auto ask = [&](const Tell& tell) {
+    if (!keep_waiting()) {
+      throw Interrupted("stopped");
+    }
+    auto status = followed.status(tell);
+    if (const auto reason = objection_to_waiting(status); service_ && !reason.empty()) {
+      throw std::runtime_error(reason);
+    }
+    status.set_name(fmt::format("{}, {}", name_, what));
+    return status;
+  };
+  const auto status = watch_study(console_, ask, stop_);
+  if (stop_.requested()) {
+    throw Interrupted("stopped");
+  }
+  if (status.state() == "cancelled") {
+    throw std::runtime_error(
+        fmt::format("the study \"{}\" was cancelled: the same command continues it", name_));
+  }
+}
+
+protocol::Table GrowingStudy::solve(const protocol::Block& block, const std::string& columns,
+                                    const std::string& what) {
+  const int round = recipe_.blocks_size();
+  const bool is_stored = round < stored_.blocks_size();
+  if (is_stored && !protocol::is_same_block(stored_.blocks(round), block)) {
+    throw solver::InputError(fmt::format(
+        "the study \"{}\" exists and its block {} has other points than this command: give another "
+        "--name",
+        name_, round + 1));
+  }
+  *recipe_.add_blocks() = block;
+  const std::uint64_t first = points_;
+  const std::uint64_t count = protocol::points_of_block(block);
+  points_ += count;
+  if (!is_stored || !is_submitted_) {
+    submit(is_stored ? stored_ : recipe_);
+    wait(what);
+  }
+  const auto solved = connection_->query(fmt::format(
+      "SELECT point, {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} AND status = "
+      "'solved' ORDER BY point",
+      columns, server::sql_text(name_), first, first + count - 1));
+  protocol::Table table{{solved.columns.begin() + 1, solved.columns.end()},
+                        std::vector<protocol::Row>(count)};
+  for (const auto& row : solved.rows) {
+    const auto point = static_cast<std::uint64_t>(std::get<std::int64_t>(row.front())) - first;
+    table.rows.at(point).assign(row.begin() + 1, row.end());
+  }
+  for (auto& row : table.rows) {
+    row.resize(table.columns.size());
+  }
+  return table;
+}
+
+protocol::Block listed_points(const std::vector<std::string>& keys,
+                              const std::vector<std::vector<double>>& values) {
+  std::vector<protocol::Axis> axes;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    axes.push_back(protocol::listed_axis(protocol::axis_key(keys[i]), values.at(i)));
+  }
+  auto block = protocol::block_of(std::move(axes));
+  block.set_zip(true);
+  return block;
+}
+
+}  // namespace oblique::client
