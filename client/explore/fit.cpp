@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <Eigen/Dense>
@@ -257,7 +258,7 @@ FitStep minimise_over(const FitProblem& problem, const VectorXd& angles,
                       const std::function<void(const FitStep&)>& after_each) {
   Residuals residuals(problem, angles, free);
   VectorXd x = residuals.free_angles();
-  residuals.describe(what);
+  residuals.describe(what.empty() ? "start" : what);
   const auto step_at = [&](int iteration) {
     const auto& here = residuals.at(x);
     return FitStep{iteration,        residuals.all_angles(x), residuals.parameters_at(x),
@@ -383,8 +384,8 @@ class Profile {
   /// `better_angles`.
   std::optional<double> end(Index j, double side) {
     constexpr int kMostSteps = 40;
-    constexpr double kTolerance = 2e-3;  // of f
-    constexpr double kSmallestBracket = 1e-4;
+    constexpr double kTolerance = 2e-3;        // of f
+    constexpr double kSmallestBracket = 1e-3;  // of the distance to the minimum
     const double least = minimum_.angles[j];
     const double bound = side < 0.0 ? pi : 2.0 * pi;
     if (std::abs(bound - least) < kAtBound) {
@@ -393,6 +394,7 @@ class Profile {
     inside_ = {least, 0.0, minimum_.angles};
     outside_.reset();
     double w = first_step(j, side, bound);
+    double width = HUGE_VAL;
     for (int step = 0; step < kMostSteps && better_.size() == 0; ++step) {
       const Trial trial = tried(j, w, side);
       if (std::abs(trial.f - 1.0) < kTolerance) {
@@ -407,13 +409,15 @@ class Profile {
         w = least + side * std::min(growth * std::abs(w - least), std::abs(bound - least));
         continue;
       }
-      const double width = outside_->w - inside_.w;
+      const double last_width = std::exchange(width, outside_->w - inside_.w);
       if (std::abs(width) < kSmallestBracket * std::abs(outside_->w - least)) {
         return inside_.w;
       }
-      const double part =
-          std::isfinite(outside_->f) ? (1.0 - inside_.f) / (outside_->f - inside_.f) : 0.5;
-      w = inside_.w + std::clamp(part, 0.1, 0.9) * width;
+      // By halves where the straight line between the ends does not halve the bracket: f has a
+      // step.
+      const bool is_slow = std::abs(width) > std::abs(last_width) / 2.0;
+      const double part = (1.0 - inside_.f) / (outside_->f - inside_.f);
+      w = inside_.w + (is_slow ? 0.5 : std::clamp(part, 0.05, 0.95)) * width;
     }
     return inside_.w;
   }
