@@ -32,7 +32,6 @@ constexpr double kDifference = 3e-3;
 constexpr double kFirstStep = 0.1;
 /// Residual of a missing prediction: large enough to have the step refused.
 constexpr double kMissing = 1e9;
-constexpr int kMostIterations = 100;
 /// A minimum whose angle is so near to that of a bound is at the bound.
 constexpr double kAtBound = 1e-2;
 /// 95 % quantile of chi2 with one degree of freedom.
@@ -46,6 +45,10 @@ constexpr double kLeastSingularValue = 1e-3;
 /// Part of a unit vector from which on an unknown belongs to an undetermined combination.
 constexpr double kLeastPart = 0.1;
 constexpr double kLargestCorrelation = 0.99;
+/// A chi2 that is smaller by less is the same minimum.
+constexpr double kSmallerChi2 = 1e-4;
+/// Least factor of variances: of exact data chi2 is the noise of the differences.
+constexpr double kLeastScale = 1e-6;
 
 Index index_of(std::size_t number) {
   return static_cast<Index>(number);
@@ -252,9 +255,20 @@ VectorXd start_angles(const FitProblem& problem) {
   throw solver::SolveError("predictions are missing with " + values);
 }
 
+/// When a minimisation ends.
+struct Stop {
+  double tolerance;           ///< of the predicted fall of chi2
+  double relative_tolerance;  ///< of chi2
+  int most_trials;            ///< of steps, refused ones included
+  bool may_run_out = false;   ///< of trials; else that is an error
+};
+constexpr Stop kAtMinimum{1e-6, 1e-9, 200};
+/// In a profile, where chi2 is 3.84 above the minimum and matters to 1e-3.
+constexpr Stop kInProfile{1e-3, 1e-4, 12, true};
+
 /// Minimises over the angles of the unknowns in `free`, from `angles`, which fix the others.
 FitStep minimise_over(const FitProblem& problem, const VectorXd& angles,
-                      const std::vector<Index>& free, double tolerance, const std::string& what,
+                      const std::vector<Index>& free, const Stop& stop, const std::string& what,
                       const std::function<void(const FitStep&)>& after_each) {
   Residuals residuals(problem, angles, free);
   VectorXd x = residuals.free_angles();
@@ -282,20 +296,21 @@ FitStep minimise_over(const FitProblem& problem, const VectorXd& angles,
   method.setExternalScaling(true);
   method.diag() = VectorXd::Ones(x.size());
   method.setXtol(1e-7);
-  method.setFtol(1e-9);
+  method.setFtol(stop.relative_tolerance);
+  method.setMaxfev(stop.most_trials);
   auto status = method.minimizeInit(x);
   while ((status == Eigen::LevenbergMarquardtSpace::NotStarted ||
           status == Eigen::LevenbergMarquardtSpace::Running) &&
-         predicted_fall(step.jacobian, residuals.at(x).residuals) > tolerance) {
-    if (step.iteration == kMostIterations) {
-      throw solver::SolveError(
-          fmt::format("the fit has found no minimum after {} iterations", kMostIterations));
-    }
+         predicted_fall(step.jacobian, residuals.at(x).residuals) > stop.tolerance) {
     residuals.describe(fmt::format("{}iteration {}, chi2 = {}", what.empty() ? "" : what + ": ",
                                    step.iteration + 1, readable_number(step.chi2, 4)));
     status = method.minimizeOneStep(x);
     step = step_at(step.iteration + 1);
     report();
+  }
+  if (status == Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation && !stop.may_run_out) {
+    throw solver::SolveError(
+        fmt::format("the fit has found no minimum in {} trials", stop.most_trials));
   }
   return step;
 }
@@ -441,7 +456,6 @@ class Profile {
 
   /// The least chi2 with unknown `j` at `w`, from where the linearised model has the others.
   Trial tried(Index j, double w, double side) {
-    constexpr double kAccuracy = 1e-3;  // of chi2
     VectorXd angles = inside_.angles;
     if (const double variance = information_.covariance(j, j); variance > 0.0) {
       angles += information_.covariance.col(j) / variance * (w - inside_.w);
@@ -451,10 +465,10 @@ class Profile {
     const auto& name = problem_.unknowns[static_cast<std::size_t>(j)].name;
     try {
       const FitStep step = minimise_over(
-          problem_, angles, all_but(problem_.unknowns.size(), j), kAccuracy,
+          problem_, angles, all_but(problem_.unknowns.size(), j), kInProfile,
           fmt::format("interval of {}, {} end", name, side < 0.0 ? "lower" : "upper"), {});
       const double rise = step.chi2 - minimum_.chi2;
-      if (rise < -0.01 * limit_) {
+      if (rise < -kSmallerChi2 - 0.01 * limit_) {
         better_ = step.angles;
       }
       return {w, std::sqrt(std::max(rise, 0.0) / limit_), step.angles};
@@ -533,13 +547,14 @@ bool add_intervals(const FitProblem& problem, const Information& information, Fi
 FitStep minimise(const FitProblem& problem, double tolerance,
                  const std::function<void(const FitStep&)>& after_each) {
   problem.check();
-  return minimise_over(problem, start_angles(problem), all_but(problem.unknowns.size()), tolerance,
-                       "", after_each);
+  Stop stop = kAtMinimum;
+  stop.tolerance = tolerance;
+  return minimise_over(problem, start_angles(problem), all_but(problem.unknowns.size()), stop, "",
+                       after_each);
 }
 
 Fit fit(const FitProblem& problem, const FitSettings& settings) {
   constexpr int kMostStarts = 5;
-  constexpr double kTolerance = 1e-6;
   problem.check();
   if (settings.is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");
@@ -547,7 +562,7 @@ Fit fit(const FitProblem& problem, const FitSettings& settings) {
   VectorXd angles = start_angles(problem);
   for (int start = 1;; ++start) {
     const FitStep minimum = minimise_over(problem, angles, all_but(problem.unknowns.size()),
-                                          kTolerance, "", settings.after_each);
+                                          kAtMinimum, "", settings.after_each);
     const Information information = information_of(minimum);
     Fit result = fit_at(problem, minimum, information, settings.is_scaled);
     if (add_intervals(problem, information, result, angles)) {

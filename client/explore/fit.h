@@ -72,7 +72,7 @@ struct FitStep {
 /// `evaluate`, with the point and all disturbed ones. Ends when the linearised model predicts that
 /// chi2 falls by less than `tolerance`, or when the method makes no progress. `after_each` is
 /// called with the start and each iteration. Throws solver::InputError as `check`, and
-/// solver::SolveError when predictions are missing at the start, or after 100 iterations.
+/// solver::SolveError when predictions are missing at the start, and after 200 trials.
 FitStep minimise(const FitProblem& problem, double tolerance = 1e-6,
                  const std::function<void(const FitStep&)>& after_each = {});
 
