@@ -553,18 +553,18 @@ FitStep minimise(const FitProblem& problem, double tolerance,
                        after_each);
 }
 
-Fit fit(const FitProblem& problem, const FitSettings& settings) {
+Fit fit(const FitProblem& problem, bool is_scaled) {
   constexpr int kMostStarts = 5;
   problem.check();
-  if (settings.is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
+  if (is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");
   }
   VectorXd angles = start_angles(problem);
   for (int start = 1;; ++start) {
-    const FitStep minimum = minimise_over(problem, angles, all_but(problem.unknowns.size()),
-                                          kAtMinimum, "", settings.after_each);
+    const FitStep minimum =
+        minimise_over(problem, angles, all_but(problem.unknowns.size()), kAtMinimum, "", {});
     const Information information = information_of(minimum);
-    Fit result = fit_at(problem, minimum, information, settings.is_scaled);
+    Fit result = fit_at(problem, minimum, information, is_scaled);
     if (add_intervals(problem, information, result, angles)) {
       return result;
     }

@@ -91,8 +91,7 @@ struct Fit {
   std::vector<Estimate> estimates;  ///< in the order of the unknowns
   Eigen::MatrixXd correlation;      ///< 0 for unknowns at a bound
   std::size_t degrees_of_freedom = 0;
-  /// chi2 / degrees of freedom with FitSettings::is_scaled, else 1; variances are multiplied by it.
-  double scale = 1.0;
+  double scale = 1.0;                       ///< by which variances are multiplied
   std::vector<std::size_t> without_effect;  ///< unknowns that hardly change any prediction
   /// Sets of unknowns of which the data determine a combination only.
   std::vector<std::vector<std::size_t>> inseparable;
@@ -100,17 +99,12 @@ struct Fit {
   std::vector<std::pair<std::size_t, std::size_t>> correlated;
 };
 
-struct FitSettings {
-  /// The standard deviations are known up to one factor, which chi2 determines. Needs more data
-  /// than unknowns.
-  bool is_scaled = false;
-  std::function<void(const FitStep&)> after_each = {};
-};
-
 /// The least chi2 with covariance (J^T J)^-1, what the data cannot determine, and
 /// profile-likelihood intervals: the values of an unknown for which the least chi2 over the others
 /// is at most 3.84 scale above the minimum. When a profile finds a smaller chi2 than the minimum,
-/// the fit starts again from there. Throws as `minimise` does.
-Fit fit(const FitProblem& problem, const FitSettings& settings = {});
+/// the fit starts again from there. With `is_scaled` the standard deviations are known up to one
+/// factor: scale is chi2 / degrees of freedom, which needs more data than unknowns; else it is 1.
+/// Throws as `minimise` does.
+Fit fit(const FitProblem& problem, bool is_scaled = false);
 
 }  // namespace oblique::client

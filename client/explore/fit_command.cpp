@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <sstream>
@@ -12,6 +15,7 @@
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
+#include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
 #include "client/commands/commands.h"
@@ -333,24 +337,21 @@ FitProblem problem_of(const MeasuredFit& fit) {
   return problem;
 }
 
-/// The settings that determine the points, for the name of the study.
-std::string settings_of(const MeasuredFit& fit, bool is_scaled) {
+/// All that determines the points, for the name of the study.
+std::string settings_of(const MeasuredFit& fit, const FitProblem& problem, bool is_scaled) {
+  Eigen::VectorXd start(static_cast<Eigen::Index>(fit.unknowns.size()));
   std::string text = protocol::canonical_model(fit.model) + (is_scaled ? " scaled" : "");
-  for (const Unknown& unknown : fit.unknowns) {
-    text += fmt::format(" {}={}:{}:{}", unknown.name, exact_number(unknown.from),
-                        exact_number(unknown.to), exact_number(unknown.start));
+  for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
+    start[static_cast<Eigen::Index>(i)] = fit.unknowns[i].start;
+    text +=
+        fmt::format(" {}:{}", exact_number(fit.unknowns[i].from), exact_number(fit.unknowns[i].to));
   }
-  for (std::size_t i = 0; i < fit.keys.size(); ++i) {
-    text += " " + fit.keys[i];
-    for (const double value : fit.fixed_values[i]) {
-      text += " " + exact_number(value);
-    }
+  for (std::size_t i = 0; i < problem.names.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    text += fmt::format(" {} {} {}", problem.names[i], exact_number(problem.measured[at]),
+                        exact_number(problem.sd[at]));
   }
-  for (const auto& number : fit.measured.numbers) {
-    text += fmt::format(" {} {} {} {}", fit.measured.outputs[number.output], number.row,
-                        exact_number(number.value), exact_number(number.sd));
-  }
-  return text;
+  return text + block_of_points(fit, {start}).SerializeAsString();
 }
 
 // ---- Report ----
@@ -359,7 +360,6 @@ std::string settings_of(const MeasuredFit& fit, bool is_scaled) {
 struct Report {
   const MeasuredFit& fitted;
   const Fit& fit;
-  const FitProblem& problem;
   const GrowingStudy& study;
 };
 
@@ -425,14 +425,27 @@ std::vector<std::string> notes_of(const Report& report) {
   return notes;
 }
 
-protocol::Table table_of_unknowns(const Report& report, bool has_units) {
-  protocol::Table table{.columns = {"unknown", "start", "fitted", "sd", "lower_95", "upper_95"}};
+protocol::Table table_of_unknowns(const Report& report) {
+  protocol::Table table{
+      .columns = {"unknown", "unit", "from", "to", "start", "value", "sd", "lower_95", "upper_95"}};
   for (std::size_t i = 0; i < report.fit.estimates.size(); ++i) {
-    const auto& unknown = report.fitted.unknowns[i];
+    const Unknown& unknown = report.fitted.unknowns[i];
     const auto& estimate = report.fit.estimates[i];
-    table.rows.push_back({has_units ? heading(unknown.name) : unknown.name, unknown.start,
-                          estimate.value, value_or_null(estimate.sd), value_or_null(estimate.lower),
+    table.rows.push_back({unknown.name, std::string(protocol::axis_key(unknown.name).unit),
+                          unknown.from, unknown.to, unknown.start, estimate.value,
+                          value_or_null(estimate.sd), value_or_null(estimate.lower),
                           value_or_null(estimate.upper)});
+  }
+  return table;
+}
+
+/// The same for reading: the unit in the name, without bounds.
+protocol::Table shown_table_of_unknowns(const Report& report) {
+  protocol::Table table = table_of_unknowns(report);
+  table.columns.erase(table.columns.begin() + 1, table.columns.begin() + 4);
+  for (auto& row : table.rows) {
+    row.front() = heading(std::get<std::string>(row.front()));
+    row.erase(row.begin() + 1, row.begin() + 4);
   }
   return table;
 }
@@ -465,7 +478,7 @@ protocol::Table table_of_residuals(const Report& report) {
 
 void print_report(std::ostream& out, const Report& report) {
   const Fit& fit = report.fit;
-  print(out, table_of_unknowns(report, true), Format::kTable);
+  print(out, shown_table_of_unknowns(report), Format::kTable);
   out << fmt::format("\nchi2 = {} with {}", readable_number(fit.minimum.chi2, 4),
                      counted(fit.degrees_of_freedom, "degree of freedom", "degrees of freedom"));
   if (fit.degrees_of_freedom > 0) {
@@ -486,8 +499,10 @@ void print_report(std::ostream& out, const Report& report) {
   print(out, table_of_residuals(report), Format::kTable);
 }
 
-nlohmann::ordered_json json_or_null(const std::optional<double>& value) {
-  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+nlohmann::ordered_json json_of(const protocol::Table& table) {
+  std::ostringstream text;
+  print(text, table, Format::kJson);
+  return nlohmann::ordered_json::parse(text.str());
 }
 
 nlohmann::ordered_json json_of(const Report& report) {
@@ -498,40 +513,13 @@ nlohmann::ordered_json json_of(const Report& report) {
                               {"points", report.study.points()},
                               {"chi2", fit.minimum.chi2},
                               {"degrees_of_freedom", fit.degrees_of_freedom},
-                              {"scale", fit.scale}};
-  for (std::size_t i = 0; i < fit.estimates.size(); ++i) {
-    const auto& unknown = report.fitted.unknowns[i];
-    const auto& estimate = fit.estimates[i];
-    json["unknowns"].push_back({{"name", unknown.name},
-                                {"unit", protocol::axis_key(unknown.name).unit},
-                                {"from", unknown.from},
-                                {"to", unknown.to},
-                                {"start", unknown.start},
-                                {"value", estimate.value},
-                                {"sd", json_or_null(estimate.sd)},
-                                {"lower_95", json_or_null(estimate.lower)},
-                                {"upper_95", json_or_null(estimate.upper)},
-                                {"is_at_bound", estimate.is_at_bound}});
-    std::vector<double> row(fit.estimates.size());
-    Eigen::VectorXd::Map(row.data(), static_cast<Eigen::Index>(row.size())) =
-        fit.correlation.row(static_cast<Eigen::Index>(i));
-    json["correlation"].push_back(row);
+                              {"scale", fit.scale},
+                              {"unknowns", json_of(table_of_unknowns(report))}};
+  for (const auto& row : fit.correlation.rowwise()) {
+    json["correlation"].push_back(std::vector<double>(row.begin(), row.end()));
   }
   json["notes"] = notes_of(report);
-  const auto residuals = table_of_residuals(report);
-  json["residuals"] = nlohmann::ordered_json::array();
-  for (const auto& row : residuals.rows) {
-    auto& object = json["residuals"].emplace_back();
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      std::visit(
-          [&](const auto& value) {
-            if constexpr (!std::is_same_v<std::decay_t<decltype(value)>, std::monostate>) {
-              object[residuals.columns[i]] = value;
-            }
-          },
-          row[i]);
-    }
-  }
+  json["residuals"] = json_of(table_of_residuals(report));
   return json;
 }
 
@@ -540,7 +528,7 @@ void write_report(const FitFlags& flags, const Report& report, Format format) {
   if (format == Format::kTable) {
     print_report(text, report);
   } else if (format == Format::kCsv) {
-    print(text, table_of_unknowns(report, false), format);
+    print(text, table_of_unknowns(report), format);
   } else {
     text << json_of(report).dump(2) << '\n';
   }
@@ -563,7 +551,8 @@ int fit_to_measurements(const FitFlags& flags, Console& console) {
   }
   const auto fitted = measured_fit(flags, tip_reach(console));
   auto problem = problem_of(fitted);
-  const auto name = explored_name(flags.explore, "fit", settings_of(fitted, flags.is_scaled));
+  const auto name =
+      explored_name(flags.explore, "fit", settings_of(fitted, problem, flags.is_scaled));
   return run_exploration(console, [&](protocol::StopSignals& stop) {
     GrowingStudy study(console, flags.explore, name, fitted.model, stop);
     const std::string columns = fmt::format("{}", fmt::join(fitted.measured.outputs, ", "));
@@ -571,8 +560,8 @@ int fit_to_measurements(const FitFlags& flags, Console& console) {
       return predictions_of(fitted.measured,
                             study.solve(block_of_points(fitted, points), columns, what));
     };
-    const Fit found = fit(problem, {.is_scaled = flags.is_scaled});
-    write_report(flags, {fitted, found, problem, study}, format);
+    const Fit found = fit(problem, flags.is_scaled);
+    write_report(flags, {fitted, found, study}, format);
     return kDone;
   });
 }

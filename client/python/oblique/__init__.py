@@ -9,6 +9,7 @@ Units are SI and stand at the end of names: ``fn_peak_N``, ``duration_s``.
 
 * :func:`solve` solves one point, :func:`solve_many` any number of them on all cores, with arrays in
   and out, and :func:`trace` gives the time histories of one.
+* :func:`fit` finds the parameters of measured numbers, by the program ``oblique``.
 * :class:`Database` asks the results that studies have left, also while a server writes them.
 
 All of it may be called from several threads at once and lets other threads run meanwhile. Falls
@@ -22,6 +23,7 @@ from __future__ import annotations
 
 from ._database import Answer, Database, Study
 from ._solving import solve, solve_many, trace
+from .explore import Fit, fit
 from ._results import Energy, Errors, ManyResults, Result, Solver, Trace, _core
 
 DatabaseError, SolveError = _core.DatabaseError, _core.SolveError
@@ -40,12 +42,14 @@ __all__ = [
     "DatabaseError",
     "Energy",
     "Errors",
+    "Fit",
     "ManyResults",
     "Result",
     "SolveError",
     "Solver",
     "Study",
     "Trace",
+    "fit",
     "solve",
     "solve_many",
     "trace",

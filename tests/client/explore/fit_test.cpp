@@ -107,7 +107,7 @@ TEST(Fit, OfAStraightLineHasTheCovarianceOfLinearRegression) {
 
 TEST(Fit, ScalesDeviationsAndIntervalsByChi2WhereAsked) {
   const Fit plain = fit(line_problem());
-  const Fit scaled = fit(line_problem(), {.is_scaled = true});
+  const Fit scaled = fit(line_problem(), true);
   const double factor = std::sqrt(plain.minimum.chi2 / 2.0);
   EXPECT_NEAR(scaled.scale, factor * factor, 1e-9);
   for (const std::size_t i : {0U, 1U}) {
