@@ -2,9 +2,10 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <random>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,9 +15,12 @@
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/solve.h"
 
-namespace oblique::client::test {
+namespace oblique::test {
 namespace {
 
+using client::Estimate;
+using client::Fit;
+using client::FitProblem;
 using Eigen::Index;
 using Eigen::VectorXd;
 
@@ -84,7 +88,7 @@ Coverage fit_coverage(int fits, std::uint64_t seed,
     for (Index i = 0; i < exact.size(); ++i) {
       problem.measured[i] += normal(random) * problem.sd[i];
     }
-    const Fit found = fit(problem);
+    const Fit found = client::fit(problem);
     ++coverage.fits;
     coverage.k += covers(found.estimates[0], truth[0]) ? 1 : 0;
     coverage.eta2 += covers(found.estimates[1], truth[1]) ? 1 : 0;
@@ -95,4 +99,4 @@ Coverage fit_coverage(int fits, std::uint64_t seed,
   return coverage;
 }
 
-}  // namespace oblique::client::test
+}  // namespace oblique::test

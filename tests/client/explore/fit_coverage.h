@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-namespace oblique::client::test {
+namespace oblique::test {
 
 /// How often 95 % intervals of fits to synthetic measurements cover the truth.
 struct Coverage {
@@ -18,4 +18,4 @@ struct Coverage {
 Coverage fit_coverage(int fits, std::uint64_t seed,
                       const std::function<void(const Coverage&)>& after_each = {});
 
-}  // namespace oblique::client::test
+}  // namespace oblique::test

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   app.add_option("--fits", fits, "number of fits")->capture_default_str();
   app.add_option("--seed", seed, "of the noise")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  const auto coverage = oblique::client::test::fit_coverage(fits, seed);
+  const auto coverage = oblique::test::fit_coverage(fits, seed);
   const auto percent = [&](int covered) { return 100.0 * covered / coverage.fits; };
   fmt::print("{} fits: k {:.1f} %, eta2 {:.1f} %\n", coverage.fits, percent(coverage.k),
              percent(coverage.eta2));

@@ -69,7 +69,7 @@ FitProblem decay_problem(double sd) {
 }
 
 TEST(Unknown, RunsThroughItsRangeWithTheAngleAndStaysWithin) {
-  for (const Unknown unknown : {Unknown{"k", 1e7, 1e8, 2e7}, Unknown{"x", -2.0, 3.0, 0.0}}) {
+  for (const Unknown& unknown : {Unknown{"k", 1e7, 1e8, 2e7}, Unknown{"x", -2.0, 3.0, 0.0}}) {
     EXPECT_DOUBLE_EQ(unknown.value_at(M_PI), unknown.from);
     EXPECT_DOUBLE_EQ(unknown.value_at(2.0 * M_PI), unknown.to);
     EXPECT_NEAR(unknown.value_at(unknown.angle_of(unknown.start)), unknown.start,
