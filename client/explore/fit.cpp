@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <Eigen/Dense>
@@ -201,19 +205,29 @@ class Residuals : public Eigen::DenseFunctor<double> {
       const VectorXd& below = predictions[static_cast<std::size_t>(2 * i + 1)];
       const VectorXd& above = predictions[static_cast<std::size_t>(2 * i + 2)];
       for (Index row = 0; row < here.size(); ++row) {
+        const double sd = problem_.sd[row];
         evaluation.jacobian(row, i) =
-            difference(below[row], here[row], above[row]) / problem_.sd[row];
+            derivative((here[row] - below[row]) / sd, (above[row] - here[row]) / sd);
       }
     }
     return evaluation;
   }
 
-  /// The central difference; one-sided where a side is missing, 0 where both are.
-  static double difference(double below, double here, double above) {
-    const double low = std::isfinite(below) ? below : here;
-    const double high = std::isfinite(above) ? above : here;
-    const double sides = (std::isfinite(below) ? 1.0 : 0.0) + (std::isfinite(above) ? 1.0 : 0.0);
-    return sides == 0.0 || !std::isfinite(here) ? 0.0 : (high - low) / (sides * kDifference);
+  /// The central difference of the steps below and above; that of one side where the other is
+  /// missing, or where outputs jump between the two, as with the sequence of states; 0 without any.
+  static double derivative(double below, double above) {
+    constexpr double kJump = 0.1;  // [standard deviations]
+    constexpr double kTimes = 5.0;
+    if (!std::isfinite(below) || !std::isfinite(above)) {
+      const double known = std::isfinite(below) ? below : above;
+      return std::isfinite(known) ? known / kDifference : 0.0;
+    }
+    const double least = std::abs(below) < std::abs(above) ? below : above;
+    const double largest = std::max(std::abs(below), std::abs(above));
+    if (std::abs(above - below) > kJump && largest > kTimes * std::abs(least)) {
+      return least / kDifference;
+    }
+    return (above + below) / (2.0 * kDifference);
   }
 
   const FitProblem& problem_;

@@ -80,7 +80,7 @@ TEST_F(FitCommand, SaysWhatIsWrong) {
     return ended.err;
   };
   EXPECT_THAT(error_of({"--e", "1"}), HasSubstr("give --fit KEY=FROM:TO"));
-  EXPECT_THAT(error_of({"--e", "1", "--fit", "k"}), HasSubstr("write KEY=FROM:TO"));
+  EXPECT_THAT(error_of({"--e", "1", "--fit", "k", "--sd", "1%"}), HasSubstr("write KEY=FROM:TO"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "kk=1:2", "--sd", "1%"}), HasSubstr("kk"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "links=2:4", "--sd", "1%"}),
               HasSubstr("single values only"));
