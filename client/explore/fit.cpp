@@ -409,8 +409,7 @@ class Profile {
       : problem_(problem), minimum_(minimum), information_(information), limit_(limit) {}
 
   /// The angle at which the interval of unknown `j` ends below (`side` -1) or above (1); nothing
-  /// where it goes on to the bound. False f: a point with a smaller chi2 was found, see
-  /// `better_angles`.
+  /// where it goes on to the bound. Ends early when `better_angles` is found.
   std::optional<double> end(Index j, double side) {
     constexpr int kMostSteps = 40;
     constexpr double kTolerance = 2e-3;        // of f
@@ -432,7 +431,11 @@ class Profile {
       if (trial.f < 1.0 && w == bound) {
         return {};
       }
-      (trial.f < 1.0 ? inside_ : outside_.emplace()) = trial;
+      if (trial.f < 1.0) {
+        inside_ = trial;
+      } else {
+        outside_ = trial;
+      }
       if (!outside_) {
         const double growth = std::clamp(1.05 / std::max(trial.f, 1e-3), 1.1, 3.0);
         w = least + side * std::min(growth * std::abs(w - least), std::abs(bound - least));
@@ -456,9 +459,9 @@ class Profile {
 
  private:
   struct Trial {
-    double w = 0.0;
-    double f = 0.0;
-    VectorXd angles{};
+    double w;
+    double f;
+    VectorXd angles;
   };
 
   double first_step(Index j, double side, double bound) const {
@@ -496,7 +499,7 @@ class Profile {
   const FitStep& minimum_;
   const Information& information_;
   double limit_;
-  Trial inside_;
+  Trial inside_{};
   std::optional<Trial> outside_;
   VectorXd better_;
 };
