@@ -11,7 +11,7 @@ import os
 import pathlib
 import shutil
 import subprocess
-from typing import Any, Optional
+from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -117,3 +117,34 @@ def uncertainty(study: str, **flags: Any) -> Named:
     ``points`` of the study, the last of which are all.
     """
     return _with_outputs(run("uncertainty", study, **flags))
+
+
+class Fit(Named):
+    """A fit. ``names``, ``value``, ``sd``, ``lower_95`` and ``upper_95`` (NumPy arrays; NaN for what the data
+    do not determine) have an entry for each unknown; ``correlation`` is a matrix; ``fitted`` and
+    ``residuals`` (in standard deviations) have an entry for each measured number, and ``rows`` are dicts
+    of these as in the JSON of ``oblique fit``. ``notes`` says what the data leave open."""
+
+
+def fit(measured: str, unknowns: Mapping[str, Sequence[float]], **flags: Any) -> Fit:
+    """``oblique fit``: ``oblique.fit("measured.csv", {"k": (1e7, 1e8)}, sd="1%", preset="paper")``. An
+    unknown has its bounds, and perhaps its start."""
+    texts = [f"{key}={':'.join(repr(float(end)) for end in ends)}" for key, ends in unknowns.items()]
+    found = run("fit", measured, fit=texts, **flags)
+    of_unknowns, rows = found.pop("unknowns"), found.pop("residuals")
+
+    def column(objects: List[Dict[str, Any]], name: str) -> Any:
+        return np.array([each[name] for each in objects], dtype=float)
+
+    return Fit(
+        names=[each["unknown"] for each in of_unknowns],
+        value=column(of_unknowns, "value"),
+        sd=column(of_unknowns, "sd"),
+        lower_95=column(of_unknowns, "lower_95"),
+        upper_95=column(of_unknowns, "upper_95"),
+        correlation=np.array(found.pop("correlation"), dtype=float),
+        fitted=column(rows, "fitted"),
+        residuals=column(rows, "residual_sd"),
+        rows=rows,
+        **found,
+    )
