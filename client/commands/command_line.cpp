@@ -52,11 +52,10 @@ std::string fitted_meaning(const std::string& line, std::size_t width, std::size
 
 void add_commands(CLI::App& app, Action& parsed) {
   for (const auto add :
-       {add_solve,       add_run,           add_study,          add_submit,    add_status,
-        add_workers,     add_study_changes, add_query,          add_trace,     add_plot,
-        add_view,        add_columns,       add_paper,          add_converge,  add_fit,
-        add_sensitivity, add_uncertainty,   add_database_files, add_autoscale, add_keys,
-        add_doctor}) {
+       {add_solve,          add_run,       add_study, add_submit, add_status,      add_workers,
+        add_study_changes,  add_query,     add_trace, add_plot,   add_view,        add_columns,
+        add_paper,          add_converge,  add_fit,   add_map,    add_sensitivity, add_uncertainty,
+        add_database_files, add_autoscale, add_keys,  add_doctor}) {
     add(app, parsed);
   }
 }

@@ -71,6 +71,8 @@ void add_autoscale(CLI::App& app, Action& parsed);
 /// `keygen` and `keys`.
 void add_keys(CLI::App& app, Action& parsed);
 void add_doctor(CLI::App& app, Action& parsed);
+// In client/explore:
+void add_map(CLI::App& app, Action& parsed);
 
 /// Parses and carries out the command line. Returns the exit code: 0 done, 1 failed, 2 wrong usage,
 /// 128 + number of the signal that stopped the command.

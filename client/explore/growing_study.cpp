@@ -52,8 +52,8 @@ std::string explored_name(const ExploreFlags& flags, std::string_view verb,
   if (flags.name.empty()) {
     return fmt::format("{}-{}", verb, protocol::sha256_of(settings).substr(0, kDigits));
   }
-  if (const auto objection = protocol::objection_to_study_name(flags.name); !objection.empty()) {
-    throw solver::InputError("--name: " + objection);
+  if (const auto error = protocol::study_name_error(flags.name); !error.empty()) {
+    throw solver::InputError("--name: " + error);
   }
   return flags.name;
 }
@@ -128,7 +128,7 @@ void GrowingStudy::submit(const protocol::Recipe& recipe) {
     note_unusual_values(console_.notes(), recipe);
   } else if (!is_submitted_) {
     console_.notes() << fmt::format("Continuing \"{}\": {} of {} points are done.\n", name_,
-                                    format_count(reply.settled()), format_count(reply.points()));
+                                    format_count(reply.completed()), format_count(reply.points()));
   }
   is_submitted_ = true;
 }

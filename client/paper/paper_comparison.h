@@ -1,8 +1,6 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <ostream>
 #include <span>
@@ -108,25 +106,5 @@ void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases&
 
 /// The differences as rows, one per published number, for CSV and JSON.
 protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences);
-
-/// Fitted model keys, which the paper omits or rounds.
-inline constexpr std::array<std::string_view, 4> kFittedKeys{"A", "I", "k", "eta2"};
-
-struct FitStep {
-  int iteration;                        ///< 0: the start
-  solver::ModelParameters model;        ///< with the fitted parameters of this iteration
-  std::vector<Difference> differences;  ///< all published numbers
-  DifferenceSummary summary;
-};
-
-/// Fits the parameters of kFittedKeys, beginning with `start`. Minimises the sum of squared
-/// relative differences from all published numbers by Levenberg-Marquardt on the logarithms of the
-/// parameters, with derivatives by differences. A published peak, phase or stick that the model
-/// lacks counts as a difference of 100 %. Stops when an iteration lowers the sum by less than 1e-3
-/// of itself, or moves the parameters by less than 1e-5 of their distance from the start. Calls
-/// `after_each` with the start and each iteration. Returns the last iteration. Throws SolveError if
-/// there is no minimum within 50 iterations or a model cannot be solved.
-FitStep fit_parameters(const PublishedTable& published, const solver::ModelParameters& start,
-                       const std::function<void(const FitStep&)>& after_each);
 
 }  // namespace oblique::client

@@ -50,7 +50,8 @@ std::string shown_value(const FigureAxis& axis, double value);
 
 /// A line through points in order, or the points alone. NaN is a gap.
 struct Curve {
-  enum class Mark { kLine, kLineAndMarks, kDots, kDiamonds };
+  /// kBorder: a dark line, whatever `stroke` is.
+  enum class Mark { kLine, kLineAndMarks, kDots, kDiamonds, kBorder };
   std::string name = {};  ///< in the key; empty: no entry
   std::vector<double> x = {};
   std::vector<double> y = {};

@@ -65,8 +65,9 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kSpanStyl
 }};
 
 /// Styles of curves by Curve::Mark.
-constexpr std::array<std::string_view, 4> kMarks{
-    "lines ls {}", "linespoints ls {}", "points ls {} pt 7 ps 0.4", "points ls {} pt 12 ps 1.0"};
+constexpr std::array<std::string_view, 5> kMarks{
+    "lines ls {}", "linespoints ls {}", "points ls {} pt 7 ps 0.4", "points ls {} pt 12 ps 1.0",
+    "lines lc rgb '#202428' dt solid lw 1.5"};
 
 // Sizes of text in pixels. On a terminal one character counts as a letter.
 constexpr double kLetter = 6.5;  // average width, rounded up

@@ -1,6 +1,7 @@
 #include "client/study/csv_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -24,18 +25,23 @@ std::string trimmed(std::string_view text) {
              : std::string(text.substr(first, text.find_last_not_of(kBlank) - first + 1));
 }
 
-double number_of_field(std::string_view field, const solver::ParameterKey& key) {
-  if (key.name == "integrator") {
-    return static_cast<double>(solver::integrator_named(field));
-  }
+double parsed_number(std::string_view field) {
   const auto value = solver::number_of(field.starts_with('+') ? field.substr(1) : field);
   if (!value) {
     throw InputError(field.empty()
                          ? "the field is empty: it must be a number"
                          : fmt::format("\"{}\" is not a number", protocol::excerpt(field)));
   }
-  solver::check_value(key, *value);
   return *value;
+}
+
+double number_of_field(std::string_view field, const solver::ParameterKey& key) {
+  if (key.name == "integrator") {
+    return static_cast<double>(solver::integrator_named(field));
+  }
+  const double value = parsed_number(field);
+  solver::check_value(key, value);
+  return value;
 }
 
 }  // namespace
@@ -131,8 +137,8 @@ void CsvFile::check_names() const {
   }
 }
 
-std::vector<double> CsvFile::values(std::string_view column,
-                                    const solver::ParameterKey& key) const {
+void CsvFile::read_column(std::string_view column,
+                          const std::function<void(std::string_view field)>& read) const {
   const auto found = std::find(columns().begin(), columns().end(), column);
   if (found == columns().end()) {
     const std::vector<std::string_view> known(columns().begin(), columns().end());
@@ -140,16 +146,39 @@ std::vector<double> CsvFile::values(std::string_view column,
                                  protocol::excerpt(column), protocol::did_you_mean(column, known),
                                  protocol::excerpt(protocol::joined(known), 1000)));
   }
-  std::vector<double> values;
   for (auto row = rows_.begin() + 1; row != rows_.end(); ++row) {
     try {
-      values.push_back(
-          number_of_field(row->fields[static_cast<std::size_t>(found - columns().begin())], key));
+      read(row->fields[static_cast<std::size_t>(found - columns().begin())]);
     } catch (const InputError& error) {
       fail(row->line, fmt::format("column `{}`: {}", protocol::excerpt(column), error.what()));
     }
   }
+}
+
+std::vector<double> CsvFile::values(std::string_view column,
+                                    const solver::ParameterKey& key) const {
+  std::vector<double> values;
+  read_column(column,
+              [&](std::string_view field) { values.push_back(number_of_field(field, key)); });
   return values;
+}
+
+std::vector<std::optional<double>> CsvFile::numbers(std::string_view column) const {
+  std::vector<std::optional<double>> numbers;
+  read_column(column, [&](std::string_view field) {
+    auto& number = numbers.emplace_back();
+    if (!field.empty()) {
+      number = parsed_number(field);
+      if (!std::isfinite(*number)) {
+        throw InputError(fmt::format("{} is not finite", field));
+      }
+    }
+  });
+  return numbers;
+}
+
+std::string CsvFile::place_of_row(std::size_t row) const {
+  return fmt::format("{}:{}", name_, rows_.at(row + 1).line);
 }
 
 const CsvFile& CsvFiles::at(const std::string& path) {

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,6 +30,13 @@ class CsvFile {
   /// and for a field that is no number or not allowed for the key.
   std::vector<double> values(std::string_view column, const solver::ParameterKey& key) const;
 
+  /// The numbers of a column; nothing for an empty field. Throws InputError for an unknown column
+  /// and for a field that is no finite number.
+  std::vector<std::optional<double>> numbers(std::string_view column) const;
+
+  /// Where a row of values is: "measured.csv:3".
+  std::string place_of_row(std::size_t row) const;
+
  private:
   struct Row {
     std::size_t line;  ///< line where the row begins, from 1
@@ -35,6 +44,9 @@ class CsvFile {
   };
   void read_rows(std::string_view text);
   void check_names() const;
+  /// Calls `read` with each field of a column; its InputErrors get the place.
+  void read_column(std::string_view column,
+                   const std::function<void(std::string_view field)>& read) const;
   [[noreturn]] void fail(std::size_t line, std::string_view message) const;
 
   std::string name_;

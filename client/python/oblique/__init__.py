@@ -9,6 +9,8 @@ Values are in SI units; names end with the unit: ``fn_peak_N``, ``duration_s``.
 
 * :func:`solve` solves one point, :func:`solve_many` many points on all cores, with arrays for
   parameters and results. :func:`trace` returns the time histories of one point.
+* :func:`map` finds the borders between modes on a plane.
+* :func:`fit` finds the parameters that fit measured outputs.
 * :func:`sensitivity` shows which inputs matter, :func:`uncertainty` how the outputs of a sampled
   study are distributed.
 * :class:`Database` queries the results of studies, also while a server writes them.
@@ -24,7 +26,7 @@ from __future__ import annotations
 
 from ._database import Answer, Database, Study
 from ._solving import solve, solve_many, trace
-from .explore import sensitivity, uncertainty
+from .explore import Fit, Map, fit, map, sensitivity, uncertainty
 from ._results import Energy, Errors, ManyResults, Result, Solver, Trace, _core
 
 DatabaseError, SolveError = _core.DatabaseError, _core.SolveError
@@ -43,12 +45,16 @@ __all__ = [
     "DatabaseError",
     "Energy",
     "Errors",
+    "Fit",
     "ManyResults",
+    "Map",
     "Result",
     "SolveError",
     "Solver",
     "Study",
     "Trace",
+    "fit",
+    "map",
     "sensitivity",
     "solve",
     "solve_many",

@@ -11,7 +11,7 @@ import os
 import pathlib
 import shutil
 import subprocess
-from typing import Any, Optional
+from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -52,6 +52,34 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     return json.loads(ended.stdout)
 
 
+class Map(Named):
+    """Borders on a plane. ``x``, ``y``, ``width`` (NumPy arrays), ``region_from``, ``region_to`` and
+    ``along`` (arrays of objects) have an entry for each vertex; ``curves`` are arrays of vertex numbers,
+    ``corners``, ``regions`` and ``shifts`` lists of dicts as in the JSON of ``oblique map``."""
+
+
+def map(study: Optional[str] = None, **flags: Any) -> Map:
+    """``oblique map``: ``oblique.map(x="mu=0.05:2", y="H=0.3:1.05", e=1, preset="paper")``."""
+    found = run("map", study, **flags)
+    vertices = found.pop("vertices")
+
+    def column(name: str, kind: Any) -> Any:
+        return np.array([vertex[name] for vertex in vertices], dtype=kind)
+
+    return Map(
+        x=column("x", float),
+        y=column("y", float),
+        width=column("width", float),
+        region_from=column("from", object),
+        region_to=column("to", object),
+        along=column("along", object),
+        curves=[np.array(curve, dtype=np.int64) for curve in found.pop("curves")],
+        x_key=found.pop("x"),
+        y_key=found.pop("y"),
+        **found,
+    )
+
+
 def arrays_of(value: Any) -> Any:
     """Objects of JSON as Named, and lists of numbers as arrays with NaN for null."""
     if isinstance(value, dict):
@@ -89,3 +117,34 @@ def uncertainty(study: str, **flags: Any) -> Named:
     ``points`` of the study, the last of which are all.
     """
     return _with_outputs(run("uncertainty", study, **flags))
+
+
+class Fit(Named):
+    """A fit. ``names``, ``value``, ``sd``, ``lower_95`` and ``upper_95`` (NumPy arrays; NaN for what the data
+    do not determine) have an entry for each unknown; ``correlation`` is a matrix; ``fitted`` and
+    ``residuals`` (in standard deviations) have an entry for each measured number, and ``rows`` are dicts
+    of these as in the JSON of ``oblique fit``. ``notes`` says what the data leave open."""
+
+
+def fit(measured: str, unknowns: Mapping[str, Sequence[float]], **flags: Any) -> Fit:
+    """``oblique fit``: ``oblique.fit("measured.csv", {"k": (1e7, 1e8)}, sd="1%", preset="paper")``. An
+    unknown has its bounds, and perhaps its start."""
+    texts = [f"{key}={':'.join(repr(float(end)) for end in ends)}" for key, ends in unknowns.items()]
+    found = run("fit", measured, fit=texts, **flags)
+    of_unknowns, rows = found.pop("unknowns"), found.pop("residuals")
+
+    def column(objects: List[Dict[str, Any]], name: str) -> Any:
+        return np.array([each[name] for each in objects], dtype=float)
+
+    return Fit(
+        names=[each["unknown"] for each in of_unknowns],
+        value=column(of_unknowns, "value"),
+        sd=column(of_unknowns, "sd"),
+        lower_95=column(of_unknowns, "lower_95"),
+        upper_95=column(of_unknowns, "upper_95"),
+        correlation=np.array(found.pop("correlation"), dtype=float),
+        fitted=column(rows, "fitted"),
+        residuals=column(rows, "residual_sd"),
+        rows=rows,
+        **found,
+    )

@@ -1,5 +1,7 @@
 """Explorations: the commands of the program, as arrays."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -42,3 +44,18 @@ def test_uncertainty_gives_arrays_over_parts_of_the_points(folder):
     modes = found.outputs["major_mode"].statistics
     assert sum(modes[mode]["value"][-1] for mode in modes) == pytest.approx(1)
     assert np.isfinite(mu.statistics["mean"]["to"]).all()
+
+
+def test_a_map_is_that_of_the_program(tmp_path):
+    flags = {
+        "x": "mu=0.1:1", "y": "H=0.5:1", "e": 1, "preset": "paper", "cells": 4, "bracket": 1e-3,
+        "db": str(tmp_path / "map.db"),
+    }  # fmt: skip
+    found = oblique.map(**flags)
+    words = [f"--{name}={value}" for name, value in flags.items()]
+    of_program = json.loads(run_oblique("map", "--format", "json", *words))
+    assert found.x.dtype == found.width.dtype == np.float64 and len(found.x) > 5
+    for name, member in (("x", "x"), ("y", "y"), ("region_from", "from"), ("along", "along")):
+        assert found[name].tolist() == [vertex[member] for vertex in of_program["vertices"]]
+    assert [curve.tolist() for curve in found.curves] == of_program["curves"]
+    assert found.regions == of_program["regions"] and found.x_key == "mu"
