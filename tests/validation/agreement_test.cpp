@@ -299,11 +299,10 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtAMicrosecond) {
                              {"all peaks of F_t, of largest F_t", {3e-3, kHundredfold}},
                              {"instants of turns, of duration", {1e-2, kHundredfold}}});
   expect_at_most(
-      {"60 contacts, 1 us: contacts with a grazing ripple more or "
-       "less, of which only outputs of the whole are compared:" +
+      {"60 contacts, 1 us: contacts that differ by a grazing ripple, compared as a whole only:" +
            apart,
        kReference, static_cast<double>(cases_apart), 6.0,
-       "grazing turns come and go with errors of the size of the ripple"});
+       "errors of the size of the ripple add or remove grazing turns"});
 }
 
 TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
@@ -325,7 +324,7 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
                             {3e-4, "accuracy stated for whole cases"},
                             {{"exit velocity, of exit speed", {1e-3, kSlowExit}},
                              {"reaction peaks, of each itself",
-                              {4e-4, "vibration from the release, which 5 us do not resolve"}}});
+                              {4e-4, "vibration from the release, unresolved at 5 us"}}});
 }
 
 TEST(Agreement, EstimatedErrorsBoundTheErrorsOfTheStepsInAllOutputsAndInstantsOfSixtyContacts) {

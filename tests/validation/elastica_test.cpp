@@ -214,7 +214,7 @@ TEST(Elastica, CantileverBendsAsTheElasticaUnderATransverseForce) {
     expect_at_most({load + ", n = 64: tip, of L", reference, fine, 5e-5,
                     "half the last digit of the published tables"});
     expect_at_least({load + ": error at n = 32, of that at 64", reference, coarse / fine, 8.0,
-                     "order 4 sets in once an element no longer locks"});
+                     "order 4 begins where elements no longer lock"});
   }
 }
 
@@ -225,7 +225,7 @@ TEST(Elastica, CantileverRollsUpToACircleUnderAMoment) {
   expect_at_most({"roll-up at M = 2 pi EI/L, n = 64: gap, of L", reference, fine, 1e-6,
                   "stretch of the bent beam, 2 (2 pi)^2 EI/(EA L^2) = 7.9e-7"});
   expect_at_least({"roll-up: gap at n = 32, of that at 64", reference, coarse / fine, 8.0,
-                   "order 4 sets in once an element no longer locks"});
+                   "order 4 begins where elements no longer lock"});
 }
 
 }  // namespace

@@ -36,10 +36,10 @@ TEST(Energy, BalancesInThePublishedContactsWithBothIntegrators) {
     by_generalized_alpha =
         std::max(by_generalized_alpha, closure(both.generalized_alpha_case(point, 1e-7)));
   }
-  expect_at_most({"ten published contacts, explicit, 1 us: energy missing, of that exchanged",
+  expect_at_most({"ten published contacts, explicit, 1 us: missing energy, of the exchanged work",
                   kBalance, by_explicit, 1e-6, "stated accuracy"});
   expect_at_most(
-      {"ten published contacts, generalized-alpha, 0.1 us: energy missing, of that exchanged",
+      {"ten published contacts, generalized-alpha, 0.1 us: missing energy, of the exchanged work",
        kBalance, by_generalized_alpha, 1e-6, "stated accuracy"});
 }
 

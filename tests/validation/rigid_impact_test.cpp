@@ -203,7 +203,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithExplicitSteps) {
     expect_at_most({std::string("two stiff links, explicit, E * 1e4 (") + regime.mode + ")",
                     kReference,
                     stiff_chain_error(motion, p, links.state(chain, p.V0_m_s), dt_s, regime.mode),
-                    2e-4, "what the links yield and turn, and rounding in stiff links"});
+                    2e-4, "deformation and rotation of the links, and rounding"});
   }
 }
 
@@ -218,7 +218,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithGeneralizedAlpha) {
     expect_at_most(
         {std::string("two stiff links, generalized-alpha, E * 1e6 (") + regime.mode + ")",
          kReference, stiff_chain_error(motion, p, touch, 1e-6, regime.mode), 1e-5,
-         "what the links turn during contact"});
+         "rotation of the links during contact"});
   }
 }
 

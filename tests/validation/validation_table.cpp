@@ -44,7 +44,7 @@ class ValidationTable : public testing::EmptyTestEventListener {
     }
   }
   void OnTestProgramEnd(const testing::UnitTest&) override {
-    std::cout << "| check | reference | measured | bound | where the bound comes from |\n"
+    std::cout << "| check | reference | measured | bound | reason for the bound |\n"
                  "|---|---|--:|--:|---|\n";
     for (const std::string& row : rows_) {
       std::cout << row << '\n';
