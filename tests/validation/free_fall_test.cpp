@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tests/validation/validation_table.h"
+#include "tests/worker/solver/reference/known_falls.h"
 #include "worker/solver/reference/fall.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
@@ -19,18 +20,11 @@ using solver::Chain;
 using solver::ChainState;
 using solver::Fall;
 using solver::GeneralizedAlphaMotion;
+using solver::kKnownFalls;
+using solver::KnownFall;
 using solver::ModelParameters;
 using solver::Motion;
 using solver::TipState;
-
-/// State of the tip when it has dropped H.
-struct KnownState {
-  double H_m;
-  double t_s;
-  double x_m;  ///< NaN if not known
-  double vx_m_s;
-  double vy_m_s;
-};
 
 /// Largest errors over known states.
 struct FallErrors {
@@ -39,21 +33,16 @@ struct FallErrors {
   double v_m_s = 0.0;
 };
 
-/// An independent explicit solution of order 4 for the preset `paper`, converged to nine digits and
-/// rounded to the digits given here.
-constexpr std::array<KnownState, 3> kKnown{{{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
-                                            {1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
-                                            {1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}};
 const std::string kKnownFrom = "independent explicit solution, converged";
 
 /// Three rigid links in minimal coordinates, by a Runge-Kutta method; independent of A and I.
-constexpr std::array<KnownState, 1> kRigid{
+constexpr std::array<KnownFall, 1> kRigid{
     {{1.00, 0.430188812, std::numeric_limits<double>::quiet_NaN(), -5.738072, -5.234437}}};
 
 template <std::size_t n>
-FallErrors errors(const Motion& motion, const Fall& fall, const std::array<KnownState, n>& known) {
+FallErrors errors(const Motion& motion, const Fall& fall, const std::array<KnownFall, n>& known) {
   FallErrors worst;
-  for (const KnownState& right : known) {
+  for (const KnownFall& right : known) {
     const ChainState state = fall.state_at(right.H_m);
     const TipState tip = motion.tip(state);
     worst.t_s = std::max(worst.t_s, std::abs(state.t_s - right.t_s));
@@ -66,14 +55,14 @@ FallErrors errors(const Motion& motion, const Fall& fall, const std::array<Known
 
 template <std::size_t n>
 FallErrors explicit_errors(const ModelParameters& model, double dt_s,
-                           const std::array<KnownState, n>& known) {
+                           const std::array<KnownFall, n>& known) {
   const Chain chain(model);
   return errors(solver::ExplicitMotion(chain), *solver::solve_stepped_fall(chain, dt_s), known);
 }
 
 template <std::size_t n>
 FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
-                                    const std::array<KnownState, n>& known) {
+                                    const std::array<KnownFall, n>& known) {
   const auto motion = std::make_shared<GeneralizedAlphaMotion>(model);
   return errors(*motion,
                 *solver::solve_stepped_fall(motion, dt_s, solver::longest_fall_s(Chain(model))),
@@ -81,7 +70,7 @@ FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
 }
 
 TEST(FreeFall, ExplicitIntegratorReachesTheKnownStates) {
-  const FallErrors worst = explicit_errors(solver::preset("paper"), 2.5e-6, kKnown);
+  const FallErrors worst = explicit_errors(solver::preset("paper"), 2.5e-6, kKnownFalls);
   expect_at_most({"fall, explicit, 2.5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom, worst.t_s,
                   1e-8, "digits of the reference"});
   expect_at_most({"fall, explicit, 2.5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
@@ -91,7 +80,7 @@ TEST(FreeFall, ExplicitIntegratorReachesTheKnownStates) {
 }
 
 TEST(FreeFall, GeneralizedAlphaReachesTheKnownStates) {
-  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 5e-6, kKnown);
+  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 5e-6, kKnownFalls);
   expect_at_most({"fall, generalized-alpha, 5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
                   worst.t_s, 1e-8 + 3e-9, "the reference's digits, and the vibration's 3e-9"});
   expect_at_most({"fall, generalized-alpha, 5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
@@ -102,7 +91,7 @@ TEST(FreeFall, GeneralizedAlphaReachesTheKnownStates) {
 }
 
 TEST(FreeFall, GeneralizedAlphaFindsTheImpactTimeWithStepsOfATenthOfAMillisecond) {
-  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 1e-4, kKnown);
+  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 1e-4, kKnownFalls);
   expect_at_most({"fall, generalized-alpha, 100 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
                   worst.t_s, 3e-7, "(w h)^2/12 t of links that turn at w = 25 rad/s in the end"});
 }

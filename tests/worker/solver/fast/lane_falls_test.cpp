@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/worker/solver/reference/known_falls.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/reference/fall.h"
 
@@ -77,19 +78,7 @@ TEST(CollocationFall, StateAtATimeAgreesWithTheStateAtTheDropReachedThen) {
 }
 
 TEST(CollocationFall, TipHasTheKnownStateAtTheDropsOfThePaper) {
-  struct Known {
-    double H_m, t_s, x_m, vx_m_s, vy_m_s;
-  };
-  // From an independent explicit solution, converged to nine digits.
-  for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
-                             Known{1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
-                             Known{1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}) {
-    const TipState tip = paper().tip_at(known.H_m);
-    EXPECT_NEAR(paper().fall.state_at(known.H_m).t_s, known.t_s, 1e-8);
-    EXPECT_NEAR(tip.x_m, known.x_m, 1e-7);
-    EXPECT_NEAR(tip.vx_m_s, known.vx_m_s, 5e-5);
-    EXPECT_NEAR(tip.vy_m_s, known.vy_m_s, 5e-5);
-  }
+  expect_known_falls(paper().chain, paper().fall);
 }
 
 /// Largest differences of time [s] and velocity [m/s] from a fall in small explicit steps.

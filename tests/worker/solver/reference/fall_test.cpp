@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/worker/solver/reference/known_falls.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/motion.h"
@@ -41,26 +42,9 @@ struct FallOf {
   const Fall& fall;
 };
 
-struct Known {
-  double H_m;
-  double t_s;
-  double x_m;
-  double vx_m_s;
-  double vy_m_s;
-};
-
 TEST(Fall, TipHasTheKnownStateAtTheDropsOfThePaper) {
-  // From an independent explicit solution, converged to nine digits.
   const FallOf paper(preset("paper"), 2.5e-6);
-  for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
-                             Known{1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
-                             Known{1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}) {
-    const TipState tip = paper.tip_at(known.H_m);
-    EXPECT_NEAR(paper.fall.state_at(known.H_m).t_s, known.t_s, 1e-8);
-    EXPECT_NEAR(tip.x_m, known.x_m, 1e-7);
-    EXPECT_NEAR(tip.vx_m_s, known.vx_m_s, 5e-5);
-    EXPECT_NEAR(tip.vy_m_s, known.vy_m_s, 5e-5);
-  }
+  expect_known_falls(paper.chain, paper.fall);
   EXPECT_NEAR(paper.fall.largest_drop_m(), 1.179, 5e-4);
 }
 
