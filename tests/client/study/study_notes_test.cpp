@@ -80,7 +80,7 @@ TEST(ValueNotes, CheckTheEndsOfRangesAndDistributions) {
       "Note: rho = 2.7 kg/m^3 is lighter than cork; 2700?\n");
 }
 
-TEST(ValueNotes, SaysThatARangeOfASampleIsAListOfValues) {
+TEST(ValueNotes, ReportThatARangeOfASampleIsAListOfValues) {
   EXPECT_EQ(value_notes("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
                                       "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
             "Note: mu takes 5 values; 0.1:1 draws any value between them.\n")
@@ -88,7 +88,7 @@ TEST(ValueNotes, SaysThatARangeOfASampleIsAListOfValues) {
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
 }
 
-TEST(ValueNotes, SaysNothingOfUsualValues) {
+TEST(ValueNotes, IgnoreUsualValues) {
   for (const char* preset : {"paper", "printed", "converged"}) {
     EXPECT_EQ(value_notes(std::string("preset = '") + preset + "'",
                           kSample + "H = { from = 0.3, to = 1.1 }\nmu = [0, 2]\ne = 1\n"
