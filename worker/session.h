@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <set>
 #include <string>
 
 #include <zmq.hpp>
@@ -52,14 +51,12 @@ class Session {
   /// The socket of the present attempt.
   struct Link {
     Link(zmq::context_t& context, const protocol::DealerSettings& settings)
-        : socket(protocol::make_dealer(context, settings)),
-          monitor(context, socket, settings, true) {}
+        : socket(protocol::make_dealer(context, settings)), monitor(context, socket, settings) {}
     zmq::socket_t socket;
     protocol::SocketMonitor monitor;
   };
 
   void open_socket();
-  void report_unreachable();
   void apply(Effects effects);
   /// False if the socket did not accept the message.
   bool send(const protocol::WorkerMessage& message);
@@ -71,8 +68,7 @@ class Session {
   std::optional<Link> link_;
   unsigned attempt_ = 0;      ///< to connect: selects IPv4 or IPv6 for a host with both
   bool has_received_ = true;  ///< a message, over this socket
-  std::set<std::string> reported_causes_;  ///< why no server answers; since the last welcome
-  protocol::WakeUp news_;                  ///< a batch ended, or a trace is ready
+  protocol::WakeUp news_;     ///< a batch ended, or a trace is ready
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

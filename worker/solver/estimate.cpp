@@ -147,23 +147,22 @@ std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcom
 /// Sets the companions of points, one for points of a model that follow each other.
 void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
   std::vector<ModelParameters> companions;
-  std::vector<std::size_t> first;  // point of each
+  std::vector<std::size_t> number;  // of each point's companion
   for (std::size_t i = 0; i < points.size(); ++i) {
     const ModelParameters& model = points[i].point.finger.model();
     if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
       companions.push_back(companion_model(model));
-      first.push_back(i);
     }
+    number.push_back(companions.size() - 1);
   }
   const std::vector<FallOutcome> fallen = falls.falls(companions);
-  first.push_back(points.size());
-  for (std::size_t m = 0; m < companions.size(); ++m) {
-    const int elements = points[first[m]].point.finger.model().elements_per_link;
-    if (fallen[m].fallen && companions[m].elements_per_link < elements) {
-      const Finger finger(companions[m], fallen[m].fallen);
-      for (std::size_t i = first[m]; i < first[m + 1]; ++i) {
-        points[i].companion = finger;
-      }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ModelParameters& companion = companions[number[i]];
+    if (i > 0 && number[i] == number[i - 1]) {
+      points[i].companion = points[i - 1].companion;
+    } else if (fallen[number[i]].fallen &&
+               companion.elements_per_link < points[i].point.finger.model().elements_per_link) {
+      points[i].companion.emplace(companion, fallen[number[i]].fallen);
     }
   }
 }
@@ -176,30 +175,29 @@ void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
   for (bool ended = false; !ended;) {
     std::vector<SolvedPoint> points = solve_next(source, sink, ended);
     set_companions(points, falls);
-    const auto pass_on = [&sink](SolvedPoint& solved) {
-      sink({solved.point.number, std::move(solved.result), {}});
-    };
-    std::size_t count = 0;
-    const auto next = [&]() -> std::optional<FingerPoint> {
-      while (count < points.size()) {
-        const std::size_t i = count++;
-        if (points[i].result && points[i].companion) {
-          return FingerPoint{*points[i].companion, i, points[i].point.point};
-        }
-        if (points[i].result) {
-          pass_on(points[i]);
-        }
+    auto next = points.begin();
+    const auto next_companion = [&]() -> std::optional<FingerPoint> {
+      next = std::find_if(next, points.end(), [](const SolvedPoint& solved) {
+        return solved.result && solved.companion;
+      });
+      if (next == points.end()) {
+        return std::nullopt;
       }
-      return std::nullopt;
+      const auto number = static_cast<std::uint64_t>(next - points.begin());
+      return FingerPoint{*next->companion, number, next++->point.point};
     };
-    solve_points(next, [&](Outcome&& companion) {
+    solve_points(next_companion, [&](Outcome&& companion) {
       SolvedPoint& solved = points[companion.number];
       if (companion.result) {
         solved.result->errors =
             estimated_errors(solved.point.finger.model(), *solved.result, *companion.result);
       }
-      pass_on(solved);
     });
+    for (SolvedPoint& solved : points) {
+      if (solved.result) {
+        sink({solved.point.number, std::move(solved.result), {}});
+      }
+    }
   }
 }
 

@@ -114,9 +114,7 @@ TEST_F(LeavingProgramTest, AWorkerWithoutServerSaysWhy) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
   EXPECT_EQ(refused.wait(), 1);  // after the first attempt, of 3 s, and before the end of the next
   const std::string said = refused.err();
-  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1 (connections fail at once"),
-            std::string::npos)
-      << said;
+  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << said;
   EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;
 }
 

@@ -155,7 +155,7 @@ class ContactLanes {
       }
       return false;
     }
-    if (is_accepted && h_s >= kShortestSpan * slot.contact_case.steps.compression_s) {
+    if (is_accepted && h_s >= kShortestSpan * contact.step_lengths().compression_s) {
       slot.progress->reactions.add(contact.time_s(), h_s,
                                    stepper_.mean_reactions_squared_N2() + lane, lanes_.size());
     }
@@ -198,12 +198,9 @@ class ContactLanes {
     const Lane& slot = lanes_[lane];
     const Contact& contact = slot.progress->contact;
     try {
-      CaseResult result =
-          contact_result(contact, slot.contact_case.parameters, slot.progress->touch,
-                         slot.progress->in, slot.motion->energies(stored(lane)));
+      CaseResult result = contact_result(contact, slot.progress->touch, slot.progress->in,
+                                         slot.motion->energies(stored(lane)));
       result.reaction_peaks = reaction_peaks(lane);
-      result.solver.dt_s = slot.contact_case.steps.compression_s;
-      result.solver.steps = contact.steps();
       const std::chrono::duration<double> elapsed = Clock::now() - slot.started;
       result.solver.wall_s = elapsed.count() / static_cast<double>(busy_);  // lanes share the time
       end(lane, std::move(result), {});

@@ -50,6 +50,7 @@ class Contact {
   const ContactMargin& margin() const { return margin_; }
   double time_s() const { return t_s_; }
   std::int64_t steps() const { return steps_; }
+  const ContactSteps& step_lengths() const { return steps_s_; }
   /// Number of events so far; when it grows, force() has changed.
   int events() const { return events_; }
   const TipState& tip() const { return tip_; }

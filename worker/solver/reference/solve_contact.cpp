@@ -83,11 +83,11 @@ TraceRow falling_row(const Motion& motion, ChainState& state, double touch_s, bo
 
 }  // namespace
 
-CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
-                          const TipState& touch, const Energies& in, const Energies& out) {
+CaseResult contact_result(const Contact& contact, const TipState& touch, const Energies& in,
+                          const Energies& out) {
   CaseResult result = contact.record().result();
-  result.mu = parameters.mu;
-  result.e_star = parameters.e_star;
+  result.mu = contact.law().mu();
+  result.e_star = contact.law().e_star();
   result.impact_x_m = touch.x_m;
   result.vt_in_m_s = touch.vx_m_s;
   result.vn_in_m_s = touch.vy_m_s;
@@ -97,6 +97,8 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
   result.margin = nearest.distance;
   result.margin_event = nearest.event;
   balance(in, out, contact.record(), result.energy);
+  result.solver.dt_s = contact.step_lengths().compression_s;
+  result.solver.steps = contact.steps();
   return result;
 }
 
@@ -159,10 +161,8 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
     }
     observe();
   }
-  CaseResult result = contact_result(contact, parameters, touch, in, motion.energies(accepted));
+  CaseResult result = contact_result(contact, touch, in, motion.energies(accepted));
   result.reaction_peaks = reaction_peaks.peaks();
-  result.solver.dt_s = steps.compression_s;
-  result.solver.steps = contact.steps();
   result.solver.wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return result;

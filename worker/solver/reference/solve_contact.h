@@ -14,11 +14,11 @@ namespace oblique::solver {
 CaseResult solve_contact(const Motion& motion, const ContactParameters& parameters,
                          const ContactSteps& steps, ChainState touch, const Tracing& tracing);
 
-/// Result of a finished contact without H, the fall time and the solver's report. `in` and `out`
-/// are the energies at touch and separation. Throws SolveError when the energy balance shows that
-/// the step is too long.
-CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
-                          const TipState& touch, const Energies& in, const Energies& out);
+/// Result of a finished contact without H, fall time, reactions and the solver's name, version and
+/// time. `in` and `out` are the energies at touch and separation. Throws SolveError when the energy
+/// balance shows that the step is too long.
+CaseResult contact_result(const Contact& contact, const TipState& touch, const Energies& in,
+                          const Energies& out);
 
 /// Gives the rows of a contact's trace to tracing.sink, which must be set.
 class ContactTracer {
