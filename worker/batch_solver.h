@@ -35,8 +35,6 @@ class BatchSolver {
 
   /// Waits for the points that are being solved.
   ~BatchSolver();
-  BatchSolver(const BatchSolver&) = delete;
-  BatchSolver& operator=(const BatchSolver&) = delete;
 
   void add(Batch batch);
 

@@ -47,20 +47,6 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   return hello;
 }
 
-/// Calls `work` again as long as a signal interrupts it.
-template <class Work>
-auto uninterrupted(const Work& work) {
-  while (true) {
-    try {
-      return work();
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        throw;
-      }
-    }
-  }
-}
-
 template <class... Handlers>
 struct Overloaded : Handlers... {
   using Handlers::operator()...;
@@ -85,8 +71,10 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
                                {nullptr, stop_descriptor, ZMQ_POLLIN, 0},
                                {link_->monitor.handle(), 0, ZMQ_POLLIN, 0}};
     const std::int64_t due_ms = std::min(conversation_.next_deadline_ms(), report_due_ms_);
-    const std::chrono::milliseconds timeout(std::max<std::int64_t>(due_ms - now_ms(), 0));
-    uninterrupted([&] { return zmq::poll(items, std::size(items), timeout); });
+    const std::int64_t timeout_ms = std::max<std::int64_t>(due_ms - now_ms(), 0);
+    if (zmq_poll(items, static_cast<int>(std::size(items)), timeout_ms) < 0 && errno != EINTR) {
+      throw zmq::error_t();
+    }
     if (settings_.on_turn) {
       settings_.on_turn(conversation_.status());
     }
@@ -135,8 +123,7 @@ void Session::report_progress() {
 void Session::receive_all() {
   for (int i = 0; i < kMessagesAtATime && !exit_code_; ++i) {
     zmq::message_t frame;
-    const auto receive = [&] { return link_->socket.recv(frame, zmq::recv_flags::dontwait); };
-    if (!uninterrupted(receive)) {
+    if (!link_->socket.recv(frame, zmq::recv_flags::dontwait)) {
       return;
     }
     protocol::ServerToWorker message;
@@ -151,11 +138,8 @@ void Session::receive_all() {
 
 bool Session::send(const protocol::WorkerMessage& message) {
   const std::string frame = protocol::encode(message);
-  const auto attempt = [&] {
-    return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait);
-  };
   try {
-    return uninterrupted(attempt).has_value();
+    return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait).has_value();
   } catch (const zmq::error_t& error) {
     spdlog::warn("sending failed: {}", error.what());
     return false;

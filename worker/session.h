@@ -35,9 +35,6 @@ class Session {
  public:
   /// Solves points of batches by `solve` and those of traces by `trace`. Does not connect yet.
   Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace = {});
-  ~Session() = default;
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
 
   /// Runs until the worker is stopped or refused, and returns the exit code. A readable
   /// `stop_descriptor` is a request to stop; `on_stop` must read it, so that a second request can

@@ -48,66 +48,6 @@ double factor(const ModelParameters& model, int order) {
   return (1.0 + unresolved_waves(companion)) / (std::pow(ratio, order) - 1.0);
 }
 
-}  // namespace
-
-ModelParameters companion_model(const ModelParameters& model) {
-  ModelParameters companion = model;
-  companion.elements_per_link = std::max(1, model.elements_per_link / kRefinement);
-  companion.step_factor = model.step_factor * kRefinement;
-  return companion;
-}
-
-ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
-                               const CaseResult& companion) {
-  const double smooth = factor(model, kSmoothOrder);
-  const double rough = factor(model, kRoughOrder);
-  const double speed_m_s = std::hypot(result.vt_in_m_s, result.vn_in_m_s);
-  // Error of chosen steps. That of steps that the user set is part of the difference.
-  const double step_error = model.dt_s == 0.0 ? model.tolerance : 0.0;
-  const auto error_of = [&](double difference, double scale) -> std::optional<double> {
-    const double error = std::abs(difference) / std::abs(scale);
-    if (!std::isfinite(error)) {
-      return std::nullopt;
-    }
-    // Without a difference the output is exact, as 0 without friction.
-    return error > 0.0 ? error + step_error : error;
-  };
-  const auto error = [&](double factor, double CaseResult::*output, double scale) {
-    return error_of(factor * (result.*output - companion.*output), scale);
-  };
-  ErrorEstimate errors;
-  errors.mode_same = result.major_mode == companion.major_mode ? 1 : 0;
-  errors.fn_peak = error(smooth, &CaseResult::fn_peak_N, result.fn_peak_N);
-  errors.ft_peak = error(rough, &CaseResult::ft_peak_N, result.fn_peak_N);
-  errors.duration = error(smooth, &CaseResult::duration_s, result.duration_s);
-  errors.stick_total = error(rough, &CaseResult::stick_total_s, result.duration_s);
-  errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
-  errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
-  errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
-  // One vibration is in both components, so the difference of either may pass through 0.
-  errors.v_out = error_of(rough * std::hypot(result.vt_out_m_s - companion.vt_out_m_s,
-                                             result.vn_out_m_s - companion.vn_out_m_s),
-                          speed_m_s);
-  return errors;
-}
-
-ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
-                                  FallCache& falls) {
-  const ModelParameters companion = companion_model(model);
-  if (companion.elements_per_link >= model.elements_per_link) {
-    return {};
-  }
-  const FallOutcome fall = falls.falls({&companion, 1}).front();
-  if (!fall.fallen) {
-    return {};
-  }
-  const Point point{result.H_m, result.mu, result.e_star};
-  const Outcome outcome = solve_points(Finger(companion, fall.fallen), {&point, 1}).front();
-  return outcome.result ? estimated_errors(model, result, *outcome.result) : ErrorEstimate{};
-}
-
-namespace {
-
 struct SolvedPoint {
   FingerPoint point;
   std::optional<CaseResult> result = {};
@@ -168,6 +108,62 @@ void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
 }
 
 }  // namespace
+
+ModelParameters companion_model(const ModelParameters& model) {
+  ModelParameters companion = model;
+  companion.elements_per_link = std::max(1, model.elements_per_link / kRefinement);
+  companion.step_factor = model.step_factor * kRefinement;
+  return companion;
+}
+
+ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
+                               const CaseResult& companion) {
+  const double smooth = factor(model, kSmoothOrder);
+  const double rough = factor(model, kRoughOrder);
+  const double speed_m_s = std::hypot(result.vt_in_m_s, result.vn_in_m_s);
+  // Error of chosen steps. That of steps that the user set is part of the difference.
+  const double step_error = model.dt_s == 0.0 ? model.tolerance : 0.0;
+  const auto error_of = [&](double difference, double scale) -> std::optional<double> {
+    const double error = std::abs(difference) / std::abs(scale);
+    if (!std::isfinite(error)) {
+      return std::nullopt;
+    }
+    // Without a difference the output is exact, as 0 without friction.
+    return error > 0.0 ? error + step_error : error;
+  };
+  const auto error = [&](double factor, double CaseResult::*output, double scale) {
+    return error_of(factor * (result.*output - companion.*output), scale);
+  };
+  ErrorEstimate errors;
+  errors.mode_same = result.major_mode == companion.major_mode ? 1 : 0;
+  errors.fn_peak = error(smooth, &CaseResult::fn_peak_N, result.fn_peak_N);
+  errors.ft_peak = error(rough, &CaseResult::ft_peak_N, result.fn_peak_N);
+  errors.duration = error(smooth, &CaseResult::duration_s, result.duration_s);
+  errors.stick_total = error(rough, &CaseResult::stick_total_s, result.duration_s);
+  errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
+  errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
+  errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
+  // One vibration is in both components, so the difference of either may pass through 0.
+  errors.v_out = error_of(rough * std::hypot(result.vt_out_m_s - companion.vt_out_m_s,
+                                             result.vn_out_m_s - companion.vn_out_m_s),
+                          speed_m_s);
+  return errors;
+}
+
+ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
+                                  FallCache& falls) {
+  const ModelParameters companion = companion_model(model);
+  if (companion.elements_per_link >= model.elements_per_link) {
+    return {};
+  }
+  const FallOutcome fall = falls.falls({&companion, 1}).front();
+  if (!fall.fallen) {
+    return {};
+  }
+  const Point point{result.H_m, result.mu, result.e_star};
+  const Outcome outcome = solve_points(Finger(companion, fall.fallen), {&point, 1}).front();
+  return outcome.result ? estimated_errors(model, result, *outcome.result) : ErrorEstimate{};
+}
 
 // Chains of different shapes share no lanes, so companions are solved after the points.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,

@@ -43,7 +43,8 @@ std::span<const LaneKernel> runnable_lane_kernels() {
 
 double* LaneMemory::zeros(std::size_t entries) {
   constexpr std::size_t kLine = sizeof(Line) / sizeof(double);
-  return arrays_.emplace_back((entries * lanes_ + kLine - 1) / kLine).front().numbers;
+  const std::size_t lines = (entries * lanes_ + kLine - 1) / kLine;
+  return arrays_.emplace_back(std::make_unique<Line[]>(lines))[0].numbers;
 }
 
 void LaneMemory::write(double* array, std::size_t lane, std::span<const double> values) const {

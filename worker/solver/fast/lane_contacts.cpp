@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Source = std::function<std::optional<ContactCase>()>;
-using Sink = std::function<void(ContactOutcome&&)>;
+using Sink = std::function<void(Outcome&&)>;
 
 /// Largest group: the first case and those that branch off.
 constexpr std::size_t kLargestGroup = 16;
@@ -151,7 +151,7 @@ class ContactLanes {
     } catch (const SolveError& error) {
       end(lane, std::nullopt, error.what());
       for (const ContactCase& follower : std::exchange(slot.followers, {})) {
-        sink_({follower.tag, std::nullopt, error.what()});  // it would fail alike
+        sink_({follower.number, std::nullopt, error.what()});  // it would fail alike
       }
       return false;
     }
@@ -213,7 +213,7 @@ class ContactLanes {
   void end(std::size_t lane, std::optional<CaseResult>&& result, std::string error) {
     lanes_[lane].progress.reset();
     stepper_.idle(lane);
-    sink_({lanes_[lane].contact_case.tag, std::move(result), std::move(error)});
+    sink_({lanes_[lane].contact_case.number, std::move(result), std::move(error)});
   }
 
   /// Of a contact that has just ended.

@@ -39,17 +39,9 @@ constexpr std::size_t kMostSteps = 2'000'000;
 /// Halvings in a row after which a fall is given up.
 constexpr int kMostHalvings = 30;
 
-/// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is a way to
-/// fall, with
-///
-///   lanes()               number of lanes, all idle at first
-///   start(lane, request)  puts a fall into an idle lane
-///   step()                tries a step in all lanes
-///   judge(lane)           after each step: the lane's fall when it is complete, else nullptr
-///   idle(lane)            ends a lane's fall
-///   settle()              accepts the step
-///
-/// What start() and judge() throw becomes the error of that fall, except for std::bad_alloc.
+/// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is
+/// SteppedLanes or CollocationFalls. What start() and judge() throw becomes the error of that fall,
+/// except for std::bad_alloc.
 template <class Lanes>
 std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> requests, Lanes& lanes) {
   std::vector<FallSolution> solutions(requests.size());
@@ -91,7 +83,7 @@ std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> reques
   }
 }
 
-/// Falls by explicit steps, one a lane.
+/// Falls by explicit steps, one a lane. All lanes are idle at first.
 class SteppedLanes {
  public:
   SteppedLanes(const Chain& shape, const LaneKernel& kernel)
@@ -111,7 +103,7 @@ class SteppedLanes {
     stepper_.set_force(lane, {});
   }
   void step() { stepper_.step(); }
-
+  /// After each step: the lane's fall when it is complete, else nullptr.
   std::shared_ptr<const Fall> judge(std::size_t lane) {
     if (!falls_[lane]->is_over_after_next(stepper_.trial_tip(lane))) {
       return nullptr;
@@ -123,6 +115,7 @@ class SteppedLanes {
     falls_[lane].reset();
     stepper_.idle(lane);
   }
+  /// Accepts the step.
   void settle() {
     stepper_.settle(all_);
     for (std::size_t lane = 0; lane < lanes(); ++lane) {

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace oblique::solver {
@@ -23,11 +22,6 @@ struct TangentialPeak {
 };
 
 enum class PhaseKind { kCompression, kRestitution };
-
-/// "compression" or "restitution".
-constexpr std::string_view phase_kind_name(PhaseKind kind) {
-  return kind == PhaseKind::kCompression ? "compression" : "restitution";
-}
 
 struct Phase {
   PhaseKind kind;
@@ -117,6 +111,13 @@ struct CaseResult {
   ContactEnergy energy;
   ErrorEstimate errors;
   SolverReport solver;
+};
+
+/// The result of a point, or the reason why there is none.
+struct Outcome {
+  std::uint64_t number;  ///< the caller's number of the point
+  std::optional<CaseResult> result;
+  std::string error;  ///< a sentence; empty with a result
 };
 
 }  // namespace oblique::solver

@@ -39,16 +39,11 @@ template <auto member>
 constexpr ParameterKey key(std::string_view name, std::string_view unit, std::string_view meaning,
                            std::string_view allowed, bool (*is_allowed)(double),
                            const UsualRange& usual = {}) {
-  return {name,
-          unit,
-          meaning,
-          allowed,
-          is_allowed,
-          [](const Model& model) { return static_cast<double>(model.*member); },
-          [](Model& model, double value) {
-            model.*member = static_cast<std::remove_cvref_t<decltype(model.*member)>>(value);
-          },
-          usual};
+  const auto get = [](const Model& model) { return static_cast<double>(model.*member); };
+  const auto set = [](Model& model, double value) {
+    model.*member = static_cast<std::remove_cvref_t<decltype(model.*member)>>(value);
+  };
+  return {name, unit, meaning, allowed, is_allowed, get, set, usual};
 }
 
 constexpr std::array<ParameterKey, 16> kModelKeys{{
@@ -138,10 +133,13 @@ std::string short_number(double value) {
   return text;
 }
 
+std::string with_unit(const ParameterKey& key, double value) {
+  return short_number(value) + (key.unit.empty() ? "" : " ") + std::string(key.unit);
+}
+
 std::string outside_usual(const ParameterKey& key, double value) {
-  const std::string unit = (key.unit.empty() ? "" : " ") + std::string(key.unit);
-  return std::string(key.name) + " = " + short_number(value) + unit + " is outside the usual " +
-         short_number(key.usual.from) + " to " + short_number(key.usual.to) + unit;
+  return std::string(key.name) + " = " + with_unit(key, value) + " is outside the usual " +
+         short_number(key.usual.from) + " to " + with_unit(key, key.usual.to);
 }
 
 /// The value times the power of 1000 that brings it into the range; of several the nearest to its

@@ -70,7 +70,7 @@ Cell cell(bool flag) {
   return flag;
 }
 Cell cell(PhaseKind kind) {
-  return phase_kind_name(kind);
+  return std::string_view(kind == PhaseKind::kCompression ? "compression" : "restitution");
 }
 
 /// Gives `take` these members of each element of a list.
