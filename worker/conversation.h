@@ -72,8 +72,7 @@ struct OutboxLimits {
   std::size_t messages_on_their_way = 128;
 };
 
-/// Results that the server has not acknowledged, in the order of their sequence numbers. Those on
-/// their way come before those that wait.
+/// Results that the server has not acknowledged, in the order of their sequence numbers.
 class Outbox {
  public:
   explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}

@@ -41,6 +41,20 @@ inline std::size_t pivots_of(const ChainTables<Constant>& chain, std::size_t ele
   return ends_chain ? 8 : ends_link ? 6 : 4;
 }
 
+template <std::size_t number>
+struct Place {
+  static constexpr std::size_t value = number;
+};
+
+/// operation(Place<first>), ..., operation(Place<last - 1>): a loop that is always unrolled.
+template <std::size_t first, std::size_t last, class Operation>
+inline void for_each_place(const Operation& operation) {
+  if constexpr (first < last) {
+    operation(Place<first>{});
+    for_each_place<first + 1, last>(operation);
+  }
+}
+
 template <class Real>
 inline Complex<Real> product(const Complex<Real>& a, const Complex<Real>& b) {
   return {less_product(a.re * b.re, a.im, b.im), plus_product(a.re * b.im, a.im, b.re)};
@@ -59,46 +73,50 @@ inline Complex<Real> inverse(const Complex<Real>& a) {
 
 /// Eliminates the unknowns first..last - 1 of a symmetric front, of which only the lower triangle
 /// is read.
-template <class Real>
-inline void eliminate(Complex<Real> (&front)[8][8], std::size_t first, std::size_t last,
-                      Complex<Real>* factors) {
-  for (std::size_t k = first; k < last; ++k) {
+template <std::size_t first, std::size_t last, class Real>
+inline void eliminate(Complex<Real> (&front)[8][8], Complex<Real>* factors) {
+  for_each_place<first, last>([&](auto pivot) {
+    constexpr std::size_t k = decltype(pivot)::value;
     Complex<Real>* const column = factors + front_factors(k) - k;
     const Complex<Real> inverse_pivot = inverse(front[k][k]);
     column[k] = inverse_pivot;
-    for (std::size_t j = k + 1; j < 8; ++j) {
+    for_each_place<k + 1, 8>([&](auto below) {
+      constexpr std::size_t j = decltype(below)::value;
       const Complex<Real> factor = product(front[j][k], inverse_pivot);
-      for (std::size_t i = j; i < 8; ++i) {
+      for_each_place<j, 8>([&](auto row) {
+        constexpr std::size_t i = decltype(row)::value;
         front[i][j] = less(front[i][j], front[i][k], factor);
-      }
+      });
       column[j] = factor;
-    }
-  }
+    });
+  });
 }
 
 /// L y = x for the first `pivots` unknowns of a front.
-template <class Real>
-inline void substitute_forward(const Complex<Real>* factors, std::size_t pivots,
-                               Complex<Real> (&x)[8]) {
-  for (std::size_t k = 0; k < pivots; ++k) {
-    for (std::size_t i = k + 1; i < 8; ++i) {
+template <std::size_t pivots, class Real>
+inline void substitute_forward(const Complex<Real>* factors, Complex<Real> (&x)[8]) {
+  for_each_place<0, pivots>([&](auto pivot) {
+    constexpr std::size_t k = decltype(pivot)::value;
+    for_each_place<k + 1, 8>([&](auto row) {
+      constexpr std::size_t i = decltype(row)::value;
       x[i] = less(x[i], factors[front_factors(k) + i - k], x[k]);
-    }
-  }
+    });
+  });
 }
 
 /// D L^T x = y for the first `pivots` unknowns of a front.
-template <class Real>
-inline void substitute_backward(const Complex<Real>* factors, std::size_t pivots,
-                                Complex<Real> (&x)[8]) {
-  for (std::size_t k = pivots; k-- > 0;) {
+template <std::size_t pivots, class Real>
+inline void substitute_backward(const Complex<Real>* factors, Complex<Real> (&x)[8]) {
+  for_each_place<0, pivots>([&](auto place) {
+    constexpr std::size_t k = pivots - 1 - decltype(place)::value;
     Complex<Real> value = product(x[k], factors[front_factors(k)]);
     // The row that became known last comes last: what waits for it is then short.
-    for (std::size_t i = 8; --i > k;) {
+    for_each_place<0, 7 - k>([&](auto later) {
+      constexpr std::size_t i = 7 - decltype(later)::value;
       value = less(value, factors[front_factors(k) + i - k], x[i]);
-    }
+    });
     x[k] = value;
-  }
+  });
 }
 
 /// Puts a block of M + z K at (row, column); entries above the diagonal do not count.
@@ -156,7 +174,16 @@ inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlock
       front[4][4].re += *chain.tip_mass_kg;
       front[5][5].re += *chain.tip_mass_kg;
     }
-    eliminate(front, element > 0 ? 0 : 2, pivots, factors);
+    if (element > 0) {
+      eliminate<0, 2>(front, factors);
+    }
+    eliminate<2, 4>(front, factors);
+    if (pivots > 4) {
+      eliminate<4, 6>(front, factors);
+    }
+    if (pivots > 6) {
+      eliminate<6, 8>(front, factors);
+    }
     for (std::size_t i = 0; i < 4; ++i) {
       for (std::size_t j = 0; j <= i; ++j) {
         carried[i][j] = pivots + i < 8 ? front[pivots + i][pivots + j] : Complex<Real>{};
@@ -177,24 +204,26 @@ inline void solve_fronts(const ChainTables<Constant>& chain, const Complex<Real>
   const std::size_t elements = chain.links * chain.elements_per_link;
   const std::size_t all_factors = chain_factors(chain.links, chain.elements_per_link);
   std::size_t first = 0;  // unknown of the front
-  const auto for_each_system = [&](const auto& substitute, std::size_t pivots) {
+  const auto for_each_system = [&](const auto& substitute) {
     for (std::size_t system = 0; system < systems; ++system) {
       Real* const re = x + 2 * system * size + first;
       Real* const im = re + size;
       Complex<Real> z[8];
-      for (std::size_t i = 0; i < 8; ++i) {
-        z[i] = {re[i], im[i]};
-      }
-      substitute(factors + system * all_factors, pivots, z);
-      for (std::size_t i = 0; i < 8; ++i) {
-        re[i] = z[i].re;
-        im[i] = z[i].im;
-      }
+      for_each_place<0, 8>([&](auto i) { z[i.value] = {re[i.value], im[i.value]}; });
+      substitute(factors + system * all_factors, z);
+      for_each_place<0, 8>([&](auto i) {
+        re[i.value] = z[i.value].re;
+        im[i.value] = z[i.value].im;
+      });
     }
   };
   for (std::size_t element = 0; element < elements; ++element) {
     const std::size_t pivots = pivots_of(chain, element);
-    for_each_system(substitute_forward<Real>, pivots);
+    for_each_system([&](const Complex<Real>* f, Complex<Real>(&z)[8]) {
+      pivots == 4   ? substitute_forward<4>(f, z)
+      : pivots == 6 ? substitute_forward<6>(f, z)
+                    : substitute_forward<8>(f, z);
+    });
     first += pivots;
     factors += front_factors(pivots);
   }
@@ -202,7 +231,11 @@ inline void solve_fronts(const ChainTables<Constant>& chain, const Complex<Real>
     const std::size_t pivots = pivots_of(chain, element);
     first -= pivots;
     factors -= front_factors(pivots);
-    for_each_system(substitute_backward<Real>, pivots);
+    for_each_system([&](const Complex<Real>* f, Complex<Real>(&z)[8]) {
+      pivots == 4   ? substitute_backward<4>(f, z)
+      : pivots == 6 ? substitute_backward<6>(f, z)
+                    : substitute_backward<8>(f, z);
+    });
   }
 }
 

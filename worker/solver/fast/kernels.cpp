@@ -1,8 +1,5 @@
 #include "worker/solver/fast/kernels.h"
 
-#include <algorithm>
-#include <cstring>
-
 namespace oblique::solver {
 namespace {
 
@@ -87,18 +84,6 @@ void LaneMemory::copy(const double* from, double* to, std::size_t lane, std::siz
 
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b) {
   return a.links == b.links && a.elements_per_link == b.elements_per_link;
-}
-
-bool are_equal(const ChainTables<double>& a, const ChainTables<double>& b) {
-  if (!have_one_shape(a, b)) {
-    return false;
-  }
-  const auto of_a = constants_of(a);
-  const auto of_b = constants_of(b);
-  return std::ranges::equal(of_a, of_b, [](const auto& one, const auto& other) {
-    return one.data() == other.data() ||
-           std::memcmp(one.data(), other.data(), one.size_bytes()) == 0;
-  });
 }
 
 }  // namespace oblique::solver

@@ -120,7 +120,5 @@ LaneKernel avx512_kernel();  ///< AVX-512 F and DQ
 
 /// Whether chains have the same numbers of links and elements, so that they fit side by side.
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b);
-/// Whether chains have one shape and equal constants: they move alike.
-bool are_equal(const ChainTables<double>& a, const ChainTables<double>& b);
 
 }  // namespace oblique::solver

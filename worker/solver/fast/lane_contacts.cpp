@@ -37,7 +37,6 @@ struct Lane {
   ContactCase contact_case{};
   std::optional<ExplicitMotion> motion;
   std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
-  std::optional<ContactTracer> tracer;
   Clock::time_point started{};
 };
 
@@ -106,8 +105,7 @@ class ContactLanes {
            ReactionPeaks(next.chain->links())});
     Lane& slot = lanes_[lane];
     if (tracing_.sink) {
-      slot.tracer.emplace(*slot.motion, tracing_, tip);
-      slot.tracer->accepted(slot.progress->contact, touch);
+      trace_instant(*slot.motion, tracing_, tip, slot.progress->contact, touch);
       return;
     }
     // The state at touch is in the lane: the source may overwrite it.
@@ -131,7 +129,6 @@ class ContactLanes {
     Lane& slot = lanes_[lane];
     slot.contact_case = next;
     slot.motion.emplace(*next.chain);
-    slot.tracer.reset();
     slot.started = Clock::now();
     stepper_.load(lane, next.chain->tables(), state.q.data(), state.v.data());
     stepper_.set_step(lane, progress.contact.trial_step_s());
@@ -170,8 +167,8 @@ class ContactLanes {
   void follow(std::size_t lane) {
     Lane& slot = lanes_[lane];
     const Contact& contact = slot.progress->contact;
-    if (accept_[lane] != 0 && slot.tracer) {
-      slot.tracer->accepted(contact, stored(lane));
+    if (accept_[lane] != 0 && tracing_.sink) {
+      trace_instant(*slot.motion, tracing_, slot.progress->touch, contact, stored(lane));
     }
     if (!slot.followers.empty() && contact.is_at_first_turn()) {
       branch_off(lane);

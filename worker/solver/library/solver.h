@@ -21,9 +21,7 @@
 /// Units are SI; names end with them. x points along the ground away from O, y upwards. Forces act
 /// on the tip. Times count from touch.
 ///
-/// Versions: releases 0.x.y with the same x replace each other without relinking. Another x is
-/// another library (SONAME liboblique.so.0.x). Releases with the same x give the same bits for the
-/// same input on every machine and instruction set, except SolverReport::wall_s.
+/// Releases 0.x.y with the same x replace each other without relinking and give the same results.
 namespace oblique {
 
 using solver::CaseResult;       ///< outputs of a point

@@ -77,13 +77,8 @@ struct FallSolution {
   std::string error;
 };
 
-/// A fall in steps of one length by any integrator. The caller takes the steps and passes the few
-/// states that are kept; the state at a drop is stepped to from the one before:
-///
-///   while (!fall.is_over_after_next(tip after one more step)) {
-///     if (fall.keeps_last()) fall.keep(state after it);
-///   }
-///   fall.end(state before the last step);
+/// A fall in steps of one length by any integrator. The caller takes the steps (solve_stepped_fall)
+/// and passes the few states that are kept; the state at a drop is stepped to from the one before.
 class SteppedFall : public Fall {
  public:
   /// Throws SolveError when sqrt(2 length/g) would take more than 1e9 steps. Reports to `progress`,

@@ -102,19 +102,20 @@ CaseResult contact_result(const Contact& contact, const TipState& touch, const E
   return result;
 }
 
-void ContactTracer::accepted(const Contact& contact, const ChainState& state) const {
+void trace_instant(const Motion& motion, const Tracing& tracing, const TipState& touch,
+                   const Contact& contact, const ChainState& state) {
   const ContactLaw& law = contact.law();
   const TipState& tip = contact.tip();
-  TraceRow row = chain_row(motion_, contact.force(), state, tracing_.with_shape);
+  TraceRow row = chain_row(motion, contact.force(), state, tracing.with_shape);
   row.t_s = contact.time_s();
   row.fn_N = law.fn_N(tip);
   row.ft_N = law.ft_N(tip);
-  row.uy_m = tip.y_m - touch_y_m_;
+  row.uy_m = tip.y_m - touch.y_m;
   row.ux_m = law.ux_m(tip);
   row.xP_m = tip.x_m - row.ux_m;
   row.vP_m_s = law.is_stick() ? 0.0 : law.slip_velocity_m_s(tip);
   row.state = {law.is_stick() ? 'S' : 's', law.is_compression() ? 'C' : 'R'};
-  tracing_.sink(row);
+  tracing.sink(row);
 }
 
 void trace_fall(const Motion& motion, const Fall& fall, double H_m, const Tracing& tracing) {
@@ -134,7 +135,6 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
   const Energies in = motion.energies(accepted);
   Contact contact(parameters, touch, steps);
   motion.restart(contact.force(), accepted);
-  const ContactTracer tracer(motion, tracing, touch);
   Eigen::Matrix2Xd reactions_N;
   motion.reactions(contact.force(), accepted, reactions_N);
   ReactionPeaks reaction_peaks(static_cast<std::size_t>(reactions_N.cols()));
@@ -144,7 +144,7 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
     squared_N2 = reactions_N.colwise().squaredNorm();
     reaction_peaks.add(contact.time_s(), 0.0, squared_N2.data());
     if (tracing.sink) {
-      tracer.accepted(contact, accepted);
+      trace_instant(motion, tracing, touch, contact, accepted);
     }
   };
   observe();
