@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace oblique::solver {
@@ -22,6 +23,11 @@ struct TangentialPeak {
 };
 
 enum class PhaseKind { kCompression, kRestitution };
+
+/// "compression" or "restitution".
+constexpr std::string_view phase_kind_name(PhaseKind kind) {
+  return kind == PhaseKind::kCompression ? "compression" : "restitution";
+}
 
 struct Phase {
   PhaseKind kind;

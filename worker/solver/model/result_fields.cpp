@@ -70,7 +70,7 @@ Cell cell(bool flag) {
   return flag;
 }
 Cell cell(PhaseKind kind) {
-  return std::string_view(kind == PhaseKind::kCompression ? "compression" : "restitution");
+  return phase_kind_name(kind);
 }
 
 /// Gives `take` these members of each element of a list.
