@@ -239,16 +239,6 @@ TEST_F(ConversationTest, KeptResultsAreSentAFewMessagesAtATime) {
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
-TEST_F(ConversationTest, UnacknowledgedBytesAreBoundedAndALargeMessageIsSentAlone) {
-  join_with_batch({.outbox = {.bytes_on_their_way = 1}});
-  solve(1, 0, 1, false);
-  EXPECT_EQ(sent_results().size(), 1U);
-  solve(1, 1, 1, false);
-  EXPECT_TRUE(sent_results().empty());
-  receive(stored_message(1));
-  EXPECT_EQ(sent_results().size(), 1U);
-}
-
 TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
   use({.outbox = {.messages_on_their_way = 1}});
   join();

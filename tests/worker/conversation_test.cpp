@@ -98,7 +98,7 @@ TEST_F(ConversationTest, AnUnansweredHelloIsRepeatedAfterAPauseThatDoublesToTwoS
     pass(1);
     patience_ms = std::min<std::int64_t>(2 * patience_ms, 12'000);
     EXPECT_FALSE(has<Connect>());
-    EXPECT_TRUE(has<ReportUnreachable>());
+    EXPECT_EQ(has<Note>() && effects_of<Note>()[0].is_warning, backoff_ms == 50) << "warned once";
     EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + backoff_ms);
     pass(backoff_ms);
     EXPECT_TRUE(has<Connect>());
@@ -365,7 +365,6 @@ TEST_F(ExitTest, AtItsTimeLimitAWorkerGivesBackItsPointsAndLeaves) {
   EXPECT_EQ(given_back(), (std::vector<std::uint64_t>{31, 32}));
   EXPECT_FALSE(finish());
   receive(stored_message(1));
-  take(conversation_->on_solver_idle(now_ms_));
   EXPECT_EQ(sent(WorkerMessage::kGoodbye).size(), 1U);
   EXPECT_EQ(exit_code(), 0);
 }
@@ -419,30 +418,14 @@ TEST_F(ExitTest, TheNextDeadlineIsNeverLaterThanTheTimeLimit) {
   EXPECT_LE(conversation_->next_deadline_ms(), now_ms_ + 100);
 }
 
-TEST_F(ExitTest, AStoppedWorkerGivesBackAtOnceAndSendsPointsThatEndSoonAfter) {
+TEST_F(ExitTest, AStoppedWorkerGivesBackAtOnceAndWaitsForItsResultsToBeStored) {
   leave_within(kNever_ms);
   receive(batch_message(7, 31));
   solve(1, 0, 5, false);
-  receive(stored_message(1));
-  take(conversation_->stop(now_ms_, true));
+  take(conversation_->stop(now_ms_));
   EXPECT_EQ(given_back(), std::vector<std::uint64_t>{31});
   EXPECT_FALSE(finish());
-  solve(1, 5, 2, false);
-  ASSERT_EQ(sent_results().size(), 1U);
-  EXPECT_EQ(sent_results()[0].lease_id(), 0U);
-  take(conversation_->on_solver_idle(now_ms_));
-  EXPECT_FALSE(finish());
-  receive(stored_message(2));
-  EXPECT_TRUE(finish());
-}
-
-TEST_F(ExitTest, AStoppedWorkerDoesNotWaitForLongPoints) {
-  leave_within(kNever_ms);
-  receive(batch_message(7, 31));
-  take(conversation_->stop(now_ms_, true));
-  pass(249);
-  EXPECT_FALSE(finish());
-  pass(1);
+  receive(stored_message(1));
   EXPECT_TRUE(finish());
 }
 

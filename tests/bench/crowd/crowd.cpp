@@ -247,7 +247,6 @@ class Crowd::Parts {
         [&](const worker::DropAll&) { member.jobs.clear(); },
         [](const worker::SolveTrace&) {},
         [](const worker::CancelTrace&) {},
-        [](const worker::ReportUnreachable&) {},
         [](const worker::Note&) {},
         [](const worker::Finish& finish) {
           std::fprintf(stderr, "a worker ended: %s\n", finish.reason.c_str());

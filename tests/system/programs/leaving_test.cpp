@@ -116,9 +116,7 @@ TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   EXPECT_EQ(refused.wait(),
             1);  // after the first attempt, which takes 3 s, and before the end of the second
   const std::string said = refused.err();
-  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1 (connections fail at once"),
-            std::string::npos)
-      << said;
+  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << said;
   EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;
 }
 

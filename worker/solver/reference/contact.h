@@ -9,16 +9,11 @@
 
 namespace oblique::solver {
 
-/// One contact from touch to separation, as a state machine that any integrator drives. The
-/// integrator keeps the state at the last accepted instant. The machine gives the length of the
-/// next step and its forces, then judges the end of the step:
-///
-///   while (!contact.finished()) {
-///     step a copy of the accepted state by contact.trial_step_s() under contact.force();
-///     if (contact.judge(tip, integrals)) make the copy the accepted state;
-///   }
-///
-/// A step that passes an event is refused; shorter ones follow until the event is at a step's end.
+/// One contact from touch to separation, as a state machine that any integrator drives
+/// (solve_contact.cpp). The integrator keeps the state at the last accepted instant, steps a copy
+/// of it by trial_step_s() under force(), and makes the copy the accepted state if judge() returns
+/// true. A step that passes an event is refused; shorter ones follow until the event is at a step's
+/// end.
 class Contact {
  public:
   /// Time within which a contact must end [s].
@@ -50,6 +45,7 @@ class Contact {
   const ContactMargin& margin() const { return margin_; }
   double time_s() const { return t_s_; }
   std::int64_t steps() const { return steps_; }
+  const ContactSteps& step_lengths() const { return steps_s_; }
   /// Number of events so far; when it grows, force() has changed.
   int events() const { return events_; }
   const TipState& tip() const { return tip_; }

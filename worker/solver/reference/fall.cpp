@@ -108,7 +108,12 @@ ChainState SteppedFall::state_at_drop(double H_m) const {
       break;
     }
   }
-  return locate(H_m, before);
+  locate_drop(dt_s_, 1e-18, [&](double h_s) {
+    motion_->step(before, kNoContact, h_s, state);
+    const TipState tip = motion_->tip(state);
+    return std::pair(H_m + tip.y_m, tip.vy_m_s);
+  });
+  return state;
 }
 
 ChainState SteppedFall::state_at_time(double t_s) const {
@@ -137,32 +142,6 @@ std::size_t SteppedFall::bytes() const {
   const auto numbers = state.q.size() + state.v.size() + state.acceleration.size() +
                        state.algorithmic_offset_rate.size() + state.multipliers_N.size();
   return kept_.size() * (sizeof(ChainState) + static_cast<std::size_t>(numbers) * sizeof(double));
-}
-
-ChainState SteppedFall::locate(double H_m, const ChainState& before) const {
-  // Newton on the drop, bracketed by the step; bisection near the largest drop, where the speed
-  // vanishes.
-  double low = 0.0;
-  double high = dt_s_;
-  double h = 0.5 * dt_s_;
-  ChainState state = before;
-  for (int i = 0; i < 80 && high - low > 0.0; ++i) {
-    motion_->step(before, kNoContact, h, state);
-    const TipState tip = motion_->tip(state);
-    const double missing_m = H_m + tip.y_m;
-    if (missing_m == 0.0) {
-      break;
-    }
-    const bool is_before = missing_m > 0.0 && tip.vy_m_s < 0.0;
-    (is_before ? low : high) = h;
-    const double newton = h - missing_m / tip.vy_m_s;
-    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
-    if (next == h || std::abs(next - h) < 1e-18) {
-      break;
-    }
-    h = next;
-  }
-  return state;
 }
 
 std::shared_ptr<const Fall> solve_stepped_fall(const std::shared_ptr<const Motion>& motion,

@@ -58,9 +58,9 @@ std::vector<CaseResult> solve_by(const LaneKernel& kernel) {
                            steps.contact(c.e_star),
                            &touch};
       },
-      [&](ContactOutcome&& outcome) {
+      [&](Outcome&& outcome) {
         ASSERT_TRUE(outcome.result) << outcome.error;
-        results.at(outcome.tag) = std::move(*outcome.result);
+        results.at(outcome.number) = std::move(*outcome.result);
       },
       {}, kernel);
   return results;

@@ -38,18 +38,18 @@ const Coarse& coarse() {
   return one;
 }
 
-std::map<std::uint64_t, ContactOutcome> solved(
+std::map<std::uint64_t, Outcome> solved(
     const std::vector<ContactCase>& cases,
     const LaneKernel& kernel = runnable_lane_kernels().front()) {
-  std::map<std::uint64_t, ContactOutcome> outcomes;
+  std::map<std::uint64_t, Outcome> outcomes;
   std::size_t next = 0;
   solve_contacts(
       coarse().chain,
       [&]() -> std::optional<ContactCase> {
         return next < cases.size() ? std::optional(cases[next++]) : std::nullopt;
       },
-      [&](ContactOutcome&& outcome) {
-        const std::uint64_t tag = outcome.tag;
+      [&](Outcome&& outcome) {
+        const std::uint64_t tag = outcome.number;
         const bool is_new = outcomes.emplace(tag, std::move(outcome)).second;
         EXPECT_TRUE(is_new) << "case " << tag << " was delivered twice";
       },
@@ -95,11 +95,11 @@ TEST(LaneContacts, ACaseHasTheSameBitsBesideCasesOfOtherChains) {
     const auto together = solved(cases, kernel);
     ASSERT_EQ(together.size(), cases.size());
     for (const ContactCase& one : cases) {
-      SCOPED_TRACE(std::string(kernel.name) + ", case " + std::to_string(one.tag));
+      SCOPED_TRACE(std::string(kernel.name) + ", case " + std::to_string(one.number));
       const auto alone = solved({one}, kernel);
-      ASSERT_TRUE(alone.at(one.tag).result) << alone.at(one.tag).error;
-      ASSERT_TRUE(together.at(one.tag).result) << together.at(one.tag).error;
-      expect_same_bits(*together.at(one.tag).result, *alone.at(one.tag).result);
+      ASSERT_TRUE(alone.at(one.number).result) << alone.at(one.number).error;
+      ASSERT_TRUE(together.at(one.number).result) << together.at(one.number).error;
+      expect_same_bits(*together.at(one.number).result, *alone.at(one.number).result);
     }
   }
 }
@@ -120,7 +120,7 @@ TEST(LaneContacts, WhenASharedContactFailsEachOfItsCasesFailsAndNoOther) {
   ASSERT_EQ(outcomes.size(), cases.size());
   const auto alone = solved({cases[4]});
   for (const ContactCase& one : cases) {
-    const ContactOutcome& outcome = outcomes.at(one.tag);
+    const Outcome& outcome = outcomes.at(one.number);
     if (one.touch == &broken) {
       EXPECT_FALSE(outcome.result);
       EXPECT_NE(outcome.error.find("diverged"), std::string::npos);
@@ -148,9 +148,9 @@ TEST(LaneContacts, AChainMayBeDestroyedAfterItsCaseIsDone) {
         one.chain = chains.back().get();
         return one;
       },
-      [&](ContactOutcome&& outcome) {
+      [&](Outcome&& outcome) {
         EXPECT_TRUE(outcome.result) << outcome.error;
-        chains[outcome.tag].reset();
+        chains[outcome.number].reset();
         ++done;
       });
   EXPECT_EQ(done, chains.size());
@@ -175,10 +175,10 @@ TEST(LaneContacts, PeaksOfReactionsFromMomentaAgreeWithThoseFromAccelerations) {
   }
   const auto outcomes = solved(cases);
   for (const ContactCase& one : cases) {
-    SCOPED_TRACE(one.tag);
+    SCOPED_TRACE(one.number);
     const CaseResult exact = solve_contact(motion, one.parameters, one.steps, *one.touch, {});
-    ASSERT_TRUE(outcomes.at(one.tag).result);
-    const auto& peaks = outcomes.at(one.tag).result->reaction_peaks;
+    ASSERT_TRUE(outcomes.at(one.number).result);
+    const auto& peaks = outcomes.at(one.number).result->reaction_peaks;
     ASSERT_EQ(peaks.size(), 3U);
     for (std::size_t joint = 0; joint < peaks.size(); ++joint) {
       const ReactionPeak& known = exact.reaction_peaks[joint];
