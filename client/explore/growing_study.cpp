@@ -1,6 +1,5 @@
 #include "client/explore/growing_study.h"
 
-#include <filesystem>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -18,20 +17,6 @@
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
-namespace {
-
-/// Whether a server that runs already solves the points.
-bool is_elsewhere(const ExploreFlags& flags) {
-  return flags.source.database.empty() &&
-         !(flags.source.server + environment_variable("OBLIQUE_SERVER").value_or("")).empty();
-}
-
-std::filesystem::path database_of(const ExploreFlags& flags) {
-  return flags.source.database.empty() ? DatabaseSettings().file : flags.source.database;
-}
-
-}  // namespace
-
 void add_explore_flags(CLI::App& command, ExploreFlags& flags) {
   command
       .add_option("--name", flags.name,
@@ -72,12 +57,16 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
                            const solver::ModelParameters& model, protocol::StopSignals& stop)
     : console_(console), stop_(stop), name_(std::move(name)), no_reuse_(flags.run.no_reuse) {
   ConnectionSettings where;
-  if (is_elsewhere(flags)) {
+  const bool is_server_named =
+      !(flags.source.server + environment_variable("OBLIQUE_SERVER").value_or("")).empty();
+  if (is_server_named && flags.source.database.empty()) {
     where = connection_settings(console, flags.source);
   } else {
     check_settings(flags.run);
     ServiceSettings settings = flags.run.service;
-    settings.database = database_of(flags);
+    if (!flags.source.database.empty()) {
+      settings.database = flags.source.database;
+    }
     settings.only_study = name_;
     refuse_used_database(settings.database);
     service_ = std::make_unique<EmbeddedService>(settings, stop);
@@ -109,13 +98,11 @@ void GrowingStudy::read_stored() {
     return;
   }
   stored_ = connection_->describe(name_);
-  const bool has_same_model =
-      protocol::canonical_model(protocol::from_message_unchecked(stored_.model())) ==
-      protocol::canonical_model(protocol::from_message(recipe_.model()));
-  if (!has_same_model || stored_.errors()) {
+  if (stored_.errors() ||
+      stored_.model().SerializeAsString() != recipe_.model().SerializeAsString()) {
     throw solver::InputError(fmt::format(
-        "the study \"{}\" exists and has {}: give another --name", name_,
-        has_same_model ? "estimated errors, which this command does not use" : "another model"));
+        "the study \"{}\" exists with another model or with estimated errors: give another --name",
+        name_));
   }
 }
 
@@ -168,26 +155,14 @@ protocol::Table GrowingStudy::solve(const protocol::Block& block, const std::str
   }
   *recipe_.add_blocks() = block;
   const std::uint64_t first = points_;
-  const std::uint64_t count = protocol::points_of_block(block);
-  points_ += count;
+  points_ += protocol::points_of_block(block);
   if (!is_stored || !is_submitted_) {
     submit(is_stored ? stored_ : recipe_);
     wait(what);
   }
-  const auto solved = connection_->query(fmt::format(
-      "SELECT point, {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} AND status = "
-      "'solved' ORDER BY point",
-      columns, server::sql_text(name_), first, first + count - 1));
-  protocol::Table table{{solved.columns.begin() + 1, solved.columns.end()},
-                        std::vector<protocol::Row>(count)};
-  for (const auto& row : solved.rows) {
-    const auto point = static_cast<std::uint64_t>(std::get<std::int64_t>(row.front())) - first;
-    table.rows.at(point).assign(row.begin() + 1, row.end());
-  }
-  for (auto& row : table.rows) {
-    row.resize(table.columns.size());
-  }
-  return table;
+  return connection_->query(
+      fmt::format("SELECT {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} ORDER BY point",
+                  columns, server::sql_text(name_), first, points_ - 1));
 }
 
 protocol::Block listed_points(const std::vector<std::string>& keys,

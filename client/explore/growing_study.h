@@ -36,8 +36,8 @@ void add_explore_flags(CLI::App& command, ExploreFlags& flags);
 std::string explored_name(const ExploreFlags& flags, std::string_view verb,
                           std::string_view settings);
 
-/// Returns the exit code that `work` returns. When a signal stops it (Interrupted), prints that the
-/// same command continues, and returns 128 plus the number of the signal.
+/// Returns what `work` returns. When a signal stops it (Interrupted), prints that the same command
+/// continues, and returns 128 plus the number of the signal.
 int run_exploration(Console& console, const std::function<int(protocol::StopSignals& stop)>& work);
 
 /// A study that grows round by round: each round appends a block, which must be a deterministic
@@ -52,14 +52,12 @@ class GrowingStudy {
   GrowingStudy(Console& console, const ExploreFlags& flags, std::string name,
                const solver::ModelParameters& model, protocol::StopSignals& stop);
   ~GrowingStudy();
-  GrowingStudy(const GrowingStudy&) = delete;
-  GrowingStudy& operator=(const GrowingStudy&) = delete;
 
-  /// Solves the points of `block`, or finds them stored. Returns a row per point, in the order of
-  /// the block, with the values of `columns`: SQL over the view `runs`, as "mode, fn_peak_N". They
-  /// are NULL where the point failed. `what` is shown with the progress: "round 3 of about 14".
-  /// Throws solver::InputError when the stored study has another block in this place, Interrupted
-  /// when a signal stops it, std::runtime_error when the study is cancelled meanwhile.
+  /// Solves the points of `block`, unless they are stored. Returns a row per point, in their order,
+  /// with the values of `columns`: SQL over the view `runs`, as "mode, fn_peak_N"; NULL where the
+  /// point failed. `what` is shown with the progress. Throws solver::InputError when the stored
+  /// study has another block in this place, Interrupted when a signal stops it, and
+  /// std::runtime_error when the study is cancelled meanwhile.
   protocol::Table solve(const protocol::Block& block, const std::string& columns,
                         const std::string& what);
 
@@ -69,7 +67,6 @@ class GrowingStudy {
 
  private:
   bool keep_waiting();
-  /// The stored blocks, or none where there is no such study.
   void read_stored();
   void submit(const protocol::Recipe& recipe);
   void wait(const std::string& what);

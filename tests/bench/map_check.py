@@ -4,8 +4,8 @@
     PYTHONPATH=build/release/python tests/bench/map_check.py map.json --e 1 --preset paper [--points 100000]
 
 Both sides of every vertex must have the modes that it names. Random points are compared with the regions
-that the curves enclose; those within a bracket's width of a curve do not count. Ends with 1 where a side
-is wrong. All flags behind the file but --points are keys that the points share.
+that the curves enclose, inside the box around all vertices; those within a bracket's width of a curve do
+not count. Ends with 1 where a side is wrong. All flags behind the file but --points are keys that the points share.
 """
 
 import argparse
@@ -32,31 +32,28 @@ def wrong_sides(found, keys):
     return int(wrong.sum())
 
 
-def distance(one, other):
-    return np.hypot(one[0] - other[0], one[1] - other[1])
-
-
 def segments(found):
     """Chords as rows x0, y0, x1, y1, and the regions to the left and the right of each."""
-    vertices, corners = found["vertices"], found["corners"]
+    vertices = found["vertices"]
+    at = np.array([(vertex["x"], vertex["y"]) for vertex in vertices])
+    curves_of = np.bincount([vertex for curve in found["curves"] for vertex in set(curve)])
     rows, sides = [], []
-    for number, curve in enumerate(found["curves"]):
-        points = [(vertices[vertex]["x"], vertices[vertex]["y"]) for vertex in curve]
-        ends = [(corner["x"], corner["y"]) for corner in corners for each in corner["curves"] if each == number]
-        if len(ends) == 2 and distance(points[0], ends[0]) > distance(points[0], ends[1]):
-            ends.reverse()
-        is_nearer = ends and distance(points[0], ends[0]) <= distance(points[-1], ends[0])
-        at_begin = len(ends) == 2 or is_nearer
-        path = ends[:1] + points + ends[1:] if at_begin else points + ends
-        vertex = vertices[curve[len(curve) // 2]]
-        middle = points.index((vertex["x"], vertex["y"])) + (1 if at_begin else 0)
-        before, behind = path[max(middle - 1, 0)], path[min(middle + 1, len(path) - 1)]
-        direction = np.subtract(behind, before)
+    for curve in found["curves"]:
+        inner = [i for i, vertex in enumerate(curve) if curves_of[vertex] == 1]
+        if not inner:  # both its vertices belong to other borders too
+            continue
         # The bracket points from `from` to `to`: to the left where it turns left from the curve's direction.
-        turn = -direction[1] if vertex["along"] == "x" else direction[0]
+        turns = []
+        for i in inner:
+            direction = at[curve[min(i + 1, len(curve) - 1)]] - at[curve[max(i - 1, 0)]]
+            turns.append(-direction[1] if vertices[curve[i]]["along"] == "x" else direction[0])
+        turn = max(turns, key=abs)
+        if turn == 0:  # the border is inside one side of a cell
+            continue
+        vertex = vertices[curve[inner[turns.index(turn)]]]
         left, right = (vertex["to"], vertex["from"]) if turn > 0 else (vertex["from"], vertex["to"])
-        for one, other in zip(path, path[1:]):
-            rows.append((*one, *other))
+        for one, other in zip(curve, curve[1:]):
+            rows.append((*at[one], *at[other]))
             sides.append((left, right))
     return np.array(rows), sides
 
@@ -98,8 +95,8 @@ def main():
     sides = wrong_sides(found, keys)
     print(f"{len(found['vertices'])} vertices, {sides} with a wrong side")
     random = np.random.default_rng(known.seed)
-    low_x, high_x = found["x_range"]
-    low_y, high_y = found["y_range"]
+    low_x, high_x = np.quantile([vertex["x"] for vertex in found["vertices"]], (0, 1))
+    low_y, high_y = np.quantile([vertex["y"] for vertex in found["vertices"]], (0, 1))
     x, y = random.uniform(low_x, high_x, known.points), random.uniform(low_y, high_y, known.points)
     regions, names, nearest = judged(found, x, y)
     solved = modes(found, keys, x, y)

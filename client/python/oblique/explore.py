@@ -55,7 +55,7 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
 class Map(Named):
     """Borders on a plane. ``x``, ``y``, ``width`` (NumPy arrays), ``region_from``, ``region_to`` and
     ``along`` (arrays of objects) have an entry for each vertex; ``curves`` are arrays of vertex numbers,
-    ``corners``, ``regions`` and ``shifts`` lists of dicts as in the JSON of ``oblique map``."""
+    ``regions`` and ``shifts`` lists of dicts as in the JSON of ``oblique map``."""
 
 
 def map(study: Optional[str] = None, **flags: Any) -> Map:

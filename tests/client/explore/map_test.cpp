@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <numbers>
-#include <random>
 #include <set>
 #include <utility>
 #include <vector>
@@ -20,36 +21,38 @@ using Regions = std::function<int(double x, double y)>;
 
 constexpr double kBracket = 1e-6;
 
-struct Solved {
+/// Returns the regions of lattice points, and counts rounds and points.
+struct Solver {
+  Regions regions;
   MapGrid grid;
-  BorderSearch search{grid};
   std::size_t rounds = 0;
-  std::size_t points = 0;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> points = {};
   std::size_t solved_twice = 0;
+
+  std::vector<int> operator()(const std::vector<LatticePoint>& asked) {
+    ++rounds;
+    std::vector<int> found;
+    for (const auto& [x, y] : asked) {
+      solved_twice += points.emplace(x, y).second ? 0U : 1U;
+      found.push_back(
+          regions(static_cast<double>(x) / grid.last(), static_cast<double>(y) / grid.last()));
+    }
+    return found;
+  }
 };
 
-std::vector<int> regions_of(const Regions& regions, const MapGrid& grid,
-                            const std::vector<LatticePoint>& points) {
-  std::vector<int> found;
-  for (const auto& point : points) {
-    found.push_back(regions(static_cast<double>(point.x) / grid.last(),
-                            static_cast<double>(point.y) / grid.last()));
-  }
-  return found;
+struct Found {
+  Solver solver;
+  Borders borders = find_borders(solver.grid, std::ref(solver));
+};
+
+Found found_borders(const Regions& regions, std::uint32_t cells = 32) {
+  return Found{.solver = {regions, MapGrid::of(cells, kBracket)}};
 }
 
-Solved solved(const Regions& regions, std::uint32_t cells = 32) {
-  Solved all{.grid = MapGrid::of(cells, kBracket)};
-  std::set<std::pair<std::uint32_t, std::uint32_t>> known;
-  for (auto points = all.search.next(); !points.empty(); points = all.search.next()) {
-    ++all.rounds;
-    all.points += points.size();
-    for (const auto& point : points) {
-      all.solved_twice += known.emplace(point.x, point.y).second ? 0U : 1U;
-    }
-    all.search.set_regions(regions_of(regions, all.grid, points));
-  }
-  return all;
+double area_of(const Borders& borders, int region) {
+  return static_cast<double>(std::count(borders.raster.begin(), borders.raster.end(), region)) /
+         static_cast<double>(borders.raster.size());
 }
 
 int disc(double x, double y) {
@@ -72,168 +75,150 @@ int waves(double x, double y) {
   return static_cast<int>(std::floor(3.0 * x + 2.0 * std::sin(4.0 * y))) + 3;
 }
 
-Position end_of(const BorderVertex& vertex, std::uint32_t step) {
-  return vertex.is_along_x
-             ? Position{static_cast<double>(vertex.low.x + step), static_cast<double>(vertex.low.y)}
-             : Position{static_cast<double>(vertex.low.x),
-                        static_cast<double>(vertex.low.y + step)};
+/// A vertex in the unit square: the end of its bracket at that step.
+std::pair<double, double> place_of(const BorderVertex& vertex, double step, const MapGrid& grid) {
+  return {(vertex.low.x + (vertex.is_along_x ? step : 0.0)) / grid.last(),
+          (vertex.low.y + (vertex.is_along_x ? 0.0 : step)) / grid.last()};
 }
 
-TEST(BorderSearch, BracketsHaveTheNamedRegionsAtTheirEndsAndAreAsShortAsAskedFor) {
+TEST(FindBorders, BracketsHaveTheNamedRegionsAtTheirEndsAndAreAsShortAsAskedFor) {
   for (const auto& regions : std::vector<Regions>{disc, sectors, sliver, waves}) {
-    const auto found = solved(regions);
-    const double last = found.grid.last();
-    EXPECT_LE(1.0 / last, kBracket);
-    const auto borders = found.search.borders();
+    const auto [solver, borders] = found_borders(regions);
+    EXPECT_LE(1.0 / solver.grid.last(), kBracket);
     ASSERT_GT(borders.vertices.size(), 30U);
     for (const auto& vertex : borders.vertices) {
-      const auto from = end_of(vertex, 0);
-      const auto to = end_of(vertex, 1);
+      const auto from = place_of(vertex, 0.0, solver.grid);
+      const auto to = place_of(vertex, 1.0, solver.grid);
       ASSERT_NE(vertex.from, vertex.to);
-      ASSERT_EQ(regions(from.x / last, from.y / last), vertex.from);
-      ASSERT_EQ(regions(to.x / last, to.y / last), vertex.to);
+      ASSERT_EQ(regions(from.first, from.second), vertex.from);
+      ASSERT_EQ(regions(to.first, to.second), vertex.to);
     }
   }
 }
 
-TEST(BorderSearch, ADiscHasOneClosedCurveOfItsLengthAndArea) {
-  const auto found = solved(disc);
-  const auto borders = found.search.borders();
+TEST(FindBorders, ADiscHasOneClosedCurveOfItsLengthAndArea) {
+  const auto [solver, borders] = found_borders(disc);
   ASSERT_EQ(borders.curves.size(), 1U);
-  EXPECT_TRUE(borders.corners.empty());
   const auto& curve = borders.curves.front();
-  EXPECT_TRUE(curve.is_closed());
-  EXPECT_EQ(curve.vertices.size(), borders.vertices.size() + 1);
+  EXPECT_EQ(curve.front(), curve.back());
+  EXPECT_EQ(curve.size(), borders.vertices.size() + 1);
   double length = 0.0;
-  for (std::size_t i = 1; i < curve.vertices.size(); ++i) {
-    const auto a = borders.vertices[curve.vertices[i - 1]].middle();
-    const auto b = borders.vertices[curve.vertices[i]].middle();
-    length += std::hypot(a.x - b.x, a.y - b.y) / found.grid.last();
+  for (std::size_t i = 1; i < curve.size(); ++i) {
+    const auto a = place_of(borders.vertices[curve[i - 1]], 0.5, solver.grid);
+    const auto b = place_of(borders.vertices[curve[i]], 0.5, solver.grid);
+    length += std::hypot(a.first - b.first, a.second - b.second);
   }
   // Chords of length h are shorter than their arcs by a part (h/r)^2/24.
-  const double h = std::sqrt(2.0) / found.grid.cells;
+  const double h = std::sqrt(2.0) / solver.grid.cells;
   EXPECT_NEAR(length, 2.0 * std::numbers::pi * 0.3,
               2.0 * std::numbers::pi * 0.3 * std::pow(h / 0.3, 2) / 24.0);
-  const double cells = static_cast<double>(found.grid.cells) * found.grid.cells;
-  EXPECT_NEAR(found.search.areas().at(1) / cells, std::numbers::pi * 0.09,
-              std::numbers::pi * 0.09 * std::pow(h / 0.3, 2) / 6.0);
-  EXPECT_NEAR(found.search.areas().at(0) / cells, 1.0 - std::numbers::pi * 0.09, 1e-3);
+  EXPECT_NEAR(area_of(borders, 1), std::numbers::pi * 0.09, 1e-3);
+  EXPECT_NEAR(area_of(borders, 0), 1.0 - std::numbers::pi * 0.09, 1e-3);
 }
 
-TEST(BorderSearch, ThreeRegionsMeetInACornerAtTheEndOfThreeCurves) {
-  const auto found = solved(sectors);
-  const auto borders = found.search.borders();
-  ASSERT_EQ(borders.corners.size(), 1U);
-  const auto& corner = borders.corners.front();
-  const double last = found.grid.last();
-  EXPECT_LT(corner.size, found.grid.cell() / 32);
-  EXPECT_NEAR(corner.middle.x / last, 0.41, corner.size / last);
-  EXPECT_NEAR(corner.middle.y / last, 0.56, corner.size / last);
-  EXPECT_EQ(std::set<int>(corner.regions.begin(), corner.regions.end()), (std::set<int>{0, 1, 2}));
+TEST(FindBorders, ThreeCurvesEndWithTheSameVertexWhereTheirRegionsMeet) {
+  const auto [solver, borders] = found_borders(sectors);
   ASSERT_EQ(borders.curves.size(), 3U);
+  std::map<std::size_t, int> ends;
   for (const auto& curve : borders.curves) {
-    EXPECT_EQ(curve.begins_at.has_value() + curve.ends_at.has_value(), 1);
+    ++ends[curve.front()];
+    ++ends[curve.back()];
   }
+  const auto corner =
+      std::find_if(ends.begin(), ends.end(), [](const auto& end) { return end.second == 3; });
+  ASSERT_NE(corner, ends.end());
+  const auto at = place_of(borders.vertices[corner->first], 0.5, solver.grid);
+  EXPECT_NEAR(at.first, 0.41, 1.0 / (8.0 * solver.grid.cells));
+  EXPECT_NEAR(at.second, 0.56, 1.0 / (8.0 * solver.grid.cells));
 }
 
-TEST(BorderSearch, EveryVertexIsInOneCurveBetweenTwoRegions) {
+TEST(FindBorders, EveryVertexWithinACurveIsInNoOtherAndBetweenItsTwoRegions) {
   for (const auto& regions : std::vector<Regions>{disc, sectors, sliver, waves}) {
-    const auto borders = solved(regions).search.borders();
+    const auto borders = found_borders(regions).borders;
     std::vector<int> uses(borders.vertices.size());
     for (const auto& curve : borders.curves) {
-      const auto& first = borders.vertices[curve.vertices.front()];
-      const std::set<int> sides{first.from, first.to};
-      for (std::size_t i = curve.is_closed() ? 1 : 0; i < curve.vertices.size(); ++i) {
-        const auto& vertex = borders.vertices[curve.vertices[i]];
-        ++uses[curve.vertices[i]];
-        ASSERT_EQ((std::set<int>{vertex.from, vertex.to}), sides);
+      std::set<std::pair<int, int>> sides;
+      for (std::size_t i = 1; i + 1 < curve.size(); ++i) {
+        const auto& vertex = borders.vertices[curve[i]];
+        sides.insert(std::minmax(vertex.from, vertex.to));
+        EXPECT_EQ(++uses[curve[i]], 1);
       }
+      EXPECT_LE(sides.size(), 1U);
+      ++uses[curve.front()];
+      ++uses[curve.back()];
     }
-    EXPECT_EQ(uses, std::vector<int>(uses.size(), 1));
+    EXPECT_EQ(std::count(uses.begin(), uses.end(), 0), 0);
   }
 }
 
-TEST(BorderSearch, ASliverThatTheGridMeetsIsFollowedIntoCellsThatItCrosses) {
-  const auto found = solved(sliver);
-  const double cells = static_cast<double>(found.grid.cells) * found.grid.cells;
-  EXPECT_NEAR(found.search.areas().at(1) / cells, 0.004, 0.0004);
+TEST(FindBorders, ASliverThatTheGridMeetsIsFollowedIntoCellsThatItCrosses) {
+  EXPECT_NEAR(area_of(found_borders(sliver).borders, 1), 0.004, 0.0004);
 }
 
-TEST(BorderSearch, RandomPointsAreInTheRegionsThatTheCurvesSay) {
-  std::mt19937_64 random(1);
-  std::uniform_real_distribution<double> uniform;
+TEST(FindBorders, RasterCellsAreInTheRegionsThatTheCurvesSay) {
   for (const auto& regions : std::vector<Regions>{disc, sectors, waves}) {
-    const auto found = solved(regions);
+    const auto [solver, borders] = found_borders(regions);
     int wrong = 0;
-    constexpr int kPoints = 20'000;
-    for (int i = 0; i < kPoints; ++i) {
-      const double x = uniform(random);
-      const double y = uniform(random);
-      wrong +=
-          found.search.region_at({x * found.grid.last(), y * found.grid.last()}) != regions(x, y);
+    for (std::size_t i = 0; i < borders.raster.size(); ++i) {
+      const double x = (static_cast<double>(i % Borders::kRaster) + 0.5) / Borders::kRaster;
+      const double y = (static_cast<double>(i / Borders::kRaster) + 0.5) / Borders::kRaster;
+      wrong += borders.raster[i] != regions(x, y) ? 1 : 0;
     }
     // Chords of length h are at most h^2/8 times the curvature, here 8, from their arcs, on
     // borders with a length of at most 10.
-    const double h = std::sqrt(2.0) / found.grid.cells;
-    EXPECT_LT(wrong, kPoints * 10.0 * 8.0 * h * h / 12.0);
+    const double h = std::sqrt(2.0) / solver.grid.cells;
+    EXPECT_LT(wrong, static_cast<double>(borders.raster.size()) * 10.0 * 8.0 * h * h / 12.0);
   }
 }
 
-TEST(BorderSearch, SolvesTheGridThenAPointForEachHalvingOfABracketAndTwoForEachChord) {
-  const auto found = solved(disc, 256);
-  const std::size_t vertices = found.search.borders().vertices.size();
-  ASSERT_GT(vertices, 500U);  // so many that brackets are halved, not divided into more parts
-  EXPECT_LT(found.points, 257U * 257U + (found.grid.halvings + 4U) * vertices);
-  EXPECT_LT(found.rounds, 3U * found.grid.halvings);
-  EXPECT_EQ(found.solved_twice, 0U);
-  EXPECT_EQ(solved([](double, double) { return 7; }).rounds, 1U);
+TEST(FindBorders, SolvesTheGridThenAPointForEachHalvingOfABracket) {
+  const auto [solver, borders] = found_borders(disc, 64);
+  EXPECT_LT(solver.points.size(),
+            65U * 65U + (solver.grid.halvings + 4U) * borders.vertices.size());
+  EXPECT_LT(solver.rounds, 4U * solver.grid.halvings);
+  EXPECT_EQ(solver.solved_twice, 0U);
 }
 
-TEST(BorderSearch, OneRegionHasNoBorders) {
-  const auto found = solved([](double, double) { return 7; });
-  EXPECT_TRUE(found.search.borders().curves.empty());
-  EXPECT_EQ(found.search.areas().at(7), 32.0 * 32.0);
-  EXPECT_EQ(found.search.region_at({0.0, 5.0}), 7);
+TEST(FindBorders, OneRegionHasNoBorders) {
+  const auto [solver, borders] = found_borders([](double, double) { return 7; });
+  EXPECT_EQ(solver.rounds, 1U);
+  EXPECT_TRUE(borders.curves.empty());
+  EXPECT_EQ(area_of(borders, 7), 1.0);
 }
 
-TEST(ShiftSearch, FindsTheShiftOfEachSampleToAnotherBorder) {
-  const auto found = solved(disc);
-  const auto borders = found.search.borders();
+TEST(FindShifts, AreThoseOfEverySixteenthVertexToAnotherBorder) {
+  const auto borders = found_borders(disc).borders;
   constexpr double kShift = 0.0021;
-  ShiftSearch shifts(found.grid, borders, 16);
-  std::size_t rounds = 0;
-  for (auto points = shifts.next(); !points.empty(); points = shifts.next()) {
-    shifts.set_regions(
-        regions_of([](double x, double y) { return disc(x - kShift, y); }, found.grid, points));
-    ++rounds;
+  Solver shifted{[](double x, double y) { return disc(x - kShift, y); }, MapGrid::of(32, kBracket)};
+  const auto shifts = find_shifts(shifted.grid, borders, 16, std::ref(shifted));
+  EXPECT_LT(shifted.rounds, 30U);
+  std::vector<double> expected;
+  const auto& curve = borders.curves.front();
+  for (std::size_t i = 8; i < curve.size(); i += 16) {
+    const auto& vertex = borders.vertices[curve[i]];
+    const auto [x, y] = place_of(vertex, 0.5, shifted.grid);
+    const double across = vertex.is_along_x ? y - 0.52 : x - 0.47 - kShift;
+    const double before = vertex.is_along_x ? x - 0.47 : y - 0.52;
+    const double after = std::copysign(std::sqrt(0.09 - across * across), before) +
+                         (vertex.is_along_x ? kShift : 0.0);
+    expected.push_back(std::abs(after - before));
   }
-  EXPECT_LT(rounds, 30U);
-  EXPECT_NEAR(static_cast<double>(shifts.shifts().size()),
-              static_cast<double>(borders.vertices.size()) / 16.0, 1.0);
-  for (const auto& shift : shifts.shifts()) {
-    const auto& vertex = borders.vertices[shift.vertex];
-    ASSERT_TRUE(shift.shift);
-    const double last = found.grid.last();
-    const double across =
-        (vertex.is_along_x ? vertex.low.y / last - 0.52 : vertex.low.x / last - 0.47 - kShift);
-    const double before =
-        (vertex.is_along_x ? vertex.low.x / last - 0.47 : vertex.low.y / last - 0.52);
-    const double root = std::sqrt(0.09 - across * across);
-    const double after = std::copysign(root, before) + (vertex.is_along_x ? kShift : 0.0);
-    EXPECT_NEAR(*shift.shift, std::abs(after - before),
-                0.1 * std::abs(after - before) + 2.0 / last);
-  }
+  std::sort(expected.begin(), expected.end());
+  ASSERT_EQ(shifts.size(), 1U);
+  EXPECT_EQ(shifts[0].checked, expected.size());
+  EXPECT_EQ(shifts[0].lost, 0U);
+  EXPECT_NEAR(*shifts[0].median, expected[expected.size() / 2], 2.0 / shifted.grid.last());
+  EXPECT_NEAR(*shifts[0].largest, expected.back(), 2.0 / shifted.grid.last());
 }
 
-TEST(ShiftSearch, ReportsThatNoSuchBorderIsNear) {
-  const auto found = solved(disc);
-  ShiftSearch shifts(found.grid, found.search.borders(), 16);
-  for (auto points = shifts.next(); !points.empty(); points = shifts.next()) {
-    shifts.set_regions(regions_of([](double, double) { return 0; }, found.grid, points));
-  }
-  for (const auto& shift : shifts.shifts()) {
-    EXPECT_FALSE(shift.shift);
-  }
+TEST(FindShifts, HaveNoValueWhereNoSuchBorderIsNear) {
+  const auto borders = found_borders(disc).borders;
+  Solver none{[](double, double) { return 0; }, MapGrid::of(32, kBracket)};
+  const auto shifts = find_shifts(none.grid, borders, 16, std::ref(none));
+  ASSERT_EQ(shifts.size(), 1U);
+  EXPECT_GT(shifts[0].checked, 0U);
+  EXPECT_EQ(shifts[0].lost, shifts[0].checked);
+  EXPECT_FALSE(shifts[0].median);
 }
 
 }  // namespace
