@@ -32,7 +32,6 @@
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/sampling.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/fall_model.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
