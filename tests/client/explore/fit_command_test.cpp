@@ -82,16 +82,16 @@ TEST_F(FitCommand, SaysWhatIsWrong) {
   EXPECT_THAT(error_of({"--e", "1"}), HasSubstr("give --fit KEY=FROM:TO"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k", "--sd", "1%"}), HasSubstr("write KEY=FROM:TO"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "kk=1:2", "--sd", "1%"}), HasSubstr("kk"));
-  EXPECT_THAT(error_of({"--e", "1", "--fit", "links=2:4", "--sd", "1%"}),
-              HasSubstr("single values only"));
-  EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8"}), HasSubstr("no standard deviation"));
+  EXPECT_THAT(error_of({"--e", "1", "--fit", "links=2:4", "--sd", "1%"}), HasSubstr("links"));
+  EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8"}),
+              HasSubstr("the standard deviation 0, which must be"));
   EXPECT_THAT(error_of({"--fit", "k=1e7:1e8", "--sd", "1%"}), HasSubstr("--e is missing"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "H=0.5:1", "--sd", "1%"}),
               HasSubstr("H is given twice"));
   EXPECT_THAT(error_of({"--e", "1,0.9", "--fit", "k=1e7:1e8", "--sd", "1%"}),
               HasSubstr("fit takes one value"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8:1e8", "--sd", "1%"}),
-              HasSubstr("between the bounds"));
+              HasSubstr("must be between them"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8", "--fit", "eta2=1:2", "--sd", "1%"}),
               HasSubstr("2 unknowns cannot be determined by 1 measured"));
 }
