@@ -279,7 +279,8 @@ class IntervalEnd {
         limit_(limit),
         least_(minimum.angles[unknown]),
         bound_(side < 0.0 ? pi : 2.0 * pi),
-        usual_distance_(variance > 0.0 ? std::sqrt(limit * variance) : kWithoutVariance),
+        usual_distance_(std::min(variance > 0.0 ? std::sqrt(limit * variance) : kWithoutVariance,
+                                 std::abs(bound_ - least_))),
         inside_(minimum),
         is_open_(std::abs(bound_ - least_) >= kAtBound) {
     try_at(outwards(usual_distance_ / 2.0));
@@ -370,7 +371,7 @@ class IntervalEnd {
       return;
     }
     if (!outside_angle_) {
-      try_at(outwards(std::clamp(1.05 / std::max(f, 1e-3), 1.1, 3.0) * std::abs(w - least_)));
+      try_at(outwards(std::clamp(1.05 / std::max(f, 1e-3), 1.1, 2.0) * std::abs(w - least_)));
       return;
     }
     const double inside_f = root_of_rise(inside_.chi2);

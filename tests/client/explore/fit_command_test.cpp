@@ -13,7 +13,6 @@
 namespace oblique::client {
 namespace {
 
-using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -58,7 +57,7 @@ TEST_F(FitCommand, FindsTheParametersOfMeasurements) {
                                        "eta2=1:1.8", "--sd", "1%",    "--json"};
   const auto first = fit(flags);
   ASSERT_EQ(first.exit_code, 0) << first.err;
-  const auto found = json::parse(first.out);
+  const auto found = nlohmann::json::parse(first.out);
   EXPECT_NEAR(found["unknowns"][0]["value"].get<double>(), 2.7e7, 1e5);
   EXPECT_NEAR(found["unknowns"][1]["value"].get<double>(), 1.2463, 1e-3);
   EXPECT_LT(found["unknowns"][1]["lower_95"].get<double>(), 1.24);
