@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -14,6 +13,7 @@
 #include <Eigen/Dense>
 #include <unsupported/Eigen/LevenbergMarquardt>
 
+#include "client/io/console.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -23,36 +23,18 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using solver::exact_number;
 using solver::InputError;
-using solver::readable_number;
 using std::numbers::pi;
 
 /// Angle of a central difference. Outputs of the solver are smooth to about 1e-7 of themselves, so
-/// that derivatives are good to about 1e-5.
+/// derivatives are good to about 1e-5.
 constexpr double kDifference = 3e-3;
-/// The first step of a minimisation is at most this part of the vector of the angles, which are
-/// between pi and 2 pi.
-constexpr double kFirstStep = 0.1;
 /// Residual of a missing prediction: large enough to have the step refused.
 constexpr double kMissing = 1e9;
-/// A minimum whose angle is so near to that of a bound is at the bound.
+/// An unknown is at a bound if their angles differ by less.
 constexpr double kAtBound = 1e-2;
 /// 95 % quantile of chi2 with one degree of freedom.
 constexpr double kChi2Quantile = 3.841458820694124;
-/// An unknown whose whole range changes the residuals by less, in standard deviations, has no
-/// effect.
-constexpr double kLeastEffect = 0.1;
-/// Smallest singular value of the Jacobian with columns of length 1 that is not due to the
-/// differences.
-constexpr double kLeastSingularValue = 1e-3;
-/// Part of a unit vector from which on an unknown belongs to an undetermined combination.
-constexpr double kLeastPart = 0.1;
-constexpr double kLargestCorrelation = 0.99;
-/// A chi2 that is smaller by less is the same minimum.
-constexpr double kSmallerChi2 = 1e-4;
-/// Least factor of variances: of exact data chi2 is the noise of the differences.
-constexpr double kLeastScale = 1e-6;
 
 Index index_of(std::size_t number) {
   return static_cast<Index>(number);
@@ -60,535 +42,438 @@ Index index_of(std::size_t number) {
 
 }  // namespace
 
-double Unknown::usual_start(double from, double to) {
-  return from > 0.0 ? std::sqrt(from) * std::sqrt(to) : from + (to - from) / 2.0;
-}
-
-Unknown::Scale Unknown::scale() const {
-  const bool is_logarithmic = from > 0.0;
-  const double low = is_logarithmic ? std::log(from) : from;
-  const double high = is_logarithmic ? std::log(to) : to;
-  return {is_logarithmic, (low + high) / 2.0, (high - low) / 2.0};
-}
-
 double Unknown::value_at(double angle) const {
-  const auto [is_logarithmic, middle, half] = scale();
-  const double value = middle + half * std::cos(angle);
-  return std::clamp(is_logarithmic ? std::exp(value) : value, from, to);
+  const double share = (1.0 + std::cos(angle)) / 2.0;
+  const double value = from > 0.0 ? from * std::pow(to / from, share) : from + share * (to - from);
+  return std::clamp(value, from, to);
 }
 
 double Unknown::angle_of(double value) const {
-  const auto [is_logarithmic, middle, half] = scale();
-  const double cosine = ((is_logarithmic ? std::log(value) : value) - middle) / half;
-  return 2.0 * pi - std::acos(std::clamp(cosine, -1.0, 1.0));
-}
-
-double Unknown::slope_at(double angle) const {
-  const auto [is_logarithmic, middle, half] = scale();
-  return -half * std::sin(angle) * (is_logarithmic ? value_at(angle) : 1.0);
+  const double share =
+      from > 0.0 ? std::log(value / from) / std::log(to / from) : (value - from) / (to - from);
+  return 2.0 * pi - std::acos(std::clamp(2.0 * share - 1.0, -1.0, 1.0));
 }
 
 void FitProblem::check() const {
-  if (unknowns.empty()) {
-    throw InputError("nothing is to be fitted: at least one unknown is needed");
-  }
-  for (const Unknown& unknown : unknowns) {
-    const auto range = fmt::format("{} = {} to {}", unknown.name, exact_number(unknown.from),
-                                   exact_number(unknown.to));
-    if (!(unknown.from < unknown.to)) {
-      throw InputError(unknown.name, range + ": the lower bound must be below the upper one");
-    }
-    if (!(unknown.from < unknown.start && unknown.start < unknown.to)) {
-      throw InputError(
-          unknown.name,
-          fmt::format("{}: the start {} must be between the bounds and at neither of them", range,
-                      exact_number(unknown.start)));
+  for (const auto& [name, from, to, start] : unknowns) {
+    if (!(from < start && start < to)) {
+      throw InputError(name,
+                       fmt::format("{} to {} with the start {}: the bounds must rise, and the "
+                                   "start must be between them",
+                                   solver::exact_number(from), solver::exact_number(to),
+                                   solver::exact_number(start)));
     }
   }
-  for (Index i = 0; i < measured.size(); ++i) {
-    if (!(sd[i] > 0.0) || !std::isfinite(sd[i])) {
-      throw InputError(fmt::format("{}: the standard deviation {} must be positive",
-                                   names[static_cast<std::size_t>(i)], exact_number(sd[i])));
-    }
-  }
-  if (index_of(unknowns.size()) > measured.size()) {
-    throw InputError(
-        fmt::format("{} unknowns cannot be determined by {} measured numbers: at least as many "
-                    "numbers as unknowns are needed",
-                    unknowns.size(), measured.size()));
+  if (unknowns.empty() || index_of(unknowns.size()) > measured.size()) {
+    throw InputError(fmt::format(
+        "{} cannot be determined by {}: a fit needs one unknown or more, "
+        "and one number or more for each",
+        counted(unknowns.size(), "unknown", "unknowns"),
+        counted(static_cast<std::size_t>(measured.size()), "measured number", "measured numbers")));
   }
 }
 
 namespace {
 
-/// The residuals of a problem and their derivatives by the angles of some of its unknowns; the
-/// other angles are fixed.
-class Residuals : public Eigen::DenseFunctor<double> {
- public:
-  Residuals(const FitProblem& problem, VectorXd angles, std::vector<Index> free)
-      : Eigen::DenseFunctor<double>(static_cast<int>(free.size()),
-                                    static_cast<int>(problem.measured.size())),
-        problem_(problem),
-        angles_(std::move(angles)),
-        free_(std::move(free)) {}
+/// The model with derivatives at several vectors of angles, by one call of `evaluate`.
+std::vector<FitStep> steps_at(const FitProblem& problem, const std::vector<VectorXd>& places,
+                              const std::string& what) {
+  const Index unknowns = index_of(problem.unknowns.size());
+  std::vector<VectorXd> points;
+  for (const VectorXd& angles : places) {
+    for (Index i = 0; i < 2 * unknowns + 1; ++i) {
+      VectorXd values = angles;
+      if (i > 0) {
+        values[(i - 1) / 2] += i % 2 == 1 ? -kDifference : kDifference;
+      }
+      for (std::size_t u = 0; u < problem.unknowns.size(); ++u) {
+        values[index_of(u)] = problem.unknowns[u].value_at(values[index_of(u)]);
+      }
+      points.push_back(std::move(values));
+    }
+  }
+  const auto predictions = problem.evaluate(points, what);
+  std::vector<FitStep> steps;
+  for (std::size_t p = 0, at = 0; p < places.size(); ++p) {
+    FitStep& step = steps.emplace_back();
+    step.angles = places[p];
+    step.parameters = points[at];
+    step.predictions = predictions[at++];
+    step.is_complete = step.predictions.allFinite();
+    step.residuals = ((step.predictions - problem.measured).array() / problem.sd.array())
+                         .unaryExpr([](double r) { return std::isfinite(r) ? r : kMissing; });
+    step.chi2 = step.residuals.squaredNorm();
+    step.jacobian.resize(problem.measured.size(), unknowns);
+    for (Index i = 0; i < unknowns; ++i, at += 2) {
+      step.jacobian.col(i) =
+          ((predictions[at + 1] - predictions[at]).array() / problem.sd.array() / kDifference / 2.0)
+              .unaryExpr([](double slope) { return std::isfinite(slope) ? slope : 0.0; });
+    }
+  }
+  return steps;
+}
 
-  /// What the calls of `evaluate` are called.
-  void describe(std::string what) { what_ = std::move(what); }
+/// Gauss and Newton's step (J^T J + 1e-3) delta = -J^T r. The damping keeps combinations without
+/// effect where they are.
+VectorXd newton_step(const MatrixXd& jacobian, const VectorXd& residuals) {
+  MatrixXd normal = jacobian.transpose() * jacobian;
+  normal.diagonal().array() += 1e-3;
+  return normal.ldlt().solve(-jacobian.transpose() * residuals);
+}
 
-  int operator()(const VectorXd& x, VectorXd& residuals) {
-    residuals = at(x).residuals;
+/// By how much the linearised model lets chi2 fall.
+double predicted_fall(const MatrixXd& jacobian, const VectorXd& residuals, const VectorXd& step) {
+  return residuals.squaredNorm() - (residuals + jacobian * step).squaredNorm();
+}
+
+/// The problem in Eigen's form. Eigen requests derivatives only where it requested residuals last.
+struct Residuals : public Eigen::DenseFunctor<double> {
+  explicit Residuals(const FitProblem& fitted)
+      : Eigen::DenseFunctor<double>(static_cast<int>(fitted.unknowns.size()),
+                                    static_cast<int>(fitted.measured.size())),
+        problem(fitted) {}
+
+  int operator()(const VectorXd& angles, VectorXd& residuals) {
+    last = steps_at(problem, {angles}, what).front();
+    residuals = last.residuals;
+    return 0;
+  }
+  int df(const VectorXd& /*angles*/, MatrixXd& jacobian) const {
+    jacobian = last.jacobian;
     return 0;
   }
 
-  int df(const VectorXd& x, MatrixXd& jacobian) {
-    jacobian = at(x).jacobian;
-    return 0;
-  }
-
-  VectorXd all_angles(const VectorXd& x) const {
-    VectorXd angles = angles_;
-    for (std::size_t i = 0; i < free_.size(); ++i) {
-      angles[free_[i]] = x[index_of(i)];
-    }
-    return angles;
-  }
-
-  VectorXd free_angles() const {
-    VectorXd x(index_of(free_.size()));
-    for (std::size_t i = 0; i < free_.size(); ++i) {
-      x[index_of(i)] = angles_[free_[i]];
-    }
-    return x;
-  }
-
-  VectorXd parameters_at(const VectorXd& x) const {
-    VectorXd values = all_angles(x);
-    for (Index i = 0; i < values.size(); ++i) {
-      values[i] = problem_.unknowns[static_cast<std::size_t>(i)].value_at(values[i]);
-    }
-    return values;
-  }
-
-  struct Evaluation {
-    VectorXd x;
-    VectorXd predictions;
-    VectorXd residuals;
-    MatrixXd jacobian;
-  };
-
-  /// Solved once for each x.
-  const Evaluation& at(const VectorXd& x) {
-    const auto known =
-        std::ranges::find_if(evaluations_, [&](const Evaluation& each) { return each.x == x; });
-    return known != evaluations_.end() ? *known : evaluations_.emplace_back(evaluated(x));
-  }
-
- private:
-  Evaluation evaluated(const VectorXd& x) const {
-    std::vector<VectorXd> points{parameters_at(x)};
-    for (Index i = 0; i < x.size(); ++i) {
-      for (const double side : {-1.0, 1.0}) {
-        VectorXd disturbed = x;
-        disturbed[i] += side * kDifference;
-        points.push_back(parameters_at(disturbed));
-      }
-    }
-    const auto predictions = problem_.evaluate(points, what_);
-    Evaluation evaluation{
-        x, predictions.front(), {}, MatrixXd(predictions.front().size(), x.size())};
-    const VectorXd& here = evaluation.predictions;
-    evaluation.residuals =
-        ((here - problem_.measured).array() / problem_.sd.array()).unaryExpr([](double r) {
-          return std::isfinite(r) ? r : kMissing;
-        });
-    for (Index i = 0; i < x.size(); ++i) {
-      const VectorXd& below = predictions[static_cast<std::size_t>(2 * i + 1)];
-      const VectorXd& above = predictions[static_cast<std::size_t>(2 * i + 2)];
-      for (Index row = 0; row < here.size(); ++row) {
-        const double sd = problem_.sd[row];
-        evaluation.jacobian(row, i) =
-            derivative((here[row] - below[row]) / sd, (above[row] - here[row]) / sd);
-      }
-    }
-    return evaluation;
-  }
-
-  /// The central difference of the steps below and above; that of one side where the other is
-  /// missing, or where outputs jump between the two, as with the sequence of states; 0 without any.
-  static double derivative(double below, double above) {
-    constexpr double kJump = 0.1;  // [standard deviations]
-    constexpr double kTimes = 5.0;
-    if (!std::isfinite(below) || !std::isfinite(above)) {
-      const double known = std::isfinite(below) ? below : above;
-      return std::isfinite(known) ? known / kDifference : 0.0;
-    }
-    const double least = std::abs(below) < std::abs(above) ? below : above;
-    const double largest = std::max(std::abs(below), std::abs(above));
-    if (std::abs(above - below) > kJump && largest > kTimes * std::abs(least)) {
-      return least / kDifference;
-    }
-    return (above + below) / (2.0 * kDifference);
-  }
-
-  const FitProblem& problem_;
-  VectorXd angles_;
-  std::vector<Index> free_;
-  std::string what_;
-  std::vector<Evaluation> evaluations_;
+  const FitProblem& problem;
+  std::string what{"start"};
+  FitStep last;
 };
-
-/// By how much the linearised model lets chi2 fall: the squared length of the residuals' projection
-/// on the columns of the Jacobian.
-double predicted_fall(const MatrixXd& jacobian, const VectorXd& residuals) {
-  const Eigen::ColPivHouseholderQR<MatrixXd> qr(jacobian);
-  const VectorXd rotated = qr.householderQ().adjoint() * residuals;
-  return rotated.head(qr.rank()).squaredNorm();
-}
-
-VectorXd start_angles(const FitProblem& problem) {
-  VectorXd angles(index_of(problem.unknowns.size()));
-  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
-    angles[index_of(i)] = problem.unknowns[i].angle_of(problem.unknowns[i].start);
-  }
-  return angles;
-}
-
-[[noreturn]] void throw_missing(const FitProblem& problem, const FitStep& step) {
-  std::string values;
-  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
-    values += fmt::format("{}{} = {}", i == 0 ? "" : ", ", problem.unknowns[i].name,
-                          readable_number(step.parameters[index_of(i)]));
-  }
-  for (Index i = 0; i < step.predictions.size(); ++i) {
-    if (!std::isfinite(step.predictions[i])) {
-      throw solver::SolveError(
-          fmt::format("{}: the model has no such output with {}; start from other values",
-                      problem.names[static_cast<std::size_t>(i)], values));
-    }
-  }
-  throw solver::SolveError("predictions are missing with " + values);
-}
-
-/// When a minimisation ends.
-struct Stop {
-  double tolerance;           ///< of the predicted fall of chi2
-  double relative_tolerance;  ///< of chi2
-  int most_trials;            ///< of steps, refused ones included
-  bool may_run_out = false;   ///< of trials; else that is an error
-};
-constexpr Stop kAtMinimum{1e-6, 1e-9, 200};
-/// In a profile, where chi2 is 3.84 above the minimum and matters to 1e-3.
-constexpr Stop kInProfile{1e-3, 1e-4, 12, true};
-
-/// Minimises over the angles of the unknowns in `free`, from `angles`, which fix the others.
-FitStep minimise_over(const FitProblem& problem, const VectorXd& angles,
-                      const std::vector<Index>& free, const Stop& stop, const std::string& what,
-                      const std::function<void(const FitStep&)>& after_each) {
-  Residuals residuals(problem, angles, free);
-  VectorXd x = residuals.free_angles();
-  residuals.describe(what.empty() ? "start" : what);
-  const auto step_at = [&](int iteration) {
-    const auto& here = residuals.at(x);
-    return FitStep{iteration,        residuals.all_angles(x), residuals.parameters_at(x),
-                   here.predictions, here.jacobian,           here.residuals.squaredNorm()};
-  };
-  FitStep step = step_at(0);
-  if (!step.predictions.allFinite()) {
-    throw_missing(problem, step);
-  }
-  const auto report = [&] {
-    if (after_each) {
-      after_each(step);
-    }
-  };
-  report();
-  if (free.empty()) {
-    return step;
-  }
-  Eigen::LevenbergMarquardt<Residuals> method(residuals);
-  method.setFactor(kFirstStep);
-  method.setExternalScaling(true);
-  method.diag() = VectorXd::Ones(x.size());
-  method.setXtol(1e-7);
-  method.setFtol(stop.relative_tolerance);
-  method.setMaxfev(stop.most_trials);
-  auto status = method.minimizeInit(x);
-  while ((status == Eigen::LevenbergMarquardtSpace::NotStarted ||
-          status == Eigen::LevenbergMarquardtSpace::Running) &&
-         predicted_fall(step.jacobian, residuals.at(x).residuals) > stop.tolerance) {
-    residuals.describe(fmt::format("{}iteration {}, chi2 = {}", what.empty() ? "" : what + ": ",
-                                   step.iteration + 1, readable_number(step.chi2, 4)));
-    status = method.minimizeOneStep(x);
-    step = step_at(step.iteration + 1);
-    report();
-  }
-  if (status == Eigen::LevenbergMarquardtSpace::TooManyFunctionEvaluation && !stop.may_run_out) {
-    throw solver::SolveError(
-        fmt::format("the fit has found no minimum in {} trials", stop.most_trials));
-  }
-  return step;
-}
-
-std::vector<Index> all_but(std::size_t count, std::optional<Index> fixed = {}) {
-  std::vector<Index> numbers;
-  for (Index i = 0; i < index_of(count); ++i) {
-    if (i != fixed) {
-      numbers.push_back(i);
-    }
-  }
-  return numbers;
-}
-
-/// What the Jacobian at a minimum says.
-struct Information {
-  MatrixXd covariance;  ///< of the angles; 0 for unknowns at a bound and without effect
-  MatrixXd correlation;
-  std::vector<Index> free;  ///< unknowns neither at a bound nor without effect
-  std::vector<std::size_t> without_effect;
-  std::vector<std::vector<std::size_t>> inseparable;
-};
-
-bool is_at_bound(double angle) {
-  return std::abs(std::sin(angle)) < kAtBound;
-}
-
-/// With the columns of J scaled to length 1, J = U S V^T D: covariance D^-1 V S^-2 V^T D^-1. A
-/// singular value at the noise of the differences is a combination that the data leave open, whose
-/// unknowns are the large parts of its vector in V.
-Information information_of(const FitStep& minimum) {
-  Information found;
-  const MatrixXd& jacobian = minimum.jacobian;
-  const Index unknowns = jacobian.cols();
-  found.covariance = MatrixXd::Zero(unknowns, unknowns);
-  found.correlation = MatrixXd::Zero(unknowns, unknowns);
-  for (Index i = 0; i < unknowns; ++i) {
-    if (is_at_bound(minimum.angles[i])) {
-      continue;
-    }
-    if (jacobian.col(i).norm() * pi < kLeastEffect) {
-      found.without_effect.push_back(static_cast<std::size_t>(i));
-    } else {
-      found.free.push_back(i);
-    }
-  }
-  if (found.free.empty()) {
-    return found;
-  }
-  const MatrixXd columns = jacobian(Eigen::all, found.free);
-  const VectorXd lengths = columns.colwise().norm();
-  const Eigen::BDCSVD<MatrixXd> svd(columns * lengths.cwiseInverse().asDiagonal(),
-                                    Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const VectorXd values = svd.singularValues().cwiseMax(kLeastSingularValue / 10.0);
-  for (Index k = 0; k < values.size(); ++k) {
-    if (svd.singularValues()[k] < kLeastSingularValue) {
-      auto& combination = found.inseparable.emplace_back();
-      for (Index i = 0; i < lengths.size(); ++i) {
-        if (std::abs(svd.matrixV()(i, k)) > kLeastPart) {
-          combination.push_back(static_cast<std::size_t>(found.free[static_cast<std::size_t>(i)]));
-        }
-      }
-    }
-  }
-  const MatrixXd half =
-      lengths.cwiseInverse().asDiagonal() * svd.matrixV() * values.cwiseInverse().asDiagonal();
-  const MatrixXd covariance = half * half.transpose();
-  const VectorXd deviations = covariance.diagonal().cwiseSqrt();
-  found.covariance(found.free, found.free) = covariance;
-  found.correlation(found.free, found.free) =
-      deviations.cwiseInverse().asDiagonal() * covariance * deviations.cwiseInverse().asDiagonal();
-  return found;
-}
-
-/// Searches the ends of profile-likelihood intervals. The root of the rise of chi2 over the limit,
-/// f(w) = sqrt((min chi2 with w fixed - chi2) / limit), is 0 at the minimum and 1 at the end, and
-/// linear where the residuals are.
-class Profile {
- public:
-  Profile(const FitProblem& problem, const FitStep& minimum, const Information& information,
-          double limit)
-      : problem_(problem), minimum_(minimum), information_(information), limit_(limit) {}
-
-  /// The angle at which the interval of unknown `j` ends below (`side` -1) or above (1); nothing
-  /// where it goes on to the bound. Ends early when `better_angles` is found.
-  std::optional<double> end(Index j, double side) {
-    constexpr int kMaxSteps = 40;
-    constexpr double kTolerance = 2e-3;        // of f
-    constexpr double kSmallestBracket = 1e-3;  // of the distance to the minimum
-    const double least = minimum_.angles[j];
-    const double bound = side < 0.0 ? pi : 2.0 * pi;
-    if (std::abs(bound - least) < kAtBound) {
-      return {};
-    }
-    inside_ = {least, 0.0, minimum_.angles};
-    outside_.reset();
-    double w = first_step(j, side, bound);
-    double width = HUGE_VAL;
-    for (int step = 0; step < kMaxSteps && better_.size() == 0; ++step) {
-      const Trial trial = tried(j, w, side);
-      if (std::abs(trial.f - 1.0) < kTolerance) {
-        return w;
-      }
-      if (trial.f < 1.0 && w == bound) {
-        return {};
-      }
-      if (trial.f < 1.0) {
-        inside_ = trial;
-      } else {
-        outside_ = trial;
-      }
-      if (!outside_) {
-        const double growth = std::clamp(1.05 / std::max(trial.f, 1e-3), 1.1, 3.0);
-        w = least + side * std::min(growth * std::abs(w - least), std::abs(bound - least));
-        continue;
-      }
-      const double last_width = std::exchange(width, outside_->w - inside_.w);
-      if (std::abs(width) < kSmallestBracket * std::abs(outside_->w - least)) {
-        return inside_.w;
-      }
-      // By halves where the straight line between the ends does not halve the bracket: f has a
-      // step.
-      const bool is_slow = std::abs(width) > std::abs(last_width) / 2.0;
-      const double part = (1.0 - inside_.f) / (outside_->f - inside_.f);
-      w = inside_.w + (is_slow ? 0.5 : std::clamp(part, 0.05, 0.95)) * width;
-    }
-    return inside_.w;
-  }
-
-  /// A point of smaller chi2 than the minimum, if one was found; else empty.
-  const VectorXd& better_angles() const { return better_; }
-
- private:
-  struct Trial {
-    double w;
-    double f;
-    VectorXd angles;
-  };
-
-  double first_step(Index j, double side, double bound) const {
-    constexpr double kWithoutVariance = 0.3;
-    const double variance = information_.covariance(j, j);
-    const double step = variance > 0.0 ? std::sqrt(limit_ * variance) : kWithoutVariance;
-    return minimum_.angles[j] + side * std::min(step, std::abs(bound - minimum_.angles[j]));
-  }
-
-  /// The least chi2 with unknown `j` at `w`, from where the linearised model has the others.
-  Trial tried(Index j, double w, double side) {
-    VectorXd angles = inside_.angles;
-    if (const double variance = information_.covariance(j, j); variance > 0.0) {
-      angles += information_.covariance.col(j) / variance * (w - inside_.w);
-    }
-    angles = angles.cwiseMax(pi + kAtBound).cwiseMin(2.0 * pi - kAtBound);
-    angles[j] = w;
-    const auto& name = problem_.unknowns[static_cast<std::size_t>(j)].name;
-    try {
-      const FitStep step = minimise_over(
-          problem_, angles, all_but(problem_.unknowns.size(), j), kInProfile,
-          fmt::format("interval of {}, {} end", name, side < 0.0 ? "lower" : "upper"), {});
-      const double rise = step.chi2 - minimum_.chi2;
-      if (rise < -kSmallerChi2 - 0.01 * limit_) {
-        better_ = step.angles;
-      }
-      return {w, std::sqrt(std::max(rise, 0.0) / limit_), step.angles};
-    } catch (const solver::SolveError&) {
-      // There the model lacks an output that was measured.
-      return {w, std::numeric_limits<double>::infinity(), angles};
-    }
-  }
-
-  const FitProblem& problem_;
-  const FitStep& minimum_;
-  const Information& information_;
-  double limit_;
-  Trial inside_{};
-  std::optional<Trial> outside_;
-  VectorXd better_;
-};
-
-bool is_in(const std::vector<std::vector<std::size_t>>& sets, std::size_t number) {
-  return std::ranges::any_of(
-      sets, [number](const auto& set) { return std::ranges::find(set, number) != set.end(); });
-}
-
-/// Values, deviations and correlations at a minimum, still without intervals.
-Fit fit_at(const FitProblem& problem, FitStep minimum, const Information& information,
-           bool is_scaled) {
-  Fit fit;
-  fit.degrees_of_freedom =
-      static_cast<std::size_t>(problem.measured.size()) - problem.unknowns.size();
-  fit.scale = is_scaled ? minimum.chi2 / static_cast<double>(fit.degrees_of_freedom) : 1.0;
-  fit.correlation = information.correlation;
-  fit.without_effect = information.without_effect;
-  fit.inseparable = information.inseparable;
-  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
-    const double angle = minimum.angles[index_of(i)];
-    auto& estimate = fit.estimates.emplace_back();
-    estimate.value = minimum.parameters[index_of(i)];
-    estimate.is_at_bound = is_at_bound(angle);
-    const double variance = information.covariance(index_of(i), index_of(i)) * fit.scale;
-    if (variance > 0.0 && !is_in(fit.inseparable, i)) {
-      estimate.sd = std::abs(problem.unknowns[i].slope_at(angle)) * std::sqrt(variance);
-    }
-    for (std::size_t j = 0; j < i; ++j) {
-      if (std::abs(fit.correlation(index_of(i), index_of(j))) > kLargestCorrelation &&
-          !(is_in(fit.inseparable, i) && is_in(fit.inseparable, j))) {
-        fit.correlated.emplace_back(j, i);
-      }
-    }
-  }
-  fit.minimum = std::move(minimum);
-  return fit;
-}
-
-/// Fills in the intervals. Returns false, with the angles from which to start again, when a smaller
-/// chi2 was found.
-bool add_intervals(const FitProblem& problem, const Information& information, Fit& fit,
-                   VectorXd& angles) {
-  Profile profile(problem, fit.minimum, information, kChi2Quantile * fit.scale);
-  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
-    const auto end = [&](double side) -> std::optional<double> {
-      const auto angle = profile.end(index_of(i), side);
-      return angle ? std::optional(problem.unknowns[i].value_at(*angle)) : std::nullopt;
-    };
-    fit.estimates[i].lower = end(-1.0);
-    fit.estimates[i].upper = end(1.0);
-    if (profile.better_angles().size() > 0) {
-      angles = profile.better_angles();
-      return false;
-    }
-  }
-  return true;
-}
 
 }  // namespace
 
 FitStep minimise(const FitProblem& problem, double tolerance,
                  const std::function<void(const FitStep&)>& after_each) {
+  namespace Space = Eigen::LevenbergMarquardtSpace;
+  constexpr int kMostTrials = 200;
   problem.check();
-  Stop stop = kAtMinimum;
-  stop.tolerance = tolerance;
-  return minimise_over(problem, start_angles(problem), all_but(problem.unknowns.size()), stop, "",
-                       after_each);
+  VectorXd angles(index_of(problem.unknowns.size()));
+  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
+    angles[index_of(i)] = problem.unknowns[i].angle_of(problem.unknowns[i].start);
+  }
+  Residuals residuals(problem);
+  Eigen::LevenbergMarquardt<Residuals> method(residuals);
+  method.setFactor(0.1);  // the first step is at most this part of the vector of angles
+  method.setExternalScaling(true);
+  method.diag() = VectorXd::Ones(angles.size());
+  method.setXtol(1e-7);
+  method.setFtol(1e-9);
+  method.setMaxfev(kMostTrials);
+  auto status = method.minimizeInit(angles);
+  FitStep step = residuals.last;
+  for (Index i = 0; i < step.predictions.size(); ++i) {
+    if (!std::isfinite(step.predictions[i])) {
+      throw solver::SolveError(problem.names[static_cast<std::size_t>(i)] +
+                               ": the model has no such output at the start; give other starts");
+    }
+  }
+  after_each(step);
+  while ((status == Space::NotStarted || status == Space::Running) &&
+         predicted_fall(step.jacobian, step.residuals, newton_step(step.jacobian, step.residuals)) >
+             tolerance) {
+    residuals.what = fmt::format("iteration {}, chi2 = {}", step.iteration + 1,
+                                 solver::readable_number(step.chi2, 4));
+    status = method.minimizeOneStep(angles);
+    if (residuals.last.angles == angles) {  // else the last trial was refused
+      residuals.last.iteration = step.iteration + 1;
+      step = residuals.last;
+      after_each(step);
+    }
+  }
+  if (status == Space::TooManyFunctionEvaluation) {
+    throw solver::SolveError(fmt::format("the fit has found no minimum in {} trials", kMostTrials));
+  }
+  return step;
 }
 
-Fit fit(const FitProblem& problem, bool is_scaled) {
-  constexpr int kMaxStarts = 5;
-  problem.check();
+namespace {
+
+/// Adds the covariance of the angles of the unknowns in `free` and what the data leave open. With
+/// the columns of J scaled to length 1, J = U S V^T D, it is D^-1 V S^-2 V^T D^-1. A small singular
+/// value is a combination that the data leave open; its unknowns are the large parts of its vector
+/// in V.
+void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& free, Fit& fit) {
+  constexpr double kUndetermined = 1e-3;     // singular value, from the noise of differences
+  constexpr double kPoorlyDetermined = 0.1;  // as two unknowns with a correlation of 0.99
+  constexpr double kLeastPart = 0.2;         // of a unit vector
+  const MatrixXd columns = fit.minimum.jacobian(Eigen::all, free);
+  const VectorXd shares = columns.colwise().norm().cwiseInverse();
+  const Eigen::BDCSVD<MatrixXd> svd(columns * shares.asDiagonal(),
+                                    Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const VectorXd& values = svd.singularValues();
+  const MatrixXd root = shares.asDiagonal() * svd.matrixV() *
+                        values.cwiseMax(kUndetermined / 10.0).cwiseInverse().asDiagonal();
+  fit.covariance(free, free) = root * root.transpose();
+  for (const std::size_t i : free) {
+    const Index at = index_of(i);
+    const auto value = [&](double change) {
+      return problem.unknowns[i].value_at(fit.minimum.angles[at] + change);
+    };
+    const double slope = (value(kDifference) - value(-kDifference)) / (2.0 * kDifference);
+    fit.unknowns[i].sd = slope * std::sqrt(fit.covariance(at, at) * fit.scale);
+  }
+  for (Index k = 0; k < values.size(); ++k) {
+    if (values[k] >= kPoorlyDetermined) {
+      continue;
+    }
+    auto& [unknowns, is_undetermined] =
+        fit.combinations.emplace_back(Combination{{}, values[k] < kUndetermined});
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      if (std::abs(svd.matrixV()(index_of(i), k)) > kLeastPart) {
+        unknowns.push_back(free[i]);
+        fit.unknowns[free[i]].sd = is_undetermined ? kNaN : fit.unknowns[free[i]].sd;
+      }
+    }
+  }
+}
+
+/// The result at a minimum, without intervals.
+Fit fit_at(const FitProblem& problem, const FitStep& minimum, bool is_scaled) {
+  constexpr double kLeastEffect = 0.1;  // of the whole range [standard deviations]
+  constexpr double kLeastScale = 1e-6;  // exact data: chi2 is the noise of the differences
+  Fit fit;
+  fit.minimum = minimum;
+  fit.unknowns.resize(problem.unknowns.size());
+  fit.covariance = MatrixXd::Zero(minimum.angles.size(), minimum.angles.size());
+  fit.degrees_of_freedom =
+      static_cast<std::size_t>(minimum.jacobian.rows() - minimum.jacobian.cols());
+  if (is_scaled) {
+    fit.scale = std::max(minimum.chi2 / static_cast<double>(fit.degrees_of_freedom), kLeastScale);
+  }
+  std::vector<std::size_t> free;
+  for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
+    auto& unknown = fit.unknowns[i];
+    unknown.estimate.value = minimum.parameters[index_of(i)];
+    unknown.is_at_bound = std::abs(std::sin(minimum.angles[index_of(i)])) < kAtBound;
+    unknown.has_effect = minimum.jacobian.col(index_of(i)).norm() * pi >= kLeastEffect;
+    if (!unknown.is_at_bound && unknown.has_effect) {
+      free.push_back(i);
+    }
+  }
+  if (!free.empty()) {
+    add_covariance(problem, free, fit);
+  }
+  return fit;
+}
+
+/// Searches one end of a profile-likelihood interval, one trial at a time. The root of the rise of
+/// chi2, f(w) = sqrt((least chi2 with the angle w - chi2) / limit), is 0 at the minimum and 1 at
+/// the end, and linear where the residuals are. Trials go outwards until f > 1, then divide the
+/// bracket. Each starts from the linearised model at the last angle with f < 1; steps of Gauss and
+/// Newton in the other angles correct it.
+class IntervalEnd {
+ public:
+  /// `side` is -1 for the lower end, 1 for the upper one.
+  IntervalEnd(const FitStep& minimum, Index unknown, double side, double limit, double variance)
+      : minimum_(minimum),
+        unknown_(unknown),
+        side_(side),
+        limit_(limit),
+        least_(minimum.angles[unknown]),
+        bound_(side < 0.0 ? pi : 2.0 * pi),
+        usual_distance_(std::min(variance > 0.0 ? std::sqrt(limit * variance) : kWithoutVariance,
+                                 std::abs(bound_ - least_))),
+        inside_(minimum),
+        is_open_(std::abs(bound_ - least_) >= kAtBound) {
+    try_at(outwards(usual_distance_ / 2.0));
+  }
+
+  bool is_open() const { return is_open_; }
+  const VectorXd& trial() const { return trial_; }
+  /// The last angle inside the interval; nothing if no angle outside was found.
+  std::optional<double> angle() const {
+    return outside_angle_ ? std::optional(inside_.angles[unknown_]) : std::nullopt;
+  }
+  bool is_cut() const { return is_cut_; }
+
+  void take(const FitStep& step) {
+    constexpr int kMostCorrections = 4;
+    constexpr double kSmallFall = 2e-3;  // of the limit
+    const bool is_better = step.chi2 < best_.chi2 - kSmallFall * limit_;
+    if (step.chi2 < best_.chi2) {
+      best_ = step;
+    }
+    if (is_better && best_.is_complete && corrections_ < kMostCorrections &&
+        correct(best_, kSmallFall * limit_)) {
+      ++corrections_;
+      return;
+    }
+    judge();
+  }
+
+ private:
+  static constexpr double kWithoutVariance = 0.6;
+
+  double outwards(double distance) const {
+    return least_ + side_ * std::min(distance, std::abs(bound_ - least_));
+  }
+
+  /// The next trial, at angle `w` of the unknown.
+  void try_at(double w) {
+    FitStep shifted = inside_;
+    shifted.residuals += inside_.jacobian.col(unknown_) * (w - inside_.angles[unknown_]);
+    shifted.angles[unknown_] = w;
+    trial_ = shifted.angles;
+    correct(shifted, 0.0);
+    best_ = {};
+    best_.chi2 = HUGE_VAL;
+    corrections_ = 0;
+  }
+
+  /// Makes the Gauss-Newton step from `step` in the other angles the next trial. Returns false if
+  /// chi2 would fall by less than `least_fall`.
+  bool correct(const FitStep& step, double least_fall) {
+    constexpr double kLongest = 0.5;
+    MatrixXd others = step.jacobian;
+    others.col(unknown_).setZero();
+    VectorXd delta = newton_step(others, step.residuals);
+    if (predicted_fall(others, step.residuals, delta) < least_fall) {
+      return false;
+    }
+    delta *= std::min(1.0, kLongest / std::max(delta.norm(), kLongest));
+    trial_ = (step.angles + delta).cwiseMax(pi + kAtBound).cwiseMin(2.0 * pi - kAtBound);
+    trial_[unknown_] = step.angles[unknown_];
+    return true;
+  }
+
+  double root_of_rise(double chi2) const {
+    return std::sqrt(std::max(chi2 - minimum_.chi2, 0.0) / limit_);
+  }
+
+  /// Decides on which side of the end the last angle is, and where to go on.
+  void judge() {
+    constexpr double kTolerance = 2e-3;        // of f
+    constexpr double kSmallestBracket = 5e-3;  // of the distance to the minimum, or the usual one
+    constexpr double kJump = 0.1;              // of f, within the smallest bracket
+    const double w = trial_[unknown_];
+    const double f = root_of_rise(best_.chi2);
+    if (f > 1.0) {
+      outside_angle_ = w;
+      outside_f_ = f;
+    } else {
+      inside_ = best_;
+    }
+    const bool is_end = std::abs(f - 1.0) < kTolerance;
+    if (is_end) {
+      inside_.angles[unknown_] = w;
+      outside_angle_ = w;
+    }
+    if (is_end || (f <= 1.0 && std::abs(w - bound_) < 1e-9)) {
+      is_open_ = false;
+      return;
+    }
+    if (!outside_angle_) {
+      try_at(outwards(std::clamp(1.05 / std::max(f, 1e-3), 1.1, 2.0) * std::abs(w - least_)));
+      return;
+    }
+    const double inside_f = root_of_rise(inside_.chi2);
+    const double width = *outside_angle_ - inside_.angles[unknown_];
+    if (std::abs(width) <
+        kSmallestBracket * std::max(std::abs(*outside_angle_ - least_), usual_distance_)) {
+      is_cut_ = outside_f_ - inside_f > kJump;
+      is_open_ = false;
+      return;
+    }
+    // Halves where the straight line between the ends does not halve the bracket: f has a step.
+    const bool is_slow = std::abs(width) > std::exchange(last_width_, std::abs(width)) / 2.0;
+    const double part = is_slow ? 0.5 : (1.0 - inside_f) / (outside_f_ - inside_f);
+    try_at(inside_.angles[unknown_] + std::clamp(part, 0.05, 0.95) * width);
+  }
+
+  const FitStep& minimum_;
+  Index unknown_;
+  double side_;
+  double limit_;
+  double least_;
+  double bound_;
+  double usual_distance_;  ///< of the end, by the covariance
+  FitStep inside_;         ///< best trial at the farthest angle with f < 1
+  std::optional<double> outside_angle_;
+  double outside_f_ = HUGE_VAL;
+  double last_width_ = HUGE_VAL;
+  VectorXd trial_;
+  FitStep best_;
+  int corrections_ = 0;
+  bool is_open_;
+  bool is_cut_ = false;
+};
+
+/// Fills in the intervals, all ends side by side. Returns the step with the least chi2 if that is
+/// below the minimum; with `ends_early` it returns it at once.
+std::optional<FitStep> add_intervals(const FitProblem& problem, bool ends_early, Fit& fit) {
+  constexpr int kMostRounds = 40;
+  constexpr double kSmallerChi2 = 1e-4;  // less is the same minimum
+  const double limit = kChi2Quantile * fit.scale;
+  std::vector<IntervalEnd> ends;
+  for (Index i = 0; i < fit.covariance.rows(); ++i) {
+    ends.emplace_back(fit.minimum, i, -1.0, limit, fit.covariance(i, i));
+    ends.emplace_back(fit.minimum, i, 1.0, limit, fit.covariance(i, i));
+  }
+  std::optional<FitStep> better;
+  double least = fit.minimum.chi2 - kSmallerChi2 - 0.01 * limit;
+  for (int round = 1; round <= kMostRounds && !(ends_early && better); ++round) {
+    std::vector<IntervalEnd*> open;
+    std::vector<VectorXd> places;
+    for (IntervalEnd& end : ends) {
+      if (end.is_open()) {
+        open.push_back(&end);
+        places.push_back(end.trial());
+      }
+    }
+    if (open.empty()) {
+      break;
+    }
+    const auto steps = steps_at(
+        problem, places, fmt::format("intervals, round {}: {} ends open", round, open.size()));
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      open[i]->take(steps[i]);
+      if (steps[i].chi2 < least) {
+        least = steps[i].chi2;
+        better = steps[i];
+      }
+    }
+  }
+  for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
+    const auto value = [&](const IntervalEnd& end) {
+      return end.angle() ? problem.unknowns[i].value_at(*end.angle()) : kNaN;
+    };
+    auto& unknown = fit.unknowns[i];
+    unknown.estimate.from = value(ends[2 * i]);
+    unknown.estimate.to = value(ends[2 * i + 1]);
+    unknown.is_cut = ends[2 * i].is_cut() || ends[2 * i + 1].is_cut();
+  }
+  return better;
+}
+
+}  // namespace
+
+double Fit::correlation(Index i, Index j) const {
+  const double variances = covariance(i, i) * covariance(j, j);
+  return variances > 0.0 ? covariance(i, j) / std::sqrt(variances) : 0.0;
+}
+
+Fit fit(FitProblem problem, bool is_scaled) {
+  constexpr int kMostStarts = 4;
   if (is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");
   }
-  VectorXd angles = start_angles(problem);
   for (int start = 1;; ++start) {
-    const FitStep minimum =
-        minimise_over(problem, angles, all_but(problem.unknowns.size()), kAtMinimum, "", {});
-    const Information information = information_of(minimum);
-    Fit result = fit_at(problem, minimum, information, is_scaled);
-    if (add_intervals(problem, information, result, angles)) {
-      return result;
+    Fit found = fit_at(problem, minimise(problem), is_scaled);
+    const auto better = add_intervals(problem, start < kMostStarts, found);
+    if (!better || start == kMostStarts) {
+      found.has_other_minimum = better.has_value();
+      return found;
     }
-    if (start == kMaxStarts) {
-      throw solver::SolveError(fmt::format(
-          "the fit has found smaller minima {} times: chi2 has many; start from other values",
-          start));
+    for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
+      problem.unknowns[i].start = better->parameters[index_of(i)];
     }
   }
 }

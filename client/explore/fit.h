@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
+
+#include "client/explore/estimate.h"
 
 namespace oblique::client {
 
@@ -16,33 +16,20 @@ struct Unknown {
   std::string name;
   double from;
   double to;
-  double start;  ///< between the bounds and at neither of them
+  double start;  ///< strictly between the bounds
 
-  /// Half way between the bounds: in logarithms where both are positive.
-  static double usual_start(double from, double to);
-
-  /// value(w) = middle + half cos(w), of ln(value) where both bounds are positive. The angle w runs
-  /// from pi (`from`) to 2 pi (`to`), so that no step leaves the bounds.
+  /// share = (1 + cos w) / 2 of the range, in logarithms where both bounds are positive. The angle
+  /// w runs from pi (`from`) to 2 pi (`to`), so that no step leaves the bounds.
   double value_at(double angle) const;
   double angle_of(double value) const;
-  /// d value / d angle.
-  double slope_at(double angle) const;
-
- private:
-  struct Scale {
-    bool is_logarithmic;
-    double middle;
-    double half;
-  };
-  Scale scale() const;
 };
 
 /// What is fitted: predictions f(theta) to measured numbers y with standard deviations sigma, by
 /// the least chi2 = sum r_i^2, r_i = (f_i - y_i) / sigma_i.
 struct FitProblem {
-  /// The predictions of the model for each of the parameter vectors, in the order of `measured`;
-  /// NaN where the model lacks one. `what` describes the round: "iteration 3, chi2 = 12.4". What it
-  /// throws ends the fit and comes out of it.
+  /// Returns the predictions for each parameter vector, in the order of `measured`; NaN where the
+  /// model lacks one. `what` describes the round: "iteration 3, chi2 = 12.4". Exceptions end the
+  /// fit.
   using Evaluate = std::function<std::vector<Eigen::VectorXd>(
       const std::vector<Eigen::VectorXd>& parameters, const std::string& what)>;
 
@@ -52,59 +39,65 @@ struct FitProblem {
   std::vector<std::string> names;  ///< of the measured numbers, for errors: "line 3: fn_peak_N"
   Evaluate evaluate;
 
-  /// Throws solver::InputError for bounds that do not rise, a start that is not between them, a
-  /// standard deviation that is not positive, no unknown and more unknowns than measured numbers.
+  /// Throws solver::InputError for a start that is not between the bounds, no unknown, and more
+  /// unknowns than measured numbers.
   void check() const;
 };
 
-/// Where a minimisation stands.
+/// The model at one parameter vector.
 struct FitStep {
   int iteration = 0;  ///< 0: the start
   Eigen::VectorXd angles;
   Eigen::VectorXd parameters;
   Eigen::VectorXd predictions;
-  Eigen::MatrixXd jacobian;  ///< of the residuals by the angles
+  Eigen::VectorXd residuals;  ///< a missing prediction counts as 1e9
+  Eigen::MatrixXd jacobian;   ///< of the residuals by the angles
   double chi2 = 0.0;
+  bool is_complete = true;  ///< no prediction is missing
 };
 
-/// The least chi2 by Levenberg and Marquardt's method (Eigen's, after MINPACK's lmder) in the
-/// angles of the unknowns, with derivatives by central differences. An iteration is one call of
-/// `evaluate`, with the point and all disturbed ones. Ends when the linearised model predicts that
-/// chi2 falls by less than `tolerance`, or when the method makes no progress. `after_each` is
-/// called with the start and each iteration. Throws solver::InputError as `check`, and
-/// solver::SolveError when predictions are missing at the start, and after 200 trials.
-FitStep minimise(const FitProblem& problem, double tolerance = 1e-6,
-                 const std::function<void(const FitStep&)>& after_each = {});
+/// Minimises chi2 by Levenberg and Marquardt's method (Eigen's, after MINPACK's lmder) in the
+/// angles, with central differences. Each iteration is one call of `evaluate`. Ends when the
+/// linearised model predicts that chi2 falls by less than `tolerance`, or without progress.
+/// `after_each` is called with the start and each iteration. Throws solver::InputError as `check`,
+/// and solver::SolveError for missing predictions at the start and after 200 trials.
+FitStep minimise(
+    const FitProblem& problem, double tolerance = 1e-6,
+    const std::function<void(const FitStep&)>& after_each = [](const FitStep&) {});
 
-/// One fitted parameter.
-struct FittedValue {
-  double value;
-  std::optional<double> sd;  ///< from the covariance; nothing at a bound or if it is undetermined
-  /// Ends of the 95 % profile-likelihood interval; nothing where it goes on to the bound.
-  std::optional<double> lower;
-  std::optional<double> upper;
+/// A fitted parameter; NaN for what the data do not determine.
+struct FittedUnknown {
+  Estimate estimate;  ///< with the profile-likelihood interval; an end is NaN if it is the bound
+  double sd = kNaN;   ///< from the covariance
   bool is_at_bound = false;
+  bool has_effect = true;  ///< on any prediction
+  bool is_cut = false;     ///< an end of the interval is a jump of chi2, or a missing output
+};
+
+/// Unknowns of which the data determine some combinations much worse than others.
+struct Combination {
+  std::vector<std::size_t> unknowns;
+  bool is_undetermined;  ///< completely; else it is only poorly determined
 };
 
 struct Fit {
   FitStep minimum;
-  std::vector<FittedValue> estimates;  ///< in the order of the unknowns
-  Eigen::MatrixXd correlation;         ///< 0 for unknowns at a bound
+  std::vector<FittedUnknown> unknowns;
+  Eigen::MatrixXd covariance;  ///< of the angles; 0 for unknowns at a bound or without effect
   std::size_t degrees_of_freedom = 0;
-  double scale = 1.0;                       ///< by which variances are multiplied
-  std::vector<std::size_t> without_effect;  ///< unknowns that hardly change any prediction
-  /// Sets of unknowns of which the data determine a combination only.
-  std::vector<std::vector<std::size_t>> inseparable;
-  /// Pairs whose correlation is beyond 0.99, of those that are not in such a set.
-  std::vector<std::pair<std::size_t, std::size_t>> correlated;
+  double scale = 1.0;  ///< by which variances are multiplied
+  std::vector<Combination> combinations;
+  bool has_other_minimum = false;  ///< a profile found a smaller chi2 even after three restarts
+
+  double correlation(Eigen::Index i, Eigen::Index j) const;
 };
 
-/// The least chi2 with covariance (J^T J)^-1, what the data cannot determine, and
-/// profile-likelihood intervals: the values of an unknown for which the least chi2 over the others
-/// is at most 3.84 scale above the minimum. When a profile finds a smaller chi2 than the minimum,
-/// the fit starts again from there. With `is_scaled` the standard deviations are known up to one
+/// The least chi2, the covariance (J^T J)^-1 and 95 % profile-likelihood intervals: the values of
+/// an unknown for which the least chi2 over the others is at most 3.84 scale above the minimum. All
+/// ends are searched side by side, in at most 40 calls of `evaluate`. If a profile finds a smaller
+/// chi2, the fit restarts there. With `is_scaled` the standard deviations are known up to one
 /// factor: scale is chi2 / degrees of freedom, which needs more data than unknowns; else it is 1.
-/// Throws as `minimise` does.
-Fit fit(const FitProblem& problem, bool is_scaled = false);
+/// Throws as `minimise`.
+Fit fit(FitProblem problem, bool is_scaled = false);
 
 }  // namespace oblique::client

@@ -1,17 +1,11 @@
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
-#include <memory>
-#include <optional>
-#include <ostream>
-#include <sstream>
+#include <numbers>
 #include <string>
 #include <string_view>
-#include <variant>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -19,14 +13,15 @@
 #include <nlohmann/json.hpp>
 
 #include "client/commands/commands.h"
-#include "client/commands/shared.h"
+#include "client/explore/answer.h"
 #include "client/explore/fit.h"
 #include "client/explore/growing_study.h"
 #include "client/explore/measurements.h"
 #include "client/explore/paper_fit.h"
-#include "client/io/progress.h"
+#include "client/io/console.h"
 #include "client/io/row_output.h"
 #include "client/paper/paper_comparison.h"
+#include "client/plot/figure.h"
 #include "client/study/csv_file.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
@@ -42,142 +37,102 @@
 namespace oblique::client {
 namespace {
 
+using Eigen::Index;
+using Eigen::VectorXd;
 using solver::exact_number;
 using solver::fixed_number;
 using solver::InputError;
 using solver::readable_number;
-using solver::signed_number;
 
 constexpr const char* kFitExamples = R"(Examples:
   oblique fit measured.csv --fit k=1e7:1e8 --fit eta2=1:2 --preset paper
-  oblique fit measured.csv --fit k=1e7:1e8:2.5e7 --sd 1% --e 1      a start; deviations
-  oblique fit measured.csv --fit mu=0.1:1 --sd fn_peak_N=50 --sd duration_s=2% --format json
+  oblique fit measured.csv --fit k=1e7:1e8:2.5e7 --sd 1% --e 1 --out fit.svg
+  oblique fit measured.csv --fit mu=0.1:1 --format json
   oblique fit                             the paper's numbers: A, I, k and eta2
   oblique fit --from paper --elements-per-link 5
 
 measured.csv has a line with the names of its columns and a line for each impact. Columns are H, mu, e
-and model keys, outputs as `oblique columns` calls them, and their standard deviations, as
+and model keys, outputs as `oblique columns` names them, and their standard deviations, as
 fn_peak_N_sd. What has no column is a flag. Intervals are 95 % profile-likelihood intervals.
 Ctrl-C loses nothing: the same command continues.)";
 
-constexpr const char* kMesh = "elements_per_link";
 constexpr const char* kUsualFrom = "printed";
 
 struct FitFlags {
   std::string file;
-  std::vector<std::string> fit;         ///< "k=1e7:1e8", "k=1e7:1e8:5e7"
-  std::vector<std::string> deviations;  ///< of --sd
+  std::vector<std::string> fit;  ///< "k=1e7:1e8", "k=1e7:1e8:5e7"
+  std::string deviation;         ///< of --sd
   bool is_scaled = false;
   PointFlags points;
   ExploreFlags explore;
-  OutputFlags output;
+  AnswerFlags answer;
   std::string from{kUsualFrom};
   bool json = false;
 };
 
 // ---- The paper's numbers ----
 
-const solver::ParameterKey& fitted_key(std::string_view name) {
-  return *solver::find_model_key(name);
-}
-
-std::string heading(std::string_view name) {
-  const auto& key = protocol::axis_key(name);
-  return key.unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, key.unit);
-}
-
-std::string shown(const PaperFitStep& step) {
-  std::string text = fmt::format("iteration {:>2}:", step.iteration);
-  for (const auto name : kFittedKeys) {
-    text += fmt::format("  {} = {}", name, readable_number(fitted_key(name).get(step.model), 5));
-  }
-  text += fmt::format("  rms {} %", fixed_number(step.summary.rms_percent, 3));
-  if (step.summary.missing > 0) {
-    text += fmt::format(" ({} numbers missing)", step.summary.missing);
-  }
-  return text;
-}
-
-double percent_from(double value, double reference) {
-  return 100.0 * (value / reference - 1.0);
-}
-
-void print_end(std::ostream& out, const PaperFitStep& end, const solver::ModelParameters& start) {
-  const solver::ModelParameters preset = solver::preset("paper");
-  protocol::Table table{
-      .columns = {"parameter", "start", "fitted", "preset paper", "difference [%]"}};
-  for (const auto name : kFittedKeys) {
-    const auto& key = fitted_key(name);
-    const double value = key.get(end.model);
-    const double reference = key.get(preset);
-    table.rows.push_back({heading(name), key.get(start), value, reference,
-                          signed_number(percent_from(value, reference), 2)});
-  }
-  print(out, table, Format::kTable);
-  const auto& summary = end.summary;
-  out << fmt::format("\n{} published numbers: rms difference {} %, largest {} %",
-                     end.differences.size(), fixed_number(summary.rms_percent, 2),
-                     fixed_number(summary.largest_percent, 2));
-  if (summary.missing > 0) {
-    out << fmt::format(", {} without ours", summary.missing);
-  }
-  out << fmt::format(" ({} iterations, n = {})\n", end.iteration, end.model.elements_per_link);
-}
-
-void print_json(std::ostream& out, const PaperFitStep& end) {
-  const solver::ModelParameters preset = solver::preset("paper");
-  nlohmann::ordered_json json = {{"elements_per_link", end.model.elements_per_link},
-                                 {"iterations", end.iteration},
-                                 {"published_numbers", end.differences.size()},
-                                 {"missing", end.summary.missing},
-                                 {"rms_percent", end.summary.rms_percent},
-                                 {"largest_percent", end.summary.largest_percent}};
-  for (const auto name : kFittedKeys) {
-    const auto& key = fitted_key(name);
-    const double value = key.get(end.model);
-    json["fitted"][std::string(name)] = value;
-    json["from_preset_percent"][std::string(name)] = percent_from(value, key.get(preset));
-  }
-  out << json.dump(2) << '\n';
-}
-
-PaperFitStep fitted(Console& console, const solver::ModelParameters& start) {
-  std::atomic<int> iteration{0};
-  StatusLine line(console);
-  const auto fitting = line.begin([&] {
-    return fmt::format("iteration {}, falls on {} elements a link", iteration.load(),
-                       start.elements_per_link);
-  });
-  return fit_paper(published_table(), start, [&](const PaperFitStep& step) {
-    line.print(shown(step));
-    iteration = step.iteration + 1;
-  });
-}
-
-int fit_to_paper(const FitFlags& flags, Console& console) {
-  auto points = flags.points;
+/// Takes the mesh from the flags; throws InputError for any other flag of points.
+solver::ModelParameters paper_start(const FitFlags& flags) {
+  constexpr const char* kMesh = "elements_per_link";
+  PointFlags points = flags.points;
   auto start = solver::preset(flags.from);
   start.elements_per_link = solver::preset("paper").elements_per_link;
   if (const auto mesh = points.axes.extract(kMesh); !mesh.empty()) {
     const auto& key = *solver::find_model_key(kMesh);
-    CsvFiles files(".");
-    const auto axis = axis_of_flag(key, mesh.mapped(), protocol::BlockKind::kProduct, files);
-    const double elements = axis.values_size() == 1 ? axis.values(0) : 0.0;
+    const double elements = solver::number_of(mesh.mapped()).value_or(kNaN);
     solver::check_value(key, elements);
     key.set(start, elements);
   }
-  if (points != PointFlags() || !flags.fit.empty() || !flags.deviations.empty()) {
-    throw solver::InputError(
+  if (points != PointFlags() || !flags.fit.empty() || !flags.deviation.empty()) {
+    throw InputError(
         "a fit of measured numbers needs their file: `oblique fit MEASURED.csv --fit ...`; without "
         "one the paper's numbers are fitted, with --from, --elements-per-link and --json alone");
   }
   solver::validate(start);
-  const auto end = fitted(console, start);
-  if (flags.json || flags.output.format == "json") {
-    print_json(console.out(), end);
-  } else {
-    print_end(console.out(), end, start);
+  return start;
+}
+
+Answer answer_of(const PaperFitStep& end, const solver::ModelParameters& start) {
+  const solver::ModelParameters preset = solver::preset("paper");
+  const auto& [counted_numbers, missing, rms_percent, largest_percent, largest] = end.summary;
+  nlohmann::ordered_json json = {{"elements_per_link", end.model.elements_per_link},
+                                 {"iterations", end.iteration},
+                                 {"published_numbers", end.differences.size()},
+                                 {"missing", missing},
+                                 {"rms_percent", rms_percent},
+                                 {"largest_percent", largest_percent}};
+  protocol::Table table{
+      .columns = {"parameter", "start", "fitted", "preset paper", "difference [%]"}};
+  for (const auto name : kFittedKeys) {
+    const auto& key = *solver::find_model_key(name);
+    const double value = key.get(end.model);
+    const double percent = 100.0 * (value / key.get(preset) - 1.0);
+    auto heading = std::string(name) + (key.unit.empty() ? "" : fmt::format(" [{}]", key.unit));
+    table.rows.push_back({std::move(heading), key.get(start), value, key.get(preset),
+                          solver::signed_number(percent, 2)});
+    json["fitted"][std::string(name)] = value;
+    json["from_preset_percent"][std::string(name)] = percent;
   }
+  const auto summary = fmt::format(
+      "{} published numbers: rms difference {} %, largest {} %{} ({} iterations, n = {})\n",
+      end.differences.size(), fixed_number(rms_percent, 2), fixed_number(largest_percent, 2),
+      missing == 0 ? "" : fmt::format(", {} without ours", missing), end.iteration,
+      end.model.elements_per_link);
+  return {.tables = text_of(table) + '\n' + summary, .rows = table, .json = json.dump(2)};
+}
+
+int fit_to_paper(const FitFlags& flags, Console& console) {
+  const auto start = paper_start(flags);
+  const auto end = fit_paper(published_table(), start, [&](const PaperFitStep& step) {
+    std::string text = fmt::format("iteration {:>2}:", step.iteration);
+    for (const auto name : kFittedKeys) {
+      const double value = solver::find_model_key(name)->get(step.model);
+      text += fmt::format("  {} = {}", name, readable_number(value, 5));
+    }
+    console.notes() << text << "  rms " << fixed_number(step.summary.rms_percent, 3) << " %\n";
+  });
+  put_out(console, flags.answer, answer_of(end, start));
   return kDone;
 }
 
@@ -186,28 +141,22 @@ int fit_to_paper(const FitFlags& flags, Console& console) {
 /// Of KEY=FROM:TO or KEY=FROM:TO:START.
 Unknown unknown_of_flag(const std::string& text) {
   const auto equals = std::min(text.find('='), text.size());
-  const auto parts =
-      protocol::split(std::string_view(text).substr(std::min(equals + 1, text.size())), ':');
   std::vector<double> numbers;
-  for (const auto part : parts) {
-    numbers.push_back(solver::number_of(part).value_or(std::numeric_limits<double>::quiet_NaN()));
-  }
-  if (equals == text.size() || parts.size() < 2 || parts.size() > 3 ||
-      !std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); })) {
-    throw InputError(fmt::format("--fit {}: write KEY=FROM:TO, as k=1e7:1e8, or KEY=FROM:TO:START",
-                                 protocol::excerpt(text)));
+  for (const auto part : protocol::split(std::string_view(text).substr(equals), ':')) {
+    const auto number = part.substr(part.starts_with('=') ? 1 : 0);
+    numbers.push_back(solver::number_of(number).value_or(kNaN));
   }
   try {
+    if (numbers.size() < 2 || numbers.size() > 3) {
+      throw InputError("write KEY=FROM:TO, as k=1e7:1e8, or KEY=FROM:TO:START");
+    }
     const auto& key = protocol::axis_key(text.substr(0, equals));
-    const Unknown unknown{
-        std::string(key.name), numbers[0], numbers[1],
-        numbers.size() == 3 ? numbers[2] : Unknown::usual_start(numbers[0], numbers[1])};
-    solver::check_value(key, unknown.from);
-    solver::check_value(key, unknown.to);
-    constexpr double kSomewhere = 0.381966;
-    if (!key.is_allowed(unknown.from + kSomewhere * (unknown.to - unknown.from))) {
-      throw InputError(fmt::format("{} ({}) takes single values only and cannot be fitted",
-                                   key.name, key.allowed));
+    Unknown unknown{std::string(key.name), numbers[0], numbers[1], numbers.back()};
+    unknown.start = numbers.size() == 3 ? numbers[2] : unknown.value_at(1.5 * std::numbers::pi);
+    constexpr double kSomewhere = 0.381966;  // keys of whole numbers are refused
+    const double between = unknown.from + kSomewhere * (unknown.to - unknown.from);
+    for (const double value : {unknown.from, unknown.to, unknown.start, between}) {
+      solver::check_value(key, value);
     }
     return unknown;
   } catch (const InputError& error) {
@@ -215,46 +164,53 @@ Unknown unknown_of_flag(const std::string& text) {
   }
 }
 
+/// Of 1%; 0 for no text.
+double relative_deviation(std::string_view text) {
+  const auto percent = solver::number_of(text.substr(0, text.find('%')));
+  if (!text.empty() && !(text.ends_with('%') && percent > 0.0 && std::isfinite(*percent))) {
+    throw InputError(fmt::format("--sd {}: write a positive percentage of each value, as 1%",
+                                 protocol::excerpt(text)));
+  }
+  return percent.value_or(0.0) / 100.0;
+}
+
 /// What is fitted, and how its points are made.
 struct MeasuredFit {
-  Measurements measured;
-  std::vector<Unknown> unknowns;
-  solver::ModelParameters model;
-  std::vector<std::string> keys;                  ///< axes behind those of the unknowns
-  std::vector<std::vector<double>> fixed_values;  ///< of these: one a row, or one
+  Measurements measured = {};
+  FitProblem problem = {};
+  solver::ModelParameters model = {};
+  /// Axes besides the unknowns, with a value for each row or one for all.
+  std::vector<std::pair<std::string, std::vector<double>>> conditions = {};
 };
 
-/// Adds H, mu and e of the flags, and the model. Missing ones with a column or among the unknowns
-/// stand in the flags with one value, so that all is checked as flags are.
+/// Adds the model and the conditions. Columns and unknowns join the flags with one of their values,
+/// so that everything is checked as flags are.
 void add_flags(MeasuredFit& fit, PointFlags points, const ReachCheck& check_reach) {
   const auto given = points.axes;
-  const auto add = [&](const std::string& key, double value, const char* where) {
-    if (given.contains(key)) {
-      throw InputError(fmt::format("{} is given twice: as a flag and {}", key, where));
-    }
+  const auto add = [&](const std::string& key, double value) {
     if (!points.axes.emplace(key, exact_number(value)).second) {
-      throw InputError(fmt::format("{} is given twice: as a column or --fit, and {}", key, where));
+      throw InputError(fmt::format(
+          "{} is given twice: it is a flag, a column of the measurements, or --fit", key));
     }
   };
   for (const auto& [key, values] : fit.measured.conditions) {
-    add(key, values.front(), "as a column");
+    add(key, values.front());
   }
-  for (const Unknown& unknown : fit.unknowns) {
-    add(unknown.name, unknown.start, "as --fit");
+  for (const Unknown& unknown : fit.problem.unknowns) {
+    add(unknown.name, unknown.start);
   }
   const auto recipe = recipe_of_flags(points, check_reach);
   fit.model = protocol::from_message(recipe.model());
+  fit.conditions = fit.measured.conditions;
   for (const auto& axis : recipe.blocks(0).axes()) {
-    const std::string& key = axis.key();
     if (axis.values_size() != 1) {
       throw InputError(
-          fmt::format("{} {}: fit takes one value; a column of the measurements takes one for "
-                      "each line",
-                      flag_of_key(key), points.axes[key]));
+          fmt::format("{}: fit takes one value; a column of the measurements has one "
+                      "for each line",
+                      flag_of_key(axis.key())));
     }
-    if (given.contains(key)) {
-      fit.keys.push_back(key);
-      fit.fixed_values.push_back({axis.values(0)});
+    if (given.contains(axis.key())) {
+      fit.conditions.push_back({axis.key(), {axis.values(0)}});
     }
   }
 }
@@ -265,308 +221,231 @@ MeasuredFit measured_fit(const FitFlags& flags, const ReachCheck& check_reach) {
   }
   MeasuredFit fit;
   CsvFiles files(".");
-  fit.measured = read_measurements(files.at(flags.file), flags.deviations);
-  for (const auto& [key, values] : fit.measured.conditions) {
-    fit.keys.push_back(key);
-    fit.fixed_values.push_back(values);
-  }
+  fit.measured = read_measurements(files.at(flags.file), relative_deviation(flags.deviation));
   for (const std::string& text : flags.fit) {
-    fit.unknowns.push_back(unknown_of_flag(text));
+    fit.problem.unknowns.push_back(unknown_of_flag(text));
   }
   add_flags(fit, flags.points, check_reach);
+  const auto& numbers = fit.measured.numbers;
+  fit.problem.measured.resize(static_cast<Index>(numbers.size()));
+  fit.problem.sd = fit.problem.measured;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    fit.problem.measured[static_cast<Index>(i)] = numbers[i].value;
+    fit.problem.sd[static_cast<Index>(i)] = numbers[i].sd;
+    fit.problem.names.push_back(numbers[i].name);
+  }
+  fit.problem.check();
   return fit;
 }
 
-/// All parameter vectors with all rows of measurements: the rows of the first vector come first.
-protocol::Block block_of_points(const MeasuredFit& fit,
-                                const std::vector<Eigen::VectorXd>& points) {
+/// All rows of measurements with each parameter vector.
+protocol::Block block_of(const MeasuredFit& fit, const std::vector<VectorXd>& points) {
   std::vector<std::string> keys;
   std::vector<std::vector<double>> values;
-  for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
-    keys.push_back(fit.unknowns[i].name);
-    auto& column = values.emplace_back();
-    for (const Eigen::VectorXd& point : points) {
-      column.insert(column.end(), fit.measured.rows, point[static_cast<Eigen::Index>(i)]);
+  for (std::size_t i = 0; i < fit.problem.unknowns.size(); ++i) {
+    keys.push_back(fit.problem.unknowns[i].name);
+    values.emplace_back();
+    for (const VectorXd& point : points) {
+      values.back().insert(values.back().end(), fit.measured.rows, point[static_cast<Index>(i)]);
     }
   }
-  for (std::size_t i = 0; i < fit.keys.size(); ++i) {
-    keys.push_back(fit.keys[i]);
-    auto& column = values.emplace_back();
-    for (std::size_t point = 0; point < (fit.fixed_values[i].size() == 1 ? 1 : points.size());
-         ++point) {
-      column.insert(column.end(), fit.fixed_values[i].begin(), fit.fixed_values[i].end());
+  for (const auto& [key, of_rows] : fit.conditions) {
+    keys.push_back(key);
+    values.emplace_back();
+    for (std::size_t point = 0; point < (of_rows.size() == 1 ? 1 : points.size()); ++point) {
+      values.back().insert(values.back().end(), of_rows.begin(), of_rows.end());
     }
   }
   return listed_points(keys, values);
 }
 
-double number_or_nan(const protocol::Value& value) {
-  if (const auto* integer = std::get_if<std::int64_t>(&value)) {
-    return static_cast<double>(*integer);
-  }
-  const auto* real = std::get_if<double>(&value);
-  return real == nullptr ? std::numeric_limits<double>::quiet_NaN() : *real;
-}
-
-/// The measured numbers that rows of results have, in the order of the measurements.
-std::vector<Eigen::VectorXd> predictions_of(const Measurements& measured,
-                                            const protocol::Table& rows) {
-  std::vector<Eigen::VectorXd> predictions;
-  for (std::size_t first = 0; first < rows.rows.size(); first += measured.rows) {
-    auto& prediction = predictions.emplace_back(static_cast<Eigen::Index>(measured.numbers.size()));
-    for (std::size_t i = 0; i < measured.numbers.size(); ++i) {
-      const auto& number = measured.numbers[i];
-      prediction[static_cast<Eigen::Index>(i)] =
-          number_or_nan(rows.rows[first + number.row][number.output]);
+/// The measured numbers among the rows of results of such a block.
+std::vector<VectorXd> predictions_of(const Measurements& measured, const protocol::Table& results) {
+  std::vector<VectorXd> predictions;
+  for (std::size_t first = 0; first < results.rows.size(); first += measured.rows) {
+    auto& prediction = predictions.emplace_back(static_cast<Index>(measured.numbers.size()));
+    Index i = 0;
+    for (const auto& number : measured.numbers) {
+      prediction[i++] = number_of(results.rows[first + number.row][number.output], "MEASURED.csv",
+                                  measured.outputs[number.output]);
     }
   }
   return predictions;
 }
 
-FitProblem problem_of(const MeasuredFit& fit) {
-  FitProblem problem{fit.unknowns, {}, {}, {}, {}};
-  const auto& numbers = fit.measured.numbers;
-  problem.measured.resize(static_cast<Eigen::Index>(numbers.size()));
-  problem.sd.resize(problem.measured.size());
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    problem.measured[static_cast<Eigen::Index>(i)] = numbers[i].value;
-    problem.sd[static_cast<Eigen::Index>(i)] = numbers[i].sd;
-    problem.names.push_back(numbers[i].name);
-  }
-  problem.check();
-  return problem;
-}
-
 /// All that determines the points, for the name of the study.
-std::string settings_of(const MeasuredFit& fit, const FitProblem& problem, bool is_scaled) {
-  Eigen::VectorXd start(static_cast<Eigen::Index>(fit.unknowns.size()));
-  std::string text = protocol::canonical_model(fit.model) + (is_scaled ? " scaled" : "");
-  for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
-    start[static_cast<Eigen::Index>(i)] = fit.unknowns[i].start;
-    text +=
-        fmt::format(" {}:{}", exact_number(fit.unknowns[i].from), exact_number(fit.unknowns[i].to));
+std::string settings_of(const MeasuredFit& fit, const FitFlags& flags) {
+  const auto& [unknowns, measured, sd, names, evaluate] = fit.problem;
+  std::string text =
+      fmt::format("{} {} {} {} {}", protocol::canonical_model(fit.model), flags.is_scaled,
+                  fmt::join(flags.fit, " "), fmt::join(measured.begin(), measured.end(), " "),
+                  fmt::join(sd.begin(), sd.end(), " "));
+  for (const Output& output : fit.measured.outputs) {
+    text += " " + output.name;
   }
-  for (std::size_t i = 0; i < problem.names.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    text += fmt::format(" {} {} {}", problem.names[i], exact_number(problem.measured[at]),
-                        exact_number(problem.sd[at]));
+  for (const auto& [key, values] : fit.conditions) {
+    text += fmt::format(" {} {}", key, fmt::join(values, " "));
   }
-  return text + block_of_points(fit, {start}).SerializeAsString();
+  return text;
 }
 
-// ---- Report ----
-
-/// What is printed of a fit.
-struct Report {
-  const MeasuredFit& fitted;
-  const Fit& fit;
-  const GrowingStudy& study;
-};
-
-protocol::Value value_or_null(const std::optional<double>& value) {
-  return value ? protocol::Value(*value) : protocol::Value();
-}
-
-std::string names_of(const Report& report, const std::vector<std::size_t>& numbers) {
-  std::vector<std::string_view> names;
-  for (const std::size_t number : numbers) {
-    names.push_back(report.fitted.unknowns[number].name);
-  }
-  const auto last = names.back();
-  names.pop_back();
-  return names.empty() ? std::string(last)
-                       : fmt::format("{} and {}", protocol::joined(names), last);
-}
+// ---- Answer ----
 
 /// What the data do not determine, in sentences.
-std::vector<std::string> notes_of(const Report& report) {
+std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fit& fit) {
   std::vector<std::string> notes;
-  const Fit& fit = report.fit;
-  for (const std::size_t number : fit.without_effect) {
-    notes.push_back(fmt::format("{} has no effect on these data.", names_of(report, {number})));
+  for (const auto& [numbers, is_undetermined] : fit.combinations) {
+    std::string names;
+    for (const std::size_t number : numbers) {
+      names += (names.empty() ? "" : " and ") + unknowns[number].name;
+    }
+    notes.push_back(names + (is_undetermined ? " cannot" : " can hardly") +
+                    " be told apart by these data.");
   }
-  for (const auto& set : fit.inseparable) {
-    notes.push_back(
-        set.size() == 1
-            ? names_of(report, set) + " is not determined by these data."
-            : names_of(report, set) +
-                  " cannot be told apart by these data: only a combination of them is determined.");
-  }
-  for (const auto& [a, b] : fit.correlated) {
-    notes.push_back(fmt::format(
-        "{} can hardly be told apart by these data: their correlation is {}.",
-        names_of(report, {a, b}),
-        fixed_number(fit.correlation(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)),
-                     4)));
-  }
-  for (std::size_t i = 0; i < fit.estimates.size(); ++i) {
-    const auto& unknown = report.fitted.unknowns[i];
-    const auto& estimate = fit.estimates[i];
-    if (estimate.is_at_bound) {
-      const bool is_lower = estimate.value - unknown.from < unknown.to - estimate.value;
-      notes.push_back(fmt::format("{} is at its {} bound, {}: wider bounds may fit better.",
-                                  unknown.name, is_lower ? "lower" : "upper",
-                                  exact_number(is_lower ? unknown.from : unknown.to)));
-    } else if (!estimate.lower || !estimate.upper) {
-      notes.push_back(fmt::format("The data give {} no {} end: its interval goes on to the bound.",
-                                  unknown.name,
-                                  estimate.lower   ? "upper"
-                                  : estimate.upper ? "lower"
-                                                   : "lower and no upper"));
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const auto& fitted = fit.unknowns[i];
+    const bool has_ends = !std::isnan(fitted.estimate.from) && !std::isnan(fitted.estimate.to);
+    const auto* const what =
+        !fitted.has_effect   ? "has no effect on these data."
+        : fitted.is_at_bound ? "is at a bound: wider bounds may fit better."
+        : !has_ends          ? "has no interval within its bounds: an end is open."
+        : fitted.is_cut ? "has an interval that ends where an output jumps, or is missing, because "
+                          "the sequence of states changes."
+                        : "";
+    if (*what != '\0') {
+      notes.push_back(fmt::format("{} {}", unknowns[i].name, what));
     }
   }
   const auto degrees = static_cast<double>(fit.degrees_of_freedom);
   if (degrees > 0.0 && fit.minimum.chi2 > degrees + 4.0 * std::sqrt(2.0 * degrees)) {
-    notes.push_back(
-        "chi2 is larger than the deviations explain: they are too small, or the model lacks "
-        "something. "
-        "--scale widens the intervals accordingly.");
+    notes.emplace_back(
+        "chi2 is larger than the deviations explain: they are too small, the model lacks "
+        "something, or another start leads to a lower minimum. --scale widens the intervals.");
+  } else if (fit.has_other_minimum) {
+    notes.emplace_back("chi2 has lower minima: give other starts.");
   }
   return notes;
 }
 
-protocol::Table table_of_unknowns(const Report& report) {
+protocol::Table table_of_unknowns(const std::vector<Unknown>& unknowns, const Fit& fit) {
   protocol::Table table{
       .columns = {"unknown", "unit", "from", "to", "start", "value", "sd", "lower_95", "upper_95"}};
-  for (std::size_t i = 0; i < report.fit.estimates.size(); ++i) {
-    const Unknown& unknown = report.fitted.unknowns[i];
-    const auto& estimate = report.fit.estimates[i];
-    table.rows.push_back({unknown.name, std::string(protocol::axis_key(unknown.name).unit),
-                          unknown.from, unknown.to, unknown.start, estimate.value,
-                          value_or_null(estimate.sd), value_or_null(estimate.lower),
-                          value_or_null(estimate.upper)});
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const auto& [name, from, to, start] = unknowns[i];
+    const auto& [value, lower, upper] = fit.unknowns[i].estimate;
+    table.rows.push_back({name, std::string(protocol::axis_key(name).unit), from, to, start, value,
+                          value_of(fit.unknowns[i].sd), value_of(lower), value_of(upper)});
   }
   return table;
 }
 
-/// The same for reading: the unit in the name, without bounds.
-protocol::Table shown_table_of_unknowns(const Report& report) {
-  protocol::Table table = table_of_unknowns(report);
-  table.columns.erase(table.columns.begin() + 1, table.columns.begin() + 4);
-  for (auto& row : table.rows) {
-    row.front() = heading(std::get<std::string>(row.front()));
-    row.erase(row.begin() + 1, row.begin() + 4);
+protocol::Table table_of_residuals(const Measurements& measured, const FitStep& minimum) {
+  protocol::Table table{.columns = {"row", "output", "measured", "sd", "fitted", "residual_sd"}};
+  for (std::size_t i = 0; i < measured.numbers.size(); ++i) {
+    const auto& number = measured.numbers[i];
+    table.rows.push_back({static_cast<std::int64_t>(number.row + 1),
+                          measured.outputs[number.output].name, number.value, number.sd,
+                          minimum.predictions[static_cast<Index>(i)],
+                          minimum.residuals[static_cast<Index>(i)]});
   }
   return table;
 }
 
-protocol::Table table_of_correlations(const Report& report) {
-  protocol::Table table{.columns = {"correlation"}};
-  for (std::size_t i = 0; i < report.fitted.unknowns.size(); ++i) {
-    table.columns.push_back(report.fitted.unknowns[i].name);
-    auto& row = table.rows.emplace_back();
-    row.emplace_back(report.fitted.unknowns[i].name);
-    for (std::size_t j = 0; j < report.fitted.unknowns.size(); ++j) {
-      row.emplace_back(fixed_number(
-          report.fit.correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)), 3));
+/// For each output its fitted over its measured values, and the residuals of all.
+plot::Figure figure_of(const Measurements& measured, const FitStep& minimum) {
+  using Mark = plot::Curve::Mark;
+  plot::Figure figure{.title = fmt::format("Fit with chi2 = {}", readable_number(minimum.chi2, 4)),
+                      .columns = 2,
+                      .panel_size = {480.0, 360.0}};
+  plot::Panel residuals{.x = {.label = "row"}, .y = {.label = "residual / standard deviation"}};
+  residuals.x.span({1.0, static_cast<double>(measured.rows)}, 0.05);
+  residuals.y.span(
+      {std::min(-2.0, minimum.residuals.minCoeff()), std::max(2.0, minimum.residuals.maxCoeff())},
+      0.05);
+  for (std::size_t output = 0; output < measured.outputs.size(); ++output) {
+    const std::string& name = measured.outputs[output].name;
+    plot::Curve values{.stroke = output, .mark = Mark::kDots};
+    auto& rows = residuals.curves.emplace_back(
+        plot::Curve{.name = name, .stroke = output, .mark = Mark::kDots});
+    for (std::size_t i = 0; i < measured.numbers.size(); ++i) {
+      if (const auto& number = measured.numbers[i]; number.output == output) {
+        values.x.push_back(number.value);
+        values.y.push_back(minimum.predictions[static_cast<Index>(i)]);
+        rows.x.push_back(static_cast<double>(number.row + 1));
+        rows.y.push_back(minimum.residuals[static_cast<Index>(i)]);
+      }
+    }
+    plot::Panel panel{.x = plot::axis_of(name, server::unit_of_column(name)), .has_key = false};
+    panel.x.span(plot::united(plot::range_of(values.x), plot::range_of(values.y)), 0.05);
+    panel.y = panel.x;
+    panel.x.label += ", measured";
+    panel.y.label += ", fitted";
+    const std::vector<double> ends{panel.x.range.from, panel.x.range.to};
+    panel.curves = {{.x = ends, .y = ends, .mark = Mark::kBorder}, std::move(values)};
+    figure.panels.push_back(std::move(panel));
+  }
+  figure.panels.push_back(std::move(residuals));
+  return figure;
+}
+
+Answer answer_of(const MeasuredFit& fitted, const Fit& fit, const GrowingStudy& study) {
+  const auto& unknowns = fitted.problem.unknowns;
+  const auto notes = notes_of(unknowns, fit);
+  const auto table = table_of_unknowns(unknowns, fit);
+  const auto residuals = table_of_residuals(fitted.measured, fit.minimum);
+  const auto json_of_rows = [](const protocol::Table& rows) {
+    return nlohmann::ordered_json::parse(
+        text_of({protocol::chunk_of(rows)}, {.format = Format::kJson}));
+  };
+  nlohmann::ordered_json json{
+      {"study", study.name()},    {"iterations", fit.minimum.iteration},
+      {"rounds", study.rounds()}, {"points", study.points()},
+      {"chi2", fit.minimum.chi2}, {"degrees_of_freedom", fit.degrees_of_freedom},
+      {"scale", fit.scale},       {"unknowns", json_of_rows(table)}};
+  for (Index i = 0; i < fit.covariance.rows(); ++i) {
+    for (Index j = 0; j < fit.covariance.cols(); ++j) {
+      json["correlation"][static_cast<std::size_t>(i)].push_back(fit.correlation(i, j));
     }
   }
-  return table;
-}
-
-protocol::Table table_of_residuals(const Report& report) {
-  protocol::Table table{.columns = {"row", "output", "measured", "sd", "fitted", "residual_sd"}};
-  const auto& numbers = report.fitted.measured.numbers;
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const double fitted = report.fit.minimum.predictions[static_cast<Eigen::Index>(i)];
-    table.rows.push_back({static_cast<std::int64_t>(numbers[i].row + 1),
-                          report.fitted.measured.outputs[numbers[i].output], numbers[i].value,
-                          numbers[i].sd, fitted, (fitted - numbers[i].value) / numbers[i].sd});
-  }
-  return table;
-}
-
-void print_report(std::ostream& out, const Report& report) {
-  const Fit& fit = report.fit;
-  print(out, shown_table_of_unknowns(report), Format::kTable);
-  out << fmt::format("\nchi2 = {} with {}", readable_number(fit.minimum.chi2, 4),
-                     counted(fit.degrees_of_freedom, "degree of freedom", "degrees of freedom"));
-  if (fit.degrees_of_freedom > 0) {
-    out << fmt::format(
-        ", {} each{}",
-        readable_number(fit.minimum.chi2 / static_cast<double>(fit.degrees_of_freedom), 3),
-        fit.scale == 1.0 ? "" : ", by which variances and intervals are scaled");
-  }
-  out << '\n';
-  for (const std::string& note : notes_of(report)) {
-    out << note << '\n';
-  }
-  if (report.fitted.unknowns.size() > 1) {
-    out << '\n';
-    print(out, table_of_correlations(report), Format::kTable);
-  }
-  out << '\n';
-  print(out, table_of_residuals(report), Format::kTable);
-}
-
-nlohmann::ordered_json json_of(const protocol::Table& table) {
-  std::ostringstream text;
-  print(text, table, Format::kJson);
-  return nlohmann::ordered_json::parse(text.str());
-}
-
-nlohmann::ordered_json json_of(const Report& report) {
-  const Fit& fit = report.fit;
-  nlohmann::ordered_json json{{"study", report.study.name()},
-                              {"iterations", fit.minimum.iteration},
-                              {"rounds", report.study.rounds()},
-                              {"points", report.study.points()},
-                              {"chi2", fit.minimum.chi2},
-                              {"degrees_of_freedom", fit.degrees_of_freedom},
-                              {"scale", fit.scale},
-                              {"unknowns", json_of(table_of_unknowns(report))}};
-  for (const auto& row : fit.correlation.rowwise()) {
-    json["correlation"].push_back(std::vector<double>(row.begin(), row.end()));
-  }
-  json["notes"] = notes_of(report);
-  json["residuals"] = json_of(table_of_residuals(report));
-  return json;
-}
-
-void write_report(const FitFlags& flags, const Report& report, Format format) {
-  std::ostringstream text;
-  if (format == Format::kTable) {
-    print_report(text, report);
-  } else if (format == Format::kCsv) {
-    print(text, table_of_unknowns(report), format);
-  } else {
-    text << json_of(report).dump(2) << '\n';
-  }
-  std::unique_ptr<Sink> sink;
-  if (flags.output.file.empty()) {
-    sink = std::make_unique<StandardOutput>(!flags.output.no_pager && format == Format::kTable);
-  } else {
-    sink = std::make_unique<AtomicFile>(flags.output.file);
-  }
-  sink->append(text.str());
-  sink->finish();
+  json["notes"] = notes;
+  json["residuals"] = json_of_rows(residuals);
+  const auto summary =
+      fmt::format("chi2 = {} with {}{}", readable_number(fit.minimum.chi2, 4),
+                  counted(fit.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
+                  fit.scale == 1.0
+                      ? ""
+                      : fmt::format("; variances are scaled by {}", readable_number(fit.scale, 4)));
+  return {.tables = fmt::format("{}\n{}\n{}{}\n{}", text_of(table), summary, fmt::join(notes, "\n"),
+                                notes.empty() ? "" : "\n", text_of(residuals)),
+          .rows = table,
+          .json = json.dump(2),
+          .figure = figure_of(fitted.measured, fit.minimum)};
 }
 
 int fit_to_measurements(const FitFlags& flags, Console& console) {
-  constexpr std::array<std::string_view, 3> kFormats{"table", "csv", "json"};
-  const auto format =
-      format_of_output(flags.json ? "json" : flags.output.format, flags.output.file, kFormats);
   if (flags.from != kUsualFrom) {
     throw InputError("--from is for the fit of the paper's numbers: here --preset is the model");
   }
-  const auto fitted = measured_fit(flags, tip_reach(console));
-  auto problem = problem_of(fitted);
-  const auto name =
-      explored_name(flags.explore, "fit", settings_of(fitted, problem, flags.is_scaled));
+  auto fitted = measured_fit(flags, tip_reach(console));
+  std::string columns;
+  for (const Output& output : fitted.measured.outputs) {
+    columns += (columns.empty() ? "" : ", ") + output.sql;
+  }
+  const auto name = explored_name(flags.explore, "fit", settings_of(fitted, flags));
   return run_exploration(console, [&](protocol::StopSignals& stop) {
     GrowingStudy study(console, flags.explore, name, fitted.model, stop);
-    const std::string columns = fmt::format("{}", fmt::join(fitted.measured.outputs, ", "));
-    problem.evaluate = [&](const std::vector<Eigen::VectorXd>& points, const std::string& what) {
-      return predictions_of(fitted.measured,
-                            study.solve(block_of_points(fitted, points), columns, what));
+    fitted.problem.evaluate = [&](const std::vector<VectorXd>& points, const std::string& what) {
+      return predictions_of(fitted.measured, study.solve(block_of(fitted, points), columns, what));
     };
-    const Fit found = fit(problem, flags.is_scaled);
-    write_report(flags, {fitted, found, study}, format);
+    put_out(console, flags.answer, answer_of(fitted, fit(fitted.problem, flags.is_scaled), study));
     return kDone;
   });
 }
 
-int fit_command(const FitFlags& flags, Console& console) {
+int fit_command(const FitFlags& given, Console& console) {
+  FitFlags flags = given;
+  flags.answer.format = flags.json ? "json" : flags.answer.format;
+  static_cast<void>(choice_of(flags.answer));
   return flags.file.empty() ? fit_to_paper(flags, console) : fit_to_measurements(flags, console);
 }
 
@@ -589,10 +468,9 @@ void add_fit(CLI::App& app, Action& parsed) {
       ->type_name("KEY=FROM:TO[:START]")
       ->take_all();
   command
-      .add_option("--sd", flags.deviations,
-                  "standard deviations that the file lacks: of all outputs, relative, or of one")
-      ->type_name("1%|OUTPUT=VALUE|OUTPUT=1%")
-      ->take_all();
+      .add_option("--sd", flags.deviation,
+                  "standard deviation of the values that have none in the file")
+      ->type_name("PERCENT%");
   command.add_flag(
       "--scale", flags.is_scaled,
       "multiply variances by chi2 / degrees of freedom: the deviations are known up to one factor");
@@ -605,7 +483,7 @@ void add_fit(CLI::App& app, Action& parsed) {
           ->capture_default_str();
   protocol::note_choices(from, solver::preset_names());
   command.add_flag("--json", flags.json, "the same as --format json");
-  add_output_flags(command, flags.output);
+  add_answer_flags(command, flags.answer);
   add_explore_flags(command, flags.explore);
   add_point_flags(command, flags.points, FlagValues::kOne);
 }

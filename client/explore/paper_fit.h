@@ -13,19 +13,18 @@ namespace oblique::client {
 /// Model keys that the paper does not print, or prints rounded, and that are fitted.
 inline constexpr std::array<std::string_view, 4> kFittedKeys{"A", "I", "k", "eta2"};
 
-/// Where a fit to the paper's numbers stands.
+/// One iteration of a fit to the paper's numbers.
 struct PaperFitStep {
-  int iteration;                        ///< 0: the start
-  solver::ModelParameters model;        ///< with the fitted parameters of this iteration
+  int iteration;  ///< 0: the start
+  solver::ModelParameters model;
   std::vector<Difference> differences;  ///< from every published number
   DifferenceSummary summary;
 };
 
-/// Fits the parameters of kFittedKeys, from a third to three times what `start` has, so that the
-/// sum of squared relative differences from all published numbers is least (`minimise`). A
-/// published peak, phase or stick that the model lacks counts as a difference of 100 %.
-/// `after_each` is called with the start and after each iteration. Returns the last step. Throws
-/// SolveError when no minimum is found or a model on the way cannot be solved.
+/// Fits kFittedKeys, from a third to three times the values of `start`, so that the sum of squared
+/// relative differences from the published numbers is least (`minimise`). A number that the model
+/// lacks counts as a difference of 100 %. Returns the last step. Throws solver::SolveError when no
+/// minimum is found or a model on the way cannot be solved.
 PaperFitStep fit_paper(const PublishedTable& published, const solver::ModelParameters& start,
                        const std::function<void(const PaperFitStep&)>& after_each);
 

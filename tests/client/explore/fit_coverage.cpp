@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "client/explore/estimate.h"
 #include "client/explore/fit.h"
 #include "worker/solver/fall_cache.h"
 #include "worker/solver/model/parameters.h"
@@ -18,9 +19,9 @@
 namespace oblique::test {
 namespace {
 
+using client::Estimate;
 using client::Fit;
 using client::FitProblem;
-using client::FittedValue;
 using Eigen::Index;
 using Eigen::VectorXd;
 
@@ -61,9 +62,8 @@ std::vector<VectorXd> peak_forces(const std::vector<VectorXd>& points,
   return predictions;
 }
 
-bool covers(const FittedValue& estimate, double truth) {
-  return (!estimate.lower || *estimate.lower <= truth) &&
-         (!estimate.upper || truth <= *estimate.upper);
+bool covers(const Estimate& estimate, double truth) {
+  return !(estimate.from > truth) && !(truth > estimate.to);
 }
 
 }  // namespace
@@ -90,8 +90,8 @@ Coverage fit_coverage(int fits, std::uint64_t seed,
     }
     const Fit found = client::fit(problem);
     ++coverage.fits;
-    coverage.k += covers(found.estimates[0], truth[0]) ? 1 : 0;
-    coverage.eta2 += covers(found.estimates[1], truth[1]) ? 1 : 0;
+    coverage.k += covers(found.unknowns[0].estimate, truth[0]) ? 1 : 0;
+    coverage.eta2 += covers(found.unknowns[1].estimate, truth[1]) ? 1 : 0;
     if (after_each) {
       after_each(coverage);
     }

@@ -15,13 +15,13 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Pair;
 
-Measurements measured(const std::string& text, const std::vector<std::string>& deviations = {}) {
-  return read_measurements(CsvFile(text, "measured.csv"), deviations);
+Measurements measured(const std::string& text, double relative_sd = 0.0) {
+  return read_measurements(CsvFile(text, "measured.csv"), relative_sd);
 }
 
-std::string objection_to(const std::string& text, const std::vector<std::string>& deviations = {}) {
+std::string objection_to_file(const std::string& text, double relative_sd = 0.0) {
   try {
-    measured(text, deviations);
+    measured(text, relative_sd);
   } catch (const solver::InputError& error) {
     return error.what();
   }
@@ -33,49 +33,42 @@ TEST(Measurements, AreNumbersWithDeviationsUnderTheConditionsOfTheirRow) {
       "H,mu,E_Pa,fn_peak_N,fn_peak_N_sd,duration_s\n"
       "1,0.4,7e10,5058,50,\n"
       "0.9,0.6,6e10,4700,,5e-4\n",
-      {"1%", "duration_s=2e-6"});
+      0.01);
   EXPECT_EQ(found.rows, 2U);
   EXPECT_THAT(found.conditions,
               ElementsAre(Pair("H", ElementsAre(1.0, 0.9)), Pair("mu", ElementsAre(0.4, 0.6)),
                           Pair("E", ElementsAre(7e10, 6e10))));
-  EXPECT_THAT(found.outputs, ElementsAre("fn_peak_N", "duration_s"));
+  ASSERT_EQ(found.outputs.size(), 2U);
+  EXPECT_EQ(found.outputs[1].name, "duration_s");
   ASSERT_EQ(found.numbers.size(), 3U);  // an empty field was not measured
   EXPECT_EQ(found.numbers[0].value, 5058.0);
   EXPECT_EQ(found.numbers[0].sd, 50.0);
   EXPECT_EQ(found.numbers[1].row, 1U);
   EXPECT_DOUBLE_EQ(found.numbers[1].sd, 47.0);  // 1 %, for the file has none
   EXPECT_EQ(found.numbers[2].output, 1U);
-  EXPECT_EQ(found.numbers[2].sd, 2e-6);
+  EXPECT_DOUBLE_EQ(found.numbers[2].sd, 5e-6);
   EXPECT_EQ(found.numbers[2].name, "measured.csv:3: duration_s");
 }
 
 TEST(Measurements, NameWhatIsWrongInAFile) {
-  EXPECT_THAT(objection_to("H,fn_peak\n1,2\n", {"1%"}),
+  EXPECT_THAT(objection_to_file("H,fn_peak\n1,2\n", 0.01),
               HasSubstr("a column `fn_peak` (did you mean `fn_peak_N`?)"));
-  EXPECT_THAT(objection_to("H,mode\n1,2\n", {"1%"}), HasSubstr("a column `mode`"));
+  EXPECT_THAT(objection_to_file("H,mode\n1,2\n", 0.01), HasSubstr("a column `mode`"));
   EXPECT_THAT(
-      objection_to("H,fn_peak_N\n1,2\n"),
+      objection_to_file("H,fn_peak_N\n1,2\n"),
       HasSubstr(
-          "measured.csv:2: fn_peak_N has no standard deviation: fill in the column fn_peak_N_sd"));
-  EXPECT_THAT(objection_to("H,fn_peak_N,fn_peak_N_sd\n1,2,-3\n"),
+          "measured.csv:2: fn_peak_N has the standard deviation 0, which must be positive: fill in "
+          "the column fn_peak_N_sd, or give --sd 1%"));
+  EXPECT_THAT(objection_to_file("H,fn_peak_N,fn_peak_N_sd\n1,2,-3\n"),
               HasSubstr("deviation -3, which must be positive"));
-  EXPECT_THAT(objection_to("H,stick_total_s\n1,0\n", {"1%"}),
-              HasSubstr("give --sd stick_total_s=VALUE for a measured 0"));
-  EXPECT_THAT(objection_to("H,fn_peak_N_sd\n1,2\n"),
-              HasSubstr("fn_peak_N_sd and none called fn_peak_N"));
-  EXPECT_THAT(objection_to("H,mu\n1,2\n"), HasSubstr("no measured output"));
-  EXPECT_THAT(objection_to("H,fn_peak_N\n-1,2\n", {"1%"}), HasSubstr("measured.csv:2: column `H`"));
-  EXPECT_THAT(objection_to("H,fn_peak_N\n1,many\n", {"1%"}), HasSubstr("\"many\" is not a number"));
-}
-
-TEST(Measurements, NameWhatIsWrongInDeviations) {
-  const std::string text = "H,fn_peak_N\n1,5000\n";
-  for (const auto* const wrong : {"50", "fn_peak_N=", "-1%", "fn_peak_N=0", "x%"}) {
-    EXPECT_THAT(objection_to(text, {wrong}),
-                HasSubstr(std::string("--sd ") + wrong + ": write 1% for all"));
-  }
-  EXPECT_THAT(objection_to(text, {"fn_peak=50"}),
-              HasSubstr("no output `fn_peak` (did you mean `fn_peak_N`?)"));
+  EXPECT_THAT(objection_to_file("H,stick_total_s\n1,0\n", 0.01),
+              HasSubstr("fill in the column stick_total_s_sd"));
+  EXPECT_THAT(objection_to_file("H,fn_peak_N_sd\n1,2\n"), HasSubstr("a column `fn_peak_N_sd`"));
+  EXPECT_THAT(objection_to_file("H,mu\n1,2\n"), HasSubstr("no measured output"));
+  EXPECT_THAT(objection_to_file("H,fn_peak_N\n-1,2\n", 0.01),
+              HasSubstr("measured.csv:2: column `H`"));
+  EXPECT_THAT(objection_to_file("H,fn_peak_N\n1,many\n", 0.01),
+              HasSubstr("\"many\" is not a number"));
 }
 
 }  // namespace
