@@ -53,10 +53,10 @@ std::string kind_of(const toml::node& node) {
 }
 
 std::string shown(const toml::node& node) {
-  constexpr std::size_t kMost = 60;
+  constexpr std::size_t kMax = 60;
   const std::string all = element(node, false);
   const std::string line = all.substr(0, all.find('\n'));
-  return line.size() > kMost ? line.substr(0, kMost) + "..." : line;
+  return line.size() > kMax ? line.substr(0, kMax) + "..." : line;
 }
 
 std::string toml_string(std::string_view text) {

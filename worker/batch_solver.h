@@ -19,9 +19,8 @@
 
 namespace oblique::worker {
 
-/// Solves batches, in the order in which they were added, on threads of its own, so that solving
-/// never delays heartbeats. Points that a filter leaves out are reported, not solved. Threads split
-/// each batch into tasks of up to 32 points and lock once a task.
+/// Solves batches, in the order in which they were added, on threads of its own (README.md). Points
+/// that a filter leaves out are reported, not solved.
 class BatchSolver {
  public:
   /// Solves the points that the source gives and passes the outcomes on, in any order. Numbers of
@@ -35,8 +34,6 @@ class BatchSolver {
 
   /// Waits for the points that are being solved.
   ~BatchSolver();
-  BatchSolver(const BatchSolver&) = delete;
-  BatchSolver& operator=(const BatchSolver&) = delete;
 
   void add(Batch batch);
 

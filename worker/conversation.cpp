@@ -29,67 +29,55 @@ void Outbox::add(protocol::Results results) {
   const std::size_t bytes = results.ByteSizeLong();
   results_ += static_cast<std::size_t>(results.results_size());
   bytes_ += bytes;
-  messages_.push_back({std::move(results), bytes, false});
+  messages_.push_back({std::move(results), bytes});
 }
 
 const protocol::Results* Outbox::next_to_send() {
-  if (!has_waiting()) {
+  if (!has_waiting() || on_their_way_ >= limits_.messages_on_their_way) {
     return nullptr;
   }
-  Message& next = messages_[on_their_way_];
-  if (on_their_way_ > 0 && (on_their_way_ >= limits_.messages_on_their_way ||
-                            bytes_on_their_way_ + next.bytes > limits_.bytes_on_their_way)) {
-    return nullptr;
+  return &messages_[on_their_way_++].results;
+}
+
+template <class Predicate>
+void Outbox::remove(const Predicate& is_unwanted) {
+  std::size_t number = 0;
+  while (number < messages_.size()) {
+    const Message& message = messages_[number];
+    if (!is_unwanted(message.results)) {
+      ++number;
+      continue;
+    }
+    results_ -= static_cast<std::size_t>(message.results.results_size());
+    bytes_ -= message.bytes;
+    on_their_way_ -= number < on_their_way_ ? 1U : 0U;
+    messages_.erase(messages_.begin() + static_cast<std::ptrdiff_t>(number));
   }
-  next.is_on_its_way = true;
-  ++on_their_way_;
-  bytes_on_their_way_ += next.bytes;
-  return &next.results;
 }
 
 void Outbox::acknowledged(std::uint64_t sequence) {
-  const auto found = std::find_if(messages_.begin(), messages_.end(), [&](const Message& message) {
-    return message.results.sequence() == sequence;
-  });
-  if (found != messages_.end()) {
-    messages_.erase(found);
-    count();
-  }
+  remove([&](const protocol::Results& results) { return results.sequence() == sequence; });
 }
 
 void Outbox::drop_study(std::uint64_t study_id) {
-  std::erase_if(messages_,
-                [&](const Message& message) { return message.results.study_id() == study_id; });
-  count();
+  remove([&](const protocol::Results& results) { return results.study_id() == study_id; });
 }
 
 void Outbox::drop_all() {
-  messages_.clear();
-  count();
+  remove([](const protocol::Results&) { return true; });
 }
 
 void Outbox::start_over() {
   for (Message& message : messages_) {
     message.results.set_lease_id(0);
     message.results.set_batch_done(false);
-    message.is_on_its_way = false;
   }
-  count();
+  on_their_way_ = 0;
 }
 
 void Outbox::add_leases(std::set<std::uint64_t>& leases) const {
   for (const Message& message : messages_) {
     leases.insert(message.results.lease_id());
-  }
-}
-
-void Outbox::count() {
-  results_ = bytes_ = on_their_way_ = bytes_on_their_way_ = 0;
-  for (const Message& message : messages_) {
-    results_ += static_cast<std::size_t>(message.results.results_size());
-    bytes_ += message.bytes;
-    on_their_way_ += message.is_on_its_way ? 1U : 0U;
-    bytes_on_their_way_ += message.is_on_its_way ? message.bytes : 0U;
   }
 }
 
@@ -179,13 +167,18 @@ Effects Conversation::on_time(std::int64_t now_ms) {
   if (stopping_ && now_ms_ >= stop_deadline_ms_) {
     finish(stop_exit_code_, stop_reason_);
   }
-  finish_if_delivered();
   exit_if_due();
   const bool is_over = now_ms_ >= deadline_ms_;
   if (state_ == State::kGreeting && is_over) {
     // On a slow connection, handshake and hello may take longer than the timeout.
     hello_timeout_ms_ = settings_.hello_timeout.after(hello_timeout_ms_);
-    effects_.emplace_back(ReportUnreachable{});
+    if (!std::exchange(has_warned_, true)) {
+      note(fmt::format(
+               "no server answers at {}; trying again. Is it running there, is this its port "
+               "for workers, and does a firewall let connections through?",
+               server_),
+           true);
+    }
     connect_after_backoff("");
   } else if (state_ == State::kWaiting && is_over) {
     connect("");
@@ -201,10 +194,7 @@ std::int64_t Conversation::next_deadline_ms() const {
   if (state_ == State::kFinished) {
     return kNever_ms;
   }
-  const std::int64_t last_points_ms =
-      outbox_.is_empty() ? std::max(last_points_until_ms_, now_ms_ + 1) : kNever_ms;
-  const std::int64_t stop_ms =
-      stopping_ ? std::min(stop_deadline_ms_, last_points_ms) : std::min(exit_ms(), idle_exit_ms());
+  const std::int64_t stop_ms = stopping_ ? stop_deadline_ms_ : std::min(exit_ms(), idle_exit_ms());
   const std::int64_t heartbeat_ms = state_ == State::kWelcomed ? heartbeat_due_ms_ : kNever_ms;
   return std::min({deadline_ms_, stop_ms, heartbeat_ms});
 }
@@ -282,6 +272,7 @@ void Conversation::on(const protocol::Welcome& welcome) {
   rejected_ms_ = 0;
   rejection_.clear();
   was_welcomed_ = true;
+  has_warned_ = false;
   heartbeat_interval_ms_ = std::clamp<std::int64_t>(welcome.heartbeat_interval_ms(),
                                                     kShortestInterval_ms, kLongestInterval_ms);
   lost_after_ms_ = std::clamp<std::int64_t>(welcome.lost_after_ms(), 2 * heartbeat_interval_ms_,
@@ -496,30 +487,22 @@ Effects Conversation::on_traces(std::vector<protocol::Trace> traces, std::int64_
 
 // ---- The end ------------------------------------------------------------------------------------
 
-Effects Conversation::stop(std::int64_t now_ms, bool is_solving) {
+Effects Conversation::stop(std::int64_t now_ms) {
   now_ms_ = now_ms;
   if (!stopping_) {
     stop_repeats_until_ms_ = now_ms_ + settings_.stop_repeats_ms;
-    begin_stop("stopped", is_solving);
+    begin_stop("stopped");
   } else if (now_ms_ >= stop_repeats_until_ms_) {
     finish(0, "stopped at once");
   }
   return take_effects();
 }
 
-Effects Conversation::on_solver_idle(std::int64_t now_ms) {
-  now_ms_ = now_ms;
-  last_points_until_ms_ = std::min(last_points_until_ms_, now_ms);
-  finish_if_delivered();
-  return take_effects();
-}
-
-void Conversation::begin_stop(const std::string& reason, bool is_solving, int exit_code) {
+void Conversation::begin_stop(const std::string& reason, int exit_code) {
   stopping_ = true;
   stop_reason_ = reason;
   stop_exit_code_ = exit_code;
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
-  last_points_until_ms_ = now_ms_ + (is_solving ? settings_.last_points_ms : 0);
   // The server must not lease points again whose results still wait here.
   if (!outbox_.has_waiting() && !held_.empty()) {
     protocol::WorkerMessage message;
@@ -534,7 +517,7 @@ void Conversation::begin_stop(const std::string& reason, bool is_solving, int ex
 }
 
 void Conversation::finish_if_delivered() {
-  if (stopping_ && outbox_.is_empty() && now_ms_ >= last_points_until_ms_) {
+  if (stopping_ && outbox_.is_empty()) {
     finish(stop_exit_code_, stop_reason_);
   }
 }
@@ -581,13 +564,12 @@ void Conversation::exit_if_due() {
   if (!was_welcomed_) {
     const char* what = rejection_.empty() ? "was never reached" : "never accepted this worker";
     begin_stop(fmt::format("leaving: {} {} in {}", server_, what, seconds_of(now_ms_ - start_ms_)),
-               false, 1);
+               1);
   } else if (is_time) {
-    begin_stop("leaving: --until " + settings_.exit.until, !held_.empty());
+    begin_stop("leaving: --until " + settings_.exit.until);
   } else {
     begin_stop(fmt::format("no work for {}: leaving (--idle-exit)",
-                           seconds_of(settings_.exit.idle_exit_ms)),
-               false);
+                           seconds_of(settings_.exit.idle_exit_ms)));
   }
 }
 

@@ -46,8 +46,6 @@ struct SolveTrace {
 struct CancelTrace {
   std::uint64_t trace_id;
 };
-/// The server did not answer: log why, as far as the socket shows the cause.
-struct ReportUnreachable {};
 /// A line for the log.
 struct Note {
   std::string text;
@@ -60,7 +58,7 @@ struct Finish {
 };
 
 using Effect = std::variant<Connect, Send, Solve, DropStudy, DropBatch, DropAll, SolveTrace,
-                            CancelTrace, ReportUnreachable, Note, Finish>;
+                            CancelTrace, Note, Finish>;
 using Effects = std::vector<Effect>;
 
 // ---- Results until they are acknowledged --------------------------------------------------------
@@ -69,14 +67,12 @@ struct OutboxLimits {
   /// Solving pauses while this many results, or bytes of them, are not acknowledged.
   std::size_t unacknowledged_results = 50'000;
   std::size_t unacknowledged_bytes = std::size_t{64} << 20U;
-  /// Messages and bytes sent and not acknowledged; others wait. This spares a server that was away
-  /// from receiving all results at once.
-  std::size_t messages_on_their_way = 256;
-  std::size_t bytes_on_their_way = std::size_t{8} << 20U;
+  /// Messages sent and not acknowledged; others wait. This spares a server that was away from
+  /// receiving all results at once.
+  std::size_t messages_on_their_way = 128;
 };
 
-/// Results that the server has not acknowledged, in the order of their sequence numbers. Those on
-/// their way come before those that wait.
+/// Results that the server has not acknowledged, in the order of their sequence numbers.
 class Outbox {
  public:
   explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}
@@ -105,16 +101,16 @@ class Outbox {
   struct Message {
     protocol::Results results;
     std::size_t bytes;
-    bool is_on_its_way;
   };
-  void count();
+  /// Removes the messages for which the predicate holds.
+  template <class Predicate>
+  void remove(const Predicate& is_unwanted);
 
   const OutboxLimits limits_;
   std::deque<Message> messages_;
   std::size_t results_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t on_their_way_ = 0;  ///< messages
-  std::size_t bytes_on_their_way_ = 0;
+  std::size_t on_their_way_ = 0;  ///< the first messages
   std::uint64_t next_sequence_ = 1;
 };
 
@@ -150,7 +146,6 @@ struct ConversationSettings {
   Doubling backoff{50, 2000};           ///< pause between failures
   Doubling rejection{2000, 30'000};     ///< pause after the server rejects the socket
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
-  std::int64_t last_points_ms = 250;    ///< part of it, for points under way to end
   /// A request to stop this soon after the first is the same request: Slurm sends SIGTERM twice
   /// within milliseconds to jobs that it preempts.
   std::int64_t stop_repeats_ms = 1000;
@@ -177,13 +172,9 @@ class Conversation {
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
   /// Call it at `next_deadline_ms` or a little later.
   Effects on_time(std::int64_t now_ms);
-  /// Gives back unsolved points, delivers results, says goodbye and finishes. If `is_solving`, it
-  /// also delivers points that end within `last_points_ms`. A second call after `stop_repeats_ms`
-  /// finishes at once.
-  Effects stop(std::int64_t now_ms, bool is_solving = false);
-  /// After a stop: no point is being solved, and all results are reported.
-  Effects on_solver_idle(std::int64_t now_ms);
-  bool is_stopping() const { return stopping_; }
+  /// Gives back unsolved points, delivers results, says goodbye and finishes. A second call after
+  /// `stop_repeats_ms` finishes at once.
+  Effects stop(std::int64_t now_ms);
   /// The state in words, for a service manager.
   std::string status() const;
 
@@ -230,7 +221,7 @@ class Conversation {
   std::int64_t exit_ms() const;
   std::int64_t idle_exit_ms() const;
   void exit_if_due();
-  void begin_stop(const std::string& reason, bool is_solving, int exit_code = 0);
+  void begin_stop(const std::string& reason, int exit_code = 0);
   void finish_if_delivered();
   void finish(int exit_code, const std::string& reason);
   Effects take_effects();
@@ -252,11 +243,11 @@ class Conversation {
   std::int64_t start_ms_ = 0;
   std::int64_t last_work_ms_ = 0;  ///< when it last had a batch, a trace or results to deliver
   bool was_welcomed_ = false;      ///< ever
+  bool has_warned_ = false;        ///< that no server answers; since the last welcome
   bool stopping_ = false;
   std::string stop_reason_;
   int stop_exit_code_ = 0;
   std::int64_t stop_deadline_ms_ = 0;
-  std::int64_t last_points_until_ms_ = 0;
   std::int64_t stop_repeats_until_ms_ = 0;
   bool server_stopping_ = false;
   std::string database_id_;

@@ -39,7 +39,7 @@ namespace {
 using oblique::worker::SessionSettings;
 
 constexpr const char* kProgram = "oblique-worker";
-constexpr std::size_t kMostThreads = 4096;
+constexpr std::size_t kMaxThreads = 4096;
 constexpr double kLongest_s = 1e9;
 
 struct Options {
@@ -170,11 +170,11 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--name", session.name, "Name of the worker in lists; the default is HOST:PROCESS")
       ->type_name("NAME")
       ->check(check_name);
-  session.threads = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostThreads);
+  session.threads = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMaxThreads);
   app.add_option("--threads", session.threads,
                  "Threads that solve points; the default is one for each core")
       ->capture_default_str()
-      ->check(CLI::Range(std::size_t{1}, kMostThreads));
+      ->check(CLI::Range(std::size_t{1}, kMaxThreads));
   app.add_option("--fall-memory", options.fall_memory_bytes,
                  "Memory for solved falls, which points share, as 2GB; the default is an eighth of "
                  "the free memory, or of the container's limit")

@@ -9,7 +9,6 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
-#include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/result_message.h"
 #include "worker/solver/solve.h"
@@ -18,7 +17,6 @@ namespace oblique::worker {
 namespace {
 
 constexpr int kLinger_ms = 500;         ///< for the goodbye to be sent
-constexpr int kLastReports_ms = 10;     ///< between reports of a stopping worker
 constexpr int kMessagesAtATime = 1000;  ///< then the loop does its other work
 
 std::int64_t now_ms() {
@@ -49,20 +47,6 @@ protocol::WorkerHello hello_of(const SessionSettings& settings) {
   return hello;
 }
 
-/// Calls `work` again as long as a signal interrupts it.
-template <class Work>
-auto uninterrupted(const Work& work) {
-  while (true) {
-    try {
-      return work();
-    } catch (const zmq::error_t& error) {
-      if (error.num() != EINTR) {
-        throw;
-      }
-    }
-  }
-}
-
 template <class... Handlers>
 struct Overloaded : Handlers... {
   using Handlers::operator()...;
@@ -87,8 +71,10 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
                                {nullptr, stop_descriptor, ZMQ_POLLIN, 0},
                                {link_->monitor.handle(), 0, ZMQ_POLLIN, 0}};
     const std::int64_t due_ms = std::min(conversation_.next_deadline_ms(), report_due_ms_);
-    const std::chrono::milliseconds timeout(std::max<std::int64_t>(due_ms - now_ms(), 0));
-    uninterrupted([&] { return zmq::poll(items, std::size(items), timeout); });
+    const std::int64_t timeout_ms = std::max<std::int64_t>(due_ms - now_ms(), 0);
+    if (zmq_poll(items, static_cast<int>(std::size(items)), timeout_ms) < 0 && errno != EINTR) {
+      throw zmq::error_t();
+    }
     if (settings_.on_turn) {
       settings_.on_turn(conversation_.status());
     }
@@ -103,11 +89,7 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     if ((items[2].revents & ZMQ_POLLIN) != 0) {
       on_stop();
       report_progress();
-      apply(conversation_.stop(now_ms(), solver_.is_solving()));
-    }
-    if (conversation_.is_stopping() && !solver_.is_solving()) {
-      report_progress();
-      apply(conversation_.on_solver_idle(now_ms()));
+      apply(conversation_.stop(now_ms()));
     }
     apply(conversation_.on_time(now_ms()));
     solver_.set_paused(!conversation_.may_solve());
@@ -132,37 +114,16 @@ void Session::open_socket() {
   protocol::connect(link_->socket, settings, attempt_);
 }
 
-void Session::report_unreachable() {
-  // During one hello, connections that are refused fail more often than this, those that nothing
-  // answers less often.
-  constexpr unsigned kManyAttempts = 4;
-  const auto attempts = link_->monitor.attempts();
-  const std::string host = protocol::host_of(settings_.server);
-  const auto [has_v4, has_v6] = protocol::families_of(host);
-  const std::string cause =
-      attempts.was_accepted
-          ? "connections are accepted, but no worker is welcomed: is this its port for workers?"
-      : !host.empty() && !has_v4 && !has_v6 ? fmt::format("the name {} has no known address", host)
-      : attempts.failed >= kManyAttempts
-          ? "connections fail at once: is it running there?"
-          : "attempts to connect get no answer: does a firewall drop them?";
-  if (reported_causes_.insert(cause).second) {
-    spdlog::warn("no server answers at {} ({}); trying again", settings_.server, cause);
-  }
-}
-
 void Session::report_progress() {
   apply(conversation_.on_progress(solver_.collect(), now_ms()));
   apply(conversation_.on_traces(tracer_.collect(), now_ms()));
-  report_due_ms_ =
-      now_ms() + (conversation_.is_stopping() ? kLastReports_ms : settings_.report_interval_ms);
+  report_due_ms_ = now_ms() + settings_.report_interval_ms;
 }
 
 void Session::receive_all() {
   for (int i = 0; i < kMessagesAtATime && !exit_code_; ++i) {
     zmq::message_t frame;
-    const auto receive = [&] { return link_->socket.recv(frame, zmq::recv_flags::dontwait); };
-    if (!uninterrupted(receive)) {
+    if (!link_->socket.recv(frame, zmq::recv_flags::dontwait)) {
       return;
     }
     protocol::ServerToWorker message;
@@ -171,20 +132,14 @@ void Session::receive_all() {
       continue;
     }
     has_received_ = true;
-    if (message.has_welcome()) {
-      reported_causes_.clear();
-    }
     apply(conversation_.on_message(message, now_ms()));
   }
 }
 
 bool Session::send(const protocol::WorkerMessage& message) {
   const std::string frame = protocol::encode(message);
-  const auto attempt = [&] {
-    return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait);
-  };
   try {
-    return uninterrupted(attempt).has_value();
+    return link_->socket.send(zmq::buffer(frame), zmq::send_flags::dontwait).has_value();
   } catch (const zmq::error_t& error) {
     spdlog::warn("sending failed: {}", error.what());
     return false;
@@ -210,7 +165,6 @@ void Session::apply(Effects effects) {
       },
       [&](const SolveTrace& effect) { tracer_.take(effect.order); },
       [&](const CancelTrace& effect) { tracer_.cancel(effect.trace_id); },
-      [&](const ReportUnreachable&) { report_unreachable(); },
       [&](const Note& note) {
         spdlog::log(note.is_warning ? spdlog::level::warn : spdlog::level::info, "{}", note.text);
       },

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <set>
 #include <string>
 
 #include <zmq.hpp>
@@ -36,9 +35,6 @@ class Session {
  public:
   /// Solves points of batches by `solve` and those of traces by `trace`. Does not connect yet.
   Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace = {});
-  ~Session() = default;
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
 
   /// Runs until the worker is stopped or refused, and returns the exit code. A readable
   /// `stop_descriptor` is a request to stop; `on_stop` must read it, so that a second request can
@@ -52,14 +48,12 @@ class Session {
   /// The socket of the present attempt.
   struct Link {
     Link(zmq::context_t& context, const protocol::DealerSettings& settings)
-        : socket(protocol::make_dealer(context, settings)),
-          monitor(context, socket, settings, true) {}
+        : socket(protocol::make_dealer(context, settings)), monitor(context, socket, settings) {}
     zmq::socket_t socket;
     protocol::SocketMonitor monitor;
   };
 
   void open_socket();
-  void report_unreachable();
   void apply(Effects effects);
   /// False if the socket did not accept the message.
   bool send(const protocol::WorkerMessage& message);
@@ -71,8 +65,7 @@ class Session {
   std::optional<Link> link_;
   unsigned attempt_ = 0;      ///< to connect: selects IPv4 or IPv6 for a host with both
   bool has_received_ = true;  ///< a message, over this socket
-  std::set<std::string> reported_causes_;  ///< why no server answers; since the last welcome
-  protocol::WakeUp news_;                  ///< a batch ended, or a trace is ready
+  protocol::WakeUp news_;     ///< a batch ended, or a trace is ready
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

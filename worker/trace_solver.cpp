@@ -94,7 +94,7 @@ TraceSolver::TraceSolver(Solve solve, std::function<void()> has_trace, std::size
 void TraceSolver::take(const protocol::TraceOrder& order) {
   gather();
   if (running_.valid() || !solve_) {
-    traces_.push_back(not_taken(order.trace_id()));
+    traces_.push_back(declined(order.trace_id()));
     has_trace_();
     return;
   }
@@ -143,7 +143,7 @@ void TraceSolver::gather() {
   if (running_.valid() && !is_solving()) {
     protocol::Trace trace = running_.get();
     if (!is_dropped_) {
-      traces_.push_back(is_cancelled_ ? not_taken(trace_id_) : std::move(trace));
+      traces_.push_back(is_cancelled_ ? declined(trace_id_) : std::move(trace));
     }
   }
 }

@@ -49,13 +49,12 @@ class TraceRows {
   std::vector<Row> rows_;
 };
 
-/// Solves the point of an order with a fall from `falls` and passes its instants to `sink`. Gives
-/// the same bits as in a batch; the result's number is 0. A wrong order gives a failed result.
+/// Solves the point of an order with a fall from `falls` and passes its instants to `sink`. The
+/// result's number is 0. A wrong order gives a failed result.
 protocol::PointResult solve_trace(const protocol::TraceOrder& order,
                                   const solver::Tracing::Sink& sink, solver::FallCache& falls);
 
-/// Solves points for traces, one at a time, on a thread beside those of the batches. Its functions
-/// are called by one thread.
+/// Solves points for traces, one at a time, on a thread beside those of the batches.
 class TraceSolver {
  public:
   /// Solves the point of an order and passes its instants to the sink. Must not throw.

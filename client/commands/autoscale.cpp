@@ -132,8 +132,8 @@ void check_variables(Console& console, const AutoscaleFlags& flags, const std::s
     // It may also be passed by --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=...".
     return is_set(variable) || flags.sbatch_arguments.find(variable) != std::string::npos;
   };
-  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
-  const std::string text = protocol::read_small_file(script, "the script", kMostBytes);
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
+  const std::string text = protocol::read_small_file(script, "the script", kMaxBytes);
   if (text.find(fmt::format("${{{}:?", kServer)) != std::string::npos && !is_given(kServer)) {
     throw solver::InputError(fmt::format(
         "{0} is not set, and {1} needs it: export {0}=tcp://HOST:7601, the server's address for "

@@ -33,7 +33,7 @@ grows with the cube of the number of elements, the time of a fall linearly.)";
 
 constexpr int kCoarsest = 4;
 // Upper limit of --finest. The range of elements_per_link is checked later.
-constexpr int kMostElements = 1024;
+constexpr int kMaxElements = 1024;
 
 struct ConvergeFlags {
   PointFlags points;
@@ -87,11 +87,11 @@ int converge(const ConvergeFlags& flags, Console& console) {
     throw solver::InputError(fmt::format(
         "the flags define {} points, but converge takes one: give one value per flag", points));
   }
-  constexpr int kMostHalvings = 8;
-  if (flags.halvings < 2 || flags.halvings > kMostHalvings) {
+  constexpr int kMaxHalvings = 8;
+  if (flags.halvings < 2 || flags.halvings > kMaxHalvings) {
     throw solver::InputError(fmt::format(
         "--halvings {} is not allowed: it must be from 2 to {}, because an order needs three steps",
-        flags.halvings, kMostHalvings));
+        flags.halvings, kMaxHalvings));
   }
   constexpr int kFinest = 32;
   const auto given = table.point(table.first_passing(0, table.size()));
@@ -135,13 +135,13 @@ void add_converge(CLI::App& app, Action& parsed) {
                   kConvergeExamples, converge);
   command.add_flag("--json", flags.json, "print one JSON object (SI units)");
   command.add_option("--coarsest", flags.coarsest, "elements per link of the coarsest mesh")
-      ->check(CLI::Range(1, kMostElements))
+      ->check(CLI::Range(1, kMaxElements))
       ->type_name("N")
       ->capture_default_str();
   command
       .add_option("--finest", flags.finest,
                   "elements per link of the finest mesh, at least 4 times --coarsest; default: 32")
-      ->check(CLI::Range(1, kMostElements))
+      ->check(CLI::Range(1, kMaxElements))
       ->type_name("N");
   command.add_option("--halvings", flags.halvings, "number of times the step is halved")
       ->type_name("N")

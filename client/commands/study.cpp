@@ -114,14 +114,14 @@ std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::Bl
 
 BlockReport report_of_block(const protocol::PointTable& table, int number,
                             const protocol::PassingPoints& left_in) {
-  constexpr std::uint64_t kMostLooks = 100'000;
+  constexpr std::uint64_t kMaxSearched = 100'000;
   const protocol::Block& block = table.recipe().blocks(number);
   const auto& place = table.block(static_cast<std::size_t>(number));
-  const std::uint64_t end = place.first_point + std::min(kMostLooks, place.points);
+  const std::uint64_t end = place.first_point + std::min(kMaxSearched, place.points);
   const std::uint64_t first = table.first_passing(place.first_point, end);
   return {place, left_in, made_of(block),
           shown_point(table, block, first < end ? first : place.first_point),
-          shown_point(table, block, last_left_in(table, place, kMostLooks))};
+          shown_point(table, block, last_left_in(table, place, kMaxSearched))};
 }
 
 Report report_of(const std::string& name, const protocol::PointTable& table) {

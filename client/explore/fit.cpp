@@ -411,7 +411,7 @@ class Profile {
   /// The angle at which the interval of unknown `j` ends below (`side` -1) or above (1); nothing
   /// where it goes on to the bound. Ends early when `better_angles` is found.
   std::optional<double> end(Index j, double side) {
-    constexpr int kMostSteps = 40;
+    constexpr int kMaxSteps = 40;
     constexpr double kTolerance = 2e-3;        // of f
     constexpr double kSmallestBracket = 1e-3;  // of the distance to the minimum
     const double least = minimum_.angles[j];
@@ -423,7 +423,7 @@ class Profile {
     outside_.reset();
     double w = first_step(j, side, bound);
     double width = HUGE_VAL;
-    for (int step = 0; step < kMostSteps && better_.size() == 0; ++step) {
+    for (int step = 0; step < kMaxSteps && better_.size() == 0; ++step) {
       const Trial trial = tried(j, w, side);
       if (std::abs(trial.f - 1.0) < kTolerance) {
         return w;
@@ -571,7 +571,7 @@ FitStep minimise(const FitProblem& problem, double tolerance,
 }
 
 Fit fit(const FitProblem& problem, bool is_scaled) {
-  constexpr int kMostStarts = 5;
+  constexpr int kMaxStarts = 5;
   problem.check();
   if (is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");
@@ -585,7 +585,7 @@ Fit fit(const FitProblem& problem, bool is_scaled) {
     if (add_intervals(problem, information, result, angles)) {
       return result;
     }
-    if (start == kMostStarts) {
+    if (start == kMaxStarts) {
       throw solver::SolveError(fmt::format(
           "the fit has found smaller minima {} times: chi2 has many; start from other values",
           start));

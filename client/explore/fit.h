@@ -77,7 +77,7 @@ FitStep minimise(const FitProblem& problem, double tolerance = 1e-6,
                  const std::function<void(const FitStep&)>& after_each = {});
 
 /// One fitted parameter.
-struct Estimate {
+struct FittedValue {
   double value;
   std::optional<double> sd;  ///< from the covariance; nothing at a bound or if it is undetermined
   /// Ends of the 95 % profile-likelihood interval; nothing where it goes on to the bound.
@@ -88,8 +88,8 @@ struct Estimate {
 
 struct Fit {
   FitStep minimum;
-  std::vector<Estimate> estimates;  ///< in the order of the unknowns
-  Eigen::MatrixXd correlation;      ///< 0 for unknowns at a bound
+  std::vector<FittedValue> estimates;  ///< in the order of the unknowns
+  Eigen::MatrixXd correlation;         ///< 0 for unknowns at a bound
   std::size_t degrees_of_freedom = 0;
   double scale = 1.0;                       ///< by which variances are multiplied
   std::vector<std::size_t> without_effect;  ///< unknowns that hardly change any prediction

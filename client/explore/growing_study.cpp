@@ -110,7 +110,7 @@ void GrowingStudy::read_stored() {
   }
   stored_ = connection_->describe(name_);
   const bool has_same_model =
-      protocol::canonical_model(protocol::unjudged_from_message(stored_.model())) ==
+      protocol::canonical_model(protocol::from_message_unchecked(stored_.model())) ==
       protocol::canonical_model(protocol::from_message(recipe_.model()));
   if (!has_same_model || stored_.errors()) {
     throw solver::InputError(fmt::format(

@@ -198,9 +198,9 @@ void BorderSearch::refine_all() {
 void BorderSearch::request_sections() {
   // A round costs as much as some hundred points: few brackets are divided into more parts.
   constexpr std::size_t kPointsWorthARound = 1000;
-  constexpr std::uint32_t kMostParts = 16;
+  constexpr std::uint32_t kMaxParts = 16;
   std::uint32_t parts = 2;
-  while (parts < kMostParts && open_brackets_.size() * (2 * parts - 1) < kPointsWorthARound) {
+  while (parts < kMaxParts && open_brackets_.size() * (2 * parts - 1) < kPointsWorthARound) {
     parts *= 2;
   }
   for (const auto& bracket : open_brackets_) {

@@ -165,16 +165,16 @@ std::string map_table(const FoundMap& map) {
   std::ostringstream out;
   print(out, table_of_regions(map), Format::kTable);
   out << '\n';
-  constexpr std::size_t kMostCurves = 40;
+  constexpr std::size_t kMaxCurves = 40;
   auto curves = table_of_curves(map);
   const std::size_t all = curves.rows.size();
-  curves.rows.resize(std::min(all, kMostCurves));
+  curves.rows.resize(std::min(all, kMaxCurves));
   if (all > 0) {
     print(out, curves, Format::kTable);
     out << '\n';
   }
-  if (all > kMostCurves) {
-    out << fmt::format("The {} longest of {} curves; csv and json have all.\n", kMostCurves, all);
+  if (all > kMaxCurves) {
+    out << fmt::format("The {} longest of {} curves; csv and json have all.\n", kMaxCurves, all);
   }
   out << fmt::format(
       "{} vertices, each in a bracket of at most {} of an axis; {} points in {} rounds\n",
@@ -288,11 +288,11 @@ plot::Cells cells_of_regions(const FoundMap& map) {
       axis->values.push_back((axis->edges[i] + axis->edges[i + 1]) / 2.0);
     }
   }
-  constexpr std::size_t kMostCategories = 16;
+  constexpr std::size_t kMaxCategories = 16;
   constexpr double kLeastShare = 1.0 / 400;
   const double all = static_cast<double>(map.grid.cells) * map.grid.cells;
   for (const auto& region : map.regions) {
-    if (cells.categories.size() < kMostCategories && region.cells >= kLeastShare * all) {
+    if (cells.categories.size() < kMaxCategories && region.cells >= kLeastShare * all) {
       cells.categories.push_back({.name = region.name});
     }
   }

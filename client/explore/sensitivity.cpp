@@ -101,12 +101,12 @@ double Sensitivity::half_width() const {
 }
 
 std::vector<double> saltelli_row(std::size_t inputs, std::uint64_t seed, std::uint64_t number) {
-  if (inputs > kMostSobolInputs) {
+  if (inputs > kMaxSobolInputs) {
     throw std::out_of_range("Saltelli's design has too many inputs");
   }
   protocol::Sample sobol;
   sobol.set_kind(protocol::SAMPLE_SOBOL);
-  sobol.set_count(sampling::kMostPoints);
+  sobol.set_count(sampling::kMaxSamples);
   sobol.set_seed(seed);
   std::vector<double> row((inputs + 2) * inputs);
   for (std::size_t i = 0; i < inputs; ++i) {

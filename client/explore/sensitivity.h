@@ -15,13 +15,13 @@ namespace oblique::client {
 
 /// Maximum number of inputs of Saltelli's design, which needs two dimensions of Sobol's sequence
 /// for each.
-inline constexpr std::size_t kMostSobolInputs = sampling::kSobolDimensions / 2;
+inline constexpr std::size_t kMaxSobolInputs = sampling::kSobolDimensions / 2;
 
 /// Row `number` of Saltelli's design for d inputs: the d + 2 points A, B, A_B^1, ..., A_B^d, each
 /// with its d coordinates. A is the first half and B the second half of point `number` of the
 /// scrambled Sobol sequence in 2d dimensions; A_B^i is A with coordinate i of B. A balanced design
 /// has 2^m rows, beginning with row 0: A. B. Owen, On dropping the first Sobol' point (2022).
-/// Throws std::out_of_range for more than kMostSobolInputs.
+/// Throws std::out_of_range for more than kMaxSobolInputs.
 std::vector<double> saltelli_row(std::size_t inputs, std::uint64_t seed, std::uint64_t number);
 
 /// Trajectory `number` of Morris' design for d inputs: d + 1 points, each with its d coordinates.

@@ -134,11 +134,11 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
       });
     }
   }
-  if (problem.is_sobol && problem.inputs.size() > kMostSobolInputs) {
+  if (problem.is_sobol && problem.inputs.size() > kMaxSobolInputs) {
     throw solver::InputError(
         fmt::format("--method sobol allows {} inputs, not {}: find those that matter with --method "
                     "morris, and give the others one value",
-                    kMostSobolInputs, problem.inputs.size()));
+                    kMaxSobolInputs, problem.inputs.size()));
   }
   return problem;
 }
@@ -162,9 +162,9 @@ void note_falls(Console& console, const SensitivityProblem& problem, const proto
 /// intervals are narrow enough or the next round would exceed a limit.
 std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityProblem& problem,
                                           double interval, GrowingStudy& study) {
-  constexpr std::uint64_t kMostPoints = 500'000;
-  constexpr std::uint64_t kMostValues = 1'900'000;  // that the definition of a study can list
-  const std::uint64_t most_points = std::min(kMostPoints, kMostValues / problem.inputs.size());
+  constexpr std::uint64_t kMaxPoints = 500'000;
+  constexpr std::uint64_t kMaxValues = 1'900'000;  // that the definition of a study can list
+  const std::uint64_t max_points = std::min(kMaxPoints, kMaxValues / problem.inputs.size());
   const auto columns = fmt::format("{}", fmt::join(problem.outputs, ", "));
   std::vector<std::vector<double>> values(problem.outputs.size());
   std::string of_rounds;
@@ -191,12 +191,12 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
     if (!problem.is_sobol || half_width <= interval) {
       return found;
     }
-    if (2 * end * (problem.inputs.size() + 2) > most_points) {
+    if (2 * end * (problem.inputs.size() + 2) > max_points) {
       console.note(
           fmt::format("Note: the widest interval is ± {} instead of ± {}: twice as many "
                       "points would be more than {}.",
                       solver::readable_number(half_width, 2), solver::readable_number(interval),
-                      format_count(most_points)));
+                      format_count(max_points)));
       return found;
     }
     // The width falls as the square root of the rows.

@@ -175,15 +175,15 @@ std::string ChildProcess::ending() const {
 }
 
 std::string ChildProcess::last_output() const {
-  constexpr std::size_t kMostBytes = 4000;
-  constexpr int kMostLines = 12;
+  constexpr std::size_t kMaxBytes = 4000;
+  constexpr int kMaxLines = 12;
   const std::size_t bytes = bytes_in(errors_);
-  std::string text = text_in(errors_, bytes - std::min(bytes, kMostBytes));
+  std::string text = text_in(errors_, bytes - std::min(bytes, kMaxBytes));
   while (!text.empty() && text.back() == '\n') {
     text.pop_back();
   }
   std::size_t start = text.size();
-  for (int lines = 0; lines < kMostLines && start != std::string::npos && start > 0; ++lines) {
+  for (int lines = 0; lines < kMaxLines && start != std::string::npos && start > 0; ++lines) {
     start = text.rfind('\n', start - 1);
   }
   return start == std::string::npos || start == 0 ? text : text.substr(start + 1);
@@ -198,7 +198,7 @@ std::string ChildProcess::output(std::size_t most_bytes) const {
 
 std::string output_of(ChildSettings settings, const std::function<bool()>& keep_waiting) {
   constexpr std::chrono::milliseconds kPause{5};
-  constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
+  constexpr std::size_t kMaxBytes = std::size_t{16} << 20U;
   settings.keep_output = true;
   ChildProcess child(settings);
   while (child.is_running()) {
@@ -213,7 +213,7 @@ std::string output_of(ChildSettings settings, const std::function<bool()>& keep_
     throw ProcessError(fmt::format("{} {}{}{}", settings.program.string(), child.ending(),
                                    words.empty() ? "" : ": ", words));
   }
-  return child.output(kMostBytes);
+  return child.output(kMaxBytes);
 }
 
 std::filesystem::path sibling_program(const std::string& name) {

@@ -71,11 +71,11 @@ struct FilePlace {
 };
 
 FilePlace file_place(const std::string& path, std::string_view flag) {
-  constexpr int kMostLinks = 40;  // Linux's own limit
+  constexpr int kMaxLinks = 40;  // Linux's own limit
   FilePlace place{path};
   std::error_code ignored;
   for (int links = 0; fs::is_symlink(fs::symlink_status(place.path, ignored)); ++links) {
-    if (links == kMostLinks) {
+    if (links == kMaxLinks) {
       refuse(flag, path, ELOOP);
     }
     const fs::path link = fs::absolute(place.path);

@@ -250,11 +250,11 @@ Answer read_columns(RowStream& stream) {
         columns[i].add(rows.cell(i));
       }
     }
-    if (!columns.empty() && columns.front().numbers.size() > kMostRows) {
+    if (!columns.empty() && columns.front().numbers.size() > kMaxRows) {
       throw std::runtime_error(
           fmt::format("a picture shows at most {} points, and these are more: select fewer with "
                       "--where or --at",
-                      format_count(kMostRows)));
+                      format_count(kMaxRows)));
     }
     ends = chunk.ends();
   }

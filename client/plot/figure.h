@@ -176,10 +176,10 @@ struct AnswerColumn {
 using Answer = std::vector<AnswerColumn>;
 
 /// Maximum number of rows; a picture of more needs a narrower query.
-inline constexpr std::size_t kMostRows = 20'000'000;
+inline constexpr std::size_t kMaxRows = 20'000'000;
 
 /// Reads all rows of an answer: 8 bytes per value. Throws what the stream throws, and
-/// std::runtime_error for more than kMostRows.
+/// std::runtime_error for more than kMaxRows.
 Answer read_columns(RowStream& stream);
 
 /// Cells around the values of a study, and equal cells for scattered points.

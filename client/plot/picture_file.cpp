@@ -29,7 +29,7 @@ namespace {
 constexpr std::array<std::string_view, 5> kFormats{"svg", "pdf", "png", "gp", "csv"};
 constexpr double kSmallestSide = 240.0;
 constexpr double kLargestSide = 10'000.0;
-constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
+constexpr std::size_t kMaxBytes = std::size_t{256} << 20U;
 constexpr std::chrono::seconds kTimeLimit{120};  // a map of 10^5 cells takes about 2 s
 
 /// NaN becomes NULL, an empty field.
@@ -143,7 +143,7 @@ std::string output_of_gnuplot(const std::string& script) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     // gnuplot returns 0 after some errors, without output.
-    std::string output = gnuplot.output(kMostBytes);
+    std::string output = gnuplot.output(kMaxBytes);
     if (!gnuplot.succeeded() || output.empty()) {
       throw std::runtime_error(
           fmt::format("gnuplot {}: {}", gnuplot.ending(), gnuplot.last_output()));

@@ -39,7 +39,7 @@ void sort_unique(std::vector<double>& values) {
 
 StudyAxis study_axis(const Axis& axis) {
   StudyAxis made{.key = axis.key(), .column = column_of_key(axis.key())};
-  made.is_listed = protocol::has_own_values(axis) && protocol::axis_size(axis) <= kMostListed;
+  made.is_listed = protocol::has_own_values(axis) && protocol::axis_size(axis) <= kMaxListed;
   made.is_logarithmic = axis.count() > 0 && axis.spacing() == protocol::SPACING_LOGARITHMIC;
   for (std::uint64_t i = 0; made.is_listed && i < protocol::axis_size(axis); ++i) {
     made.values.push_back(protocol::axis_value(axis, i));
@@ -230,9 +230,9 @@ std::vector<const StudyAxis*> StudyShape::by_preference() const {
     }
   }
   const auto rank = [](const StudyAxis* axis) {
-    return axis->key == "mu"  ? 3.0 * kMostListed
-           : axis->key == "H" ? 2.0 * kMostListed
-           : !axis->is_listed ? 1.0 * kMostListed
+    return axis->key == "mu"  ? 3.0 * kMaxListed
+           : axis->key == "H" ? 2.0 * kMaxListed
+           : !axis->is_listed ? 1.0 * kMaxListed
                               : static_cast<double>(axis->values.size());
   };
   std::stable_sort(found.begin(), found.end(),

@@ -49,7 +49,7 @@ struct StudyAxis {
   std::string key;     ///< name in study files: "E"
   std::string column;  ///< column in queries: "E_Pa"; an expression for single lengths
   /// The values in the picture, ascending; empty if they are drawn from a distribution, follow from
-  /// other keys, or are more than kMostListed.
+  /// other keys, or are more than kMaxListed.
   std::vector<double> values = {};
   bool is_listed = true;        ///< `values` is complete
   bool is_logarithmic = false;  ///< the range is logarithmic
@@ -59,7 +59,7 @@ struct StudyAxis {
   /// Label in pictures: E_Pa for E, because SQL does not distinguish E and e.
   const std::string& label() const { return key == "E" ? column : key; }
 };
-inline constexpr std::uint64_t kMostListed = 100'000;
+inline constexpr std::uint64_t kMaxListed = 100'000;
 
 /// Structure of a study, as far as pictures need it.
 struct StudyShape {

@@ -23,12 +23,12 @@ namespace {
 using solver::InputError;
 using solver::readable_number;
 
-constexpr std::size_t kMostCellsAlong = 320;  // values of an axis; for more, cells group values
-constexpr std::size_t kMostCategories = 12;   // categories with their own entry
-constexpr std::size_t kMostNamedLines = 8;    // lines; more are coloured by their value
-constexpr std::size_t kMostMarked = 60;       // points of a line with marks
-constexpr std::size_t kMostDots = 4000;       // points; more are grouped in cells
-constexpr std::size_t kMostNames = 16;        // bars of a histogram of texts
+constexpr std::size_t kMaxCellsAlong = 320;  // values of an axis; for more, cells group values
+constexpr std::size_t kMaxCategories = 12;   // categories with their own entry
+constexpr std::size_t kMaxNamedLines = 8;    // lines; more are coloured by their value
+constexpr std::size_t kMaxMarked = 60;       // points of a line with marks
+constexpr std::size_t kMaxDots = 4000;       // points; more are grouped in cells
+constexpr std::size_t kMaxNames = 16;        // bars of a histogram of texts
 
 bool is_drawable(double value, bool is_logarithmic) {
   return std::isfinite(value) && (!is_logarithmic || value > 0.0);
@@ -50,8 +50,8 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   std::stable_sort(categories.begin(), categories.end(),
                    [](const Category& a, const Category& b) { return a.points > b.points; });
   std::size_t kept = categories.size();
-  if (kept > kMostCategories) {
-    kept = kMostCategories;
+  if (kept > kMaxCategories) {
+    kept = kMaxCategories;
     while (kept > 1 && categories[kept - 1].points * 400 < whole) {
       --kept;  // less than 0.25 % is not visible
     }
@@ -82,7 +82,7 @@ Bars bars_of_names(const AnswerColumn& column) {
   }
   std::sort(counts.begin(), counts.end());
   Bars bars;
-  const std::size_t kept = counts.size() <= kMostNames ? counts.size() : kMostNames - 1;
+  const std::size_t kept = counts.size() <= kMaxNames ? counts.size() : kMaxNames - 1;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     if (i <= kept) {
       bars.names.push_back(i < kept ? counts[i].second
@@ -230,7 +230,7 @@ class FigureBuilder {
       std::erase_if(of_study, [&part](double v) { return v < part.from || v > part.to; });
     }
     auto values = axis_values(std::move(of_study), column);
-    return values.size() <= kMostCellsAlong ? values : std::vector<double>();
+    return values.size() <= kMaxCellsAlong ? values : std::vector<double>();
   }
 
   Gathered gather_map(const Answer& answer, const ChosenAxis& x, const ChosenAxis& y) {
@@ -408,9 +408,9 @@ class FigureBuilder {
                         request_.is_y_logarithmic);
     auto gathered = gathered_lines(answer, is_whole_axis ? x.axis->values : std::vector<double>());
     auto& curves = gathered.curves;
-    const bool are_coloured = by && curves.size() > kMostNamedLines;
+    const bool are_coloured = by && curves.size() > kMaxNamedLines;
     const bool has_marks =
-        !are_coloured && !curves.empty() && curves.front().x.size() <= kMostMarked;
+        !are_coloured && !curves.empty() && curves.front().x.size() <= kMaxMarked;
     FigureAxis by_axis = by ? axis_for("--by", *by, answer[2], false) : FigureAxis();
     panel_.by_name = by_axis.name;
     for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -486,7 +486,7 @@ class FigureBuilder {
     const std::string what = fmt::format("{} over {}", y.name, x.name);
     const std::string title =
         has_colour ? fmt::format("{}, coloured by {}", what, colour.name) : what;
-    if (points <= kMostDots) {
+    if (points <= kMaxDots) {
       Curve dots{.x = answer[0].numbers, .y = answer[1].numbers, .mark = Curve::Mark::kDots};
       if (has_colour) {
         dots.colours = answer[2].numbers;

@@ -279,10 +279,10 @@ void EmbeddedService::stop() {
 }
 
 void check_settings(const RunSettings& settings) {
-  constexpr int kMostWorkers = 1024;
-  if (settings.service.workers < 1 || settings.service.workers > kMostWorkers) {
+  constexpr int kMaxWorkers = 1024;
+  if (settings.service.workers < 1 || settings.service.workers > kMaxWorkers) {
     throw solver::InputError(fmt::format("--workers {} is not allowed: it must be from 1 to {}",
-                                         settings.service.workers, kMostWorkers));
+                                         settings.service.workers, kMaxWorkers));
   }
   if (settings.rows < 0) {
     throw solver::InputError(

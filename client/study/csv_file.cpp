@@ -182,13 +182,13 @@ std::string CsvFile::place_of_row(std::size_t row) const {
 }
 
 const CsvFile& CsvFiles::at(const std::string& path) {
-  constexpr std::size_t kMostBytes = std::size_t{64} << 20U;
+  constexpr std::size_t kMaxBytes = std::size_t{64} << 20U;
   const auto known = files_.find(path);
   if (known != files_.end()) {
     return known->second;
   }
   const std::string whole = (folder_ / path).string();
-  const std::string text = protocol::read_small_file(whole, "the CSV file", kMostBytes);
+  const std::string text = protocol::read_small_file(whole, "the CSV file", kMaxBytes);
   return files_.emplace(path, CsvFile(text, whole)).first->second;
 }
 

@@ -322,7 +322,7 @@ void add_point_flags(CLI::App& command, PointFlags& flags, FlagValues values) {
     add(key, group)->default_str(default_of(key));
   }
   command.footer(fmt::format("{}\n\n{}", command.get_footer(), table_of_presets()));
-  for (std::size_t link = 1; link <= protocol::kMostLinks; ++link) {
+  for (std::size_t link = 1; link <= protocol::kMaxLinks; ++link) {
     add(protocol::axis_key(fmt::format("length{}", link)), protocol::kUnlisted);
   }
 }

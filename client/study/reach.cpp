@@ -39,7 +39,7 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
   for (int number = 0; number < blocks.size(); ++number) {
     const auto& place = study.block(static_cast<std::size_t>(number));
     const double H_m = largest_H_m(blocks[number], place.models);
-    const std::uint64_t models = place.models <= kMostFalls ? place.models : 0;
+    const std::uint64_t models = place.models <= kMaxFalls ? place.models : 0;
     for (std::uint64_t i = 0; i < models; ++i) {
       const double drop_m = reached_m(study.model(place.first_model + i), H_m);
       if (H_m > drop_m) {
@@ -69,7 +69,7 @@ double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m)
   auto fall = std::find_if(falls_.begin(), falls_.end(),
                            [&](const Fall& known) { return known.model == falling; });
   if (fall == falls_.end()) {
-    if (falls_.size() >= kMostFalls) {
+    if (falls_.size() >= kMaxFalls) {
       return H_m;
     }
     fall = falls_.insert(fall, Fall{falling, {}, {}});

@@ -21,14 +21,14 @@ using ReachCheck = std::function<void(const protocol::PointTable& study)>;
 class ReachChecker {
  public:
   /// Maximum number of solved falls, and of models in a checked block.
-  static constexpr std::size_t kMostFalls = 8;
+  static constexpr std::size_t kMaxFalls = 8;
 
   explicit ReachChecker(LargestDrop largest_drop_m);
 
   /// Throws InputError unless every model of a block reaches the block's largest H. Does not check
   /// blocks in which the largest H depends on the point: with expressions, filters, or several
   /// models in a zip or sample. Only an H near the length of the finger costs a fall, first on a
-  /// coarse mesh and then, if that is not clear, on the model's own. Beyond `kMostFalls`, points
+  /// coarse mesh and then, if that is not clear, on the model's own. Beyond `kMaxFalls`, points
   /// with an H that is not reached fail when they are solved.
   void operator()(const protocol::PointTable& study);
 

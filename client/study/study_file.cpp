@@ -432,8 +432,8 @@ Study read_study_file(const std::filesystem::path& path, const ReachCheck& check
                                      : ""));
   }
   // A recipe has at most 4 MiB. A number takes 8 bytes in it and up to 25 in a file.
-  constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
-  return parse_study(protocol::read_small_file(path.string(), "the study file", kMostBytes),
+  constexpr std::size_t kMaxBytes = std::size_t{16} << 20U;
+  return parse_study(protocol::read_small_file(path.string(), "the study file", kMaxBytes),
                      path.string(), check_reach);
 }
 

@@ -123,7 +123,7 @@ std::optional<CurveKey> parse_z85(std::string_view text) {
 
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
 constexpr mode_t kOwnersAlone = 0600;
 using Fields = std::span<const std::string_view>;
 constexpr std::array<std::string_view, 5> kFileFields{"role", "name", "public", "secret", "server"};
@@ -259,7 +259,7 @@ KeyFile read_key_file(const std::string& path) {
     refuse_mode(path, is_ours ? S_IRWXG | S_IRWXO : S_IRWXO,
                 "others than its owner can read the secret key in it", is_ours ? "600" : "o=");
   }
-  std::string text = read_small_file(path, "the key file", kMostBytes);
+  std::string text = read_small_file(path, "the key file", kMaxBytes);
   const std::optional<SecretKey> secret = take_secret(text);
   const TomlReader file(path);
   const toml::table top = file.parse(text);
@@ -354,7 +354,7 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
     refuse_mode(folder, S_IWOTH, kRisk, "o-w");
   }
   const TomlReader file(path);
-  const toml::table top = file.parse(read_small_file(path, "the list of keys", kMostBytes));
+  const toml::table top = file.parse(read_small_file(path, "the list of keys", kMaxBytes));
   const KeyFields fields(file, top, kListFields);
   AuthorizedKeys keys;
   if (top.empty()) {

@@ -175,13 +175,13 @@ void Configuration::set_from_environment(std::string& place) const {
 }
 
 void Configuration::set_from_file(std::string& place) const {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
   const std::string path = file_to_read();
   if (path.empty()) {
     return;
   }
   const TomlReader file(path);
-  const toml::table top = file.parse(read_small_file(path, "the configuration file", kMostBytes));
+  const toml::table top = file.parse(read_small_file(path, "the configuration file", kMaxBytes));
   std::vector<std::string_view> known;
   for (const Setting& setting : settings_) {
     known.emplace_back(setting.key);

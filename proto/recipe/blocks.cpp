@@ -50,7 +50,7 @@ const std::vector<ParameterKey>& all_keys() {
     all.insert(all.end(), solver::point_keys().begin(), solver::point_keys().end());
     return all;
   }
-  (std::make_index_sequence<kMostLinks>());
+  (std::make_index_sequence<kMaxLinks>());
   return keys;
 }
 
@@ -95,7 +95,7 @@ bool is_axis_key(std::string_view name) {
 }
 
 bool is_point_key(std::size_t number) {
-  return number >= solver::model_keys().size() + kMostLinks;
+  return number >= solver::model_keys().size() + kMaxLinks;
 }
 
 std::optional<std::size_t> link_of_key(std::size_t number) {

@@ -15,7 +15,7 @@
 namespace oblique::protocol {
 
 /// Maximum number of links of a model.
-inline constexpr std::size_t kMostLinks = 64;
+inline constexpr std::size_t kMaxLinks = 64;
 
 /// Number of a key: first the keys of a model in the order of listings, then `length1`, `length2`,
 /// ..., then H, mu and e. Throws InputError for an unknown key, with the nearest one and a list of

@@ -302,15 +302,15 @@ solver::ModelParameters ModelInput::model() const {
 }
 
 std::string study_name_error(const std::string& name) {
-  constexpr std::size_t kMostBytes = 100;
-  if (!name.empty() && name.size() <= kMostBytes && name.front() != '-' && is_visible(name)) {
+  constexpr std::size_t kMaxBytes = 100;
+  if (!name.empty() && name.size() <= kMaxBytes && name.front() != '-' && is_visible(name)) {
     return {};
   }
   return fmt::format(
       "name = \"{}\" is not allowed: the name of a study has 1 to {} bytes of UTF-8, no control "
       "characters, marks of writing direction or zero-width characters, and does not begin with "
       "'-'",
-      visible(name.substr(0, kMostBytes)), kMostBytes);
+      visible(name.substr(0, kMaxBytes)), kMaxBytes);
 }
 
 std::string priority_error(std::int64_t priority) {

@@ -72,7 +72,7 @@ class PointTable {
   /// Whether `validate_points` has anything to check.
   bool has_points_to_validate() const { return blocks_to_validate_ > 0; }
   /// Checks blocks with values or filters that can only be checked point by point: all of their
-  /// points, or `kMostValidated` random ones in all (about 0.1 s). Throws solver::InputError, with
+  /// points, or `kMaxValidated` random ones in all (about 0.1 s). Throws solver::InputError, with
   /// block and point, for a value that is not allowed and for a filter that leaves out all points
   /// of its block. A point with a wrong value that was not checked fails later (`fault`).
   void validate_points() const;

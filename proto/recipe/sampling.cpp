@@ -132,7 +132,7 @@ std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key) {
 }
 
 double fraction(const protocol::Sample& sample, std::uint32_t dimension, std::uint64_t index) {
-  if (index >= sample.count() || sample.count() > kMostPoints) {
+  if (index >= sample.count() || sample.count() > kMaxSamples) {
     throw std::out_of_range("a sample of " + std::to_string(sample.count()) +
                             " points has no point " + std::to_string(index));
   }

@@ -8,7 +8,7 @@
 // of axes.
 namespace oblique::sampling {
 
-inline constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 44;
+inline constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 44;
 inline constexpr std::uint32_t kSobolDimensions = 32;
 inline constexpr int kSobolBits = 52;
 

@@ -94,11 +94,10 @@ void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned att
 }
 
 SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,
-                             DealerSettings settings, bool with_attempts)
+                             DealerSettings settings)
     : socket_(socket), settings_(std::move(settings)), events_(context, zmq::socket_type::pair) {
   const int events = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
-                     ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL |
-                     (with_attempts ? ZMQ_EVENT_CONNECTED | ZMQ_EVENT_CONNECT_RETRIED : 0);
+                     ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL;
   const auto name = [](int number) { return "inproc://connections-" + std::to_string(number); };
   int number = 0;
   while (zmq_socket_monitor(socket_.handle(), name(number).c_str(), events) != 0) {
@@ -126,11 +125,7 @@ void SocketMonitor::take_events() {
     }
     std::memcpy(&event, frame.data(), sizeof event);
     std::memcpy(&value, frame.data<char>() + sizeof event, sizeof value);
-    if (event == ZMQ_EVENT_CONNECTED) {
-      attempts_.was_accepted = true;
-    } else if (event == ZMQ_EVENT_CONNECT_RETRIED) {
-      ++attempts_.failed;
-    } else if (event == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
+    if (event == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
       ++connections_;
       failure_.reset();
     } else {
@@ -142,11 +137,6 @@ void SocketMonitor::take_events() {
 std::uint64_t SocketMonitor::connections() {
   take_events();
   return connections_;
-}
-
-SocketMonitor::Attempts SocketMonitor::attempts() {
-  take_events();
-  return attempts_;
 }
 
 std::optional<std::string> SocketMonitor::rejection() {

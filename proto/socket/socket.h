@@ -39,10 +39,8 @@ void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned att
 class SocketMonitor {
  public:
   /// `socket` was made with `settings` and must not be connected yet. It and `context` must outlive
-  /// this. With `with_attempts`, call `attempts` often: libzmq blocks while too many events are
-  /// unread.
-  SocketMonitor(zmq::context_t& context, zmq::socket_t& socket, DealerSettings settings,
-                bool with_attempts = false);
+  /// this.
+  SocketMonitor(zmq::context_t& context, zmq::socket_t& socket, DealerSettings settings);
   ~SocketMonitor();
   SocketMonitor(const SocketMonitor&) = delete;
   SocketMonitor& operator=(const SocketMonitor&) = delete;
@@ -55,13 +53,6 @@ class SocketMonitor {
   /// Why the peer rejected the socket, and the remedy, without a full stop. A rejected socket does
   /// not connect again; make a new one.
   std::optional<std::string> rejection();
-
-  /// Counts of attempts to connect, for `with_attempts`.
-  struct Attempts {
-    bool was_accepted = false;  ///< a TCP connection was accepted
-    unsigned failed = 0;
-  };
-  Attempts attempts();
 
  private:
   /// The event that ended a handshake, and its value.
@@ -76,7 +67,6 @@ class SocketMonitor {
   zmq::socket_t events_;
   std::uint64_t connections_ = 0;
   std::optional<Failure> failure_;
-  Attempts attempts_;
 };
 
 }  // namespace oblique::protocol

@@ -133,10 +133,10 @@ class KeyList {
 
 bool KeyList::reload() {
   constexpr int kEmptyReads = 4;
-  constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
   try {
     // Parse only a changed file, because thousands of keys take long.
-    std::optional file = protocol::read_small_file(path_, "the list of keys", kMostBytes);
+    std::optional file = protocol::read_small_file(path_, "the list of keys", kMaxBytes);
     if (file == file_ && empty_reads_ == 0 && fault_.empty()) {
       return false;
     }

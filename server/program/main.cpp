@@ -137,9 +137,9 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
 
 /// The limits that users may set; server/study/limits.h has their defaults and all other limits.
 void add_limits(CLI::App& app, LoopSettings& loop) {
-  constexpr std::size_t kMost = 1'000'000;  // for counts
+  constexpr std::size_t kMax = 1'000'000;  // for counts
   constexpr std::size_t kLongestMessage = oblique::protocol::kMaxFrameBytes;
-  constexpr std::size_t kMostBytes = std::size_t{1} << 40U;
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 40U;
   const auto add = [&app](const char* name, auto& value, auto least, auto largest,
                           const char* meaning) {
     using Number = std::decay_t<decltype(value)>;
@@ -147,16 +147,16 @@ void add_limits(CLI::App& app, LoopSettings& loop) {
         ->check(CLI::Range(static_cast<Number>(least), static_cast<Number>(largest)))
         ->group("Limits");
   };
-  add("--limits-connections", loop.network.connections, 2U, kMost,
+  add("--limits-connections", loop.network.connections, 2U, kMax,
       "Maximum number of connections at both ports");
-  add("--limits-waiting-out-bytes", loop.network.waiting_out_bytes, kLongestMessage, kMostBytes,
+  add("--limits-waiting-out-bytes", loop.network.waiting_out_bytes, kLongestMessage, kMaxBytes,
       "End a connection with more unsent bytes than this");
-  add("--limits-unstored-bytes", loop.service.ledger.bytes, 1U, kMostBytes,
+  add("--limits-unstored-bytes", loop.service.ledger.bytes, 1U, kMaxBytes,
       "Stop reading from workers while more than this many bytes of results are unstored");
   add("--limits-running-queries", loop.queries.queue.readers, 1U, 256U,
       "Maximum number of queries that run at a time, each in its own process");
-  constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 60U;
-  add("--limits-open-points", loop.service.bounds.points, 1U, kMostPoints,
+  constexpr std::uint64_t kMaxPoints = std::uint64_t{1} << 60U;
+  add("--limits-open-points", loop.service.bounds.points, 1U, kMaxPoints,
       "Maximum number of points of all studies that are neither done nor cancelled");
   add("--limits-credit", loop.service.scheduler.max_credit, 1U, 65'536U,
       "Maximum number of batches that a worker may request at a time");

@@ -43,13 +43,13 @@ protocol::ClientReply error_reply(const std::string& message) {
 }
 
 void PeerLog::write(Severity severity, const std::string& text) {
-  if (++lines_ <= kMostLines) {
+  if (++lines_ <= kMaxLines) {
     ports_.log(severity, text);
   }
 }
 
 void PeerLog::write_of_stranger(const std::string& text) {
-  if (++stranger_lines_ <= kMostLines) {
+  if (++stranger_lines_ <= kMaxLines) {
     ports_.log(Severity::kWarning, text);
   }
 }
@@ -65,9 +65,8 @@ void PeerLog::tick(std::int64_t now_ms) {
     return;
   }
   for (std::uint64_t* lines : {&lines_, &stranger_lines_}) {
-    if (*lines > kMostLines) {
-      ports_.log(Severity::kInfo,
-                 fmt::format("and {} more lines about peers", *lines - kMostLines));
+    if (*lines > kMaxLines) {
+      ports_.log(Severity::kInfo, fmt::format("and {} more lines about peers", *lines - kMaxLines));
     }
     *lines = 0;
   }

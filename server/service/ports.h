@@ -104,7 +104,7 @@ class PeerLog {
   std::uint64_t bad_frames() const { return bad_frames_; }
 
  private:
-  static constexpr std::uint64_t kMostLines = 20;
+  static constexpr std::uint64_t kMaxLines = 20;
 
   Ports& ports_;
   std::uint64_t bad_frames_ = 0;

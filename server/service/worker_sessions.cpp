@@ -17,7 +17,7 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kLongestWorkerText = 256;
-constexpr std::uint32_t kMostThreads = 4096;
+constexpr std::uint32_t kMaxThreads = 4096;
 
 /// Escapes and shortens a text from a peer, for logs and tables.
 std::string plain(const std::string& text) {
@@ -164,7 +164,7 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
   }
   const WorkerRecord worker{
       identity,
-      {id, plain(hello.name()), std::clamp(hello.threads(), 1U, kMostThreads),
+      {id, plain(hello.name()), std::clamp(hello.threads(), 1U, kMaxThreads),
        plain(hello.solver_version()), plain(hello.instruction_set()), iso_8601(now)},
       key,
       plain(hello.host()),

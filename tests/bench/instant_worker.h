@@ -12,7 +12,8 @@
 
 namespace oblique::bench {
 
-/// A worker in this process that answers every point at once, with one result solved beforehand.
+/// A worker in this process that answers every point at once with the same result, solved
+/// beforehand.
 class InstantWorker {
  public:
   explicit InstantWorker(const std::string& server_url) : stop_(eventfd(0, EFD_CLOEXEC)) {

@@ -32,9 +32,9 @@ void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
 
 /// Uses the input as properties in a valid INITIATE.
 void send_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
-  constexpr std::size_t kMost = 3500;
+  constexpr std::size_t kMax = 3500;
   be_welcomed(zmtp, client);
-  client.properties = input.substr(0, kMost);
+  client.properties = input.substr(0, kMax);
   static_cast<void>(send(zmtp, command_frame("INITIATE", client.initiate())));
 }
 

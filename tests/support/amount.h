@@ -4,8 +4,8 @@
 
 namespace oblique::test {
 
-/// How often something is repeated: `all` times where the environment variable OBLIQUE_TEST_ALL is
-/// set, as by `deploy/test --all`, else `quick` times.
+/// Number of repetitions: `all` if the environment variable OBLIQUE_TEST_ALL is set, as by
+/// `deploy/test --all`, else `quick`.
 inline int amount(int quick, int all) {
   return std::getenv("OBLIQUE_TEST_ALL") != nullptr ? all : quick;
 }

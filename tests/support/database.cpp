@@ -14,7 +14,7 @@ struct Close {
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
 
-/// Calls `take` with each row.
+/// Calls `take` for each row.
 void for_each_row(const std::string& file, const std::string& sql,
                   const std::function<void(sqlite3_stmt*)>& take) {
   sqlite3* opened = nullptr;
@@ -60,7 +60,7 @@ double Database::rows() const {
   try {
     return number("SELECT count(*) FROM results");
   } catch (const std::runtime_error&) {
-    return 0.0;  // not made yet
+    return 0.0;  // no tables yet
   }
 }
 

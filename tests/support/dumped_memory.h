@@ -12,12 +12,12 @@
 
 namespace oblique::test {
 
-/// A range of addresses of this process, by /proc/self/smaps.
+/// A range of addresses of this process, from /proc/self/smaps.
 struct MappedRange {
   std::uintptr_t begin = 0;
   std::uintptr_t end = 0;
   bool is_writable = false;
-  std::string flags;  ///< as " rd wr mr mw me dd lo ", see proc(5)
+  std::string flags;  ///< for example " rd wr mr mw me dd lo ", see proc(5)
 
   bool has(std::string_view flag) const {
     return flags.find(" " + std::string(flag) + " ") != std::string::npos;
@@ -47,7 +47,7 @@ inline std::vector<MappedRange> mapped_ranges() {
   return ranges;
 }
 
-/// Sanitizers object to reading all memory.
+/// False with sanitizers, which forbid reading all memory.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kAllMemoryMayBeRead = false;
 #elif defined(__has_feature)
@@ -60,7 +60,7 @@ inline constexpr bool kAllMemoryMayBeRead = true;
 inline constexpr bool kAllMemoryMayBeRead = true;
 #endif
 
-/// Whether a core dump of this process would hold these bytes. Only with `kAllMemoryMayBeRead`.
+/// Whether a core dump of this process would contain these bytes. Requires `kAllMemoryMayBeRead`.
 inline bool is_in_a_core_dump(std::string_view bytes) {
   for (const MappedRange& range : mapped_ranges()) {
     if (range.is_writable && !range.has("dd") &&

@@ -4,7 +4,7 @@
 
 namespace oblique::test {
 
-/// How long a test waits for an event. It only ends a hang: no sound run comes near it.
+/// Longest time that a test waits for an event. It only ends tests that hang.
 inline constexpr std::chrono::minutes kHangLimit{10};
 
 }  // namespace oblique::test

@@ -20,23 +20,23 @@
 namespace oblique::test {
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenLooks{2};
+constexpr std::chrono::milliseconds kPollInterval{2};
 
-/// Empty also if the process of a file in /proc is gone, where a read fails.
+/// Also empty if the file in /proc belongs to a process that has ended.
 std::string contents(const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   return text.str();
 }
 
-/// State and parent of a process, from /proc; nothing when it is gone.
+/// State and parent of a process, from /proc; nothing if it has ended.
 struct ProcessState {
   char state;
   pid_t parent;
 };
 std::optional<ProcessState> state_of(pid_t pid) {
   const std::string stat = contents("/proc/" + std::to_string(pid) + "/stat");
-  const std::size_t name_end = stat.rfind(')');  // the name before it may hold anything
+  const std::size_t name_end = stat.rfind(')');  // the name before it may contain any character
   if (name_end == std::string::npos) {
     return std::nullopt;
   }
@@ -46,11 +46,11 @@ std::optional<ProcessState> state_of(pid_t pid) {
   return rest ? std::optional(state) : std::nullopt;
 }
 
-/// Our environment without the variables of our programs and of whoever started us, and with
-/// `changes`, each as NAME=value.
+/// The environment of this process with `changes`, without the variables of our programs and of
+/// systemd; each as NAME=value.
 std::vector<std::string> environment_with(const Environment& changes) {
   std::vector<std::string> all;
-  // What is installed on this machine is not what is tested.
+  // Configuration files of this machine must not affect tests.
   Environment set{{"OBLIQUE_SERVER_CONFIG", "/dev/null"}, {"OBLIQUE_WORKER_CONFIG", "/dev/null"}};
   for (const auto& [name, value] : changes) {
     set[name] = value;
@@ -71,7 +71,7 @@ std::vector<std::string> environment_with(const Environment& changes) {
   return all;
 }
 
-/// As system calls take a list of texts; lives as long as they do.
+/// Null-terminated list of pointers to `texts`, for system calls.
 std::vector<char*> pointers_to(std::vector<std::string>& texts) {
   std::vector<char*> pointers;
   for (std::string& text : texts) {
@@ -98,9 +98,9 @@ void wait_until(const std::string& what, const std::function<bool()>& condition)
   const auto give_up = std::chrono::steady_clock::now() + kHangLimit;
   while (!condition()) {
     if (std::chrono::steady_clock::now() > give_up) {
-      throw std::runtime_error("waited in vain: " + what);
+      throw std::runtime_error("timeout while waiting for: " + what);
     }
-    std::this_thread::sleep_for(kBetweenLooks);
+    std::this_thread::sleep_for(kPollInterval);
   }
 }
 
@@ -193,7 +193,7 @@ std::optional<int> Process::exit_code() {
 }
 
 int Process::wait() {
-  wait_until("the end of process " + std::to_string(pid_) + ", which said: " + err(),
+  wait_until("the end of process " + std::to_string(pid_) + "; its output: " + err(),
              [this] { return reap(); });
   return *exit_code_;
 }

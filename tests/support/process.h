@@ -12,52 +12,51 @@
 
 namespace oblique::test {
 
-/// Waits until `condition` holds. Throws std::runtime_error that names `what` after a time that no
-/// sound run needs.
+/// Waits until `condition` holds. Throws std::runtime_error that names `what` after kHangLimit.
 void wait_until(const std::string& what, const std::function<bool()>& condition);
 
-/// Whether the process lives; one that ended and is not yet waited for does not.
+/// Whether the process runs; false for a zombie.
 bool is_running(pid_t pid);
 
-/// Processes that `pid` started and that still have it as their parent.
+/// Child processes of `pid`.
 std::vector<pid_t> children_of(pid_t pid);
 
-/// Processes in whose environment the name of this folder stands, whoever their parent is.
+/// Processes whose environment contains the path of this folder, whatever their parent.
 std::vector<pid_t> processes_of(const TemporaryFolder& folder);
 
-/// Variables for a program, beside our own or in place of them.
+/// Variables for a program, added to those of this process or in place of them.
 using Environment = std::map<std::string, std::string>;
 
-/// What one run of a program gave.
+/// Result of one run of a program.
 struct Outcome {
   int exit_code;    ///< as of Process::wait
   std::string out;  ///< standard output
   std::string err;  ///< standard error
 };
 
-/// A program under test, in a process group of its own and with the folder as its current one. It
-/// reads nothing; its output goes to files in the folder.
+/// A program under test, in its own process group, with `folder` as its current folder. Its input
+/// is empty; its output goes to files in the folder.
 class Process {
  public:
-  /// Starts `program` with `arguments`, without the variables of our programs and systemd's unless
-  /// `environment` has them, and without the configuration files of this machine. `ready_fd`, when
-  /// not −1, is its descriptor 3. Throws std::runtime_error when it does not start.
+  /// Starts `program` with `arguments`. Variables of our programs and of systemd are removed unless
+  /// `environment` sets them, and configuration files of this machine are not read. `ready_fd`,
+  /// unless −1, becomes its descriptor 3. Throws std::runtime_error if it does not start.
   Process(const TemporaryFolder& folder, const std::string& program,
           const std::vector<std::string>& arguments, const Environment& environment = {},
           int ready_fd = -1);
-  /// Kills what still runs.
+  /// Kills the process if it still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
-  /// As of wait; nothing while it runs.
+  /// As wait(); nothing while it runs.
   std::optional<int> exit_code();
-  /// Waits for the end. The exit code, or minus the signal that ended it: a program that ends in
-  /// order because of SIGINT gives 130, one that SIGINT ends gives −2.
+  /// Waits for the end. Returns the exit code, or minus the signal that ended it: a program that
+  /// handles SIGINT and exits returns 130, one that SIGINT kills returns −2.
   int wait();
-  /// What it has written so far to standard output and standard error.
+  /// Standard output and standard error so far.
   std::string out() const;
   std::string err() const;
   /// Waits for the end.

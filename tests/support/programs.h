@@ -10,32 +10,32 @@
 
 namespace oblique::test {
 
-// Where our programs are.
+// Paths of our programs.
 std::string client_program();
 std::string server_program();
 std::string worker_program();
 
-/// Runs `oblique` with `arguments` to its end in `folder`, or in one of its own.
+/// Runs `oblique` with `arguments` to its end, in `folder` or in a temporary folder.
 Outcome run_oblique(const TemporaryFolder& folder, const std::vector<std::string>& arguments);
 Outcome run_oblique(const std::vector<std::string>& arguments);
 
-/// An `oblique-server` that is ready when constructed.
+/// An `oblique-server`, ready when constructed.
 class Server {
  public:
-  /// On loopback at ports that the system picks, and gives nobody else while this or a successor
-  /// lives.
+  /// On loopback at ports that the system picks and reserves while this object or a successor
+  /// exists.
   Server(const TemporaryFolder& folder, const std::string& database,
          const Environment& environment = {});
-  /// At the same ports as one that has ended.
+  /// At the ports of `before`, which has ended.
   Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
          const Environment& environment = {});
-  /// With these arguments, which say where its database is and where it listens.
+  /// With these arguments, which must name its database and addresses.
   Server(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
          const Environment& environment = {});
 
   const std::string& worker_url() const { return worker_url_; }
   const std::string& client_url() const { return client_url_; }
-  /// As http://127.0.0.1:7602, where metrics are.
+  /// For example http://127.0.0.1:7602.
   const std::string& http_url() const { return http_url_; }
   Process& process() { return *process_; }
 

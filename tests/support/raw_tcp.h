@@ -19,11 +19,11 @@
 
 namespace oblique::test {
 
-/// A TCP connection to a server on 127.0.0.1, without a protocol.
+/// A TCP connection to a server on 127.0.0.1 that sends and receives bytes.
 class RawTcp {
  public:
-  /// `endpoint` ends with :PORT, as tcp://127.0.0.1:7601; `source` is the IPv4 address of this
-  /// machine that the server sees.
+  /// `endpoint` ends with :PORT, as in tcp://127.0.0.1:7601; `source` is the local IPv4 address,
+  /// which the server sees.
   explicit RawTcp(const std::string& endpoint, const std::string& source = "127.0.0.1")
       : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     const auto port =
@@ -39,7 +39,7 @@ class RawTcp {
     }
   }
 
-  /// False when the server takes no more.
+  /// Returns false if the server has closed the connection.
   bool send_all(std::string_view bytes) {
     while (!bytes.empty()) {
       const ssize_t sent = ::send(number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -50,7 +50,7 @@ class RawTcp {
     }
     return true;
   }
-  /// Reads once; empty when the server has ended the connection.
+  /// Reads once; empty if the server has closed the connection.
   std::string receive(int flags = 0, std::size_t most = 65536) {
     std::string bytes(most, '\0');
     ssize_t count = 0;
@@ -58,12 +58,12 @@ class RawTcp {
       count = ::recv(number(), bytes.data(), bytes.size(), flags);
     } while (count < 0 && errno == EINTR);
     if (count < 0 && errno == EAGAIN && (flags & MSG_DONTWAIT) == 0) {
-      throw std::runtime_error("the server neither answers nor ends the connection");
+      throw std::runtime_error("the server neither answers nor closes the connection");
     }
     bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
     return bytes;
   }
-  /// All that comes until the server ends the connection.
+  /// Reads until the server closes the connection.
   std::string read_to_the_end() {
     std::string all;
     for (std::string some = receive(); !some.empty(); some = receive()) {
@@ -71,7 +71,7 @@ class RawTcp {
     }
     return all;
   }
-  /// Ends the connection as the system does for a killed process that left input unread.
+  /// Resets the connection, as the system does for a killed process with unread input.
   void reset() {
     const linger at_once{1, 0};
     setsockopt(number(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);

@@ -39,7 +39,7 @@ inline Axis listed(const std::string& key, const std::vector<double>& values) {
   return axis;
 }
 
-/// An axis of `count` values with both ends in.
+/// An axis of `count` evenly spaced values from `from` to `to` inclusive.
 inline Axis range(const std::string& key, double from, double to, std::uint64_t count) {
   Axis axis;
   axis.set_key(key);
@@ -49,14 +49,14 @@ inline Axis range(const std::string& key, double from, double to, std::uint64_t 
   return axis;
 }
 
-/// The same with equal ratios.
+/// The same with equal ratios of neighbours.
 inline Axis log_range(const std::string& key, double from, double to, std::uint64_t count) {
   Axis axis = range(key, from, to, count);
   axis.set_spacing(SPACING_LOGARITHMIC);
   return axis;
 }
 
-/// An axis whose value follows from others.
+/// An axis whose value is an expression of others.
 inline Axis following(const std::string& key, const std::string& expression) {
   Axis axis;
   axis.set_key(key);
@@ -64,7 +64,7 @@ inline Axis following(const std::string& key, const std::string& expression) {
   return axis;
 }
 
-/// An axis of a sample, drawn between two values with equal chances.
+/// An axis of a sample with a uniform distribution between two values.
 inline Axis uniform(const std::string& key, double from, double to) {
   Axis axis;
   axis.set_key(key);
@@ -73,7 +73,7 @@ inline Axis uniform(const std::string& key, double from, double to) {
   return axis;
 }
 
-/// The points of a block of these axes, filtered by `where`.
+/// A grid of these axes, filtered by `where`.
 inline Block filtered(const std::vector<Axis>& axes, const std::string& where) {
   Block block;
   for (const Axis& axis : axes) {
@@ -83,7 +83,7 @@ inline Block filtered(const std::vector<Axis>& axes, const std::string& where) {
   return block;
 }
 
-/// A block whose axes go side by side.
+/// A block whose axes are paired (zip).
 inline Block zipped(const std::vector<Axis>& axes) {
   Block block = filtered(axes, "");
   block.set_zip(true);
@@ -116,7 +116,7 @@ inline Recipe recipe_of_blocks(const std::vector<Block>& blocks) {
   return recipe;
 }
 
-/// A sample whose points have `falls` falls, in which E takes so many values and k any.
+/// A sample with `falls` falls: E has that many values, and k is drawn for each point.
 inline Recipe sample_with_falls(std::uint64_t points, std::uint64_t falls,
                                 SampleKind kind = SAMPLE_RANDOM) {
   return recipe_of_blocks(

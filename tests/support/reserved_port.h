@@ -12,9 +12,9 @@
 
 namespace oblique::test {
 
-/// A port of 127.0.0.1 that the system gave us and gives nobody else while this lives. Nobody
-/// listens there: connections are refused, until a ZeroMQ socket, of this process or another, is
-/// bound to it by number. That one may close and be bound again as often as it likes.
+/// A port of 127.0.0.1 that the system gives to no other program while this object exists.
+/// Connections are refused until a ZeroMQ socket of any process binds to the port by number; this
+/// may be repeated.
 class ReservedPort {
  public:
   ReservedPort() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -24,7 +24,7 @@ class ReservedPort {
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t size = sizeof address;
     auto* const any_address = reinterpret_cast<sockaddr*>(&address);
-    // Sockets that all have this option share a port as long as one of them listens at most.
+    // Sockets with this option may share a port if at most one of them listens.
     if (setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
         bind(socket_, any_address, size) != 0 || getsockname(socket_, any_address, &size) != 0) {
       throw std::runtime_error(std::string("cannot reserve a port: ") + std::strerror(errno));

@@ -9,7 +9,7 @@
 
 namespace oblique::test {
 
-/// Adds a study of `points` points as number 1, of which the first `solved` have a result.
+/// Adds a study of `points` points with the number 1; its first `solved` points have a result.
 inline void add_study(server::Store& store, const std::string& name, std::uint64_t points,
                       std::uint64_t solved) {
   const auto table = server::table_of(points);

@@ -5,17 +5,17 @@
 
 namespace oblique::test {
 
-/// A folder of its own for one test; it is gone afterwards, with all that is in it.
+/// A temporary folder, deleted with its contents by the destructor.
 class TemporaryFolder {
  public:
-  /// Below TMPDIR. Throws std::runtime_error where none can be made.
+  /// Creates it below TMPDIR. Throws std::runtime_error if this fails.
   TemporaryFolder();
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// The path of a file in it, whether or not it exists.
+  /// Path of a file in the folder; the file need not exist.
   std::string file(const std::string& name) const { return (path_ / name).string(); }
 
  private:

@@ -1,5 +1,5 @@
-// A database that is deleted or replaced while its server runs, or that others read while the
-// server ends.
+// Databases that are deleted or replaced while their server runs, or that other programs read while
+// the server ends.
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A reading connection of another program.
+/// A read-only connection, as of another program.
 class OtherReader {
  public:
   explicit OtherReader(const std::string& file) {
@@ -31,7 +31,7 @@ class OtherReader {
   OtherReader(const OtherReader&) = delete;
   OtherReader& operator=(const OtherReader&) = delete;
 
-  /// Starts a query and does not finish it; false if there is no row.
+  /// Starts a query and leaves it unfinished. Returns false if it has no row.
   bool read_one() { return sqlite3_step(statement_) == SQLITE_ROW; }
   void finish_query() { sqlite3_reset(statement_); }
 
@@ -68,7 +68,7 @@ TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedReportsThisAndExitsWith1)
   fs::remove(file_);
   EXPECT_EQ(server.process().wait(), 1);
   EXPECT_TRUE(contains(server.process().err(), file_ + " was deleted")) << server.process().err();
-  EXPECT_TRUE(is_running(worker.pid())) << "it keeps what is not stored";
+  EXPECT_TRUE(is_running(worker.pid())) << "it keeps unacknowledged results";
 }
 
 TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsWithThatReason) {
@@ -82,7 +82,7 @@ TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsWithThatReason) {
   fs::rename(other, file_);
   EXPECT_EQ(run.wait(), 1);
   EXPECT_TRUE(contains(run.err(), file_ + " was replaced")) << run.err();
-  EXPECT_EQ(database_.rows(), 1) << "the other database is as it was";
+  EXPECT_EQ(database_.rows(), 1) << "the other database is unchanged";
 }
 
 TEST_F(DatabaseFilesTest, AServerStoppedInTheMiddleOfAStudyCompletesItWhenItIsStartedAgain) {
@@ -92,14 +92,15 @@ TEST_F(DatabaseFilesTest, AServerStoppedInTheMiddleOfAStudyCompletesItWhenItIsSt
   wait_until("rows in the database", [&] { return database_.rows() > 0; });
   server.process().send(SIGTERM);
   EXPECT_EQ(server.process().wait(), 0) << server.process().err();
-  ASSERT_LT(database_.rows(), kManyPoints) << "stopped too late to be a test";
+  ASSERT_LT(database_.rows(), kManyPoints)
+      << "the study was complete before the server was stopped";
   const Server next(folder_, file_, server);
   wait_until("all rows", [&] { return database_.rows() == kManyPoints; });
   EXPECT_EQ(database_.number("SELECT count(DISTINCT point) FROM results WHERE status = 'solved'"),
             kManyPoints);
 }
 
-TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsAfterARunAlsoWhenAnotherProgramHasItOpen) {
+TEST_F(DatabaseFilesTest, AfterARunTheFileAloneContainsAllRowsEvenIfAnotherProgramHasItOpen) {
   ASSERT_EQ(run_oblique(folder_, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                                   "--db", file_})
                 .exit_code,
@@ -114,7 +115,7 @@ TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsAfterARunAlsoWhenAnotherProgramH
   EXPECT_EQ(Database(folder_.file("copy.db")).rows(), kManyPoints + 1);
 }
 
-TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsOnceAStudyIsDoneWhileItsServerRuns) {
+TEST_F(DatabaseFilesTest, WhenAStudyIsDoneTheFileAloneContainsAllRowsAlthoughTheServerRuns) {
   Server server(folder_, file_);
   const Worker worker(folder_, server.worker_url());
   submit_to(server);
@@ -124,7 +125,7 @@ TEST_F(DatabaseFilesTest, TheFileAloneHasAllRowsOnceAStudyIsDoneWhileItsServerRu
   EXPECT_EQ(Database(folder_.file("copy.db")).rows(), kManyPoints);
 }
 
-TEST_F(DatabaseFilesTest, AServerThatEndsDuringALongQueryReportsThatRowsAreInTheLog) {
+TEST_F(DatabaseFilesTest, AServerThatEndsDuringALongQueryReportsThatRowsAreInTheWriteAheadLog) {
   Server server(folder_, file_);
   Worker worker(folder_, server.worker_url());
   submit_to(server);

@@ -1,4 +1,4 @@
-// The programs of deploy/examples that read a database.
+// Programs of deploy/examples that read a database.
 #include <cstdlib>
 #include <sstream>
 #include <string>
@@ -31,17 +31,17 @@ Rows numbers_of(const std::string& csv) {
   return rows;
 }
 
-/// A program that reads a database, and a command that succeeds where the program can run.
+/// A program that reads a database, and a command that succeeds if the program can run here.
 struct Example {
   std::string name;
   std::vector<std::string> command;
   std::string needs;
-  double relative_error = 0.0;  ///< of the numbers that it prints
+  double relative_error = 0.0;  ///< allowed, of the printed numbers
 };
 
 class Examples : public testing::TestWithParam<Example> {};
 
-TEST_P(Examples, ReadTheNumbersThatTheClientPrints) {
+TEST_P(Examples, PrintTheSameNumbersAsTheClient) {
   if (std::system((GetParam().needs + " > /dev/null 2>&1").c_str()) != 0) {
     GTEST_SKIP() << "this fails here: " << GetParam().needs;
   }

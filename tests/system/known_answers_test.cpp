@@ -14,13 +14,13 @@ namespace {
 
 using solver::KnownImpact;
 
-/// Relative error allowed at the default step.
+/// Allowed relative error at the default step.
 constexpr double kTolerance = 3e-5;
-/// The same for instants, of the duration: valleys are flat, and the default step moves one by
-/// 0.003 µs.
+/// Allowed error of instants, relative to the duration. Minima of the force are flat, so that the
+/// default step moves one by 0.003 µs.
 constexpr double kTimeTolerance = 6e-6;
 
-/// Values rounded to `digit` may be half of it off, and `kTolerance` besides.
+/// Allowed error of a value that is rounded to multiples of `digit`.
 void expect_close(double value, double known, double digit, const std::string& what) {
   EXPECT_NEAR(value, known, 0.5 * digit + kTolerance * std::abs(known)) << what;
 }
@@ -49,7 +49,7 @@ void expect_times(const Database& database, const KnownImpact& known, const std:
       database.numbers("SELECT 1e6 * (t1_s - t0_s)" + where(known, "phases") + " ORDER BY seq");
   ASSERT_EQ(phases_us.size(), known.phases_us.size()) << name;
   for (std::size_t i = 0; i < phases_us.size(); ++i) {
-    // A phase ends where the force turns, a time of the contact: its error is that of the contact.
+    // Phases end where the force turns; the error of such an instant scales with the duration.
     EXPECT_NEAR(phases_us[i], known.phases_us[i], 0.0005 + kTimeTolerance * known.contact_us)
         << name << ": phase " << i;
   }
@@ -64,7 +64,7 @@ void expect_times(const Database& database, const KnownImpact& known, const std:
   }
 }
 
-TEST(KnownAnswersTest, TheTenPublishedCasesComeThroughRealProcessesWithTheKnownAnswers) {
+TEST(KnownAnswersTest, RealProcessesGiveTheKnownAnswersOfTheTenPublishedCases) {
   const TemporaryFolder folder;
   const Database database(folder.file("paper.db"));
   const Outcome ran =
@@ -80,7 +80,7 @@ TEST(KnownAnswersTest, TheTenPublishedCasesComeThroughRealProcessesWithTheKnownA
   EXPECT_LT(database.number("SELECT max(closure) FROM results"), 1e-4);
 }
 
-TEST(KnownAnswersTest, TheSameStudyAgainHasNothingToSolve) {
+TEST(KnownAnswersTest, RunningTheSameStudyAgainSolvesNothing) {
   const TemporaryFolder folder;
   const std::string file = folder.file("paper.db");
   const Database database(file);
@@ -93,10 +93,10 @@ TEST(KnownAnswersTest, TheSameStudyAgainHasNothingToSolve) {
   EXPECT_EQ(database.texts("SELECT solved_at FROM results ORDER BY point"), solved_at);
 }
 
-TEST(KnownAnswersTest, APointWithoutAnswerIsARowWithTheReasonAndTheOthersAreSolved) {
+TEST(KnownAnswersTest, AFailedPointIsARowWithTheReasonAndTheOthersAreSolved) {
   const TemporaryFolder folder;
   const Database database(folder.file("steps.db"));
-  // 20 µs is beyond the stability limit.
+  // 20 µs is above the stability limit.
   const Outcome ran = run_oblique(
       folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--dt",
                "4e-6,2e-5", "--name", "steps", "--db", folder.file("steps.db")});

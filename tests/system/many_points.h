@@ -6,13 +6,13 @@
 namespace oblique::test {
 
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr int kSide = 30;  ///< sanitized programs are some twenty times slower
+constexpr int kSide = 30;  ///< sanitizers make programs about twenty times slower
 #else
 constexpr int kSide = 140;
 #endif
 
-/// The words of a command and, behind them, those of a study that takes seconds, so that there is
-/// time to break something in its middle.
+/// Appends to `command` the arguments of a study that takes seconds, long enough to cause faults
+/// while it is solved.
 constexpr double kManyPoints = kSide * kSide;
 inline std::vector<std::string> many_points(const std::string& name,
                                             std::vector<std::string> command) {

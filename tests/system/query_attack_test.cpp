@@ -11,7 +11,7 @@
 namespace oblique::test {
 namespace {
 
-/// Compares bytes for hours without checking for an interrupt.
+/// A statement that compares bytes for hours and does not check for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 class QueryAttackTest : public testing::Test {

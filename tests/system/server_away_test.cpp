@@ -75,7 +75,7 @@ TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
     std::vector<std::unique_ptr<Process>> clients;
     for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
       clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
-      // Watching needs an existing study.
+      // Watching requires an existing study.
       wait_until("the study is stored", [this] {
         const std::string count = "SELECT count(*) FROM studies";
         try {

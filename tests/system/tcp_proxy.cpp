@@ -26,8 +26,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using protocol::Descriptor;
 constexpr int kLongestPoll_ms = 5;
-/// Size of the buffer per direction, after which it is not read: as on a fast long line.
-constexpr std::size_t kMostUnderWay = std::size_t{4} << 20U;
+/// Buffered bytes per direction, above which nothing more is read. So large that a delay does not
+/// limit the rate.
+constexpr std::size_t kMaxUnderWay = std::size_t{4} << 20U;
 
 sockaddr_in on_loopback(std::uint16_t port) {
   sockaddr_in address{};
@@ -41,10 +42,10 @@ const sockaddr* any_address(const sockaddr_in& address) {
   return reinterpret_cast<const sockaddr*>(&address);
 }
 
-/// Bytes from one side that are not sent to the other yet.
+/// Bytes received from one side and not yet sent to the other.
 class Direction {
  public:
-  bool takes_more() const { return !has_end_ && bytes_ < kMostUnderWay; }
+  bool takes_more() const { return !has_end_ && bytes_ < kMaxUnderWay; }
 
   /// Reads available bytes.
   void take(int from, Clock::time_point due) {
@@ -59,7 +60,7 @@ class Direction {
     under_way_.push_back({due, std::move(bytes)});
   }
 
-  /// Sends bytes that are due; false after the end.
+  /// Sends bytes that are due. Returns false after the end of the connection.
   bool pass_on(int to, Clock::time_point now) {
     while (!under_way_.empty() && under_way_.front().due <= now) {
       std::string& bytes = under_way_.front().bytes;
@@ -71,7 +72,7 @@ class Direction {
       bytes_ -= sent;
       bytes.erase(0, sent);
       if (!bytes.empty()) {
-        return true;  // the receiver is slower
+        return true;  // the receiver's buffer is full
       }
       under_way_.pop_front();
     }
@@ -93,7 +94,7 @@ class Direction {
   bool has_end_ = false;
 };
 
-/// The connection of a peer, the one to the server, and the bytes in between.
+/// The connections to a peer and to the server, and the bytes between them.
 struct Line {
   Descriptor peer;
   Descriptor server;
@@ -101,7 +102,7 @@ struct Line {
   Direction to_peer = {};
   bool is_swallowed = false;
 
-  /// False if it has ended.
+  /// Returns false if a connection has ended.
   bool move(Clock::time_point now, std::chrono::milliseconds delay, bool stalls) {
     for (auto [direction, from, to] :
          {std::tuple(&to_server, &peer, &server), std::tuple(&to_peer, &server, &peer)}) {

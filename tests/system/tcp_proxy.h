@@ -12,20 +12,20 @@ namespace oblique::test {
 /// cut again and again.
 class TcpProxy {
  public:
-  /// Forwards to the server at that ZeroMQ address. Every byte and every end arrives `delay` later
-  /// in both directions. All connections are cut after each `cut_interval`, unless it is 0.
+  /// Forwards to the server at that ZeroMQ address. Bytes and ends of connections arrive `delay`
+  /// later, in both directions. All connections are cut after each `cut_interval`, unless it is 0.
   explicit TcpProxy(const std::string& server_url, std::chrono::milliseconds delay = {},
                     std::chrono::milliseconds cut_interval = {});
   ~TcpProxy();
   TcpProxy(const TcpProxy&) = delete;
   TcpProxy& operator=(const TcpProxy&) = delete;
 
-  /// Its ZeroMQ address.
+  /// ZeroMQ address of the proxy.
   std::string url() const;
-  /// While true, nothing is forwarded; received bytes are forwarded afterwards.
+  /// While true, nothing is forwarded. Bytes received meanwhile are forwarded afterwards.
   void stall(bool holds) { stalls_ = holds; }
-  /// Drops everything on the present connections, their ends too, so that each side is silent for
-  /// the other. Later connections are forwarded.
+  /// Drops everything on the present connections, including their ends, so that each side becomes
+  /// silent for the other. Later connections are forwarded.
   void swallow() { ++swallowed_; }
   /// Number of connections so far.
   int connections() const { return connections_; }

@@ -19,14 +19,14 @@ namespace {
 
 using solver::CaseResult;
 
-/// One output of a case, and what an error in it is measured against.
+/// One output of a case, and the scale of its errors.
 struct Output {
   std::string name;
   std::string relative_to;
   std::function<std::vector<double>(const solver::CaseResult&)> values;
-  /// The scale of value i; one for all of an output, or each value's own.
+  /// The scale of value i: the same for all values of the output, or the value itself.
   std::function<double(const solver::CaseResult&, double value)> scale;
-  /// False where the number of values depends on ripples.
+  /// False if the number of values depends on ripples.
   bool is_headline;
 };
 
@@ -73,7 +73,7 @@ Values tangential_peaks(const CaseResult& r) {
   return values;
 }
 
-/// All ends of phases but the last, which is the duration.
+/// Ends of all phases except the last, whose end is the duration.
 Values turns(const CaseResult& r) {
   Values values;
   for (const auto& phase : r.phases) {
@@ -104,7 +104,7 @@ Values reactions(const CaseResult& r) {
   return values;
 }
 
-/// All outputs of a case that are numbers.
+/// All numerical outputs of a case.
 std::vector<Output> outputs() {
   return {
       {"largest F_n", "itself", [](const CaseResult& r) { return Values{r.fn_peak_N}; }, itself,
@@ -137,8 +137,8 @@ std::vector<Output> outputs() {
   };
 }
 
-/// Largest difference of one output between two results, relative to its scale in `right`. The
-/// results must have equally many values.
+/// Largest difference of one output between two results, relative to its scale in `right`. Both
+/// results must have the same number of values.
 double difference(const Output& output, const std::vector<double>& values,
                   const solver::CaseResult& right) {
   const Values expected = output.values(right);
@@ -152,13 +152,13 @@ double difference(const Output& output, const std::vector<double>& values,
   return largest;
 }
 
-/// The same order of states, so that every output has equally many values.
+/// Whether both results have the same mode, so that every output has the same number of values.
 bool have_same_turns(const solver::CaseResult& a, const solver::CaseResult& b) {
   return a.mode == b.mode && a.phases.size() == b.phases.size() &&
          a.ft_peaks.size() == b.ft_peaks.size();
 }
 
-/// Explicit steps of the reference: PEFRL's own error is below 1e-9 there.
+/// Explicit steps of the reference, at which PEFRL's own error is below 1e-9.
 constexpr double kReferenceStep_s = 2e-7;
 const std::string kReference = "explicit, 0.2 us";
 
@@ -174,7 +174,7 @@ std::vector<Point> grid() {
   return points;
 }
 
-/// Bounds by the name of an output and what it is relative to.
+/// Bounds by the name and the scale of an output.
 struct Bound {
   double value;
   std::string reason;
@@ -185,10 +185,10 @@ std::string key(const Output& output) {
   return output.name + ", of " + output.relative_to;
 }
 
-/// Largest difference of each output over the cases given so far.
+/// Largest difference of each output over all added cases.
 class Differences {
  public:
-  /// `values` holds those of each output, in the order of outputs(); all or the headline ones.
+  /// `values` contains the values of each output, in the order of outputs().
   void add(const Point& point, const std::vector<std::vector<double>>& values,
            const CaseResult& right, bool headline_only) {
     for (std::size_t i = 0; i < outputs_.size(); ++i) {
@@ -228,7 +228,7 @@ std::vector<std::vector<double>> values_of(const CaseResult& result) {
   return values;
 }
 
-/// (4 f(h/2) - f(h))/3: what is left when an error of order 2 is taken away.
+/// (4 f(h/2) - f(h))/3: Richardson extrapolation of an error of order 2.
 std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const CaseResult& half) {
   auto values = values_of(half);
   const auto coarse = values_of(whole);
@@ -240,8 +240,8 @@ std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const Cas
   return values;
 }
 
-// Vibrations of w = 1.5e5 rad/s carry about a tenth of the speed. Over a contact of T = 0.5 ms the
-// method's period error (w h)^2/12 puts them out of phase by 1.4e-3 rad at 0.1 us.
+// Vibrations of w = 1.5e5 rad/s have about a tenth of the speed. Over a contact of T = 0.5 ms the
+// period error (w h)^2/12 of the method shifts their phase by 1.4e-3 rad at 0.1 us.
 const std::string kPeriodError =
     "a tenth of the speed vibrates at w = 1.5e5/s: phase error (w h)^2/12 w T = 1.4e-3";
 const std::string kSlowExit = "the same; some exits are slow";
@@ -299,11 +299,10 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyContactsAtAMicrosecond) {
                              {"all peaks of F_t, of largest F_t", {3e-3, kHundredfold}},
                              {"instants of turns, of duration", {1e-2, kHundredfold}}});
   expect_at_most(
-      {"60 contacts, 1 us: contacts with a grazing ripple more or "
-       "less, of which only outputs of the whole are compared:" +
+      {"60 contacts, 1 us: contacts that differ by a grazing ripple, compared as a whole only:" +
            apart,
        kReference, static_cast<double>(cases_apart), 6.0,
-       "grazing turns come and go with errors of the size of the ripple"});
+       "errors of the size of the ripple add or remove grazing turns"});
 }
 
 TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
@@ -325,10 +324,10 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
                             {3e-4, "accuracy stated for whole cases"},
                             {{"exit velocity, of exit speed", {1e-3, kSlowExit}},
                              {"reaction peaks, of each itself",
-                              {4e-4, "vibration from the release, which 5 us do not resolve"}}});
+                              {4e-4, "vibration from the release, unresolved at 5 us"}}});
 }
 
-TEST(Agreement, EstimatedErrorsCoverWhatTheStepsLeaveInAllOutputsAndInstantsOfSixtyContacts) {
+TEST(Agreement, EstimatedErrorsBoundTheErrorsOfTheStepsInAllOutputsAndInstantsOfSixtyContacts) {
   const solver::ModelParameters model = solver::preset("standard");
   solver::ModelParameters fine = model;
   fine.step_factor = 0.25;  // an error 256 times smaller

@@ -30,8 +30,8 @@ inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
                                                          {1.00, 1.4, 1.0},
                                                          {1.00, 1.6, 1.0}}};
 
-/// One chain under both integrators. Contacts start from the same state at touch, that of an
-/// explicit fall, so that what differs is the contact's alone.
+/// One chain with both integrators. Contacts start from the same state at touch, that of an
+/// explicit fall, so that results differ by the errors in contact only.
 class BothWays {
  public:
   explicit BothWays(const solver::ModelParameters& model)
@@ -54,7 +54,7 @@ class BothWays {
   solver::ContactParameters contact(const Point& point) const {
     return {model_.k_N_m, model_.eta2, point.mu, point.e_star};
   }
-  /// The contact with reactions, steps of dt_s throughout.
+  /// Solves the contact with reactions, in steps of dt_s.
   solver::CaseResult explicit_case(const Point& point, double dt_s) const {
     return solver::solve_contact(explicit_, contact(point), {dt_s, dt_s}, explicit_touch(point.H_m),
                                  {});
@@ -65,7 +65,7 @@ class BothWays {
   }
 
  private:
-  /// There the fall's own error is 1e-10 of the speed.
+  /// Step of the fall [s], at which its error is 1e-10 of the speed.
   static constexpr double kFallStep_s = 2e-6;
 
   solver::ModelParameters model_;

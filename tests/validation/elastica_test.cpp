@@ -17,10 +17,10 @@ namespace {
 constexpr std::size_t kBandwidth = 7;
 constexpr std::size_t kClamped = 4;  ///< coordinates of the first node
 constexpr double kConverged = 1e-12;
-constexpr int kMostIterations = 50;
+constexpr int kMaxIterations = 50;
 
-/// A straight cantilever of the solver's elements in static equilibrium, found by Newton's method
-/// with the solver's own tangent. Clamped at the origin, along x.
+/// A cantilever of the solver's elements in static equilibrium, found by Newton's method with the
+/// solver's tangent. Unloaded it is straight along x; it is clamped at the origin.
 class ClampedBeam {
  public:
   struct Properties {
@@ -30,7 +30,7 @@ class ClampedBeam {
     int elements;
   };
   struct TipLoad {
-    double force_y_N;   ///< keeps its direction
+    double force_y_N;   ///< of constant direction
     double moment_N_m;  ///< counter-clockwise
   };
   struct Tip {
@@ -41,9 +41,9 @@ class ClampedBeam {
 
   explicit ClampedBeam(const Properties& properties);
 
-  /// Goes to `load` in `increments` equal parts. Throws std::runtime_error when Newton's method
-  /// does not converge: the largest correction, in units of an element's length for positions, does
-  /// not fall below 1e-12 in 50 iterations.
+  /// Applies `load` in `increments` equal steps. Throws std::runtime_error if Newton's method does
+  /// not converge: its largest correction (for positions in units of an element's length) must fall
+  /// below 1e-12 within 50 iterations.
   void load_to(const TipLoad& load, int increments);
   Tip tip() const;
 
@@ -78,7 +78,7 @@ void ClampedBeam::load_to(const TipLoad& load, int increments) {
 }
 
 void ClampedBeam::equilibrate(const TipLoad& load) {
-  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     if (newton_step(load) < kConverged) {
       return;
     }
@@ -110,7 +110,7 @@ double ClampedBeam::newton_step(const TipLoad& load) {
   }
   const std::size_t tip = residual.size() - 4;
   residual[tip + 1] -= load.force_y_N;
-  // A moment works on the slope's angle: Q = M (-s_y, s_x)/|s|^2.
+  // A moment does work on the angle of the slope: Q = M (-s_y, s_x)/|s|^2.
   const double x = q_[q_.size() - 2];
   const double y = q_[q_.size() - 1];
   const double s = x * x + y * y;
@@ -149,8 +149,8 @@ constexpr double kEI_N_m2 = 1570.0;
 ///   sqrt(alpha) = K(p) - F(phi_1, p),   v/L = 1 - 2 (E(p) - E(phi_1, p))/sqrt(alpha),
 ///   (L - u)/L = sqrt(2 (2 p^2 - 1)/alpha).
 struct Elastica {
-  double v_over_L;  ///< across
-  double u_over_L;  ///< back along the beam
+  double v_over_L;  ///< deflection across the beam
+  double u_over_L;  ///< deflection along the beam, towards the clamp
 };
 
 Elastica elastica(double alpha) {
@@ -168,7 +168,7 @@ Elastica elastica(double alpha) {
   return {1.0 - 2.0 * arc / std::sqrt(alpha), 1.0 - std::sqrt(2.0 * (2.0 * p * p - 1.0) / alpha)};
 }
 
-/// EA L^2/EI: so large that the beam's stretch stays below 1e-6.
+/// EA L^2/EI, so large that the strain of the beam stays below 1e-6.
 constexpr double kSlenderness = 1e8;
 
 ClampedBeam beam_of(int elements) {
@@ -176,7 +176,7 @@ ClampedBeam beam_of(int elements) {
       {kLength_m, kSlenderness * kEI_N_m2 / (kLength_m * kLength_m), kEI_N_m2, elements});
 }
 
-/// Distance of the tip from where the elastica has it, over the length.
+/// Distance between the tip and the tip of the elastica, over the length.
 double elastica_error(double alpha, int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({alpha * kEI_N_m2 / (kLength_m * kLength_m), 0.0}, 20);
@@ -186,7 +186,8 @@ double elastica_error(double alpha, int elements) {
                     1.0 - tip.x_m / kLength_m - right.u_over_L);
 }
 
-/// Distance of the tip from the clamp, over the length, under the moment that makes a full circle.
+/// Distance between tip and clamp, over the length, for the moment that bends the beam to a full
+/// circle.
 double roll_up_error(int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({0.0, 2.0 * M_PI * kEI_N_m2 / kLength_m}, 40);
@@ -204,7 +205,7 @@ TEST(Elastica, ClosedFormHasThePublishedValues) {
   }
 }
 
-TEST(Elastica, CantileverBendsAsTheElasticaUnderAForceAcross) {
+TEST(Elastica, CantileverBendsAsTheElasticaUnderATransverseForce) {
   const std::string reference = "elliptic integrals (Bisshopp and Drucker 1945)";
   for (const double alpha : {1.0, 5.0, 10.0}) {
     const std::string load = "cantilever, FL^2/EI = " + std::to_string(std::lround(alpha));
@@ -213,7 +214,7 @@ TEST(Elastica, CantileverBendsAsTheElasticaUnderAForceAcross) {
     expect_at_most({load + ", n = 64: tip, of L", reference, fine, 5e-5,
                     "half the last digit of the published tables"});
     expect_at_least({load + ": error at n = 32, of that at 64", reference, coarse / fine, 8.0,
-                     "order 4 sets in once an element no longer locks"});
+                     "order 4 begins where elements no longer lock"});
   }
 }
 
@@ -224,7 +225,7 @@ TEST(Elastica, CantileverRollsUpToACircleUnderAMoment) {
   expect_at_most({"roll-up at M = 2 pi EI/L, n = 64: gap, of L", reference, fine, 1e-6,
                   "stretch of the bent beam, 2 (2 pi)^2 EI/(EA L^2) = 7.9e-7"});
   expect_at_least({"roll-up: gap at n = 32, of that at 64", reference, coarse / fine, 8.0,
-                   "order 4 sets in once an element no longer locks"});
+                   "order 4 begins where elements no longer lock"});
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ using solver::Motion;
 
 const std::string kBalance = "kinetic + strain + gravity + springs + losses = constant";
 
-/// What the energies of a contact do not add up to, of the work exchanged, taken anew from the
-/// result's parts.
+/// The energy that is missing in the balance of a contact, over the exchanged work, computed from
+/// the parts of the result.
 double closure(const CaseResult& result) {
   const solver::ContactEnergy& e = result.energy;
   const double missing_J =
@@ -27,7 +27,7 @@ double closure(const CaseResult& result) {
   return std::abs(missing_J) / e.exchanged_J;
 }
 
-TEST(Energy, BalancesOverThePublishedContactsUnderBothIntegrators) {
+TEST(Energy, BalancesInThePublishedContactsWithBothIntegrators) {
   const BothWays both(solver::preset("paper"));
   double by_explicit = 0.0;
   double by_generalized_alpha = 0.0;
@@ -36,14 +36,14 @@ TEST(Energy, BalancesOverThePublishedContactsUnderBothIntegrators) {
     by_generalized_alpha =
         std::max(by_generalized_alpha, closure(both.generalized_alpha_case(point, 1e-7)));
   }
-  expect_at_most({"ten published contacts, explicit, 1 us: energy missing, of that exchanged",
+  expect_at_most({"ten published contacts, explicit, 1 us: missing energy, of the exchanged work",
                   kBalance, by_explicit, 1e-6, "stated accuracy"});
   expect_at_most(
-      {"ten published contacts, generalized-alpha, 0.1 us: energy missing, of that exchanged",
+      {"ten published contacts, generalized-alpha, 0.1 us: missing energy, of the exchanged work",
        kBalance, by_generalized_alpha, 1e-6, "stated accuracy"});
 }
 
-/// Energy gained or lost in the fall to H = 1, of the kinetic energy there.
+/// Change of the energy in the fall to H = 1, over the kinetic energy there.
 double fall_drift(const Motion& motion, const solver::Fall& fall) {
   const solver::Energies before = motion.energies(motion.at_rest());
   const solver::Energies after = motion.energies(fall.state_at(1.0));
@@ -52,7 +52,7 @@ double fall_drift(const Motion& motion, const solver::Fall& fall) {
          after.kinetic_J;
 }
 
-TEST(Energy, IsKeptInTheFallUnderBothIntegrators) {
+TEST(Energy, IsConservedInTheFallWithBothIntegrators) {
   const solver::ModelParameters model = solver::preset("paper");
   const solver::Chain chain(model);
   const auto generalized_alpha = std::make_shared<solver::GeneralizedAlphaMotion>(model);

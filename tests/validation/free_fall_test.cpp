@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tests/validation/validation_table.h"
+#include "tests/worker/solver/reference/known_falls.h"
 #include "worker/solver/reference/fall.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
@@ -19,41 +20,29 @@ using solver::Chain;
 using solver::ChainState;
 using solver::Fall;
 using solver::GeneralizedAlphaMotion;
+using solver::kKnownFalls;
+using solver::KnownFall;
 using solver::ModelParameters;
 using solver::Motion;
 using solver::TipState;
 
-/// State of the tip when it has dropped H.
-struct KnownState {
-  double H_m;
-  double t_s;
-  double x_m;  ///< NaN: not known
-  double vx_m_s;
-  double vy_m_s;
-};
-
-/// Largest errors over some known states.
+/// Largest errors over known states.
 struct FallErrors {
   double t_s = 0.0;
   double x_m = 0.0;
   double v_m_s = 0.0;
 };
 
-/// An independent explicit solution of order 4 of the preset `paper`, converged to nine digits and
-/// printed to the digits here.
-constexpr std::array<KnownState, 3> kKnown{{{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
-                                            {1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
-                                            {1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}};
 const std::string kKnownFrom = "independent explicit solution, converged";
 
-/// Three rigid links, whatever A and I: minimal coordinates, Runge-Kutta.
-constexpr std::array<KnownState, 1> kRigid{
+/// Three rigid links in minimal coordinates, by a Runge-Kutta method; independent of A and I.
+constexpr std::array<KnownFall, 1> kRigid{
     {{1.00, 0.430188812, std::numeric_limits<double>::quiet_NaN(), -5.738072, -5.234437}}};
 
 template <std::size_t n>
-FallErrors errors(const Motion& motion, const Fall& fall, const std::array<KnownState, n>& known) {
+FallErrors errors(const Motion& motion, const Fall& fall, const std::array<KnownFall, n>& known) {
   FallErrors worst;
-  for (const KnownState& right : known) {
+  for (const KnownFall& right : known) {
     const ChainState state = fall.state_at(right.H_m);
     const TipState tip = motion.tip(state);
     worst.t_s = std::max(worst.t_s, std::abs(state.t_s - right.t_s));
@@ -66,22 +55,22 @@ FallErrors errors(const Motion& motion, const Fall& fall, const std::array<Known
 
 template <std::size_t n>
 FallErrors explicit_errors(const ModelParameters& model, double dt_s,
-                           const std::array<KnownState, n>& known) {
+                           const std::array<KnownFall, n>& known) {
   const Chain chain(model);
   return errors(solver::ExplicitMotion(chain), *solver::solve_stepped_fall(chain, dt_s), known);
 }
 
 template <std::size_t n>
 FallErrors generalized_alpha_errors(const ModelParameters& model, double dt_s,
-                                    const std::array<KnownState, n>& known) {
+                                    const std::array<KnownFall, n>& known) {
   const auto motion = std::make_shared<GeneralizedAlphaMotion>(model);
   return errors(*motion,
                 *solver::solve_stepped_fall(motion, dt_s, solver::longest_fall_s(Chain(model))),
                 known);
 }
 
-TEST(FreeFall, ExplicitWayReachesTheKnownStates) {
-  const FallErrors worst = explicit_errors(solver::preset("paper"), 2.5e-6, kKnown);
+TEST(FreeFall, ExplicitIntegratorReachesTheKnownStates) {
+  const FallErrors worst = explicit_errors(solver::preset("paper"), 2.5e-6, kKnownFalls);
   expect_at_most({"fall, explicit, 2.5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom, worst.t_s,
                   1e-8, "digits of the reference"});
   expect_at_most({"fall, explicit, 2.5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
@@ -91,18 +80,18 @@ TEST(FreeFall, ExplicitWayReachesTheKnownStates) {
 }
 
 TEST(FreeFall, GeneralizedAlphaReachesTheKnownStates) {
-  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 5e-6, kKnown);
+  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 5e-6, kKnownFalls);
   expect_at_most({"fall, generalized-alpha, 5 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
                   worst.t_s, 1e-8 + 3e-9, "the reference's digits, and the vibration's 3e-9"});
   expect_at_most({"fall, generalized-alpha, 5 us: x of the tip [m]", kKnownFrom, worst.x_m, 1e-7,
                   "digits of the reference"});
   expect_at_most({"fall, generalized-alpha, 5 us: velocity of the tip [m/s]", kKnownFrom,
                   worst.v_m_s, 1e-3,
-                  "amplitude of the vibration from the release, which 5 us do not resolve"});
+                  "amplitude of the vibration from the release, unresolved at 5 us"});
 }
 
 TEST(FreeFall, GeneralizedAlphaFindsTheImpactTimeWithStepsOfATenthOfAMillisecond) {
-  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 1e-4, kKnown);
+  const FallErrors worst = generalized_alpha_errors(solver::preset("paper"), 1e-4, kKnownFalls);
   expect_at_most({"fall, generalized-alpha, 100 us: time at H = 0.96, 1, 1.04 [s]", kKnownFrom,
                   worst.t_s, 3e-7, "(w h)^2/12 t of links that turn at w = 25 rad/s in the end"});
 }
@@ -113,7 +102,7 @@ TEST(FreeFall, StiffLinksFallAsRigidOnes) {
   model.E_Pa *= 100.0;
   const FallErrors one = explicit_errors(model, 1.5e-6, kRigid);
   const FallErrors other = generalized_alpha_errors(model, 5e-6, kRigid);
-  const std::string reference = "three rigid links, whatever A and I";
+  const std::string reference = "three rigid links";
   const std::string reason = "bending moves it by 1e-6 s at E, and as 1/E";
   expect_at_most({"fall, explicit, E * 100: time at H = 1 [s]", reference, one.t_s, 2e-8, reason});
   expect_at_most(

@@ -1,5 +1,5 @@
-// The two studies of the method that worker/solver/accuracy.md shows: which mesh is good enough,
-// and what the chosen steps leave.
+// The two studies that worker/solver/accuracy.md shows: which mesh is fine enough, and the errors
+// of the chosen steps.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -48,7 +48,7 @@ Fallen fall_of(const solver::ModelParameters& model) {
   return fall.fallen;
 }
 
-/// The results of `points` in their order. Throws SolveError when one has no answer.
+/// The results of `points` in their order. Throws SolveError if a point fails.
 std::vector<CaseResult> contacts_of(const solver::Finger& finger,
                                     const std::vector<ContactPoint>& points) {
   std::vector<solver::Point> asked;
@@ -68,12 +68,12 @@ std::vector<CaseResult> contacts_of(const solver::Finger& finger,
 // ---- Meshes ----
 
 constexpr double kTolerance = 0.005;  // relative
-// A mesh is good enough when each output is within the tolerance at this part of its points: exit
-// velocities pass through zero, so that no mesh has them all.
-constexpr double kMostPoints = 0.8;
+// A mesh is fine enough if each output is within the tolerance at this fraction of its points. Not
+// at all points, because exit velocities pass through zero.
+constexpr double kMaxPoints = 0.8;
 
-/// Errors of one output of a point relative to its limit, a level each; nothing where the mode up
-/// to it is another one than on the finest level.
+/// Errors of one output of a point relative to its limit, one for each level; nothing on a level
+/// whose mode differs from that of the finest level.
 struct PointErrors {
   std::size_t point;
   double limit;
@@ -96,8 +96,8 @@ std::size_t points_within(const OutputStudy& output, std::size_t level) {
                     [&](const PointErrors& point) { return is_within(point.errors[level]); }));
 }
 
-/// Peaks of F_n count as one output, reactions too: the worst of a point's. The largest F_n is one
-/// of the peaks.
+/// Peaks of F_n count as one output with the largest error, and so do reactions. The largest F_n is
+/// one of the peaks.
 std::string counted_under(const std::string& name) {
   return name.starts_with("major_peak") ? "major_peaks_N"
          : name.starts_with("reaction") ? "reaction_peaks_N"
@@ -108,7 +108,8 @@ void add_point(std::vector<OutputStudy>& outputs, std::size_t point,
                const PointConvergence& convergence) {
   for (const auto& output : convergence.outputs) {
     const double limit = output.extrapolation.limit;
-    if (output.name == "fn_peak_N" || limit == 0.0) {  // as stick where there is none
+    if (output.name == "fn_peak_N" ||
+        limit == 0.0) {  // for example of stick in a contact without stick
       continue;
     }
     std::vector<std::optional<double>> errors;
@@ -165,12 +166,13 @@ void print_cells(const std::vector<Level>& levels, const std::vector<OutputStudy
   print(std::cout, table, Format::kTable);
 }
 
-/// The coarsest level from which on all are good enough; the number of levels when none is.
+/// The coarsest level from which on all levels are fine enough; the number of levels if there is
+/// none.
 std::size_t coarsest_good_enough(std::size_t levels, const std::vector<OutputStudy>& outputs) {
   const auto is_good_enough = [&](std::size_t level) {
     return std::all_of(outputs.begin(), outputs.end(), [&](const OutputStudy& output) {
       return static_cast<double>(points_within(output, level)) >=
-             kMostPoints * static_cast<double>(output.points.size());
+             kMaxPoints * static_cast<double>(output.points.size());
     });
   };
   std::size_t chosen = levels;
@@ -248,28 +250,29 @@ void study_meshes() {
 
 // ---- Steps ----
 
-/// A model with the points and the steps that it is judged by.
+/// A model with the points and steps at which its errors are measured.
 struct StepCase {
-  std::string name;  ///< as "k = 1e+08"
+  std::string name;  ///< for example "k = 1e+08"
   solver::ModelParameters model;
   std::size_t points = 300;
-  double least_e = solver::StepChoice::kFastRestitution;  ///< below, steps shrink
+  double least_e =
+      solver::StepChoice::kFastRestitution;  ///< smallest e*; below the default, steps shrink
   double largest_e = 1.0;
-  std::vector<double> factors{1.0};  ///< of the chosen steps
+  std::vector<double> factors{1.0};  ///< by which the chosen steps are multiplied
 };
 
 /// Largest errors over the points of one mode.
 struct StepErrors {
   double step_s = 0.0;     ///< in compression
-  double of_limit = 0.0;   ///< of the longest stable step
-  double peaks = 0.0;      ///< of major peaks of F_n, over the contact's largest
-  double each_peak = 0.0;  ///< the same, each over itself
+  double of_limit = 0.0;   ///< over the longest stable step
+  double peaks = 0.0;      ///< of major peaks of F_n, over the largest of the contact
+  double each_peak = 0.0;  ///< the same, over the peak itself
   double duration = 0.0;   ///< relative
   double slide = 0.0;      ///< relative
   double stick_s = 0.0;
-  double exit_m_s = 0.0;         ///< of either exit velocity
-  std::int64_t late_sticks = 0;  ///< points whose stick errs by more than 5 ns
-  std::int64_t grazing = 0;      ///< points that have another mode at the other step; not judged
+  double exit_m_s = 0.0;         ///< larger one of both exit velocities
+  std::int64_t late_sticks = 0;  ///< points whose stick has an error above 5 ns
+  std::int64_t grazing = 0;      ///< points whose mode differs between the steps; excluded
 };
 
 /// Meshes, contact stiffnesses, restitution, tip masses and lengths around the preset `paper`.
@@ -301,8 +304,8 @@ std::vector<StepCase> step_cases() {
   return cases;
 }
 
-/// Points spread evenly in H, mu and e*, the same each time: an additive recurrence with the powers
-/// of 1/1.2207, the root of x^4 = x + 1.
+/// Fixed points spread evenly in H, mu and e*: an additive recurrence with the powers of 1/1.2207,
+/// where 1.2207 is the root of x^4 = x + 1.
 std::vector<ContactPoint> step_points(const StepCase& of, double largest_drop_m) {
   constexpr double kRoot = 1.2207440846057596;
   const auto between = [](double least, double largest, std::size_t i, double step) {
@@ -344,7 +347,7 @@ void judge(const CaseResult& result, const CaseResult& reference, StepErrors& er
   }
 }
 
-/// One for each factor of the case.
+/// One row for each factor of the case.
 std::vector<StepErrors> step_errors(const StepCase& of) {
   constexpr double kReferenceFactor = 1.0 / 6.0;
   const auto fallen = fall_of(of.model);

@@ -21,7 +21,7 @@ using solver::Contact;
 using solver::ContactParameters;
 using solver::Motion;
 
-/// What a run ends with, as vectors that can be subtracted.
+/// Final state of a run, as vectors that can be subtracted.
 struct Outcome {
   std::vector<double> position;
   std::vector<double> velocity;
@@ -61,7 +61,7 @@ Outcome fall_for(const Motion& motion, ChainState state, double duration_s, int 
   return outcome;
 }
 
-/// Contact from touch to `end_s`, events located on the way.
+/// Contact from touch to `end_s`, with event location.
 Outcome contact_until(const Motion& motion, const ContactParameters& parameters, ChainState state,
                       double dt_s, double end_s) {
   Contact contact(parameters, motion.tip(state), {dt_s, dt_s});
@@ -98,7 +98,7 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum);
 }
 
-/// What the explicit way ends with, in the coordinates of the constrained chain.
+/// Final state of the explicit integrator in the coordinates of the constrained chain.
 Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlphaMotion& motion) {
   ChainState state;
   state.q = in_columns(outcome.position);
@@ -112,7 +112,7 @@ Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlp
 /// Smallest observed orders over some runs.
 class SmallestOrders {
  public:
-  /// Errors against `right` of two runs, the second at half the step of the first.
+  /// Adds the errors of two runs against `right`; the second run has half the step of the first.
   void add(const Outcome& at_step, const Outcome& at_half, const Outcome& right) {
     for (std::size_t i = 0; i < kParts.size(); ++i) {
       const auto part = kParts[i].values;
@@ -149,18 +149,18 @@ class SmallestOrders {
   std::array<double, kParts.size()> smallest_{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
 };
 
-/// Links so soft that the fall itself bends them far: of the paper's links the vibration in the
-/// fall is so small that a halved step finds rounding.
+/// Links so soft that the fall bends them far. With the paper's links the vibration in the fall is
+/// so small that at half the step rounding dominates.
 solver::ModelParameters soft_chain() {
   solver::ModelParameters model = solver::preset("paper");
   model.E_Pa *= 1e-4;
   return model;
 }
 constexpr double kFall_s = 0.2;
-/// Before the shortest of the ten contacts ends.
+/// Before the end of the shortest of the ten contacts.
 constexpr double kContact_s = 330e-6;
 
-TEST(Order, OfTheExplicitWayIsFourInTheFall) {
+TEST(Order, OfTheExplicitIntegratorIsFourInTheFall) {
   const solver::Chain chain(soft_chain());
   const solver::ExplicitMotion motion(chain);
   const auto at = [&](int steps) { return fall_for(motion, chain.at_rest(), kFall_s, steps); };
@@ -182,7 +182,7 @@ TEST(Order, OfGeneralizedAlphaIsTwoInTheFall) {
                                "explicit, 12.5 us", 1.9);
 }
 
-TEST(Order, OfTheExplicitWayIsFourInContactWithEvents) {
+TEST(Order, OfTheExplicitIntegratorIsFourInContactWithEvents) {
   const BothWays both(solver::preset("paper"));
   SmallestOrders orders;
   for (const Point& point : kPublishedPoints) {

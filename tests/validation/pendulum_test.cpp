@@ -29,7 +29,7 @@ ModelParameters pendulum() {
   return model;
 }
 
-/// A thousandth of the stiffness: the swing bends and stretches it visibly.
+/// A thousandth of the stiffness, so that swinging bends and stretches the link visibly.
 ModelParameters soft_pendulum() {
   ModelParameters model = pendulum();
   model.E_Pa *= 1e-3;
@@ -41,7 +41,7 @@ double energy_J(const Motion& motion, const ChainState& state) {
   return energies.kinetic_J + energies.strain_J + energies.gravity_J;
 }
 
-/// Largest deviation of the energy over `steps` steps from rest, and the state then.
+/// Largest deviation of the energy over `steps` steps from rest, and the final state.
 struct Swing {
   ChainState state;
   double energy_drift_J = 0.0;
@@ -60,7 +60,7 @@ Swing swing(const Motion& motion, double dt_s, int steps) {
   return result;
 }
 
-/// First instant at which `value` falls below zero, found by a last step of the right length.
+/// First instant at which `value` falls below zero, located by the length of the last step.
 double first_zero_s(const Motion& motion, ChainState state, double dt_s,
                     const std::function<double(const ChainState&)>& value) {
   ChainState next = state;
@@ -81,7 +81,7 @@ double first_zero_s(const Motion& motion, ChainState state, double dt_s,
   return state.t_s + high;
 }
 
-TEST(Pendulum, KeepsItsEnergyUnderBothIntegrators) {
+TEST(Pendulum, ConservesItsEnergyWithBothIntegrators) {
   const ModelParameters model = soft_pendulum();
   const Chain chain(model);
   const solver::ExplicitMotion by_explicit(chain);
@@ -103,8 +103,9 @@ TEST(Pendulum, KeepsItsEnergyUnderBothIntegrators) {
                   "amplitude of the stretching vibration, out of phase by then"});
 }
 
-TEST(Pendulum, SwingsLikeARigidOneInTheStiffLimit) {
-  // From the horizontal, a uniform rod is a pendulum of 2L/3 with an amplitude of 90 degrees.
+TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
+  // A uniform rod released from the horizontal is a pendulum of length 2L/3 with an amplitude of 90
+  // degrees.
   ModelParameters model = pendulum();
   const double quarter_s = std::sqrt(2.0 * model.lengths_m.front() / (3.0 * model.g_m_s2)) *
                            std::comp_ellint_1(std::sqrt(0.5));
@@ -133,14 +134,14 @@ TEST(Pendulum, SwingsLikeARigidOneInTheStiffLimit) {
   }
 }
 
-/// Half the period of the first bending vibration between pinned and free end, from the instant at
-/// which the mode's coordinate phi^T M q comes back to zero; other modes are orthogonal to it.
+/// Half the period of the first bending vibration between pinned and free end: the instant at which
+/// the modal coordinate phi^T M q returns to zero. Other modes are orthogonal to it.
 double half_period_s(const Motion& motion, const ChainState& start, double dt_s) {
   const auto product = [&](const ChainState& state) {
     // (|a + b|^2 - |a - b|^2)/4 in the norm of the kinetic energy, a across, b the mode.
     ChainState sum = start;
     ChainState difference = start;
-    // The link lies along x, so that slopes and positions across are zero at rest.
+    // The link lies along x, so that transverse positions and slopes are zero at rest.
     sum.v.row(1) = state.q.row(1) + start.v.row(1);
     difference.v.row(1) = state.q.row(1) - start.v.row(1);
     return motion.energies(sum).kinetic_J - motion.energies(difference).kinetic_J;
@@ -160,7 +161,7 @@ TEST(Pendulum, VibratesAtTheFirstFrequencyOfAPinnedFreeBeam) {
         std::sqrt(model.E_Pa * model.I_m4 / (model.rho_kg_m3 * model.A_m2));
     const Chain chain(model);
     ChainState start = chain.at_rest();
-    constexpr double kSpeed_m_s = 1e-4;  // so slow that the vibration is linear
+    constexpr double kSpeed_m_s = 1e-4;  // so small that the vibration is linear
     for (Eigen::Index row = 0; row < chain.rows(); ++row) {
       const double z = kRoot * static_cast<double>(row / 2) / elements;
       const bool is_slope = row % 2 == 1;
@@ -175,7 +176,7 @@ TEST(Pendulum, VibratesAtTheFirstFrequencyOfAPinnedFreeBeam) {
     ChainState constrained = from_eliminated(by_generalized_alpha.chain(), start);
     by_generalized_alpha.restart(kNoContact, constrained);
     const double right_s = M_PI / frequency_rad_s;
-    // The step's own error, (w h)^2/12 and less, stays far below the element's.
+    // The error of the step, at most (w h)^2/12, is far below that of the elements.
     const double dt_s =
         std::min(1e-6, 0.2 * solver::Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0));
     const double element = std::pow(kRoot / elements, 4) / 1440.0;

@@ -23,7 +23,7 @@ using solver::RigidImpact;
 
 const std::string kReference = "Stronge, rigid body, closed form";
 
-/// A rod of 0.5 kg that flies freely and strikes with its end, 30 degrees from the ground:
+/// A free rod of 0.5 kg that strikes with its end, at 30 degrees to the ground:
 /// W = (1/m) [1 + 3 sin^2, -3 sin cos; -3 sin cos, 1 + 3 cos^2].
 RigidImpact::Parameters flying_rod(double mu, double e_star, double vt_m_s) {
   const double c = std::cos(M_PI / 6.0);
@@ -67,7 +67,7 @@ struct Regime {
   double mu;
   double vt_m_s;
 };
-/// Each regime of Stronge's theory, by the order of states that the closed form has.
+/// Each regime of Stronge's theory, with the mode of the closed form.
 constexpr std::array<Regime, 5> kRegimes{{{"slip throughout", "sC sR", 0.3, 3.0},
                                           {"stick, then slip in restitution", "SC SR sR", 0.8, 1.0},
                                           {"slip, stick, slip", "sC SC SR sR", 0.1, 1.0},
@@ -95,7 +95,7 @@ TEST(RigidImpact, WorkOfRestitutionIsMinusTheSquareOfTheRestitutionTimesThatOfCo
       const RigidImpact::Parameters p = flying_rod(regime.mu, e_star, regime.vt_m_s);
       const CaseResult result = solved(p, RigidImpact(p).duration_s() / 400);
       ASSERT_EQ(result.peaks.size(), 1U);
-      // Compression stores F^2/2k; restitution gives back all but what is booked as lost.
+      // Compression stores F^2/2k; restitution returns this minus the loss in the result.
       const double stored_J = result.fn_peak_N * result.fn_peak_N / (2.0 * p.k_N_m);
       const double given_back_J = stored_J - result.energy.restitution_J;
       largest = std::max(largest, std::abs(given_back_J / stored_J - e_star * e_star));
@@ -105,7 +105,7 @@ TEST(RigidImpact, WorkOfRestitutionIsMinusTheSquareOfTheRestitutionTimesThatOfCo
                   "Stronge's definition of e*", largest, 1e-12, "exact; rounding"});
 }
 
-/// Two links so stiff that the tip feels rigid ones: W = J M^-1 J^T, with the angles as
+/// Two links so stiff that they impact as rigid ones: W = J M^-1 J^T, with the angles as
 /// coordinates.
 struct StiffLinks {
   static constexpr double kLength_m = 0.4;
@@ -129,7 +129,7 @@ struct StiffLinks {
     mass *= model.rho_kg_m3 * model.A_m2 * kLength_m * kLength_m * kLength_m;
     RigidImpact::Parameters p;
     p.W_per_kg = J * mass.inverse() * J.transpose();
-    // A hundredth of the finger's: the links yield less.
+    // A hundredth of the finger's stiffness, so that the links deform less.
     p.k_N_m = 2.7e5;
     p.eta2 = model.eta2;
     p.mu = mu;
@@ -138,7 +138,7 @@ struct StiffLinks {
     return p;
   }
 
-  /// Straight links at their angles, turning so that the tip has the velocity V.
+  /// Straight links at the given angles, rotating so that the tip has the velocity V.
   solver::ChainState state(const solver::Chain& chain, const Eigen::Vector2d& V_m_s) const {
     const Eigen::Vector2d rate = J.inverse() * V_m_s;
     solver::ChainState state = chain.at_rest();
@@ -192,23 +192,23 @@ double stiff_chain_error(const solver::Motion& motion, const RigidImpact::Parame
   return largest_error(result, right, p.V0_m_s.norm());
 }
 
-TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidOnesByExplicitSteps) {
+TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithExplicitSteps) {
   const StiffLinks links(1e4);
   const solver::Chain chain(links.model);
   const solver::ExplicitMotion motion(chain);
   const double dt_s = 0.4 * solver::Pefrl::stability_limit() / chain.highest_frequency_rad_s(2.7e5);
   for (const ChainRegime& regime : kChainRegimes) {
-    // Slower, and rounding in the stiff links would be felt.
+    // A lower speed would make rounding in the stiff links visible.
     const auto p = links.impact(regime.mu, {-1e-3 * regime.vt_over_vn, -1e-3});
     expect_at_most({std::string("two stiff links, explicit, E * 1e4 (") + regime.mode + ")",
                     kReference,
                     stiff_chain_error(motion, p, links.state(chain, p.V0_m_s), dt_s, regime.mode),
-                    2e-4, "what the links yield and turn, and rounding in stiff links"});
+                    2e-4, "deformation and rotation of the links, and rounding"});
   }
 }
 
-TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidOnesByGeneralizedAlpha) {
-  // Its steps need not shrink with the stiffness.
+TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithGeneralizedAlpha) {
+  // The steps of this integrator need not shrink with the stiffness.
   const StiffLinks links(1e6);
   const solver::Chain chain(links.model);
   const solver::GeneralizedAlphaMotion motion(links.model);
@@ -218,7 +218,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidOnesByGeneralizedAlpha) {
     expect_at_most(
         {std::string("two stiff links, generalized-alpha, E * 1e6 (") + regime.mode + ")",
          kReference, stiff_chain_error(motion, p, touch, 1e-6, regime.mode), 1e-5,
-         "what the links turn during contact"});
+         "rotation of the links during contact"});
   }
 }
 

@@ -20,7 +20,7 @@ std::string three_digits(double value) {
   return text.str();
 }
 
-/// Adds the line to the running test's properties, from which ValidationTable reads it.
+/// Adds the line to the properties of the running test, from which ValidationTable reads it.
 void record(const Check& check, const char* relation) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   std::ostringstream key;
@@ -31,8 +31,8 @@ void record(const Check& check, const char* relation) {
   testing::Test::RecordProperty(key.str(), line.str());
 }
 
-/// Gathers the lines of all tests that run and prints them as one table, as Markdown, when the
-/// program ends. Lines travel as properties of their test, so reports in XML hold them too.
+/// Collects the lines of all tests and prints them at the end of the program as one Markdown table.
+/// Lines are properties of their test, so that XML reports contain them too.
 class ValidationTable : public testing::EmptyTestEventListener {
  public:
   void OnTestEnd(const testing::TestInfo& test) override {
@@ -44,7 +44,7 @@ class ValidationTable : public testing::EmptyTestEventListener {
     }
   }
   void OnTestProgramEnd(const testing::UnitTest&) override {
-    std::cout << "| check | reference | measured | bound | where the bound comes from |\n"
+    std::cout << "| check | reference | measured | bound | reason for the bound |\n"
                  "|---|---|--:|--:|---|\n";
     for (const std::string& row : rows_) {
       std::cout << row << '\n';
@@ -71,7 +71,7 @@ void expect_at_least(const Check& check) {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  // The unit test owns its listeners.
+  // GoogleTest owns its listeners.
   testing::UnitTest::GetInstance()->listeners().Append(
       std::make_unique<oblique::validation::ValidationTable>().release());
   return RUN_ALL_TESTS();

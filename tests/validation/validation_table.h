@@ -7,14 +7,14 @@ namespace oblique::validation {
 /// One line of the table.
 struct Check {
   std::string what;       ///< what is measured
-  std::string reference;  ///< where the right answer comes from
+  std::string reference;  ///< source of the right answer
   double measured;
   double bound;
-  std::string reason;  ///< where the bound comes from
+  std::string reason;  ///< why this bound
 };
 
-/// Fails the running test unless measured <= bound, and adds a line to the table. Texts must not
-/// hold '|', which separates the columns.
+/// Adds a line to the table, and fails the running test unless measured <= bound. Texts must not
+/// contain '|', which separates the columns.
 void expect_at_most(const Check& check);
 /// The same for measured >= bound.
 void expect_at_least(const Check& check);

@@ -25,7 +25,7 @@ using solver::ModelParameters;
 using solver::Motion;
 using solver::RodEndOnSpring;
 
-/// A little, so that nothing but the elements' linear answer is measured.
+/// So small that the response of the elements is linear.
 constexpr double kV0_m_s = 1e-3;
 constexpr double kSpring_N_m = 2.6e7;
 
@@ -39,16 +39,16 @@ ModelParameters link(double length_m, int elements) {
   return model;
 }
 
-/// A link that turns about its pin, horizontal, the tip at V0 downwards: no wave but those that
-/// start at the tip.
+/// A horizontal link that rotates about its pin, its tip moving at V0 downwards. All waves start at
+/// the tip.
 ChainState turning(const Chain& chain, double length_m) {
   ChainState state = chain.at_rest();
   state.v.row(1) = -kV0_m_s / length_m * state.q.row(0);
   return state;
 }
 
-/// A link that hangs straight down, every node but the pinned one moving at V0 downwards. From the
-/// pin a wave follows at the speed of sound.
+/// A link that hangs straight down; all nodes except the pinned one move at V0 downwards. A wave
+/// starts at the pin with the speed of sound.
 ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   ChainState state = chain.at_rest();
   state.q.row(1) = -state.q.row(0);
@@ -82,7 +82,7 @@ struct BeamErrors {
 
 BeamErrors beam_errors(int elements) {
   constexpr double kLength_m = 0.4;
-  // The peak is at 57.8 us; from 85 us on, waves are back from the pin.
+  // The peak is at 57.8 us; reflections from the pin arrive from 85 us on.
   constexpr double kWindow_s = 85e-6;
   const ModelParameters model = link(kLength_m, elements);
   const Chain chain(model);
@@ -99,7 +99,7 @@ BeamErrors beam_errors(int elements) {
                       kWindow_s, beam.peak_N(), right)};
 }
 
-TEST(Waves, BeamTipOnASpringFeelsTheForceOfASemiInfiniteBeam) {
+TEST(Waves, BeamTipOnASpringHasTheForceOfASemiInfiniteBeam) {
   struct Known {
     int elements;
     double bound;
@@ -116,8 +116,8 @@ TEST(Waves, BeamTipOnASpringFeelsTheForceOfASemiInfiniteBeam) {
   }
 }
 
-/// A rod long enough for the wave from the pin to stay away. It has no bending stiffness: the
-/// paper's curvature counts r'' along the beam too, which would stiffen short waves.
+/// A rod so long that the wave from the pin does not arrive. Without bending stiffness, because the
+/// paper's curvature includes r'' along the beam, which would stiffen short waves.
 ModelParameters rod_of(int elements) {
   ModelParameters model = link(0.8, elements);
   model.I_m4 = 1e-16;
@@ -142,7 +142,7 @@ struct Rod {
   double dt_s;
 };
 
-TEST(Waves, RodOnASpringFeelsTheForceOfASemiInfiniteRod) {
+TEST(Waves, RodOnASpringHasTheForceOfASemiInfiniteRod) {
   const auto error = [](int elements) {
     const Rod rod(elements, kSpring_N_m);
     const RodEndOnSpring exact = rod.exact();
@@ -160,8 +160,8 @@ TEST(Waves, RodOnASpringFeelsTheForceOfASemiInfiniteRod) {
                    "F has a kink at the front: order 1 at least"});
 }
 
-TEST(Waves, RodOnARigidWallFeelsTheForceOfASemiInfiniteRod) {
-  // As good as rigid: the spring yields for 0.07 us.
+TEST(Waves, RodOnARigidWallHasTheForceOfASemiInfiniteRod) {
+  // Nearly rigid: the spring compresses for 0.07 us.
   const Rod rod(64, 1e11);
   const solver::ExplicitMotion motion(rod.chain);
   ChainState state = falling_along(rod.chain, rod.model);

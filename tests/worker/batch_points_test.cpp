@@ -30,7 +30,8 @@ Batch batch_of(const protocol::Recipe& recipe) {
   return {1, 7, {{0, points->size()}}, points};
 }
 
-/// Solves all points of a batch on so many threads; the results in the order of the points.
+/// Solves all points of a batch on `threads` threads. Returns the results in the order of the
+/// points.
 std::vector<protocol::PointResult> solved(const Batch& batch, solver::FallCache& falls,
                                           std::size_t threads = 1) {
   std::promise<void> ended;
@@ -44,7 +45,8 @@ std::vector<protocol::PointResult> solved(const Batch& batch, solver::FallCache&
   std::vector<protocol::PointResult> results(batch.size());
   for (Progress& progress : solver.collect()) {
     for (protocol::PointResult& result : progress.results) {
-      EXPECT_FALSE(results.at(result.point()).has_model()) << result.point() << " came twice";
+      EXPECT_FALSE(results.at(result.point()).has_model())
+          << result.point() << " was delivered twice";
       results.at(result.point()) = std::move(result);
     }
   }
@@ -56,14 +58,14 @@ std::vector<protocol::PointResult> solved(const Batch& batch) {
   return solved(batch, falls);
 }
 
-/// The bytes of a result's outputs but for the time that it took.
+/// The encoded outputs of a result without `wall_s`.
 std::string bits_of(const protocol::PointResult& result) {
   auto outputs = protocol::from_message(result);
   outputs.solver.wall_s = 0.0;
   return protocol::to_message(0, outputs).SerializeAsString();
 }
 
-/// Behind the other model axes of the only block, before H, mu and e.
+/// Adds a model axis to the only block, after its other model axes and before H, mu and e.
 void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector<double>& values) {
   protocol::Block& block = *recipe.mutable_blocks(0);
   protocol::Axis& axis = *block.add_axes();
@@ -77,7 +79,7 @@ void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector
   }
 }
 
-/// Axes over E and k for each of `points` points of a coarse mesh.
+/// `points` points for each pair of E and k, on a coarse mesh.
 protocol::Recipe recipe_with_models(std::uint64_t points, const std::vector<double>& E_Pa,
                                     const std::vector<double>& k_N_m) {
   protocol::Recipe recipe = recipe_with_points(points);
@@ -89,7 +91,7 @@ protocol::Recipe recipe_with_models(std::uint64_t points, const std::vector<doub
   return recipe;
 }
 
-/// Falls that are counted.
+/// Solves falls and counts them.
 struct CountedFalls {
   solver::FallCache::Solve solve = [this](std::span<const solver::ModelParameters> models) {
     const std::lock_guard lock(mutex);
@@ -108,7 +110,7 @@ struct CountedFalls {
   std::vector<std::vector<solver::ModelParameters>> solved;
 };
 
-TEST(PointsOfABatch, EveryPointGivesWhatTheFingerGivesForItAlone) {
+TEST(PointsOfABatch, EveryPointHasTheResultOfSolvingItAlone) {
   const Batch batch = batch_of(recipe_with_points(12));
   const auto results = solved(batch);
   const solver::Finger finger(solver::preset("paper"));
@@ -123,7 +125,7 @@ TEST(PointsOfABatch, EveryPointGivesWhatTheFingerGivesForItAlone) {
   }
 }
 
-TEST(PointsOfABatch, ResultsHaveTheInputsOfTheirPointsAlsoWhenTheyFailed) {
+TEST(PointsOfABatch, ResultsContainTheInputsOfTheirPointsEvenIfTheyFailed) {
   protocol::Recipe recipe = recipe_with_points(2);
   recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
   add_model_axis(recipe, "k", {1e7, 2e7});
@@ -142,7 +144,7 @@ TEST(PointsOfABatch, ResultsHaveTheInputsOfTheirPointsAlsoWhenTheyFailed) {
   EXPECT_EQ(failed, 4U);
 }
 
-TEST(PointsOfABatch, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved) {
+TEST(PointsOfABatch, AFailedPointHasTheReasonAndTheOthersAreSolved) {
   protocol::Recipe recipe = recipe_with_points(2);
   recipe.mutable_blocks(0)->mutable_axes(0)->add_values(1.19);  // beyond the largest drop
   const auto results = solved(batch_of(recipe));
@@ -151,7 +153,7 @@ TEST(PointsOfABatch, APointWithoutAnswerFailsWithTheReasonAndTheOthersAreSolved)
   EXPECT_NE(results[2].error().find("1.19"), std::string::npos) << results[2].error();
 }
 
-TEST(PointsOfABatch, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
+TEST(PointsOfABatch, APointWithAForbiddenValueFailsAndNamesItsValues) {
   const Batch batch = batch_of(protocol::recipe_of(
       {{protocol::following("k", "if(mu < 0.5, 2.7e7, -1)"), protocol::listed("H", {0.5}),
         protocol::listed("mu", {0.4, 0.6}), protocol::listed("e", {1.0})}}));
@@ -161,8 +163,8 @@ TEST(PointsOfABatch, APointWithAValueThatIsNotAllowedFailsWithTheValues) {
   EXPECT_NE(results[1].error().find("mu = 0.6"), std::string::npos);
 }
 
-TEST(PointsOfABatch, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
-  // The recipe takes any positive number, the solver only one that leaves it a step.
+TEST(PointsOfABatch, AnInvalidModelFailsEachOfItsPointsWithTheReason) {
+  // A recipe allows any positive step; the solver requires a stable one.
   protocol::Recipe recipe = recipe_with_points(3);
   solver::ModelParameters model = solver::preset("paper");
   model.dt_s = 1.0;
@@ -174,16 +176,16 @@ TEST(PointsOfABatch, AModelThatMakesNoFingerFailsEachPointWithTheReason) {
   }
 }
 
-TEST(PointsOfABatch, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
+TEST(PointsOfABatch, PointsOfManyModelsHaveTheResultsOfSolvingThemAlone) {
   const Batch batch = batch_of(recipe_with_models(3, {6e10, 7e10, 8e10}, {2e7, 3e7}));
   ASSERT_EQ(batch.size(), 18U);
   CountedFalls falls;
   solver::FallCache one({}, falls.solve);
   solver::FallCache several({}, falls.solve);
   const auto results = solved(batch, one);
-  EXPECT_EQ(falls.count(), 3U) << "k does not enter the fall";
+  EXPECT_EQ(falls.count(), 3U) << "a fall does not depend on k";
   const auto by_threads = solved(batch, several, 3);
-  EXPECT_EQ(falls.count(), 6U) << "threads do not solve each other's falls again";
+  EXPECT_EQ(falls.count(), 6U) << "each fall is solved by one thread only";
   for (std::uint64_t i = 0; i < batch.size(); ++i) {
     const protocol::Point point = batch.points().point(i);
     const solver::CaseResult expected =
@@ -197,7 +199,7 @@ TEST(PointsOfABatch, PointsOfManyModelsGiveWhatTheirFingersGiveForThemAlone) {
   }
 }
 
-TEST(PointsOfABatch, FallsThatLaterPointsMissAreSolvedBesideTheFirst) {
+TEST(PointsOfABatch, MissingFallsOfLaterPointsAreSolvedTogetherWithTheFirst) {
   const Batch batch = batch_of(recipe_with_models(2, {5e10, 6e10, 7e10, 8e10}, {2e7, 3e7}));
   CountedFalls falls;
   solver::FallCache cache({}, falls.solve);
@@ -208,13 +210,13 @@ TEST(PointsOfABatch, FallsThatLaterPointsMissAreSolvedBesideTheFirst) {
   EXPECT_EQ(falls.count(), 4U);
 }
 
-TEST(PointsOfABatch, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlone) {
+TEST(PointsOfABatch, AFailingFallIsSolvedOnceAndFailsOnlyThePointsOfItsModels) {
   protocol::Recipe recipe = recipe_with_models(4, {7e10}, {2e7, 3e7});
   solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   model.integrator = solver::Integrator::kGeneralizedAlpha;
   *recipe.mutable_model() = protocol::to_message(model);
-  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails in the first
+  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // with 0.025 s Newton's method fails
   const Batch batch = batch_of(recipe);
   CountedFalls falls;
   solver::FallCache cache({}, falls.solve);
@@ -229,9 +231,9 @@ TEST(PointsOfABatch, AFallThatFailsIsSolvedOnceAndFailsThePointsOfItsModelsAlone
   EXPECT_EQ(falls.count(), 2U);
 }
 
-TEST(PointsOfABatch, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumbers) {
+TEST(PointsOfABatch, EstimatedErrorsAreAddedIfTheStudyWantsThemAndChangeNothingElse) {
   protocol::Recipe recipe = recipe_with_models(3, {7e10, 6e10}, {2.7e7, 1e7});
-  recipe.mutable_model()->set_elements_per_link(2);  // one has no coarser mesh
+  recipe.mutable_model()->set_elements_per_link(2);  // one element has no coarser mesh
   const auto without = solved(batch_of(recipe));
   recipe.set_errors(true);
   const auto with = solved(batch_of(recipe));
@@ -246,7 +248,7 @@ TEST(PointsOfABatch, ResultsHaveErrorsWhereTheStudyWantsThemAndElseTheSameNumber
   }
 }
 
-/// The order for a point of a recipe.
+/// The order of a trace of a point.
 protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
   const protocol::Point point = batch.points().point(number);
   protocol::TraceOrder order;
@@ -258,15 +260,15 @@ protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
   return order;
 }
 
-/// Solves a batch of that many points of each of two models, and then traces its first and its last
-/// point; each trace must have the bits of the batch's result.
+/// Solves a batch of `points` points of each of two models, then traces its first and last point.
+/// The results of both must be equal bit for bit.
 void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, bool errors,
                              bool shape) {
   solver::ModelParameters model = solver::preset("paper");
   model.integrator = integrator;
   model.elements_per_link = 2;
   if (integrator == solver::Integrator::kGeneralizedAlpha) {
-    model.dt_fall_s = 1e-3;  // longer than chosen: what is asked is repetition
+    model.dt_fall_s = 1e-3;  // longer than the chosen step, to save time
   }
   protocol::Recipe recipe = recipe_with_points(points);
   *recipe.mutable_model() = protocol::to_message(model);
@@ -293,7 +295,7 @@ void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, 
   }
 }
 
-TEST(SolveTrace, ATracedPointHasTheBitsThatItHadInItsBatch) {
+TEST(SolveTrace, ATracedPointHasTheSameBitsAsInItsBatch) {
   for (const bool errors : {false, true}) {
     for (const bool shape : {false, true}) {
       expect_traces_to_repeat(solver::Integrator::kExplicit, 12, errors, shape);
@@ -301,11 +303,11 @@ TEST(SolveTrace, ATracedPointHasTheBitsThatItHadInItsBatch) {
   }
 }
 
-TEST(SolveTrace, ATraceByGeneralizedAlphaHasTheBitsOfItsBatchToo) {
+TEST(SolveTrace, ATracedPointHasTheSameBitsAsInItsBatchWithGeneralizedAlpha) {
   expect_traces_to_repeat(solver::Integrator::kGeneralizedAlpha, 2, false, true);
 }
 
-TEST(SolveTrace, ATraceBeginsWithTheFallWhereThatIsOrdered) {
+TEST(SolveTrace, ATraceBeginsWithTheFallIfOrdered) {
   solver::ModelParameters model = solver::preset("paper");
   model.elements_per_link = 1;
   protocol::Recipe recipe = recipe_with_points(2);
@@ -324,7 +326,7 @@ TEST(SolveTrace, ATraceBeginsWithTheFallWhereThatIsOrdered) {
   }
 }
 
-TEST(SolveTrace, ATraceWithoutAnswerFailsWithTheReasonOfItsPoint) {
+TEST(SolveTrace, TheTraceOfAFailingPointFailsWithItsReason) {
   solver::FallCache falls(kFallBytes);
   const Batch batch = batch_of(recipe_with_points(2));
   protocol::TraceOrder order = order_of(batch, 0);

@@ -21,13 +21,13 @@
 namespace oblique::worker {
 namespace {
 
-/// Of a study in which nothing is left out.
+/// A batch of a study without filter.
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
             std::uint64_t study_id = 7) {
   return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000)};
 }
 
-/// Of a study of a thousand points with mu from 0 to 999.
+/// A batch of a study of a thousand points with mu from 0 to 999.
 Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string& where) {
   const auto points = std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
       {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 999.0, 1000),
@@ -39,7 +39,7 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
 /// Lets the test decide when each point ends.
 class Gate {
  public:
-  /// Called by the solver: says that a point has begun and waits until it may end.
+  /// Called by the solver: counts a begun point and waits until it may end.
   void pass() {
     std::unique_lock lock(mutex_);
     ++begun_;
@@ -68,7 +68,7 @@ class Gate {
   int open_ = 0;
 };
 
-/// Fails all points of a source, and calls `before` before each.
+/// Fails all points of a source; calls `before` before each.
 void fail_all(
     solver::PointSource& points, const solver::TakeOutcome& take,
     const std::function<void()>& before = [] {}) {
@@ -78,7 +78,7 @@ void fail_all(
   }
 }
 
-/// A batch solver whose points are solved when the test says so.
+/// A batch solver whose points end when the test opens the gate.
 class BatchSolverTest : public ::testing::Test {
  protected:
   void TearDown() override { gate_.open(1'000'000); }
@@ -117,7 +117,7 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
   EXPECT_TRUE(solver_.collect().empty());
 }
 
-TEST_F(BatchSolverTest, PointsOfItsRangesAreSolvedInOrderAndThoseThatAFilterLeavesOutAreNamed) {
+TEST_F(BatchSolverTest, PointsOfABatchAreSolvedInOrderAndLeftOutPointsAreReported) {
   struct Case {
     std::vector<Batch::Range> ranges;
     const char* where;
@@ -153,7 +153,7 @@ TEST_F(BatchSolverTest, PointsOfItsRangesAreSolvedInOrderAndThoseThatAFilterLeav
   }
 }
 
-TEST_F(BatchSolverTest, PartOfABatchCanBeCollectedWhileItIsSolved) {
+TEST_F(BatchSolverTest, ResultsOfABatchCanBeCollectedBeforeItEnds) {
   solver_.add(batch(1, 0, 3));
   gate_.open(2);
   gate_.wait_begun(3);
@@ -170,7 +170,7 @@ TEST_F(BatchSolverTest, PartOfABatchCanBeCollectedWhileItIsSolved) {
   EXPECT_TRUE(rest[0].batch_done);
 }
 
-TEST_F(BatchSolverTest, ADroppedStudyLeavesNothingAndOthersGoOn) {
+TEST_F(BatchSolverTest, ADroppedStudyLeavesNothingAndOthersContinue) {
   solver_.add(batch(1, 0, 3, 7));
   solver_.add(batch(2, 0, 3, 7));
   solver_.add(batch(3, 0, 1, 8));
@@ -184,20 +184,20 @@ TEST_F(BatchSolverTest, ADroppedStudyLeavesNothingAndOthersGoOn) {
   EXPECT_EQ(progress[0].batch, 3U);
 }
 
-TEST_F(BatchSolverTest, ABatchThatIsDroppedIsLeftAtTheNextPointHoweverLongItIs) {
+TEST_F(BatchSolverTest, ADroppedBatchEndsAfterThePresentPoint) {
   solver_.add(batch(1, 0, 1000));
   gate_.wait_begun(1);
   solver_.drop_study(7);
   solver_.add(batch(2, 0, 1, 8));
   gate_.open(1000);
   wait_batches_ended(1);
-  EXPECT_EQ(gate_.begun(), 2) << "one of each";
+  EXPECT_EQ(gate_.begun(), 2) << "one point of each batch";
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 1U);
   EXPECT_EQ(progress[0].batch, 2U);
 }
 
-TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
+TEST_F(BatchSolverTest, ResultsSolvedBeforeAllIsDroppedCanStillBeCollected) {
   solver_.add(batch(1, 0, 3));
   solver_.add(batch(2, 0, 3));
   gate_.open(1);
@@ -212,12 +212,12 @@ TEST_F(BatchSolverTest, WhenAllIsDroppedWhatWasSolvedCanStillBeCollected) {
   wait_batches_ended(1);
   const auto rest = solver_.collect();
   ASSERT_EQ(rest.size(), 2U);
-  EXPECT_EQ(rest[0].batch, 1U) << "the point that was being solved counts";
+  EXPECT_EQ(rest[0].batch, 1U) << "the point in progress is included";
   EXPECT_EQ(rest[0].results.size(), 1U);
   EXPECT_EQ(rest[1].batch, 3U);
 }
 
-TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
+TEST_F(BatchSolverTest, APausedSolverFinishesItsPointAndBeginsNoOther) {
   solver_.add(batch(1, 0, 3));
   gate_.wait_begun(1);
   solver_.set_paused(true);
@@ -235,7 +235,7 @@ TEST_F(BatchSolverTest, APausedSolverEndsItsPointAndBeginsNoOther) {
   EXPECT_EQ(solver_.collect().at(0).results.size(), 2U);
 }
 
-TEST_F(BatchSolverTest, APausedSolverThatIsEndedBeginsNoPoint) {
+TEST_F(BatchSolverTest, APausedSolverThatIsDestroyedBeginsNoPoint) {
   std::atomic<int> begun{0};
   {
     BatchSolver paused(
@@ -255,7 +255,7 @@ TEST_F(BatchSolverTest, SeveralThreadsShareABatch) {
                      [] {}, 3);
   shared.add(batch(1, 0, 3));
   gate_.wait_begun(3);
-  EXPECT_TRUE(shared.collect().empty()) << "none has ended, and all three are begun";
+  EXPECT_TRUE(shared.collect().empty()) << "all three points have begun and none has ended";
   gate_.open(3);
   std::set<std::uint64_t> points;
   while (points.size() < 3) {
@@ -268,15 +268,15 @@ TEST_F(BatchSolverTest, SeveralThreadsShareABatch) {
   EXPECT_EQ(points, (std::set<std::uint64_t>{0, 1, 2}));
 }
 
-TEST_F(BatchSolverTest, AThreadThatIsFreePassesOverADroppedBatchThatAnotherStillWorksOn) {
+TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolves) {
   Gate dropped_batch;
   std::atomic<int> taken_up{0};
   std::atomic<bool> next_is_solved{false};
   BatchSolver shared(
       [&](const Batch& at_hand, auto& points, const auto& take) {
         if (at_hand.number() == 1 && ++taken_up > 2) {
-          ADD_FAILURE() << "a dropped batch is taken up";
-          std::abort();  // and would be without end
+          ADD_FAILURE() << "a dropped batch was started";
+          std::abort();  // otherwise the test would not end
         }
         fail_all(points, take, [&] {
           if (at_hand.number() == 1) {
@@ -290,15 +290,15 @@ TEST_F(BatchSolverTest, AThreadThatIsFreePassesOverADroppedBatchThatAnotherStill
       },
       [] {}, 2);
   shared.add(batch(1, 0, 6));
-  dropped_batch.wait_begun(2);  // both threads are in it
+  dropped_batch.wait_begun(2);  // both threads solve it
   shared.drop_batch(1);
-  dropped_batch.open(1);  // one of them comes free
+  dropped_batch.open(1);  // one of them becomes free
   shared.add(batch(2, 0, 1));
   next_is_solved.wait(false);
   dropped_batch.open(1000);
 }
 
-TEST(BatchSolver, EveryPointOfManyBatchesIsSolvedOnceHoweverManyThreads) {
+TEST(BatchSolver, EveryPointOfManyBatchesIsSolvedOnceByAnyNumberOfThreads) {
   constexpr std::uint64_t kBatches = 40;
   std::mutex mutex;
   std::condition_variable changed;

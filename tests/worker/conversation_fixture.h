@@ -89,8 +89,7 @@ inline protocol::ServerToWorker heartbeat_reply_message() {
   return message;
 }
 
-/// A worker's side of the conversation whose time and messages the test makes. The last effects are
-/// kept for looking at.
+/// A worker's conversation whose time and messages the test controls. Keeps the last effects.
 class ConversationTest : public ::testing::Test {
  protected:
   void start() { take(conversation_->start(now_ms_)); }
@@ -99,21 +98,21 @@ class ConversationTest : public ::testing::Test {
     take(conversation_->on_message(message, now_ms_));
   }
 
-  /// Starts and is welcomed; study 7 of 100 points is defined.
+  /// Starts, is welcomed, and receives study 7 of 100 points.
   void join() {
     start();
     receive(welcome_message());
     receive(study_message(7));
   }
 
-  /// The same by these settings, and holds lease 31, points 0 to 9 of that study.
+  /// The same with these settings, and receives lease 31 of points 0 to 9 of that study.
   void join_with_batch(const ConversationSettings& settings = {}) {
     use(settings);
     join();
     receive(batch_message(7, 31));
   }
 
-  /// The server asks for a hello and welcomes the worker once more.
+  /// The server requests a hello and welcomes the worker again.
   void rejoin(const std::string& database_id = "db") {
     receive(hello_again_message());
     receive(welcome_message(database_id));
@@ -126,7 +125,7 @@ class ConversationTest : public ::testing::Test {
     take(conversation_->on_time(now_ms_));
   }
 
-  /// Points `first` to `first + count − 1` of a batch were solved.
+  /// Reports points `first` to `first + count − 1` of a batch as solved.
   void solve(std::uint64_t batch, std::uint64_t first, std::uint64_t count, bool batch_done,
              std::uint64_t study_id = 7) {
     Progress progress{batch, study_id, {}, 0.5, batch_done};
@@ -173,7 +172,7 @@ class ConversationTest : public ::testing::Test {
     return found;
   }
 
-  /// Batches asked for by the last effects; 0 when none.
+  /// Credit in the last effects; 0 if none.
   std::uint32_t credit_given() const {
     std::uint32_t batches = 0;
     for (const auto& message : sent(protocol::WorkerMessage::kCredit)) {
@@ -182,7 +181,7 @@ class ConversationTest : public ::testing::Test {
     return batches;
   }
 
-  /// Nothing before the conversation is over.
+  /// Nothing before the conversation has ended.
   std::optional<int> exit_code() const {
     return finish() ? std::optional(finish()->exit_code) : std::nullopt;
   }
@@ -192,7 +191,7 @@ class ConversationTest : public ::testing::Test {
     return all.empty() ? std::nullopt : std::optional(all.front());
   }
 
-  /// Begins anew with other settings.
+  /// Replaces the conversation by one with other settings.
   void use(const ConversationSettings& settings) { conversation_.emplace(hello(), settings); }
 
   static protocol::WorkerHello hello() {

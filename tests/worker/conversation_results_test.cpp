@@ -21,7 +21,7 @@ protocol::Trace trace_of(std::uint64_t id) {
   return trace;
 }
 
-TEST_F(ConversationTest, ResultsAreNumberedFromOneAndTheLastOfABatchSaysSo) {
+TEST_F(ConversationTest, ResultsMessagesAreNumberedFromOneAndTheLastOneEndsTheBatch) {
   join_with_batch();
   solve(1, 0, 4, false);
   ASSERT_EQ(sent_results().size(), 1U);
@@ -40,7 +40,7 @@ TEST_F(ConversationTest, ResultsAreNumberedFromOneAndTheLastOfABatchSaysSo) {
   EXPECT_EQ(results.results(5).point(), 9U);
 }
 
-TEST_F(ConversationTest, ABatchThatEndsWithNothingNewIsStillSaidToBeDone) {
+TEST_F(ConversationTest, TheEndOfABatchIsReportedEvenWithoutNewResults) {
   join_with_batch();
   solve(1, 0, 10, false);
   solve(1, 10, 0, true);
@@ -68,7 +68,7 @@ TEST_F(ConversationTest, ManyResultsAreSplitAndOnlyTheLastMessageEndsTheBatch) {
   EXPECT_NEAR(busy_s, 0.5, 1e-12);
 }
 
-TEST_F(ConversationTest, AMessageStaysBelowItsSizeInBytesAndALargeResultGoesAlone) {
+TEST_F(ConversationTest, AMessageStaysBelowItsLimitInBytesAndALargeResultIsSentAlone) {
   join_with_batch({.bytes_a_message = 100});
   solve(1, 0, 10, true);
   EXPECT_GT(sent_results().size(), 1U);
@@ -78,7 +78,7 @@ TEST_F(ConversationTest, AMessageStaysBelowItsSizeInBytesAndALargeResultGoesAlon
   join_with_batch({.bytes_a_message = 10});
   solve(1, 0, 10, true);
   ASSERT_EQ(sent_results().size(), 10U);
-  EXPECT_EQ(sent_results()[0].results(0).error(), "for the test") << "as it was solved";
+  EXPECT_EQ(sent_results()[0].results(0).error(), "for the test") << "in the order of solving";
 }
 
 TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
@@ -91,7 +91,7 @@ TEST_F(ConversationTest, AResultTooLargeToSendBecomesAFailedPoint) {
   EXPECT_EQ(sent_results()[0].results(0).error(), "its result is too large to send");
 }
 
-TEST_F(ConversationTest, PointsThatAFilterLeavesOutAreNamedAsRangesOfTheirBatch) {
+TEST_F(ConversationTest, PointsThatAFilterLeavesOutAreReportedAsRangesOfTheirBatch) {
   join();
   receive(batch_message(7, 31, 0, 10));
   take(conversation_->on_progress(
@@ -105,7 +105,7 @@ TEST_F(ConversationTest, PointsThatAFilterLeavesOutAreNamedAsRangesOfTheirBatch)
             (std::vector<std::uint64_t>{0, 3, 4, 6}));
 }
 
-TEST_F(ConversationTest, ManyRangesGoInSeveralMessagesOfWhichTheLastEndsTheBatch) {
+TEST_F(ConversationTest, ManyRangesAreSplitAndOnlyTheLastMessageEndsTheBatch) {
   join();
   receive(study_message(7, 100'000));
   receive(batch_message(7, 31, 0, 100'000));
@@ -125,7 +125,7 @@ TEST_F(ConversationTest, ManyRangesGoInSeveralMessagesOfWhichTheLastEndsTheBatch
   EXPECT_TRUE(sent_results().back().batch_done());
 }
 
-TEST_F(ConversationTest, UnacknowledgedResultsAreDeliveredAgainBeforeCreditIsGiven) {
+TEST_F(ConversationTest, UnacknowledgedResultsAreSentAgainBeforeCreditIsGiven) {
   join_with_batch();
   solve(1, 0, 4, false);
   solve(1, 4, 3, false);
@@ -147,7 +147,7 @@ TEST_F(ConversationTest, ResultsOfAnEarlierSessionBelongToNoLease) {
   EXPECT_FALSE(sent_results()[0].batch_done());
 }
 
-TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBefore) {
+TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcome) {
   join_with_batch();
   receive(hello_again_message());
   EXPECT_FALSE(has<DropAll>());
@@ -156,11 +156,11 @@ TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcomeAndNotBe
   EXPECT_EQ(credit_given(), 2U);
 }
 
-TEST_F(ConversationTest, PointsOfADroppedBatchThatWereSolvedAreDeliveredWithoutALease) {
+TEST_F(ConversationTest, SolvedPointsOfADroppedBatchAreSentWithoutALease) {
   join_with_batch();
   rejoin();
   receive(study_message(7));
-  receive(batch_message(7, 31));  // the server counts its leases anew
+  receive(batch_message(7, 31));  // a restarted server reuses the lease number
   solve(1, 0, 3, false);
   ASSERT_EQ(sent_results().size(), 1U);
   EXPECT_EQ(sent_results()[0].lease_id(), 0U);
@@ -172,7 +172,7 @@ TEST_F(ConversationTest, PointsOfADroppedBatchThatWereSolvedAreDeliveredWithoutA
   EXPECT_TRUE(sent_results()[0].batch_done());
 }
 
-TEST_F(ConversationTest, PointsSolvedWhileTheServerIsAwayAreKeptAndDeliveredAtTheWelcome) {
+TEST_F(ConversationTest, PointsSolvedWithoutAServerAreKeptAndSentAfterTheWelcome) {
   join_with_batch();
   receive(hello_again_message());
   solve(1, 0, 10, true);
@@ -183,7 +183,7 @@ TEST_F(ConversationTest, PointsSolvedWhileTheServerIsAwayAreKeptAndDeliveredAtTh
   EXPECT_EQ(sent_results()[0].results_size(), 10);
 }
 
-TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverDeliveredToAnother) {
+TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverSentToAnother) {
   join_with_batch();
   solve(1, 0, 10, true);
   rejoin("another");
@@ -191,13 +191,13 @@ TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverDeliveredToAnother) {
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
-TEST_F(ConversationTest, APointThatEndsAfterTheDatabaseChangedIsNotDeliveredEither) {
+TEST_F(ConversationTest, APointSolvedAfterTheDatabaseChangedIsNotSentEither) {
   join_with_batch();
   rejoin("another");
   receive(study_message(7));
   receive(batch_message(7, 31));
   solve(1, 0, 10, false);
-  EXPECT_TRUE(sent_results().empty()) << "study 7 is another one now";
+  EXPECT_TRUE(sent_results().empty()) << "study 7 is another study now";
   solve(2, 0, 10, false);
   EXPECT_EQ(sent_results().size(), 1U);
 }
@@ -218,7 +218,7 @@ TEST_F(ConversationTest,
   }
 }
 
-TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessagesAtATime) {
+TEST_F(ConversationTest, KeptResultsAreSentAFewMessagesAtATime) {
   join_with_batch({.outbox = {.messages_on_their_way = 2}});
   receive(hello_again_message());
   for (std::uint64_t point = 0; point < 5; ++point) {
@@ -226,7 +226,7 @@ TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessag
   }
   receive(welcome_message());
   EXPECT_EQ(sent_results().size(), 2U);
-  EXPECT_EQ(credit_given(), 0U) << "points of what waits would be handed out again";
+  EXPECT_EQ(credit_given(), 0U) << "with credit the server would lease the same points again";
   receive(stored_message(1));
   ASSERT_EQ(sent_results().size(), 1U);
   EXPECT_EQ(sent_results()[0].sequence(), 3U);
@@ -237,16 +237,6 @@ TEST_F(ConversationTest, WhatWasSolvedWhileTheServerWasAwayIsDeliveredAFewMessag
   receive(stored_message(4));
   receive(stored_message(5));
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
-}
-
-TEST_F(ConversationTest, BytesOnTheirWayAreBoundedTooAndALargeMessageGoesAlone) {
-  join_with_batch({.outbox = {.bytes_on_their_way = 1}});
-  solve(1, 0, 1, false);
-  EXPECT_EQ(sent_results().size(), 1U);
-  solve(1, 1, 1, false);
-  EXPECT_TRUE(sent_results().empty());
-  receive(stored_message(1));
-  EXPECT_EQ(sent_results().size(), 1U);
 }
 
 TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
@@ -263,7 +253,7 @@ TEST_F(ConversationTest, AWithdrawnStudyMakesRoomForTheResultsOfOthers) {
   EXPECT_EQ(sent_results()[0].study_id(), 8U);
 }
 
-TEST_F(ConversationTest, AnAcknowledgementThatComesTwiceOrForNothingChangesNothing) {
+TEST_F(ConversationTest, ARepeatedOrUnknownAcknowledgementHasNoEffect) {
   join_with_batch();
   solve(1, 0, 4, false);
   solve(1, 4, 4, false);
@@ -276,7 +266,7 @@ TEST_F(ConversationTest, AnAcknowledgementThatComesTwiceOrForNothingChangesNothi
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
-TEST_F(ConversationTest, AnOrderedTraceIsSolvedAndTakesNothingFromTheCredit) {
+TEST_F(ConversationTest, AnOrderedTraceIsSolvedAndDoesNotChangeTheCredit) {
   join();
   receive(trace_order(5));
   ASSERT_EQ(effects_of<SolveTrace>().size(), 1U);
@@ -295,15 +285,15 @@ TEST_F(ConversationTest, TracesOfAnEarlierSessionAreForgotten) {
   receive(trace_order(5));
   receive(hello_again_message());
   take(conversation_->on_traces({trace_of(5)}, now_ms_));
-  EXPECT_TRUE(sent(WorkerMessage::kTrace).empty()) << "nobody is there to take it";
-  pass(1000);  // it connects again
+  EXPECT_TRUE(sent(WorkerMessage::kTrace).empty()) << "no server is connected";
+  pass(1000);  // it reconnects
   receive(welcome_message());
   EXPECT_TRUE(has<DropAll>());
 }
 
-TEST_F(ConversationTest, AStoppingWorkerTakesNoTrace) {
+TEST_F(ConversationTest, AStoppingWorkerDeclinesTraces) {
   join_with_batch();
-  solve(1, 0, 1, false);  // it waits for this to be stored
+  solve(1, 0, 1, false);  // it waits until this is stored
   stop();
   EXPECT_TRUE(has<DropAll>());
   receive(trace_order(5));

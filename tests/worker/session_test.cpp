@@ -19,15 +19,15 @@ namespace {
 
 using protocol::WorkerMessage;
 
-/// The worker does not give up a server that is slow.
+/// A welcome with which the worker tolerates a slow server.
 protocol::ServerToWorker patient_welcome() {
   protocol::ServerToWorker welcome = welcome_message();
   welcome.mutable_welcome()->set_lost_after_ms(600'000);
   return welcome;
 }
 
-/// The server's side of the socket, played by the test. Waiting for a message that never comes is
-/// an error after a time that no sound run needs.
+/// The server's side of the socket, controlled by the test. Waiting for a message that never
+/// arrives is an error after ten minutes.
 class ScriptedServer {
  public:
   explicit ScriptedServer(const std::string& endpoint = "tcp://127.0.0.1:*")
@@ -40,7 +40,7 @@ class ScriptedServer {
 
   std::string endpoint() const { return socket_.get(zmq::sockopt::last_endpoint); }
 
-  /// The next message of that kind; others are passed over.
+  /// Returns the next message of that kind; skips others.
   WorkerMessage wait_for(WorkerMessage::KindCase kind) {
     while (true) {
       zmq::message_t identity;
@@ -59,14 +59,14 @@ class ScriptedServer {
     }
   }
 
-  /// To the worker heard last.
+  /// Sends to the worker of the last received message.
   void send(const protocol::ServerToWorker& message) { send_frame(protocol::encode(message)); }
   void send_frame(const std::string& frame) {
     socket_.send(zmq::buffer(worker_), zmq::send_flags::sndmore);
     socket_.send(zmq::buffer(frame));
   }
 
-  /// Takes a hello and hands out points 0 to `count − 1` of study 7.
+  /// Welcomes the worker and leases it points 0 to `count − 1` of study 7.
   void welcome_and_hand_out(std::uint64_t count) {
     wait_for(WorkerMessage::kHello);
     protocol::ServerToWorker welcome = patient_welcome();
@@ -83,7 +83,7 @@ class ScriptedServer {
   std::string worker_;
 };
 
-/// A session on a thread of its own.
+/// A session on its own thread.
 class RunningWorker {
  public:
   explicit RunningWorker(const std::string& server, BatchSolver::SolvePoints solve)
@@ -139,7 +139,7 @@ TEST(SessionTest, ABatchIsSolvedAndReportedAndAStoppedWorkerSaysGoodbye) {
   EXPECT_EQ(worker.exit_code(), 0);
 }
 
-TEST(SessionTest, ATraceIsSolvedBesideABatchThatTakesLong) {
+TEST(SessionTest, ATraceIsSolvedDuringALongBatch) {
   ScriptedServer server;
   std::promise<void> release;
   const std::shared_future<void> released(release.get_future());
@@ -160,7 +160,7 @@ TEST(SessionTest, ATraceIsSolvedBesideABatchThatTakesLong) {
   server.send(stored_message(results.sequence()));
 }
 
-TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
+TEST(SessionTest, HeartbeatsContinueWhileAPointIsSolved) {
   ScriptedServer server;
   std::promise<void> release;
   const std::shared_future<void> released(release.get_future());
@@ -178,7 +178,7 @@ TEST(SessionTest, HeartbeatsGoOnWhileAPointIsSolved) {
   server.send(stored_message(results.sequence()));
 }
 
-TEST(SessionTest, WhatTheLostServerDidNotStoreIsDeliveredToTheNextOneAtTheSameAddress) {
+TEST(SessionTest, ResultsThatALostServerDidNotStoreAreSentToTheNextServerAtTheAddress) {
   const test::ReservedPort port;
   auto server = std::make_unique<ScriptedServer>(port.url());
   RunningWorker worker(port.url(), solved_at_once);
@@ -209,7 +209,7 @@ TEST(SessionTest, AWorkerStartedBeforeItsServerFindsIt) {
   EXPECT_EQ(server.wait_for(WorkerMessage::kHello).hello().name(), "test");
 }
 
-TEST(SessionTest, FramesThatAreNoMessagesDoNotHarmAWorker) {
+TEST(SessionTest, InvalidFramesAreIgnored) {
   ScriptedServer server;
   RunningWorker worker(server.endpoint(), solved_at_once);
   server.wait_for(WorkerMessage::kHello);
@@ -220,7 +220,7 @@ TEST(SessionTest, FramesThatAreNoMessagesDoNotHarmAWorker) {
   EXPECT_EQ(server.wait_for(WorkerMessage::kCredit).credit().batches(), 2U);
 }
 
-TEST(SessionTest, ARefusedWorkerEndsWithOne) {
+TEST(SessionTest, ARefusedWorkerExitsWithOne) {
   ScriptedServer server;
   RunningWorker worker(server.endpoint(), solved_at_once);
   server.wait_for(WorkerMessage::kHello);
@@ -230,7 +230,7 @@ TEST(SessionTest, ARefusedWorkerEndsWithOne) {
   EXPECT_EQ(worker.exit_code(), 1);
 }
 
-TEST(SessionTest, AnAddressThatIsNoneIsAnErrorThatNamesIt) {
+TEST(SessionTest, AnInvalidAddressIsAnErrorThatNamesIt) {
   for (const std::string address : {"", "localhost", "tcp://127.0.0.1", "tcp://127.0.0.1:port"}) {
     SessionSettings settings;
     settings.server = address;

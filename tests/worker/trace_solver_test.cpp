@@ -32,7 +32,7 @@ protocol::TraceOrder order(std::uint64_t id, std::uint64_t every = 1) {
   return order;
 }
 
-/// Answers with 5 rows, and waits before that while it is held.
+/// Answers with 5 rows; while held it waits first.
 class Solving {
  public:
   TraceSolver::Solve solve() {
@@ -64,8 +64,8 @@ protocol::Trace answer_of(TraceSolver& solver) {
   }
 }
 
-/// The times of the rows, which `trace` gets, of a fall of 3 rows and a contact of `instants`, of
-/// which the second third is restitution, that may have `most_rows`.
+/// Adds a fall of 3 rows and a contact of `instants` rows, whose second third is restitution, to
+/// TraceRows limited to `most_rows` rows. Fills `trace` and returns the times of its rows.
 std::vector<double> times_of(std::uint64_t every, int instants, std::size_t most_rows,
                              protocol::Trace& trace) {
   trace.Clear();
@@ -87,7 +87,7 @@ std::vector<double> times_of(std::uint64_t every, int instants, std::size_t most
   return times;
 }
 
-TEST(TraceRowsTest, HaveTheFallEachKthInstantAllEndsOfPhasesAndTheLastInstant) {
+TEST(TraceRowsTest, ContainTheFallEachKthInstantAllEndsOfPhasesAndTheLastInstant) {
   protocol::Trace trace;
   EXPECT_EQ(times_of(10, 39, 100, trace),
             (std::vector<double>{-3, -2, -1, 0, 10, 13, 20, 26, 30, 38}));
@@ -97,7 +97,7 @@ TEST(TraceRowsTest, HaveTheFallEachKthInstantAllEndsOfPhasesAndTheLastInstant) {
   EXPECT_EQ(times_of(1, 39, 42, trace).size(), 42U);
 }
 
-TEST(TraceRowsTest, ThatAreTooManyAreRefusedWithTheKThatMakesThemFit) {
+TEST(TraceRowsTest, TooManyAreRefusedWithAKThatFits) {
   for (const auto& [every, instants, most] :
        {std::tuple{std::uint64_t{1}, 39, std::size_t{41}}, {1, 100'000, 500}, {7, 10'000, 20}}) {
     protocol::Trace refused;
@@ -109,21 +109,22 @@ TEST(TraceRowsTest, ThatAreTooManyAreRefusedWithTheKThatMakesThemFit) {
   }
 }
 
-TEST(TraceRowsTest, ThatFitWithNoKNameOneBeyondAllInstants) {
+TEST(TraceRowsTest, IfNoKFitsTheAnswerIsOneBeyondAllInstants) {
   protocol::Trace trace;
-  EXPECT_TRUE(times_of(1, 100, 5, trace).empty());  // the fall, ends of phases and the last
+  EXPECT_TRUE(times_of(1, 100, 5, trace)
+                  .empty());  // even the fall, the ends of phases and the last row are too many
   EXPECT_EQ(trace.every(), trace.instants() + 1);
 }
 
-TEST(TraceRowsTest, AreChosenEvenlyWhereNoKIsGiven) {
+TEST(TraceRowsTest, WithoutKTheSmallestPowerOfTwoThatFitsIsChosen) {
   protocol::Trace trace;
   const auto times = times_of(0, 100'000, 500, trace);
   EXPECT_EQ(trace.every(), 256U);
   EXPECT_EQ(times, times_of(256, 100'000, 500, trace));
-  EXPECT_EQ(times_of(0, 30, 500, trace).size(), 33U) << "all, where they fit";
+  EXPECT_EQ(times_of(0, 30, 500, trace).size(), 33U) << "all rows if they fit";
 }
 
-TEST(TraceSolverTest, AnOrderIsAnsweredByItsRowsAndItsResult) {
+TEST(TraceSolverTest, AnOrderIsAnsweredWithRowsAndResult) {
   Solving solving;
   TraceSolver solver(solving.solve(), [] {});
   solver.take(order(7));
@@ -139,7 +140,7 @@ TEST(TraceSolverTest, AnOrderIsAnsweredByItsRowsAndItsResult) {
   EXPECT_EQ(row.reactions_N, (std::vector<double>{1, 2}));
 }
 
-TEST(TraceSolverTest, WhileOneIsSolvedAnotherIsNotTaken) {
+TEST(TraceSolverTest, ASecondOrderIsDeclinedWhileOneIsSolved) {
   Solving solving;
   solving.hold();
   TraceSolver solver(solving.solve(), [] {});
@@ -153,12 +154,12 @@ TEST(TraceSolverTest, WhileOneIsSolvedAnotherIsNotTaken) {
   EXPECT_EQ(answer_of(solver).trace_id(), 7U);
 }
 
-TEST(TraceSolverTest, ACancelledOrderIsAnsweredAsNotTakenAndADroppedOneNotAtAll) {
+TEST(TraceSolverTest, ACancelledOrderIsDeclinedAndADroppedOneNotAnswered) {
   Solving solving;
   solving.hold();
   TraceSolver solver(solving.solve(), [] {});
   solver.take(order(7));
-  solver.cancel(6);  // an unknown one
+  solver.cancel(6);  // unknown
   solver.cancel(7);
   solving.release();
   const auto trace = answer_of(solver);

@@ -48,6 +48,65 @@ double factor(const ModelParameters& model, int order) {
   return (1.0 + unresolved_waves(companion)) / (std::pow(ratio, order) - 1.0);
 }
 
+struct SolvedPoint {
+  FingerPoint point;
+  std::optional<CaseResult> result = {};
+  std::optional<Finger> companion = {};  ///< none without a coarser mesh or a fall on it
+};
+
+/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` when the source
+/// has no more.
+std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
+                                    bool& ended) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::size_t kMaxPoints = 256;
+  constexpr std::chrono::seconds kLongest{1};
+  std::vector<SolvedPoint> points;
+  const auto next = [&, begun = Clock::now()]() -> std::optional<FingerPoint> {
+    if (points.size() >= kMaxPoints || Clock::now() - begun > kLongest) {
+      return std::nullopt;
+    }
+    auto point = source();
+    ended = !point;
+    if (point) {
+      points.push_back({*point});
+      point->number = points.size() - 1;
+    }
+    return point;
+  };
+  solve_points(next, [&](Outcome&& outcome) {
+    SolvedPoint& solved = points[outcome.number];
+    solved.result = std::move(outcome.result);
+    if (!solved.result) {
+      sink({solved.point.number, std::nullopt, std::move(outcome.error)});
+    }
+  });
+  return points;
+}
+
+/// Sets the companions of points, one for points of a model that follow each other.
+void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
+  std::vector<ModelParameters> companions;
+  std::vector<std::size_t> number;  // of each point's companion
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ModelParameters& model = points[i].point.finger.model();
+    if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
+      companions.push_back(companion_model(model));
+    }
+    number.push_back(companions.size() - 1);
+  }
+  const std::vector<FallOutcome> fallen = falls.falls(companions);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ModelParameters& companion = companions[number[i]];
+    if (i > 0 && number[i] == number[i - 1]) {
+      points[i].companion = points[i - 1].companion;
+    } else if (fallen[number[i]].fallen &&
+               companion.elements_per_link < points[i].point.finger.model().elements_per_link) {
+      points[i].companion.emplace(companion, fallen[number[i]].fallen);
+    }
+  }
+}
+
 }  // namespace
 
 ModelParameters companion_model(const ModelParameters& model) {
@@ -106,100 +165,35 @@ ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult
   return outcome.result ? estimated_errors(model, result, *outcome.result) : ErrorEstimate{};
 }
 
-namespace {
-
-struct SolvedPoint {
-  FingerPoint point;
-  std::optional<CaseResult> result = {};
-  std::optional<Finger> companion = {};  ///< none without a coarser mesh or a fall on it
-};
-
-/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` when the source
-/// has no more.
-std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
-                                    bool& ended) {
-  using Clock = std::chrono::steady_clock;
-  constexpr std::size_t kMostPoints = 256;
-  constexpr std::chrono::seconds kLongest{1};
-  std::vector<SolvedPoint> points;
-  const auto next = [&, begun = Clock::now()]() -> std::optional<FingerPoint> {
-    if (points.size() >= kMostPoints || Clock::now() - begun > kLongest) {
-      return std::nullopt;
-    }
-    auto point = source();
-    ended = !point;
-    if (point) {
-      points.push_back({*point});
-      point->number = points.size() - 1;
-    }
-    return point;
-  };
-  solve_points(next, [&](Outcome&& outcome) {
-    SolvedPoint& solved = points[outcome.number];
-    solved.result = std::move(outcome.result);
-    if (!solved.result) {
-      sink({solved.point.number, std::nullopt, std::move(outcome.error)});
-    }
-  });
-  return points;
-}
-
-/// Sets the companions of points, one for points of a model that follow each other.
-void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
-  std::vector<ModelParameters> companions;
-  std::vector<std::size_t> first;  // point of each
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ModelParameters& model = points[i].point.finger.model();
-    if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
-      companions.push_back(companion_model(model));
-      first.push_back(i);
-    }
-  }
-  const std::vector<FallOutcome> fallen = falls.falls(companions);
-  first.push_back(points.size());
-  for (std::size_t m = 0; m < companions.size(); ++m) {
-    const int elements = points[first[m]].point.finger.model().elements_per_link;
-    if (fallen[m].fallen && companions[m].elements_per_link < elements) {
-      const Finger finger(companions[m], fallen[m].fallen);
-      for (std::size_t i = first[m]; i < first[m + 1]; ++i) {
-        points[i].companion = finger;
-      }
-    }
-  }
-}
-
-}  // namespace
-
 // Chains of different shapes share no lanes, so companions are solved after the points.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink) {
   for (bool ended = false; !ended;) {
     std::vector<SolvedPoint> points = solve_next(source, sink, ended);
     set_companions(points, falls);
-    const auto pass_on = [&sink](SolvedPoint& solved) {
-      sink({solved.point.number, std::move(solved.result), {}});
-    };
-    std::size_t count = 0;
-    const auto next = [&]() -> std::optional<FingerPoint> {
-      while (count < points.size()) {
-        const std::size_t i = count++;
-        if (points[i].result && points[i].companion) {
-          return FingerPoint{*points[i].companion, i, points[i].point.point};
-        }
-        if (points[i].result) {
-          pass_on(points[i]);
-        }
+    auto next = points.begin();
+    const auto next_companion = [&]() -> std::optional<FingerPoint> {
+      next = std::find_if(next, points.end(), [](const SolvedPoint& solved) {
+        return solved.result && solved.companion;
+      });
+      if (next == points.end()) {
+        return std::nullopt;
       }
-      return std::nullopt;
+      const auto number = static_cast<std::uint64_t>(next - points.begin());
+      return FingerPoint{*next->companion, number, next++->point.point};
     };
-    solve_points(next, [&](Outcome&& companion) {
+    solve_points(next_companion, [&](Outcome&& companion) {
       SolvedPoint& solved = points[companion.number];
       if (companion.result) {
         solved.result->errors =
             estimated_errors(solved.point.finger.model(), *solved.result, *companion.result);
       }
-      pass_on(solved);
     });
+    for (SolvedPoint& solved : points) {
+      if (solved.result) {
+        sink({solved.point.number, std::move(solved.result), {}});
+      }
+    }
   }
 }
 

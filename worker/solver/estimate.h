@@ -12,14 +12,10 @@ namespace oblique::solver {
 /// are stable. It takes about a quarter of the time, apart from its own fall.
 ModelParameters companion_model(const ModelParameters& model);
 
-/// Estimated errors of `result`, a point of `model`, from its differences d to `companion`, the
-/// same point of `companion_model(model)`:
-/// error = d (1 + (2 l/L)^4)/(r^p - 1) + tolerance, with r the ratio of the meshes, l the length of
-/// an element of the companion, L the length of the bending waves that the contact makes, p an
-/// order for each output, and the tolerance that chooses the step (accuracy.md, "Errors of single
-/// results"). Dimensionless: of forces and impulses relative to the normal one, of times to the
-/// duration, of the slide to speed at touch times duration, of speeds to the speed at touch. Absent
-/// where that is 0.
+/// Estimated errors of `result`, a point of `model`, from its differences to `companion`, the same
+/// point of `companion_model(model)` (accuracy.md, "Errors of single results"). Dimensionless: of
+/// forces and impulses relative to the normal one, of times to the duration, of the slide to speed
+/// at touch times duration, of speeds to the speed at touch. Absent where that is 0.
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 
@@ -29,9 +25,8 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
                                   FallCache& falls);
 
-/// Like solve_points(), with estimated errors in each result whose companion has an answer. All
-/// other outputs have the same bits. Solves up to 256 points, for about a second, before their
-/// companions, so outcomes come in bursts. Falls of companions come from `falls`.
+/// Like solve_points(), with estimated errors in each result whose companion has an answer. Solves
+/// up to 256 points, for about a second, before their companions, so outcomes come in bursts.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink);
 

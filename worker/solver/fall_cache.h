@@ -42,10 +42,9 @@ class FallCache {
       : FallCache(Bounds{.bytes = most_bytes}) {}
 
   /// The fall of `model`. A missing one is solved, together with the first falls of `ahead` that
-  /// are missing, as many as there are lanes. While another thread solves the fall of `model`, this
-  /// one solves those of `ahead`. Does not wait for falls of `ahead` that other threads solve. A
-  /// model outside its domain has an error as its outcome. Exceptions of `solve`, as
-  /// std::bad_alloc, are passed on and not kept: the next call solves the fall again.
+  /// are missing, as many as there are lanes; those of `ahead` also while another thread solves
+  /// that of `model`. A model outside its domain has an error as its outcome. Exceptions of
+  /// `solve`, as std::bad_alloc, are passed on and not kept: the next call solves the fall again.
   FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
 
   /// The falls of all models; missing ones are solved side by side. An exception of `solve` becomes
@@ -72,7 +71,7 @@ class FallCache {
   void make_room();
 
   const Bounds bounds_;
-  const Solve solve_;
+  Solve solve_;
   std::mutex mutex_;
   std::condition_variable solved_;
   Entries entries_;              ///< most recently used first

@@ -50,6 +50,21 @@ FallSolution solve_alone(const FallRequest& request) {
   }
 }
 
+std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
+  return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
+}
+
+/// Why `falling` is outside its domain; else empty. A NaN, which equals nothing, would never be
+/// found among the entries.
+std::string fault_of(const ModelParameters& falling) {
+  try {
+    validate(falling);
+    return {};
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
 }  // namespace
 
 FallenChain::FallenChain(const ModelParameters& model)
@@ -122,31 +137,12 @@ std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
 
 // ---- FallCache ----------------------------------------------------------------------------------
 
-namespace {
-
-std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
-  return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
-}
-
-/// Why `falling` is outside its domain; else empty. A NaN, which equals nothing, would never be
-/// found among the entries.
-std::string fault_of(const ModelParameters& falling) {
-  try {
-    validate(falling);
-    return {};
-  } catch (const InputError& error) {
-    return error.what();
+FallCache::FallCache(const Bounds& bounds, Solve solve)
+    : bounds_(bounds), solve_(std::move(solve)) {
+  if (!solve_) {
+    solve_ = [](std::span<const ModelParameters> models) { return solve_falls(models); };
   }
 }
-
-std::vector<FallOutcome> solve_models(std::span<const ModelParameters> models) {
-  return solve_falls(models);
-}
-
-}  // namespace
-
-FallCache::FallCache(const Bounds& bounds, Solve solve)
-    : bounds_(bounds), solve_(solve ? std::move(solve) : solve_models) {}
 
 FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelParameters> ahead) {
   const ModelParameters falling = fall_model(model);

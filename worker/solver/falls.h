@@ -20,9 +20,6 @@ class FallenChain {
  public:
   /// Throws InputError when `model` is outside its domain or its dt_fall is above the limit.
   explicit FallenChain(const ModelParameters& model);
-  FallenChain(const FallenChain&) = delete;
-  FallenChain& operator=(const FallenChain&) = delete;
-  ~FallenChain() = default;
 
   /// As returned by fall_model().
   const ModelParameters& model() const { return model_; }

@@ -117,7 +117,7 @@ class PointSolver {
     if (!next) {
       return;
     }
-    ContactOutcome contact{next->tag, std::nullopt, {}};
+    Outcome contact{next->number, std::nullopt, {}};
     try {
       const Motion& motion = *last_->finger.parts()->prepared().motion();
       contact.result = solve_contact(motion, next->parameters, next->steps, *next->touch, tracing_);
@@ -140,7 +140,7 @@ class PointSolver {
       return std::nullopt;
     };
     solve_contacts(
-        shape, next, [this](ContactOutcome&& contact) { pass_on(std::move(contact)); }, tracing_);
+        shape, next, [this](Outcome&& contact) { pass_on(std::move(contact)); }, tracing_);
   }
 
   bool shares_lanes_of(const Chain& chain) const {
@@ -158,10 +158,13 @@ class PointSolver {
       group_ += continues_group(point, steps) ? 0U : 1U;
       last_ = point;
       last_compression_s_ = steps.compression_s;
-      begun_.insert_or_assign(next_tag_, Begun{point, touch.t_s});
-      return ContactCase{
-          next_tag_++, group_, &finger.prepared().chain(), finger.contact_parameters(point.point),
-          steps,       &touch};
+      begun_.insert_or_assign(next_number_, Begun{point, touch.t_s});
+      return ContactCase{next_number_++,
+                         group_,
+                         &finger.prepared().chain(),
+                         finger.contact_parameters(point.point),
+                         steps,
+                         &touch};
     } catch (const std::exception& error) {
       sink_({point.number, std::nullopt, error.what()});
       return std::nullopt;
@@ -170,8 +173,8 @@ class PointSolver {
 
   /// The state at touch, found once for neighbours.
   const ChainState& touch_of(const Finger::Parts& finger, double H_m) {
-    constexpr std::size_t kMostTouches = 16;
-    if (fallen_ != finger.fallen() || touches_.size() >= kMostTouches) {
+    constexpr std::size_t kMaxTouches = 16;
+    if (fallen_ != finger.fallen() || touches_.size() >= kMaxTouches) {
       fallen_ = finger.fallen();
       touches_.clear();
     }
@@ -189,8 +192,8 @@ class PointSolver {
            last_compression_s_ == steps.compression_s;
   }
 
-  void pass_on(ContactOutcome&& contact) {
-    const auto entry = begun_.extract(contact.tag);
+  void pass_on(Outcome&& contact) {
+    const auto entry = begun_.extract(contact.number);
     const auto& [point, fall_time_s] = entry.mapped();
     const ModelParameters& model = point.finger.model();
     if (contact.result) {
@@ -214,7 +217,7 @@ class PointSolver {
   std::optional<FingerPoint> last_;  ///< begun last
   double last_compression_s_ = 0.0;  ///< its step
   std::map<std::uint64_t, Begun> begun_;
-  std::uint64_t next_tag_ = 0;
+  std::uint64_t next_number_ = 0;
   std::uint64_t group_ = 0;
 };
 

@@ -26,13 +26,6 @@ struct Point {
   double e_star;  ///< Stronge's energetic coefficient of restitution (e* in eqs. 17 and 22)
 };
 
-/// The result of a point, or the reason why there is none.
-struct Outcome {
-  std::uint64_t number;  ///< the caller's number of the point
-  std::optional<CaseResult> result;
-  std::string error;  ///< a sentence; empty with a result
-};
-
 /// Solves points of one model. Copies are cheap and share everything. Const members may be called
 /// by several threads at once. A point's result has the same bits whatever is solved before or
 /// beside it.

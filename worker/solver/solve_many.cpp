@@ -7,12 +7,12 @@
 #include <cstdint>
 #include <exception>
 #include <future>
+#include <iterator>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -66,11 +66,11 @@ class FingerSource {
  private:
   /// Fall models of that point and of those after it, without repetitions in a row.
   std::vector<ModelParameters> models_from(std::uint64_t number) {
-    constexpr int kMostRuns = 4096;
-    constexpr std::size_t kMostFalls = 64;
+    constexpr int kMaxRuns = 4096;
+    constexpr std::size_t kMaxFalls = 64;
     std::vector<ModelParameters> models;
     std::optional<std::uint64_t> at = number;
-    for (int i = 0; at && i < kMostRuns && models.size() < kMostFalls; ++i) {
+    for (int i = 0; at && i < kMaxRuns && models.size() < kMaxFalls; ++i) {
       const PointSource::Run run = source_.run_of(*at);
       ModelParameters falling = fall_model(source_.model(run.model));
       if (models.empty() || !(models.back() == falling)) {
@@ -224,11 +224,8 @@ class Work {
 
   /// Neighbours share a fall, a model, the state at touch, and the contact up to the first turn.
   void sort_points() {
-    std::unordered_map<std::uint64_t, std::size_t> numbers;  // of falls, by their hashes
-    std::vector<std::size_t> falls;                          // number of each model's fall
-    for (const ModelParameters& model : models_) {
-      falls.push_back(numbers.try_emplace(fall_hash(model), numbers.size()).first->second);
-    }
+    std::vector<std::uint64_t> falls;  // of each model
+    std::transform(models_.begin(), models_.end(), std::back_inserter(falls), fall_hash);
     std::sort(points_.begin(), points_.end(), [&falls](const Entry& a, const Entry& b) {
       std::strong_ordering order = falls[a.point.model] <=> falls[b.point.model];
       order = std::is_eq(order) ? a.point.model <=> b.point.model : order;

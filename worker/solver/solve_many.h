@@ -27,12 +27,11 @@ struct ManyOptions {
 };
 
 /// Solves points on several threads and in all vector lanes. Passes each outcome to `take`, one at
-/// a time, on threads of its own and in any order; the outcome's number is the index in `points`.
-/// Points may be in any order: they are sorted so that neighbours share falls and the beginnings of
-/// contacts. Returns true when all outcomes were passed on, false when `goes_on` returned false.
-/// After the return `take` is not called. A point without an answer, or with a wrong model or
-/// value, gets an outcome with the reason. Throws InputError for a model number that does not
-/// exist, and what `take` or `goes_on` throw. May be called by several threads at once.
+/// a time, on threads of its own and in any order; the outcome's number is the index in `points`,
+/// which may be in any order. Returns true when all outcomes were passed on, false when `goes_on`
+/// returned false; after that `take` is not called. A point without an answer, or with a wrong
+/// model or value, gets an outcome with the reason. Throws InputError for a model number that does
+/// not exist, and what `take` or `goes_on` throw. May be called by several threads at once.
 bool solve_many(std::span<const ModelParameters> models, std::span<const ModelPoint> points,
                 const TakeOutcome& take, const ManyOptions& options = {});
 

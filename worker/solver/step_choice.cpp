@@ -96,7 +96,7 @@ ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const 
           std::min(steps.restitution_s, longest_s / slower)};
 }
 
-/// Throws SolveError for steps in compression with which Contact::kMostSteps end before the contact
+/// Throws SolveError for steps in compression with which Contact::kMaxSteps end before the contact
 /// can, and for steps in which the tip, fallen by about the chain's length, moves by less than the
 /// rounding of its position.
 void StepChoice::check_can_end(double step_s) const {
@@ -108,8 +108,8 @@ void StepChoice::check_can_end(double step_s) const {
                      exact_number(model_.k_N_m) + " N/m here)");
   }
   const double shortest_s = kShortestContact * std::sqrt(tip_inertia_kg_ / model_.k_N_m);
-  if (step_s * static_cast<double>(Contact::kMostSteps) < shortest_s) {
-    throw SolveError("the contact would take more than " + std::to_string(Contact::kMostSteps) +
+  if (step_s * static_cast<double>(Contact::kMaxSteps) < shortest_s) {
+    throw SolveError("the contact would take more than " + std::to_string(Contact::kMaxSteps) +
                      " steps of " + readable_number(step_s) +
                      " s: dt must be longer (0 chooses a step)");
   }

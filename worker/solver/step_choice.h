@@ -6,18 +6,16 @@
 
 namespace oblique::solver {
 
-/// Step lengths of a model: those that the user set, or chosen ones.
+/// Step lengths of a model: those that the user set, or chosen ones (accuracy.md has the
+/// measurements behind the constants).
 ///
 /// Explicit integrator: the longest step whose error, by the error model
 ///
 ///   error = kErrorFactor (omega_tip h)^3 (omega_max h),
 ///
-/// is the model's tolerance, at most kLongestFraction of the stability limit, which is PEFRL's
-/// omega h over omega_max. A longer step that the user set is refused above the limit. omega_max is
-/// the highest frequency of the chain, in contact with the stiffest contact spring at its tip;
-/// omega_tip is that of the tip's own inertia on the spring of compression. Generalized-alpha:
-/// fractions of the times of the motion itself, on any mesh. accuracy.md has the measurements
-/// behind the constants.
+/// is the model's tolerance. omega_max is the highest frequency of the chain, in contact with the
+/// stiffest contact spring at its tip; omega_tip is that of the tip's own inertia on the spring of
+/// compression. Generalized-alpha: fractions of the times of the motion itself, on any mesh.
 class StepChoice {
  public:
   static constexpr double kErrorFactor = 0.045;

@@ -354,8 +354,8 @@ constexpr std::uint64_t kUsualBins = 64;
 constexpr double kEndTolerance = 1e-12;
 
 std::string sql_number(double value) {
-  constexpr double kMost = std::numeric_limits<double>::max();
-  return fmt::format("({:#})", std::clamp(value, -kMost, kMost));
+  constexpr double kMax = std::numeric_limits<double>::max();
+  return fmt::format("({:#})", std::clamp(value, -kMax, kMax));
 }
 
 struct BinSide {

@@ -29,13 +29,13 @@ using nlohmann::ordered_json;
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-constexpr std::uint64_t kMostLines = 1000;
+constexpr std::uint64_t kMaxLines = 1000;
 constexpr std::uint64_t kUsualRows = 200;
-constexpr std::uint64_t kMostRows = 100'000;
+constexpr std::uint64_t kMaxRows = 100'000;
 
 std::uint32_t lines_of(const Fields& fields) {
   return static_cast<std::uint32_t>(std::clamp<std::uint64_t>(
-      FieldReader(fields).whole("limit").value_or(kMostLines), 1, kMostLines));
+      FieldReader(fields).whole("limit").value_or(kMaxLines), 1, kMaxLines));
 }
 
 ordered_json json_of(const protocol::Cell& cell) {
@@ -252,7 +252,7 @@ PendingAnswer query_rows(ServiceClient& service, std::uint64_t study, const Fiel
   if (const auto select = reader.text("select")) {
     query.add_select(*select);
   }
-  query.set_limit(std::min(reader.whole("limit").value_or(kUsualRows), kMostRows));
+  query.set_limit(std::min(reader.whole("limit").value_or(kUsualRows), kMaxRows));
   const auto exchange = std::make_shared<ServiceExchange>(service);
   const bool as_csv = format == "csv";
   return named_study_flow(

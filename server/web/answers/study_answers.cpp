@@ -32,7 +32,7 @@ using protocol::ClientReply;
 using protocol::ClientRequest;
 
 /// Longer lists of values are omitted; slices contain the values that they show.
-constexpr std::uint64_t kMostListed = 4096;
+constexpr std::uint64_t kMaxListed = 4096;
 
 ordered_json axis_json(const protocol::AxisLayout& layout) {
   const protocol::Axis& axis = *layout.axis;
@@ -51,7 +51,7 @@ ordered_json axis_json(const protocol::AxisLayout& layout) {
         {"to", axis.to()},
         {"count", axis.count()},
         {"spacing", axis.spacing() == protocol::SPACING_LOGARITHMIC ? "log" : "linear"}};
-  } else if (protocol::axis_size(axis) <= kMostListed) {
+  } else if (protocol::axis_size(axis) <= kMaxListed) {
     json["list"] = std::vector<double>(axis.values().begin(), axis.values().end());
   }
   return json;

@@ -29,9 +29,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// One message of a real worker.
+/// Results in one message of a real worker.
 constexpr std::uint64_t kResultsATurn = 1000;
-/// Real workers report so often while a batch is solved.
+/// Real workers report at this interval while they solve a batch.
 constexpr double kReportInterval_s = 0.1;
 
 double now_s() {
@@ -88,14 +88,14 @@ class Crowd::Parts {
  private:
   struct Job {
     worker::Batch batch;
-    std::uint64_t done = 0;  // points that were reported
+    std::uint64_t done = 0;  // reported points
   };
   struct Member {
     explicit Member(protocol::WorkerHello hello) : conversation(std::move(hello), {}) {}
     worker::Conversation conversation;
     std::optional<zmq::socket_t> socket;
     std::deque<Job> jobs;
-    double solving_since_s = 0.0;  // the points of the first job that are not reported
+    double solving_since_s = 0.0;  // start of the unreported points of the first job
   };
 
   void run() {
@@ -135,8 +135,8 @@ class Crowd::Parts {
     }
   }
 
-  /// Takes what has come and reports some of what is due; what is sent may swallow the sign that
-  /// something came.
+  /// Receives all messages and reports due points, until neither is left: sending may reset the
+  /// readiness of the descriptor (ZMQ_FD is edge-triggered).
   void work_on(std::size_t number) {
     receive_all(number);
     while (report_due(number) && receive_all(number)) {
@@ -159,7 +159,7 @@ class Crowd::Parts {
     return any;
   }
 
-  /// Reports the points of the first batch that are solved by now. False when there are none.
+  /// Reports the points of the first batch that are solved by now. Returns false if there are none.
   bool report_due(std::size_t number) {
     Member& member = *members_[number];
     if (member.jobs.empty() || !member.conversation.may_solve()) {
@@ -167,7 +167,7 @@ class Crowd::Parts {
     }
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
-    // The others get their turn.
+    // At most one message, so that other workers get their turn.
     std::uint64_t solved = std::min<std::uint64_t>(left, kResultsATurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {
@@ -224,9 +224,9 @@ class Crowd::Parts {
     };
     const Overloaded apply_one{
         [&](const worker::Connect& effect) {
-          constexpr std::uint64_t kMostTold = 5;
-          if (!effect.reason.empty() && connects_ < members_.size() + kMostTold) {
-            std::fprintf(stderr, "worker %zu connects again: %s\n", number, effect.reason.c_str());
+          constexpr std::uint64_t kMaxReported = 5;
+          if (!effect.reason.empty() && connects_ < members_.size() + kMaxReported) {
+            std::fprintf(stderr, "worker %zu reconnects: %s\n", number, effect.reason.c_str());
           }
           connect(number);
         },
@@ -247,7 +247,6 @@ class Crowd::Parts {
         [&](const worker::DropAll&) { member.jobs.clear(); },
         [](const worker::SolveTrace&) {},
         [](const worker::CancelTrace&) {},
-        [](const worker::ReportUnreachable&) {},
         [](const worker::Note&) {},
         [](const worker::Finish& finish) {
           std::fprintf(stderr, "a worker ended: %s\n", finish.reason.c_str());
@@ -269,7 +268,7 @@ class Crowd::Parts {
   std::atomic<std::uint64_t> welcomed_ = 0;
   std::atomic<double> longest_gap_s_ = 0.0;
   std::atomic<bool> stopping_ = false;
-  std::thread thread_;  // last: it uses all the others
+  std::thread thread_;  // last: it uses the other members
 };
 
 std::size_t bytes_of_result() {

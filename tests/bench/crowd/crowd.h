@@ -13,31 +13,31 @@ namespace oblique::bench {
 struct CrowdSettings {
   std::string worker_url;
   std::size_t workers = 1;
-  /// What a point takes each of them; 0: nothing, they answer at once.
+  /// Simulated time per point; 0: workers answer at once.
   double point_s = 0.0;
-  std::optional<protocol::KeyFile> key = {};  ///< of all of them
+  std::optional<protocol::KeyFile> key = {};  ///< shared by all workers
 };
 
-/// What the workers together have seen so far.
+/// Sums over all workers.
 struct CrowdCounts {
   std::uint64_t batches = 0;
-  std::uint64_t results = 0;   ///< made
-  std::uint64_t messages = 0;  ///< that they sent
-  std::uint64_t connects = 0;  ///< of all workers; more than there are workers: some were dropped
+  std::uint64_t results = 0;   ///< produced
+  std::uint64_t messages = 0;  ///< sent
+  std::uint64_t connects = 0;  ///< more than the number of workers if some had to reconnect
   std::uint64_t welcomed = 0;
-  /// So late was its thread for all of them once. Beyond 2 s they take the server for silent.
+  /// Longest delay of the crowd's thread. Above 2 s workers consider the server silent.
   double longest_gap_s = 0.0;
 };
 
-/// Bytes of the result that each of them answers every point with.
+/// Size of the result with which every point is answered.
 std::size_t bytes_of_result();
 
-/// Many workers on one thread, each with a socket and a conversation of its own, as real ones have,
-/// that solve nothing: the answer to every point is one result that was solved beforehand.
+/// Many workers on one thread. Each has a real socket and a real conversation but solves nothing:
+/// it answers every point with the same result, solved beforehand.
 class Crowd {
  public:
   explicit Crowd(const CrowdSettings& settings);
-  /// They vanish without a word.
+  /// Closes all connections without goodbye.
   ~Crowd();
   Crowd(const Crowd&) = delete;
   Crowd& operator=(const Crowd&) = delete;

@@ -22,8 +22,8 @@
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 
-/// Many workers that answer at once against one real server on loopback: results a second, what
-/// they cost the server, and how soon a client is answered meanwhile. README.md says how to run it.
+/// Many workers that solve nothing against one real server on loopback. Measures results per
+/// second, their cost in the server, and the latency of a client. README.md has the commands.
 namespace oblique::bench {
 namespace {
 
@@ -50,7 +50,7 @@ void wait_for(const std::string& what, const std::function<bool()>& condition) {
   const auto until = Clock::now() + kLongest;
   while (!condition()) {
     if (Clock::now() > until) {
-      throw std::runtime_error("waited in vain for " + what);
+      throw std::runtime_error("timeout while waiting for " + what);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
@@ -66,7 +66,7 @@ void check(const test::Outcome& ran) {
   }
 }
 
-/// Where a row's server has its files, and with which keys one speaks with it.
+/// The folder of a row's server and, if keys are on, its keys.
 struct Place {
   explicit Place(bool with_keys) {
     if (with_keys) {
@@ -84,7 +84,7 @@ struct Place {
   test::Environment environment;
 };
 
-/// A study that no crowd comes to the end of.
+/// Submits a study too large to be completed.
 void submit(const Place& place, const test::Server& server) {
   std::vector<std::string> words{"submit",         "--server", server.client_url(), "--preset",
                                  "paper",          "--H",      "0.1:1.15:1000",     "--mu",
@@ -96,8 +96,8 @@ void submit(const Place& place, const test::Server& server) {
   check(test::run_oblique(place.folder, words));
 }
 
-/// One row: a fresh server and database, the crowd, then the study, all measured from its first
-/// result on.
+/// Measures and prints one row, with a new server and database. The measurement starts at the first
+/// stored result.
 void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_keys) {
   const Place place(with_keys);
   const test::Database database(place.folder.file("bench.db"));
@@ -135,7 +135,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_k
     rows = database.rows() - rows_before;
     seen = probe.stop();
   }
-  // Workers that vanished are forgotten after some seconds.
+  // By then the server has removed the lost workers.
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const Usage left = usage_of(pid);
   const double server_cpu_s = ended.cpu_s - began.cpu_s;
@@ -155,13 +155,13 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_k
       left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers));
   std::fflush(stdout);
   if (after.connects > workers) {
-    std::fprintf(stderr, "the crowd itself was late by %.1f s at most\n", after.longest_gap_s);
+    std::fprintf(stderr, "longest delay of the crowd's own thread: %.1f s\n", after.longest_gap_s);
   }
 }
 
 void run(const Flags& flags) {
   take_all_descriptors();
-  std::printf("A result has %zu bytes on its way.\n", bytes_of_result());
+  std::printf("Size of a result on the network: %zu bytes\n", bytes_of_result());
   std::printf(
       "| workers | keys | point [ms] | results/s | batches/s | their messages/s | CPU: loop | "
       "writer | "
@@ -186,18 +186,18 @@ void run(const Flags& flags) {
 
 int main(int argc, char** argv) {
   oblique::bench::Flags flags;
-  CLI::App app{"Many workers that answer at once against one server.", "oblique-crowd-bench"};
-  app.add_option("--workers", flags.workers, "Numbers of workers, a row each")
+  CLI::App app{"Measures one server with many workers that solve nothing.", "oblique-crowd-bench"};
+  app.add_option("--workers", flags.workers, "Numbers of workers; one row for each")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--seconds", flags.seconds, "Length of a row [s]")->capture_default_str();
-  app.add_option("--results", flags.most_results, "A row ends earlier with so many")
+  app.add_option("--results", flags.most_results, "A row ends earlier after this number of results")
       ->capture_default_str();
   app.add_option("--point-ms", flags.point_ms,
-                 "What a point takes a worker, a row each; 0: nothing")
+                 "Simulated time per point [ms]; one row for each; 0: none")
       ->delimiter(',')
       ->capture_default_str();
-  app.add_option("--keys", flags.keys, "Whether all is encrypted: off, on, or a row of each")
+  app.add_option("--keys", flags.keys, "Encryption: off, on, or both (one row for each)")
       ->check(CLI::IsMember({"off", "on", "both"}))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

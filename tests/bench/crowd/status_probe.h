@@ -12,29 +12,30 @@
 
 namespace oblique::bench {
 
-/// A client that asks a server for the status of a study at fixed times, whether the last answer
-/// has come or not, on a thread of its own.
+/// A client, on its own thread, that requests the status of a study at fixed times without waiting
+/// for earlier replies.
 class StatusProbe {
  public:
   struct Seen {
-    std::vector<double> latencies_ms;  ///< in ascending order
-    std::uint64_t unanswered = 0;      ///< at the end
-    std::uint64_t settled = 0;         ///< points of the study, by the last answer
+    std::vector<double> latencies_ms;  ///< ascending
+    std::uint64_t unanswered = 0;      ///< requests
+    std::uint64_t settled = 0;         ///< points with an answer, by the last reply
     std::uint64_t leased = 0;
     std::uint32_t workers = 0;
 
-    /// The latency that this share of the answers did not exceed; 0 without answers.
+    /// Quantile of the latencies; 0 without replies.
     double quantile_ms(double share) const;
   };
 
-  /// Asks until it is stopped.
+  /// Starts the requests.
   StatusProbe(std::string client_url, std::optional<protocol::KeyFile> key, std::string study,
               std::chrono::milliseconds interval);
   ~StatusProbe();
   StatusProbe(const StatusProbe&) = delete;
   StatusProbe& operator=(const StatusProbe&) = delete;
 
-  /// Waits a second for the last answers, and gives what was seen. To be called once.
+  /// Ends the requests, waits one second for the last replies and returns the measurements. Call it
+  /// once.
   Seen stop();
 
  private:
@@ -44,7 +45,7 @@ class StatusProbe {
   std::optional<protocol::KeyFile> key_;
   std::string study_;
   std::chrono::milliseconds interval_;
-  Seen seen_;  // of the thread until it has ended
+  Seen seen_;  // used by the thread until it ends
   std::atomic<bool> stopping_ = false;
   std::thread thread_;
 };

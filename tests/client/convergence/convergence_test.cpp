@@ -392,7 +392,7 @@ TEST(Verdict, NamesTheEventThatOnlySomeLevelsHave) {
   EXPECT_EQ(json["changes"][0]["finer"], "dt/4");
 }
 
-TEST(Verdict, NamesOutputsThatGoOnChangingByMoreThanAThousandthOfTheirScale) {
+TEST(Verdict, NamesOutputsThatStillChangeByMoreThanAThousandthOfTheirScale) {
   auto finest = second_order(0.025);
   finest.vt_out_m_s = -3.0;
   const auto refinement = refinement_with({second_order(0.1), second_order(0.05), finest});

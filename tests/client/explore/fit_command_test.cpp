@@ -72,7 +72,7 @@ TEST_F(FitCommand, FindsTheParametersOfMeasurements) {
   EXPECT_THAT(again.err, HasSubstr("Continuing"));
 }
 
-TEST_F(FitCommand, SaysWhatIsWrong) {
+TEST_F(FitCommand, ReportsWrongInput) {
   std::ofstream(folder_.file("measured.csv")) << "H,mu,fn_peak_N\n1,0.4,5058\n";
   const auto error_of = [&](const std::vector<std::string>& flags) {
     const auto ended = fit(flags);

@@ -18,9 +18,9 @@
 namespace oblique::test {
 namespace {
 
-using client::Estimate;
 using client::Fit;
 using client::FitProblem;
+using client::FittedValue;
 using Eigen::Index;
 using Eigen::VectorXd;
 
@@ -61,7 +61,7 @@ std::vector<VectorXd> peak_forces(const std::vector<VectorXd>& points,
   return predictions;
 }
 
-bool covers(const Estimate& estimate, double truth) {
+bool covers(const FittedValue& estimate, double truth) {
   return (!estimate.lower || *estimate.lower <= truth) &&
          (!estimate.upper || truth <= *estimate.upper);
 }

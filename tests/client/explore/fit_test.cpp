@@ -164,7 +164,7 @@ TEST(Fit, KeepsAnUnknownAtABoundBehindWhichTheMinimumIs) {
   EXPECT_NEAR(found.estimates[1].upper.value(), end, 0.01);
 }
 
-TEST(Fit, SaysWhichUnknownsOnlyTheirProductDetermines) {
+TEST(Fit, NamesUnknownsOfWhichOnlyTheProductIsDetermined) {
   const auto problem = problem_of(
       {{"a", 0.1, 10.0, 0.5}, {"b", 0.1, 10.0, 2.0}, {"c", -1.0, 1.0, 0.1}},
       VectorXd{{2.0, 4.1, 6.0, 8.1}}, 0.1, [](const VectorXd& p) {
@@ -181,7 +181,7 @@ TEST(Fit, SaysWhichUnknownsOnlyTheirProductDetermines) {
   EXPECT_FALSE(found.estimates[0].upper);
 }
 
-TEST(Fit, SaysWhichUnknownChangesNothing) {
+TEST(Fit, NamesAnUnknownThatChangesNothing) {
   auto problem = line_problem();
   problem.unknowns.push_back({"unused", 0.0, 1.0, 0.5});
   const Fit found = fit(problem);
@@ -192,7 +192,7 @@ TEST(Fit, SaysWhichUnknownChangesNothing) {
   EXPECT_NEAR(found.estimates[1].value, 0.85, 1e-3);
 }
 
-TEST(Fit, SaysWhichPairIsNearlyTheSame) {
+TEST(Fit, NamesAPairThatIsNearlyEquivalent) {
   const auto problem =
       problem_of({{"a", -10.0, 10.0, 1.0}, {"b", -10.0, 10.0, 1.0}}, VectorXd{{3.0, 3.2, 3.1}}, 0.1,
                  [](const VectorXd& p) {

@@ -133,7 +133,7 @@ TEST(MapCommand, TakesModelAndSingleValuesOfAStudyAndLevelsOfAnOutput) {
   EXPECT_THAT(varying.err, HasSubstr("several values of mu: give one with --mu"));
 }
 
-TEST(MapCommand, SaysWhatIsWrongBeforeItSolvesAnything) {
+TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
   const test::TemporaryFolder folder;
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
       {{"--of", "colour"}, "--of colour"},

@@ -225,7 +225,7 @@ TEST(ShiftSearch, FindsTheShiftOfEachSampleToAnotherBorder) {
   }
 }
 
-TEST(ShiftSearch, SaysWhereNoSuchBorderIsNear) {
+TEST(ShiftSearch, ReportsThatNoSuchBorderIsNear) {
   const auto found = solved(disc);
   ShiftSearch shifts(found.grid, found.search.borders(), 16);
   for (auto points = shifts.next(); !points.empty(); points = shifts.next()) {

@@ -113,7 +113,7 @@ TEST(Table, AlignsNumbersAtThePoint) {
       "       -  -\n");
 }
 
-TEST(Table, WithModesSaysWhatTheirLettersMean) {
+TEST(Table, WithModesExplainsTheirLetters) {
   for (const char* column : {"mode", "major_mode"}) {
     EXPECT_TRUE(printed(Format::kTable, {chunk_of({column}, {{"SC"}})})
                     .ends_with("\n(S stick, s slip; C compression, R restitution)\n"));
@@ -136,7 +136,7 @@ TEST(Table, KeepsTheWidthsOfItsFirstRows) {
             "a    4\n");
 }
 
-TEST(Table, FitsATerminalAndSaysWhatItLeavesOut) {
+TEST(Table, FitsATerminalAndReportsWhatItLeavesOut) {
   OutputSettings settings;
   settings.width = 40;
   const std::string long_text = "µµµµµµµµµµµµµµµµµµµµµµµµµµµµµµ";
@@ -215,7 +215,7 @@ TEST(Csv, QuotesWhatWouldBreakALineAndHoldsOtherTextsByteForByte) {
             "\x1b[2J\u202e\n");
 }
 
-TEST(Csv, TellsNullFromAnEmptyText) {
+TEST(Csv, DistinguishesNullFromEmptyText) {
   auto rows = rows_of_texts({""});
   rows.rows.emplace_back().emplace_back();
   EXPECT_EQ(whole(rows, Format::kCsv), "text\n\"\"\n\n");

@@ -90,7 +90,7 @@ TEST(Map, WithARangeMentionsValuesOutside) {
   EXPECT_THAT(figure.notes, Contains(HasSubstr("Values from 1 to 30; those outside the scale")));
 }
 
-TEST(Map, OfNothingSaysSo) {
+TEST(Map, WithoutRowsStatesThis) {
   const Figure empty = figure_from({.map = "fn_peak_N"}, kMapColumns, {});
   EXPECT_TRUE(empty.is_empty);
   EXPECT_THAT(empty.notes, Contains("Nothing to draw: no cell has a value."));
@@ -347,7 +347,7 @@ TEST(StudyShape, OfASampleIsNoGridAndHasNoListedValues) {
   EXPECT_THAT(error_of({.at = {"H=0.5"}}, shape), HasSubstr("lie scattered"));
 }
 
-TEST(Condition, HoldsAnOpenAxisAtItsFirstValueAndSaysSo) {
+TEST(Condition, FixesAnOpenAxisAtItsFirstValueAndReportsIt) {
   const auto condition = condition_of({}, grid(), {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "H = 0.5 AND e = 0.5");
   EXPECT_THAT(condition.said,

@@ -43,7 +43,7 @@ def test_a_value_probably_in_another_unit_is_warned_of_once_per_key():
     with pytest.warns(UserWarning) as warned:
         oblique.solve_many(1, 0.4, 1, rho=[2.7, 2700], tip_mass=20)
     assert [str(one.message) for one in warned] == [
-        "rho = 2.7 kg/m^3 is lighter than cork; 2700?",
+        "rho = 2.7 kg/m^3 is outside the usual 100 to 25000 kg/m^3; 2700?",
         "tip_mass = 20 kg is outside the usual 1e-6 to 10 kg; 0.02?",
     ]
     assert {one.filename for one in warned} == {__file__}

@@ -29,7 +29,7 @@ TEST(Reach, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
   }
   ReachChecker checker(pretended_drop_m);
   parse_study(text, "x.toml", std::ref(checker));
-  EXPECT_EQ(checker.falls_solved(), ReachChecker::kMostFalls);
+  EXPECT_EQ(checker.falls_solved(), ReachChecker::kMaxFalls);
 }
 
 TEST(Reach, ASmallDropIsCheckedOnACoarseMesh) {

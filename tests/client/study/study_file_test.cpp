@@ -30,7 +30,7 @@ TEST(StudyFile, MultipliesAxesInsideABlockWithHSlowestAndEFastest) {
   EXPECT_EQ(table.point(4).H_m, 1.0);
 }
 
-TEST(StudyFile, AsksForErrorsWhenItSaysSo) {
+TEST(StudyFile, RequestsErrorsByAKey) {
   const auto asks = [](const std::string& head) {
     return protocol::PointTable(parsed(head + block_with("mu = 0.4")).recipe).wants_errors();
   };

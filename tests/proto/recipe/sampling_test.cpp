@@ -81,16 +81,16 @@ TEST(SampleTest, ALatinHypercubeHasOnePointInEachStratumOfEachDimension) {
 TEST(SampleTest,
      EachPointOfTheLargestSampleIsComputedDirectlyLiesInTheOpenCubeAndDependsOnTheSeed) {
   for (const auto kind : {SAMPLE_RANDOM, SAMPLE_LATIN_HYPERCUBE, SAMPLE_SOBOL}) {
-    for (const std::uint64_t index : {std::uint64_t{0}, kMostPoints / 3, kMostPoints - 1}) {
+    for (const std::uint64_t index : {std::uint64_t{0}, kMaxSamples / 3, kMaxSamples - 1}) {
       for (std::uint32_t d = 0; d < kSobolDimensions; ++d) {
-        const double x = fraction(sample_of(kind, kMostPoints, 1), d, index);
+        const double x = fraction(sample_of(kind, kMaxSamples, 1), d, index);
         EXPECT_GT(x, 0.0);
         EXPECT_LT(x, 1.0);
-        EXPECT_NE(x, fraction(sample_of(kind, kMostPoints, 2), d, index));
+        EXPECT_NE(x, fraction(sample_of(kind, kMaxSamples, 2), d, index));
       }
     }
     EXPECT_THROW(fraction(sample_of(kind, 10, 1), 0, 10), std::out_of_range);
-    EXPECT_THROW(fraction(sample_of(kind, kMostPoints + 1, 1), 0, 0), std::out_of_range);
+    EXPECT_THROW(fraction(sample_of(kind, kMaxSamples + 1, 1), 0, 0), std::out_of_range);
   }
 }
 

@@ -249,8 +249,8 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
     ClientRequest request = query_request(sql);
     request.set_request_id(++id_);
     send(request);
-    constexpr int kMostWords = 600;  // one per second
-    for (int words = 0; words < kMostWords; ++words) {
+    constexpr int kMaxMessages = 600;  // one per second
+    for (int words = 0; words < kMaxMessages; ++words) {
       const auto word = receive();
       ASSERT_EQ(word.still_working().request_id(), id_);
       if (word.still_working().runs()) {

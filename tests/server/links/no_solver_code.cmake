@@ -1,4 +1,4 @@
-# A program that solves nothing: neither its targets nor its symbols are the solver's, but for model/.
+# Checks that neither the targets nor the symbols of a program belong to the solver, except model/.
 #   cmake -DPROGRAM=oblique-server -DTARGETS=a,b,c -DSOLVER_ARCHIVES=x.a,y.a -DNM=nm -P no_solver_code.cmake
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" TARGETS "${TARGETS}")

@@ -453,11 +453,11 @@ TEST_F(NetworkTest, ForgedFramesEndTheirConnectionAndTheNextPeerIsServed) {
 
 class CrowdTest : public NetworkTest {
  protected:
-  CrowdTest() : NetworkTest({.handshakes = kMost}) {
-    run_until([&] { return network_.connections() == kMost; });
+  CrowdTest() : NetworkTest({.handshakes = kMax}) {
+    run_until([&] { return network_.connections() == kMax; });
   }
 
-  static constexpr std::size_t kMost = 100;
+  static constexpr std::size_t kMax = 100;
   std::vector<std::unique_ptr<KeyedPeer>> crowd_ = keyed_peers(300);
 };
 
@@ -477,25 +477,25 @@ TEST_F(CrowdTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
 
 TEST_F(CrowdTest, SilentPeersMakeRoomAfterAFractionOfTheirTime) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  run_until([&] { return refused(RefusalCause::kBound) == kMost; });
-  EXPECT_EQ(network_.connections(), kMost);
+  run_until([&] { return refused(RefusalCause::kBound) == kMax; });
+  EXPECT_EQ(network_.connections(), kMax);
 }
 
 class CrowdOfOneAddressTest : public NetworkTest {
  protected:
-  static constexpr std::size_t kMost = 16;
-  CrowdOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMost, .handshakes_of_source = kMost}) {}
+  static constexpr std::size_t kMax = 16;
+  CrowdOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
 };
 
 TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
   const auto crowd = keyed_peers(100, kElsewhere);
-  run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMost; });
-  EXPECT_EQ(network_.connections(), kMost);
+  run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMax; });
+  EXPECT_EQ(network_.connections(), kMax);
   const auto other = admitted();
   expect_message(*other);
   now_ms_ += NetworkLimits().handshake_ms / 100;
   const auto second = admitted(kElsewhere);
-  EXPECT_EQ(network_.connections(), kMost + 1) << "in the place of one of the newest";
+  EXPECT_EQ(network_.connections(), kMax + 1) << "in the place of one of the newest";
   crowd[0]->say_hello();
   take_welcome(*crowd[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;

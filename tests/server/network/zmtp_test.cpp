@@ -259,7 +259,7 @@ TEST_F(CurveTest, AHandshakeStoresAtMostItsLongestCommand) {
   EXPECT_LT(link.zmtp.held_bytes(), 10'000U);
 }
 
-TEST_F(CurveTest, AHandshakeThatIsCutOffAnywhereAdmitsNobody) {
+TEST_F(CurveTest, AnIncompleteHandshakeAdmitsNoPeer) {
   const std::string hello = curve_greeting() + greeted().hello_frame();
   for (std::size_t bytes = 0; bytes < hello.size(); ++bytes) {
     Link link = greeted();
@@ -276,7 +276,7 @@ TEST_F(CurveTest, AHandshakeThatIsCutOffAnywhereAdmitsNobody) {
   EXPECT_TRUE(link.zmtp.is_open());
 }
 
-TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNobody) {
+TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNoPeer) {
   const auto expect_refused = [](Link link, const std::string& begin, const std::string& bytes,
                                  std::size_t at) {
     const std::string answers = link.send(begin + flipped(bytes, at));

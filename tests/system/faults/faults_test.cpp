@@ -19,7 +19,7 @@ namespace {
 
 // ---- Disks ----
 
-/// Limits the size of files of that process, as on a full disk.
+/// Limits the size of files of a process, to simulate a full disk.
 void limit_files(pid_t pid, rlim_t bytes) {
   const rlimit limit{bytes, RLIM_INFINITY};
   ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
@@ -51,7 +51,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
   const Outcome refused =
       run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                            "--name", "another", "--server", server.client_url()});
-  // Some rows may still have fitted.
+  // Some rows may still fit.
   EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
       << refused.err;
   EXPECT_TRUE(is_running(server.process().pid()));
@@ -65,10 +65,10 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
   EXPECT_EQ(run_oblique(folder, {"check", "--db", file}).exit_code, 0);
 }
 
-TEST(FailedSyncTest, AServerEndsWithOneAndTheNextOneRecovers) {
+TEST(FailedSyncTest, AServerExitsWithOneAndTheNextServerRecovers) {
   const TemporaryFolder folder;
   const std::string file = folder.file("failing.db");
-  // LD_PRELOAD splits paths at spaces and colons, which the build folder may contain.
+  // LD_PRELOAD separates paths at spaces and colons, which the build folder may contain.
   const std::string library = folder.file("failing_sync.so");
   std::filesystem::create_symlink(OBLIQUE_FAILING_SYNC, library);
   const std::string mark = folder.file("fails");
@@ -80,7 +80,7 @@ TEST(FailedSyncTest, AServerEndsWithOneAndTheNextOneRecovers) {
     Server server(folder, file, {{"LD_PRELOAD", library}, {"OBLIQUE_FAIL_SYNC", mark}});
     ASSERT_EQ(submit(server, "before").exit_code, 0);
     std::ofstream(mark).put('x');
-    EXPECT_NE(submit(server, "lost").exit_code, 0) << "it is not durable";
+    EXPECT_NE(submit(server, "lost").exit_code, 0) << "it was not stored";
     EXPECT_EQ(server.process().wait(), 1);
     EXPECT_NE(server.process().err().find("the disk failed to store"), std::string::npos)
         << server.process().err();
@@ -96,7 +96,7 @@ TEST(FailedSyncTest, AServerEndsWithOneAndTheNextOneRecovers) {
 
 // ---- Runs ----
 
-/// `oblique run` of a study that takes long enough to be interrupted.
+/// `oblique run` with a study that takes long enough to be interrupted.
 class RunTest : public ::testing::Test {
  protected:
   std::vector<std::string> arguments() const {
@@ -104,7 +104,7 @@ class RunTest : public ::testing::Test {
   }
   static constexpr double kPoints = kManyPoints;
 
-  /// The server and workers of a run, when all of them are working.
+  /// Returns the server and workers of a run as soon as all of them work.
   std::vector<pid_t> started_by(const Process& run) {
     wait_until("rows in the database", [&] { return database_.rows() >= kPoints / 400; });
     const auto children = children_of(run.pid());
@@ -132,7 +132,7 @@ TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
     EXPECT_FALSE(is_running(child));
   }
   const double rows = database_.rows();
-  ASSERT_LT(rows, kPoints) << "stopped too late to be a test";
+  ASSERT_LT(rows, kPoints) << "the study was complete before the run was stopped";
   const auto kept = database_.texts("SELECT point || ' ' || solved_at FROM results ORDER BY point");
 
   const Outcome again = run_oblique(folder_, arguments());
@@ -153,7 +153,7 @@ TEST_F(RunTest, ARunThatIsKilledLeavesNoProcessAndTheSameCommandContinues) {
   run.send(SIGKILL);
   EXPECT_EQ(run.wait(), -SIGKILL);
   expect_gone(children);
-  ASSERT_LT(database_.rows(), kPoints) << "killed too late to be a test";
+  ASSERT_LT(database_.rows(), kPoints) << "the study was complete before the run was killed";
   const Outcome again = run_oblique(folder_, arguments());
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), kPoints);

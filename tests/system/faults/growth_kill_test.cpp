@@ -22,7 +22,7 @@ constexpr int kPointsABlock = 200;
 
 class GrowthKillTest : public ::testing::Test {
  protected:
-  /// A study file with that many blocks of 200 points each, which no other study has.
+  /// A study file with `blocks` blocks of 200 points each, none of which another study has.
   std::string study_file(const std::string& name, double k, int blocks) const {
     const std::string path = folder_.file(name + ".toml");
     std::ofstream file(path);
@@ -74,13 +74,14 @@ TEST_F(GrowthKillTest, AcknowledgedChangesSurviveAKillAtAnyTime) {
               kPointsABlock * (round + 1))
         << round;
     if (deleting != nullptr) {
-      // The request is repeated at the next server; the killed one may have carried it out.
+      // The client repeats the request at the next server; the killed one may already have executed
+      // it.
       const int code = deleting->wait();
       EXPECT_TRUE(code == 0 || deleting->err().find("no study") != std::string::npos)
           << round << ": " << deleting->err();
       EXPECT_EQ(number("SELECT count(*) FROM studies WHERE name = '" + victim + "'"), 0) << round;
     }
-    // Its rows exist when it is deleted in the next round, or arrive just then.
+    // When the next round deletes it, its rows are stored or arrive at that moment.
     victim = "victim " + std::to_string(round);
     const auto next = submit(study_file(victim, 1e7 + round, 2));
     EXPECT_EQ(next->wait(), 0) << next->err();

@@ -1,4 +1,5 @@
-// Peers with a listed key are admitted; others are refused at once, with the reason on both sides.
+// Peers with a listed key are admitted. Others are refused at once, and both sides report the
+// reason.
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -19,7 +20,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A server with keys, and folders with keys of others.
+/// A server with keys, and folders with other keys.
 class KeysTest : public ::testing::Test {
  protected:
   KeysTest() {
@@ -47,9 +48,10 @@ class KeysTest : public ::testing::Test {
                                     std::vector<std::string>{"--threads", "1", "--keys", key_file});
   }
   static void wait_until_said(const Process& process, const std::string& words) {
-    wait_until("is said: " + words, [&] { return process.err().find(words) != std::string::npos; });
+    wait_until("the message " + words,
+               [&] { return process.err().find(words) != std::string::npos; });
   }
-  /// Expects the exit code and the message of a client that is not admitted.
+  /// Expects exit code and message of a refused client.
   void expect_turned_away(const std::string& key_file, const std::string& words) const {
     const Outcome outcome = ask({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
@@ -98,10 +100,11 @@ TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
   const Outcome seen = ask({"workers"}, key("reader"));
   EXPECT_THAT(seen.err, AllOf(HasSubstr("refused since the server started: "),
                               HasSubstr("key of another role (1)")));
-  EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2) << "nobody but the server uses that";
+  EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2)
+      << "a client must not use the server's key";
 }
 
-TEST_F(KeysTest, AValidKeyAtTheWrongPortIsRefusedWithTheHint) {
+TEST_F(KeysTest, AValidKeyAtTheWrongPortIsRefusedWithAHint) {
   const Outcome outcome =
       run_oblique(folder_, {"status", "--server", server_->worker_url(), "--keys", key("client")});
   EXPECT_EQ(outcome.exit_code, 1);
@@ -121,7 +124,7 @@ TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwn) {
                     HasSubstr("--keys or OBLIQUE_SERVER_KEYS, which override OBLIQUE_KEYS")));
 }
 
-TEST_F(KeysTest, AKeyFileThatOthersMayReadIsWrongUsageWithTheRemedy) {
+TEST_F(KeysTest, AKeyFileReadableByOthersIsWrongUsageAndTheMessageHasTheRemedy) {
   std::filesystem::permissions(key("client"), std::filesystem::perms(0644));
   const Outcome outcome = ask({"status"}, key("client"));
   EXPECT_EQ(outcome.exit_code, 2);
@@ -146,7 +149,7 @@ TEST_F(KeysTest, ARefusedWorkerReportsTheReasonAndRetriesSlowly) {
   wait_until_said(*client, "trying again in 4 s");
 }
 
-TEST_F(KeysTest, AWorkerWhoseKeyIsAddedLaterJoinsThenAndLeavesWhenItIsRevoked) {
+TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   ASSERT_EQ(change_keys({"add", "late", "--role", "worker"}).exit_code, 0);
   const Outcome listed = change_keys({"list", "--format", "csv"});
   const std::size_t at = listed.out.find("late,worker,");
@@ -155,7 +158,7 @@ TEST_F(KeysTest, AWorkerWhoseKeyIsAddedLaterJoinsThenAndLeavesWhenItIsRevoked) {
   EXPECT_THAT(change_keys({"list"}).out, Not(HasSubstr("late")));
   const auto worker = worker_with(key("late"));
   wait_until_said(*worker, "did not accept this key");
-  // The public key from the file; `keys add --public` adds it to the list again.
+  // `keys add --public` adds the public key from the file to the list again.
   std::string line;
   std::ifstream file(key("late"));
   while (std::getline(file, line) && !line.starts_with("public = \"")) {

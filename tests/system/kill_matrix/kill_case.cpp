@@ -16,7 +16,7 @@ struct Entry {
   const char* program;
   const char* point;
   int signal;
-  int highest;  ///< occurrence, or milliseconds, that is drawn
+  int highest;  ///< largest occurrence, or time [ms], that is drawn
 };
 
 constexpr bool kApart = false;
@@ -27,13 +27,14 @@ constexpr const char* kWorker = "oblique-worker";
 constexpr const char* kNoProcess = "";
 constexpr int kNoSignal = 0;
 
-// Points that are a storm.
+// Storms in place of a point.
 constexpr const char* kKilledWorkers = "storm:killed workers";
 constexpr const char* kCutConnections = "storm:cut connections";
 constexpr const char* kVanishingPeers = "storm:vanishing peers";
 
-// The first twenty-three have every class of point, every program in both ways of starting it, and
-// both signals: they are what runs always. Occurrences are such that a sound run has them.
+// The first 23 entries are the test that always runs. They contain every class of point, every
+// program both started apart and by `oblique run`, and both signals. An undisturbed run reaches
+// every occurrence.
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},
@@ -58,7 +59,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kNoProcess, kKilledWorkers, kNoSignal, 1},
     Entry{kApart, kNoProcess, kCutConnections, kNoSignal, 1},
     Entry{kApart, kNoProcess, kVanishingPeers, kNoSignal, 1},
-    // Those of the server.
+    // Server.
     Entry{kApart, kServer, "before-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "time", SIGSTOP, 1500},
     Entry{kApart, kServer, "after-receive:submit", SIGKILL, 1},
@@ -75,7 +76,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kServer, "after-receive:goodbye", SIGKILL, 2},
     Entry{kApart, kServer, "before-send:stopping", SIGKILL, 2},
     Entry{kApart, kServer, "after-send:stopping", SIGSTOP, 2},
-    // Those of a worker.
+    // Worker.
     Entry{kApart, kWorker, "time", SIGKILL, 1200},
     Entry{kApart, kWorker, "before-send:hello", SIGKILL, 1},
     Entry{kApart, kWorker, "after-send:hello", SIGSTOP, 1},
@@ -88,14 +89,14 @@ constexpr std::array kMatrix{
     Entry{kApart, kWorker, "after-receive:results_stored", SIGSTOP, 2},
     Entry{kApart, kWorker, "before-send:heartbeat", SIGKILL, 1},
     Entry{kApart, kWorker, "after-send:goodbye", SIGSTOP, 1},
-    // Those of a client. Nothing waits for one that only watches.
+    // Client.
     Entry{kApart, kClient, "before-send:submit", SIGKILL, 1},
     Entry{kApart, kClient, "after-send:submit", SIGSTOP, 1},
     Entry{kApart, kClient, "after-receive:submit", SIGKILL, 1},
     Entry{kApart, kClient, "before-send:status", SIGKILL, 12},
     Entry{kApart, kClient, "after-send:status", SIGSTOP, 12},
     Entry{kApart, kClient, "time", SIGSTOP, 800},
-    // `oblique run` and its children; at first while it starts them.
+    // `oblique run` and its children; the first entry hits it while it starts them.
     Entry{kRun, kClient, "time", SIGKILL, 40},
     Entry{kRun, kClient, "time", SIGSTOP, 800},
     Entry{kRun, kClient, "before-send:submit", SIGKILL, 1},
@@ -153,16 +154,18 @@ KillCase draw_case(std::uint64_t seed) {
   drawn.storm = storm_of(drawn.point);
   drawn.signal = entry.signal;
   drawn.occurrence = up_to(entry.highest);
-  // At once a message is still in the process; 20 ms later it has left.
+  // Without a pause a message is still in the process; after 20 ms it has been sent.
   drawn.pause = milliseconds(random() % 2 == 0 ? 0 : 20);
   drawn.server_stops_first = random() % 2 == 0;
   if (drawn.signal == SIGSTOP) {
-    // Workers and server give each other up after 3 s, a client its request after 10 s.
+    // Server and workers are silent for each other after 3 s; a client's request times out after 10
+    // s.
     constexpr std::array kStopped{milliseconds(300), milliseconds(1500), milliseconds(4500)};
     drawn.stopped = kStopped.at(random() % kStopped.size());
     drawn.then = random() % 3 == 0 ? SIGKILL : SIGCONT;
   }
-  // Goodbyes and the server's own are only said to somebody who is there.
+  // A worker sends a goodbye only to a running server, and a server its end only to running
+  // workers.
   if (drawn.point.ends_with(":goodbye")) {
     drawn.server_stops_first = false;
   } else if (drawn.point.ends_with(":stopping")) {
@@ -193,8 +196,7 @@ std::string describe(const KillCase& kill_case) {
     line << " for " << kill_case.stopped.count() << " ms, then " << name_of(kill_case.then);
   }
   if (!kill_case.all_in_one) {
-    line << ", stopped in the end: " << (kill_case.server_stops_first ? "server" : "workers")
-         << " first";
+    line << ", at the end stopped first: " << (kill_case.server_stops_first ? "server" : "workers");
   }
   return line.str();
 }

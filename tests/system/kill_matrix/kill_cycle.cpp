@@ -22,13 +22,13 @@
 namespace oblique::test {
 namespace {
 
-constexpr std::chrono::milliseconds kBetweenLooks{5};
-constexpr int kMostAttempts = 6;
-constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
+constexpr std::chrono::milliseconds kPollInterval{5};
+constexpr int kMaxAttempts = 6;
+constexpr int kPointsFailed = 1;  ///< exit code of a complete study with failed points
 
-// Several models, so that batches end before the study does. The points of the first block take
-// long enough for heartbeats and for a score of commits. Of the second a filter leaves half out.
-// The last two have no answer.
+// Several models, so that batches end before the study does. The first block takes long enough for
+// heartbeats and about twenty commits. A filter leaves out half of the second block. The two points
+// of the last block fail.
 constexpr const char* kStudy = R"(name = "matrix"
 [model]
 preset = "paper"
@@ -54,33 +54,33 @@ e = [0.8, 1.0]
   throw std::runtime_error(what);
 }
 
-bool says_end_of_study(const Process& process) {
+bool reports_end_of_study(const Process& process) {
   const std::string end = std::to_string(KillStudy::kFailing) + " of ";
   return process.err().find(end) != std::string::npos &&
          process.err().find("points failed") != std::string::npos;
 }
 
-/// The one blow of a cycle. The struck process does it to itself, by the library kill_points; here
-/// it is armed for it, and wakes or ends when it was halted.
-class Blow {
+/// The signal of a cycle. The process sends it to itself, by the library kill_points. This class
+/// sets the environment for that, and continues or kills a halted process.
+class FaultInjection {
  public:
-  Blow(const TemporaryFolder& folder, const KillCase& kill_case)
+  FaultInjection(const TemporaryFolder& folder, const KillCase& kill_case)
       : case_(kill_case),
         folder_(folder.path().string()),
-        mark_(folder.file("struck")),
+        mark_(folder.file("mark")),
         library_(folder.file("kill_points.so")) {
-    // LD_PRELOAD ends a path at a space or colon, which that of the build folder may have.
+    // LD_PRELOAD separates paths at spaces and colons, which the build folder may contain.
     std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
     if (case_.signal == SIGSTOP) {
-      halt_ = std::jthread([this](const std::stop_token& stop) { end_the_halt(stop); });
+      halt_ = std::jthread([this](const std::stop_token& stop) { end_halt(stop); });
     }
   }
-  Blow(const Blow&) = delete;
-  Blow& operator=(const Blow&) = delete;
+  FaultInjection(const FaultInjection&) = delete;
+  FaultInjection& operator=(const FaultInjection&) = delete;
 
-  /// What `program` is started with: with the order when it is the one that is meant.
+  /// Environment of `program`; if it is the program of the case, with the order to kill_points.
   Environment environment(const std::string& program) const {
-    Environment all = bystander();
+    Environment all = plain_environment();
     if (program == case_.program) {
       std::ostringstream order;
       order << case_.program << ' ' << case_.point << ' ' << case_.occurrence << ' ' << case_.signal
@@ -90,15 +90,16 @@ class Blow {
     }
     return all;
   }
-  /// What a process is started with that is to be left alone. By this every process of a cycle is
-  /// known, those too that its processes start.
-  Environment bystander() const { return {{"TMPDIR", folder_}}; }
+  /// Environment of processes that get no signal. TMPDIR marks all processes of a cycle, including
+  /// their children (`processes_of`).
+  Environment plain_environment() const { return {{"TMPDIR", folder_}}; }
 
-  bool has_struck() const { return struck() > 0; }
-  /// Whether that exit code of that program is the blow's. Only once: it strikes one process.
+  bool has_happened() const { return target() > 0; }
+  /// Whether the signal explains that exit code of that program. True at most once, because one
+  /// process gets the signal.
   bool explains(const std::string& program, int exit_code) {
     if (explained_ || program != case_.program || exit_code != -SIGKILL || !case_.is_killed() ||
-        !has_struck()) {
+        !has_happened()) {
       return false;
     }
     explained_ = true;
@@ -106,21 +107,21 @@ class Blow {
   }
 
  private:
-  /// The process that was struck; −1 when none is yet.
-  pid_t struck() const {
+  /// The process that got the signal; −1 if none has yet.
+  pid_t target() const {
     std::ifstream mark(mark_);
     pid_t pid = -1;
     return mark >> pid ? pid : -1;
   }
-  void end_the_halt(const std::stop_token& stop) const {
-    while (!stop.stop_requested() && !has_struck()) {
-      std::this_thread::sleep_for(kBetweenLooks);
+  void end_halt(const std::stop_token& stop) const {
+    while (!stop.stop_requested() && !has_happened()) {
+      std::this_thread::sleep_for(kPollInterval);
     }
     const auto until = std::chrono::steady_clock::now() + case_.stopped;
     while (!stop.stop_requested() && std::chrono::steady_clock::now() < until) {
-      std::this_thread::sleep_for(kBetweenLooks);
+      std::this_thread::sleep_for(kPollInterval);
     }
-    if (const pid_t pid = struck(); pid > 0 && is_running(pid)) {
+    if (const pid_t pid = target(); pid > 0 && is_running(pid)) {
       kill(pid, case_.then);
     }
   }
@@ -130,7 +131,7 @@ class Blow {
   std::string mark_;
   std::string library_;
   bool explained_ = false;
-  std::jthread halt_;  ///< last, as it uses the others
+  std::jthread halt_;  ///< last: it uses the other members
 };
 
 // ---- Server, workers and client, each started apart ---------------------------------------------
@@ -138,28 +139,28 @@ class Blow {
 class ApartCycle {
  public:
   ApartCycle(const TemporaryFolder& folder, const KillStudy& study, const KillCase& kill_case,
-             Blow& blow)
+             FaultInjection& injection)
       : folder_(folder),
         study_(study),
         case_(kill_case),
-        blow_(blow),
+        injection_(injection),
         database_(folder.file("matrix.db")) {}
 
   void run() {
     start_server();
     if (case_.storm) {
-      storm_.emplace(*case_.storm, folder_, server_->worker_url(), blow_.bystander());
+      storm_.emplace(*case_.storm, folder_, server_->worker_url(), injection_.plain_environment());
     }
     for (auto& worker : workers_) {
       start_worker(worker, &worker == workers_.data());
     }
     for (int attempt = 1; !submit_and_watch(attempt == 1); ++attempt) {
-      if (attempt == kMostAttempts) {
+      if (attempt == kMaxAttempts) {
         fail("the study was submitted " + std::to_string(attempt) + " times and did not end");
       }
     }
     wait_until("the study is done", [this] {
-      look_after();
+      restart_killed();
       return Database(database_).texts("SELECT state FROM studies").at(0) == "done";
     });
     if (storm_) {
@@ -168,35 +169,36 @@ class ApartCycle {
     stop_all();
   }
 
-  bool had_storm() const { return storm_ && storm_->blows() > 0; }
+  bool had_storm() const { return storm_ && storm_->faults() > 0; }
 
  private:
-  /// Killed before it is ready, it is started once more, at other ports.
+  /// If the server is killed before it is ready, starts it again at other ports.
   void start_server() {
     try {
-      server_ = std::make_unique<Server>(folder_, database_, blow_.environment("oblique-server"));
+      server_ =
+          std::make_unique<Server>(folder_, database_, injection_.environment("oblique-server"));
     } catch (const std::runtime_error&) {
-      if (!blow_.explains("oblique-server", -SIGKILL)) {
+      if (!injection_.explains("oblique-server", -SIGKILL)) {
         throw;
       }
-      server_ = std::make_unique<Server>(folder_, database_, blow_.bystander());
+      server_ = std::make_unique<Server>(folder_, database_, injection_.plain_environment());
     }
   }
 
-  /// At the same ports.
   void start_server_again() {
-    server_ = std::make_unique<Server>(folder_, database_, *server_, blow_.bystander());
+    server_ =
+        std::make_unique<Server>(folder_, database_, *server_, injection_.plain_environment());
   }
 
-  /// One thread each: so few cores are shared by so many cycles.
+  /// With one thread, because many cycles share the cores.
   void start_worker(std::unique_ptr<Worker>& worker, bool first) {
     worker = std::make_unique<Worker>(
         folder_, server_->worker_url(), std::vector<std::string>{"--threads", "1"},
-        first ? blow_.environment("oblique-worker") : blow_.bystander());
+        first ? injection_.environment("oblique-worker") : injection_.plain_environment());
   }
 
-  /// Starts again what the blow has ended. Nothing else may end.
-  void look_after() {
+  /// Restarts the process that the signal has ended. Fails if another one has ended.
+  void restart_killed() {
     if (const auto code = server_->process().exit_code()) {
       expect_explained("oblique-server", *code, server_->process());
       start_server_again();
@@ -210,24 +212,24 @@ class ApartCycle {
   }
 
   void expect_explained(const std::string& program, int code, const Process& process) {
-    if (!blow_.explains(program, code)) {
+    if (!injection_.explains(program, code)) {
       fail(program + " ended with exit code " + std::to_string(code) + ":\n" + process.err());
     }
   }
 
-  /// False when it is to be done again.
+  /// Returns false if the client was killed and must be started again.
   bool submit_and_watch(bool first) {
-    // What a killed server was asked is asked again of the next one: the client does not give up.
+    // The long timeout makes the client repeat requests that a killed server has received.
     Process client(
         folder_, client_program(),
         {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "600"},
-        first ? blow_.environment("oblique") : blow_.bystander());
+        first ? injection_.environment("oblique") : injection_.plain_environment());
     while (!client.exit_code()) {
-      look_after();
-      std::this_thread::sleep_for(kBetweenLooks);
+      restart_killed();
+      std::this_thread::sleep_for(kPollInterval);
     }
     const int code = *client.exit_code();
-    if (code == kPointsFailed && says_end_of_study(client)) {
+    if (code == kPointsFailed && reports_end_of_study(client)) {
       return true;
     }
     expect_explained("oblique", code, client);
@@ -247,7 +249,7 @@ class ApartCycle {
   }
 
   void stop(const std::string& program, Process& process) {
-    // Until a program has said that it begins a signal may end it as any program.
+    // Before its first log line a program may not handle signals yet.
     wait_until(program + " has begun",
                [&] { return process.exit_code() || !process.err().empty(); });
     if (!process.exit_code()) {
@@ -261,7 +263,7 @@ class ApartCycle {
   const TemporaryFolder& folder_;
   const KillStudy& study_;
   const KillCase& case_;
-  Blow& blow_;
+  FaultInjection& injection_;
   std::string database_;
   std::unique_ptr<Server> server_;
   std::array<std::unique_ptr<Worker>, 2> workers_;
@@ -270,21 +272,22 @@ class ApartCycle {
 
 // ---- `oblique run` ------------------------------------------------------------------------------
 
-/// False when the same command is to be given again.
+/// Returns false if the command ended early and must be repeated.
 bool run_once(const TemporaryFolder& folder, const KillStudy& study, const KillCase& kill_case,
-              Blow& blow, bool first) {
+              FaultInjection& injection, bool first) {
   Process run(folder, client_program(),
               {"run", study.file(), "--db", folder.file("matrix.db"), "--workers", "2"},
-              first ? blow.environment(kill_case.program) : blow.bystander());
+              first ? injection.environment(kill_case.program) : injection.plain_environment());
   const int code = run.wait();
   wait_until("the children of oblique run are gone", [&] { return processes_of(folder).empty(); });
-  if (code == kPointsFailed && says_end_of_study(run)) {
+  if (code == kPointsFailed && reports_end_of_study(run)) {
     return true;
   }
-  // It goes on without one of its workers, and says so when it loses its server.
+  // It continues without one of its workers, and reports the loss of its server.
   const bool server_lost = code == 1 && kill_case.program == "oblique-server" &&
                            run.err().find("was killed by signal 9") != std::string::npos;
-  if (!first || !blow.has_struck() || !(server_lost || blow.explains("oblique", code))) {
+  if (!first || !injection.has_happened() ||
+      !(server_lost || injection.explains("oblique", code))) {
     fail("oblique run ended with exit code " + std::to_string(code) + ":\n" + run.err());
   }
   return false;
@@ -307,18 +310,18 @@ void check_database(const TemporaryFolder& folder, const KillStudy& study) {
   }
 }
 
-std::string last_words(const TemporaryFolder& folder) {
-  std::ostringstream words;
+std::string error_output(const TemporaryFolder& folder) {
+  std::ostringstream output;
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
     if (entry.path().extension() == ".err") {
       std::ifstream file(entry.path());
       const std::string text(std::istreambuf_iterator<char>(file), {});
-      constexpr std::size_t kMost = 3000;
-      words << "\n--- " << entry.path().filename().string() << "\n"
-            << text.substr(text.size() - std::min(kMost, text.size()));
+      constexpr std::size_t kMax = 3000;
+      output << "\n--- " << entry.path().filename().string() << "\n"
+             << text.substr(text.size() - std::min(kMax, text.size()));
     }
   }
-  return words.str();
+  return output.str();
 }
 
 // ---- Many cycles -------------------------------------------------------------------------------
@@ -326,43 +329,43 @@ std::string last_words(const TemporaryFolder& folder) {
 constexpr unsigned kAtOncePerCore = 4;
 
 struct CycleOutcome {
-  bool struck = false;                 ///< the point was reached
-  std::optional<std::string> failure;  ///< what was wrong, with what the processes said
+  bool reached = false;                ///< the point, or at least one fault of the storm
+  std::optional<std::string> failure;  ///< reason, and error output of the processes
 };
 
-/// Runs the study in a folder of its own, with the blow of the case, to its end, and compares what
-/// is stored with the undisturbed database.
+/// Runs the study in a temporary folder with the signal of the case, and compares the database with
+/// the undisturbed one.
 CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
   const TemporaryFolder folder;
   CycleOutcome outcome;
-  Blow blow(folder, kill_case);
+  FaultInjection injection(folder, kill_case);
   try {
     if (kill_case.all_in_one) {
-      if (!run_once(folder, study, kill_case, blow, true)) {
-        run_once(folder, study, kill_case, blow, false);
+      if (!run_once(folder, study, kill_case, injection, true)) {
+        run_once(folder, study, kill_case, injection, false);
       }
     } else {
-      ApartCycle cycle(folder, study, kill_case, blow);
+      ApartCycle cycle(folder, study, kill_case, injection);
       cycle.run();
-      outcome.struck = cycle.had_storm();
+      outcome.reached = cycle.had_storm();
     }
     wait_until("no process is left", [&] { return processes_of(folder).empty(); });
     check_database(folder, study);
   } catch (const std::exception& error) {
-    outcome.failure = error.what() + last_words(folder);
+    outcome.failure = error.what() + error_output(folder);
     for (const pid_t left : processes_of(folder)) {
       kill(left, SIGKILL);
     }
   }
-  outcome.struck = outcome.struck || blow.has_struck();
+  outcome.reached = outcome.reached || injection.has_happened();
   return outcome;
 }
 
-// ---- Rows that must be the same ----------------------------------------------------------------
+// ---- Rows that must be equal ----------------------------------------------------------------
 
 struct Table {
   std::string name;
-  std::set<std::string> by_chance;  ///< columns
+  std::set<std::string> by_chance;  ///< columns that are not compared
   std::string joined;
   std::string order;
 };
@@ -374,7 +377,7 @@ std::vector<Table> tables() {
        "",
        "study_id"},
       {"models", {"model_id"}, "", "definition"},
-      // The model's number is one by order of arrival, so its definition stands in for it.
+      // Numbers of models depend on the order of arrival; their definitions are compared instead.
       {"results",
        {"model_id", "wall_s", "worker_id", "attempt", "solved_at", "checksum"},
        " JOIN models USING (model_id)",
@@ -382,9 +385,9 @@ std::vector<Table> tables() {
   };
 }
 
-/// Every row as one text. The columns are asked for, so that new ones are compared too.
+/// Every row as one text. Columns are read from the schema, so that new ones are compared too.
 std::vector<std::string> rows_of(const Database& database, const Table& table) {
-  // quote() writes numbers so that they are read again as the same ones.
+  // quote() writes numbers with all their digits.
   std::string row = table.joined.empty() ? "''" : "quote(models.definition)";
   for (const std::string& column :
        database.texts("SELECT name FROM pragma_table_info('" + table.name + "')")) {
@@ -402,8 +405,8 @@ KillStudy::KillStudy() {
   std::ofstream(file()) << kStudy;
   const TemporaryFolder folder;
   const KillCase nobody;
-  Blow blow(folder, nobody);
-  ApartCycle(folder, *this, nobody, blow).run();
+  FaultInjection injection(folder, nobody);
+  ApartCycle(folder, *this, nobody, injection).run();
   std::filesystem::copy_file(folder.file("matrix.db"), undisturbed());
 }
 
@@ -418,7 +421,7 @@ MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count) {
       const CycleOutcome outcome = run_cycle(study, kill_case);
       const std::lock_guard lock(mutex);
       ++report.cycles;
-      report.not_struck += outcome.struck ? 0 : 1;
+      report.not_reached += outcome.reached ? 0 : 1;
       if (outcome.failure) {
         report.failures.push_back(describe(kill_case) + ": " + *outcome.failure);
       }

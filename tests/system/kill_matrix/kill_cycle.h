@@ -11,37 +11,38 @@
 
 namespace oblique::test {
 
-/// What is struck in one cycle of the kill matrix, where, and what becomes of it.
+/// One cycle of the kill matrix: which process gets which signal, where, and what follows.
 struct KillCase {
   std::uint64_t seed = 0;
-  bool all_in_one = false;  ///< `oblique run`, else programs started one by one
-  std::string program;      ///< who is struck; empty: nobody, there is a storm in its place
-  std::optional<StormKind> storm{};  ///< goes on until the study is done
+  bool all_in_one = false;           ///< `oblique run`; otherwise each program is started apart
+  std::string program;               ///< that gets the signal; empty: none, or a storm
+  std::optional<StormKind> storm{};  ///< continues until the study is done
   std::string point;                 ///< as kill_points.cpp names them
-  int occurrence = 1;  ///< at which one; of the point `time`: milliseconds after the start
+  int occurrence = 1;  ///< of the point, from 1; for `time`: milliseconds after the start
   int signal = 0;      ///< SIGKILL or SIGSTOP
   std::chrono::milliseconds pause{0};  ///< between point and signal
-  // Of SIGSTOP only.
-  std::chrono::milliseconds stopped{0};  ///< for how long
-  int then = 0;                          ///< SIGCONT or SIGKILL
-  bool server_stops_first = false;       ///< at the end, before the workers
+  // For SIGSTOP only.
+  std::chrono::milliseconds stopped{0};  ///< duration of the halt
+  int then = 0;                          ///< SIGCONT or SIGKILL, after the halt
+  bool server_stops_first = false;       ///< at the end; otherwise the workers stop first
 
   bool is_killed() const;
 };
 
-/// The case of a seed: the entry of the matrix goes round with the seed, the rest is drawn from it.
+/// The case of a seed: entry `seed` modulo the size of the matrix; the rest is drawn at random from
+/// the seed.
 KillCase draw_case(std::uint64_t seed);
 
-/// Cases until each entry of the matrix has had its turn.
+/// Number of entries of the matrix.
 std::uint64_t entries_of_matrix();
 
-/// On one line, for people.
+/// Description on one line.
 std::string describe(const KillCase& kill_case);
 
 /// "before-send" of "before-send:results".
 std::string class_of(const std::string& point);
 
-/// The study of every cycle, and the database of a run of it in which nothing happened.
+/// The study of all cycles, and the database of an undisturbed run.
 class KillStudy {
  public:
   KillStudy();
@@ -50,7 +51,7 @@ class KillStudy {
   std::string undisturbed() const { return folder_.file("undisturbed.db"); }
 
   static constexpr const char* kName = "matrix";
-  static constexpr int kFailing = 2;  ///< points whose step is beyond the limit of stability
+  static constexpr int kFailing = 2;  ///< points that fail: their step is above the stability limit
 
  private:
   TemporaryFolder folder_;
@@ -58,18 +59,17 @@ class KillStudy {
 
 struct MatrixReport {
   std::uint64_t cycles = 0;
-  std::uint64_t not_struck = 0;       ///< the study ended before the point was reached
-  std::vector<std::string> failures;  ///< the case and what was wrong
+  std::uint64_t not_reached = 0;      ///< cycles whose study ended before the point
+  std::vector<std::string> failures;  ///< case and reason
 };
 
-/// Runs the cases of `count` seeds from `first_seed`, several at once, because a cycle mostly waits
-/// until a halted process counts as lost.
+/// Runs the cases of `count` seeds from `first_seed`. Several run at once, because a cycle mostly
+/// waits until a halted process counts as lost.
 MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count);
 
-/// The first difference between two databases in what must not depend on who solved what and when:
-/// studies, models and results, row for row and to the last bit, without numbers given in order of
-/// arrival, times of day, durations, and by whose key a study came, which is none without keys.
-/// Empty when there is none.
+/// Returns the first difference between two databases; empty if there is none. Compares all bits of
+/// studies, models and results, except columns that depend on chance: numbers given in order of
+/// arrival, times, durations, attempts, workers, and the key of the submitter.
 std::string first_difference(const std::string& database, const std::string& other);
 
 }  // namespace oblique::test

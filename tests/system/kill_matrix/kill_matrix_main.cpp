@@ -1,4 +1,4 @@
-// oblique-kill-matrix FIRST_SEED COUNT: runs the cycles of so many seeds and names those that fail.
+// oblique-kill-matrix FIRST_SEED COUNT: runs the cycles of COUNT seeds and prints those that fail.
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -22,7 +22,8 @@ int main(int argc, char** argv) {
     }
     std::cout << report.cycles << " cycles in "
               << std::chrono::duration_cast<std::chrono::seconds>(took).count() << " s, "
-              << report.not_struck << " without a blow, " << report.failures.size() << " failed\n";
+              << report.not_reached << " ended before their point, " << report.failures.size()
+              << " failed\n";
     return report.failures.empty() ? 0 : 1;
   } catch (const std::exception& error) {
     std::cerr << error.what() << '\n';

@@ -12,20 +12,20 @@
 namespace oblique::test {
 namespace {
 
-/// More of them: `oblique-kill-matrix`.
+/// The program `oblique-kill-matrix` runs more.
 constexpr std::uint64_t kCycles = 23;
 
-TEST(KillMatrixTest, WhoeverIsKilledOrHaltedWhereverTheDatabaseIsThatOfAnUndisturbedRun) {
+TEST(KillMatrixTest, TheDatabaseEqualsThatOfAnUndisturbedRunWhicheverProcessIsKilledOrHalted) {
   const MatrixReport report = run_matrix(0, kCycles);
   EXPECT_EQ(report.cycles, kCycles);
   for (const std::string& failure : report.failures) {
     ADD_FAILURE() << failure;
   }
-  // Where messages are grouped otherwise a late occurrence may not come.
-  EXPECT_LE(report.not_struck, kCycles / 5) << "too many cycles without a blow to be a test";
+  // A late occurrence may be missing if messages are grouped differently.
+  EXPECT_LE(report.not_reached, kCycles / 5) << "too many cycles ended before their point";
 }
 
-TEST(KillMatrixTest, TheCyclesThatRunAlwaysHaveEveryClassOfPointProgramAndSignalOfTheMatrix) {
+TEST(KillMatrixTest, TheFirstCyclesContainEveryClassOfPointProgramAndSignalOfTheMatrix) {
   std::set<std::string> always;
   std::set<std::string> all;
   for (std::uint64_t seed = 0; seed < entries_of_matrix(); ++seed) {
@@ -43,7 +43,7 @@ TEST(KillMatrixTest, TheCyclesThatRunAlwaysHaveEveryClassOfPointProgramAndSignal
 
 class ComparisonTest : public ::testing::Test {
  protected:
-  /// What is found when this is done to one of two equal databases.
+  /// The difference found after `sql` has changed one of two equal databases.
   std::string difference_after(const std::string& sql) {
     const std::string changed = folder_.file("changed.db");
     std::filesystem::copy_file(study_.undisturbed(), changed,
@@ -59,10 +59,10 @@ class ComparisonTest : public ::testing::Test {
   KillStudy study_;
 };
 
-TEST_F(ComparisonTest, OfDatabasesSeesWhatMustNotDifferAndNothingElse) {
+TEST_F(ComparisonTest, FindsDifferencesThatMustNotBeAndNoOthers) {
   EXPECT_EQ(difference_after("SELECT 1"), "");
   EXPECT_EQ(difference_after("UPDATE results SET attempt = 7, wall_s = 1, solved_at = 'then'"), "");
-  // A filter leaves some numbers out.
+  // By offset, because a filter leaves out some point numbers.
   const std::string one = " WHERE point = (SELECT point FROM results LIMIT 1 OFFSET 300)";
   for (const std::string& change : std::vector<std::string>{
            "UPDATE results SET fn_peak_N = fn_peak_N + 1" + one,

@@ -1,16 +1,16 @@
-// A library that a test loads into a program with LD_PRELOAD. It stands between the program and the
-// calls by which the program commits, sends and receives, and sends the program a signal at one of
-// them. So the programs under test are those that people run, without a hook of their own.
+// A library that a test loads into a program with LD_PRELOAD. It intercepts the calls with which
+// the program commits, sends and receives, and sends the program a signal at one of them. So the
+// programs under test need no hooks of their own.
 //
-// OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" is the order:
-//   PROGRAM     who is meant; its children inherit the variable and are left alone
+// OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" defines when:
+//   PROGRAM     name of the program; children of other names inherit the variable and ignore it
 //   POINT       before-commit, after-commit, before-send:KIND, after-send:KIND, after-receive:KIND
 //               with a kind of proto/oblique.proto, or time
-//   OCCURRENCE  at which one, from 1; of time: milliseconds after the start
+//   OCCURRENCE  of the point, from 1; for time: milliseconds after the start
 //   SIGNAL      number of the signal
-//   PAUSE_MS    how long the thread sleeps before, as for a message to leave the process
-//   MARK        a file that is made, with the process id, before the signal is sent. When it is
-//               there already another process was hit, and this one goes on.
+//   PAUSE_MS    sleep before the signal, for example until a message has been sent
+//   MARK        file with the process id, created before the signal is sent. If it exists,
+//               another process already got the signal, and this one continues.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -78,7 +78,7 @@ const Kinds& kinds_of(const std::string& program, bool sent, bool with_client) {
   return by_server ? to_worker : to_server;
 }
 
-/// Takes a varint off the front of `bytes`.
+/// Removes a varint from the front of `bytes` and returns it.
 std::uint64_t take_varint(std::basic_string_view<unsigned char>& bytes) {
   std::uint64_t value = 0;
   for (int shift = 0; !bytes.empty() && shift < 64; shift += 7) {
@@ -92,14 +92,14 @@ std::uint64_t take_varint(std::basic_string_view<unsigned char>& bytes) {
   return value;
 }
 
-/// Name of the kind of message in a frame, empty for none. By hand: a second copy of the generated
-/// code in one process is refused by the Protobuf library.
+/// Name of the kind of message in a frame; empty if unknown. Decoded by hand, because the Protobuf
+/// library refuses a second copy of the generated code in one process.
 std::string kind_of(const std::string& program, bool sent, const void* data, std::size_t size) {
   std::basic_string_view<unsigned char> bytes(static_cast<const unsigned char*>(data), size);
   constexpr unsigned char kNumberInFieldOne = 0x08;
   const bool with_client = !bytes.empty() && bytes.front() == kNumberInFieldOne;
   const Kinds& kinds = kinds_of(program, sent, with_client);
-  // The kind is the first field that is a message; only numbers stand before it.
+  // The kind is the first field that is a message; only numbers precede it.
   while (!bytes.empty()) {
     const std::uint64_t tag = take_varint(bytes);
     constexpr std::uint64_t kNumber = 0;
@@ -127,13 +127,13 @@ class KillPoints {
   }
 
   bool armed() const { return order_.has_value(); }
-  /// The server speaks ZMTP itself; the others leave that to libzmq.
+  /// The server implements ZMTP itself; the other programs use libzmq.
   bool watches_sockets() const { return armed() && program_ == "oblique-server"; }
 
   void reached(const std::string& point) {
     if (order_ && order_->point == point && ++times_ == order_->occurrence) {
       std::this_thread::sleep_for(std::chrono::milliseconds(order_->pause_ms));
-      strike();
+      send_signal();
     }
   }
 
@@ -145,7 +145,7 @@ class KillPoints {
   }
 
  private:
-  void strike() const {
+  void send_signal() const {
     const int mark = open(order_->mark.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600);
     if (mark < 0) {
       return;
@@ -158,7 +158,7 @@ class KillPoints {
     }
   }
 
-  /// The thread takes no signal: those sent to the process are for its own threads.
+  /// The thread blocks all signals, so that the program's own threads receive them.
   void start_clock() const {
     sigset_t all;
     sigset_t before;
@@ -166,7 +166,7 @@ class KillPoints {
     pthread_sigmask(SIG_SETMASK, &all, &before);
     std::thread([this] {
       std::this_thread::sleep_for(std::chrono::milliseconds(order_->occurrence));
-      strike();
+      send_signal();
     }).detach();
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
   }
@@ -176,10 +176,10 @@ class KillPoints {
   std::atomic<int> times_ = 0;
 };
 
-/// What one end of a connection sends, by ZMTP: a greeting, then frames.
+/// The bytes that one side of a ZMTP connection sends: a greeting, then frames.
 class Stream {
  public:
-  /// Calls `take` with the body of every message that is whole now.
+  /// Calls `take` with the body of every complete message.
   template <class Take>
   void receive(std::string_view bytes, const Take& take) {
     buffer_ += bytes;
@@ -225,13 +225,13 @@ struct Connection {
   Stream sent;
 };
 
-/// By descriptor; of the server's one thread that has sockets.
+/// Connections by descriptor. Only one thread of the server uses sockets.
 std::map<int, Connection>& connections() {
   static auto* const only = new std::map<int, Connection>;
   return *only;
 }
 
-/// Never destroyed: threads may come here until the very end.
+/// Never destroyed, because threads may call it until the process ends.
 KillPoints& points() {
   static auto* const only = new KillPoints;
   return *only;
@@ -248,7 +248,7 @@ Function* next(const char* name) {
 
 }  // namespace
 
-// ---- In the place of the libraries' functions ---------------------------------------------------
+// ---- Replacements of library functions ---------------------------------------------------
 
 extern "C" int sqlite3_exec(sqlite3* database, const char* sql,
                             int (*take)(void*, int, char**, char**), void* context,
@@ -291,7 +291,7 @@ extern "C" int zmq_msg_recv(zmq_msg_t* message, void* socket, int flags) {
   return received;
 }
 
-/// Queries go to other processes by sockets too.
+/// False for the sockets to query processes.
 static bool is_of_a_peer(int socket) {
   int domain = 0;
   socklen_t size = sizeof domain;

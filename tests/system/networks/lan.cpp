@@ -24,7 +24,7 @@ void write_to(const std::string& file, const std::string& text) {
   std::ofstream(file) << text;
 }
 
-/// In a user namespace, where no root is needed; where there are none, as root.
+/// Tries a user namespace, which needs no root; without one, root is needed.
 void enter_namespaces() {
   const uid_t user = geteuid();
   const gid_t group = getegid();
@@ -64,9 +64,9 @@ protocol::Descriptor new_network() {
   return made;
 }
 
-/// Runs it where this thread is.
+/// Runs the command in the namespaces of this thread.
 std::string run_here(const TemporaryFolder& folder, const std::string& command) {
-  // Those who are not root have no sbin in their path.
+  // The PATH of other users than root may lack sbin.
   const Outcome ran =
       Process(folder, "/bin/sh", {"-ec", command}, {{"PATH", "/usr/sbin:/usr/bin:/sbin:/bin"}})
           .outcome();
@@ -78,7 +78,8 @@ std::string run_here(const TemporaryFolder& folder, const std::string& command) 
 
 }  // namespace
 
-// ---- Where this thread is ---------------------------------------------------------------------
+// ---- Namespaces of this thread
+// ---------------------------------------------------------------------
 
 Inside::Inside(const Host& host) : before_(present_network()) {
   if (setns(host.network(), CLONE_NEWNET) != 0) {
@@ -163,7 +164,7 @@ Lan::~Lan() {
 
 Host& Lan::add(const std::string& name, int last) {
   Host& host = *hosts_.emplace_back(std::unique_ptr<Host>(new Host(*folder_, name, last)));
-  // The name is that of the descriptor in this process, for the command to open.
+  // The path names the descriptor in this process, so that the command can open it.
   run_here(*folder_, fmt::format("ip link add name to-{0} type veth peer name cable;"
                                  "ip link set dev cable netns /proc/{1}/fd/{2};"
                                  "ip link set dev to-{0} master switch up",

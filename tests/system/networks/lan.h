@@ -11,7 +11,7 @@
 
 namespace oblique::test {
 
-/// The system refuses to create networks; the message has the reason.
+/// The system refuses to create namespaces; the message has the reason.
 class NoNamespaces : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -32,14 +32,15 @@ class Host {
   /// Unplugs or plugs in its cable at the switch.
   void pull_cable() const;
   void plug_cable() const;
-  /// Drops that percentage of arriving packets at random.
+  /// Drops `percent` percent of the arriving packets at random.
   void lose_percent(int percent) const;
   /// Drops all packets to and from it, so that neither side of a connection is notified.
   void lose_everything() const;
   void lose_nothing() const;
   /// Changes its addresses to those that end in `last`.
   void renumber(int last);
-  /// Runs a shell command on it and returns its output. Throws std::runtime_error if it fails.
+  /// Runs a shell command on the machine and returns its output. Throws std::runtime_error if the
+  /// command fails.
   std::string run(const std::string& command) const;
 
  private:
@@ -64,11 +65,11 @@ class Inside {
   protocol::Descriptor before_;
 };
 
-/// A switch with machines, in user, mount and network namespaces of this process. They need no
-/// root, have no names outside, and end with this process and its children.
+/// A switch with machines, in user, mount and network namespaces of this process. These need no
+/// root, are invisible outside, and end with this process and its children.
 class Lan {
  public:
-  /// Moves this process, which must have one thread, to these namespaces. Throws NoNamespaces.
+  /// Moves this process, which must be single-threaded, to new namespaces. Throws NoNamespaces.
   explicit Lan(const TemporaryFolder& folder);
   ~Lan();
   Lan(const Lan&) = delete;
@@ -76,7 +77,7 @@ class Lan {
 
   /// Adds a machine with the addresses 10.77.0.`last` and fd77::`last`.
   Host& add(const std::string& name, int last);
-  /// Programs on all machines resolve that name to these addresses, and no other name.
+  /// Makes programs on all machines resolve `name`, and only this name, to these addresses.
   void set_addresses(const std::string& name, const std::vector<std::string>& addresses) const;
 
  private:

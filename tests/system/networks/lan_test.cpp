@@ -1,5 +1,5 @@
-// Programs on separate machines, with broken, lossy and stalled lines, changed addresses and
-// eavesdroppers; and the commands of README.md for a second machine.
+// Programs on separate machines: broken, lossy and stalled lines, changed addresses, eavesdroppers,
+// and the commands of README.md for a second machine.
 #include <arpa/inet.h>
 #include <linux/if_packet.h>
 #include <net/ethernet.h>
@@ -44,7 +44,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 /// A server, two workers and a client, each on its own machine, and a study that takes seconds.
-/// Skips if no networks can be created.
+/// Skipped if no networks can be created.
 class StudyOnLan : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -73,7 +73,7 @@ class StudyOnLan : public ::testing::Test {
     return options;
   }
 
-  /// On its default ports; `::` stands for all addresses of both families.
+  /// Starts the server at its default ports; `::` means all IPv4 and IPv6 addresses.
   void start_server(const std::string& address = "::") {
     const Inside inside(*server_host_);
     std::vector<std::string> arguments{"--db", folder_.file("study.db"), "--listen", address};
@@ -84,7 +84,7 @@ class StudyOnLan : public ::testing::Test {
     }
     server_ = std::make_unique<Server>(folder_, arguments);
   }
-  /// A worker on that machine, named like it.
+  /// A worker on that machine, with its name.
   std::unique_ptr<Process> worker_on(const Host& host) const {
     const Inside inside(host);
     auto arguments = access("worker");
@@ -92,7 +92,7 @@ class StudyOnLan : public ::testing::Test {
                                        "--stop-with-parent", std::to_string(getpid())});
     return std::make_unique<Process>(folder_, worker_program(), arguments);
   }
-  /// `oblique` with these arguments and the server's address, on the client's machine.
+  /// Starts `oblique` with these arguments and the server's address on the client's machine.
   std::unique_ptr<Process> client(std::vector<std::string> arguments) const {
     const Inside inside(*client_host_);
     const auto options = access("client");
@@ -100,10 +100,10 @@ class StudyOnLan : public ::testing::Test {
     return std::make_unique<Process>(folder_, client_program(), arguments);
   }
 
-  /// Starts all programs that do not run yet. When points are stored it calls `fault`, which also
-  /// repairs the fault. Then the study must complete (small_study.h) and all workers must still
-  /// run. Prints the time until new rows.
-  void goes_on_after(const std::function<void()>& fault, std::size_t workers = 2) {
+  /// Starts all programs that do not run yet. When the first results are stored it calls `fault`,
+  /// which causes and repairs a fault. Then the study must complete (small_study.h) and all workers
+  /// must still run. Prints the time until new results.
+  void expect_completion_after(const std::function<void()>& fault, std::size_t workers = 2) {
     if (server_ == nullptr) {
       start_server();
     }
@@ -115,11 +115,11 @@ class StudyOnLan : public ::testing::Test {
     }
     wait_for_rows(database_, 1);
     fault();
-    const auto mended = std::chrono::steady_clock::now();
+    const auto repaired = std::chrono::steady_clock::now();
     const double rows = database_.rows();
     ASSERT_LT(rows, kManyPoints) << "the study was too short for this fault";
     wait_for_rows(database_, rows + 1);
-    print_measured("work goes on after", mended);
+    print_measured("new results after", repaired);
     expect_completed(*client_, database_, [this] {
       return client({"workers", "--format", "json"})->outcome().out;
     });
@@ -156,44 +156,44 @@ class BrokenLines : public StudyOnLan {
 };
 
 TEST_F(BrokenLines, TheServersCableIsPulledForTenSeconds) {
-  goes_on_after([this] { pull_for(*server_host_, seconds(10)); });
+  expect_completion_after([this] { pull_for(*server_host_, seconds(10)); });
 }
 
 TEST_F(BrokenLines, TheCableOfTheOnlyWorkerIsPulledForTenSeconds) {
-  goes_on_after([this] { pull_for(*worker_hosts_[0], seconds(10)); }, 1);
+  expect_completion_after([this] { pull_for(*worker_hosts_[0], seconds(10)); }, 1);
 }
 
-TEST_F(BrokenLines, TheServersCableIsPulledForLessThanAWorkersLeasesLast) {
-  goes_on_after([this] { pull_for(*server_host_, milliseconds(1500)); });
+TEST_F(BrokenLines, TheServersCableIsPulledForLessTimeThanALeaseLasts) {
+  expect_completion_after([this] { pull_for(*server_host_, milliseconds(1500)); });
 }
 
-TEST_F(BrokenLines, OfAHundredPacketsFiveAreLostBothWays) {
+TEST_F(BrokenLines, FivePercentOfThePacketsAreLostInBothDirections) {
   for (const Host* host : {server_host_, worker_hosts_[0], worker_hosts_[1], client_host_}) {
     host->lose_percent(5);
   }
-  goes_on_after([] {});
+  expect_completion_after([] {});
 }
 
-TEST_F(BrokenLines, AWorkerIsCutOffWithoutAWordAndStartedAgain) {
-  goes_on_after([this] {
+TEST_F(BrokenLines, AWorkerIsCutOffSilentlyAndRestarted) {
+  expect_completion_after([this] {
     worker_hosts_[0]->lose_everything();
     workers_[0]->send(SIGKILL);
     workers_[0]->wait();
-    worker_hosts_[0]->lose_nothing();  // the server still has the connection of the previous worker
+    worker_hosts_[0]->lose_nothing();  // the server still has the connection of the first worker
     workers_[0] = worker_on(*worker_hosts_[0]);
   });
 }
 
-TEST_F(BrokenLines, TheServerIsCutOffWithoutAWordForTenSeconds) {
-  goes_on_after([this] {
+TEST_F(BrokenLines, TheServerIsCutOffSilentlyForTenSeconds) {
+  expect_completion_after([this] {
     server_host_->lose_everything();
     std::this_thread::sleep_for(seconds(10));
     server_host_->lose_nothing();
   });
 }
 
-TEST_F(BrokenLines, TheServersMachineGoesDownWithoutAWordAndComesBack) {
-  goes_on_after([this] {
+TEST_F(BrokenLines, TheServersMachineGoesDownSilentlyAndComesBack) {
+  expect_completion_after([this] {
     server_host_->pull_cable();
     server_->process().send(SIGKILL);
     server_->process().wait();
@@ -208,7 +208,7 @@ TEST_F(BrokenLines, TheServersMachineGoesDownWithoutAWordAndComesBack) {
 using ChangedAddresses = StudyOnLan;
 
 TEST_F(ChangedAddresses, TheMachineOfTheOnlyWorkerGetsAnotherAddress) {
-  goes_on_after([this] { worker_hosts_[0]->renumber(13); }, 1);
+  expect_completion_after([this] { worker_hosts_[0]->renumber(13); }, 1);
 }
 
 TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
@@ -217,24 +217,24 @@ TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
   const auto says = [this](const std::string& words) {
     return client_->err().find(words) != std::string::npos;
   };
-  wait_until("it watches", [&] { return says("waits for a worker"); });
+  wait_until("the client watches", [&] { return says("waits for a worker"); });
   client_host_->renumber(15);
   const auto renumbered = std::chrono::steady_clock::now();
-  wait_until("it is answered again", [&] { return says("answers again"); });
-  print_measured("the client is answered again after", renumbered);
-  goes_on_after([] {});
+  wait_until("the client receives replies again", [&] { return says("answers again"); });
+  print_measured("the client receives replies again after", renumbered);
+  expect_completion_after([] {});
 }
 
 TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
   lan_->set_addresses("coordinator", {server_host_->v4()});
   server_name_ = "coordinator";
-  goes_on_after([this] {
+  expect_completion_after([this] {
     server_host_->renumber(12);
     lan_->set_addresses("coordinator", {server_host_->v4()});
   });
 }
 
-TEST_F(ChangedAddresses, ANameThatHasNoneIsSaidToHaveNone) {
+TEST_F(ChangedAddresses, ANameWithoutAddressIsReported) {
   server_name_ = "nowhere";
   const Outcome asked = client({"status", "--timeout", "0.2"})->outcome();
   EXPECT_EQ(asked.exit_code, 1);
@@ -244,45 +244,45 @@ TEST_F(ChangedAddresses, ANameThatHasNoneIsSaidToHaveNone) {
 
 using IPv6 = StudyOnLan;
 
-TEST_F(IPv6, CarriesAStudyFromEndToEnd) {
+TEST_F(IPv6, CarriesAStudy) {
   server_name_ = "[" + server_host_->v6() + "]";
-  goes_on_after([] {});
+  expect_completion_after([] {});
 }
 
 TEST_F(IPv6, CarriesAStudyOverLinkLocalAddresses) {
   const std::string address = server_host_->link_local() + "%eth0";
   server_name_ = "[" + address + "]";
   start_server(address);
-  goes_on_after([] {});
+  expect_completion_after([] {});
 }
 
-TEST_F(IPv6, IsFoundByName) {
+TEST_F(IPv6, AddressesAreFoundByName) {
   lan_->set_addresses("coordinator", {server_host_->v6()});
   server_name_ = "coordinator";
-  goes_on_after([] {});
+  expect_completion_after([] {});
 }
 
-TEST_F(IPv6, IsTriedWhereNobodyAnswersAtTheAddressOfIPv4OfTheSameName) {
+TEST_F(IPv6, IsTriedIfTheIPv4AddressOfTheSameNameDoesNotAnswer) {
   lan_->set_addresses("coordinator", {server_host_->v4(), server_host_->v6()});
   server_name_ = "coordinator";
   start_server(server_host_->v6());
-  goes_on_after([] {});
+  expect_completion_after([] {});
 }
 
-// ---- With keys on, nothing that people wrote or that was computed can be read on the way --------
+// ---- Encryption ---------------------------------------------------------------------------------
 
 /// Captures all packets on the cable of a machine, in both directions.
 class Capture {
  public:
-  /// Throws std::runtime_error if the system refuses such a socket.
+  /// Throws std::runtime_error if the system refuses a packet socket.
   explicit Capture(const Host& host)
       : socket_(socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, htons(ETH_P_ALL))) {
     sockaddr_ll cable{};
     cable.sll_family = AF_PACKET;
     cable.sll_protocol = htons(ETH_P_ALL);
     cable.sll_ifindex = static_cast<int>(if_nametoindex(("to-" + host.name()).c_str()));
-    // A large buffer, so that no packet is lost on a busy machine. Root of the namespace may exceed
-    // the system's limit; otherwise the default must suffice.
+    // A large buffer, so that no packet is lost on a busy machine. Without the right to exceed the
+    // system's limit the default must suffice.
     constexpr int kWaitingBytes = 64 << 20;
     static_cast<void>(setsockopt(socket_.number(), SOL_SOCKET, SO_RCVBUFFORCE, &kWaitingBytes,
                                  sizeof kWaitingBytes));
@@ -320,11 +320,11 @@ class Capture {
 
 class PlainText : public StudyOnLan {
  protected:
-  /// All traffic of the server while a study with a conspicuous name is solved and queried.
+  /// Returns all traffic of the server while a study named "conspicuous" is solved and queried.
   std::string captured() {
     Capture capture(*server_host_);
     start_server();
-    workers_.push_back(worker_on(*worker_hosts_[0]));  // it sends its name, worker1
+    workers_.push_back(worker_on(*worker_hosts_[0]));  // its hello contains its name, worker1
     using Words = std::vector<std::string>;
     for (const Words& asked :
          {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
@@ -338,23 +338,23 @@ class PlainText : public StudyOnLan {
   }
 
   /// Revealing texts: names of study and worker, a column, words of a statement, states of a
-  /// contact, an instruction set.
-  const std::vector<std::string> telling_{"conspicuous", "worker1", "fn_peak_N",
-                                          "SELECT",      "SC SR",   "0.95"};
+  /// contact and a value.
+  const std::vector<std::string> revealing_texts_{"conspicuous", "worker1", "fn_peak_N",
+                                                  "SELECT",      "SC SR",   "0.95"};
 };
 
-TEST_F(PlainText, CanBeReadOnTheWayWithoutKeys) {
+TEST_F(PlainText, IsReadableOnTheNetworkWithoutKeys) {
   keys_.clear();
   const std::string bytes = captured();
-  for (const std::string& words : telling_) {
+  for (const std::string& words : revealing_texts_) {
     EXPECT_THAT(bytes.find(words), Not(std::string::npos)) << words;
   }
 }
 
-TEST_F(PlainText, IsNotToBeFoundWithKeys) {
+TEST_F(PlainText, IsNotReadableOnTheNetworkWithKeys) {
   const std::string bytes = captured();
   ASSERT_THAT(bytes.find("CURVE"), Not(std::string::npos)) << "nothing was captured";
-  for (const std::string& words : telling_) {
+  for (const std::string& words : revealing_texts_) {
     EXPECT_EQ(bytes.find(words), std::string::npos) << words;
   }
 }
@@ -366,7 +366,7 @@ std::string readme() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The content of the first fenced block of that kind after `place`.
+/// Returns the content of the first fenced block of language `kind` after `place`.
 std::string block_after(const std::string& text, const std::string& place,
                         const std::string& kind) {
   const std::string fence = "\n```" + kind + "\n";
@@ -419,7 +419,7 @@ class ReadmeCommands : public StudyOnLan {
   TemporaryFolder elsewhere_;
 };
 
-TEST_F(ReadmeCommands, AreFiveFromTheFirstKeyToTheFirstResultFromAnotherMachine) {
+TEST_F(ReadmeCommands, FiveOfThemLeadFromTheFirstKeyToTheFirstResultOfAnotherMachine) {
   const std::string text = readme();
   std::ofstream(elsewhere_.file("first.toml")) << block_after(text, "## A study", "toml");
   const auto commands = commands_of(block_after(text, "## More than one machine", ""));

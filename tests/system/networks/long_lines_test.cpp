@@ -22,7 +22,7 @@ using std::chrono::seconds;
 /// A server with keys, and two workers and a client on a slow line to it.
 class LongLines : public ::testing::Test {
  protected:
-  /// Delay of every byte.
+  /// Starts all programs and waits for the first result; every byte is delayed by `delay`.
   void start(milliseconds delay) {
     ASSERT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 0);
     server_ = std::make_unique<Server>(folder_, folder_.file("study.db"),
@@ -61,14 +61,14 @@ class LongLines : public ::testing::Test {
   std::optional<Process> client_;
 };
 
-TEST_F(LongLines, TheyTakeLongerForAHandshakeThanIsWaitedForAtFirst) {
+TEST_F(LongLines, AHandshakeMayTakeLongerThanTheFirstTimeout) {
   start(milliseconds(600));  // until a study is submitted and points are stored
-  EXPECT_GE(to_workers_port_->connections(), 4) << "both workers tried again";
+  EXPECT_GE(to_workers_port_->connections(), 4) << "both workers reconnected";
 }
 
-TEST_F(LongLines, TheyAreStalledForSecondsAgainAndAgain) {
+TEST_F(LongLines, AStudyCompletesAlthoughLinesStallRepeatedlyForSeconds) {
   start(milliseconds(200));
-  // The second time for longer than a lease lasts.
+  // The second stall exceeds the duration of a lease.
   for (const milliseconds time : {milliseconds(1500), milliseconds(4000)}) {
     for (const bool stalls : {true, false}) {
       to_workers_port_->stall(stalls);
@@ -79,12 +79,12 @@ TEST_F(LongLines, TheyAreStalledForSecondsAgainAndAgain) {
   expect_completed();
 }
 
-TEST_F(LongLines, TheyEndWithoutAWord) {
+TEST_F(LongLines, AStudyCompletesAlthoughConnectionsBreakSilently) {
   start(milliseconds(200));
   to_workers_port_->swallow();
   to_clients_port_->swallow();
   expect_completed();
-  EXPECT_GE(to_workers_port_->connections(), 4) << "both workers had to connect again";
+  EXPECT_GE(to_workers_port_->connections(), 4) << "both workers reconnected";
 }
 
 }  // namespace

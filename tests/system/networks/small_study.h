@@ -16,13 +16,12 @@
 
 namespace oblique::test {
 
-/// The arguments of `oblique` with which a client submits and watches the study, except for the
-/// server.
+/// Arguments of `oblique` to submit and watch the study, without the server's address.
 inline std::vector<std::string> submit_and_watch() {
   return many_points("many", {"submit", "--watch"});
 }
 
-/// Waits until that many points have a row.
+/// Waits until at least that many results are stored.
 inline void wait_for_rows(const Database& database, double at_least) {
   wait_until("rows", [&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -30,7 +29,7 @@ inline void wait_for_rows(const Database& database, double at_least) {
   });
 }
 
-/// Prints the time since then.
+/// Prints the time since `since`.
 inline void print_measured(const std::string& what, std::chrono::steady_clock::time_point since) {
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - since;
   const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
@@ -45,7 +44,7 @@ inline void expect_completed(Process& client, const Database& database,
   wait_for_rows(database, kManyPoints);
   const auto completed = std::chrono::steady_clock::now();
   EXPECT_EQ(client.wait(), 0) << client.err();
-  print_measured("the client knows of the end after", completed);
+  print_measured("the client reports the end after", completed);
   EXPECT_EQ(database.number("SELECT count(DISTINCT point) FROM results WHERE status = 'solved'"),
             kManyPoints);
   EXPECT_EQ(database.rows(), kManyPoints);

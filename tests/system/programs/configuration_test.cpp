@@ -1,4 +1,4 @@
-// What server and worker make of a file, the environment and flags.
+// Settings of server and worker from a file, the environment and flags.
 #include <csignal>
 #include <fstream>
 #include <sstream>
@@ -19,12 +19,12 @@ std::string write(const std::string& file, const std::string& text) {
   return file;
 }
 
-/// Without the comment that names the file.
+/// Removes the first line, a comment that names the file.
 std::string values_of(const std::string& printed) {
   return printed.substr(printed.find('\n'));
 }
 
-TEST(ConfigurationOfProgramsTest, WhatIsPrintedIsAFileThatGivesTheSame) {
+TEST(ConfigurationOfProgramsTest, PrintedSettingsAreAFileThatGivesTheSameSettings) {
   const TemporaryFolder folder;
   for (const auto& [program, variable, flags] :
        {std::tuple{server_program(), "OBLIQUE_SERVER_DB",
@@ -41,7 +41,7 @@ TEST(ConfigurationOfProgramsTest, WhatIsPrintedIsAFileThatGivesTheSame) {
   }
 }
 
-TEST(ConfigurationOfProgramsTest, ServerAndWorkerRunOnFilesAlone) {
+TEST(ConfigurationOfProgramsTest, ServerAndWorkerRunWithSettingsFromFilesAlone) {
   const TemporaryFolder folder;
   const std::string server_file = write(folder.file("server.toml"),
                                         "db = \"in_the_file.db\"\nworker_port = 0\nclient_port = "
@@ -89,7 +89,7 @@ TEST(ConfigurationOfProgramsTest, LimitsOfTheServerArePrintedAndWrongOnesRefused
   }
 }
 
-TEST(ConfigurationOfProgramsTest, HelpEndsWithTheVariableAndTheKeyThatAnOptionMayAlsoBe) {
+TEST(ConfigurationOfProgramsTest, HelpNamesTheVariableOfAnOptionAtItsEnd) {
   const TemporaryFolder folder;
   for (const auto& [program, words] : std::vector<std::pair<std::string, std::string>>{
            {server_program(), "(--log-level: OBLIQUE_SERVER_LOG_LEVEL)"},
@@ -103,7 +103,7 @@ TEST(ConfigurationOfProgramsTest, HelpEndsWithTheVariableAndTheKeyThatAnOptionMa
   }
 }
 
-TEST(ConfigurationOfProgramsTest, AnUnknownKeyEndsBothWithTwoAndTheNearestName) {
+TEST(ConfigurationOfProgramsTest, AnUnknownKeyIsWrongUsageAndTheMessageHasTheNearestName) {
   const TemporaryFolder folder;
   for (const auto& [program, text, named] :
        {std::tuple{server_program(), "worker_prot = 5\n", "worker_port"},
@@ -116,7 +116,7 @@ TEST(ConfigurationOfProgramsTest, AnUnknownKeyEndsBothWithTwoAndTheNearestName) 
   }
 }
 
-TEST(ConfigurationOfProgramsTest, APrivateServiceDoesNotTakeWhatIsMeantForTheMachinesOwn) {
+TEST(ConfigurationOfProgramsTest, TheServiceOfARunIgnoresSettingsOfTheMachinesService) {
   const TemporaryFolder folder;
   Process run(folder, client_program(),
               {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--db",

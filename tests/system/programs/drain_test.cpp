@@ -1,4 +1,4 @@
-// Draining: a server that is stopped while batches run, and its notifications of systemd.
+// Draining: a server that is stopped while batches run, and its notifications to systemd.
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -17,7 +17,7 @@
 namespace oblique::test {
 namespace {
 
-/// Plays the service manager for one program. Excess messages are lost: the system keeps ten.
+/// Acts as service manager for one program. The system queues at most ten messages; more are lost.
 class Manager {
  public:
   explicit Manager(const TemporaryFolder& folder, const std::string& name = "notify")
@@ -36,13 +36,13 @@ class Manager {
   Environment environment() const {
     return {{"NOTIFY_SOCKET", path_}, {"OBLIQUE_SERVER_DRAIN", "600"}};
   }
-  /// With the watchdog.
+  /// Environment of a service with a watchdog.
   Environment watching() const {
     Environment all = environment();
     all["WATCHDOG_USEC"] = "400000";
     return all;
   }
-  /// Whether that message was received so far.
+  /// Whether that message has been received.
   bool received(const std::string& what) {
     std::array<char, 4096> bytes{};
     ssize_t got = 0;

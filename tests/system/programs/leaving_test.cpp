@@ -1,4 +1,4 @@
-// Workers that end while there is work: the rest of it is another's at once, and nobody's loss.
+// Workers that end while there is work: another worker gets the rest at once, and no loss counts.
 #include <csignal>
 #include <optional>
 #include <string>
@@ -31,7 +31,8 @@ std::optional<nlohmann::json> worker_named(const TemporaryFolder& folder, const 
 
 class LeavingProgramTest : public testing::Test {
  protected:
-  /// Points whose fall takes a minute and more, so that a batch is cut before it has any result.
+  /// Submits points whose fall takes more than a minute, so that a batch is given back before it
+  /// has results.
   void submit_slow_points() const {
     const Outcome outcome = run_oblique(
         folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.1:2:40", "--e",
@@ -47,7 +48,7 @@ class LeavingProgramTest : public testing::Test {
   Server server_{folder_, folder_.file("a.db")};
 };
 
-TEST_F(LeavingProgramTest, TheRestOfABatchThatSigtermCutsIsAnotherWorkersAtOnceAndNoLoss) {
+TEST_F(LeavingProgramTest, AfterSigtermAnotherWorkerGetsTheBatchAtOnceAndNoLossCounts) {
   submit_slow_points();
   Worker first(folder_, server_.worker_url(), {"--name", "first", "--threads", "1"});
   wait_until("the first worker works", [&] { return holds_points("first"); });
@@ -62,14 +63,14 @@ TEST_F(LeavingProgramTest, TheRestOfABatchThatSigtermCutsIsAnotherWorkersAtOnceA
   EXPECT_EQ(server_.process().err().find("is lost"), std::string::npos) << server_.process().err();
 }
 
-TEST_F(LeavingProgramTest, AStudyWhoseWorkersComeAndGoIsSolvedOnceAndNothingIsLost) {
+TEST_F(LeavingProgramTest, AStudyIsSolvedWithoutLossesAlthoughWorkersComeAndGo) {
   const Outcome submitted =
       run_oblique(folder_, many_points("study", {"submit", "--server", server_.client_url()}));
   ASSERT_EQ(submitted.exit_code, 0) << submitted.err;
   Worker last(folder_, server_.worker_url(), {"--name", "last"});
   for (int i = 0; i < 3; ++i) {
     Worker first(folder_, server_.worker_url(), {"--name", "first"});
-    wait_until("the first worker has solved something", [&] {
+    wait_until("the first worker has solved points", [&] {
       const auto worker = worker_named(folder_, server_, "first");
       return worker && worker->at("solved_points") > 0;
     });
@@ -83,7 +84,7 @@ TEST_F(LeavingProgramTest, AStudyWhoseWorkersComeAndGoIsSolvedOnceAndNothingIsLo
   EXPECT_EQ(server_.process().err().find("is lost"), std::string::npos) << server_.process().err();
 }
 
-TEST_F(LeavingProgramTest, AWorkerIsGoneByTheTimeThatItIsGiven) {
+TEST_F(LeavingProgramTest, AWorkerExitsBeforeTheTimeOfUntil) {
   submit_slow_points();
   Worker worker(folder_, server_.worker_url(), {"--until", "5s", "--threads", "1"});
   EXPECT_EQ(worker.wait(), 0) << worker.err();
@@ -91,7 +92,7 @@ TEST_F(LeavingProgramTest, AWorkerIsGoneByTheTimeThatItIsGiven) {
   EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
 }
 
-TEST_F(LeavingProgramTest, AWorkerWithoutWorkLeaves) {
+TEST_F(LeavingProgramTest, AnIdleWorkerLeaves) {
   Worker worker(folder_, server_.worker_url(), {"--idle-exit", "3"});
   EXPECT_EQ(worker.wait(), 0) << worker.err();
   EXPECT_NE(worker.err().find("no work for 3 s: leaving (--idle-exit)"), std::string::npos)
@@ -99,7 +100,7 @@ TEST_F(LeavingProgramTest, AWorkerWithoutWorkLeaves) {
   EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
 }
 
-TEST_F(LeavingProgramTest, AWorkerWhoseServerIsNotThereLeavesTooWithOneAndTheServersAddress) {
+TEST_F(LeavingProgramTest, AWorkerThatNeverReachedItsServerExitsWithOneAndNamesTheAddress) {
   for (const std::vector<std::string>& end :
        {std::vector<std::string>{"--idle-exit", "0.3"}, {"--until", "0.0012h"}}) {
     Worker worker(folder_, "tcp://127.0.0.1:1", end);
@@ -110,17 +111,16 @@ TEST_F(LeavingProgramTest, AWorkerWhoseServerIsNotThereLeavesTooWithOneAndTheSer
   }
 }
 
-TEST_F(LeavingProgramTest, AWorkerWithoutServerSaysWhy) {
+TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
-  EXPECT_EQ(refused.wait(), 1);  // after the first attempt, of 3 s, and before the end of the next
+  EXPECT_EQ(refused.wait(),
+            1);  // after the first attempt, which takes 3 s, and before the end of the second
   const std::string said = refused.err();
-  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1 (connections fail at once"),
-            std::string::npos)
-      << said;
+  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << said;
   EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;
 }
 
-TEST(LeavingFlagsTest, NonsenseIsWrongUsage) {
+TEST(LeavingFlagsTest, InvalidValuesAreWrongUsage) {
   const TemporaryFolder folder;
   for (const auto& [flag, value] :
        std::vector<std::pair<std::string, std::string>>{{"--until", "soon"},

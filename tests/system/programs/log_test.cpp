@@ -1,4 +1,4 @@
-// What server and worker write to standard error.
+// Log lines of server and worker.
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -14,10 +14,10 @@
 namespace oblique::test {
 namespace {
 
-/// Far from UTC at any time of the year.
+/// A time zone that differs from UTC in all seasons.
 const Environment kInTokyo{{"TZ", "Asia/Tokyo"}};
 
-/// Every line is of the form that logs have, with the time now in UTC.
+/// Expects that every line has the format of a log line and the present time in UTC.
 void expect_log(const std::string& log, const std::string& program) {
   const std::regex form(R"((\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)\.\d{3}Z )" + program +
                         " (info|warning|error): .*");
@@ -34,7 +34,7 @@ void expect_log(const std::string& log, const std::string& program) {
   EXPECT_GE(count, 2);
 }
 
-TEST(LogTest, HasTheTimeInUtcAsTheDatabaseHasIt) {
+TEST(LogTest, HasTimesInUtc) {
   const TemporaryFolder folder;
   Server server(folder, folder.file("a.db"), kInTokyo);
   Worker worker(folder, server.worker_url(), {}, kInTokyo);
@@ -48,7 +48,7 @@ TEST(LogTest, HasTheTimeInUtcAsTheDatabaseHasIt) {
   expect_log(worker.err(), "oblique-worker");
 }
 
-TEST(LogTest, ShowsTextFromOutsideWithoutSteeringTheTerminalOrForgingALine) {
+TEST(LogTest, EscapesControlCharactersOfTextFromOutside) {
   const TemporaryFolder folder;
   Server server(folder, folder.file("a\x1b[2J\u202e\nforged.db"));
   server.process().send(SIGTERM);

@@ -14,10 +14,10 @@ namespace {
 struct WrongUse {
   std::string program;
   std::vector<std::string> arguments;
-  std::string named;  ///< what the sentence must name
+  std::string named;  ///< text that the message must contain
 };
 
-TEST(UsageTest, WrongFlagsEndWithTwoAndASentenceThatNamesThem) {
+TEST(UsageTest, WrongArgumentsExitWithTwoAndTheMessageNamesThem) {
   const TemporaryFolder folder;
   const std::string client = client_program();
   const std::vector<std::string> point{"--mu", "0.4", "--e", "1", "--db", folder.file("a.db")};
@@ -53,12 +53,12 @@ TEST(UsageTest, WrongFlagsEndWithTwoAndASentenceThatNamesThem) {
     Process process(folder, use.program, use.arguments);
     EXPECT_EQ(process.wait(), 2) << line;
     EXPECT_NE(process.err().find(use.named), std::string::npos)
-        << line << "\nsaid: " << process.err();
+        << line << "\nprinted: " << process.err();
     EXPECT_EQ(process.out(), "") << line;
   }
 }
 
-/// Flags of a program that take a value, as its help lists them.
+/// Flags with a value, from the help of a program.
 std::vector<std::string> flags_with_values(const TemporaryFolder& folder,
                                            const std::string& program) {
   Process help(folder, program, {"--help"});
@@ -97,7 +97,7 @@ TEST(UsageTest, EveryFlagOfServerAndWorkerRefusesAnEmptyValue) {
   }
 }
 
-TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
+TEST(UsageTest, ServerAndWorkerRefuseInvalidValues) {
   const TemporaryFolder folder;
   for (const char* value : {"nan", "-1", "1.5", "65536", "99999999999999999999", "x"}) {
     expect_refused(folder, server_program(), {"--worker-port", value});
@@ -121,7 +121,7 @@ TEST(UsageTest, NumbersOfServerAndWorkerRefuseWhatTheyCannotBe) {
   }
 }
 
-TEST(UsageTest, EveryProgramSaysItsVersionAndTheCommitThatItWasBuiltFrom) {
+TEST(UsageTest, EveryProgramPrintsItsVersionAndCommit) {
   const TemporaryFolder folder;
   const auto version = [](const std::string& name) {
     return std::regex(name + R"( \d+\.\d+\.\d+ \(commit (unknown|[0-9a-f]{12}( with changes)?, )"
@@ -136,7 +136,7 @@ TEST(UsageTest, EveryProgramSaysItsVersionAndTheCommitThatItWasBuiltFrom) {
   }
 }
 
-TEST(UsageTest, HelpIsNoError) {
+TEST(UsageTest, HelpExitsWithZero) {
   const TemporaryFolder folder;
   for (const std::string& program : {client_program(), server_program(), worker_program()}) {
     Process process(folder, program, {"--help"});

@@ -1,4 +1,4 @@
-// `oblique view`: a database, its page and a worker, from a program that a browser could ask.
+// `oblique view`: serves the page of a database and solves traces with a worker of its own.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -20,13 +20,13 @@ using server::RawHttp;
 using server::status_of_answer;
 using testing::HasSubstr;
 
-/// Waits for the address that it prints.
+/// Waits until the address is printed and returns it.
 std::string printed_url(const Process& view) {
   wait_until("the address is printed", [&] { return view.out().ends_with("\n"); });
   return view.out().substr(0, view.out().size() - 1);
 }
 
-/// As a browser does with what it is given.
+/// Opens the printed address and keeps the cookie, as a browser does.
 class Browser {
  public:
   explicit Browser(const std::string& address)
@@ -69,7 +69,7 @@ TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
   wait_until("server and worker have ended", [&] { return processes_of(folder).empty(); });
 }
 
-TEST(View, AFileThatIsNotThereIsNotMade) {
+TEST(View, AMissingFileIsNotCreated) {
   const TemporaryFolder folder;
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"view", "nothing.db"}, {"view", "--db", "nothing.db"}}) {
@@ -79,7 +79,7 @@ TEST(View, AFileThatIsNotThereIsNotMade) {
   }
 }
 
-TEST(View, APortThatIsTakenIsToldByTheFlagOfTheVerb) {
+TEST(View, APortInUseIsReportedWithTheFlagOfTheCommand) {
   const TemporaryFolder folder;
   for (const std::string name : {"first", "second"}) {
     const Outcome made = run_oblique(folder, {"run", "--preset", "paper", "--H", "0.5", "--mu",
@@ -96,7 +96,7 @@ TEST(View, APortThatIsTakenIsToldByTheFlagOfTheVerb) {
   EXPECT_THAT(second.err, testing::Not(HasSubstr("--http")));
 }
 
-TEST(View, AFileThatMayNotBeWrittenToIsToBeCopied) {
+TEST(View, ForAReadOnlyFileTheMessageAdvisesACopy) {
   if (::geteuid() == 0) {
     GTEST_SKIP() << "root may write to every file";
   }

@@ -18,7 +18,7 @@
 namespace oblique::test {
 namespace {
 
-/// The program in PATH or where daemons are; empty: it is not installed.
+/// Path of a program in PATH or sbin; empty if it is not installed.
 std::string installed(const std::string& program) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(std::string(path == nullptr ? "" : path) + ":/usr/sbin:/sbin");
@@ -36,7 +36,7 @@ std::string user() {
   return entry == nullptr ? std::string() : std::string(entry->pw_name);
 }
 
-/// Intervals are short, nodes need not be what they say, and nothing is limited or accounted.
+/// Short intervals; the real size of nodes is not checked; no limits, no accounting.
 constexpr const char* kConfiguration = R"(
 ClusterName=oblique
 SlurmctldHost=localhost(127.0.0.1)
@@ -90,7 +90,7 @@ SlurmCluster::~SlurmCluster() {
   nodes_.clear();
   controller_.reset();
   authentication_.reset();
-  // Jobs and their keepers have other parents, but our variables.
+  // Jobs and slurmstepd have other parents but inherit our environment.
   for (auto left = processes_of(folder_); !left.empty(); left = processes_of(folder_)) {
     for (const pid_t pid : left) {
       kill(pid, SIGKILL);
@@ -117,7 +117,7 @@ void SlurmCluster::write_configuration() const {
   file << kConfiguration << "SlurmUser=" << user() << "\nSlurmdUser=" << user()
        << "\nSlurmctldPort="
        << controller_port_.number()
-       // A job that is queued again waits as long as a credential counts.
+       // A requeued job waits until its credential has expired, so that is short.
        << "\nAuthInfo=cred_expire=5,socket=" << in("munge.socket")
        << "StateSaveLocation=" << in("state") << "SlurmdSpoolDir=" << in("spool-%n")
        << "SlurmctldPidFile=" << in("slurmctld.pid") << "SlurmdPidFile=" << in("slurmd-%n.pid")
@@ -138,7 +138,7 @@ void SlurmCluster::start_authentication() {
     }
   }
   chmod(folder_.file("munge.key").c_str(), 0600);
-  // Forced: the folder is closed to other users, which is no fault here.
+  // --force, because munged objects that other users cannot access the folder.
   authentication_ = started(
       "munged",
       {"--foreground", "--force", "--socket=" + folder_.file("munge.socket"),
@@ -154,14 +154,14 @@ void SlurmCluster::start_authentication() {
 
 std::unique_ptr<Process> SlurmCluster::started(const std::string& program,
                                                const std::vector<std::string>& arguments) const {
-  // Whatever ends us ends them.
+  // The daemons end with this process.
   std::vector<std::string> words{"--pdeathsig", "KILL", installed(program)};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return std::make_unique<Process>(folder_, installed("setpriv"), words, environment());
 }
 
 void SlurmCluster::wait_for_nodes() const {
-  wait_until("Slurm's nodes are there; its log: " + log(), [this] {
+  wait_until("Slurm's nodes are idle; its log: " + log(), [this] {
     const auto asked =
         Process(folder_, installed("sinfo"), {"-h", "-N", "-p", "work", "-o", "%T"}, environment())
             .outcome();
@@ -200,7 +200,7 @@ std::string SlurmCluster::field_of(const std::string& job, const std::string& fi
 void SlurmCluster::wait_for_state(const std::string& job, const std::string& state) const {
   std::string last;
   try {
-    wait_until("", [&] {
+    wait_until("state " + state, [&] {
       last = field_of(job, "JobState");
       usleep(20'000);
       return last == state;
@@ -212,17 +212,17 @@ void SlurmCluster::wait_for_state(const std::string& job, const std::string& sta
 
 void SlurmCluster::begin_now(const std::string& job) const {
   wait_for_state(job, "PENDING");
-  // A node refuses what was started in the second in which it revoked the job, or earlier.
+  // A node refuses a job whose start is not later than the second in which the job was revoked.
   const std::time_t revoked = std::time(nullptr);
   wait_until("the next second", [&] { return std::time(nullptr) > revoked; });
   run("scontrol", {"update", "JobId=" + job, "StartTime=now"});
 }
 
 std::string SlurmCluster::log() const {
-  constexpr std::size_t kMost = 4000;
+  constexpr std::size_t kMax = 4000;
   std::ifstream file(folder_.file("slurmctld.log"));
   const std::string text{std::istreambuf_iterator<char>(file), {}};
-  return text.size() > kMost ? text.substr(text.size() - kMost) : text;
+  return text.size() > kMax ? text.substr(text.size() - kMax) : text;
 }
 
 }  // namespace oblique::test

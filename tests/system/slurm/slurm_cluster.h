@@ -11,37 +11,37 @@
 
 namespace oblique::test {
 
-/// A Slurm of our own: munged, slurmctld and a slurmd for each of two nodes, n1 and n2, which are
-/// this machine under two names and have one core each. Everything of it is in the folder; it
-/// listens on loopback. Partitions: `work` (the default), `grace`, whose preempted jobs have
-/// 30 s, both with requeueing, and `urgent`, which preempts them.
+/// A Slurm cluster on loopback: munged, slurmctld, and a slurmd for each of two nodes, n1 and n2,
+/// which are this machine under two names, with one core each. All its files are in the folder.
+/// Partitions: `work` (the default) and `grace` (30 s for preempted jobs), both with requeueing;
+/// `urgent` preempts them.
 class SlurmCluster {
  public:
-  /// Why it cannot run here; empty: it can.
+  /// Reason why Slurm cannot run here; empty if it can.
   static std::string objection();
 
-  /// All nodes are idle when constructed.
+  /// Starts the daemons and waits until all nodes are idle.
   explicit SlurmCluster(const TemporaryFolder& folder);
-  /// Kills every process that belongs to it, jobs too.
+  /// Kills all daemons and jobs.
   ~SlurmCluster();
   SlurmCluster(const SlurmCluster&) = delete;
   SlurmCluster& operator=(const SlurmCluster&) = delete;
 
-  /// What programs that ask this Slurm find in their environment.
+  /// Environment of programs that use this cluster.
   Environment environment() const;
 
-  /// Runs `srun`, `squeue`, ... to its end, with more variables; what it wrote to standard output,
-  /// without the last line break. Throws std::runtime_error when it fails.
+  /// Runs `srun`, `squeue`, ... with additional variables. Returns its standard output without the
+  /// last line break. Throws std::runtime_error if it fails.
   std::string run(const std::string& program, const std::vector<std::string>& arguments,
                   const Environment& more = {}) const;
 
-  /// A field of `scontrol show job`, as "JobState"; empty where there is none, or no such job.
+  /// A field of `scontrol show job`, such as "JobState"; empty if the field or the job is unknown.
   std::string field_of(const std::string& job, const std::string& field) const;
   void wait_for_state(const std::string& job, const std::string& state) const;
-  /// A job that waits until a time begins now.
+  /// Sets the start time of a pending job to now.
   void begin_now(const std::string& job) const;
 
-  /// The end of the controller's log, for failures.
+  /// The last lines of the controller's log.
   std::string log() const;
 
  private:

@@ -1,5 +1,5 @@
-// Studies that are solved by workers which a real Slurm starts: through deploy/slurm's script, by
-// `oblique autoscale`, and by the recipe of a campaign.
+// A real Slurm starts workers: by the script of deploy/slurm, by `oblique autoscale`, and by
+// deploy/examples/campaign.sh.
 #include <unistd.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@
 namespace oblique::test {
 namespace {
 
-/// A server with keys, and a Slurm to run its workers. Skipped where Slurm is not installed.
+/// A server with keys, and a Slurm for its workers. Skipped if Slurm is not installed.
 class SlurmTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -39,7 +39,7 @@ class SlurmTest : public ::testing::Test {
 
   void TearDown() override {
     if (HasFailure() && cluster_) {
-      std::cerr << "The server said:\n" << server_->process().err();
+      std::cerr << "Log of the server:\n" << server_->process().err();
       for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
         if (entry.path().extension() == ".log") {
           std::ifstream log(entry.path());
@@ -49,7 +49,7 @@ class SlurmTest : public ::testing::Test {
     }
   }
 
-  /// The key file of a server, client, reader or worker.
+  /// Key file of a role: server, client, reader or worker.
   std::string key_of(const std::string& role) const {
     return folder_.file("keys/" + role + ".key");
   }
@@ -61,7 +61,7 @@ class SlurmTest : public ::testing::Test {
             {"OBLIQUE_WORKER_PROGRAM", worker_program()}};
   }
 
-  /// Submits the batch script with more arguments and variables; the job's id.
+  /// Submits the batch script with additional arguments and variables. Returns the id of the job.
   std::string submit_workers(std::vector<std::string> arguments = {},
                              const Environment& more = {}) const {
     Environment all = more;
@@ -71,7 +71,7 @@ class SlurmTest : public ::testing::Test {
     return cluster_->run("sbatch", arguments, all);
   }
 
-  /// Waits until the server has welcomed so many workers since it began.
+  /// Waits until the server has welcomed `count` workers since its start.
   void wait_for_workers(int count) {
     wait_until("workers join", [&] {
       const std::string log = server_->process().err();
@@ -83,7 +83,7 @@ class SlurmTest : public ::testing::Test {
     });
   }
 
-  /// One study more of `kPoints` points.
+  /// Submits another study of `kPoints` points.
   void submit_study() {
     const std::string side = std::to_string(kSide);
     const auto submitted = run_oblique(
@@ -95,7 +95,7 @@ class SlurmTest : public ::testing::Test {
 
   double rows() const { return Database(database_).rows(); }
 
-  /// Waits until workers of the job have delivered so many points of the last study.
+  /// Waits until workers of the job have delivered `points` points of the last study.
   void wait_until_solved_by(const std::string& job, int points) const {
     wait_until("job " + job + " solves points", [&] {
       return Database(database_).number(
@@ -109,7 +109,7 @@ class SlurmTest : public ::testing::Test {
     wait_until("every point has a row", [this] { return rows() >= studies_ * kPoints; });
   }
 
-  /// Nothing is lost, and nothing is counted against a point or a worker.
+  /// Expects one solved row for each point and no lost worker.
   void expect_each_point_once() {
     const Database database(database_);
     EXPECT_EQ(database.rows(), studies_ * kPoints);
@@ -119,13 +119,13 @@ class SlurmTest : public ::testing::Test {
   }
 
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-  static constexpr int kSide = 25;  ///< sanitized programs are some twenty times slower
+  static constexpr int kSide = 25;  ///< sanitizers make programs about twenty times slower
 #else
   static constexpr int kSide = 110;
 #endif
   static constexpr double kPoints = kSide * kSide;
 
-  /// Of jobs: those of a test that was killed end by themselves.
+  /// Time limit of jobs [min], so that the jobs of a killed test end.
   static constexpr const char* kTimeLimit = "--time=5";
 
   TemporaryFolder folder_;
@@ -137,18 +137,18 @@ class SlurmTest : public ::testing::Test {
 
 using SlurmWorkersTest = SlurmTest;
 
-TEST_F(SlurmWorkersTest, AStudyIsCompletedThoughOneJobIsCancelledAndOneIsQueuedAgain) {
+TEST_F(SlurmWorkersTest, AStudyCompletesAlthoughOneJobIsCancelledAndOneIsRequeued) {
   const auto cancelled = submit_workers();
-  const auto queued_again = submit_workers();
+  const auto requeued = submit_workers();
   wait_for_workers(2);
   submit_study();
   wait_until_solved_by(cancelled, 100);
-  wait_until_solved_by(queued_again, 100);
+  wait_until_solved_by(requeued, 100);
   cluster_->run("scancel", {cancelled});
-  cluster_->run("scontrol", {"requeue", queued_again});
-  cluster_->begin_now(queued_again);
+  cluster_->run("scontrol", {"requeue", requeued});
+  cluster_->begin_now(requeued);
   wait_until_done();
-  EXPECT_EQ(cluster_->field_of(queued_again, "Restarts"), "1");
+  EXPECT_EQ(cluster_->field_of(requeued, "Restarts"), "1");
   expect_each_point_once();
 }
 
@@ -164,9 +164,9 @@ TEST_F(SlurmWorkersTest, OneJobRunsAWorkerOnEachOfItsNodesUntilThereIsNoMoreWork
   EXPECT_EQ(cluster_->field_of(job, "ExitCode"), "0:0");
 }
 
-TEST_F(SlurmWorkersTest, WorkersHaveLeftInOrderBeforeTheirTimeIsOver) {
-  // A minute is the shortest limit that Slurm has: they leave 53 s before, with work at hand unless
-  // this machine is so slow that they begin later.
+TEST_F(SlurmWorkersTest, WorkersLeaveInOrderBeforeTheirTimeLimit) {
+  // One minute is the shortest limit of Slurm. The workers leave 53 s before it, while there is
+  // work unless this machine is so slow that they start later.
   const auto job = submit_workers({"--time=1"}, {{"OBLIQUE_WORKER_LEAVE_BEFORE", "53"}});
   submit_study();
   cluster_->wait_for_state(job, "COMPLETED");  // not TIMEOUT
@@ -176,7 +176,7 @@ TEST_F(SlurmWorkersTest, WorkersHaveLeftInOrderBeforeTheirTimeIsOver) {
   expect_each_point_once();
 }
 
-TEST_F(SlurmWorkersTest, PreemptedWorkersGiveBackTheirBatchesAndAreQueuedAgain) {
+TEST_F(SlurmWorkersTest, PreemptedWorkersGiveBackTheirBatchesAndAreRequeued) {
   for (const char* partition : {"work", "grace"}) {
     const auto job = submit_workers({"--nodes=2", std::string("--partition=") + partition});
     submit_study();
@@ -227,7 +227,7 @@ class SlurmAutoscaleTest : public SlurmTest {
   }
 };
 
-TEST_F(SlurmAutoscaleTest, JobsComeUpForAStudyAndEndByThemselvesWhenItIsDone) {
+TEST_F(SlurmAutoscaleTest, JobsStartForAStudyAndEndByThemselvesWhenItIsDone) {
   auto variables = environment();
   variables["OBLIQUE_WORKER_IDLE_EXIT"] = "3";
   const auto half = std::to_string(static_cast<int>(kPoints / 2) + 1);
@@ -243,7 +243,7 @@ TEST_F(SlurmAutoscaleTest, JobsComeUpForAStudyAndEndByThemselvesWhenItIsDone) {
   EXPECT_NE(scaling.err().find("submitting 2 jobs"), std::string::npos) << scaling.err();
 }
 
-TEST_F(SlurmAutoscaleTest, OneThatIsStoppedLeavesItsJobsAndTheNextOneCountsThem) {
+TEST_F(SlurmAutoscaleTest, AfterItIsStoppedItsJobsContinueAndTheNextAutoscalerCountsThem) {
   {
     Process scaling(folder_, client_program(), autoscale({"--min", "2", "--max", "2"}),
                     environment());
@@ -258,7 +258,7 @@ TEST_F(SlurmAutoscaleTest, OneThatIsStoppedLeavesItsJobsAndTheNextOneCountsThem)
   EXPECT_EQ(listed_jobs(), 2U);
 }
 
-/// With oblique installed as its user has it.
+/// With oblique installed in a folder, as for a user.
 class SlurmCampaignTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -298,7 +298,7 @@ class SlurmCampaignTest : public ::testing::Test {
   std::optional<SlurmCluster> cluster_;
 };
 
-TEST_F(SlurmCampaignTest, JobsSolveAStudyItsResultsAreInAFileAndNothingIsLeftRunning) {
+TEST_F(SlurmCampaignTest, JobsSolveAStudyWriteItsResultsToAFileAndLeaveNothingRunning) {
   std::ofstream(folder_.file("sticking.toml"))
       << "name = \"sticking\"\n[[block]]\nH = 1.0\nmu = { from = 0.5, to = 2.0, count = 40 }\n"
          "e = [0.5, 1.0]\n";
@@ -312,7 +312,7 @@ TEST_F(SlurmCampaignTest, JobsSolveAStudyItsResultsAreInAFileAndNothingIsLeftRun
                 .number("SELECT count(*) FROM workers WHERE name LIKE 'slurm-%'"),
             1.0);
   EXPECT_EQ(cluster_->run("squeue", {"--noheader"}), "");
-  // Again: nothing is left to solve, and no job is needed.
+  // The second time nothing is left to solve, and no job is needed.
   Process again(folder_, "/bin/sh", {"campaign.sh", "sticking.toml", "1"}, environment());
   EXPECT_EQ(again.wait(), 0) << again.err();
   EXPECT_NE(again.out().find("80 results in sticking.csv\n"), std::string::npos);

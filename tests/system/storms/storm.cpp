@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBetweenCuts{150};
 constexpr int kShortestLife_ms = 20;
 constexpr int kLongestLife_ms = 300;
-constexpr std::uint32_t kGreed = 1000;  ///< number of batches that a vanishing peer requests
+constexpr std::uint32_t kRequestedBatches = 1000;
 
 const std::vector<std::string> kOneThread{"--threads", "1"};
 
@@ -50,13 +50,13 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
   hello.mutable_hello()->set_threads(1);
   hello.mutable_hello()->set_process_id("vanishing " + std::to_string(number));
   protocol::WorkerMessage credit;
-  credit.mutable_credit()->set_batches(kGreed);
+  credit.mutable_credit()->set_batches(kRequestedBatches);
   for (const auto* message : {&hello, &credit}) {
     static_cast<void>(
         socket.send(zmq::buffer(protocol::encode(*message)), zmq::send_flags::dontwait));
   }
-  constexpr int kMostMessages = 4;  // Welcome, study, two batches
-  for (int i = 0; i < kMostMessages; ++i) {
+  constexpr int kMaxMessages = 4;  // Welcome, study, two batches
+  for (int i = 0; i < kMaxMessages; ++i) {
     zmq::message_t frame;
     protocol::ServerToWorker message;
     if (!socket.recv(frame) || !protocol::decode(frame.to_string_view(), message)) {
@@ -104,14 +104,14 @@ void Storm::kill_workers(const std::stop_token& stop) {
     std::this_thread::sleep_for(milliseconds(kShortestLife_ms + life_ms));
     worker.send(SIGKILL);
     worker.wait();
-    ++blows_;
+    ++faults_;
   }
 }
 
 void Storm::let_peers_vanish(const std::stop_token& stop) {
   const std::string solver_version = worker_solver_version();
   for (int number = 1; !stop.stop_requested(); ++number) {
-    blows_ += vanish_with_points(server_url_, solver_version, number) ? 1 : 0;
+    faults_ += vanish_with_points(server_url_, solver_version, number) ? 1 : 0;
     std::this_thread::sleep_for(milliseconds(10));
   }
 }

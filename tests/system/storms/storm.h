@@ -29,7 +29,7 @@ class Storm {
   Storm& operator=(const Storm&) = delete;
 
   /// Number of killed workers, cut connections, or peers that disappeared with points.
-  int blows() const { return proxy_ ? proxy_->cuts() : blows_.load(); }
+  int faults() const { return proxy_ ? proxy_->cuts() : faults_.load(); }
   /// Ends the storm and all its processes.
   void end();
 
@@ -40,7 +40,7 @@ class Storm {
   const TemporaryFolder& folder_;
   std::string server_url_;
   Environment environment_;
-  std::atomic<int> blows_ = 0;
+  std::atomic<int> faults_ = 0;
   std::unique_ptr<TcpProxy> proxy_;
   std::unique_ptr<Worker> behind_proxy_;
   std::jthread thread_;  ///< last: it uses the other members

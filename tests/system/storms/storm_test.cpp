@@ -1,4 +1,4 @@
-// Workers are lost again and again while one is sound: every point is solved.
+// Every point is solved although workers are lost repeatedly, as long as one worker stays.
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,18 +15,18 @@ namespace {
 
 class StormTest : public ::testing::Test {
  protected:
-  /// One worker solves studies of many points, some left out by a filter, during such a storm,
-  /// until that many faults have happened.
-  void weather(StormKind kind, int blows, const std::string& filter = {}) {
+  /// During the storm one undisturbed worker solves studies of many points, of which `filter`
+  /// leaves out some, until at least `faults` faults have happened.
+  void solve_during(StormKind kind, int faults, const std::string& filter = {}) {
     Server server(folder_, folder_.file("many.db"));
     Storm storm(kind, folder_, server.worker_url());
     std::optional<Worker> sound;
     int studies = 0;
-    while (studies == 0 || storm.blows() < blows) {
+    while (studies == 0 || storm.faults() < faults) {
       submit(server, "many " + std::to_string(++studies), filter);
       if (kind == StormKind::kVanishingPeers) {
-        // They had time to disturb before the sound worker joined.
-        wait_until("the first peers vanished", [&] { return storm.blows() >= blows; });
+        // The undisturbed worker joins after the first peers have vanished.
+        wait_until("the first peers vanished", [&] { return storm.faults() >= faults; });
       }
       if (!sound) {
         sound.emplace(folder_, server.worker_url(), std::vector<std::string>{"--threads", "1"});
@@ -61,15 +61,15 @@ class StormTest : public ::testing::Test {
 };
 
 TEST_F(StormTest, RepeatedKillsOfAWorkerFailNoPoint) {
-  weather(StormKind::kKilledWorkers, 5);
+  solve_during(StormKind::kKilledWorkers, 5);
 }
 
 TEST_F(StormTest, RepeatedCutsOfAConnectionFailNoPoint) {
-  weather(StormKind::kCutConnections, 5);
+  solve_during(StormKind::kCutConnections, 5);
 }
 
 TEST_F(StormTest, PeersThatTakeBatchesAndDisappearFailNoPoint) {
-  weather(StormKind::kVanishingPeers, 2, "sin(1000 * mu) > -0.9");
+  solve_during(StormKind::kVanishingPeers, 2, "sin(1000 * mu) > -0.9");
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace oblique::solver {
 namespace {
 
-TEST(ParallelFor, EachNumberIsGivenOnceOnAnyNumberOfThreads) {
+TEST(ParallelFor, EachIndexIsPassedOnceOnAnyNumberOfThreads) {
   for (const std::size_t threads : {0U, 1U, 3U, 50U}) {
     std::vector<std::atomic<int>> calls(20);
     parallel_for(calls.size(), threads, [&](std::size_t i) { ++calls.at(i); });
@@ -26,7 +26,7 @@ TEST(ParallelFor, TasksRunAtTheSameTime) {
   parallel_for(3, 3, [&](std::size_t) { all_begun.arrive_and_wait(); });
 }
 
-TEST(ParallelFor, TheFirstExceptionIsThrownAndNoFurtherTaskBegins) {
+TEST(ParallelFor, TheFirstExceptionIsRethrownAndNoFurtherTaskBegins) {
   std::atomic<int> begun = 0;
   std::latch both_begun(2);
   EXPECT_THROW(parallel_for(1000, 2,

@@ -25,13 +25,13 @@ TEST(StepChoice, LimitsAreThoseOfTheStiffestSpringOfEachPhase) {
   const double k = model.k_N_m;
   EXPECT_DOUBLE_EQ(limits(1.25, 0.5).compression_s, limit_s(chain, k));
   EXPECT_DOUBLE_EQ(limits(1.25, 0.5).restitution_s, limit_s(chain, 4.0 * k));
-  // A tangential spring harder than the normal one.
+  // A tangential spring stiffer than the normal one.
   EXPECT_DOUBLE_EQ(limits(0.125, 0.5).compression_s, limit_s(chain, 8.0 * k));
   EXPECT_DOUBLE_EQ(limits(0.125, 0.5).restitution_s, limit_s(chain, 8.0 * k));
   EXPECT_DOUBLE_EQ(limits(0.125, 0.25).restitution_s, limit_s(chain, 16.0 * k));
 }
 
-TEST(StepChoice, TheStepChosenMakesTheErrorModelTheTolerance) {
+TEST(StepChoice, TheErrorModelGivesTheToleranceAtTheChosenStep) {
   ModelParameters model = preset("paper");
   for (const double tolerance : {1e-5, 1e-7}) {
     model.tolerance = tolerance;
@@ -56,7 +56,7 @@ TEST(StepChoice, StepsShrinkWithFastRestitutionInBothPhases) {
   EXPECT_DOUBLE_EQ(steps.contact(0.001).compression_s, usual_s / 8.0);
 }
 
-TEST(StepChoice, ChosenStepsStayBelowTheLimitWhateverTheModel) {
+TEST(StepChoice, ChosenStepsAreStableForAllModels) {
   const auto expect_below = [](const ModelParameters& model) {
     const Chain chain(model);
     const StepChoice steps(chain, model);
@@ -87,10 +87,10 @@ TEST(StepChoice, ChosenStepsStayBelowTheLimitWhateverTheModel) {
   EXPECT_DOUBLE_EQ(
       StepChoice(chain, heavy).contact(1.0).compression_s,
       StepChoice::kLongestFraction * StepChoice(chain, heavy).contact_limits(1.0).compression_s)
-      << "a tip so heavy is slow: stability alone bounds the step";
+      << "a heavy tip is slow, so that only stability limits the step";
 }
 
-TEST(StepChoice, AFallIsAsExactAsTheContactButNotLessExactThanByDefault) {
+TEST(StepChoice, AFallIsAsAccurateAsTheContactAndAtLeastAsByDefault) {
   for (const auto integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
     ModelParameters model = preset("paper");
     model.integrator = integrator;
@@ -115,7 +115,7 @@ TEST(StepChoice, GeneralizedAlphaFollowsTheToleranceByItsOrder) {
   EXPECT_DOUBLE_EQ(StepChoice(chain, model).contact(1.0).compression_s, 0.1 * usual_s);
 }
 
-TEST(StepChoice, StepAskedForIsTakenUpToTheLimitAndRefusedAbove) {
+TEST(StepChoice, AGivenStepIsUsedUpToTheLimitAndRefusedAboveIt) {
   ModelParameters model = preset("paper");
   const Chain chain(model);
   const double limit = StepChoice(chain, model).contact_limits(0.5).restitution_s;
@@ -131,7 +131,7 @@ TEST(StepChoice, StepAskedForIsTakenUpToTheLimitAndRefusedAbove) {
   EXPECT_EQ(StepChoice(chain, model).fall_s(), model.dt_fall_s);
 }
 
-TEST(StepChoice, RestitutionTooSmallForDoublePrecisionIsAnErrorNotAWrongNumber) {
+TEST(StepChoice, ARestitutionTooSmallForDoublePrecisionIsAnError) {
   const ModelParameters model = preset("paper");
   const Chain chain(model);
   const StepChoice steps(chain, model);

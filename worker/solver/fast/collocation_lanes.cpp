@@ -10,7 +10,7 @@ namespace oblique::solver {
 namespace {
 
 /// Iterations after which the step is too long.
-constexpr int kMostIterations = 10;
+constexpr int kMaxIterations = 10;
 /// Corrections that no longer shrink are rounding when they are below this many errors allowed.
 constexpr double kRoundingErrors = 1000.0;
 
@@ -99,7 +99,7 @@ bool CollocationLanes::iterate(int iteration) {
         iteration > 2 && ratio > 0.1 && size_m <= kRoundingErrors * step.error_m;
     step.converged =
         size_m <= step.error_m || is_rounding || (ratio < 0.5 && size_m * ratio <= step.error_m);
-    const bool is_hopeless = !std::isfinite(size_m) || ratio > 2.0 || iteration >= kMostIterations;
+    const bool is_hopeless = !std::isfinite(size_m) || ratio > 2.0 || iteration >= kMaxIterations;
     correction_m_[lane] = size_m;
     const bool goes_on = !step.converged && !is_hopeless;
     arrays_.active[lane] = goes_on ? 1.0 : 0.0;

@@ -15,9 +15,6 @@ class CollocationLanes {
  public:
   /// Lanes for chains of the shape of `chain`. Each holds `chain` at rest.
   CollocationLanes(const LaneKernel& kernel, const Chain& chain);
-  CollocationLanes(const CollocationLanes&) = delete;
-  CollocationLanes& operator=(const CollocationLanes&) = delete;
-  ~CollocationLanes() = default;
 
   std::size_t lanes() const { return memory_.lanes(); }
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "worker/solver/fast/collocation_kernel.h"
+#include "worker/solver/fast/front_kernel.h"
 #include "worker/solver/fast/kernels.h"
 #include "worker/solver/fast/lane_pack.h"
 #include "worker/solver/reference/pefrl.h"
@@ -52,6 +52,209 @@ template <class Pack>
 template <class Pack>
 [[gnu::flatten]] void step_chains(const LaneTables& chains, const PefrlArrays& arrays) {
   step_packs<Pack>(chains.of<Pack>(), arrays);
+}
+
+/// One step of Gauss collocation for the lanes of `Pack`, a LanePack; compiled once for each
+/// instruction set. Unknowns are the accelerations of all stages, found by a simplified Newton
+/// method: one tangent a step, at the middle of what is predicted (collocation.md).
+template <class Pack>
+class CollocationStep {
+ public:
+  CollocationStep(const GaussCollocation& rule, const CollocationArrays& arrays)
+      : rule_(rule),
+        arrays_(arrays),
+        chain_(arrays.chain.of<Pack>()),
+        size_(2 * chain_.rows),
+        h_s_(*packs(arrays.h_s)),
+        mass_kg_(packs(arrays.mass_kg)),
+        stage_q_(packs(arrays.stage_q)),
+        stage_a_(packs(arrays.stage_a)) {}
+
+  /// Predicts with the mean acceleration of the step before, and factors M + h^2 lambda^2 K.
+  /// Writes the diagonal of M, too.
+  inline void prepare() const;
+  /// One iteration in the lanes that are active; writes the squared size of their corrections.
+  inline void iterate() const;
+  /// Writes the state at the end of the step, and the squared size of what was hard to resolve.
+  inline void finish() const;
+
+ private:
+  using Vector = PlanarVector<Pack>;
+  static constexpr std::size_t kStages = GaussCollocation::kStages;
+  static constexpr std::size_t kPairs = GaussCollocation::kPairs;
+
+  /// One entry of the vectors of all stages.
+  struct Stages {
+    inline Stages(const Pack* first, std::size_t stride) {
+      for (std::size_t stage = 0; stage < kStages; ++stage) {
+        entry[stage] = first[stage * stride];
+      }
+    }
+    inline Pack sum(const double (&weight)[kStages]) const {
+      Pack sum = weight[0] * entry[0];
+      for (std::size_t stage = 1; stage < kStages; ++stage) {
+        sum = plus_product(sum, weight[stage], entry[stage]);
+      }
+      return sum;
+    }
+    Pack entry[kStages];
+  };
+
+  static Pack* packs(double* numbers) { return reinterpret_cast<Pack*>(numbers); }
+  Complex<Pack>* factors() const { return reinterpret_cast<Complex<Pack>*>(arrays_.factors); }
+
+  /// visit(link, rows of the element) for each element along the chain.
+  template <class Visit>
+  inline void for_each_element(const Visit& visit) const {
+    std::size_t row = 0;
+    for (std::size_t link = 0; link < chain_.links; ++link) {
+      for (std::size_t e = 1; e <= chain_.elements_per_link; ++e) {
+        const bool ends_at_joint = e == chain_.elements_per_link && link + 1 < chain_.links;
+        const ElementRows at = rows_of_element(row, ends_at_joint);
+        visit(link, at);
+        row = at.p_j;
+      }
+    }
+  }
+  inline void put_residual(const Pack* q, const Pack* a, Pack* residual) const;
+
+  const GaussCollocation& rule_;
+  const CollocationArrays& arrays_;
+  ChainTables<Pack> chain_;
+  std::size_t size_;  ///< entries of a vector
+  Pack h_s_;
+  Pack* mass_kg_;
+  Pack* stage_q_;
+  Pack* stage_a_;
+};
+
+template <class Pack>
+[[gnu::flatten]] void CollocationStep<Pack>::prepare() const {
+  const Pack squared_h = h_s_ * h_s_;
+  const Pack* q = packs(arrays_.state);
+  const Pack* v = q + size_;
+  const Pack* mean = v + size_;
+  for (std::size_t i = 0; i < size_; ++i) {
+    const Pack by_v = h_s_ * v[i];
+    const Pack by_mean = 0.5 * (squared_h * mean[i]);
+    for (std::size_t stage = 0; stage < kStages; ++stage) {
+      const double c = rule_.node[stage];
+      stage_a_[stage * size_ + i] = mean[i];
+      stage_q_[stage * size_ + i] = q[i] + plus_product(c * by_v, c * c, by_mean);
+    }
+  }
+  const auto middle = [&](std::size_t row) {
+    return 0.5 * (pair_at(stage_q_ + (kStages - 1) / 2 * size_, row) +
+                  pair_at(stage_q_ + kStages / 2 * size_, row));
+  };
+  auto* const tangents = reinterpret_cast<TangentBlocks<Pack>*>(arrays_.tangents);
+  auto* tangent = tangents;
+  for (std::size_t row = 0; row < chain_.rows; ++row) {
+    mass_kg_[row] = {};
+  }
+  for_each_element([&](std::size_t link, const ElementRows& at) {
+    const ElementConstants<Pack>& constants = chain_.link[link];
+    *tangent++ =
+        element_tangent(middle(at.p_i), middle(at.s_i), middle(at.p_j), middle(at.s_j), constants);
+    mass_kg_[at.p_i] += constants.m_pp;
+    mass_kg_[at.s_i] += constants.m_ss;
+    mass_kg_[at.p_j] += constants.m_pp;
+    mass_kg_[at.s_j] += constants.m_ss;
+  });
+  mass_kg_[chain_.tip_row] += *chain_.tip_mass_kg;
+  for (std::size_t pair = 0; pair < kPairs; ++pair) {
+    factor_fronts(
+        chain_, tangents,
+        Complex<Pack>{rule_.squared_re[pair] * squared_h, rule_.squared_im[pair] * squared_h},
+        factors() + pair * chain_factors(chain_.links, chain_.elements_per_link));
+  }
+}
+
+/// Q_gravity - dU/dq - M a of a stage.
+template <class Pack>
+void CollocationStep<Pack>::put_residual(const Pack* q, const Pack* a, Pack* residual) const {
+  for (std::size_t row = 0; row < chain_.rows; ++row) {
+    put_pair(residual, row, Vector{{}, chain_.weight_N[row]});
+  }
+  for_each_element([&](std::size_t link, const ElementRows& at) {
+    const ElementConstants<Pack>& m = chain_.link[link];
+    const ElasticForces<Pack> f = elastic_forces(pair_at(q, at.p_i), pair_at(q, at.s_i),
+                                                 pair_at(q, at.p_j), pair_at(q, at.s_j), m);
+    const Vector ap_i = pair_at(a, at.p_i);
+    const Vector as_i = pair_at(a, at.s_i);
+    const Vector ap_j = pair_at(a, at.p_j);
+    const Vector as_j = pair_at(a, at.s_j);
+    const auto add = [&](std::size_t row, const Vector& force, const Pack& kg_p_i,
+                         const Pack& kg_s_i, const Pack& kg_p_j, const Pack& less_kg_s_j) {
+      Vector sum = pair_at(residual, row) + force;
+      sum = less_product(less_product(sum, kg_p_i, ap_i), kg_s_i, as_i);
+      put_pair(residual, row, plus_product(less_product(sum, kg_p_j, ap_j), less_kg_s_j, as_j));
+    };
+    add(at.p_i, f.pull, m.m_pp, m.m_ps, m.n_pp, m.n_ps);
+    add(at.s_i, f.by_d - f.by_t, m.m_ps, m.m_ss, m.n_ps, m.n_ss);
+    add(at.p_j, Vector{} - f.pull, m.n_pp, m.n_ps, m.m_pp, m.m_ps);
+    Vector on_s_j = pair_at(residual, at.s_j) - (f.by_d + f.by_t);
+    on_s_j = plus_product(plus_product(on_s_j, m.n_ps, ap_i), m.n_ss, as_i);
+    put_pair(residual, at.s_j, less_product(plus_product(on_s_j, m.m_ps, ap_j), m.m_ss, as_j));
+  });
+  const std::size_t tip = chain_.tip_row;
+  put_pair(residual, tip,
+           less_product(pair_at(residual, tip), *chain_.tip_mass_kg, pair_at(a, tip)));
+  put_pair(residual, 0, Vector{});
+}
+
+template <class Pack>
+[[gnu::flatten]] void CollocationStep<Pack>::iterate() const {
+  Pack* const work = packs(arrays_.work);
+  for (std::size_t stage = 0; stage < kStages; ++stage) {
+    const std::size_t first = stage * size_;
+    put_residual(stage_q_ + first, stage_a_ + first, work + first);
+  }
+  for (std::size_t i = 0; i < size_; ++i) {
+    const Stages residual(work + i, size_);
+    for (std::size_t k = 0; k < kStages; ++k) {
+      work[k * size_ + i] = residual.sum(rule_.into[k]);
+    }
+  }
+  solve_fronts<kPairs>(chain_, factors(), work);
+  const Pack active = *packs(arrays_.active);
+  const Pack squared_h = h_s_ * h_s_;
+  Pack squares{};
+  for (std::size_t i = 0; i < size_; ++i) {
+    Stages w(work + i, size_);
+    for (Pack& entry : w.entry) {
+      entry = active * entry;
+    }
+    Pack sum{};
+    for (std::size_t stage = 0; stage < kStages; ++stage) {
+      const Pack by_q = squared_h * w.sum(rule_.shift[stage]);
+      stage_a_[stage * size_ + i] += w.sum(rule_.back[stage]);
+      stage_q_[stage * size_ + i] += by_q;
+      sum = plus_product(sum, by_q, by_q);
+    }
+    squares = plus_product(squares, mass_kg_[i / 2], sum);
+  }
+  *packs(arrays_.squares) = squares;
+}
+
+template <class Pack>
+[[gnu::flatten]] void CollocationStep<Pack>::finish() const {
+  const Pack* state = packs(arrays_.state);
+  Pack* next = packs(arrays_.next);
+  Pack squares{};
+  for (std::size_t i = 0; i < size_; ++i) {
+    const Stages a(stage_a_ + i, size_);
+    const Pack mean = a.sum(rule_.weight);
+    const Pack v = state[size_ + i];
+    next[2 * size_ + i] = mean;
+    next[size_ + i] = plus_product(v, h_s_, mean);
+    next[i] = plus_product(state[i], h_s_, plus_product(v, h_s_, a.sum(rule_.position_weight)));
+    const Pack highest = a.sum(rule_.legendre[kStages - 1]);
+    const Pack second = a.sum(rule_.legendre[kStages - 2]);
+    squares =
+        plus_product(squares, mass_kg_[i / 2], plus_product(highest * highest, second, second));
+  }
+  *packs(arrays_.squares) = (h_s_ * h_s_) * squares;
 }
 
 /// Compiled in each kernel_*.cpp with the flags of its instruction set.

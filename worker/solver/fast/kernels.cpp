@@ -1,8 +1,5 @@
 #include "worker/solver/fast/kernels.h"
 
-#include <algorithm>
-#include <cstring>
-
 namespace oblique::solver {
 namespace {
 
@@ -43,7 +40,8 @@ std::span<const LaneKernel> runnable_lane_kernels() {
 
 double* LaneMemory::zeros(std::size_t entries) {
   constexpr std::size_t kLine = sizeof(Line) / sizeof(double);
-  return arrays_.emplace_back((entries * lanes_ + kLine - 1) / kLine).front().numbers;
+  const std::size_t lines = (entries * lanes_ + kLine - 1) / kLine;
+  return arrays_.emplace_back(std::make_unique<Line[]>(lines))[0].numbers;
 }
 
 void LaneMemory::write(double* array, std::size_t lane, std::span<const double> values) const {
@@ -86,18 +84,6 @@ void LaneMemory::copy(const double* from, double* to, std::size_t lane, std::siz
 
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b) {
   return a.links == b.links && a.elements_per_link == b.elements_per_link;
-}
-
-bool are_equal(const ChainTables<double>& a, const ChainTables<double>& b) {
-  if (!have_one_shape(a, b)) {
-    return false;
-  }
-  const auto of_a = constants_of(a);
-  const auto of_b = constants_of(b);
-  return std::ranges::equal(of_a, of_b, [](const auto& one, const auto& other) {
-    return one.data() == other.data() ||
-           std::memcmp(one.data(), other.data(), one.size_bytes()) == 0;
-  });
 }
 
 }  // namespace oblique::solver

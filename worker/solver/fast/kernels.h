@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -11,8 +12,7 @@
 
 namespace oblique::solver {
 
-/// ChainTables of chains side by side, each constant one number a lane, without the type of packs:
-/// kernels are called through pointers to functions.
+/// ChainTables of chains side by side, each constant one number a lane.
 struct LaneTables {
   std::size_t rows;
   std::size_t tip_row;
@@ -37,7 +37,7 @@ struct LaneTables {
 };
 
 /// Owns arrays with one number a lane in each entry: entry i of a lane is element
-/// [i * lanes + lane]. Arrays are aligned for the widest vectors.
+/// [i * lanes + lane]. Arrays are aligned for the widest vectors. Not copied: others point to them.
 class LaneMemory {
  public:
   explicit LaneMemory(std::size_t lanes) : lanes_(lanes) {}
@@ -61,7 +61,7 @@ class LaneMemory {
     double numbers[8];
   };
   std::size_t lanes_;
-  std::vector<std::vector<Line>> arrays_;
+  std::vector<std::unique_ptr<Line[]>> arrays_;
 };
 
 /// Arrays of a LaneMemory for one PEFRL step. A vector has 2 rows entries.
@@ -92,12 +92,11 @@ struct CollocationArrays {
   double* squares;
 };
 
-/// The steps compiled for one instruction set. A lane gets the same bits whatever the others hold.
+/// The steps compiled for one instruction set.
 struct LaneKernel {
   std::string_view name;  ///< of the instruction set
   std::size_t lanes;
-  /// PEFRL, of lanes that share a chain's constants, and of lanes with chains of their own. A lane
-  /// gets the same bits from both.
+  /// PEFRL, of lanes that share a chain's constants, and of lanes with chains of their own.
   void (*step_one_chain)(const ChainTables<double>& chain, const PefrlArrays& arrays);
   void (*step_chains)(const LaneTables& chains, const PefrlArrays& arrays);
   /// Collocation: predicts, and factors the matrices of Newton's method.
@@ -121,7 +120,5 @@ LaneKernel avx512_kernel();  ///< AVX-512 F and DQ
 
 /// Whether chains have the same numbers of links and elements, so that they fit side by side.
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b);
-/// Whether chains have one shape and equal constants: they move alike.
-bool are_equal(const ChainTables<double>& a, const ChainTables<double>& b);
 
 }  // namespace oblique::solver

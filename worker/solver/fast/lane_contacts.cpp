@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Source = std::function<std::optional<ContactCase>()>;
-using Sink = std::function<void(ContactOutcome&&)>;
+using Sink = std::function<void(Outcome&&)>;
 
 /// Largest group: the first case and those that branch off.
 constexpr std::size_t kLargestGroup = 16;
@@ -37,7 +37,6 @@ struct Lane {
   ContactCase contact_case{};
   std::optional<ExplicitMotion> motion;
   std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
-  std::optional<ContactTracer> tracer;
   Clock::time_point started{};
 };
 
@@ -106,8 +105,7 @@ class ContactLanes {
            ReactionPeaks(next.chain->links())});
     Lane& slot = lanes_[lane];
     if (tracing_.sink) {
-      slot.tracer.emplace(*slot.motion, tracing_, tip);
-      slot.tracer->accepted(slot.progress->contact, touch);
+      trace_instant(*slot.motion, tracing_, tip, slot.progress->contact, touch);
       return;
     }
     // The state at touch is in the lane: the source may overwrite it.
@@ -131,7 +129,6 @@ class ContactLanes {
     Lane& slot = lanes_[lane];
     slot.contact_case = next;
     slot.motion.emplace(*next.chain);
-    slot.tracer.reset();
     slot.started = Clock::now();
     stepper_.load(lane, next.chain->tables(), state.q.data(), state.v.data());
     stepper_.set_step(lane, progress.contact.trial_step_s());
@@ -151,11 +148,11 @@ class ContactLanes {
     } catch (const SolveError& error) {
       end(lane, std::nullopt, error.what());
       for (const ContactCase& follower : std::exchange(slot.followers, {})) {
-        sink_({follower.tag, std::nullopt, error.what()});  // it would fail alike
+        sink_({follower.number, std::nullopt, error.what()});  // it would fail alike
       }
       return false;
     }
-    if (is_accepted && h_s >= kShortestSpan * slot.contact_case.steps.compression_s) {
+    if (is_accepted && h_s >= kShortestSpan * contact.step_lengths().compression_s) {
       slot.progress->reactions.add(contact.time_s(), h_s,
                                    stepper_.mean_reactions_squared_N2() + lane, lanes_.size());
     }
@@ -170,8 +167,8 @@ class ContactLanes {
   void follow(std::size_t lane) {
     Lane& slot = lanes_[lane];
     const Contact& contact = slot.progress->contact;
-    if (accept_[lane] != 0 && slot.tracer) {
-      slot.tracer->accepted(contact, stored(lane));
+    if (accept_[lane] != 0 && tracing_.sink) {
+      trace_instant(*slot.motion, tracing_, slot.progress->touch, contact, stored(lane));
     }
     if (!slot.followers.empty() && contact.is_at_first_turn()) {
       branch_off(lane);
@@ -198,12 +195,9 @@ class ContactLanes {
     const Lane& slot = lanes_[lane];
     const Contact& contact = slot.progress->contact;
     try {
-      CaseResult result =
-          contact_result(contact, slot.contact_case.parameters, slot.progress->touch,
-                         slot.progress->in, slot.motion->energies(stored(lane)));
+      CaseResult result = contact_result(contact, slot.progress->touch, slot.progress->in,
+                                         slot.motion->energies(stored(lane)));
       result.reaction_peaks = reaction_peaks(lane);
-      result.solver.dt_s = slot.contact_case.steps.compression_s;
-      result.solver.steps = contact.steps();
       const std::chrono::duration<double> elapsed = Clock::now() - slot.started;
       result.solver.wall_s = elapsed.count() / static_cast<double>(busy_);  // lanes share the time
       end(lane, std::move(result), {});
@@ -216,7 +210,7 @@ class ContactLanes {
   void end(std::size_t lane, std::optional<CaseResult>&& result, std::string error) {
     lanes_[lane].progress.reset();
     stepper_.idle(lane);
-    sink_({lanes_[lane].contact_case.tag, std::move(result), std::move(error)});
+    sink_({lanes_[lane].contact_case.number, std::move(result), std::move(error)});
   }
 
   /// Of a contact that has just ended.

@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t kStages = GaussCollocation::kStages;
 /// Numbers in the states that a fall keeps at most: 16 MB. With fewer a state at a drop costs more
 /// than it should beside a contact; more leave room for fewer falls.
-constexpr std::size_t kMostOfStates = (std::size_t{16} << 20) / sizeof(double);
+constexpr std::size_t kMaxOfStates = (std::size_t{16} << 20) / sizeof(double);
 /// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
 /// length): collocation.md.
 constexpr double kUnresolved = 1.5;
@@ -35,21 +35,13 @@ constexpr double kLongestStep = 1.0 / 100.0;
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 /// Steps in a fall beyond which it is given up.
-constexpr std::size_t kMostSteps = 2'000'000;
+constexpr std::size_t kMaxSteps = 2'000'000;
 /// Halvings in a row after which a fall is given up.
-constexpr int kMostHalvings = 30;
+constexpr int kMaxHalvings = 30;
 
-/// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is a way to
-/// fall, with
-///
-///   lanes()               number of lanes, all idle at first
-///   start(lane, request)  puts a fall into an idle lane
-///   step()                tries a step in all lanes
-///   judge(lane)           after each step: the lane's fall when it is complete, else nullptr
-///   idle(lane)            ends a lane's fall
-///   settle()              accepts the step
-///
-/// What start() and judge() throw becomes the error of that fall, except for std::bad_alloc.
+/// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is
+/// SteppedLanes or CollocationFalls. What start() and judge() throw becomes the error of that fall,
+/// except for std::bad_alloc.
 template <class Lanes>
 std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> requests, Lanes& lanes) {
   std::vector<FallSolution> solutions(requests.size());
@@ -91,7 +83,7 @@ std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> reques
   }
 }
 
-/// Falls by explicit steps, one a lane.
+/// Falls by explicit steps, one a lane. All lanes are idle at first.
 class SteppedLanes {
  public:
   SteppedLanes(const Chain& shape, const LaneKernel& kernel)
@@ -111,7 +103,7 @@ class SteppedLanes {
     stepper_.set_force(lane, {});
   }
   void step() { stepper_.step(); }
-
+  /// After each step: the lane's fall when it is complete, else nullptr.
   std::shared_ptr<const Fall> judge(std::size_t lane) {
     if (!falls_[lane]->is_over_after_next(stepper_.trial_tip(lane))) {
       return nullptr;
@@ -123,6 +115,7 @@ class SteppedLanes {
     falls_[lane].reset();
     stepper_.idle(lane);
   }
+  /// Accepts the step.
   void settle() {
     stepper_.settle(all_);
     for (std::size_t lane = 0; lane < lanes(); ++lane) {
@@ -199,30 +192,6 @@ double turn_of(const CoordinateOverStep& y) {
   return 2.0;
 }
 
-/// Fraction of the step, up to `last`, at which the height y is -H_m. Newton's method held by
-/// bisection, which takes over near the largest drop, where the speed vanishes.
-double fraction_at_drop(const CoordinateOverStep& y, double H_m, double last) {
-  double low = 0.0;
-  double high = last;
-  double c = 0.5 * last;
-  for (int i = 0; i < 80 && low < high; ++i) {
-    const DenseWeights weights(c);
-    const double missing_m = H_m + y.position(weights);
-    if (missing_m == 0.0) {
-      break;
-    }
-    const double rate_m_s = y.rate(weights.by_v);
-    (missing_m > 0.0 && rate_m_s < 0.0 ? low : high) = c;
-    const double newton = c - missing_m / (y.h_s * rate_m_s);
-    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
-    if (std::abs(next - c) < 1e-15) {
-      break;
-    }
-    c = next;
-  }
-  return c;
-}
-
 /// A fall solved by Gauss collocation. It keeps every step's length and some of the states, from
 /// which it solves steps again, with the same bits.
 class CollocationFall : public Fall {
@@ -278,7 +247,14 @@ class CollocationFall : public Fall {
     const std::size_t number = step_from(H_m, &Step::drop_m);
     const std::vector<CoordinateOverStep> step = solve_again(number);
     const double last = number + 1 == steps_.size() ? last_turn_ : 1.0;
-    return within(number, step, fraction_at_drop(step[tip_y()], H_m, last));
+    const CoordinateOverStep& y = step[tip_y()];
+    double at = 0.0;
+    locate_drop(last, 1e-15, [&](double c) {
+      at = c;
+      const DenseWeights weights(c);
+      return std::pair(H_m + y.position(weights), y.h_s * y.rate(weights.by_v));
+    });
+    return within(number, step, at);
   }
 
   /// The last step that begins at `value` of that member or before.
@@ -289,7 +265,7 @@ class CollocationFall : public Fall {
 
   /// Keeps every second state once they are too many.
   void thin_states() {
-    if (states_.size() * states_.front().size() <= kMostOfStates) {
+    if (states_.size() * states_.front().size() <= kMaxOfStates) {
       return;
     }
     for (std::size_t i = 1; 2 * i < states_.size(); ++i) {
@@ -375,7 +351,7 @@ class StepControl {
     }
     return true;
   }
-  bool is_hopeless() const { return halvings_ > kMostHalvings; }
+  bool is_hopeless() const { return halvings_ > kMaxHalvings; }
 
  private:
   static constexpr double kRefused = 4.0;
@@ -401,66 +377,6 @@ class StepControl {
   int halvings_ = 0;
 };
 
-/// A fall that is being solved in a lane.
-class FallingChain {
- public:
-  FallingChain(const LaneKernel& kernel, const FallRequest& request)
-      : length_m_(request.chain->length_m()),
-        longest_s_(longest_fall_s(*request.chain)),
-        progress_(request.progress),
-        error_m_(length_m_ * std::max(kSmallestPositionError, kPositionError * request.accuracy)),
-        fall_(std::make_shared<CollocationFall>(kernel, *request.chain, error_m_)),
-        control_(length_m_, request.chain->gravity_m_s2(), request.accuracy) {}
-
-  /// Sets the lane's next step.
-  void set(CollocationLanes::Step& step) const {
-    step.h_s = control_.h_s();
-    step.error_m = error_m_;
-  }
-
-  /// Accepts or refuses the lane's last attempt. The fall once it is complete, else nullptr. Throws
-  /// SolveError when it is given up.
-  std::shared_ptr<const Fall> judge(CollocationLanes& lanes, std::size_t lane) {
-    CollocationLanes::Step& step = lanes.step(lane);
-    step.is_accepted = control_.accepts(step);
-    if (!step.is_accepted) {
-      if (control_.is_hopeless()) {
-        throw SolveError(
-            "the fall could not be solved on from t = " + readable_number(fall_->time_s()) +
-            " s: steps of " + readable_number(step.h_s) + " s still do not converge");
-      }
-      return nullptr;
-    }
-    const CoordinateOverStep tip_y{step.h_s, lanes.coordinate(lane, fall_->tip_y())};
-    if (!(std::abs(tip_y.at.q) <= 2.0 * length_m_)) {
-      throw SolveError("the fall diverged at t = " + readable_number(fall_->time_s()) + " s");
-    }
-    if (fall_->append(lanes, lane, tip_y)) {
-      return fall_;
-    }
-    if (fall_->time_s() > longest_s_) {
-      throw SolveError("the tip did not turn back within " + readable_number(longest_s_) +
-                       " s of falling");
-    }
-    if (fall_->steps() >= kMostSteps) {
-      throw SolveError("the fall would take more than " +
-                       exact_number(static_cast<double>(kMostSteps)) + " steps");
-    }
-    if (progress_ != nullptr) {
-      progress_->store(-tip_y.at.q, std::memory_order_relaxed);
-    }
-    return nullptr;
-  }
-
- private:
-  double length_m_;
-  double longest_s_;
-  FallProgress* progress_;
-  double error_m_;
-  std::shared_ptr<CollocationFall> fall_;
-  StepControl control_;
-};
-
 /// Falls by collocation, one a lane.
 class CollocationFalls {
  public:
@@ -470,19 +386,55 @@ class CollocationFalls {
   std::size_t lanes() const { return falling_.size(); }
 
   void start(std::size_t lane, const FallRequest& request) {
-    lanes_.load(lane, *request.chain);
-    falling_[lane].emplace(kernel_, request);
+    const Chain& chain = *request.chain;
+    const double length_m = chain.length_m();
+    const double error_m =
+        length_m * std::max(kSmallestPositionError, kPositionError * request.accuracy);
+    lanes_.load(lane, chain);
+    lanes_.step(lane).error_m = error_m;
+    falling_[lane] = {length_m, longest_fall_s(chain), request.progress,
+                      std::make_shared<CollocationFall>(kernel_, chain, error_m),
+                      StepControl(length_m, chain.gravity_m_s2(), request.accuracy)};
   }
   void step() {
     for (std::size_t lane = 0; lane < lanes(); ++lane) {
       if (falling_[lane]) {
-        falling_[lane]->set(lanes_.step(lane));
+        lanes_.step(lane).h_s = falling_[lane]->control.h_s();
       }
     }
     lanes_.attempt();
   }
   std::shared_ptr<const Fall> judge(std::size_t lane) {
-    return falling_[lane]->judge(lanes_, lane);
+    CollocationLanes::Step& step = lanes_.step(lane);
+    auto& [length_m, longest_s, progress, fall, control] = *falling_[lane];
+    step.is_accepted = control.accepts(step);
+    if (!step.is_accepted) {
+      if (control.is_hopeless()) {
+        throw SolveError(
+            "the fall could not be solved on from t = " + readable_number(fall->time_s()) +
+            " s: steps of " + readable_number(step.h_s) + " s still do not converge");
+      }
+      return nullptr;
+    }
+    const CoordinateOverStep tip_y{step.h_s, lanes_.coordinate(lane, fall->tip_y())};
+    if (!(std::abs(tip_y.at.q) <= 2.0 * length_m)) {
+      throw SolveError("the fall diverged at t = " + readable_number(fall->time_s()) + " s");
+    }
+    if (fall->append(lanes_, lane, tip_y)) {
+      return fall;
+    }
+    if (fall->time_s() > longest_s) {
+      throw SolveError("the tip did not turn back within " + readable_number(longest_s) +
+                       " s of falling");
+    }
+    if (fall->steps() >= kMaxSteps) {
+      throw SolveError("the fall would take more than " +
+                       exact_number(static_cast<double>(kMaxSteps)) + " steps");
+    }
+    if (progress != nullptr) {
+      progress->store(-tip_y.at.q, std::memory_order_relaxed);
+    }
+    return nullptr;
   }
   void idle(std::size_t lane) {
     falling_[lane].reset();
@@ -491,9 +443,17 @@ class CollocationFalls {
   void settle() { lanes_.accept(); }
 
  private:
+  struct Falling {
+    double length_m;
+    double longest_s;
+    FallProgress* progress;
+    std::shared_ptr<CollocationFall> fall;
+    StepControl control;
+  };
+
   LaneKernel kernel_;
   CollocationLanes lanes_;
-  std::vector<std::optional<FallingChain>> falling_;
+  std::vector<std::optional<Falling>> falling_;
 };
 
 }  // namespace

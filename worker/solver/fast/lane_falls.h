@@ -11,8 +11,7 @@
 
 namespace oblique::solver {
 
-/// Tightest accuracy that falls are solved to by collocation. Its errors fall slowly with the step,
-/// as vibrations that it does not resolve do; beyond this, explicit steps are quicker
+/// Tightest accuracy that falls are solved to by collocation; beyond it, explicit steps are quicker
 /// (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 

@@ -10,8 +10,7 @@
 namespace oblique::solver {
 
 /// Vectors of the instruction sets that a source is compiled for, with their multiply-adds: c + a b
-/// and c - a b, which round once where the hardware can. The type's name keeps instances for
-/// different instruction sets apart.
+/// and c - a b, which round once where the hardware can.
 struct BaselineVectors {
   using Vector = double __attribute__((vector_size(16), may_alias));
 #if defined(__aarch64__)

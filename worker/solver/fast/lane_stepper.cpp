@@ -43,7 +43,7 @@ void LaneStepper::compare_chains() {
     if (!chain) {
       continue;
     }
-    if (one_chain_ != nullptr && !are_equal(*one_chain_, *chain)) {
+    if (one_chain_ != nullptr && one_chain_->link != chain->link) {
       one_chain_ = nullptr;
       return;
     }

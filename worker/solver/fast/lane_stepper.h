@@ -11,15 +11,11 @@
 namespace oblique::solver {
 
 /// States of as many cases as the kernel has lanes, with a chain, a step length and a force law
-/// each, stepped by PEFRL. Every lane is accepted or refused on its own. While the chains of all
-/// lanes are equal, their constants are read once for all.
+/// each, stepped by PEFRL. Every lane is accepted or refused on its own.
 class LaneStepper {
  public:
   /// For chains of the shape of `chain`, which need not outlive this. All lanes are idle.
   LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel);
-  LaneStepper(const LaneStepper&) = delete;
-  LaneStepper& operator=(const LaneStepper&) = delete;
-  ~LaneStepper() = default;
 
   std::size_t lanes() const { return memory_.lanes(); }
 

@@ -1,2 +1,2 @@
-# find_package(oblique) gives the target oblique::solver: the library and its headers. It needs no other package.
+# find_package(oblique) defines the target oblique::solver, the library with its headers.
 include(${CMAKE_CURRENT_LIST_DIR}/oblique-targets.cmake)

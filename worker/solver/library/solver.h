@@ -8,12 +8,10 @@
 
 /// The oblique impact of a flexible robotic finger on rough ground, as a library.
 ///
-/// A chain of slender elastic links hangs from a pin O and falls from rest, straight and level. Its
-/// tip strikes the ground at a drop H below O. A normal and a tangential spring with friction and
-/// losses act between tip and ground until the tip leaves the ground. The links are absolute nodal
-/// coordinate elements (equations 1 to 16 of the paper, "Oblique impact for flexible robotic finger
-/// system"); the contact is its local compliant model (equations 17 to 25). worker/solver/README.md
-/// of the sources lists corrections of these equations.
+/// A chain of slender elastic links falls from rest, straight and level. Its tip strikes rough
+/// ground at a drop H below the pin O, and contact springs with friction and losses act until it
+/// leaves the ground. Equations 1 to 25 of the paper "Oblique impact for flexible robotic finger
+/// system", as corrected in worker/solver/README.md of the sources.
 ///
 ///     #include <oblique/solver.h>
 ///     const oblique::Finger finger;                        // the preset `standard`
@@ -23,9 +21,7 @@
 /// Units are SI; names end with them. x points along the ground away from O, y upwards. Forces act
 /// on the tip. Times count from touch.
 ///
-/// Versions: releases 0.x.y with the same x replace each other without relinking. Another x is
-/// another library (SONAME liboblique.so.0.x). Releases with the same x give the same bits for the
-/// same input on every machine and instruction set, except SolverReport::wall_s.
+/// Releases 0.x.y with the same x replace each other without relinking and give the same results.
 namespace oblique {
 
 using solver::CaseResult;       ///< outputs of a point

@@ -119,4 +119,11 @@ struct CaseResult {
   SolverReport solver;
 };
 
+/// The result of a point, or the reason why there is none.
+struct Outcome {
+  std::uint64_t number;  ///< the caller's number of the point
+  std::optional<CaseResult> result;
+  std::string error;  ///< a sentence; empty with a result
+};
+
 }  // namespace oblique::solver

@@ -39,16 +39,11 @@ template <auto member>
 constexpr ParameterKey key(std::string_view name, std::string_view unit, std::string_view meaning,
                            std::string_view allowed, bool (*is_allowed)(double),
                            const UsualRange& usual = {}) {
-  return {name,
-          unit,
-          meaning,
-          allowed,
-          is_allowed,
-          [](const Model& model) { return static_cast<double>(model.*member); },
-          [](Model& model, double value) {
-            model.*member = static_cast<std::remove_cvref_t<decltype(model.*member)>>(value);
-          },
-          usual};
+  const auto get = [](const Model& model) { return static_cast<double>(model.*member); };
+  const auto set = [](Model& model, double value) {
+    model.*member = static_cast<std::remove_cvref_t<decltype(model.*member)>>(value);
+  };
+  return {name, unit, meaning, allowed, is_allowed, get, set, usual};
 }
 
 constexpr std::array<ParameterKey, 16> kModelKeys{{
@@ -65,12 +60,10 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
      [](const Model& m) { return m.lengths_m.front(); },
      [](Model& m, double v) { std::fill(m.lengths_m.begin(), m.lengths_m.end(), v); },
      {1e-3, 100.0}},
-    key<&Model::E_Pa>("E", "Pa", "Young's modulus", "> 0", positive,
-                      {1e8, 1e12, "softer than rubber", "stiffer than diamond"}),
+    key<&Model::E_Pa>("E", "Pa", "Young's modulus", "> 0", positive, {1e8, 1e12}),
     key<&Model::A_m2>("A", "m^2", "cross-section area", "> 0", positive, {1e-8, 1.0}),
     key<&Model::I_m4>("I", "m^4", "second moment of area", "> 0", positive, {1e-17, 0.1}),
-    key<&Model::rho_kg_m3>("rho", "kg/m^3", "density", "> 0", positive,
-                           {100.0, 25'000.0, "lighter than cork", "denser than any metal"}),
+    key<&Model::rho_kg_m3>("rho", "kg/m^3", "density", "> 0", positive, {100.0, 25'000.0}),
     key<&Model::g_m_s2>("g", "m/s^2", "gravity, downwards", "> 0", positive, {0.1, 100.0}),
     key<&Model::elements_per_link>("elements_per_link", "", "elements a link",
                                    "a whole number from 1 to 256", is_whole<1, 256>),
@@ -144,15 +137,15 @@ std::string with_unit(const ParameterKey& key, double value) {
   return short_number(value) + (key.unit.empty() ? "" : " ") + std::string(key.unit);
 }
 
-std::string outside(const ParameterKey& key) {
-  return "outside the usual " + short_number(key.usual.from) + " to " +
-         with_unit(key, key.usual.to);
+std::string outside_usual(const ParameterKey& key, double value) {
+  return std::string(key.name) + " = " + with_unit(key, value) + " is outside the usual " +
+         short_number(key.usual.from) + " to " + with_unit(key, key.usual.to);
 }
 
 /// The value times the power of 1000 that brings it into the range; of several the nearest to its
 /// middle. Nothing for a key without a unit.
 std::optional<double> in_another_unit(const ParameterKey& key, double value) {
-  const auto& [from, to, below, above] = key.usual;
+  const auto& [from, to] = key.usual;
   const double middle = std::sqrt(from * to);
   std::optional<double> best;
   for (int power = -12; power <= 12 && !key.unit.empty(); power += 3) {
@@ -255,11 +248,8 @@ std::string note_on_value(const ParameterKey& key, double value) {
   if (is_usual(key, value)) {
     return {};
   }
-  const std::string_view words = value < key.usual.from ? key.usual.below : key.usual.above;
   const auto other = in_another_unit(key, value);
-  return std::string(key.name) + " = " + with_unit(key, value) + " is " +
-         (words.empty() ? outside(key) : std::string(words)) +
-         (other ? "; " + short_number(*other) + "?" : "");
+  return outside_usual(key, value) + (other ? "; " + short_number(*other) + "?" : "");
 }
 
 std::string with_likely_cause(std::string error, const ModelParameters& model) {
@@ -271,8 +261,7 @@ std::string with_likely_cause(std::string error, const ModelParameters& model) {
     }
     for (const double value : values) {
       if (!is_usual(key, value)) {
-        error += "; likely cause: " + std::string(key.name) + " = " + with_unit(key, value) +
-                 " is " + outside(key);
+        error += "; likely cause: " + outside_usual(key, value);
       }
     }
   }

@@ -51,8 +51,6 @@ inline constexpr double kSmallestRestitution = 1e-3;
 struct UsualRange {
   double from = 0.0;
   double to = std::numeric_limits<double>::infinity();
-  std::string_view below = {};  ///< describes a smaller value; empty: the range is named instead
-  std::string_view above = {};
 };
 
 /// One numeric parameter as users write it: in study files, as an axis, as a flag (`_` becomes
@@ -82,8 +80,8 @@ std::span<const ParameterKey> point_keys();
 /// Throws InputError naming key, value and what is allowed, unless `value` is finite and allowed.
 void check_value(const ParameterKey& key, double value);
 
-/// "E = 70000 Pa is softer than rubber; 7e10?" for a value outside the usual range of its key, with
-/// the value that a power of 1000 brings into it. Empty for all other values.
+/// "E = 70000 Pa is outside the usual 1e8 to 1e12 Pa; 7e10?" for a value outside the usual range of
+/// its key, with the value that a power of 1000 brings into it. Empty for all other values.
 std::string note_on_value(const ParameterKey& key, double value);
 /// `error` of a fall or a contact, and "; likely cause: E = 70 Pa is outside the usual 1e8 to
 /// 1e12 Pa" for each parameter outside its usual range.

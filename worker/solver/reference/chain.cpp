@@ -237,11 +237,11 @@ double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
 /// and is concave, so Newton's steps stay below the root. Each is the Rayleigh quotient of
 /// z = (lambda M - K)^-1 e.
 double Chain::risen_eigenvalue(double tip_stiffness_N_m) const {
-  constexpr int kMostSteps = 30;
+  constexpr int kMaxSteps = 30;
   const std::size_t tip = 2 * static_cast<std::size_t>(tip_row());
   std::vector<double> z(2 * mass_.rows());
   double lambda = free_eigenvalue_;
-  for (int i = 0; i < kMostSteps; ++i) {
+  for (int i = 0; i < kMaxSteps; ++i) {
     const BandedCholesky factor(shifted(lambda, along_, mass_));
     if (!factor.positive_definite()) {
       break;

@@ -106,7 +106,6 @@ class Chain : public ElementChain {
   /// Throws InputError when `model` is outside its domain.
   explicit Chain(const ModelParameters& model);
 
-  /// The tables that the kernels of chain_kernel.h read.
   ChainTables<double> tables() const;
   /// As in chain_kernel.h.
   template <class Real>

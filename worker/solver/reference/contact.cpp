@@ -152,17 +152,17 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
   if (t_s_ > kLongest_s) {
     throw SolveError("the contact did not end within " + exact_number(kLongest_s) + " s");
   }
-  if (steps_ > kMostSteps) {
-    throw SolveError("the contact takes more than " + std::to_string(kMostSteps) + " steps of " +
+  if (steps_ > kMaxSteps) {
+    throw SolveError("the contact takes more than " + std::to_string(kMaxSteps) + " steps of " +
                      readable_number(full_step_s()) +
                      " s: a longer dt, a looser tolerance or a smaller k takes fewer");
   }
 }
 
 void Contact::happen(ContactEvent event) {
-  if (++events_ > kMostEvents) {
-    throw SolveError("the contact has more than " + std::to_string(kMostEvents) +
-                     " events within " + readable_number(t_s_) + " s");
+  if (++events_ > kMaxEvents) {
+    throw SolveError("the contact has more than " + std::to_string(kMaxEvents) + " events within " +
+                     readable_number(t_s_) + " s");
   }
   margin_.add_event(law_, event, tip_);
   const double ft = law_.ft_N(tip_);

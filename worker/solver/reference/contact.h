@@ -9,24 +9,19 @@
 
 namespace oblique::solver {
 
-/// One contact from touch to separation, as a state machine that any integrator drives. The
-/// integrator keeps the state at the last accepted instant. The machine gives the length of the
-/// next step and its forces, then judges the end of the step:
-///
-///   while (!contact.finished()) {
-///     step a copy of the accepted state by contact.trial_step_s() under contact.force();
-///     if (contact.judge(tip, integrals)) make the copy the accepted state;
-///   }
-///
-/// A step that passes an event is refused; shorter ones follow until the event is at a step's end.
+/// One contact from touch to separation, as a state machine that any integrator drives
+/// (solve_contact.cpp). The integrator keeps the state at the last accepted instant, steps a copy
+/// of it by trial_step_s() under force(), and makes the copy the accepted state if judge() returns
+/// true. A step that passes an event is refused; shorter ones follow until the event is at a step's
+/// end.
 class Contact {
  public:
   /// Time within which a contact must end [s].
   static constexpr double kLongest_s = 20e-3;
   /// More events mean that states follow each other without time passing.
-  static constexpr int kMostEvents = 10'000;
+  static constexpr int kMaxEvents = 10'000;
   /// Ten thousand times the steps that a contact takes by default.
-  static constexpr std::int64_t kMostSteps = 5'000'000;
+  static constexpr std::int64_t kMaxSteps = 5'000'000;
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
 
@@ -36,7 +31,7 @@ class Contact {
   const ContactLaw& law() const { return law_; }
 
   /// True when the step is accepted. Throws SolveError when the tip's state is not finite, the
-  /// contact outlasts kLongest_s, or has more than kMostEvents events or kMostSteps steps.
+  /// contact outlasts kLongest_s, or has more than kMaxEvents events or kMaxSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
   /// Whether the last accepted step ended at the first turn. Up to there e* has no effect.
@@ -50,6 +45,7 @@ class Contact {
   const ContactMargin& margin() const { return margin_; }
   double time_s() const { return t_s_; }
   std::int64_t steps() const { return steps_; }
+  const ContactSteps& step_lengths() const { return steps_s_; }
   /// Number of events so far; when it grows, force() has changed.
   int events() const { return events_; }
   const TipState& tip() const { return tip_; }

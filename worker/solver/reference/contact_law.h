@@ -36,6 +36,7 @@ class ContactLaw {
   /// Direction in which P slides; in stick, the direction of the last slip.
   double slip_direction() const { return s_; }
   double mu() const { return parameters_.mu; }
+  double e_star() const { return parameters_.e_star; }
   /// Slope of the normal element in the present phase [N/m].
   double normal_stiffness_N_m() const { return normal_stiffness_N_m_; }
   double tangential_stiffness_N_m() const { return tangential_stiffness_N_m_; }
@@ -54,8 +55,6 @@ class ContactLaw {
     return stick_ ? -tangential_stiffness_N_m_ * tip.vx_m_s
                   : -s_ * parameters_.mu * fn_rate_N_s(tip);
   }
-  /// mu eta2 k_n/k in the present phase: P's velocity in slip per normal velocity of the tip.
-  double slip_coupling() const { return slip_coupling_; }
   /// Tangential deformation u_x = -F_t eta2 / k [m].
   double ux_m(const TipState& tip) const { return -ft_N(tip) / tangential_stiffness_N_m(); }
   /// Position of P along the ground [m].
@@ -90,7 +89,7 @@ class ContactLaw {
   double tangential_stiffness_N_m_;
   PhaseKind phase_{};
   double normal_stiffness_N_m_{};  ///< in the present phase
-  double slip_coupling_{};         ///< in the present phase
+  double slip_coupling_{};         ///< mu eta2 k_n/k: P's velocity in slip per V_n
   bool stick_;
   double s_;
   double x_anchor_m_;

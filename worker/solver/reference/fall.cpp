@@ -12,9 +12,9 @@ namespace oblique::solver {
 namespace {
 
 /// Most states kept. A state has 32 bytes a row; when there are more, every other one is dropped.
-constexpr std::size_t kMostKept = 4096;
+constexpr std::size_t kMaxKept = 4096;
 /// More steps in sqrt(2 length/g) would take hours.
-constexpr double kMostSteps = 1e9;
+constexpr double kMaxSteps = 1e9;
 
 }  // namespace
 
@@ -34,8 +34,8 @@ ChainState Fall::state_at(double H_m) const {
 SteppedFall::SteppedFall(std::shared_ptr<const Motion> motion, double dt_s, double longest_s,
                          FallProgress* progress)
     : motion_(std::move(motion)), dt_s_(dt_s), longest_s_(longest_s), progress_(progress) {
-  if (!(longest_s <= kLongestFall * kMostSteps * dt_s)) {
-    throw SolveError("the fall would take more than " + exact_number(kMostSteps) +
+  if (!(longest_s <= kLongestFall * kMaxSteps * dt_s)) {
+    throw SolveError("the fall would take more than " + exact_number(kMaxSteps) +
                      " steps of dt_fall = " + exact_number(dt_s) + " s");
   }
   kept_.push_back(motion_->at_rest());
@@ -82,7 +82,7 @@ void SteppedFall::keep(ChainState state) {
   state.t_s = time_s(step_);
   kept_.push_back(std::move(state));
   next_kept_ += steps_kept_;
-  if (kept_.size() < kMostKept) {
+  if (kept_.size() < kMaxKept) {
     return;
   }
   for (std::size_t i = 1; 2 * i < kept_.size(); ++i) {
@@ -108,7 +108,12 @@ ChainState SteppedFall::state_at_drop(double H_m) const {
       break;
     }
   }
-  return locate(H_m, before);
+  locate_drop(dt_s_, 1e-18, [&](double h_s) {
+    motion_->step(before, kNoContact, h_s, state);
+    const TipState tip = motion_->tip(state);
+    return std::pair(H_m + tip.y_m, tip.vy_m_s);
+  });
+  return state;
 }
 
 ChainState SteppedFall::state_at_time(double t_s) const {
@@ -137,32 +142,6 @@ std::size_t SteppedFall::bytes() const {
   const auto numbers = state.q.size() + state.v.size() + state.acceleration.size() +
                        state.algorithmic_offset_rate.size() + state.multipliers_N.size();
   return kept_.size() * (sizeof(ChainState) + static_cast<std::size_t>(numbers) * sizeof(double));
-}
-
-ChainState SteppedFall::locate(double H_m, const ChainState& before) const {
-  // Newton on the drop, bracketed by the step; bisection near the largest drop, where the speed
-  // vanishes.
-  double low = 0.0;
-  double high = dt_s_;
-  double h = 0.5 * dt_s_;
-  ChainState state = before;
-  for (int i = 0; i < 80 && high - low > 0.0; ++i) {
-    motion_->step(before, kNoContact, h, state);
-    const TipState tip = motion_->tip(state);
-    const double missing_m = H_m + tip.y_m;
-    if (missing_m == 0.0) {
-      break;
-    }
-    const bool is_before = missing_m > 0.0 && tip.vy_m_s < 0.0;
-    (is_before ? low : high) = h;
-    const double newton = h - missing_m / tip.vy_m_s;
-    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
-    if (next == h || std::abs(next - h) < 1e-18) {
-      break;
-    }
-    h = next;
-  }
-  return state;
 }
 
 std::shared_ptr<const Fall> solve_stepped_fall(const std::shared_ptr<const Motion>& motion,

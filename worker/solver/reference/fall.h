@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -46,19 +47,38 @@ class Fall {
   virtual ChainState state_at_drop(double H_m) const = 0;  ///< 0 < H_m <= largest_drop_m()
 };
 
+/// Finds the argument in (0, last) at which the tip has a drop, by Newton's method held by
+/// bisection, which takes over near the largest drop, where the speed vanishes. `at(c)` returns
+/// what is missing of the drop and the rate of the tip's height; its last call is at the solution.
+/// Ends when c changes by less than `tolerance`.
+template <class At>
+void locate_drop(double last, double tolerance, const At& at) {
+  double low = 0.0;
+  double high = last;
+  double c = 0.5 * last;
+  for (int i = 0; i < 80 && low < high; ++i) {
+    const auto [missing_m, rate] = at(c);
+    if (missing_m == 0.0) {
+      return;
+    }
+    (missing_m > 0.0 && rate < 0.0 ? low : high) = c;
+    const double newton = c - missing_m / rate;
+    const double next = newton > low && newton < high ? newton : 0.5 * (low + high);
+    if (std::abs(next - c) < tolerance) {
+      return;
+    }
+    c = next;
+  }
+}
+
 /// A fall, or the reason why there is none.
 struct FallSolution {
   std::shared_ptr<const Fall> fall;
   std::string error;
 };
 
-/// A fall in steps of one length by any integrator. The caller takes the steps and passes the few
-/// states that are kept; the state at a drop is stepped to from the one before:
-///
-///   while (!fall.is_over_after_next(tip after one more step)) {
-///     if (fall.keeps_last()) fall.keep(state after it);
-///   }
-///   fall.end(state before the last step);
+/// A fall in steps of one length by any integrator. The caller takes the steps (solve_stepped_fall)
+/// and passes the few states that are kept; the state at a drop is stepped to from the one before.
 class SteppedFall : public Fall {
  public:
   /// Throws SolveError when sqrt(2 length/g) would take more than 1e9 steps. Reports to `progress`,
@@ -82,8 +102,6 @@ class SteppedFall : public Fall {
  private:
   ChainState state_at_drop(double H_m) const override;
   double time_s(std::int64_t step) const { return static_cast<double>(step) * dt_s_; }
-  /// Steps from `before` to the drop H_m, less than a step away.
-  ChainState locate(double H_m, const ChainState& before) const;
 
   std::shared_ptr<const Motion> motion_;
   double dt_s_;

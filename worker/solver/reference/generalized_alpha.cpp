@@ -139,8 +139,8 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
   }
   predict(from, force, h_s, to);
   for (int iteration = 0;; ++iteration) {
-    if (iteration == kMostIterations) {
-      throw SolveError("Newton's method did not converge in " + std::to_string(kMostIterations) +
+    if (iteration == kMaxIterations) {
+      throw SolveError("Newton's method did not converge in " + std::to_string(kMaxIterations) +
                        " iterations at t = " + readable_number(to.t_s) + " s with a step of " +
                        exact_number(h_s) + " s");
     }

@@ -38,7 +38,7 @@ class GeneralizedAlphaMotion : public Motion {
   /// length and no slope by more than this. Convergence is quadratic: the remaining error is about
   /// the square. Steps in contact take one iteration.
   static constexpr double kNewtonTolerance = 1e-6;
-  static constexpr int kMostIterations = 20;
+  static constexpr int kMaxIterations = 20;
 
   explicit GeneralizedAlphaMotion(const ModelParameters& model);
 

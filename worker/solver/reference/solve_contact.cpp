@@ -83,11 +83,11 @@ TraceRow falling_row(const Motion& motion, ChainState& state, double touch_s, bo
 
 }  // namespace
 
-CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
-                          const TipState& touch, const Energies& in, const Energies& out) {
+CaseResult contact_result(const Contact& contact, const TipState& touch, const Energies& in,
+                          const Energies& out) {
   CaseResult result = contact.record().result();
-  result.mu = parameters.mu;
-  result.e_star = parameters.e_star;
+  result.mu = contact.law().mu();
+  result.e_star = contact.law().e_star();
   result.impact_x_m = touch.x_m;
   result.vt_in_m_s = touch.vx_m_s;
   result.vn_in_m_s = touch.vy_m_s;
@@ -97,22 +97,25 @@ CaseResult contact_result(const Contact& contact, const ContactParameters& param
   result.margin = nearest.distance;
   result.margin_event = nearest.event;
   balance(in, out, contact.record(), result.energy);
+  result.solver.dt_s = contact.step_lengths().compression_s;
+  result.solver.steps = contact.steps();
   return result;
 }
 
-void ContactTracer::accepted(const Contact& contact, const ChainState& state) const {
+void trace_instant(const Motion& motion, const Tracing& tracing, const TipState& touch,
+                   const Contact& contact, const ChainState& state) {
   const ContactLaw& law = contact.law();
   const TipState& tip = contact.tip();
-  TraceRow row = chain_row(motion_, contact.force(), state, tracing_.with_shape);
+  TraceRow row = chain_row(motion, contact.force(), state, tracing.with_shape);
   row.t_s = contact.time_s();
   row.fn_N = law.fn_N(tip);
   row.ft_N = law.ft_N(tip);
-  row.uy_m = tip.y_m - touch_y_m_;
+  row.uy_m = tip.y_m - touch.y_m;
   row.ux_m = law.ux_m(tip);
   row.xP_m = tip.x_m - row.ux_m;
   row.vP_m_s = law.is_stick() ? 0.0 : law.slip_velocity_m_s(tip);
   row.state = {law.is_stick() ? 'S' : 's', law.is_compression() ? 'C' : 'R'};
-  tracing_.sink(row);
+  tracing.sink(row);
 }
 
 void trace_fall(const Motion& motion, const Fall& fall, double H_m, const Tracing& tracing) {
@@ -132,7 +135,6 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
   const Energies in = motion.energies(accepted);
   Contact contact(parameters, touch, steps);
   motion.restart(contact.force(), accepted);
-  const ContactTracer tracer(motion, tracing, touch);
   Eigen::Matrix2Xd reactions_N;
   motion.reactions(contact.force(), accepted, reactions_N);
   ReactionPeaks reaction_peaks(static_cast<std::size_t>(reactions_N.cols()));
@@ -142,7 +144,7 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
     squared_N2 = reactions_N.colwise().squaredNorm();
     reaction_peaks.add(contact.time_s(), 0.0, squared_N2.data());
     if (tracing.sink) {
-      tracer.accepted(contact, accepted);
+      trace_instant(motion, tracing, touch, contact, accepted);
     }
   };
   observe();
@@ -159,10 +161,8 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
     }
     observe();
   }
-  CaseResult result = contact_result(contact, parameters, touch, in, motion.energies(accepted));
+  CaseResult result = contact_result(contact, touch, in, motion.energies(accepted));
   result.reaction_peaks = reaction_peaks.peaks();
-  result.solver.dt_s = steps.compression_s;
-  result.solver.steps = contact.steps();
   result.solver.wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return result;

@@ -14,27 +14,15 @@ namespace oblique::solver {
 CaseResult solve_contact(const Motion& motion, const ContactParameters& parameters,
                          const ContactSteps& steps, ChainState touch, const Tracing& tracing);
 
-/// Result of a finished contact without H, the fall time and the solver's report. `in` and `out`
-/// are the energies at touch and separation. Throws SolveError when the energy balance shows that
-/// the step is too long.
-CaseResult contact_result(const Contact& contact, const ContactParameters& parameters,
-                          const TipState& touch, const Energies& in, const Energies& out);
+/// Result of a finished contact without H, fall time, reactions and the solver's name, version and
+/// time. `in` and `out` are the energies at touch and separation. Throws SolveError when the energy
+/// balance shows that the step is too long.
+CaseResult contact_result(const Contact& contact, const TipState& touch, const Energies& in,
+                          const Energies& out);
 
-/// Gives the rows of a contact's trace to tracing.sink, which must be set.
-class ContactTracer {
- public:
-  /// `motion` and `tracing` must outlive this.
-  ContactTracer(const Motion& motion, const Tracing& tracing, const TipState& touch)
-      : motion_(motion), tracing_(tracing), touch_y_m_(touch.y_m) {}
-
-  /// At each accepted instant.
-  void accepted(const Contact& contact, const ChainState& state) const;
-
- private:
-  const Motion& motion_;
-  const Tracing& tracing_;
-  double touch_y_m_;
-};
+/// Gives the row of an accepted instant to tracing.sink, which must be set.
+void trace_instant(const Motion& motion, const Tracing& tracing, const TipState& touch,
+                   const Contact& contact, const ChainState& state);
 
 /// Gives kFallRows instants of the fall to tracing.sink, from release to the touch at drop H_m.
 /// Times are exact to a thousandth of a step. Throws what Fall::state_at throws.

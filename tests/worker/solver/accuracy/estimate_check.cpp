@@ -1,5 +1,5 @@
-// How good the estimated errors of single results are: random points are solved with estimates, and
-// on a mesh so fine that it stands for the truth.
+// Accuracy of estimated errors: random points are solved with estimates, and on a mesh so fine that
+// its results count as exact.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -54,7 +54,7 @@ ModelParameters model_of(const Settings& settings, int elements_per_link) {
   return model;
 }
 
-/// H up to 0.96 of the length of the chain, as 1.15 m of three links.
+/// H up to 0.96 of the length of the chain, which is 1.15 m for three links.
 std::vector<solver::Point> random_points(const Settings& settings) {
   constexpr double kLeastDrop = 1.0 / 6.0;
   constexpr double kLargestDrop = 0.96;
@@ -85,7 +85,7 @@ Results solve(const ModelParameters& model, const std::vector<solver::Point>& po
   return results;
 }
 
-/// One kind of error: the estimate, and the true one in the same unit.
+/// Estimate and true error of one output, in the same unit.
 struct Output {
   std::string_view name;
   std::optional<double> ErrorEstimate::*estimate;
@@ -126,7 +126,7 @@ constexpr std::array kOutputs{
                     std::hypot(a.vt_in_m_s, a.vn_in_m_s);
            }}};
 
-/// Digits below this are rounding.
+/// Smaller errors are rounding.
 constexpr double kRounding = 1e-9;
 
 double quantile(std::vector<double> values, double fraction) {
@@ -164,7 +164,7 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
 
 void tell_modes(const Results& results, const Results& truth,
                 const std::vector<ErrorEstimate>& errors) {
-  std::array<std::array<int, 2>, 2> count{};  // by: the companion has the mode, the truth has it
+  std::array<std::array<int, 2>, 2> count{};  // [companion has the mode][exact result has it]
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
       const bool right = results[i]->major_mode == truth[i]->major_mode;
@@ -208,7 +208,7 @@ void check(const Settings& settings) {
   const auto points = random_points(settings);
   ModelParameters finest = model_of(settings, settings.truth);
   finest.step_factor = 0.5;
-  finest.integrator = solver::Integrator::kExplicit;  // far quicker, and as good
+  finest.integrator = solver::Integrator::kExplicit;  // much faster and equally accurate
   const Results truth = solve(finest, points);
   for (const int mesh : settings.meshes) {
     check_mesh(model_of(settings, mesh), points, truth);

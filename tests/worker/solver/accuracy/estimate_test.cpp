@@ -28,7 +28,7 @@ ContactSteps steps_of(const ModelParameters& model, double e_star) {
   return StepChoice(chain, model).contact(e_star);
 }
 
-/// Contacts so soft that two elements a link carry their waves.
+/// A contact so soft that two elements a link resolve its waves.
 ModelParameters soft_model(int elements_per_link) {
   ModelParameters model = coarse_model(elements_per_link);
   model.k_N_m *= 0.01;
@@ -40,14 +40,14 @@ CaseResult some_result() {
   return result;
 }
 
-TEST(Companion, HasHalfTheElementsRoundedDownAndOneAtLeast) {
+TEST(Companion, HasHalfTheElementsRoundedDownAndAtLeastOne) {
   for (const auto& [elements, half] : std::vector<std::pair<int, int>>{
            {1, 1}, {2, 1}, {3, 1}, {4, 2}, {5, 2}, {16, 8}, {256, 128}}) {
     EXPECT_EQ(companion_model(coarse_model(elements)).elements_per_link, half) << elements;
   }
 }
 
-TEST(Companion, TakesTwiceTheStepsWhetherTheyAreChosenOrAskedFor) {
+TEST(Companion, TakesTwiceTheStepWhetherItIsChosenOrGiven) {
   for (const Integrator integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
     for (const double dt_s : {0.0, 1e-7}) {
       ModelParameters model = coarse_model();
@@ -63,7 +63,7 @@ TEST(Companion, TakesTwiceTheStepsWhetherTheyAreChosenOrAskedFor) {
   }
 }
 
-TEST(Companion, TakesTheLongestStableStepWhereTwiceTheStepIsNotStable) {
+TEST(Companion, TakesTheLongestStableStepIfTwiceTheStepIsUnstable) {
   ModelParameters model = coarse_model();
   const Chain chain(model);
   const double limit_s = StepChoice(chain, model).contact_limits(1.0).restitution_s;
@@ -78,7 +78,7 @@ TEST(Companion, OfOneElementSharesItsFall) {
   EXPECT_EQ(fall_model(companion_model(model)), fall_model(model));
 }
 
-TEST(EstimatedErrors, AreNoneWhereBothSolutionsAreOne) {
+TEST(EstimatedErrors, AreZeroIfBothSolutionsAreEqual) {
   const ErrorEstimate errors = estimated_errors(coarse_model(4), some_result(), some_result());
   EXPECT_EQ(errors.mode_same, 1);
   for (const auto& error : {errors.fn_peak, errors.ft_peak, errors.duration, errors.stick_total,
@@ -87,7 +87,7 @@ TEST(EstimatedErrors, AreNoneWhereBothSolutionsAreOne) {
   }
 }
 
-TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheHalvedMeshDoesNotCarry) {
+TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheCoarserMeshDoesNotResolve) {
   CaseResult near = some_result();
   near.duration_s *= 1.01;
   CaseResult far = some_result();
@@ -100,13 +100,13 @@ TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheHalvedMeshDoesNotC
   };
   EXPECT_NEAR(error(16, far) / error(16, near), 2.0, 1e-9);
   EXPECT_GT(error(4, near), 5.0 * error(16, near));
-  // Once the waves are carried, that of order 2 and a factor of 2: d/3.
+  // With resolved waves the estimate is that of order 2 and ratio 2: d/3.
   EXPECT_NEAR(error(64, near), 0.01 / 3.0, 1e-5);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), near).mode_same, 1);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), far).mode_same, 0);
 }
 
-TEST(EstimatedErrors, OfOneComponentOfTheExitVelocityCountForBoth) {
+TEST(EstimatedErrors, OfTheExitVelocityAreThoseOfTheVector) {
   CaseResult companion = some_result();
   companion.vt_out_m_s += 0.1;
   const double one = *estimated_errors(coarse_model(8), some_result(), companion).v_out;
@@ -116,7 +116,7 @@ TEST(EstimatedErrors, OfOneComponentOfTheExitVelocityCountForBoth) {
   EXPECT_NEAR((both - tolerance) / (one - tolerance), std::sqrt(2.0), 1e-9);
 }
 
-TEST(EstimatedErrors, AreAbsentWhereTheScaleIsZero) {
+TEST(EstimatedErrors, AreAbsentIfTheScaleIsZero) {
   CaseResult result = some_result();
   result.fn_peak_N = 0.0;
   const ErrorEstimate errors = estimated_errors(coarse_model(4), result, some_result());
@@ -125,7 +125,7 @@ TEST(EstimatedErrors, AreAbsentWhereTheScaleIsZero) {
   EXPECT_TRUE(errors.duration);
 }
 
-TEST(EstimatedErrors, HaveTheErrorOfStepsThatAreChosenByATolerance) {
+TEST(EstimatedErrors, ContainTheToleranceOfChosenSteps) {
   CaseResult companion = some_result();
   companion.duration_s *= 1.0 + 1e-12;
   ModelParameters model = coarse_model(64);
@@ -134,7 +134,7 @@ TEST(EstimatedErrors, HaveTheErrorOfStepsThatAreChosenByATolerance) {
   EXPECT_LT(*estimated_errors(model, some_result(), companion).duration, 1e-11);
 }
 
-TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
+TEST(EstimatedErrors, TwiceTheEstimateBoundsTheDifferenceToAFinerMesh) {
   const ModelParameters model = soft_model(2);
   const Finger finger(model);
   const Finger companion(companion_model(model));
@@ -163,7 +163,7 @@ TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
 
 using Outcomes = std::map<std::uint64_t, Outcome>;
 
-/// What became of the points, each asked for and answered once.
+/// Outcomes by point; expects that each point is requested and answered once.
 Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& falls) {
   Outcomes outcomes;
   std::size_t next = 0;
@@ -176,8 +176,8 @@ Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& f
   return outcomes;
 }
 
-/// Points of several models of two elements a link, more than are solved in one go; H = 1.1999 is
-/// reached by none of them.
+/// Points of several models with two elements a link, more than are solved together. No model
+/// reaches H = 1.1999.
 std::vector<FingerPoint> solvable_and_other_points() {
   std::vector<ModelParameters> models(3, coarse_model(2));
   models[1].k_N_m *= 0.5;
@@ -206,7 +206,7 @@ const Outcomes& mixed_outcomes() {
   return outcomes;
 }
 
-TEST(SolvedWithErrors, EveryOtherNumberHasTheBitsOfThePointWithoutErrors) {
+TEST(SolvedWithErrors, AllOtherOutputsHaveTheSameBitsAsWithoutErrors) {
   const auto& points = mixed_points();
   int estimated = 0;
   std::size_t next = 0;
@@ -221,10 +221,10 @@ TEST(SolvedWithErrors, EveryOtherNumberHasTheBitsOfThePointWithoutErrors) {
                    expect_same_bits(*with.result, *without.result);
                  }
                });
-  EXPECT_EQ(estimated, 180) << "all but those that are never reached";
+  EXPECT_EQ(estimated, 180) << "all points except those that are never reached";
 }
 
-TEST(SolvedWithErrors, AreTheEstimatesOfThePointAlone) {
+TEST(SolvedWithErrors, AreEqualToTheErrorsOfThePointAlone) {
   for (const std::size_t i : {0U, 95U, 239U}) {
     const auto& [finger, number, request] = mixed_points()[i];
     const Finger companion(companion_model(finger.model()));
@@ -234,7 +234,7 @@ TEST(SolvedWithErrors, AreTheEstimatesOfThePointAlone) {
   }
 }
 
-TEST(SolvedWithErrors, ACompanionWithoutAnAnswerLeavesThePointAndNoErrors) {
+TEST(SolvedWithErrors, IfTheCompanionFailsThePointIsSolvedWithoutErrors) {
   FallCache falls({}, [](auto models) {
     return std::vector<FallOutcome>(models.size(), FallOutcome{nullptr, "no fall today"});
   });

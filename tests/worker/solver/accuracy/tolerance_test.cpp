@@ -1,4 +1,4 @@
-// What chosen steps leave in the outputs of a contact.
+// Errors of the chosen steps in the outputs of a contact.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,12 +14,12 @@ namespace oblique::solver {
 namespace {
 
 struct Errors {
-  double relative = 0.0;  ///< of peaks (over the largest), duration and slide
+  double relative = 0.0;  ///< of peaks (over the largest peak), duration and slide
   double stick_s = 0.0;
   double exit_m_s = 0.0;
 };
 
-/// Contacts of one model, from one fall, against steps six times shorter than by default.
+/// Contacts of one model from one fall, compared with steps six times shorter than by default.
 class Steps {
  public:
   explicit Steps(const ModelParameters& model)
@@ -29,7 +29,7 @@ class Steps {
     reference_ = solved(shorter);
   }
 
-  /// Largest errors of chosen steps times `factor`.
+  /// Largest errors at `factor` times the chosen steps.
   Errors left_by(double factor) const {
     ModelParameters stepped = model_;
     stepped.step_factor = factor;
@@ -81,20 +81,20 @@ void expect_within(const Errors& errors, double tolerance) {
   EXPECT_LE(errors.exit_m_s, 1e-2);
 }
 
-TEST(Tolerance, ChosenStepsKeepItOnThePublishedMesh) {
+TEST(Tolerance, IsKeptByChosenStepsOnThePublishedMesh) {
   const Errors errors = Steps(preset("paper")).left_by(1.0);
   expect_within(errors, 1e-5);
   EXPECT_LE(errors.stick_s, 5e-9);
 }
 
-TEST(Tolerance, ChosenStepsKeepItOnAFineMesh) {
+TEST(Tolerance, IsKeptByChosenStepsOnAFineMesh) {
   ModelParameters model = preset("paper");
   model.lengths_m = {0.4};
   model.elements_per_link = 16;
   expect_within(Steps(model).left_by(1.0), 1e-5);
 }
 
-TEST(Tolerance, ChosenStepsKeepItOnAHardSpringAndWithAHeavyTip) {
+TEST(Tolerance, IsKeptByChosenStepsOnAHardSpringAndWithAHeavyTip) {
   ModelParameters model = preset("paper");
   model.lengths_m = {0.4};
   model.k_N_m = 1e9;

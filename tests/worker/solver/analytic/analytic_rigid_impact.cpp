@@ -12,8 +12,8 @@ namespace oblique::solver {
 namespace {
 
 constexpr int kSamplesPerPeriod = 2000;
-constexpr int kMostSamples = 2'000'000;
-constexpr int kMostRegimes = 100;
+constexpr int kMaxSamples = 2'000'000;
+constexpr int kMaxRegimes = 100;
 constexpr double kRounding = 1e-10;
 
 /// cos(w t) and sin(w t)/w for w^2 of either sign.
@@ -28,7 +28,7 @@ double odd_solution(double w_squared, double t) {
   }
   return (w_squared < 0.0 ? std::sinh(w * t) : std::sin(w * t)) / w;
 }
-/// Answer to a constant force from rest: (1 - cos(w t))/w^2, written without cancellation.
+/// Response to a constant force from rest, (1 - cos(w t))/w^2, without cancellation.
 double forced_solution(double w_squared, double t) {
   const double half = odd_solution(w_squared, 0.5 * t);
   return 2.0 * half * half;
@@ -121,14 +121,14 @@ RigidImpact::Ending RigidImpact::end_of(const Motion& motion) const {
   const double step_s = motion.shortest_period_s() / kSamplesPerPeriod;
   std::vector<double> before;
   for (const Watch& watch : watches) {
-    // A function that starts at zero to rounding does not count until it has been negative.
+    // A function that starts at zero (to rounding) counts only after it has been negative.
     const double scale = watch.end == End::kSeparation || watch.end == End::kSlip
                              ? p_.V0_m_s.norm() * std::sqrt(p_.k_N_m / p_.W_per_kg(1, 1))
                              : p_.V0_m_s.norm();
     const double value = watch.phi(0.0);
     before.push_back(value < -kRounding * scale ? value : 0.0);
   }
-  for (int sample = 1; sample <= kMostSamples; ++sample) {
+  for (int sample = 1; sample <= kMaxSamples; ++sample) {
     const double t = sample * step_s;
     std::optional<Ending> first;
     for (std::size_t i = 0; i < watches.size(); ++i) {
@@ -165,7 +165,7 @@ RigidImpact::RigidImpact(const Parameters& parameters) : p_(parameters), V_m_s_(
   Regime regime{std::abs(V_m_s_[0]) < p_.mu * p_.eta2 * std::abs(V_m_s_[1]), true,
                 V_m_s_[0] < 0.0 ? -1.0 : 1.0, 0.0};
   Eigen::Vector2d F = Eigen::Vector2d::Zero();
-  while (motions_.size() < kMostRegimes) {
+  while (motions_.size() < kMaxRegimes) {
     motions_.push_back(begin(regime, F));
     regimes_.push_back(regime);
     const Motion& motion = motions_.back();

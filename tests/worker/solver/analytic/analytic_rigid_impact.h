@@ -9,17 +9,17 @@ namespace oblique::solver {
 /// A rigid body that strikes the ground through the local compliant contact, in closed form
 /// (Stronge, Impact Mechanics). Of the body, only the inverse mass at the tip counts,
 /// d(V_t, V_n)/dt = W (F_t, F_n), with W symmetric and positive definite. In each regime the force
-/// is F_0 - K r, r the tip's way since the regime began, so that
+/// is F_0 - K r, where r is the displacement of the tip since the regime began, so that
 ///
 ///   r'' = W F_0 - W K r,   K = diag(k/eta2, k_n) in stick,   rows (0, -s mu k_n), (0, k_n) in
 ///   slip,
 ///
-/// which is solved mode by mode; regimes end at roots of functions of that solution, found by
-/// scanning and bisection. Nothing is shared with the solver.
+/// which is solved by eigenmodes. Regimes end at roots of functions of that solution, found by
+/// scanning and bisection. No code is shared with the solver.
 class RigidImpact {
  public:
   struct Parameters {
-    Eigen::Matrix2d W_per_kg;  ///< order t, n
+    Eigen::Matrix2d W_per_kg;  ///< rows and columns t, n
     double k_N_m;
     double eta2;
     double mu;
@@ -36,7 +36,7 @@ class RigidImpact {
   explicit RigidImpact(const Parameters& parameters);
 
   const std::vector<Regime>& regimes() const { return regimes_; }
-  /// As "SC SR sR".
+  /// For example "SC SR sR".
   std::string mode() const;
   double duration_s() const { return duration_s_; }
   /// Normal force at each end of compression.

@@ -9,7 +9,7 @@
 namespace oblique::solver {
 namespace {
 
-TEST(MittagLeffler, HasItsKnownValuesAndDerivative) {
+TEST(MittagLeffler, HasKnownValuesAndDerivative) {
   EXPECT_DOUBLE_EQ(mittag_leffler_three_halves(2.0, 0.0), 1.0);
   // d/dt (t E_{3/2,2}(-t^{3/2})) = E_{3/2,1}(-t^{3/2}).
   const auto f = [](double t) { return t * mittag_leffler_three_halves(2.0, -std::pow(t, 1.5)); };
@@ -19,16 +19,16 @@ TEST(MittagLeffler, HasItsKnownValuesAndDerivative) {
   }
 }
 
-TEST(BeamEndOnSpring, PeaksWhereKnown) {
+TEST(BeamEndOnSpring, HasTheKnownPeak) {
   const BeamEndOnSpring beam(2700.0 * 5e-4, 70e9 * 2e-8, 2.6e7, 1.0);
   EXPECT_NEAR(beam.peak_N(), 784.05, 0.005);
   EXPECT_NEAR(beam.peak_time_s(), 57.8e-6, 0.05e-6);
 }
 
-TEST(BeamEndOnSpring, ObeysItsIntegralEquation) {
+TEST(BeamEndOnSpring, SatisfiesItsIntegralEquation) {
   const BeamEndOnSpring beam(1.35, 1400.0, 2.6e7, 1.0);
   const double C = std::sqrt(2.0) / (std::pow(1.35, 0.75) * std::pow(1400.0, 0.25));
-  // The half integral of F at t, with s = t - u^2 to take away the root's singularity.
+  // The half integral of F at t; s = t - u^2 removes the singularity of the root.
   constexpr int kIntervals = 1000;
   for (const double t : {10e-6, 50e-6, 90e-6}) {
     double sum = 0.0;

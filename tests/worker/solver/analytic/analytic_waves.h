@@ -2,7 +2,7 @@
 
 namespace oblique::solver {
 
-/// End of a semi-infinite Euler beam that moves sideways at V0 and meets a spring of stiffness k at
+/// End of a semi-infinite Euler beam that moves sideways at V0 and hits a spring of stiffness k at
 /// t = 0. The end's velocity drops by C D^{-1/2} F (a half integral over time), so that
 ///
 ///   F' = k (V0 - C D^{-1/2} F),   C = sqrt(2) / ((rho A)^{3/4} (E I)^{1/4}),
@@ -30,17 +30,17 @@ class BeamEndOnSpring {
 /// E_{3/2,b}(z) by its series. Needs |z| <= 20, where cancellation costs at most seven digits.
 double mittag_leffler_three_halves(double b, double z);
 
-/// End of a rod that flies along itself at V0 and meets a spring of stiffness k at t = 0:
+/// End of a rod that moves along its axis at V0 and hits a spring of stiffness k at t = 0:
 ///
 ///   F = rho A c V0 (1 - exp(-k t / (rho A c))),   c = sqrt(E / rho),
 ///
-/// until the first wave comes back from the other end; without a spring, F = rho A c V0 at once.
+/// until the first wave returns from the other end. On a rigid wall F = rho A c V0 at once.
 class RodEndOnSpring {
  public:
   RodEndOnSpring(double E_Pa, double A_m2, double rho_kg_m3, double k_N_m, double V0_m_s);
 
   double wave_speed_m_s() const { return c_m_s_; }
-  /// rho A c [N s/m].
+  /// Impedance rho A c [N s/m].
   double impedance_Ns_m() const { return impedance_Ns_m_; }
   double force_N(double t_s) const;
   double force_without_spring_N() const { return impedance_Ns_m_ * V0_m_s_; }

@@ -33,7 +33,7 @@ std::vector<ModelParameters> models_with_E(std::size_t count) {
   return models;
 }
 
-/// A fall that cannot be solved: some steps on, Newton's method does not converge.
+/// A model whose fall fails: after some steps Newton's method does not converge.
 ModelParameters model_that_fails() {
   ModelParameters model = coarse_model();
   model.integrator = Integrator::kGeneralizedAlpha;
@@ -41,7 +41,7 @@ ModelParameters model_that_fails() {
   return model;
 }
 
-/// A cache that writes down which falls are solved, and with which beside them.
+/// A cache that records which falls are solved together.
 struct CountedFalls {
   explicit CountedFalls(const FallCache::Bounds& bounds = {})
       : cache(bounds, [this](std::span<const ModelParameters> models) {
@@ -59,7 +59,7 @@ std::size_t lanes() {
   return runnable_lane_kernels().front().lanes;
 }
 
-TEST(FallCacheTest, ModelsThatDifferInContactAloneShareOneFall) {
+TEST(FallCacheTest, ModelsThatDifferInContactOnlyShareOneFall) {
   CountedFalls falls;
   ModelParameters other = coarse_model();
   other.k_N_m = 1e7;
@@ -72,7 +72,7 @@ TEST(FallCacheTest, ModelsThatDifferInContactAloneShareOneFall) {
   EXPECT_EQ(falls.solved.size(), 1U);
 }
 
-TEST(FallCacheTest, AFallThatFailsFailsOnceForAllModelsThatShareIt) {
+TEST(FallCacheTest, AFailingFallIsSolvedOnceForAllModelsThatShareIt) {
   CountedFalls falls;
   ModelParameters model = model_that_fails();
   const std::string error = falls.cache.fall(model).error;
@@ -84,7 +84,7 @@ TEST(FallCacheTest, AFallThatFailsFailsOnceForAllModelsThatShareIt) {
   EXPECT_EQ(falls.solved.size(), 1U);
 }
 
-TEST(FallCacheTest, AModelOutsideItsDomainFailsWithoutAFallBeingSolved) {
+TEST(FallCacheTest, AnInvalidModelFailsWithoutSolvingAFall) {
   CountedFalls falls;
   const ModelParameters nothing = model_with_E(std::numeric_limits<double>::quiet_NaN());
   for (int again = 0; again < 2; ++again) {
@@ -99,7 +99,7 @@ TEST(FallCacheTest, AModelOutsideItsDomainFailsWithoutAFallBeingSolved) {
   EXPECT_EQ(falls.solved[0][1], ahead.back());
 }
 
-TEST(FallCacheTest, WhatSolvingThrowsComesOutAndTheNextWhoAsksHasItSolvedAnew) {
+TEST(FallCacheTest, AnExceptionIsRethrownAndTheNextRequestSolvesTheFallAgain) {
   bool is_memory_short = true;
   FallCache cache({}, [&](std::span<const ModelParameters> models) {
     return is_memory_short ? throw std::bad_alloc() : solve_falls(models);
@@ -111,7 +111,7 @@ TEST(FallCacheTest, WhatSolvingThrowsComesOutAndTheNextWhoAsksHasItSolvedAnew) {
   EXPECT_TRUE(cache.fall(models[1]).fallen);
 }
 
-TEST(FallCacheTest, MissingFallsAreSolvedBesideTheOneAskedForUntilTheLanesAreFull) {
+TEST(FallCacheTest, MissingFallsAreSolvedTogetherWithTheRequestedOneUntilLanesAreFull) {
   CountedFalls falls;
   const auto models = models_with_E(lanes() + 3);
   falls.cache.fall(models[2]);
@@ -120,13 +120,13 @@ TEST(FallCacheTest, MissingFallsAreSolvedBesideTheOneAskedForUntilTheLanesAreFul
   ASSERT_EQ(falls.solved[1].size(), lanes());
   EXPECT_EQ(falls.solved[1][0], models[0]);
   EXPECT_EQ(falls.solved[1][1], models[1]);
-  EXPECT_EQ(falls.solved[1][2], models[3]) << "the one between was solved";
+  EXPECT_EQ(falls.solved[1][2], models[3]) << "the model between was cached";
   falls.cache.fall(models[1], models);
-  EXPECT_EQ(falls.solved.size(), 2U) << "for a fall that is there nothing is solved ahead";
+  EXPECT_EQ(falls.solved.size(), 2U) << "a cached fall solves no others ahead";
   EXPECT_FALSE(falls.cache.kept_fall(models.back()));
 }
 
-TEST(FallCacheTest, FallsOfOtherShapesOrIntegratorsAreNotSolvedBeside) {
+TEST(FallCacheTest, FallsOfOtherShapesOrIntegratorsAreNotSolvedTogether) {
   CountedFalls falls;
   std::vector<ModelParameters> ahead(5, coarse_model());
   ahead[0].elements_per_link = 2;
@@ -137,13 +137,13 @@ TEST(FallCacheTest, FallsOfOtherShapesOrIntegratorsAreNotSolvedBeside) {
   falls.cache.fall(coarse_model(), ahead);
   ASSERT_EQ(falls.solved.size(), 1U);
   ASSERT_EQ(falls.solved[0].size(), 3U);
-  EXPECT_EQ(falls.solved[0][1], ahead[3]) << "steps of any length have lanes";
+  EXPECT_EQ(falls.solved[0][1], ahead[3]) << "lanes may have different steps";
   EXPECT_EQ(falls.solved[0][2], ahead[4]);
   falls.cache.fall(model_that_fails(), ahead);
   EXPECT_EQ(falls.solved.back().size(), 1U) << "generalized-alpha has no lanes";
 }
 
-TEST(FallCacheTest, ThreadsThatAskForOneFallWaitForTheOneThatSolvesIt) {
+TEST(FallCacheTest, ThreadsThatNeedOneFallWaitForTheThreadThatSolvesIt) {
   CountedFalls falls;
   std::vector<std::shared_ptr<const FallenChain>> got(4);
   {
@@ -159,7 +159,7 @@ TEST(FallCacheTest, ThreadsThatAskForOneFallWaitForTheOneThatSolvesIt) {
   }
 }
 
-TEST(FallCacheTest, WhileAnotherThreadSolvesAFallTheNextOnesAreSolved) {
+TEST(FallCacheTest, WhileAnotherThreadSolvesAFallThisThreadSolvesTheNextFalls) {
   const auto models = models_with_E(3);
   std::latch first_is_under_way(1);
   std::latch next_are_solved(1);
@@ -180,7 +180,7 @@ TEST(FallCacheTest, WhileAnotherThreadSolvesAFallTheNextOnesAreSolved) {
   EXPECT_TRUE(cache.kept_fall(models[2]));
 }
 
-TEST(FallCacheTest, TheFallNotUsedForLongestMakesRoomForANewOne) {
+TEST(FallCacheTest, TheLeastRecentlyUsedFallIsRemoved) {
   CountedFalls falls({.falls = 2});
   const auto models = models_with_E(3);
   const auto second = falls.cache.fall(models[1]).fallen;
@@ -191,10 +191,10 @@ TEST(FallCacheTest, TheFallNotUsedForLongestMakesRoomForANewOne) {
   EXPECT_FALSE(falls.cache.kept_fall(models[0]));
   falls.cache.fall(models[0]);
   EXPECT_EQ(falls.solved.size(), 4U);
-  EXPECT_GT(second->fall().largest_drop_m(), 0.0) << "who holds it keeps it";
+  EXPECT_GT(second->fall().largest_drop_m(), 0.0) << "a fall in use stays valid";
 }
 
-TEST(FallCacheTest, MemoryBoundsWhatIsKeptButForTheFallInUse) {
+TEST(FallCacheTest, MemoryIsBoundedExceptForTheFallInUse) {
   const auto models = models_with_E(4);
   const std::size_t bytes = solve_falls({models.data(), 1}).front().fallen->fall().bytes();
   CountedFalls falls({.bytes = 2 * bytes + bytes / 2});
@@ -207,7 +207,7 @@ TEST(FallCacheTest, MemoryBoundsWhatIsKeptButForTheFallInUse) {
   CountedFalls none({.falls = 0, .bytes = 0});
   EXPECT_TRUE(none.cache.fall(models[0], models).fallen);
   EXPECT_TRUE(none.cache.kept_fall(models[0]));
-  EXPECT_EQ(none.solved.front().size(), 1U) << "nothing ahead without room for it";
+  EXPECT_EQ(none.solved.front().size(), 1U) << "no falls ahead without memory for them";
 }
 
 TEST(FallCacheTest, FallsSolvedAheadStayUntilTheyAreUsed) {

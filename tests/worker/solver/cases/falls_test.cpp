@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Models that differ in what a fall does not depend on.
+/// Models that differ only in parameters on which the fall does not depend.
 std::vector<ModelParameters> models_of_one_fall() {
   std::vector<ModelParameters> models(5, coarse_model());
   models[1].k_N_m = 1.3e7;
@@ -28,16 +28,16 @@ std::vector<ModelParameters> models_of_one_fall() {
   return models;
 }
 
-TEST(Falls, ModelsThatDifferInContactAloneShareOne) {
+TEST(Falls, AreEqualForModelsThatDifferInContactOnly) {
   for (const ModelParameters& model : models_of_one_fall()) {
     EXPECT_EQ(fall_model(model), coarse_model());
   }
 }
 
-TEST(Falls, WhatMovesAChainMakesAnother) {
+TEST(Falls, DifferForModelsWithDifferentChainsOrSteps) {
   ModelParameters model = coarse_model();
   model.spectral_radius = 0.5;
-  EXPECT_EQ(fall_model(model), coarse_model()) << "the explicit integrator has none";
+  EXPECT_EQ(fall_model(model), coarse_model()) << "the explicit integrator has no spectral radius";
   model.integrator = Integrator::kGeneralizedAlpha;
   EXPECT_EQ(fall_model(model), model);
   for (const ParameterKey& key : model_keys()) {
@@ -54,7 +54,7 @@ TEST(Falls, WhatMovesAChainMakesAnother) {
   EXPECT_EQ(fall_model(tighter), tighter);
 }
 
-TEST(Falls, SayHowFarTheyAre) {
+TEST(Falls, ReportTheirProgress) {
   ModelParameters other = coarse_model();
   other.E_Pa *= 2.0;
   ModelParameters implicit = coarse_model();
@@ -67,16 +67,16 @@ TEST(Falls, SayHowFarTheyAre) {
   const auto outcomes = solve_falls(chains);
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const double turn_m = outcomes[i].fallen->fall().largest_drop_m();
-    // Told now and then, so the end is not told to the last digit.
+    // Progress is reported at intervals, so the last report may be slightly below the end.
     EXPECT_NEAR(chains[i]->fall_progress(), turn_m, 0.02 * turn_m) << i;
     EXPECT_EQ(Finger(chains[i]->model(), chains[i]).drop_so_far_m(), chains[i]->fall_progress());
   }
 }
 
-TEST(Falls, OfDifferentShapesAndWaysAreThoseThatEachHasAlone) {
+TEST(Falls, SolvedTogetherAreEqualToFallsSolvedAlone) {
   std::vector<ModelParameters> models(6);
   for (std::size_t i = 0; i < models.size(); ++i) {
-    // Fine meshes fall by collocation, coarse ones and those with a step of their own by steps.
+    // Fine meshes use collocation; coarse meshes and models with dt_fall use explicit steps.
     models[i].elements_per_link = i % 2 == 0 ? 8 : 9;
     models[i].E_Pa *= 1.0 + 0.1 * static_cast<double>(i);
   }
@@ -96,7 +96,7 @@ TEST(Falls, OfDifferentShapesAndWaysAreThoseThatEachHasAlone) {
   }
 }
 
-TEST(Falls, ASharedFallGivesEachModelTheBitsOfItsOwn) {
+TEST(Falls, ASharedFallGivesEachModelTheSameBitsAsItsOwnFall) {
   const auto models = models_of_one_fall();
   const auto fallen = solve_falls({models.data(), 1}).front().fallen;
   for (const ModelParameters& model : models) {
@@ -105,7 +105,7 @@ TEST(Falls, ASharedFallGivesEachModelTheBitsOfItsOwn) {
   }
 }
 
-TEST(Falls, ThatOfAnotherModelIsRefused) {
+TEST(Falls, AFallOfAnotherModelIsRefused) {
   const ModelParameters other = coarse_model(2);
   const auto fallen = solve_falls({&other, 1}).front().fallen;
   EXPECT_THROW(Finger(coarse_model(), fallen), std::invalid_argument);
@@ -114,12 +114,12 @@ TEST(Falls, ThatOfAnotherModelIsRefused) {
   EXPECT_THROW(Finger(wrong, fallen), InputError);
 }
 
-TEST(Falls, OneThatFailsLeavesTheOthersAlone) {
+TEST(Falls, AFailingFallDoesNotAffectOthers) {
   std::vector<ModelParameters> models(4, coarse_model());
   models[1].E_Pa = -1.0;
   models[2].dt_fall_s = 1e-300;
   models[3].integrator = Integrator::kGeneralizedAlpha;
-  models[3].dt_fall_s = 0.025;  // some steps on, Newton's method does not converge
+  models[3].dt_fall_s = 0.025;  // after some steps Newton's method does not converge
   const std::vector<FallOutcome> outcomes = solve_falls(models);
   EXPECT_TRUE(outcomes[0].fallen);
   EXPECT_THAT(outcomes[1].error, HasSubstr("E = -1"));

@@ -12,13 +12,13 @@
 namespace oblique::solver {
 namespace {
 
-/// What a default step is held to, besides half of the last digit that is known.
+/// Allowed relative error at the default step, in addition to rounding of the known value.
 constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
 constexpr double kTimeDigit_us = 0.0005;
 constexpr double kStickDigit_us = 0.005;
-/// Of the duration, for times. Valleys are flat, and the default tolerance, 1e-5, moves an instant
-/// of a turn by up to 3.5 ns.
+/// Allowed error of instants, relative to the duration. Minima of the force are flat, so that the
+/// default tolerance 1e-5 moves the instant of a turn by up to 3.5 ns.
 constexpr double kRelativeTime = 3e-6;
 constexpr double kRelativeInstant = 6e-6;
 constexpr double kSlideDigit_mm = 0.000005;
@@ -47,7 +47,7 @@ void for_each_impact(const Check& check) {
   }
 }
 
-TEST(KnownImpacts, PeaksOfTheForcesAreKnown) {
+TEST(KnownImpacts, HaveTheKnownForcePeaks) {
   for_each_impact([](const KnownImpact& known, const CaseResult& result) {
     ASSERT_EQ(result.peaks.size(), known.fn_peaks_N.size());
     double largest_N = 0.0;
@@ -63,7 +63,7 @@ TEST(KnownImpacts, PeaksOfTheForcesAreKnown) {
   });
 }
 
-TEST(KnownImpacts, DurationsAreKnown) {
+TEST(KnownImpacts, HaveTheKnownDurations) {
   for_each_impact([](const KnownImpact& known, const CaseResult& result) {
     EXPECT_NEAR(1e6 * result.duration_s, known.contact_us,
                 kRelativeTime * known.contact_us + kTimeDigit_us);
@@ -77,7 +77,7 @@ TEST(KnownImpacts, DurationsAreKnown) {
   });
 }
 
-TEST(KnownImpacts, ATightToleranceGivesEveryDigitOfThePhases) {
+TEST(KnownImpacts, HaveAllKnownDigitsOfThePhasesAtATightTolerance) {
   ModelParameters model = preset("paper");
   model.tolerance = 1e-7;
   const Finger exact{model};
@@ -91,7 +91,7 @@ TEST(KnownImpacts, ATightToleranceGivesEveryDigitOfThePhases) {
   });
 }
 
-TEST(KnownImpacts, WayThatPSlidesIsKnown) {
+TEST(KnownImpacts, HaveTheKnownSlide) {
   for_each_impact([](const KnownImpact& known, const CaseResult& result) {
     if (known.slide_mm > 0.0) {
       EXPECT_NEAR(1e3 * result.slide_m, known.slide_mm,
@@ -100,7 +100,7 @@ TEST(KnownImpacts, WayThatPSlidesIsKnown) {
   });
 }
 
-TEST(KnownImpacts, ModesAndNumbersOfMajorPeaksAreThePublishedOnes) {
+TEST(KnownImpacts, HaveThePublishedModesAndNumbersOfMajorPeaks) {
   for_each_impact([](const KnownImpact& known, const CaseResult& result) {
     EXPECT_EQ(result.mode, known.mode);
     EXPECT_EQ(result.major_mode, known.major_peaks == 3 ? "sC sR sC sR sC sR" : "SC SR sR sC sR");
@@ -110,7 +110,7 @@ TEST(KnownImpacts, ModesAndNumbersOfMajorPeaksAreThePublishedOnes) {
   });
 }
 
-TEST(KnownImpacts, EnergyBalanceClosesToAMillionthOfTheWorkExchanged) {
+TEST(KnownImpacts, CloseTheEnergyBalanceToAMillionthOfTheExchangedWork) {
   for_each_impact(
       [](const KnownImpact&, const CaseResult& result) { EXPECT_LT(result.energy.closure, 1e-6); });
 }

@@ -58,17 +58,17 @@ std::vector<CaseResult> solve_by(const LaneKernel& kernel) {
                            steps.contact(c.e_star),
                            &touch};
       },
-      [&](ContactOutcome&& outcome) {
+      [&](Outcome&& outcome) {
         ASSERT_TRUE(outcome.result) << outcome.error;
-        results.at(outcome.tag) = std::move(*outcome.result);
+        results.at(outcome.number) = std::move(*outcome.result);
       },
       {}, kernel);
   return results;
 }
 
-/// Instruction sets differ in how many lanes they have and in whether multiply-adds round once or
-/// twice. Rounding grows in a contact, most where a state begins at a graze.
-TEST(LaneKernels, InstructionSetsDifferByGrownRoundingOnly) {
+/// Instruction sets differ in the number of lanes, and in whether multiply-adds round once or
+/// twice. Rounding errors grow in a contact, most if a state begins at a grazing event.
+TEST(LaneKernels, InstructionSetsDifferByAmplifiedRoundingOnly) {
   const auto kernels = runnable_lane_kernels();
   const std::vector<CaseResult> expected = solve_by(kernels.back());
   double largest = 0.0;

@@ -1,4 +1,4 @@
-// The margin of whole contacts: small where the mode is about to change, and only there.
+// The margin of whole contacts is small near changes of the mode, and only there.
 #include <random>
 #include <set>
 #include <string>
@@ -10,7 +10,7 @@
 namespace oblique::solver {
 namespace {
 
-/// Two frictions between which the mode changes, and the event that is to blame below and above.
+/// Two frictions between which the mode changes, and the critical event below and above.
 struct Change {
   double H_m;
   double e_star;
@@ -24,7 +24,7 @@ CaseResult solved(const Change& change, double mu) {
   return paper_finger().solve(change.H_m, mu, change.e_star);
 }
 
-/// Where the mode changes.
+/// The friction at which the mode changes.
 double threshold(const Change& change) {
   double low = change.low_mu;
   double high = change.high_mu;
@@ -37,7 +37,7 @@ double threshold(const Change& change) {
   return low;
 }
 
-TEST(Margin, GoesToZeroInProportionFromBothSidesOfAChangeOfMode) {
+TEST(Margin, FallsLinearlyToZeroOnBothSidesOfAChangeOfMode) {
   constexpr double kNear = 3e-5;
   for (const Change& change : {Change{1.0, 1.0, 0.58, 0.5866, "turn", "turn"},
                                Change{1.0, 1.0, 0.8733, 0.88, "touch", "touch"},
@@ -52,7 +52,7 @@ TEST(Margin, GoesToZeroInProportionFromBothSidesOfAChangeOfMode) {
       const CaseResult far = solved(change, mu * (1.0 + side * 2.0 * kNear));
       EXPECT_EQ(*near.margin_event, side < 0.0 ? change.below : change.above);
       EXPECT_EQ(*far.margin_event, *near.margin_event);
-      // About as small as what the friction differs by.
+      // Of the size of the difference in friction.
       EXPECT_GT(*near.margin, 0.03 * kNear);
       EXPECT_LT(*near.margin, 3.0 * kNear);
       EXPECT_NEAR(*far.margin / *near.margin, 2.0, 0.2);
@@ -60,14 +60,14 @@ TEST(Margin, GoesToZeroInProportionFromBothSidesOfAChangeOfMode) {
   }
 }
 
-TEST(Margin, OfTheKnownGrazingCaseIsTinyAndOfASmoothOneIsNot) {
+TEST(Margin, IsTinyForTheKnownGrazingCaseAndNotForASmoothCase) {
   const CaseResult grazing = paper_finger().solve(1.0, 0.5844540064, 1.0);
   EXPECT_LT(*grazing.margin, 1e-5);
   EXPECT_EQ(*grazing.margin_event, "turn");
   EXPECT_GT(*paper_finger().solve(1.0, 0.4, 1.0).margin, 1e-2);
 }
 
-TEST(Margin, IsFromZeroToOneAndNamesAnEventThatMayHappen) {
+TEST(Margin, IsFromZeroToOneAndNamesAPossibleEvent) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> part(0.0, 1.0);
   for (int i = 0; i < 200; ++i) {

@@ -23,7 +23,7 @@ std::string message_of(const std::function<void()>& action) {
   } catch (const Error& error) {
     return error.what();
   }
-  ADD_FAILURE() << "no such error";
+  ADD_FAILURE() << "no exception of this type";
   return {};
 }
 
@@ -37,7 +37,7 @@ std::string model_error(const std::function<void(ModelParameters&)>& change) {
   return message_of<InputError>([&] { Finger{model}; });
 }
 
-/// Of solving a point of the coarse model with that change.
+/// The error of solving a point of the coarse model after `change`.
 template <class Error = SolveError>
 std::string solve_error(const std::function<void(ModelParameters&)>& change, double e_star = 1.0) {
   ModelParameters model = coarse_model();
@@ -48,7 +48,7 @@ std::string solve_error(const std::function<void(ModelParameters&)>& change, dou
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-TEST(SolveErrors, ValueOutsideItsRangeIsNamedWithWhatIsAllowed) {
+TEST(SolveErrors, AValueOutsideItsRangeIsNamedWithTheAllowedRange) {
   EXPECT_THAT(input_error(1.0, -0.1, 1.0), AllOf(HasSubstr("mu = -0.1"), HasSubstr(">= 0")));
   EXPECT_THAT(input_error(1.0, 0.4, 0.0), AllOf(HasSubstr("e = 0"), HasSubstr("[0.001, 1]")));
   EXPECT_THAT(input_error(1.0, 0.4, -0.5), HasSubstr("e = -0.5"));
@@ -57,14 +57,14 @@ TEST(SolveErrors, ValueOutsideItsRangeIsNamedWithWhatIsAllowed) {
   EXPECT_THAT(input_error(-1.0, 0.4, 1.0), HasSubstr("H = -1 m"));
 }
 
-TEST(SolveErrors, TouchWithoutSpeedSaysThatThereIsNothingToSolve) {
+TEST(SolveErrors, ATouchWithoutSpeedIsReported) {
   const Finger& finger = coarse_finger();
   const double H_m = finger.largest_drop_m();
   EXPECT_THAT(message_of<SolveError>([&] { finger.solve(H_m, 0.4, 1.0); }),
               HasSubstr("hardly any speed"));
 }
 
-TEST(SolveErrors, StepAboveTheStabilityLimitNamesTheLimit) {
+TEST(SolveErrors, AStepAboveTheStabilityLimitNamesTheLimit) {
   EXPECT_THAT(model_error([](ModelParameters& m) { m.dt_fall_s = 1e-3; }),
               AllOf(HasSubstr("dt_fall = 0.001 s"), HasSubstr("stable up to 1.84")));
   EXPECT_THAT(solve_error<InputError>([](ModelParameters& m) { m.dt_s = 1e-3; }),
@@ -77,7 +77,7 @@ TEST(SolveErrors, StepAboveTheStabilityLimitNamesTheLimit) {
               HasSubstr("dt = 1e-05 s"));
 }
 
-TEST(SolveErrors, ContactThatOutlastsTheStatedTimeIsGivenUp) {
+TEST(SolveErrors, AContactLongerThanTheLimitFails) {
   // Half a period of a link on the soft spring takes 45 ms.
   EXPECT_THAT(solve_error([](ModelParameters& m) { m.k_N_m = 1e3; }),
               HasSubstr("did not end within 0.02 s"));
@@ -85,7 +85,7 @@ TEST(SolveErrors, ContactThatOutlastsTheStatedTimeIsGivenUp) {
               HasSubstr("did not end within 0.02 s"));
 }
 
-TEST(SolveErrors, AFallOrContactWithoutAnEndNamesTheUnusualValueThatIsLikelyToBlame) {
+TEST(SolveErrors, AFallOrContactWithoutEndNamesTheUnusualValueThatIsTheLikelyCause) {
   const char* const soft = "; likely cause: E = 70 Pa is outside the usual 1e8 to 1e12 Pa";
   EXPECT_THAT(solve_error([](ModelParameters& m) { m.E_Pa = 70; }),
               AllOf(HasSubstr("fall"), testing::EndsWith(soft)));
@@ -100,7 +100,7 @@ TEST(SolveErrors, AFallOrContactWithoutAnEndNamesTheUnusualValueThatIsLikelyToBl
               testing::EndsWith(loose));
 }
 
-TEST(SolveErrors, MagnitudesBeyondNumbersAreAnErrorInBoundedTime) {
+TEST(SolveErrors, OverflowIsAnErrorInBoundedTime) {
   EXPECT_THAT(model_error([](ModelParameters& m) { m.I_m4 = 1e300; }), HasSubstr("magnitude"));
   EXPECT_THAT(model_error([](ModelParameters& m) { m.rho_kg_m3 = 1e-300; }),
               HasSubstr("magnitude"));
@@ -108,7 +108,7 @@ TEST(SolveErrors, MagnitudesBeyondNumbersAreAnErrorInBoundedTime) {
               HasSubstr("more than 1e+09 steps"));
 }
 
-TEST(SolveErrors, StepsTooShortForAnyContactFailAtOnce) {
+TEST(SolveErrors, StepsTooShortToFinishAContactFailAtOnce) {
   EXPECT_THAT(solve_error([](ModelParameters& m) { m.dt_s = 1e-300; }),
               AllOf(HasSubstr("steps of 1e-300 s"), HasSubstr("a longer dt")));
   EXPECT_THAT(
@@ -122,11 +122,11 @@ TEST(SolveErrors, StepsTooShortForAnyContactFailAtOnce) {
               HasSubstr("steps of 1e-300 s"));
 }
 
-TEST(SolveErrors, MachineRefusesStatesThatAreNoNumbersAndContactsWithoutEnd) {
+TEST(SolveErrors, TheContactFailsForStatesThatAreNotFiniteAndContactsWithoutEnd) {
   const ContactParameters parameters{1e6, 1.2, 0.5, 1.0};
   Contact contact(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
   EXPECT_THROW(contact.judge({kNaN, 0.0, 1.0, -1.0}, {}), SolveError);
-  // A tip that sinks for ever.
+  // A tip that sinks forever.
   Contact sinking(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
   TipState tip{0.0, 0.0, 1.0, -1.0};
   const auto sink = [&] {
@@ -139,7 +139,7 @@ TEST(SolveErrors, MachineRefusesStatesThatAreNoNumbersAndContactsWithoutEnd) {
   EXPECT_THROW(sink(), SolveError);
 }
 
-TEST(SolveErrors, OnePointThatFailsLeavesTheOthersOfItsBatchAlone) {
+TEST(SolveErrors, AFailingPointDoesNotAffectOthersOfItsBatch) {
   const std::vector<Point> list{{0.5, 0.4, 1.0},  {1.19, 0.4, 1.0}, {0.5, -1.0, 1.0},
                                 {kNaN, 0.4, 1.0}, {0.6, 0.4, 0.0},  {1.0, 0.4, 0.5}};
   std::vector<std::string> errors;

@@ -11,19 +11,19 @@
 namespace oblique::solver {
 namespace {
 
-TEST(Impact, TipOfAVeryHeavyMassBouncesAsThatMassAlone) {
+TEST(Impact, AVeryHeavyTipBouncesLikeItsMassAlone) {
   constexpr double kMass_kg = 100.0;
   ModelParameters model = coarse_model();
   model.tip_mass_kg = kMass_kg;
   const CaseResult result = Finger{model}.solve(0.3, 0.0, 1.0);
-  // Half a period on the spring. Links of 1.7 kg and gravity add a per cent.
+  // Half a period on the spring. Links of 1.7 kg and gravity change it by one percent.
   EXPECT_NEAR(result.duration_s, M_PI * std::sqrt(kMass_kg / model.k_N_m),
               0.03 * result.duration_s);
   EXPECT_NEAR(result.fn_peak_N, -result.vn_in_m_s * std::sqrt(kMass_kg * model.k_N_m),
               0.03 * result.fn_peak_N);
 }
 
-TEST(Impact, WithoutFrictionNothingActsAlongTheGround) {
+TEST(Impact, WithoutFrictionThereIsNoTangentialForce) {
   const CaseResult result = coarse_finger().solve(0.9, 0.0, 0.8);
   EXPECT_EQ(result.impulse_t_Ns, 0.0);
   EXPECT_EQ(result.ft_peak_N, 0.0);
@@ -31,14 +31,15 @@ TEST(Impact, WithoutFrictionNothingActsAlongTheGround) {
   EXPECT_TRUE(result.stick_intervals.empty());
 }
 
-TEST(Impact, WithoutHysteresisNothingIsLostInRestitution) {
+TEST(Impact, WithoutHysteresisRestitutionLosesNoEnergy) {
   const CaseResult result = coarse_finger().solve(0.9, 0.4, 1.0);
   EXPECT_NEAR(result.energy.restitution_J, 0.0, 1e-9 * result.energy.exchanged_J);
   EXPECT_GT(result.energy.friction_J, 0.0);
 }
 
-TEST(Impact, LossInRestitutionIsThatOfEveryCycleBetweenItsTurns) {
-  // Up a slope k from F_a to F_b costs (F_b^2 - F_a^2)/2k, down k/e*^2 gives e*^2 of it back.
+TEST(Impact, TheLossInRestitutionIsTheSumOverAllCyclesBetweenTurns) {
+  // Compression on the slope k from F_a to F_b takes (F_b^2 - F_a^2)/2k; restitution on the slope
+  // k/e*^2 returns e*^2 of it.
   const double e_star = 0.7;
   const CaseResult result = paper_finger().solve(1.0, 0.4, e_star);
   ASSERT_EQ(result.peaks.size(), 3U);
@@ -53,7 +54,7 @@ TEST(Impact, LossInRestitutionIsThatOfEveryCycleBetweenItsTurns) {
   EXPECT_NEAR(result.energy.restitution_J, loss_J, 1e-9 * result.energy.exchanged_J);
 }
 
-TEST(Impact, FrictionAndNormalWorkAddUpToWhatTheFingerLost) {
+TEST(Impact, TheWorkOfBothForcesIsTheEnergyThatTheFingerLost) {
   const CaseResult result = paper_finger().solve(1.0, 0.9, 0.7);
   const ContactEnergy& energy = result.energy;
   const double change_J =
@@ -90,7 +91,7 @@ void expect_finite(const CaseResult& r) {
   }
 }
 
-/// What holds for every contact, whatever the parameters.
+/// Conditions that hold for every contact.
 void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_GT(r.duration_s, 0.0);
   EXPECT_GT(r.impulse_n_Ns, 0.0);
@@ -104,7 +105,7 @@ void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_LT(r.energy.closure, worst_closure);
 }
 
-/// Phases alternate and fill the contact; peaks lie between them; sticks lie inside.
+/// Phases alternate and fill the contact, peaks lie between phases, and stick intervals lie inside.
 void expect_in_order(const CaseResult& r) {
   ASSERT_EQ(r.phases.size(), 2 * r.peaks.size());
   double t_s = 0.0;
@@ -135,7 +136,8 @@ void expect_in_order(const CaseResult& r) {
   EXPECT_EQ(r.mode.back(), 'R');
 }
 
-/// A random point, one in six of them at an extreme. Never at the very top, where the tip stands.
+/// A random point; in one of six points one value is extreme. H stays below the largest drop, where
+/// the tip has no speed.
 Point random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);
@@ -188,7 +190,7 @@ void sweep(const ModelParameters& model, int points, unsigned seed, double worst
   }
 }
 
-TEST(SolveSweep, WhateverTheModelResultsAreFinitePhysicalAndInOrder) {
+TEST(SolveSweep, ResultsAreFinitePhysicalAndOrderedForRandomModels) {
   struct Case {
     int elements_per_link;
     std::vector<double> lengths_m = {0.4, 0.4, 0.4};
@@ -207,7 +209,8 @@ TEST(SolveSweep, WhateverTheModelResultsAreFinitePhysicalAndInOrder) {
       {.elements_per_link = 1, .tip_mass_kg = 1e-3},
       {.elements_per_link = 1, .k_N_m = 1e6},
       {.elements_per_link = 1, .k_N_m = 2.7e8},
-      // On a spring four hundred times the default's the step is set by that spring alone.
+      // On a spring four hundred times as stiff as the default the step depends on that spring
+      // only.
       {.elements_per_link = 1, .k_N_m = 1e10, .worst_closure = 1e-3},
       {.elements_per_link = 1, .eta2 = 5.0},
       {.elements_per_link = 1, .eta2 = 0.3},

@@ -73,23 +73,23 @@ void expect_same_in_any_company(std::vector<FingerPoint> list) {
   }
 }
 
-TEST(SameBits, WhateverWasSolvedBefore) {
+TEST(SameBits, WhateverPointsWereSolvedBefore) {
   const auto list = points_of(Finger{coarse_model()});
   expect_same(solved_one_by_one({list.rbegin(), list.rend()}),
               solved_one_by_one(points_of(coarse_finger())));
 }
 
-TEST(SameBits, WhateverNeighboursItHasInTheLanes) {
+TEST(SameBits, WhateverPointsAreInTheOtherLanes) {
   expect_same_in_any_company(points_of(coarse_finger()));
 }
 
-TEST(SameBits, FromSeveralThreadsAtOnceThatShareAFinger) {
+TEST(SameBits, OnSeveralThreadsThatShareAFinger) {
   const auto list = points_of(Finger{coarse_model()});
   std::vector<Results> by_thread(4);
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < by_thread.size(); ++i) {
     threads.emplace_back([&, i] {
-      // The first to come solves the fall.
+      // The first thread solves the fall.
       by_thread[i] = i % 2 == 0 ? solved_together(list) : solved_one_by_one(list);
     });
   }
@@ -102,8 +102,8 @@ TEST(SameBits, FromSeveralThreadsAtOnceThatShareAFinger) {
   }
 }
 
-/// Points of models that share a fall, of models that share the shape of their chains, and of
-/// others, numbered from 0 and mixed.
+/// Points in mixed order, numbered from 0: of models that share a fall, of models whose chains have
+/// the same shape, and of other models.
 std::vector<FingerPoint> crowd() {
   std::vector<ModelParameters> models(8, coarse_model());
   models[1].k_N_m = 1.3e7;
@@ -129,11 +129,11 @@ std::vector<FingerPoint> crowd() {
   return crowd;
 }
 
-TEST(SameBits, InAMixedCrowdOfModels) {
+TEST(SameBits, InAMixtureOfModels) {
   expect_same_in_any_company(crowd());
 }
 
-TEST(SameBits, WithATraceOrWithout) {
+TEST(SameBits, WithOrWithoutATrace) {
   int rows = 0;
   Tracing tracing;
   tracing.sink = [&rows](const TraceRow&) { ++rows; };

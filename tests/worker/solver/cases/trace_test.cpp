@@ -11,7 +11,7 @@
 namespace oblique::solver {
 namespace {
 
-/// To which instants of events are located.
+/// Accuracy of the instants of events.
 constexpr double kLocated_s = 1e-13;
 
 struct Traced {
@@ -27,7 +27,7 @@ Traced traced(double H_m, double mu, double e_star) {
   return traced;
 }
 
-/// Slip only; stick and slip; low restitution; no friction.
+/// Contacts with slip only, with stick and slip, with low restitution, and without friction.
 const std::vector<Traced>& traces() {
   static const std::vector<Traced> list{traced(1.0, 0.4, 1.0), traced(1.0, 1.4, 0.8),
                                         traced(0.9, 0.9, 0.2), traced(0.9, 0.0, 0.8)};
@@ -47,7 +47,7 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
     EXPECT_EQ(first.state[1], 'C');
     const TraceRow& last = t.rows.back();
     EXPECT_EQ(last.t_s, t.result.duration_s);
-    // The instant is located to 1e-13 s, on the spring of restitution.
+    // Separation is located to 1e-13 s, on the spring of restitution.
     const double fn_N = kLocated_s * coarse_finger().model().k_N_m * std::abs(last.vn_m_s) /
                         (t.result.e_star * t.result.e_star);
     EXPECT_NEAR(last.fn_N, 0.0, fn_N);
@@ -58,7 +58,7 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
   }
 }
 
-TEST(Trace, ForcesStayInsideTheConeAndOnItInSlip) {
+TEST(Trace, ForcesStayInsideTheFrictionConeAndOnItInSlip) {
   for (const Traced& t : traces()) {
     for (const TraceRow& row : t.rows) {
       const double limit_N = t.result.mu * row.fn_N;
@@ -67,13 +67,13 @@ TEST(Trace, ForcesStayInsideTheConeAndOnItInSlip) {
       if (row.state[0] == 's') {
         EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
         // P stops at an instant located to 1e-13 s: forces of 1e4 N, accelerations of 1e4 m/s^2.
-        EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction acts against P";
+        EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction opposes the motion of P";
       }
     }
   }
 }
 
-TEST(Trace, DeformationsAndPositionsBelongToTheForces) {
+TEST(Trace, ForcesFollowFromDeformationsAndPositions) {
   const ModelParameters& model = coarse_finger().model();
   for (const Traced& t : traces()) {
     for (const TraceRow& row : t.rows) {
@@ -91,7 +91,7 @@ TEST(Trace, DeformationsAndPositionsBelongToTheForces) {
   }
 }
 
-TEST(Trace, PRestsInStickAndMovesWithItsVelocityInSlip) {
+TEST(Trace, PIsAtRestInStickAndMovesWithItsVelocityInSlip) {
   for (const Traced& t : traces()) {
     const double cone =
         t.result.mu * coarse_finger().model().eta2 / (t.result.e_star * t.result.e_star);
@@ -101,7 +101,7 @@ TEST(Trace, PRestsInStickAndMovesWithItsVelocityInSlip) {
       const TraceRow& b = t.rows[i];
       slide_m += std::abs(b.xP_m - a.xP_m);
       if (a.state[0] == 'S') {
-        // Where sliding begins, P is where the cone has it, at an instant located to 1e-13 s.
+        // When sliding begins, P is where the cone requires it, at an instant located to 1e-13 s.
         const double end_m = kLocated_s * (std::abs(b.vt_m_s) + cone * std::abs(b.vn_m_s));
         EXPECT_NEAR(b.xP_m, a.xP_m, b.state[0] == 'S' ? 1e-15 : end_m);
         EXPECT_EQ(a.vP_m_s, 0.0);
@@ -135,7 +135,8 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
   }
   for (const Traced& t : many) {
     SCOPED_TRACE(t.result.mode);
-    // Rows of distinct instants, so that both sides of an event count once: 1e-11 s at 1e7 N/s.
+    // Rows at distinct instants, so that the two rows of an event count once. In 1e-11 s the force
+    // changes by 1e-4 N.
     std::vector<TraceRow> rows;
     for (const TraceRow& row : t.rows) {
       if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
@@ -179,7 +180,7 @@ TEST(Trace, EnergiesChangeByTheWorkOfTheContactForces) {
   }
 }
 
-TEST(Trace, MomentumChangesByThePinTheContactAndTheWeight) {
+TEST(Trace, MomentumChangesByTheImpulsesOfPinContactAndWeight) {
   const ModelParameters& model = coarse_finger().model();
   double length_m = 0.0;
   for (const double link_m : model.lengths_m) {
@@ -227,15 +228,15 @@ TEST(Trace, ShapeIsThatOfAChainFromThePinToTheTip) {
     for (std::size_t node = 1; node < 7; ++node) {
       const double element_m = std::hypot(row.nodes_m[2 * node] - row.nodes_m[2 * node - 2],
                                           row.nodes_m[2 * node + 1] - row.nodes_m[2 * node - 1]);
-      EXPECT_NEAR(element_m, 0.2, 0.002) << "links bend and stretch little";
+      EXPECT_NEAR(element_m, 0.2, 0.002) << "links hardly bend or stretch";
     }
   }
-  EXPECT_TRUE(traces()[0].rows[0].nodes_m.empty()) << "unless it is asked for";
+  EXPECT_TRUE(traces()[0].rows[0].nodes_m.empty()) << "nodes are absent unless requested";
 }
 
-TEST(Trace, PeaksOfTheReactionsAreThoseOfTheRows) {
+TEST(Trace, PeaksOfTheReactionsAgreeWithTheRows) {
   for (const Traced& t : traces()) {
-    // Three links have the pin and two joints.
+    // Three links have reactions at the pin and at two joints.
     ASSERT_EQ(t.result.reaction_peaks.size(), 3U);
     for (std::size_t joint = 0; joint < 3; ++joint) {
       double largest_N = 0.0;
@@ -244,8 +245,8 @@ TEST(Trace, PeaksOfTheReactionsAreThoseOfTheRows) {
         largest_N = std::max(
             largest_N, std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
       }
-      // Rows miss the top between two of them: (omega h)^2/8 of the fastest motion at most, with
-      // one element a link a visible part of the whole.
+      // The peak may lie between two rows, higher by up to (omega h)^2/8 of the fastest motion,
+      // which is a large part of the reaction with one element a link.
       EXPECT_GT(t.result.reaction_peaks[joint].force_N, 0.998 * largest_N);
       EXPECT_LT(t.result.reaction_peaks[joint].force_N, 1.02 * largest_N);
     }
@@ -268,7 +269,7 @@ TraceWithFall traced_with_fall(const Finger& finger, bool with_fall = true) {
   return traced;
 }
 
-/// Explicit steps, collocation, and steps of generalized-alpha.
+/// Falls by explicit steps, by collocation and by generalized-alpha.
 const std::vector<Finger>& fingers() {
   static const std::vector<Finger> list = [] {
     ModelParameters by_steps = coarse_model();
@@ -291,7 +292,7 @@ const std::vector<TraceWithFall>& falls() {
   return list;
 }
 
-TEST(FallOfATrace, GoesFromReleaseToTouchInEvenTimes) {
+TEST(FallOfATrace, GoesFromReleaseToTouchAtEvenlySpacedTimes) {
   for (const TraceWithFall& t : falls()) {
     ASSERT_EQ(t.fall.size(), static_cast<std::size_t>(kFallRows));
     const TraceRow& release = t.fall.front();
@@ -308,11 +309,11 @@ TEST(FallOfATrace, GoesFromReleaseToTouchInEvenTimes) {
   }
 }
 
-TEST(FallOfATrace, EndsWithTheInstantThatTheContactBeginsWith) {
+TEST(FallOfATrace, EndsAtTheFirstInstantOfTheContact) {
   for (const TraceWithFall& t : falls()) {
     TraceRow last = t.fall.back();
     EXPECT_EQ(last.t_s, 0.0);
-    EXPECT_EQ(last.vP_m_s, last.vt_m_s) << "P goes along with the tip until it is held";
+    EXPECT_EQ(last.vP_m_s, last.vt_m_s) << "P moves with the tip before contact";
     last.vP_m_s = t.contact.front().vP_m_s;
     std::vector<double> before;
     std::vector<double> after;
@@ -322,7 +323,7 @@ TEST(FallOfATrace, EndsWithTheInstantThatTheContactBeginsWith) {
   }
 }
 
-TEST(FallOfATrace, NothingActsAtTheTipAndNothingIsDeformedThere) {
+TEST(FallOfATrace, HasNoForceAndNoDeformationAtTheTip) {
   for (const TraceWithFall& t : falls()) {
     for (const TraceRow& row : t.fall) {
       EXPECT_EQ(row.fn_N, 0.0);
@@ -334,7 +335,7 @@ TEST(FallOfATrace, NothingActsAtTheTipAndNothingIsDeformedThere) {
   }
 }
 
-TEST(FallOfATrace, LeavesRowsOfTheContactAndResultAsTheyAreWithoutIt) {
+TEST(FallOfATrace, DoesNotChangeTheContactOrTheResult) {
   for (std::size_t i = 0; i < fingers().size(); ++i) {
     const TraceWithFall without = traced_with_fall(fingers()[i], false);
     EXPECT_TRUE(without.fall.empty());

@@ -25,7 +25,7 @@ ElementConstants<double> constants() {
                            kMassPerLength);
 }
 
-/// An element that is bent and stretched.
+/// A bent and stretched element.
 ElementCoordinates bent(double more) {
   ElementCoordinates q;
   q << 0.1, 0.9 + more, 0.21, 1.1, 0.05, 0.3, 0.12 - 0.1 * more, -0.2 + more;
@@ -37,7 +37,7 @@ TangentBlocks<double> tangent_of(const ElementCoordinates& q) {
   return element_tangent(pair(0), pair(1), pair(2), pair(3), constants());
 }
 
-/// M + z K of two links of two elements each, all bent differently, dense. Rows as in Chain.
+/// Dense M + z K of two links with two differently bent elements each. Rows as in Chain.
 struct DenseChain {
   static constexpr std::size_t kLinks = 2;
   static constexpr std::size_t kElements = 2;
@@ -80,7 +80,7 @@ struct DenseChain {
   std::vector<ElementTangent> tangents;
 };
 
-TEST(FrontKernel, SolvesWhatTheDenseMatrixSolves) {
+TEST(FrontKernel, SolvesAsTheDenseMatrixDoes) {
   const DenseChain chain;
   const std::complex<double> z(-0.011, 0.023);
   const std::vector<ElementConstants<double>> links(DenseChain::kLinks, constants());
@@ -147,8 +147,8 @@ TEST(GaussCollocation, DiagonalisesTheSquareOfItsMatrix) {
   }
 }
 
-TEST(CollocationLanes, StepsOfHalfTheLengthErrAThousandTimesLess) {
-  // A soft chain: the motion itself, and no vibration too fast for the steps.
+TEST(CollocationLanes, HalvingTheStepReducesTheErrorAThousandfold) {
+  // A chain so soft that the steps resolve all its vibrations.
   ModelParameters model = preset("paper");
   model.elements_per_link = 1;
   model.E_Pa = 1e5;
@@ -169,9 +169,9 @@ TEST(CollocationLanes, StepsOfHalfTheLengthErrAThousandTimesLess) {
   const Eigen::VectorXd exact = state_after(28);
   const double coarse = (state_after(5) - exact).norm();
   const double fine = (state_after(10) - exact).norm();
-  EXPECT_GT(coarse, 1e-8) << "else rounding is all that is seen";
+  EXPECT_GT(coarse, 1e-8) << "otherwise rounding dominates";
   EXPECT_GT(coarse / fine, 1000.0)
-      << "order 10 at least; it comes to 16 as steps get short, where rounding hides it";
+      << "at least order 10; order 16 is reached only where rounding hides it";
 }
 
 }  // namespace

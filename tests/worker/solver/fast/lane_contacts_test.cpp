@@ -19,7 +19,7 @@
 namespace oblique::solver {
 namespace {
 
-/// A coarse model with its fall, as solve_contacts() needs them.
+/// A coarse model with its fall, for solve_contacts().
 struct Coarse {
   ModelParameters model = coarse_model();
   Chain chain{model};
@@ -38,26 +38,26 @@ const Coarse& coarse() {
   return one;
 }
 
-std::map<std::uint64_t, ContactOutcome> solved(
+std::map<std::uint64_t, Outcome> solved(
     const std::vector<ContactCase>& cases,
     const LaneKernel& kernel = runnable_lane_kernels().front()) {
-  std::map<std::uint64_t, ContactOutcome> outcomes;
+  std::map<std::uint64_t, Outcome> outcomes;
   std::size_t next = 0;
   solve_contacts(
       coarse().chain,
       [&]() -> std::optional<ContactCase> {
         return next < cases.size() ? std::optional(cases[next++]) : std::nullopt;
       },
-      [&](ContactOutcome&& outcome) {
-        const std::uint64_t tag = outcome.tag;
+      [&](Outcome&& outcome) {
+        const std::uint64_t tag = outcome.number;
         const bool is_new = outcomes.emplace(tag, std::move(outcome)).second;
-        EXPECT_TRUE(is_new) << "case " << tag << " came twice";
+        EXPECT_TRUE(is_new) << "case " << tag << " was delivered twice";
       },
       {}, kernel);
   return outcomes;
 }
 
-/// Models that differ in all that a chain is made of but its shape, and one in k alone.
+/// Models whose chains have one shape and differ otherwise; one differs from the first in k only.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());
@@ -67,17 +67,17 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
     models[2].I_m4 *= 1.3;
     models[3].rho_kg_m3 *= 0.9;
     models[3].A_m2 *= 1.1;
-    models[4].k_N_m *= 0.7;  // a chain of its own that equals that of the first
+    models[4].k_N_m *= 0.7;  // an equal copy of the chain of the first model
     std::vector<std::unique_ptr<Coarse>> list;
     for (const ModelParameters& model : models) {
-      list.emplace_back(new Coarse{model});  // in place: its parts point at each other
+      list.emplace_back(new Coarse{model});  // in place, because its members point to each other
     }
     return list;
   }();
   return all;
 }
 
-TEST(LaneContacts, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
+TEST(LaneContacts, ACaseHasTheSameBitsBesideCasesOfOtherChains) {
   std::vector<ChainState> touches;
   for (const auto& model : unlike_models()) {
     touches.push_back(model->fall->state_at(0.9));
@@ -95,16 +95,16 @@ TEST(LaneContacts, GivesACaseTheSameBitsBesideCasesOfOtherChains) {
     const auto together = solved(cases, kernel);
     ASSERT_EQ(together.size(), cases.size());
     for (const ContactCase& one : cases) {
-      SCOPED_TRACE(std::string(kernel.name) + ", case " + std::to_string(one.tag));
+      SCOPED_TRACE(std::string(kernel.name) + ", case " + std::to_string(one.number));
       const auto alone = solved({one}, kernel);
-      ASSERT_TRUE(alone.at(one.tag).result) << alone.at(one.tag).error;
-      ASSERT_TRUE(together.at(one.tag).result) << together.at(one.tag).error;
-      expect_same_bits(*together.at(one.tag).result, *alone.at(one.tag).result);
+      ASSERT_TRUE(alone.at(one.number).result) << alone.at(one.number).error;
+      ASSERT_TRUE(together.at(one.number).result) << together.at(one.number).error;
+      expect_same_bits(*together.at(one.number).result, *alone.at(one.number).result);
     }
   }
 }
 
-TEST(LaneContacts, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAreLeftAlone) {
+TEST(LaneContacts, WhenASharedContactFailsEachOfItsCasesFailsAndNoOther) {
   const Coarse& other = *unlike_models()[2];
   const ChainState sound = other.fall->state_at(0.9);
   ChainState broken = coarse().fall->state_at(0.9);
@@ -120,7 +120,7 @@ TEST(LaneContacts, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAre
   ASSERT_EQ(outcomes.size(), cases.size());
   const auto alone = solved({cases[4]});
   for (const ContactCase& one : cases) {
-    const ContactOutcome& outcome = outcomes.at(one.tag);
+    const Outcome& outcome = outcomes.at(one.number);
     if (one.touch == &broken) {
       EXPECT_FALSE(outcome.result);
       EXPECT_NE(outcome.error.find("diverged"), std::string::npos);
@@ -131,7 +131,7 @@ TEST(LaneContacts, FollowersOfAContactThatFailsEachGetAnOutcomeAndOtherChainsAre
   }
 }
 
-TEST(LaneContacts, AChainMayGoOnceItsCaseIsDone) {
+TEST(LaneContacts, AChainMayBeDestroyedAfterItsCaseIsDone) {
   std::vector<std::unique_ptr<Chain>> chains;
   const ChainState touch = coarse().fall->state_at(0.5);
   std::size_t done = 0;
@@ -148,15 +148,15 @@ TEST(LaneContacts, AChainMayGoOnceItsCaseIsDone) {
         one.chain = chains.back().get();
         return one;
       },
-      [&](ContactOutcome&& outcome) {
+      [&](Outcome&& outcome) {
         EXPECT_TRUE(outcome.result) << outcome.error;
-        chains[outcome.tag].reset();
+        chains[outcome.number].reset();
         ++done;
       });
   EXPECT_EQ(done, chains.size());
 }
 
-TEST(LaneContacts, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
+TEST(LaneContacts, PeaksOfReactionsFromMomentaAgreeWithThoseFromAccelerations) {
   const ExplicitMotion motion(coarse().chain);
   std::vector<ChainState> touches;
   for (const double H_m : {0.01, 0.5, 0.9, 1.04}) {
@@ -167,7 +167,7 @@ TEST(LaneContacts, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
     for (const double mu : {0.0, 0.4, 1.4}) {
       for (const double e_star : {1.0, 0.6, 0.1}) {
         ContactCase one = coarse().contact(cases.size(), cases.size() / 3, mu, e_star, touch);
-        // A single element's link vibrates fast: steps that resolve it.
+        // Steps that resolve the fast vibrations of a link with a single element.
         one.steps = {0.25 * one.steps.compression_s, 0.25 * one.steps.restitution_s};
         cases.push_back(one);
       }
@@ -175,10 +175,10 @@ TEST(LaneContacts, PeaksOfReactionsFromMomentaAreThoseOfTheAccelerations) {
   }
   const auto outcomes = solved(cases);
   for (const ContactCase& one : cases) {
-    SCOPED_TRACE(one.tag);
+    SCOPED_TRACE(one.number);
     const CaseResult exact = solve_contact(motion, one.parameters, one.steps, *one.touch, {});
-    ASSERT_TRUE(outcomes.at(one.tag).result);
-    const auto& peaks = outcomes.at(one.tag).result->reaction_peaks;
+    ASSERT_TRUE(outcomes.at(one.number).result);
+    const auto& peaks = outcomes.at(one.number).result->reaction_peaks;
     ASSERT_EQ(peaks.size(), 3U);
     for (std::size_t joint = 0; joint < peaks.size(); ++joint) {
       const ReactionPeak& known = exact.reaction_peaks[joint];

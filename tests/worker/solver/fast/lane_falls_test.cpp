@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/worker/solver/reference/known_falls.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/reference/fall.h"
 
@@ -33,7 +34,7 @@ FallRequest request_for(const Chain& chain, double accuracy = kAccuracy,
   return {&chain, nullptr, 0.0, accuracy, progress};
 }
 
-/// A chain with its fall, at one address.
+/// A chain with its fall, not movable.
 struct Fallen {
   explicit Fallen(const ModelParameters& model, double accuracy = kAccuracy)
       : chain(model), solved(solve(accuracy)), fall(*solved) {}
@@ -64,7 +65,7 @@ const Fallen& paper() {
   return fallen;
 }
 
-TEST(CollocationFall, StateAtATimeIsTheOneThatTheTipPassesThen) {
+TEST(CollocationFall, StateAtATimeAgreesWithTheStateAtTheDropReachedThen) {
   const Fallen fallen{model_of(1)};
   EXPECT_EQ(fallen.fall.state_at_time(0.0).q, fallen.chain.at_rest().q);
   for (int i = 0; i < 40; ++i) {
@@ -77,22 +78,10 @@ TEST(CollocationFall, StateAtATimeIsTheOneThatTheTipPassesThen) {
 }
 
 TEST(CollocationFall, TipHasTheKnownStateAtTheDropsOfThePaper) {
-  struct Known {
-    double H_m, t_s, x_m, vx_m_s, vy_m_s;
-  };
-  // An independent explicit solution, converged to nine digits.
-  for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
-                             Known{1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
-                             Known{1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}) {
-    const TipState tip = paper().tip_at(known.H_m);
-    EXPECT_NEAR(paper().fall.state_at(known.H_m).t_s, known.t_s, 1e-8);
-    EXPECT_NEAR(tip.x_m, known.x_m, 1e-7);
-    EXPECT_NEAR(tip.vx_m_s, known.vx_m_s, 5e-5);
-    EXPECT_NEAR(tip.vy_m_s, known.vy_m_s, 5e-5);
-  }
+  expect_known_falls(paper().chain, paper().fall);
 }
 
-/// Largest difference of time [s] and of velocity [m/s] to small explicit steps.
+/// Largest differences of time [s] and velocity [m/s] from a fall in small explicit steps.
 struct Difference {
   double time_s = 0.0;
   double velocity_m_s = 0.0;
@@ -113,11 +102,11 @@ Difference difference(const Fallen& fallen, const Fall& explicit_fall) {
   return largest;
 }
 
-TEST(CollocationFall, IsRightForSoftAndStiffAndLoadedAndSingleLinks) {
+TEST(CollocationFall, AgreesWithSmallStepsForSoftStiffLoadedAndSingleLinks) {
   ModelParameters soft = model_of(2);
   soft.E_Pa *= 1e-4;
   ModelParameters softest = model_of(2);
-  softest.E_Pa *= 1e-5;  // each link hangs through and swings
+  softest.E_Pa *= 1e-5;  // each link sags and swings
   ModelParameters stiff = model_of(2);
   stiff.E_Pa *= 100.0;
   ModelParameters loaded = model_of(2);
@@ -141,7 +130,7 @@ TEST(CollocationFall, IsRightForSoftAndStiffAndLoadedAndSingleLinks) {
   }
 }
 
-TEST(CollocationFall, ErrorFollowsTheAccuracyAskedFor) {
+TEST(CollocationFall, ErrorFollowsTheRequestedAccuracy) {
   const auto solved = solve_stepped_fall(paper().chain, 2e-6);
   const Fall& steps = *solved;
   const Fallen tight(preset("paper"), kAccuracy / 100.0);
@@ -153,7 +142,7 @@ TEST(CollocationFall, ErrorFollowsTheAccuracyAskedFor) {
   EXPECT_LT(difference(loose, steps).velocity_m_s, 2e-3);
 }
 
-TEST(CollocationFall, EnergyOfTheFallIsKept) {
+TEST(CollocationFall, EnergyIsConserved) {
   for (const int n : {2, 8}) {
     const Fallen fallen(model_of(n));
     const double start_J = fallen.energy_J(fallen.chain.at_rest());
@@ -170,15 +159,16 @@ TEST(CollocationFall, DropIsLocatedToRounding) {
   }
 }
 
-TEST(CollocationFall, TipStandsStillAtTheLargestDrop) {
+TEST(CollocationFall, TipIsAtRestAtTheLargestDrop) {
   const double largest_m = paper().fall.largest_drop_m();
   const TipState tip = paper().tip_at(largest_m);
   EXPECT_NEAR(-tip.y_m, largest_m, 1e-15);
-  EXPECT_NEAR(tip.vy_m_s, 0.0, 1e-3) << "the drop fixes the instant only to the root of rounding";
+  EXPECT_NEAR(tip.vy_m_s, 0.0, 1e-3)
+      << "near the largest drop the instant is known to the square root of rounding";
   EXPECT_LT(paper().tip_at(largest_m - 1e-9).vy_m_s, 0.0);
 }
 
-/// Chains of one shape, more than any kernel has lanes, none like the next.
+/// Different chains of one shape, more than any kernel has lanes.
 std::deque<Chain> different_chains() {
   std::deque<Chain> chains;
   for (int i = 0; i < 11; ++i) {
@@ -249,8 +239,8 @@ TEST(CollocationFall, InstructionSetsDifferByRoundingOnly) {
   }
 }
 
-TEST(CollocationFall, OneThatFailsLeavesTheOthersAlone) {
-  // No step keeps an accuracy of 0.
+TEST(CollocationFall, AFailingFallDoesNotAffectOthers) {
+  // No step reaches an accuracy of 0.
   const Chain chain(model_of(1));
   const std::vector<FallRequest> requests{request_for(chain), request_for(chain, 0.0),
                                           request_for(chain)};
@@ -278,7 +268,7 @@ TEST(FallBySteps, HasTheSameBitsAloneAndBesideOthers) {
   expect_same_bits_alone_and_beside_others(requests, solve_by_steps);
 }
 
-TEST(FallBySteps, AgreesWithStepsOfOneNumberAtATime) {
+TEST(FallBySteps, AgreesWithTheScalarFall) {
   ModelParameters model = model_of(2);
   model.lengths_m = {0.55};
   const Chain chain(model);
@@ -290,7 +280,7 @@ TEST(FallBySteps, AgreesWithStepsOfOneNumberAtATime) {
   EXPECT_NEAR(solution.fall->state_at(0.4).t_s, alone->state_at(0.4).t_s, 1e-12);
 }
 
-TEST(FallBySteps, OneThatFailsLeavesItsNeighboursAlone) {
+TEST(FallBySteps, AFailingFallDoesNotAffectOthers) {
   const Chain chain(model_of(1));
   const auto falls = solve_by_steps(
       std::vector{by_steps(chain), by_steps(chain, 1.0), by_steps(chain), by_steps(chain, 1e-300)});

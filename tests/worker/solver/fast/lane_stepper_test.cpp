@@ -19,7 +19,7 @@ struct Shape {
   int elements_per_link;
 };
 
-/// Unlike in all that chains of one shape may differ in.
+/// A model of a given shape whose other parameters depend on `number`.
 Chain chain_number(std::size_t i, const Shape& shape) {
   const double more = static_cast<double>(i);
   ModelParameters model = preset("paper");
@@ -46,13 +46,13 @@ AffineContactForce<double> push_at_tip(const Chain& chain) {
   return force;
 }
 
-/// A stepper of one kernel, and what became of its lanes.
+/// A stepper with one kernel, and the states of its lanes.
 class Steps {
  public:
   Steps(const Chain& shape, const LaneKernel& kernel)
       : stepper_(shape.tables(), kernel), accept_(kernel.lanes, 1) {}
 
-  /// Puts a chain that moves and is pushed at its tip into a lane.
+  /// Puts a moving chain with a force at its tip into a lane.
   void load(std::size_t lane, const Chain& chain) {
     ChainState state = chain.at_rest();
     state.v.row(1).setLinSpaced(0.0, -1.0);
@@ -66,7 +66,7 @@ class Steps {
       stepper_.settle(accept_);
     }
   }
-  /// All that a lane holds after a step: state, integrals, reactions.
+  /// State, integrals and reactions of a lane after a step.
   std::vector<double> of(std::size_t lane, const Chain& chain) const {
     const std::size_t size = 2 * chain.tables().rows;
     std::vector<double> all(2 * size);
@@ -94,7 +94,7 @@ std::vector<Chain> chains_of(const Shape& shape, std::size_t count) {
   return chains;
 }
 
-TEST(LaneStepper, GivesALaneTheSameBitsBesideOtherChainsAsBesideItsOwn) {
+TEST(LaneStepper, ALaneHasTheSameBitsBesideOtherChainsAndBesideEqualChains) {
   for (const LaneKernel& kernel : runnable_lane_kernels()) {
     for (const Shape& shape : kShapes) {
       SCOPED_TRACE(testing::Message() << kernel.name << ", links " << shape.links);
@@ -114,7 +114,7 @@ TEST(LaneStepper, GivesALaneTheSameBitsBesideOtherChainsAsBesideItsOwn) {
   }
 }
 
-/// The state that ExplicitMotion, the reference, comes to by as many of the same steps.
+/// The state of the reference, ExplicitMotion, after the same steps.
 std::vector<double> by_reference(const Chain& chain, int steps) {
   const ExplicitMotion motion(chain);
   ChainState state = chain.at_rest();
@@ -132,7 +132,7 @@ std::vector<double> by_reference(const Chain& chain, int steps) {
   return all;
 }
 
-TEST(LaneStepper, StepsAsTheReferenceDoesButForRounding) {
+TEST(LaneStepper, AgreesWithTheReferenceToRounding) {
   for (const LaneKernel& kernel : runnable_lane_kernels()) {
     for (const Shape& shape : kShapes) {
       SCOPED_TRACE(testing::Message() << kernel.name << ", links " << shape.links);
@@ -147,8 +147,8 @@ TEST(LaneStepper, StepsAsTheReferenceDoesButForRounding) {
         const auto expected = by_reference(last, 20);
         const auto actual = steps.of(kernel.lanes - 1, last);
         for (std::size_t i = 0; i < expected.size(); ++i) {
-          // Rounding of a slope's acceleration is some 2e-16 E/(rho l^3), 4e-4 1/s^2 at l = 25 mm;
-          // over the 2 us of these steps it grows to 1e-9 in rates that are of order 1.
+          // Rounding of the acceleration of a slope is about 2e-16 E/(rho l^3), 4e-4 1/s^2 at l =
+          // 25 mm. In the 2 us of these steps it changes rates, which are of order 1, by 1e-9.
           EXPECT_NEAR(actual[i], expected[i], 1e-8 * std::max(1.0, std::abs(expected[i]))) << i;
         }
       }
@@ -156,7 +156,7 @@ TEST(LaneStepper, StepsAsTheReferenceDoesButForRounding) {
   }
 }
 
-TEST(LaneStepper, ChangesOverWhileItRunsWithoutATrace) {
+TEST(LaneStepper, SwitchingBetweenSharedAndOwnConstantsLeavesTheResultsUnchanged) {
   const LaneKernel& kernel = runnable_lane_kernels().front();
   const auto chains = chains_of({3, 4}, 2);
   Steps changing(chains[0], kernel);

@@ -39,7 +39,8 @@ std::vector<std::optional<Outcome>> outcomes_of(const std::vector<ModelParameter
   EXPECT_TRUE(solve_many(
       models, points,
       [&](Outcome&& outcome) {
-        EXPECT_FALSE(outcomes.at(outcome.number)) << "point " << outcome.number << " came twice";
+        EXPECT_FALSE(outcomes.at(outcome.number))
+            << "point " << outcome.number << " was delivered twice";
         outcomes[outcome.number] = std::move(outcome);
       },
       options));
@@ -55,7 +56,7 @@ std::vector<ModelPoint> sweep(std::size_t models) {
   return points;
 }
 
-TEST(LibraryTest, ManyPointsInAnyOrderGiveTheBitsOfEachAlone) {
+TEST(LibraryTest, ManyPointsInAnyOrderHaveTheSameBitsAsAlone) {
   ModelParameters stiff = coarse_model();
   stiff.k_N_m *= 2.0;
   ModelParameters light = coarse_model();
@@ -72,7 +73,7 @@ TEST(LibraryTest, ManyPointsInAnyOrderGiveTheBitsOfEachAlone) {
   }
 }
 
-TEST(LibraryTest, APointOutsideItsRangeOrOfAModelOutsideItsDomainFailsAlone) {
+TEST(LibraryTest, AnInvalidPointOrAPointOfAnInvalidModelFailsAlone) {
   ModelParameters wrong = coarse_model();
   wrong.E_Pa = -1.0;
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -88,11 +89,11 @@ TEST(LibraryTest, APointOutsideItsRangeOrOfAModelOutsideItsDomainFailsAlone) {
   EXPECT_THAT(outcomes[4]->error, HasSubstr("H = 5 m is not allowed"));
 }
 
-TEST(LibraryTest, APointOfAModelThatIsNotGivenIsRefused) {
+TEST(LibraryTest, APointOfAnUnknownModelIsRefused) {
   EXPECT_THROW(outcomes_of({coarse_model()}, {{1, {1.0, 0.4, 1.0}}}), InputError);
 }
 
-/// Its fall takes hours: a test that waits for it is ended by its time limit and by nothing else.
+/// A model whose fall takes hours, so that a test that waits for it times out.
 ModelParameters model_that_falls_for_hours() {
   ModelParameters model = preset("paper");
   model.integrator = Integrator::kGeneralizedAlpha;
@@ -100,7 +101,7 @@ ModelParameters model_that_falls_for_hours() {
   return model;
 }
 
-TEST(LibraryTest, WhoeverAsksToEndIsAnsweredWhileAFallIsStillSolvedAndGetsNothingMore) {
+TEST(LibraryTest, ACallerCanEndTheCallDuringAFallAndGetsNoFurtherOutcome) {
   std::atomic<std::size_t> taken = 0;
   ManyOptions options;
   options.goes_on = [](std::size_t) { return false; };
@@ -110,7 +111,7 @@ TEST(LibraryTest, WhoeverAsksToEndIsAnsweredWhileAFallIsStillSolvedAndGetsNothin
   EXPECT_EQ(taken, 0U);
 }
 
-TEST(LibraryTest, WhatTheTakerThrowsComesOutWhileAFallIsStillSolved) {
+TEST(LibraryTest, AnExceptionOfTakeIsRethrownDuringAFall) {
   const auto take = [](Outcome&&) { throw std::runtime_error("the disk is full"); };
   EXPECT_THROW(solve_many(std::vector{coarse_model()}, sweep(1), take), std::runtime_error);
   const std::vector models{coarse_model(), model_that_falls_for_hours()};
@@ -120,7 +121,7 @@ TEST(LibraryTest, WhatTheTakerThrowsComesOutWhileAFallIsStillSolved) {
       std::runtime_error);
 }
 
-TEST(LibraryTest, NoFallIsBegunBehindTheEndOfTheWork) {
+TEST(LibraryTest, AfterAnExceptionNoFurtherFallIsSolved) {
   ModelParameters finer = coarse_model();
   finer.elements_per_link = 2;
   const auto falls = std::make_shared<FallCache>();
@@ -133,15 +134,15 @@ TEST(LibraryTest, NoFallIsBegunBehindTheEndOfTheWork) {
   EXPECT_FALSE(falls->kept_fall(finer));
 }
 
-TEST(LibraryTest, AFingerTakesItsFallFromTheCacheThatItIsGiven) {
+TEST(LibraryTest, AFingerTakesItsFallFromTheGivenCache) {
   const auto falls = std::make_shared<FallCache>();
   const Finger finger(coarse_model(), falls);
-  EXPECT_FALSE(falls->kept_fall(coarse_model())) << "not before it is needed";
+  EXPECT_FALSE(falls->kept_fall(coarse_model())) << "the fall is not solved before it is needed";
   expect_same_bits(finger.solve(1.0, 0.4, 0.9), Finger(coarse_model()).solve(1.0, 0.4, 0.9));
   EXPECT_TRUE(falls->kept_fall(coarse_model()));
 }
 
-TEST(LibraryTest, ATraceHasTheResultOfItsPointAndWhatItsSinkThrowsEndsIt) {
+TEST(LibraryTest, ATraceHasTheResultOfItsPointAndAnExceptionOfItsSinkEndsIt) {
   const Finger finger(coarse_model());
   std::size_t rows = 0;
   Tracing tracing;
@@ -152,7 +153,7 @@ TEST(LibraryTest, ATraceHasTheResultOfItsPointAndWhatItsSinkThrowsEndsIt) {
   EXPECT_THROW(static_cast<void>(finger.solve(1.0, 0.4, 0.9, tracing)), std::length_error);
 }
 
-TEST(LibraryTest, ErrorsAreThoseThatManyPointsHave) {
+TEST(LibraryTest, EstimatedErrorsAreEqualForOneAndForManyPoints) {
   ModelParameters model = preset("paper");
   model.elements_per_link = 2;
   const Finger finger(model);
@@ -164,7 +165,7 @@ TEST(LibraryTest, ErrorsAreThoseThatManyPointsHave) {
   EXPECT_EQ(outcomes[0]->result->errors, errors_by_companion(model, result, falls));
 }
 
-TEST(LibraryTest, AModelOutsideItsDomainAndAStepThatIsTooLongAreRefusedAtOnce) {
+TEST(LibraryTest, AnInvalidModelAndAnUnstableStepAreRefusedAtOnce) {
   ModelParameters model = coarse_model();
   model.dt_fall_s = 1.0;
   EXPECT_THROW(Finger{model}, InputError);

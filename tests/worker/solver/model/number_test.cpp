@@ -19,7 +19,7 @@ double read_back(const std::string& text) {
   return value;
 }
 
-TEST(Number, IsRepeatedAsSomebodyWouldWriteIt) {
+TEST(Number, IsWrittenAsAPersonWouldWriteIt) {
   for (const char* text : {"0.1", "0.3", "1", "-2.5", "0.0001", "100000", "1234567", "1e+06",
                            "7e+10", "0.0005309", "2.243e-08", "-0", "1e-05"}) {
     EXPECT_EQ(exact_number(read_back(text)), text);
@@ -41,7 +41,7 @@ TEST(Number, ReadsBackAsTheSameBits) {
   }
 }
 
-TEST(ReadableNumber, HasSignificantDigitsAndNoZerosAtItsEnd) {
+TEST(ReadableNumber, HasSignificantDigitsAndNoTrailingZeros) {
   EXPECT_EQ(readable_number(5057.62999), "5057.63");
   EXPECT_EQ(readable_number(12.5), "12.5");
   EXPECT_EQ(readable_number(0.1 + 0.2), "0.3");
@@ -51,7 +51,7 @@ TEST(ReadableNumber, HasSignificantDigitsAndNoZerosAtItsEnd) {
   EXPECT_EQ(readable_number(-1234.5678, 10), "-1234.5678");
 }
 
-TEST(ReadableNumber, KeepsDigitsBeforeThePointRatherThanTakeAnExponent) {
+TEST(ReadableNumber, PrefersDigitsBeforeThePointToAnExponent) {
   EXPECT_EQ(readable_number(123.4, 2), "123");
   EXPECT_EQ(readable_number(99.6, 2), "100");
   EXPECT_EQ(readable_number(14300.2, 3), "14300");
@@ -68,7 +68,7 @@ TEST(ReadableNumber, IsNeverMinusZero) {
   EXPECT_EQ(fixed_number(-0.006, 2), "-0.01");
 }
 
-TEST(ReadableNumber, SaysWhatIsNotANumber) {
+TEST(ReadableNumber, NamesInfinityAndNaN) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(readable_number(nan), "nan");

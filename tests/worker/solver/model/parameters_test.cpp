@@ -26,14 +26,14 @@ std::string objection_to(const ParameterKey& key, double value) {
   }
 }
 
-TEST(Parameters, EveryPresetIsInsideItsDomain) {
+TEST(Parameters, EveryPresetIsValid) {
   for (const std::string_view name : preset_names()) {
     EXPECT_NO_THROW(validate(preset(name))) << name;
   }
   EXPECT_THROW(preset("papers"), InputError);
 }
 
-TEST(Parameters, TheDefaultIsThePaperOnAMeshThatPredicts) {
+TEST(Parameters, TheDefaultIsThePaperOnAFinerMesh) {
   EXPECT_EQ(preset_names().front(), "standard");
   EXPECT_EQ(preset("standard"), ModelParameters{});
   ModelParameters paper = preset("paper");
@@ -42,7 +42,7 @@ TEST(Parameters, TheDefaultIsThePaperOnAMeshThatPredicts) {
   EXPECT_EQ(paper, preset("standard"));
 }
 
-TEST(Parameters, EveryKeyHasANameOfItsOwnAndReadsWhatItWrote) {
+TEST(Parameters, EveryKeyHasAUniqueNameAndReadsTheValueThatItWrote) {
   std::set<std::string_view> names;
   for (const ParameterKey& key : model_keys()) {
     EXPECT_TRUE(names.insert(key.name).second) << key.name;
@@ -55,7 +55,7 @@ TEST(Parameters, EveryKeyHasANameOfItsOwnAndReadsWhatItWrote) {
   EXPECT_EQ(find_model_key("lengths"), nullptr);
 }
 
-TEST(Parameters, NumberOfLinksKeepsTheFirstLengthAndLengthSetsAll) {
+TEST(Parameters, LinksKeepsTheFirstLengthAndLengthSetsAllLengths) {
   ModelParameters model;
   model.lengths_m = {0.3, 0.5};
   find_model_key("links")->set(model, 4.0);
@@ -64,7 +64,7 @@ TEST(Parameters, NumberOfLinksKeepsTheFirstLengthAndLengthSetsAll) {
   EXPECT_EQ(model.lengths_m, (std::vector<double>{0.2, 0.2, 0.2, 0.2}));
 }
 
-TEST(Parameters, AValueThatIsNotAllowedIsNamedWithItsUnitAndWhatIs) {
+TEST(Parameters, AForbiddenValueIsNamedWithItsUnitAndTheAllowedValues) {
   EXPECT_THAT(objection_to(*find_model_key("rho"), -1.0),
               AllOf(HasSubstr("rho = -1 kg/m^3 is not allowed"), HasSubstr("> 0")));
   for (const ParameterKey& key : model_keys()) {
@@ -80,7 +80,7 @@ TEST(Parameters, AValueThatIsNotAllowedIsNamedWithItsUnitAndWhatIs) {
   EXPECT_NE(objection_to(*find_model_key("spectral_radius"), 1.0), "");
 }
 
-TEST(Parameters, AToleranceThatNoStepCouldKeepOrThatMeansNothingIsRefusedByName) {
+TEST(Parameters, ATooSmallOrTooLargeToleranceIsRefusedByName) {
   const ParameterKey& tolerance = *find_model_key("tolerance");
   for (const double allowed : {1e-9, 1e-5, 0.01}) {
     EXPECT_EQ(objection_to(tolerance, allowed), "");
@@ -100,7 +100,7 @@ TEST(Parameters, ADropIsAtMostTheLengthOfTheChain) {
   EXPECT_THROW(validate_point(model, 0.5, 0.0, 1.1), InputError);
 }
 
-TEST(Parameters, IntegratorsGoByTheirNames) {
+TEST(Parameters, IntegratorsAreSelectedByName) {
   for (const Integrator integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
     EXPECT_EQ(integrator_named(integrator_name(integrator)), integrator);
   }
@@ -108,7 +108,7 @@ TEST(Parameters, IntegratorsGoByTheirNames) {
   EXPECT_THROW(integrator_named("implicit"), InputError);
 }
 
-TEST(FallModel, ModelsHaveOneHashExactlyWhenTheyShareAFall) {
+TEST(FallModel, ModelsHaveEqualHashesExactlyWhenTheyShareAFall) {
   std::set<std::uint64_t> hashes{fall_hash(ModelParameters())};
   std::size_t falls = 1;
   for (const auto& key : model_keys()) {

@@ -21,7 +21,7 @@ CaseResult with_lists() {
   return result;
 }
 
-TEST(ResultFields, StandForAMemberEachAndHaveAColumnEach) {
+TEST(ResultFields, HaveOneMemberAndOneColumnEach) {
   std::set<std::string_view> columns;
   std::set<const void*> members;
   CaseResult result{};
@@ -43,7 +43,7 @@ TEST(ResultFields, StandForAMemberEachAndHaveAColumnEach) {
   }
 }
 
-TEST(ResultFields, OfListsNameMembersThatTheirElementsHave) {
+TEST(ResultFields, OfListsNameMembersOfTheirElements) {
   const CaseResult result = with_lists();
   for (const ResultList* list : result_lists()) {
     std::size_t elements = 0;
@@ -67,7 +67,7 @@ TEST(ResultFields, OfListsNameMembersThatTheirElementsHave) {
   }
 }
 
-TEST(ResultFields, MajorPeaksAreCountedWithoutRipplesAndAbsentWhereThereAreFewer) {
+TEST(ResultFields, MajorPeaksExcludeRipplesAndAreAbsentIfThereAreFewer) {
   CaseResult result{};
   result.peaks = {
       {1e-5, 5057.0, 2023.0, true}, {2e-5, 40.0, 16.0, false}, {3e-5, 1516.0, 606.0, true}};
@@ -82,7 +82,7 @@ TEST(ResultFields, MajorPeaksAreCountedWithoutRipplesAndAbsentWhereThereAreFewer
   EXPECT_EQ(value("major_peak_3_t_s"), nullptr);
 }
 
-TEST(ResultFields, ANumberThatIsNotFiniteIsFoundWhereverItIs) {
+TEST(ResultFields, ANumberThatIsNotFiniteIsFoundInEveryField) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(is_finite(with_lists()));
   for_each_sent<double>([&](const ResultField& field, const Member<double>& member) {

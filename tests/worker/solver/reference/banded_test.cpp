@@ -21,8 +21,8 @@ struct Sample {
   Eigen::MatrixXd dense;
 };
 
-/// Random symmetric matrix of half-bandwidth 3 with `diagonal` added: positive definite for a large
-/// one.
+/// Random symmetric matrix of half-bandwidth 3 plus `diagonal` times the identity: positive
+/// definite if `diagonal` is large.
 Sample random_matrix(std::size_t rows, double diagonal, std::mt19937_64& generator) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   const auto n = static_cast<Eigen::Index>(rows);
@@ -59,10 +59,10 @@ TEST(BandedCholesky, SolvesAsADenseFactorisationDoes) {
   }
 }
 
-TEST(BandedCholesky, TellsAMatrixThatIsNotPositiveDefinite) {
+TEST(BandedCholesky, DetectsAMatrixThatIsNotPositiveDefinite) {
   std::mt19937_64 generator(2);
   for (int trial = 0; trial < 200; ++trial) {
-    // A diagonal of about 1 beside entries up to 1: some are, some are not.
+    // With a diagonal of about 1 and entries up to 1, some matrices are positive definite.
     const Sample sample = random_matrix(6, 1.8, generator);
     const double smallest =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(sample.dense).eigenvalues().minCoeff();
@@ -72,7 +72,7 @@ TEST(BandedCholesky, TellsAMatrixThatIsNotPositiveDefinite) {
   }
 }
 
-TEST(BandedMatrix, BilinearFormTakesEveryOtherEntryOfInterleavedVectors) {
+TEST(BandedMatrix, BilinearFormUsesEveryOtherEntryOfInterleavedVectors) {
   std::mt19937_64 generator(3);
   const Sample sample = random_matrix(9, 0.0, generator);
   const Eigen::VectorXd left = Eigen::VectorXd::Random(9);
@@ -89,7 +89,7 @@ TEST(BandedMatrix, BilinearFormTakesEveryOtherEntryOfInterleavedVectors) {
 
 constexpr std::size_t kBandwidth = 3;
 
-TEST(BandedLu, SolvesAsADenseFactorisationDoesAlsoWithZerosOnTheDiagonal) {
+TEST(BandedLu, SolvesAsADenseFactorisationDoesEvenWithZerosOnTheDiagonal) {
   std::mt19937_64 generator(1);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   for (std::size_t rows = 1; rows <= 30; ++rows) {
@@ -99,7 +99,7 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesAlsoWithZerosOnTheDiagonal) {
     for (std::size_t i = 0; i < rows; ++i) {
       for (std::size_t j = i < kBandwidth ? 0 : i - kBandwidth;
            j <= std::min(rows - 1, i + kBandwidth); ++j) {
-        // Every third diagonal entry is zero, as a multiplier's is.
+        // Every third diagonal entry is zero, as for a multiplier.
         const double value = i == j && i % 3 == 2 ? 0.0 : uniform(generator);
         banded.add(i, j, value);
         dense(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = value;
@@ -120,7 +120,7 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesAlsoWithZerosOnTheDiagonal) {
   }
 }
 
-TEST(BandedLu, ABlockIsItsEntriesOneByOne) {
+TEST(BandedLu, AddingABlockEqualsAddingItsEntries) {
   const Eigen::Matrix2d block{{4.0, 1.0}, {2.0, 3.0}};
   BandedLu<1> by_block(3);
   BandedLu<1> by_entries(3);
@@ -140,7 +140,7 @@ TEST(BandedLu, ABlockIsItsEntriesOneByOne) {
   EXPECT_EQ(x, y);
 }
 
-TEST(BandedLu, TellsASingularMatrix) {
+TEST(BandedLu, DetectsASingularMatrix) {
   BandedLu<1> matrix(3);
   matrix.add(0, 0, 1.0);
   matrix.add(1, 0, 1.0);

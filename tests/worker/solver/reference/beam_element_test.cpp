@@ -19,7 +19,7 @@ const ElementConstants<double>& constants() {
   return of_element;
 }
 
-/// p_i, s_i, p_j, s_j, one column a direction.
+/// p_i, s_i, p_j, s_j; one column for each direction.
 using Nodes = Eigen::Matrix<double, 4, 2>;
 
 Nodes random_nodes(std::mt19937_64& generator) {
@@ -53,7 +53,7 @@ Nodes energy_gradient(const Nodes& q) {
   return elastic_gradient(q.transpose(), constants()).transpose();
 }
 
-/// Central difference of five points: exact for polynomials up to degree 4, which the energy is.
+/// Five-point central difference, exact for polynomials up to degree 4 such as the energy.
 template <class Function>
 std::invoke_result_t<Function, double> five_point_difference(const Function& f, double h) {
   return ((f(-2.0 * h) - f(2.0 * h)) + 8.0 * (f(h) - f(-h))) / (12.0 * h);
@@ -119,11 +119,11 @@ TEST(BeamElement, ElasticForceIsMinusTheGradientOfTheStrainEnergy) {
   }
 }
 
-TEST(BeamElement, RigidTranslationAndRotationGiveNeitherForceNorEnergy) {
+TEST(BeamElement, RigidMotionsGiveNeitherForceNorEnergy) {
   for (const double angle_rad : {0.0, 0.3, 1.5707, 2.6, -3.0}) {
     const Nodes q = straight_nodes(angle_rad, 0.7, -1.2);
-    // Strains are differences of numbers of size 1: forces vanish to EA times rounding, energies
-    // to EA l times its square.
+    // Strains are differences of numbers of size 1, so forces vanish to EA times rounding, and
+    // energies to EA l times the square of rounding.
     EXPECT_LT(energy_gradient(q).cwiseAbs().maxCoeff(), 1e-14 * kEA_N) << angle_rad;
     EXPECT_LT(energy(q), 1e-26 * kEA_N * kLength_m) << angle_rad;
   }
@@ -150,7 +150,7 @@ TEST(BeamElement, FiveGaussPointsGiveTheExactEnergy) {
       simpson += weight * 0.5 * (kEA_N * strain * strain + kEI_N_m2 * curvature_squared);
     }
     simpson *= kLength_m / kIntervals / 3.0;
-    // Simpson's error falls as the fourth power of the interval: 1e-14 times a derivative.
+    // The error of Simpson's rule is the fourth power of the interval, 1e-14, times a derivative.
     EXPECT_NEAR(energy(q), simpson, 1e-10 * energy(q));
   }
 }
@@ -174,7 +174,7 @@ TEST(BeamElement, UniformLoadIsExactOnPolynomials) {
   }
 }
 
-TEST(BeamElement, ConstantsHaveTheEntriesOfTheMassMatrix) {
+TEST(BeamElement, ConstantsAgreeWithTheMassMatrix) {
   const Eigen::Matrix4d m = mass_matrix(1.4, kLength_m);
   const auto& k = constants();
   const Eigen::Matrix4d expected{{k.m_pp, k.m_ps, k.n_pp, -k.n_ps},
@@ -194,7 +194,7 @@ TEST(BeamElement, TangentIsTheDerivativeOfTheElasticForceAndSymmetric) {
     for (int column = 0; column < 8; ++column) {
       Nodes direction = Nodes::Zero();
       direction(column / 2, column % 2) = 1.0;
-      // The force is a cubic polynomial, so five points are exact.
+      // The force is a cubic polynomial, for which five points are exact.
       const Nodes derivative = five_point_difference(
           [&](double h) -> Nodes { return energy_gradient(q + h * direction); }, 0.01);
       const Eigen::Vector<double, 8> expected = derivative.transpose().reshaped();
@@ -203,7 +203,7 @@ TEST(BeamElement, TangentIsTheDerivativeOfTheElasticForceAndSymmetric) {
   }
 }
 
-TEST(BeamElement, AMatrixOfOneDirectionActsOnBothAlike) {
+TEST(BeamElement, AMatrixForOneDirectionActsEquallyOnBoth) {
   const Eigen::Matrix4d matrix = Eigen::Matrix4d::Random();
   const ElementCoordinates q = ElementCoordinates::Random();
   const ElementCoordinates expected = q * matrix.transpose();

@@ -8,7 +8,7 @@
 
 namespace oblique::solver {
 
-/// Rows that hold positions, the pin first: slopes lie between, one a node, two at a joint.
+/// Rows of positions, the pin first. Slopes lie between them, one at a node and two at a joint.
 inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   std::vector<Eigen::Index> rows{0};
   const std::size_t links = model.lengths_m.size();
@@ -21,8 +21,8 @@ inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   return rows;
 }
 
-/// Matrices of a chain as dense ones, got from its energies and accelerations alone: row 0 (the
-/// pin) is left out, so entry i belongs to row i + 1. Both directions share the mass matrix.
+/// Dense matrices of a chain, computed from its energies and accelerations only. Row 0, the pin, is
+/// left out, so entry i belongs to row i + 1. Both directions share the mass matrix.
 class ChainProbe {
  public:
   explicit ChainProbe(const Chain& chain) : chain_(chain) {
@@ -57,12 +57,12 @@ class ChainProbe {
     return a.rightCols(mass_.rows()).transpose();
   }
 
-  /// -dU/dq as the chain applies it: M q'' - Q.
+  /// -dU/dq, computed as M q'' - Q.
   Pairs elastic_force(const Coordinates& q) const {
     return mass_ * accelerations(q, 0.0, 0.0) - gravity_;
   }
 
-  /// A state at rest, deformed and displaced at random; the pin stays.
+  /// A randomly deformed state at rest, with the pin at the origin.
   Coordinates random_coordinates(std::mt19937_64& generator, double size) const {
     std::uniform_real_distribution<double> uniform(-size, size);
     Coordinates q = chain_.at_rest().q;

@@ -29,7 +29,7 @@ double length_m(const ModelParameters& model) {
   return std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
 }
 
-/// Turns the straight chain as a whole about the pin.
+/// Rotates the straight chain about the pin.
 Coordinates turned(const Chain& chain, double angle_rad) {
   Coordinates q = chain.at_rest().q;
   q.row(1) = std::sin(angle_rad) * q.row(0);
@@ -51,7 +51,7 @@ TEST(Chain, ElasticForceIsMinusTheGradientOfTheStrainEnergy) {
           moved(i) += h;
           return chain.strain_energy_J(moved);
         };
-        // The energy is a polynomial of degree 4: five points differentiate it exactly.
+        // The energy is a polynomial of degree 4, for which five points are exact.
         const double h = 0.05;
         const double gradient =
             ((energy(-2 * h) - energy(2 * h)) + 8 * (energy(h) - energy(-h))) / (12 * h);
@@ -77,19 +77,19 @@ TEST(Chain, AccelerationsSolveTheEquationsOfMotion) {
   EXPECT_LT((accelerations - expected).norm(), 1e-10 * expected.norm());
 }
 
-TEST(Chain, RigidTurnAboutThePinCostsNoEnergyAndNoForce) {
+TEST(Chain, RigidRotationAboutThePinGivesNeitherForceNorEnergy) {
   const Chain chain(chain_of(3, 4));
   const ChainProbe probe(chain);
   for (const double angle_rad : {-1.5, -0.4, 0.9, 3.0}) {
     const Coordinates q = turned(chain, angle_rad);
     EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-    // Against the 3.7e7 N that a strain of 1 gives.
+    // Compared with 3.7e7 N at a strain of 1.
     EXPECT_LT(probe.elastic_force(q).cwiseAbs().maxCoeff(), 1e-5);
   }
 }
 
-TEST(Chain, JointsTurnFreely) {
-  // The outer half of two equal links folds up: nothing is stored.
+TEST(Chain, JointsRotateFreely) {
+  // Folding the outer one of two equal links stores no energy.
   ModelParameters model = preset("paper");
   model.lengths_m = {0.4, 0.4};
   model.elements_per_link = 1;
@@ -99,7 +99,7 @@ TEST(Chain, JointsTurnFreely) {
   ASSERT_EQ(chain.rows(), 7);
   q.rightCols<3>() << 0.0, 0.4, 0.0, 1.0, 0.4, 1.0;
   EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-  // At the slope before the joint, the same turn bends the inner link.
+  // Rotating the slope before the joint instead bends the inner link.
   q.col(2) << 0.0, 1.0;
   EXPECT_GT(chain.strain_energy_J(q), 1.0);
 }
@@ -128,7 +128,7 @@ TEST(Chain, TurningAboutThePinItHasTheMomentOfInertiaOfARod) {
   EXPECT_NEAR(chain.kinetic_energy_J(v), 0.5 * inertia * 4.0, 1e-12 * inertia);
 }
 
-TEST(Chain, InFreeFallNothingIsHeldAtThePinOrAJoint) {
+TEST(Chain, InFreeFallReactionsAreZero) {
   ModelParameters model = chain_of(3, 2);
   model.tip_mass_kg = 0.1;
   const Chain chain(model);
@@ -166,7 +166,7 @@ TEST(ChainFrequency, IsTheLargestEigenvalueOfTheNumericalJacobian) {
           jacobian.col(j) = Eigen::Map<const Eigen::VectorXd>(column.data(), size);
         }
         const double dense = std::sqrt(-jacobian.eigenvalues().real().minCoeff());
-        // The difference quotient of a cubic errs by h^2, 1e-8 here.
+        // The difference quotient of a cubic has an error of h^2, here 1e-8.
         EXPECT_NEAR(chain.highest_frequency_rad_s(stiffness_N_m), dense, 1e-6 * dense)
             << links << " links, n = " << n << ", k = " << stiffness_N_m;
       }
@@ -175,7 +175,7 @@ TEST(ChainFrequency, IsTheLargestEigenvalueOfTheNumericalJacobian) {
 }
 
 TEST(ChainFrequency, GivesTheKnownStabilityLimitsOfVerlet) {
-  // Delta t = 2/omega, to the digits known, with the printed cross-section.
+  // Delta t = 2/omega to the known digits, with the printed cross-section.
   struct Known {
     int elements_per_link;
     double dt_s;
@@ -189,7 +189,7 @@ TEST(ChainFrequency, GivesTheKnownStabilityLimitsOfVerlet) {
   }
 }
 
-TEST(Chain, TheTipShowsItsOwnMassAndAPartOfTheLastElement) {
+TEST(Chain, TheEffectiveTipMassIsThePointMassAndAPartOfTheLastElement) {
   ModelParameters model = preset("paper");
   const double bare_kg = Chain(model).tip_inertia_kg();
   const double element_kg = model.rho_kg_m3 * model.A_m2 * model.lengths_m.back() / 4.0;

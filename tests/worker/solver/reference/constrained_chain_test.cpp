@@ -9,8 +9,8 @@
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 
-/// The constrained chain and generalized-alpha against the eliminated chain: the same system in
-/// other coordinates.
+/// The constrained chain and generalized-alpha compared with the eliminated chain, which is the
+/// same system in other coordinates.
 namespace oblique::solver {
 namespace {
 
@@ -35,7 +35,7 @@ ChainState bent_and_moving(const Chain& chain) {
 
 const AffineContactForce<double> kStick{900.0, -250.0, 2.7e7, 0.0, 2.1e7, 1.05, 0.0};
 
-TEST(ConstrainedChain, HasTheEnergiesOfTheEliminatedOne) {
+TEST(ConstrainedChain, HasTheEnergiesOfTheEliminatedChain) {
   const Chain eliminated(three_links());
   const ConstrainedChain constrained(three_links());
   const ChainState state = bent_and_moving(eliminated);
@@ -47,7 +47,7 @@ TEST(ConstrainedChain, HasTheEnergiesOfTheEliminatedOne) {
   EXPECT_EQ(constrained.tip(same).y_m, eliminated.tip(state).y_m);
 }
 
-TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedOne) {
+TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedChain) {
   const Chain eliminated(three_links());
   const ConstrainedChain constrained(three_links());
   const ChainState same = from_eliminated(constrained, bent_and_moving(eliminated));
@@ -57,8 +57,8 @@ TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedOne) {
 }
 
 TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
-  // For every displacement, dq . (Phi_qᵀ lambda) = lambda . Phi(dq): a joint pushes both of its
-  // links alike, and the pin is the only force from outside.
+  // For every displacement dq, dq . (Phi_qᵀ lambda) = lambda . Phi(dq): a joint exerts opposite
+  // forces on its two links, and only the pin exerts an external force.
   const ConstrainedChain chain(three_links());
   std::mt19937_64 generator(2);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -79,7 +79,7 @@ TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
   }
 }
 
-TEST(ConstrainedChain, ConsistentAccelerationsAndReactionsAreThoseOfTheEliminatedOne) {
+TEST(ConstrainedChain, ConsistentAccelerationsAndReactionsAreThoseOfTheEliminatedChain) {
   const Chain eliminated(three_links());
   const ExplicitMotion by_elimination(eliminated);
   const GeneralizedAlphaMotion by_constraints(three_links());
@@ -103,7 +103,7 @@ TEST(ConstrainedChain, ConsistentAccelerationsAndReactionsAreThoseOfTheEliminate
   }
 }
 
-TEST(GeneralizedAlpha, ParametersAreThoseOfSecondOrderForEveryRadius) {
+TEST(GeneralizedAlpha, ParametersGiveSecondOrderForEverySpectralRadius) {
   for (const double xi : {0.0, 0.3, 0.9, 1.0}) {
     const GeneralizedAlphaParameters p(xi);
     EXPECT_NEAR(p.gamma, 0.5 - p.alpha_m + p.alpha_f, 1e-15);

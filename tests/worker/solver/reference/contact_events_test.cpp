@@ -72,7 +72,7 @@ std::vector<ContactEvent> possible(const ContactLaw& law) {
   return events;
 }
 
-TEST(ContactEvents, EachRegimeHasItsOwnEventsInTheOrderInWhichTheyAreTaken) {
+TEST(ContactEvents, EachRegimeHasItsEventsInTheirStatedOrder) {
   using enum ContactEvent;
   EXPECT_THAT(possible(slipping()), ElementsAre(kTurn, kStick));
   EXPECT_THAT(possible(restitution(false)), ElementsAre(kSeparation, kTurn, kStick));
@@ -92,7 +92,7 @@ TEST(ContactEvents, RatesAreTheDerivativesOfTheFunctionsDefinedByForces) {
       const auto value = [&](double z) {
         return event_function(law, event, motion.at(z), 1.0).value;
       };
-      // Forces are affine in time here: the difference quotient errs by rounding alone.
+      // Forces are affine in time here, so that the difference quotient has only rounding errors.
       EXPECT_NEAR(event_function(law, event, motion.at(0.5), 1.0).rate,
                   (value(1.0) - value(0.0)) / kStep_s, 1e-3);
     }
@@ -106,11 +106,11 @@ TEST(ContactEvents, SignsAreThoseOfTheirDefinitions) {
   const auto value = [&](const ContactLaw& law, ContactEvent event, const TipState& tip) {
     return event_function(law, event, tip, 1.0).value;
   };
-  EXPECT_LT(value(compression, kTurn, pressed), 0.0) << "still going down";
+  EXPECT_LT(value(compression, kTurn, pressed), 0.0) << "moving down";
   EXPECT_GT(value(compression, kTurn, {0.0, -1e-5, 1.0, 1.0}), 0.0);
-  EXPECT_GT(value(restitution(false), kTurn, pressed), 0.0) << "going down again";
+  EXPECT_GT(value(restitution(false), kTurn, pressed), 0.0) << "moving down again";
   EXPECT_LT(value(compression, kSeparation, pressed), 0.0) << "F_n > 0";
-  EXPECT_LT(value(compression, kStick, {0.0, 0.0, 1.0, 0.0}), 0.0) << "P slides on";
+  EXPECT_LT(value(compression, kStick, {0.0, 0.0, 1.0, 0.0}), 0.0) << "P continues to slide";
   EXPECT_GT(value(compression, kStick, {0.0, 0.0, -1.0, 0.0}), 0.0);
   EXPECT_LT(value(sticking(), kSlipForward, pressed), 0.0) << "inside the cone";
   EXPECT_LT(value(sticking(), kSlipBackward, pressed), 0.0);
@@ -118,13 +118,13 @@ TEST(ContactEvents, SignsAreThoseOfTheirDefinitions) {
   EXPECT_GT(value(sticking(), kSlipBackward, {-1e-3, -1e-5, -1.0, 0.0}), 0.0);
 }
 
-TEST(GuessEvent, ATurnIsWhereVnRisesThroughZeroFromBelow) {
+TEST(GuessEvent, ATurnIsWhereVnRisesThroughZero) {
   struct Case {
     const char* what;
     double a, b, c;  ///< of V_n
     bool is_compression;
     bool is_fresh;
-    double fraction;  ///< -1: no event
+    double fraction;  ///< −1 if there is no event
     bool is_inside_only = false;
   };
   const Case cases[] = {
@@ -159,12 +159,12 @@ TEST(GuessEvent, ATurnIsWhereVnRisesThroughZeroFromBelow) {
   }
 }
 
-TEST(GuessEvent, ForceThatFallsToZeroAlongACubicIsFoundExactly) {
+TEST(GuessEvent, AForceThatFallsToZeroAlongACubicIsFoundExactly) {
   // In restitution F_n = 10 N - k_n (y + 1e-5), k_n = 1e6/0.64; zero at y = -3.6e-6.
   const ContactLaw law = restitution(false);
   const TipMotion motion = with_normal_velocity(0.03, 0.04, 0.03);
   const auto found = guess(law, ContactEvent::kSeparation, motion);
-  // It does not get there within this step ...
+  // It does not reach zero within this step ...
   EXPECT_FALSE(found);
   const TipMotion faster = with_normal_velocity(0.1, 0.04, 0.03);
   const auto separation = guess(law, ContactEvent::kSeparation, faster);
@@ -172,7 +172,7 @@ TEST(GuessEvent, ForceThatFallsToZeroAlongACubicIsFoundExactly) {
   EXPECT_NEAR(faster.at(separation->fraction).y_m, -3.6e-6, 1e-17);
 }
 
-TEST(GuessEvent, FunctionThatIsZeroThroughoutIsNoEvent) {
+TEST(GuessEvent, AFunctionThatIsZeroThroughoutIsNoEvent) {
   // A tip that never moves along the ground.
   const TipMotion straight_down{[](double) { return 0.0; }, [](double t) { return -1e-5 - t; },
                                 [](double) { return 0.0; }, [](double) { return -1.0; }};
@@ -186,7 +186,7 @@ TEST(GuessEvent, FunctionThatIsZeroThroughoutIsNoEvent) {
   }
 }
 
-TEST(FarFromEvents, OnlyWhereNoEventIsGuessedAndNearlyAlwaysThere) {
+TEST(FarFromEvents, HoldsOnlyIfNoEventIsGuessedAndThenNearlyAlways) {
   std::mt19937_64 generator(5);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   int far = 0;

@@ -12,7 +12,7 @@ namespace {
 constexpr ContactParameters kParameters{2.7e7, 1.25, 0.5, 0.7};
 constexpr TipState kTouch{0.6, -1.0, -3.0, -2.0};
 
-/// A law after `turns` turns, in slip or stick, with anchors off zero.
+/// A law after `turns` turns, in slip or stick, with nonzero anchors.
 ContactLaw law_after(int turns, bool stick) {
   TipState tip{0.6, -1.0, stick ? -0.5 : -3.0, -2.0};
   ContactLaw law(kParameters, tip);
@@ -41,14 +41,14 @@ TipState random_tip(std::mt19937_64& generator) {
   return {0.6 + way(generator), -1.0 - 1e-4 + way(generator), speed(generator), speed(generator)};
 }
 
-TEST(ContactLaw, TouchStartsInCompressionWithoutForces) {
+TEST(ContactLaw, TouchBeginsInCompressionWithoutForces) {
   const ContactLaw law(kParameters, kTouch);
   EXPECT_TRUE(law.is_compression());
   EXPECT_EQ(law.fn_N(kTouch), 0.0);
   EXPECT_EQ(law.ft_N(kTouch), 0.0);
 }
 
-TEST(ContactLaw, SticksAtTouchExactlyWhenTheTipComesSteeperThanTheFrictionAllows) {
+TEST(ContactLaw, SticksAtTouchExactlyIfTheTipMovesSteeplyEnoughForTheFriction) {
   // |V_t/V_n| < mu eta2 = 0.625.
   EXPECT_TRUE(ContactLaw(kParameters, {0.0, 0.0, 0.6249, -1.0}).is_stick());
   EXPECT_TRUE(ContactLaw(kParameters, {0.0, 0.0, -0.6249, -1.0}).is_stick());
@@ -59,7 +59,7 @@ TEST(ContactLaw, SticksAtTouchExactlyWhenTheTipComesSteeperThanTheFrictionAllows
   EXPECT_FALSE(ContactLaw(smooth, {0.0, 0.0, 0.0, -1.0}).is_stick());
 }
 
-TEST(ContactLaw, FrictionActsAgainstTheSlidingOfP) {
+TEST(ContactLaw, FrictionOpposesTheSlidingOfP) {
   for (const double vt_m_s : {-3.0, 3.0}) {
     const TipState touch{0.0, 0.0, vt_m_s, -2.0};
     const ContactLaw law(kParameters, touch);
@@ -82,7 +82,7 @@ TEST(ContactLaw, SlopesAreKInCompressionAndKOverTheSquareOfRestitutionAfterEvery
   }
 }
 
-TEST(ContactLaw, ForcesAreContinuousOverATurn) {
+TEST(ContactLaw, ForcesAreContinuousAtATurn) {
   std::mt19937_64 generator(1);
   for (const ContactLaw& before : all_regimes()) {
     const TipState tip = random_tip(generator);
@@ -95,12 +95,12 @@ TEST(ContactLaw, ForcesAreContinuousOverATurn) {
   }
 }
 
-TEST(ContactLaw, ForcesAreContinuousWherePStartsToSlideOnTheConeOnEitherSide) {
+TEST(ContactLaw, ForcesAreContinuousWhenPStartsToSlideInEitherDirection) {
   for (const double side : {-1.0, 1.0}) {
     ContactLaw law(kParameters, {0.0, 0.0, -0.1 * side, -1.0});
     ASSERT_TRUE(law.is_stick());
     TipState tip{0.0, -1e-4, -0.1 * side, -1.0};
-    // Moved until F_t = side mu F_n.
+    // Displaced until F_t = side mu F_n.
     tip.x_m = -side * kParameters.mu * law.fn_N(tip) / law.tangential_stiffness_N_m();
     const double fn_N = law.fn_N(tip);
     const double ft_N = law.ft_N(tip);
@@ -132,7 +132,7 @@ TEST(ContactLaw, RatesAreTheDerivativesOfTheForcesAlongTheMotion) {
       return TipState{tip.x_m + t_s * tip.vx_m_s, tip.y_m + t_s * tip.vy_m_s, tip.vx_m_s,
                       tip.vy_m_s};
     };
-    // Forces are affine in positions: the central difference errs by rounding alone.
+    // Forces are affine in positions, so that the central difference has only rounding errors.
     const double fn_rate = (law.fn_N(moved(h_s)) - law.fn_N(moved(-h_s))) / (2.0 * h_s);
     const double ft_rate = (law.ft_N(moved(h_s)) - law.ft_N(moved(-h_s))) / (2.0 * h_s);
     EXPECT_NEAR(law.fn_rate_N_s(tip), fn_rate, 1e-8 * kParameters.k_N_m);
@@ -140,7 +140,7 @@ TEST(ContactLaw, RatesAreTheDerivativesOfTheForcesAlongTheMotion) {
   }
 }
 
-TEST(ContactLaw, PositionOfPMovesWithTheSlipVelocityInSlipAndRestsInStick) {
+TEST(ContactLaw, PMovesWithTheSlipVelocityInSlipAndIsAtRestInStick) {
   std::mt19937_64 generator(4);
   for (const ContactLaw& law : all_regimes()) {
     const TipState tip = random_tip(generator);

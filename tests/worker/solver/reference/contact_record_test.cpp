@@ -23,7 +23,7 @@ constexpr TipState at(double x_m, double y_m) {
   return {x_m, y_m, 0.0, 0.0};
 }
 
-/// A contact that is driven step by step: the law, what is recorded of it, and where the tip is.
+/// A contact that the test advances step by step: law, record and position of the tip.
 struct RecordedContact {
   explicit RecordedContact(double vt_in_m_s)
       : tip{0.0, 0.0, vt_in_m_s, -1.0}, law(kParameters, tip), record(law, tip) {}
@@ -73,10 +73,10 @@ TEST(ContactRecord, StickThroughATurnIsOneInterval) {
   EXPECT_EQ(result.stick_total_s, 1.5e-4);
 }
 
-TEST(ContactRecord, AStateOfNoLengthIsNotInTheMode) {
+TEST(ContactRecord, AStateOfZeroDurationIsNotInTheMode) {
   RecordedContact contact(kSliding_m_s);
   contact.step_to(at(1e-6, -1e-4));
-  contact.turn(1e-4);   // sR, left at once
+  contact.turn(1e-4);   // sR, of zero duration
   contact.stick(1e-4);  // SR
   contact.step_to(at(1e-6, 0.0));
   const CaseResult result = contact.finished(2e-4);
@@ -97,11 +97,11 @@ TEST(ContactRecord, AStateThatBeginsAtSeparationIsNotInTheMode) {
   EXPECT_EQ(result.stick_intervals[0].t1_s, 2e-4);
 }
 
-TEST(ContactRecord, LargestTangentialForceOfAPeakCountsTheValleyFromWhichItFalls) {
+TEST(ContactRecord, TheTangentialForceOfAPeakIncludesAdjacentValleys) {
   RecordedContact contact(kSticking_m_s);
   contact.step_to(at(-4e-5, -1e-4));
   contact.turn(1e-4);
-  contact.step_to(at(-5e-5, -5e-5));  // the valley, where |F_t| is largest
+  contact.step_to(at(-5e-5, -5e-5));  // the valley, with the largest |F_t|
   contact.turn(2e-4);
   contact.step_to(at(-1e-5, -8e-5));
   contact.turn(3e-4);
@@ -113,7 +113,7 @@ TEST(ContactRecord, LargestTangentialForceOfAPeakCountsTheValleyFromWhichItFalls
   EXPECT_DOUBLE_EQ(result.ft_peak_N, kTangential_N_m * 5e-5);
 }
 
-TEST(ContactRecord, WorkExchangedCountsWhatGoesInAndWhatComesBack) {
+TEST(ContactRecord, ExchangedWorkIsTheSumOfAbsoluteValuesInBothDirections) {
   RecordedContact contact(kSticking_m_s);
   ContactIntegrals<double> integrals;
   integrals.work_t = 0.25;
@@ -122,7 +122,7 @@ TEST(ContactRecord, WorkExchangedCountsWhatGoesInAndWhatComesBack) {
   integrals.work_t = -0.375;
   contact.step_to(at(0.0, 0.0), integrals);
   const CaseResult result = contact.finished(2e-4);
-  // F_n = 1e6 N/m 1e-3 m: half a joule each way, against that along the ground.
+  // F_n = 1e6 N/m * 1e-3 m: half a joule in each direction, besides the tangential work.
   EXPECT_DOUBLE_EQ(result.energy.exchanged_J, 0.5 + 0.5 + 0.25 + 0.375);
   EXPECT_DOUBLE_EQ(result.energy.friction_J, 0.125);
   EXPECT_NEAR(result.energy.restitution_J, 0.0, 1e-15);
@@ -130,7 +130,7 @@ TEST(ContactRecord, WorkExchangedCountsWhatGoesInAndWhatComesBack) {
 
 using testing::ElementsAreArray;
 
-TEST(WithoutRipples, KeepsWhatIsAtLeastFivePercentOfTheLargestPeakApart) {
+TEST(WithoutRipples, KeepsPeaksAndValleysThatDifferByAtLeastFivePercentOfTheLargestPeak) {
   struct Case {
     const char* what;
     std::vector<double> fn_N;
@@ -159,7 +159,7 @@ TEST(WithoutRipples, KeepsWhatIsAtLeastFivePercentOfTheLargestPeakApart) {
   }
 }
 
-TEST(WithoutRipples, WhatSurvivesAlternatesBeginsAndEndsWithAPeakAndKeepsTheLargest) {
+TEST(WithoutRipples, TheRestAlternatesBeginsAndEndsWithAPeakAndContainsTheLargestPeak) {
   std::mt19937_64 generator(1);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   for (int trial = 0; trial < 500; ++trial) {
@@ -190,15 +190,15 @@ TEST(WithoutRipples, WhatSurvivesAlternatesBeginsAndEndsWithAPeakAndKeepsTheLarg
 
 constexpr double k_N_m = 1e6;
 constexpr double kEta2 = 1.25;
-constexpr double kStep_s = 0.97e-6;  // what happens does so inside steps
+constexpr double kStep_s = 0.97e-6;  // so that events lie inside steps
 
-/// Half a period of V_n, in which it goes from -1 to 1 m/s, but for what is added to it.
+/// Half a period in which V_n goes from -1 to 1 m/s.
 TipState half_period(double t_s, double vt_m_s) {
   constexpr double kRate = M_PI / 1e-4;
   return {vt_m_s * t_s, -std::sin(kRate * t_s) / kRate, vt_m_s, -std::cos(kRate * t_s)};
 }
 
-/// V_n rises from -1 m/s to `nearest` below zero within 50 us, and falls to -1 m/s again.
+/// V_n rises from -1 m/s to `nearest` below zero within 50 us and falls back to -1 m/s.
 TipState grazing(double t_s, double nearest_m_s) {
   constexpr double kRate = 2.0 * M_PI / 1e-4;
   const double amplitude = 0.5 * (1.0 - nearest_m_s);
@@ -221,7 +221,7 @@ ContactMargin::Nearest margin_of(const Contact& contact) {
   return contact.margin().nearest(contact.law().fn_N(contact.tip()) + 100.0);
 }
 
-TEST(ContactMargin, OfAVelocityThatNearlyTurnsIsWhatItKeptFromZero) {
+TEST(ContactMargin, OfANearTurnIsTheSmallestDistanceOfTheVelocityFromZero) {
   for (const double nearest_m_s : {1e-2, 1e-4, 1e-6}) {
     const Contact contact =
         followed([=](double t_s) { return grazing(t_s, nearest_m_s); }, 0.0, 1e-4);
@@ -233,18 +233,18 @@ TEST(ContactMargin, OfAVelocityThatNearlyTurnsIsWhatItKeptFromZero) {
   }
 }
 
-TEST(ContactMargin, OfARippleIsHowFarTheVelocityWentBeyondZero) {
+TEST(ContactMargin, OfARippleIsTheLargestVelocityBetweenItsTurns) {
   for (const double beyond_m_s : {1e-2, 1e-4, 1e-6}) {
     const Contact contact =
         followed([=](double t_s) { return grazing(t_s, -beyond_m_s); }, 0.0, 1e-4);
-    ASSERT_EQ(contact.events(), 2) << "there and back";
+    ASSERT_EQ(contact.events(), 2) << "two turns";
     const auto margin = margin_of(contact);
     EXPECT_NEAR(margin.distance * std::hypot(20.0, 1.0), beyond_m_s, 1e-7 + 1e-2 * beyond_m_s);
     EXPECT_EQ(margin.event, "turn");
   }
 }
 
-TEST(ContactMargin, AtTouchIsWhatSeparatesStickFromSlip) {
+TEST(ContactMargin, AtTouchIsTheDistanceBetweenStickAndSlip) {
   for (const double vt_m_s : {0.5 * kEta2 - 1e-3, 0.5 * kEta2 + 1e-3}) {
     const Contact contact =
         followed([=](double t_s) { return half_period(t_s, vt_m_s); }, 0.5, kStep_s);
@@ -254,8 +254,9 @@ TEST(ContactMargin, AtTouchIsWhatSeparatesStickFromSlip) {
   }
 }
 
-TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsTheLargest) {
-  // It turns once and leaves as fast as it came; that P never sticks is no matter of chance.
+TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsOne) {
+  // It turns once and leaves at the speed of touch. Without friction P never sticks, so stick does
+  // not count.
   const Contact contact = followed([](double t_s) { return half_period(t_s, 1e-9); }, 0.0, 1e-3);
   ASSERT_TRUE(contact.finished());
   EXPECT_EQ(contact.margin().nearest(100.0).distance, 1.0);
@@ -263,7 +264,7 @@ TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsTheLargest) {
 
 constexpr double kDuration_s = 3.0;
 
-/// Mean of sin over a span, by its integral.
+/// Mean of sin over an interval, from its integral.
 double mean_of_sine(double begin, double end) {
   return end > begin ? (std::cos(begin) - std::cos(end)) / (end - begin) : std::sin(begin);
 }
@@ -273,14 +274,14 @@ void add(ReactionPeaks& peaks, double end_s, double width_s, double force_N) {
   peaks.add(end_s, width_s, &squared_N2);
 }
 
-TEST(ReactionPeaks, MeansOverSpansGiveThePeakOfWhatTheyAreMeansOf) {
+TEST(ReactionPeaks, MeansOverIntervalsGiveThePeakOfTheFunction) {
   ReactionPeaks peaks(1);
   constexpr double kSpan_s = 0.2;
   for (double t_s = 0.05; t_s < kDuration_s; t_s += kSpan_s) {
     add(peaks, t_s + kSpan_s, kSpan_s, 7.0 * mean_of_sine(t_s, t_s + kSpan_s));
   }
   const ReactionPeak peak = peaks.peaks().at(0);
-  // The mean is (0.2)^2/24 = 1.7e-3 low; what is left is of order 4.
+  // The mean is lower by (0.2)^2/24 = 1.7e-3; the remaining error is of order 4.
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 1e-4);
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 1e-3);
 }
@@ -296,7 +297,7 @@ TEST(ReactionPeaks, ValuesAtInstantsGiveThePeakBetweenThem) {
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 5e-3);
 }
 
-TEST(ReactionPeaks, SpansOfOtherLengthsBesideThePeakChangeLittle) {
+TEST(ReactionPeaks, IntervalsOfOtherLengthsBesideThePeakChangeLittle) {
   ReactionPeaks peaks(1);
   double t_s = 0.0;
   for (const double width_s :
@@ -307,7 +308,7 @@ TEST(ReactionPeaks, SpansOfOtherLengthsBesideThePeakChangeLittle) {
   EXPECT_NEAR(peaks.peaks().at(0).force_N, 1.0, 1e-3);
 }
 
-TEST(ReactionPeaks, TheLargestOfSeveralCountsWhereverItLies) {
+TEST(ReactionPeaks, TheLargestOfSeveralPeaksCounts) {
   for (const double grows : {-0.1, 0.1}) {
     ReactionPeaks peaks(1);
     for (double t_s = 0.0; t_s < 6.0 * M_PI; t_s += 0.1) {
@@ -320,8 +321,8 @@ TEST(ReactionPeaks, TheLargestOfSeveralCountsWhereverItLies) {
   }
 }
 
-TEST(ReactionPeaks, APeakBetweenInstantsCountsThoughAnInstantOfAnotherIsHigher) {
-  // 1 - (t - 1)^2 is met at its top, 1.005 - (t - 3.1)^2 a tenth beside it on either side.
+TEST(ReactionPeaks, APeakBetweenInstantsCountsEvenIfAnInstantOfAnotherPeakIsHigher) {
+  // The instants contain the top of 1 - (t - 1)^2, but are 0.1 beside that of 1.005 - (t - 3.1)^2.
   ReactionPeaks peaks(1);
   for (int i = 0; i <= 20; ++i) {
     const double t_s = 0.2 * i;
@@ -333,7 +334,7 @@ TEST(ReactionPeaks, APeakBetweenInstantsCountsThoughAnInstantOfAnotherIsHigher) 
   EXPECT_NEAR(peaks.peaks().at(0).t_s, 3.1, 1e-12);
 }
 
-TEST(ReactionPeaks, AForceThatOnlyFallsOrRisesIsLargestAtItsEnd) {
+TEST(ReactionPeaks, AMonotonicForceIsLargestAtAnEnd) {
   ReactionPeaks falls(1);
   ReactionPeaks rises(1);
   for (int i = 0; i < 5; ++i) {
@@ -346,7 +347,7 @@ TEST(ReactionPeaks, AForceThatOnlyFallsOrRisesIsLargestAtItsEnd) {
   EXPECT_NEAR(rises.peaks().at(0).t_s, 1.0, 1e-12);
 }
 
-TEST(ReactionPeaks, OneSpanAloneIsItsOwnPeak) {
+TEST(ReactionPeaks, TheMeanOfASingleIntervalIsThePeak) {
   ReactionPeaks peaks(1);
   add(peaks, 0.2, 0.2, 3.0);
   EXPECT_EQ(peaks.peaks().at(0).force_N, 3.0);

@@ -11,13 +11,13 @@
 #include "tests/worker/solver/reference/rigid_tip_motion.h"
 #include "worker/solver/reference/solve_contact.h"
 
-/// The contact machine, driven by a rigid body, against its closed form.
+/// The contact with a rigid body, compared with the closed form.
 namespace oblique::solver {
 namespace {
 
 constexpr double k_N_m = 1e6;
 
-/// Time in which a mass of 1 kg would go through one radian on the spring of compression.
+/// Time of one radian of the oscillation of 1 kg on the spring of compression.
 const double radian_s = 1.0 / std::sqrt(k_N_m);
 
 RigidImpact::Parameters impact(double W_tt, double W_tn, double W_nn, double mu, double e_star,
@@ -66,7 +66,7 @@ std::vector<double> tangential_maxima_N(const RigidImpact& exact) {
   return maxima_N;
 }
 
-/// Step of 2e-3 rad: order 4 leaves 1e-11.
+/// Step of 2e-3 rad, at which order 4 gives errors of 1e-11.
 void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-9) {
   const RigidImpact exact(p);
   const CaseResult result = solved(p);
@@ -85,7 +85,7 @@ void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-
   const std::vector<double> maxima_N = tangential_maxima_N(exact);
   ASSERT_EQ(result.ft_peaks.size(), maxima_N.size());
   for (std::size_t i = 0; i < maxima_N.size(); ++i) {
-    // Kinks are met by samples to a 5000th of the duration only.
+    // Samples locate kinks only to a 5000th of the duration.
     EXPECT_NEAR(result.ft_peaks[i].ft_N, maxima_N[i], 2e-3 * force_N);
   }
   const Eigen::Vector2d impulse = p.W_per_kg.inverse() * (exact.velocity_out_m_s() - p.V0_m_s);
@@ -94,7 +94,7 @@ void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-
   EXPECT_LT(result.energy.closure, tolerance);
 }
 
-TEST(ContactOfARigidBody, FollowsTheClosedFormAtRandom) {
+TEST(ContactOfARigidBody, AgreesWithTheClosedFormForRandomBodies) {
   std::mt19937_64 generator(3);
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);
@@ -112,8 +112,8 @@ TEST(ContactOfARigidBody, FollowsTheClosedFormAtRandom) {
   }
 }
 
-TEST(ContactOfARigidBody, SlidingStopsAndReversesWithAStickBetween) {
-  // Coupling turns the slip round before separation.
+TEST(ContactOfARigidBody, SlidingStopsSticksAndReverses) {
+  // Coupling reverses the slip before separation.
   const auto p = impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0);
   std::vector<double> directions;
   solved(p, 2e-3, [&directions](const TraceRow& row) {
@@ -127,7 +127,7 @@ TEST(ContactOfARigidBody, SlidingStopsAndReversesWithAStickBetween) {
   EXPECT_EQ(directions, (std::vector<double>{1.0, -1.0}));
 }
 
-TEST(ContactOfARigidBody, EventLocationCostsNoOrder) {
+TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
   const auto error = [](const RigidImpact::Parameters& p, double step_radians) {
     const RigidImpact exact(p);
     const CaseResult result = solved(p, step_radians);
@@ -137,40 +137,40 @@ TEST(ContactOfARigidBody, EventLocationCostsNoOrder) {
   };
   for (const auto& p :
        {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0), impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
-    // Steps fall differently between events at each length, so the ratio scatters about 16.
+    // The position of events within steps differs, so the ratio scatters around 16.
     EXPECT_GT(error(p, 0.2) / error(p, 0.05), 11.3 * 11.3);
     EXPECT_GT(error(p, 0.1) / error(p, 0.025), 11.3 * 11.3);
   }
 }
 
-TEST(ContactOfARigidBody, BallWithEqualStiffnessesKeepsStickingUpToASeparationThatMeetsTheCone) {
-  // Both forces fall to zero together, so separation and both slips coincide: separation is first.
+TEST(ContactOfARigidBody, ABallWithEqualStiffnessesSticksUntilSeparationOnTheFrictionCone) {
+  // Both forces reach zero together, so separation and both slips coincide. Separation comes first.
   const auto p = impact(1.0, 0.0, 1.0, 2.0, 1.0, 0.5, -1.0, 1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "SC SR");
   EXPECT_NEAR(result.duration_s, M_PI * radian_s, 1e-9 * radian_s);
   EXPECT_NEAR(result.vt_out_m_s, -0.5, 1e-9);
   EXPECT_NEAR(result.vn_out_m_s, 1.0, 1e-9);
-  // The extremum of F_t coincides with the turn and is a peak of its own.
+  // The extremum of F_t coincides with the turn and counts as a peak.
   ASSERT_EQ(result.ft_peaks.size(), 1U);
   EXPECT_NEAR(result.ft_peaks[0].ft_N, 0.5 * std::sqrt(k_N_m), 1e-6);
 }
 
-TEST(ContactOfARigidBody, TurnThatMeetsTheEndOfSlidingComesFirstAndMayKeepItSliding) {
-  // V_t = V_n = 0 together. In restitution the relaxing tangential spring drives P on when
-  // eta2/e*^2 > W_tt/W_nn, and lets it rest otherwise.
+TEST(ContactOfARigidBody, ATurnAtTheEndOfSlidingComesFirstAndSlidingMayContinue) {
+  // V_t = V_n = 0 together. In restitution the relaxing tangential spring keeps P sliding if
+  // eta2/e*^2 > W_tt/W_nn; otherwise P sticks.
   const CaseResult driven = solved(impact(1.5, 0.0, 1.0, 0.4, 0.8, 0.6, -1.0));
   EXPECT_EQ(driven.mode, "sC sR");
   EXPECT_NEAR(driven.vt_out_m_s, 0.6 - 0.4 * 1.5 * 1.8, 1e-9);
   const CaseResult resting = solved(impact(1.5, 0.0, 1.0, 0.4, 1.0, 0.6, -1.0));
   EXPECT_GT(resting.stick_total_s, radian_s);
-  // Rounding may make V_n turn several times within 1e-13 s: ripples of no height.
+  // Rounding may cause several turns within 1e-13 s: ripples without height.
   EXPECT_EQ(std::count_if(resting.peaks.begin(), resting.peaks.end(),
                           [](const Peak& peak) { return peak.major; }),
             1);
 }
 
-TEST(ContactOfARigidBody, CoincidingEventsGiveTheLimitOfThoseThatFollowEachOther) {
+TEST(ContactOfARigidBody, CoincidingEventsGiveTheLimitOfSuccessiveEvents) {
   for (const double e_star : {0.8, 1.0}) {
     const CaseResult at_once = solved(impact(1.5, 0.0, 1.0, 0.4, e_star, 0.6, -1.0));
     for (const double shift_m_s : {-1e-7, 1e-7}) {
@@ -181,8 +181,8 @@ TEST(ContactOfARigidBody, CoincidingEventsGiveTheLimitOfThoseThatFollowEachOther
   }
 }
 
-TEST(ContactOfARigidBody, WithoutFrictionPFollowsTheTipThereAndBack) {
-  // Coupling pulls the tip back: P slides forwards, reverses, slides backwards.
+TEST(ContactOfARigidBody, WithoutFrictionPFollowsTheTip) {
+  // Coupling pulls the tip back, so P slides forwards, reverses and slides backwards.
   const auto p = impact(1.5, -0.8, 1.0, 0.0, 1.0, 0.5, -1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "sC sR");
@@ -198,7 +198,7 @@ TEST(ContactOfARigidBody, WithoutFrictionPFollowsTheTipThereAndBack) {
   EXPECT_NEAR(result.slide_m, x_m(z) + (x_m(z) - x_m(M_PI)), 1e-9 * radian_s);
 }
 
-TEST(ContactOfARigidBody, StrikingStraightDownNothingMovesAlongTheGround) {
+TEST(ContactOfARigidBody, AVerticalImpactCausesNoTangentialMotion) {
   for (const double mu : {0.0, 0.7}) {
     const CaseResult result = solved(impact(1.0, 0.0, 1.0, mu, 0.5, 0.0, -1.0));
     EXPECT_EQ(result.mode, mu == 0.0 ? "sC sR" : "SC SR");

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-/// The contact machine, driven by a tip that moves as the test says, whatever the forces.
+/// The contact with a tip that moves along a given path, whatever the forces.
 namespace oblique::solver {
 namespace {
 
@@ -19,14 +19,14 @@ using TipPath = std::function<TipState(double t_s)>;
 
 struct Event {
   double t_s;
-  std::string state;  ///< after it
+  std::string state;  ///< after the event
 };
 
 std::string state_of(const Contact& contact) {
   return {contact.law().is_stick() ? 'S' : 's', contact.law().is_compression() ? 'C' : 'R'};
 }
 
-/// Follows the path up to separation or `until_s`; what happened on the way.
+/// Follows the path up to separation or `until_s` and returns the events.
 std::vector<Event> followed(Contact& contact, const TipPath& path, double until_s) {
   std::vector<Event> events;
   while (!contact.finished() && contact.time_s() < until_s) {
@@ -43,8 +43,8 @@ std::string mode_of(const Contact& contact) {
   return contact.record().result().mode;
 }
 
-TEST(Contact, ABumpThatIsHigherOnOneSideOfItsStepIsLocated) {
-  // V_n rises above zero between 0.55 and 0.9 of the first step, and is below at both of its ends.
+TEST(Contact, AnAsymmetricCrossingInsideAStepIsLocated) {
+  // V_n is above zero between 0.55 and 0.9 of the first step, and below zero at both of its ends.
   constexpr double kStep_s = 1e-4;
   const TipPath path = [](double t_s) -> TipState {
     const double z = t_s / kStep_s;
@@ -60,9 +60,10 @@ TEST(Contact, ABumpThatIsHigherOnOneSideOfItsStepIsLocated) {
   EXPECT_EQ(events[1].state, "sC");
 }
 
-/// Half a period in which forces rise and fall together: the turn meets the extremum of F_t at its
-/// middle, and separation meets both sides of the cone at its end. `lead_s` is by how much motion
-/// along the ground is ahead; `skew` makes the polynomials through a step err otherwise there.
+/// Half a period in which both forces rise and fall together: in the middle the turn coincides with
+/// the extremum of F_t, and at the end separation coincides with both sides of the cone. The
+/// tangential motion leads by `lead_s`; `skew` changes the errors of the polynomials through a
+/// step.
 TipPath in_step(double lead_s, double skew = 0.0) {
   return [lead_s, skew](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
@@ -76,7 +77,7 @@ TipPath in_step(double lead_s, double skew = 0.0) {
 }
 
 TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
-  // Less than 1e-12 s apart is at once, whichever comes first by a hair.
+  // Events less than 1e-12 s apart coincide, whichever is earlier.
   for (const double lead_s : {0.0, 4e-13, -4e-13}) {
     SCOPED_TRACE(lead_s);
     const TipPath path = in_step(lead_s);
@@ -93,9 +94,9 @@ TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
   }
 }
 
-TEST(Contact, AnEarlierOneInTheOrderTakesOverFromTheOneThatIsSoughtWhereTheyCoincide) {
-  // The polynomials through the first step that sees them put the extremum of F_t before the turn,
-  // so it is the extremum that is sought; the turn shows itself only where both are.
+TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
+  // The polynomials through the first step that contains both put the extremum of F_t before the
+  // turn, so the extremum is located first; the turn is found only at the common instant.
   struct Step {
     double skew;
     double h_s;
@@ -113,8 +114,8 @@ TEST(Contact, AnEarlierOneInTheOrderTakesOverFromTheOneThatIsSoughtWhereTheyCoin
   }
 }
 
-TEST(Contact, ATurnAndAnExtremumAtOneInstantHappenOnceEach) {
-  // Whatever the polynomials say of their order, and however little time rounding leaves between.
+TEST(Contact, ATurnAndAnExtremumAtTheSameInstantHappenOnceEach) {
+  // For any order of the polynomials' roots, and any distance due to rounding.
   for (const double skew : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3}) {
     for (const double step_s : {0.6e-4, 0.7e-4, 0.9e-4, 1.1e-4}) {
       SCOPED_TRACE(skew);
@@ -131,7 +132,7 @@ TEST(Contact, ATurnAndAnExtremumAtOneInstantHappenOnceEach) {
   }
 }
 
-TEST(Contact, ASlipThatRoundingPutsBeforeTheSeparationItMeetsIsNotInTheMode) {
+TEST(Contact, ASlipThatRoundingPutsJustBeforeSeparationIsNotInTheMode) {
   for (const double skew : {-0.3, 0.3}) {
     SCOPED_TRACE(skew);
     const TipPath path = in_step(0.0, skew);
@@ -143,8 +144,8 @@ TEST(Contact, ASlipThatRoundingPutsBeforeTheSeparationItMeetsIsNotInTheMode) {
   }
 }
 
-TEST(Contact, ARegimeThatIsLeftAtOnceIsNotInTheMode) {
-  // Both velocities vanish together: the turn comes first, and then P, at rest, sticks.
+TEST(Contact, ARegimeOfZeroDurationIsNotInTheMode) {
+  // Both velocities reach zero together. The turn comes first, then P sticks.
   const TipPath path = [](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
     const double z = kRate * t_s;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/worker/solver/reference/known_falls.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/motion.h"
@@ -41,26 +42,9 @@ struct FallOf {
   const Fall& fall;
 };
 
-struct Known {
-  double H_m;
-  double t_s;
-  double x_m;
-  double vx_m_s;
-  double vy_m_s;
-};
-
 TEST(Fall, TipHasTheKnownStateAtTheDropsOfThePaper) {
-  // An independent explicit solution, converged to nine digits.
   const FallOf paper(preset("paper"), 2.5e-6);
-  for (const Known& known : {Known{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
-                             Known{1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
-                             Known{1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}) {
-    const TipState tip = paper.tip_at(known.H_m);
-    EXPECT_NEAR(paper.fall.state_at(known.H_m).t_s, known.t_s, 1e-8);
-    EXPECT_NEAR(tip.x_m, known.x_m, 1e-7);
-    EXPECT_NEAR(tip.vx_m_s, known.vx_m_s, 5e-5);
-    EXPECT_NEAR(tip.vy_m_s, known.vy_m_s, 5e-5);
-  }
+  expect_known_falls(paper.chain, paper.fall);
   EXPECT_NEAR(paper.fall.largest_drop_m(), 1.179, 5e-4);
 }
 
@@ -71,7 +55,7 @@ TEST(Fall, DropIsLocatedToRounding) {
   }
 }
 
-TEST(Fall, StateAtATimeIsTheOneThatTheTipPassesThenAndIsKeptNowhere) {
+TEST(Fall, StateAtATimeAgreesWithTheStateAtADropAndIsNotKept) {
   const FallOf coarse(coarse_model(), 9e-6);
   const std::size_t bytes = coarse.fall.bytes();
   EXPECT_EQ(coarse.fall.state_at_time(0.0).q, coarse.chain.at_rest().q);
@@ -79,17 +63,17 @@ TEST(Fall, StateAtATimeIsTheOneThatTheTipPassesThenAndIsKeptNowhere) {
     const ChainState by_drop = coarse.fall.state_at(H_m);
     const ChainState by_time = coarse.fall.state_at_time(by_drop.t_s);
     EXPECT_NEAR(by_time.t_s, by_drop.t_s, 9e-9);
-    EXPECT_NEAR(coarse.chain.tip(by_time).y_m, -H_m, 9e-9 * 6.0) << "at 6 m/s at most";
+    EXPECT_NEAR(coarse.chain.tip(by_time).y_m, -H_m, 9e-9 * 6.0) << "at a speed of at most 6 m/s";
     EXPECT_NEAR(coarse.energy_J(by_time), coarse.energy_J(by_drop), 1e-7);
   }
   for (const double steps : {1.0, 2.0, 4095.0, 4096.0, 4097.0, 40'000.0}) {
     EXPECT_EQ(coarse.fall.state_at_time(steps * 9e-6).t_s, steps * 9e-6)
-        << "a whole step is taken whole";
+        << "a full step is not divided";
   }
   EXPECT_EQ(coarse.fall.bytes(), bytes);
 }
 
-TEST(Fall, StateAtADropHasTheSameBitsWhateverWasAskedBefore) {
+TEST(Fall, StateAtADropHasTheSameBitsWhateverWasRequestedBefore) {
   const FallOf one(coarse_model(), 9e-6);
   const FallOf other(coarse_model(), 9e-6);
   const std::vector<double> drops{1e-6, 0.01, 0.1, 0.33, 0.5, 0.77, 0.99, 1.0, 1.0001, 1.17};
@@ -105,7 +89,7 @@ TEST(Fall, StateAtADropHasTheSameBitsWhateverWasAskedBefore) {
   }
 }
 
-TEST(Fall, DropThatIsNeverReachedIsAnErrorThatNamesTheLargestDrop) {
+TEST(Fall, ADropThatIsNeverReachedIsAnErrorThatNamesTheLargestDrop) {
   const FallOf coarse(coarse_model(), 9e-6);
   for (const double H_m : {1.18, 1.2, 0.0, -0.5}) {
     try {
@@ -119,25 +103,25 @@ TEST(Fall, DropThatIsNeverReachedIsAnErrorThatNamesTheLargestDrop) {
   EXPECT_THROW(coarse.fall.state_at(std::nan("")), InputError);
 }
 
-TEST(Fall, TipStandsStillAtTheLargestDrop) {
+TEST(Fall, TipIsAtRestAtTheLargestDrop) {
   const FallOf coarse(coarse_model(), 9e-6);
   const TipState tip = coarse.tip_at(coarse.fall.largest_drop_m());
-  EXPECT_NEAR(tip.vy_m_s, 0.0, 1e-3) << "the drop fixes the instant only to the root of rounding";
+  EXPECT_NEAR(tip.vy_m_s, 0.0, 1e-3) << "the instant is known to the square root of rounding";
   EXPECT_LT(coarse.tip_at(coarse.fall.largest_drop_m() - 1e-3).vy_m_s, -0.1);
 }
 
-TEST(Fall, TurnThatLiesEarlyInItsStepIsFoundAllTheSame) {
+TEST(Fall, TheLargestDropIsFoundWhereverItLiesInItsStep) {
   const FallOf fine(coarse_model(), 9e-6);
   const double largest_m = fine.fall.largest_drop_m();
   const double turn_s = fine.fall.state_at(largest_m).t_s;
-  // Just after the turn, in its middle, and just before the next step.
+  // The turn lies early, in the middle and late in its step.
   for (const double fraction : {0.01, 0.5, 0.99}) {
     SCOPED_TRACE(fraction);
     const FallOf one(coarse_model(), turn_s / (std::floor(turn_s / 9e-6) + fraction));
     EXPECT_NEAR(one.fall.largest_drop_m(), largest_m, 1e-9);
     const ChainState top = one.fall.state_at(one.fall.largest_drop_m());
     EXPECT_NEAR(-one.chain.tip(top).y_m, one.fall.largest_drop_m(), 1e-15);
-    EXPECT_NEAR(top.t_s, turn_s, 1e-6) << "the drop fixes the instant only to the root of rounding";
+    EXPECT_NEAR(top.t_s, turn_s, 1e-6) << "the instant is known to the square root of rounding";
     // And just below it, on the way down.
     const ChainState below = one.fall.state_at(largest_m - 1e-9);
     EXPECT_LT(below.t_s, top.t_s);
@@ -146,7 +130,7 @@ TEST(Fall, TurnThatLiesEarlyInItsStepIsFoundAllTheSame) {
   }
 }
 
-TEST(Fall, StepBeyondTheStabilityLimitIsAnErrorNotANumber) {
+TEST(Fall, AStepAboveTheStabilityLimitIsAnError) {
   const Chain chain(coarse_model());
   EXPECT_THROW(solve_stepped_fall(chain, 40e-6), SolveError);
 }

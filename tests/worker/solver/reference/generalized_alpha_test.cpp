@@ -27,7 +27,7 @@ ModelParameters coarse_model() {
   return model;
 }
 
-/// A contact that pushes on the tip in both directions from where it is.
+/// A contact that pushes the tip in both directions from its present position.
 AffineContactForce<double> push_at(const TipState& tip) {
   AffineContactForce<double> force;
   force.fn0 = 3000.0;
@@ -40,7 +40,7 @@ AffineContactForce<double> push_at(const TipState& tip) {
   return force;
 }
 
-/// A bent chain in motion, in the coordinates of both systems.
+/// A bent, moving chain in the coordinates of both systems.
 struct MovingChain {
   explicit MovingChain(const ModelParameters& parameters)
       : model(parameters), chain(model), motion(model) {
@@ -76,15 +76,15 @@ TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
   for (int i = 0; i < 200; ++i) {
     moving.motion.step(state, force, 1e-6, next);
     std::swap(state, next);
-    // One rounding of a coordinate of about 1.
+    // Rounding of a coordinate of size 1.
     ASSERT_LE(moving.largest_gap(state.q), 1e-15);
   }
   EXPECT_LE(moving.largest_gap(state.v), 1e-9);
 }
 
-TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
-  // Straight down and at rest: O carries the weight, each joint what hangs below it. The links
-  // stretch a little from rest, so the reactions swing about that.
+TEST(GeneralizedAlpha, TheReactionAtThePinCarriesTheHangingChain) {
+  // The chain hangs straight down: O carries its weight, and each joint the weight below it. The
+  // links start unstretched, so that the reactions oscillate around these values.
   const ModelParameters model = preset("paper");
   const Chain chain(model);
   const GeneralizedAlphaMotion motion(model);
@@ -110,8 +110,8 @@ TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
   }
 }
 
-/// What is left, after `steps` steps a hundred times too long for it, of a link's vibration along
-/// itself.
+/// The fraction of an axial vibration of a link that is left after `steps` steps, each a hundred
+/// times too long to resolve it.
 double stiff_vibration_left(double spectral_radius, int steps) {
   ModelParameters model = coarse_model();
   model.lengths_m = {0.4};
@@ -130,14 +130,14 @@ double stiff_vibration_left(double spectral_radius, int steps) {
   return std::abs(motion.tip(state).x_m - 0.4) / kStretch_m;
 }
 
-TEST(GeneralizedAlpha, SpectralRadiusSaysHowFastUnresolvedVibrationsGo) {
+TEST(GeneralizedAlpha, UnresolvedVibrationsDecayByTheSpectralRadius) {
   EXPECT_LT(stiff_vibration_left(0.0, 5), 1e-3);
   EXPECT_LT(stiff_vibration_left(0.5, 40), 1e-6);
   EXPECT_GT(stiff_vibration_left(0.9, 20), 0.1);
   EXPECT_LT(stiff_vibration_left(0.9, 200), 1e-5);
 }
 
-TEST(GeneralizedAlpha, StepThatNewtonCannotSolveIsASolveErrorWithItsTime) {
+TEST(GeneralizedAlpha, AStepForWhichNewtonFailsIsASolveErrorWithItsTime) {
   MovingChain moving(coarse_model());
   moving.constrained.v *= 1e6;
   moving.motion.restart(kNoContact, moving.constrained);
@@ -151,8 +151,8 @@ TEST(GeneralizedAlpha, StepThatNewtonCannotSolveIsASolveErrorWithItsTime) {
   }
 }
 
-TEST(GeneralizedAlpha, AShorterStepAfterALongOneKeepsTheOrder) {
-  // Steps of changing length, as events make them, against equal ones: errors fall by four.
+TEST(GeneralizedAlpha, StepsOfChangingLengthKeepTheOrder) {
+  // Steps change their length around events. Halving them must divide the error by four.
   const auto error = [](int divisions) {
     MovingChain moving(coarse_model());
     const auto force = push_at(moving.chain.tip(moving.state));

@@ -88,13 +88,13 @@ double distance(const Coordinates& a, const Coordinates& b) {
   return (a - b).cwiseAbs().maxCoeff();
 }
 
-TEST(Pefrl, OscillatorStaysBoundedJustBelowTheStabilityLimitAndGrowsJustAbove) {
+TEST(Pefrl, AnOscillatorStaysBoundedBelowTheStabilityLimitAndGrowsAboveIt) {
   const double limit = Pefrl::stability_limit();
   EXPECT_LT(largest_swing(0.999 * limit, 100'000), 1e3);
   EXPECT_GT(largest_swing(1.001 * limit, 100'000), 1e10);
 }
 
-TEST(Pefrl, TraceOfTheStepOfAnOscillatorIsMinusTwoAtTheStabilityLimit) {
+TEST(Pefrl, TheTraceOfAnOscillatorsStepMatrixIsMinusTwoAtTheStabilityLimit) {
   const auto trace = [](double h) {
     Oscillator of_q{1.0, 0.0};
     Oscillator of_v{0.0, 1.0};
@@ -118,7 +118,7 @@ TEST(Pefrl, DriftsAndKicksAddUpToOneStep) {
   EXPECT_NEAR(kick, 1.0, 1e-15);
 }
 
-TEST(Pefrl, ErrorOnAnOscillatorFallsSixteenfoldWhenTheStepHalves) {
+TEST(Pefrl, HalvingTheStepDividesTheErrorOfAnOscillatorBySixteen) {
   const auto error = [](int steps) {
     Oscillator state;
     for (int i = 0; i < steps; ++i) {
@@ -130,7 +130,7 @@ TEST(Pefrl, ErrorOnAnOscillatorFallsSixteenfoldWhenTheStepHalves) {
   EXPECT_NEAR(error(100) / error(200), 16.0, 0.2);
 }
 
-TEST_F(PefrlOnAChain, SteppingBackLeadsToTheStart) {
+TEST_F(PefrlOnAChain, SteppingBackReturnsToTheStart) {
   ChainState there;
   ChainState back;
   ChainState state = start_;
@@ -142,7 +142,7 @@ TEST_F(PefrlOnAChain, SteppingBackLeadsToTheStart) {
     motion_->step(state, force_, -2e-6, back);
     std::swap(state, back);
   }
-  // To rounding: slopes are of size 1, their rates of size 1 and in motion at 1e6 per second.
+  // Rounding of slopes of size 1, whose rates change by up to 1e6 per second.
   EXPECT_LT(distance(state.q, start_.q), 1e-13);
   EXPECT_LT(distance(state.v, start_.v), 1e-7);
   EXPECT_LT(distance(state.v, start_.v), 1e-8 * distance(advance(4e-5, 20).state.v, start_.v));
@@ -169,7 +169,7 @@ TEST_F(PefrlOnAChain, StateAndContactIntegralsAreOfOrderFour) {
             kSmallestRatio);
 }
 
-TEST_F(PefrlOnAChain, ContactIntegralsAreThoseOfTheForceAlongTheWay) {
+TEST_F(PefrlOnAChain, ContactIntegralsAreTheIntegralsOfTheForceAlongThePath) {
   constexpr int kSteps = 4000;
   constexpr double kDuration_s = 40e-6;
   ContactIntegrals<double> trapezoid;
@@ -188,13 +188,13 @@ TEST_F(PefrlOnAChain, ContactIntegralsAreThoseOfTheForceAlongTheWay) {
     std::swap(state, next);
   }
   const auto integrals = advance(kDuration_s, kSteps).integrals;
-  // The trapezoidal rule errs by the square of the step over that of the motion, 1e-6.
+  // The error of the trapezoidal rule is (step / time scale of the motion)^2 = 1e-6.
   EXPECT_NEAR(integrals.impulse_n, trapezoid.impulse_n, 1e-5 * std::abs(trapezoid.impulse_n));
   EXPECT_NEAR(integrals.impulse_t, trapezoid.impulse_t, 1e-5 * std::abs(trapezoid.impulse_t));
   EXPECT_NEAR(integrals.work_t, trapezoid.work_t, 1e-5 * std::abs(trapezoid.work_t));
 }
 
-TEST_F(PefrlOnAChain, ChainAtRestIsStableBelowTheLimitOfItsHighestFrequencyAndNotAbove) {
+TEST_F(PefrlOnAChain, AChainAtRestIsStableBelowTheLimitOfItsHighestFrequencyOnly) {
   const double limit_s = Pefrl::stability_limit() / chain_->highest_frequency_rad_s(0.0);
   const auto swing = [&](double h_s) {
     ChainState state = chain_->at_rest();
@@ -208,7 +208,7 @@ TEST_F(PefrlOnAChain, ChainAtRestIsStableBelowTheLimitOfItsHighestFrequencyAndNo
     return std::abs(state.q(0, chain_->tip_row()) - rest.q(0, chain_->tip_row()));
   };
   EXPECT_LT(swing(0.98 * limit_s), 1e-3);
-  EXPECT_FALSE(swing(1.02 * limit_s) < 1e-2) << "grows until the chain bends, or beyond numbers";
+  EXPECT_FALSE(swing(1.02 * limit_s) < 1e-2) << "grows until the chain bends or numbers overflow";
 }
 
 }  // namespace
