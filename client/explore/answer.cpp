@@ -2,14 +2,19 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 #include <ostream>
 #include <string_view>
+#include <utility>
+#include <variant>
 
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
+#include "client/io/row_output.h"
+#include "client/plot/picture_file.h"
 #include "proto/program/usage.h"
-#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -17,92 +22,101 @@ namespace {
 
 constexpr std::array<std::string_view, 3> kTextFormats{"table", "csv", "json"};
 
-std::string ending_of(const std::string& file) {
-  const auto dot = file.rfind('.');
-  const auto slash = file.rfind('/');
-  const bool has_ending = dot != std::string::npos && (slash == std::string::npos || dot > slash);
-  return has_ending ? file.substr(dot + 1) : std::string();
+/// The format of a file with numbers; none for pictures.
+std::optional<Format> numbers_format(const std::string& file) {
+  return file.ends_with(".csv")    ? std::optional(Format::kCsv)
+         : file.ends_with(".json") ? std::optional(Format::kJson)
+                                   : std::nullopt;
+}
+
+std::string text_in_format(const Answer& answer, Format format) {
+  return format == Format::kTable  ? answer.tables
+         : format == Format::kJson ? answer.json + '\n'
+                                   : text_of({protocol::chunk_of(answer.rows)}, {.format = format});
+}
+
+std::string interval_text(const protocol::Value& from, const protocol::Value& to) {
+  const auto text = [](const protocol::Value& end) {
+    const auto* number = std::get_if<double>(&end);
+    return number == nullptr ? "?" : solver::readable_number(*number, 4);
+  };
+  return from.index() == 0 && to.index() == 0 ? "" : fmt::format("{} to {}", text(from), text(to));
+}
+
+protocol::Table with_intervals(const protocol::Table& rows) {
+  protocol::Table shown;
+  shown.rows.resize(rows.rows.size());
+  for (std::size_t i = 0; i < rows.columns.size(); ++i) {
+    const bool is_interval = rows.columns[i].ends_with("_from");
+    shown.columns.push_back(is_interval ? "95 %" : rows.columns[i]);
+    for (std::size_t row = 0; row < rows.rows.size(); ++row) {
+      const auto& cells = rows.rows[row];
+      shown.rows[row].push_back(is_interval ? interval_text(cells[i], cells[i + 1]) : cells[i]);
+    }
+    i += is_interval ? 1 : 0;
+  }
+  return shown;
 }
 
 }  // namespace
 
 void add_answer_flags(CLI::App& command, AnswerFlags& flags) {
-  auto* format = command
-                     .add_option("--format", flags.format,
-                                 "table, csv or json; default: as the name of --out ends, else "
-                                 "table; the Python module returns NumPy arrays")
-                     ->type_name("FORMAT");
+  auto* format = command.add_option("--format", flags.format, "table, csv or json")
+                     ->type_name("FORMAT")
+                     ->capture_default_str();
   protocol::note_choices(format, kTextFormats);
   command
       .add_option("--out", flags.file,
-                  "output file, written atomically: .csv or .json for the numbers; .svg, .pdf, "
-                  ".png or .gp (a gnuplot script) for a picture, beside the table on standard "
-                  "output")
+                  "file beside the text on standard output: a picture (svg, pdf, png, or gp, a "
+                  "gnuplot script) or numbers (csv, json) as its name ends")
       ->type_name("FILE");
 }
 
-AnswerChoice choice_of(const AnswerFlags& flags) {
-  AnswerChoice choice;
-  const std::string ending = ending_of(flags.file);
-  choice.is_text_in_file = ending == "csv" || ending == "json";
-  if (choice.is_text_in_file || flags.file.empty()) {
-    choice.format = format_of_output(flags.format, flags.file, kTextFormats);
-    return choice;
+void check(const AnswerFlags& flags) {
+  static_cast<void>(format_named(flags.format, kTextFormats));
+  if (!flags.file.empty() && !numbers_format(flags.file)) {
+    static_cast<void>(plot::picture_format({}, flags.file));
   }
-  choice.picture = plot::picture_format("", flags.file);
-  choice.format = format_of_output(flags.format, "", kTextFormats);
-  return choice;
+}
+
+Answer answer_of(nlohmann::ordered_json facts, protocol::Table rows, plot::Figure figure) {
+  facts["rows"] =
+      nlohmann::ordered_json::parse(text_of({protocol::chunk_of(rows)}, {.format = Format::kJson}));
+  return {.tables = text_of(with_intervals(rows)),
+          .rows = std::move(rows),
+          .json = facts.dump(2),
+          .figure = std::move(figure)};
 }
 
 void put_out(Console& console, const AnswerFlags& flags, const Answer& answer) {
-  const AnswerChoice choice = choice_of(flags);
-  const std::string text =
-      choice.format == Format::kTable ? answer.tables
-      : choice.format == Format::kJson
-          ? answer.json + '\n'
-          : text_of({protocol::chunk_of(answer.rows)}, {.format = Format::kCsv});
-  if (choice.picture) {
-    plot::write_picture(plot::picture_of(answer.figure, *choice.picture), *choice.picture,
-                        flags.file);
+  console.out() << text_in_format(answer, format_named(flags.format, kTextFormats));
+  if (flags.file.empty()) {
+    return;
   }
-  if (choice.is_text_in_file) {
+  if (const auto format = numbers_format(flags.file)) {
     AtomicFile file(flags.file);
-    file.append(text);
+    file.append(text_in_format(answer, *format));
     file.finish();
-  } else {
-    console.out() << text;
+    return;
   }
+  const auto format = plot::picture_format({}, flags.file);
+  plot::write_picture(plot::picture_of(answer.figure, format), format, flags.file);
 }
 
 protocol::Value value_of(double number) {
   return std::isnan(number) ? protocol::Value() : protocol::Value(number);
 }
 
+void append_columns(protocol::Table& table, const std::string& name) {
+  table.columns.insert(table.columns.end(), {name, name + "_from", name + "_to"});
+}
+
+void append_values(protocol::Row& row, const Estimate& estimate) {
+  row.insert(row.end(), {value_of(estimate.value), value_of(estimate.from), value_of(estimate.to)});
+}
+
 std::string text_of(const protocol::Table& table) {
   return text_of({protocol::chunk_of(table)}, {.format = Format::kTable});
-}
-
-nlohmann::ordered_json json_of(const Estimate& estimate) {
-  return {{"value", estimate.value}, {"from", estimate.from}, {"to", estimate.to}};
-}
-
-nlohmann::ordered_json json_of(const std::vector<Estimate>& estimates) {
-  auto json = nlohmann::ordered_json::object();
-  for (const Estimate& estimate : estimates) {
-    json["value"].push_back(estimate.value);
-    json["from"].push_back(estimate.from);
-    json["to"].push_back(estimate.to);
-  }
-  return json;
-}
-
-std::string interval_in_words(const Estimate& estimate, int significant) {
-  const auto end = [significant](double value) {
-    return std::isnan(value) ? "?" : solver::readable_number(value, significant);
-  };
-  return std::isnan(estimate.from) && std::isnan(estimate.to)
-             ? std::string()
-             : fmt::format("{} to {}", end(estimate.from), end(estimate.to));
 }
 
 }  // namespace oblique::client

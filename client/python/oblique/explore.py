@@ -80,43 +80,35 @@ def map(study: Optional[str] = None, **flags: Any) -> Map:
     )
 
 
-def arrays_of(value: Any) -> Any:
-    """Objects of JSON as Named, and lists of numbers as arrays with NaN for null."""
-    if isinstance(value, dict):
-        return Named(**{name: arrays_of(each) for name, each in value.items()})
-    if isinstance(value, list):
-        try:
-            return np.array(value, dtype=float)
-        except (TypeError, ValueError):  # texts
-            return value
-    return value
+def _with_columns(found: dict[str, Any]) -> Named:
+    """The rows of a table as one array for each column, beside the other members."""
+    rows = found.pop("rows")
 
+    def column(name: str) -> Any:
+        values = [row[name] for row in rows]
+        return np.array(values, dtype=object if isinstance(values[0], str) else float)
 
-def _with_outputs(found: dict[str, Any]) -> Named:
-    outputs = {output["name"]: arrays_of(output) for output in found.pop("outputs")}
-    return Named(**arrays_of(found).__dict__, outputs=outputs)
+    return Named(**found, **{name: column(name) for name in rows[0]})
 
 
 def sensitivity(**flags: Any) -> Named:
     """Which inputs matter, as ``oblique sensitivity``: ``sensitivity(H=1, mu="0.05:1.9", e="0.5:1",
-    of="fn_peak_N", preset="paper").outputs["fn_peak_N"].total["value"]``.
+    of="fn_peak_N", preset="paper").total``.
 
-    ``inputs`` names the inputs; each output has ``first`` and ``total`` (with ``method="morris"``
-    ``mu``, ``mu_star`` and ``sigma``): arrays ``["value"]``, ``["from"]`` and ``["to"]`` in the order
-    of the inputs.
+    The arrays ``output``, ``input``, ``first``, ``first_from``, ``first_to``, ``total``, ... (with
+    ``method="morris"`` ``mu_star``, ``sigma`` and ``mu``) have an entry for each output and input.
     """
-    return _with_outputs(run("sensitivity", **flags))
+    return _with_columns(run("sensitivity", **flags))
 
 
 def uncertainty(study: str, **flags: Any) -> Named:
     """How the outputs of a sampled study are distributed, as ``oblique uncertainty``:
-    ``uncertainty("spread", of="e").outputs["e"].statistics["mean"]["value"][-1]``.
+    ``found = uncertainty("spread", of="e"); found.value[found.statistic == "mean"]``.
 
-    ``statistics`` has "mean", "sd", "quantile 0.05", "pearson mu", "spearman mu", ..., or of texts
-    the probability of each: arrays ``["value"]``, ``["from"]`` and ``["to"]`` over the first
-    ``points`` of the study, the last of which are all.
+    The arrays ``output``, ``statistic``, ``value``, ``value_from``, ``value_to``, ``half``,
+    ``quarter`` and ``eighth`` have an entry for each statistic of each output.
     """
-    return _with_outputs(run("uncertainty", study, **flags))
+    return _with_columns(run("uncertainty", study, **flags))
 
 
 class Fit(Named):

@@ -1,3 +1,4 @@
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,6 @@ namespace oblique::client {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 using testing::StartsWith;
 
 /// A folder with a study of 200 random points.
@@ -37,37 +37,34 @@ class Uncertainty : public ::testing::Test {
 };
 
 TEST_F(Uncertainty, StatisticsOfAnInputAreThoseOfItsDistribution) {
-  const auto outcome = uncertainty({"spread", "--of", "e,mu > 0.95", "--format", "json"});
+  const auto outcome = uncertainty({"spread", "--of", "e", "--format", "json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(json["sample"], "random");
   EXPECT_EQ(json["points"], 200);
   EXPECT_EQ(json["inputs"], (std::vector<std::string>{"mu", "e"}));
-  const auto& e = json["outputs"][0];
-  EXPECT_EQ(e["points"], (std::vector<int>{25, 50, 100, 200}));
-  const auto& of = e["statistics"];
-  EXPECT_NEAR(of["mean"]["value"][3], 0.8, 0.006);  // four times 0.02/sqrt(200)
-  EXPECT_NEAR(of["sd"]["value"][3], 0.02, 0.004);
-  EXPECT_NEAR(of["quantile 0.5"]["value"][3], 0.8, 0.007);
-  EXPECT_LT(of["quantile 0.5"]["from"][3], of["quantile 0.5"]["value"][3]);
-  EXPECT_DOUBLE_EQ(of["pearson e"]["value"][3], 1.0);
-  EXPECT_NEAR(of["spearman mu"]["value"][3], 0.0, 0.3);
-  EXPECT_NEAR(json["outputs"][1]["statistics"]["mean"]["value"][3], 0.5, 0.15);
+  std::map<std::string, nlohmann::json> of;
+  for (const auto& row : json["rows"]) {
+    of[row["statistic"]] = row;
+  }
+  EXPECT_NEAR(of["mean"]["value"], 0.8, 0.006);  // four times 0.02/sqrt(200)
+  EXPECT_NEAR(of["mean"]["half"], 0.8, 0.008);
+  EXPECT_NEAR(of["sd"]["value"], 0.02, 0.004);
+  EXPECT_NEAR(of["quantile 0.5"]["value"], 0.8, 0.007);
+  EXPECT_LT(of["quantile 0.5"]["value_from"], of["quantile 0.5"]["value"]);
+  EXPECT_DOUBLE_EQ(of["correlation e"]["value"], 1.0);
+  EXPECT_NEAR(of["correlation mu"]["value"], 0.0, 0.3);
 }
 
 TEST_F(Uncertainty, ModesHaveProbabilitiesThatAddUpToOne) {
-  const auto outcome = uncertainty({"spread", "--of", "major_mode", "--format", "csv"});
+  const auto outcome = uncertainty({"spread", "--of", "major_mode", "--format", "json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, StartsWith("output,statistic,points,value,from,to\nmajor_mode,"));
-  EXPECT_THAT(outcome.err, Not(HasSubstr("too wide")));
-  const auto json =
-      nlohmann::json::parse(uncertainty({"spread", "--of", "major_mode", "--format", "json"}).out);
   double sum = 0.0;
-  for (const auto& [mode, probability] : json["outputs"][0]["statistics"].items()) {
-    const double value = probability["value"].back();
+  for (const auto& row : nlohmann::json::parse(outcome.out)["rows"]) {
+    const double value = row["value"];
     sum += value;
-    EXPECT_LE(probability["from"].back(), value) << mode;
-    EXPECT_GE(probability["to"].back(), value) << mode;
+    EXPECT_LE(row["value_from"], value);
+    EXPECT_GE(row["value_to"], value);
   }
   EXPECT_NEAR(sum, 1.0, 1e-12);
 }
@@ -75,22 +72,14 @@ TEST_F(Uncertainty, ModesHaveProbabilitiesThatAddUpToOne) {
 TEST_F(Uncertainty, TablesShowStatisticsCorrelationsAndConvergence) {
   const auto outcome = uncertainty({"spread", "--out", folder_.file("spread.gp")});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, StartsWith("fn_peak_N"));
+  EXPECT_THAT(outcome.out, StartsWith("output"));
   for (const char* part :
-       {"quantile 0.05", "pearson mu", "spearman e", "probability", "of the first 25"}) {
+       {"quantile 0.05", "correlation mu", "probability sC sR", "95 %", "quarter"}) {
     EXPECT_THAT(outcome.out, HasSubstr(part));
   }
   const auto script = text_in_file(folder_.file("spread.gp"));
   EXPECT_THAT(script, HasSubstr("95 % quantile"));
   EXPECT_THAT(script, HasSubstr("with boxxyerror"));
-  EXPECT_THAT(script, HasSubstr("with xerrorbars"));
-}
-
-TEST_F(Uncertainty, ASampleThatIsSpreadMoreEvenlyIsNoted) {
-  run("sobol:64", "even");
-  const auto outcome = uncertainty({"even", "--of", "fn_peak_N"});
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, HasSubstr("sobol points are spread more evenly"));
 }
 
 TEST_F(Uncertainty, AStudyThatIsNoSampleAndWrongQuantilesAreRefused) {
@@ -101,7 +90,6 @@ TEST_F(Uncertainty, AStudyThatIsNoSampleAndWrongQuantilesAreRefused) {
   const auto outcome = uncertainty({"grid"});
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("--sample"));
-  EXPECT_EQ(uncertainty({"spread", "--quantiles", "0.5,0.1"}).exit_code, 2);
   EXPECT_EQ(uncertainty({"spread", "--quantiles", "5"}).exit_code, 2);
   EXPECT_EQ(uncertainty({"nothing"}).exit_code, 1);
   EXPECT_EQ(uncertainty({"spread", "--where", "mu > 9"}).exit_code, 1);

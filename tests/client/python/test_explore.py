@@ -17,14 +17,13 @@ def folder(tmp_path, monkeypatch):
 
 def test_sensitivity_gives_arrays_in_the_order_of_the_inputs(folder):
     found = oblique.sensitivity(
-        H=0.9, mu="0.1:1.8", e="0.5:1", preset="paper", points=16, interval=9, of="fn_peak_N"
+        H=0.9, mu="0.1:1.8", e="0.5:1", preset="paper", rows=16, interval=9, of="fn_peak_N"
     )
-    assert found.inputs == ["mu", "e"]
+    assert found.inputs == found.input.tolist() == ["mu", "e"]
     assert found.points == 64
-    indices = found.outputs["fn_peak_N"]
-    assert indices.rows == 16
-    assert indices.total["value"].shape == (2,)
-    assert (indices.first["from"] <= indices.first["to"]).all()
+    assert found.rows.tolist() == [16, 16]
+    assert found.total.dtype == np.float64
+    assert (found.first_from <= found.first_to).all()
 
 
 def test_wrong_flags_are_a_value_error(folder):
@@ -32,18 +31,17 @@ def test_wrong_flags_are_a_value_error(folder):
         oblique.sensitivity(H=1, mu=0.4, e=1)
 
 
-def test_uncertainty_gives_arrays_over_parts_of_the_points(folder):
+def test_uncertainty_gives_arrays_with_an_entry_for_each_statistic(folder):
     run_oblique(
         "run", "--H", "0.9", "--mu", "0.1:1.8", "--e", "0.8", "--preset", "paper", "--quiet",
         "--sample", "random:100", "--name", "spread",
     )
     found = oblique.uncertainty("spread", of="mu,major_mode")
-    mu = found.outputs["mu"]
-    assert mu.points.tolist() == [12, 25, 50, 100]
-    assert mu.statistics["quantile 0.5"]["value"][-1] == pytest.approx(0.95, abs=0.35)
-    modes = found.outputs["major_mode"].statistics
-    assert sum(modes[mode]["value"][-1] for mode in modes) == pytest.approx(1)
-    assert np.isfinite(mu.statistics["mean"]["to"]).all()
+    assert found.points == 100
+    median = found.value[found.statistic == "quantile 0.5"]
+    assert median == pytest.approx([0.95], abs=0.35)
+    assert found.value[found.output == "major_mode"].sum() == pytest.approx(1)
+    assert np.isfinite(found.value_to[found.statistic == "mean"]).all()
 
 
 def test_a_map_is_that_of_the_program(tmp_path):
