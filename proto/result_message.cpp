@@ -213,7 +213,7 @@ std::string fault_of(const PointResult& message) {
     return "the worker sent a text that is too long";
   }
   if (message.ByteSizeLong() > kMaxResultBytes) {
-    return fmt::format("the worker sent a result of {} bytes, and one has at most {}",
+    return fmt::format("the worker sent a result of {} bytes; at most {} are allowed",
                        message.ByteSizeLong(), kMaxResultBytes);
   }
   if (!message.error().empty()) {

@@ -213,8 +213,9 @@ class Residuals : public Eigen::DenseFunctor<double> {
     return evaluation;
   }
 
-  /// The central difference of the steps below and above; that of one side where the other is
-  /// missing, or where outputs jump between the two, as with the sequence of states; 0 without any.
+  /// The derivative from the changes over one step below and one above: the central difference. If
+  /// one change is missing, or one is so much larger that an output jumps there (as where the mode
+  /// changes), the one-sided difference of the other; 0 if both are missing.
   static double derivative(double below, double above) {
     constexpr double kJump = 0.1;  // [standard deviations]
     constexpr double kTimes = 5.0;

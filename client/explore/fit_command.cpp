@@ -547,7 +547,8 @@ int fit_to_measurements(const FitFlags& flags, Console& console) {
   const auto format =
       format_of_output(flags.json ? "json" : flags.output.format, flags.output.file, kFormats);
   if (flags.from != kUsualFrom) {
-    throw InputError("--from is for the fit of the paper's numbers: here --preset is the model");
+    throw InputError(
+        "--from is allowed only in a fit to the paper's numbers: use --preset to choose the model");
   }
   const auto fitted = measured_fit(flags, tip_reach(console));
   auto problem = problem_of(fitted);

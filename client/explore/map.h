@@ -173,8 +173,8 @@ class BorderSearch {
   std::unordered_set<std::uint64_t> is_requested_;
 };
 
-/// How far borders are from those of another solution of the same points, as on a finer mesh: a
-/// sample of the vertices is searched again in it, near its place.
+/// Measures how far borders move when the same points are solved otherwise, for example on a finer
+/// mesh. For a sample of the vertices it searches the border of the other solution nearby.
 class ShiftSearch {
  public:
   struct Shift {

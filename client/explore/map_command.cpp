@@ -43,9 +43,9 @@ constexpr const char* kMapExamples = R"(Examples:
   oblique map friction --x mu=0.01:2:log --y e=0.5:1 --of fn_peak_N=5000
   oblique map --x mu=0.05:2 --y H=0.3:1.05 --e 1 --over fn_peak_N --out peaks.svg
 
-Finds the borders between regions, as of modes, on a plane of two keys. The points form a study that grows
-round by round: it is stored, and the same command continues it. Of a STUDY the model and the keys with
-one value are taken; other flags override them. --out may be given several times.)";
+Finds the borders between regions (for example of equal mode) in the plane of two keys. The points form a
+study that grows round by round. It is stored, and the same command continues it. If a STUDY is given, its
+model and its keys with a single value are used; other flags override them. --out may be repeated.)";
 
 struct MapFlags {
   std::string study;

@@ -103,9 +103,10 @@ bool has_texts(const Output& output) {
 
 void refuse_texts(std::string_view flag, const Output& output) {
   if (has_texts(output)) {
-    throw solver::InputError(fmt::format(
-        "{0}: the values of {1} are texts; name one of them, as {1}:'sC sR', or a number", flag,
-        output.name));
+    throw solver::InputError(
+        fmt::format("{0}: {1} has texts as values: give one of them (for example {1}:'sC sR'), or "
+                    "another output with numbers",
+                    flag, output.name));
   }
 }
 

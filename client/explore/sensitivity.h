@@ -12,7 +12,7 @@
 // the unit cube; the caller maps them to the quantiles of their distributions.
 namespace oblique::client {
 
-/// Most inputs of Saltelli's design: each needs two dimensions of Sobol's sequence.
+/// Maximum number of inputs of Saltelli's design: each needs two dimensions of Sobol's sequence.
 inline constexpr std::size_t kMostSobolInputs = sampling::kSobolDimensions / 2;
 
 /// Row `number` of Saltelli's design for d inputs: the d + 2 points A, B, A_B^1, ..., A_B^d, each

@@ -539,8 +539,8 @@ namespace {
 constexpr std::uint64_t kBytesAResult = 970;
 constexpr std::uint64_t kBytesAModel = 600;
 
-/// Up to kMostCounted points are counted; above that numbers are estimated from kSampledPoints
-/// random points.
+/// Up to kMaxCounted points are counted. For larger studies, numbers are estimated from
+/// kSampledPoints random points.
 constexpr std::uint64_t kMaxCounted = 100'000;
 constexpr std::uint64_t kSampledPoints = 10'000;
 

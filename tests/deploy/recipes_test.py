@@ -112,7 +112,7 @@ class PictureOfARunningStudy(Recipe):
         url, workers = self.start_server()
         self.run_in_folder("oblique", "submit", "--name", "first", "--preset", "paper", "--H", "1", "--mu", "0.1:2:40", "--e", "0.8,1",
                            OBLIQUE_SERVER=url)
-        # Nobody solves it before a picture was drawn.
+        # The worker starts only after the first picture is drawn.
         drawing = self.start(PYTHON, "-u", "running.py", "oblique.db", "first")
         self.wait_for(drawing, "0 of 80 points, running\n")
         self.start("oblique-worker", "--server", workers)

@@ -39,9 +39,10 @@ struct Outcome {
 /// reads nothing; its output goes to files in the folder.
 class Process {
  public:
-  /// Starts `program` with `arguments`, without the variables of our programs and systemd's unless
-  /// `environment` has them, and without the configuration files of this machine. `ready_fd`, when
-  /// not −1, is its descriptor 3. Throws std::runtime_error when it does not start.
+  /// Starts `program` with `arguments`. It does not inherit environment variables of our programs
+  /// or of systemd, and does not read the configuration files of this machine. `environment` is
+  /// added. `ready_fd`, unless −1, becomes its file descriptor 3. Throws std::runtime_error if the
+  /// program does not start.
   Process(const TemporaryFolder& folder, const std::string& program,
           const std::vector<std::string>& arguments, const Environment& environment = {},
           int ready_fd = -1);

@@ -26,7 +26,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using protocol::Descriptor;
 constexpr int kLongestPoll_ms = 5;
-/// Size of the buffer per direction, after which it is not read: as on a fast long line.
+/// Maximum bytes in transit per direction; the proxy reads no more until some are sent. A fast long
+/// line holds as many.
 constexpr std::size_t kMostUnderWay = std::size_t{4} << 20U;
 
 sockaddr_in on_loopback(std::uint16_t port) {

@@ -292,7 +292,7 @@ TEST_F(BatchSolverTest, AThreadThatIsFreePassesOverADroppedBatchThatAnotherStill
   shared.add(batch(1, 0, 6));
   dropped_batch.wait_begun(2);  // both threads are in it
   shared.drop_batch(1);
-  dropped_batch.open(1);  // one of them comes free
+  dropped_batch.open(1);  // one of the two threads is free again
   shared.add(batch(2, 0, 1));
   next_is_solved.wait(false);
   dropped_batch.open(1000);

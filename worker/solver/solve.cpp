@@ -207,7 +207,7 @@ class PointSolver {
   const FingerPoints& source_;
   const TakeOutcome& sink_;
   const Tracing& tracing_;
-  std::shared_ptr<const FallenChain> fallen_;  ///< that of touches_
+  std::shared_ptr<const FallenChain> fallen_;  ///< the fall that touches_ belong to
   std::map<double, ChainState> touches_;       ///< by H
   std::optional<FingerPoint> upcoming_;        ///< taken from the source, not begun
   bool has_ended_ = false;

@@ -10,7 +10,7 @@ const margin = { left: 64, right: 14, top: 10, bottom: 46 };
 const leastDrag = 6; // pixels
 const clickReach = 14;
 
-/** Ascending edges of the cells of a side: {order of the values, edges, scale}. */
+/** Edges of the cells along a picture axis: {order: of the values, edges: ascending, scale}. */
 function cellsOf(side, wantsLog) {
   const order = [...side.values.keys()].sort((a, b) => side.values[a] - side.values[b]);
   const sorted = order.map((i) => side.values[i]);

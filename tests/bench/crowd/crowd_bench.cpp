@@ -66,7 +66,7 @@ void check(const test::Outcome& ran) {
   }
 }
 
-/// Where a row's server has its files, and with which keys one speaks with it.
+/// Folder of the files of a row's server, and the keys for connecting to it.
 struct Place {
   explicit Place(bool with_keys) {
     if (with_keys) {
@@ -84,7 +84,7 @@ struct Place {
   test::Environment environment;
 };
 
-/// A study that no crowd comes to the end of.
+/// Submits a study with more points than the workers can solve during the benchmark.
 void submit(const Place& place, const test::Server& server) {
   std::vector<std::string> words{"submit",         "--server", server.client_url(), "--preset",
                                  "paper",          "--H",      "0.1:1.15:1000",     "--mu",

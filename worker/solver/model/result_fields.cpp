@@ -101,7 +101,7 @@ constexpr ResultList kPeaks =
         "ripple, the second major peak is major_peak_2_N");
 constexpr ResultList kFtPeaks =
     list_of<&Result::ft_peaks, &TangentialPeak::t_s, &TangentialPeak::ft_N>(
-        "s, N", "every peak of the tangential magnitude: t_s counted from touch and ft_N");
+        "s, N", "peaks of the tangential magnitude: t_s from touch, and ft_N");
 constexpr ResultList kPhases = list_of<&Result::phases, &Phase::kind, &Phase::t0_s, &Phase::t1_s>(
     "s", "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch");
 constexpr ResultList kStickIntervals =

@@ -22,7 +22,7 @@ struct FactorRow {
 /// Constants of the momentum balance of a link and all links beyond it.
 template <class Constant>
 struct LinkBalance {
-  Constant inner_end_kg;     ///< the link's own share of the row of its inner end
+  Constant inner_end_kg;     ///< mass that the link adds to the row of its inner end
   Constant weight_beyond_N;  ///< of the link and all beyond it
 };
 

@@ -106,7 +106,7 @@ std::string ContactRecord::mode(const std::vector<bool>& survives) const {
   std::string text;
   std::string last;
   for (const State& state : states_) {
-    // A state lies between two turns; its kind is the parity of the surviving turns before it.
+    // Compression and restitution alternate at each turn that is not part of a merged ripple.
     bool compression = true;
     for (std::size_t i = 0; i < turns_.size() && turns_[i].t_s <= state.t0_s; ++i) {
       compression = survives[i] ? !compression : compression;

@@ -11,7 +11,8 @@
 namespace oblique::solver {
 namespace {
 
-/// Most states kept. A state has 32 bytes a row; when there are more, every other one is dropped.
+/// Maximum number of stored states, of 32 bytes a row. When it is reached, every second state is
+/// dropped.
 constexpr std::size_t kMostKept = 4096;
 /// More steps in sqrt(2 length/g) would take hours.
 constexpr double kMostSteps = 1e9;

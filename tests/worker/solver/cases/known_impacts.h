@@ -6,8 +6,9 @@
 
 namespace oblique::solver {
 
-/// One impact of the preset `paper` as an independent explicit solution gives it, converged in the
-/// step; forces to 0.01 N, phases and contacts to 0.001 us, sticks to 0.01 us, slides to 10 nm.
+/// One impact of the preset `paper`, solved by an independent explicit integrator with steps so
+/// short that forces are known to 0.01 N, phases and contacts to 0.001 us, sticks to 0.01 us, and
+/// slides to 10 nm.
 struct KnownImpact {
   double H_m;
   double mu;

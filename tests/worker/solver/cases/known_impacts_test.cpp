@@ -12,13 +12,13 @@
 namespace oblique::solver {
 namespace {
 
-/// What a default step is held to, besides half of the last digit that is known.
+/// Relative tolerance of results with the default step, added to half of the last known digit.
 constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
 constexpr double kTimeDigit_us = 0.0005;
 constexpr double kStickDigit_us = 0.005;
-/// Of the duration, for times. Valleys are flat, and the default tolerance, 1e-5, moves an instant
-/// of a turn by up to 3.5 ns.
+/// Relative to the duration. Instants of turns have a larger tolerance, because valleys are flat:
+/// the default tolerance of the solver, 1e-5, moves them by up to 3.5 ns.
 constexpr double kRelativeTime = 3e-6;
 constexpr double kRelativeInstant = 6e-6;
 constexpr double kSlideDigit_mm = 0.000005;

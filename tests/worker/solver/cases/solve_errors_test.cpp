@@ -37,7 +37,7 @@ std::string model_error(const std::function<void(ModelParameters&)>& change) {
   return message_of<InputError>([&] { Finger{model}; });
 }
 
-/// Of solving a point of the coarse model with that change.
+/// Returns the error of solving a point of the coarse model with that change.
 template <class Error = SolveError>
 std::string solve_error(const std::function<void(ModelParameters&)>& change, double e_star = 1.0) {
   ModelParameters model = coarse_model();
