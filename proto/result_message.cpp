@@ -143,7 +143,7 @@ std::string fault_of_lists(const PointResult& message) {
     const Numbers& numbers = (message.*kLists[i].numbers)();
     const int elements = numbers.size() / kLists[i].members;
     if (elements > kMaxListElements) {
-      return fmt::format("the worker sent {} {}, and a result has at most {}", elements, name,
+      return fmt::format("the worker sent {} {}; at most {} are allowed", elements, name,
                          kMaxListElements);
     }
     if (numbers.size() % kLists[i].members != 0) {

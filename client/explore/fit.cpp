@@ -400,9 +400,9 @@ Information information_of(const FitStep& minimum) {
   return found;
 }
 
-/// Searches the ends of profile-likelihood intervals. The root of the rise of chi2 over the limit,
-/// f(w) = sqrt((min chi2 with w fixed - chi2) / limit), is 0 at the minimum and 1 at the end, and
-/// linear where the residuals are.
+/// Searches the ends of profile-likelihood intervals: the values of w where
+/// f(w) = sqrt((min chi2 with w fixed - chi2) / limit) is 1. At the minimum f is 0. If the
+/// residuals are linear in the unknowns, f is linear in w, too.
 class Profile {
  public:
   Profile(const FitProblem& problem, const FitStep& minimum, const Information& information,

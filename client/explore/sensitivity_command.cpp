@@ -32,8 +32,8 @@
 #include "proto/recipe/point_table.h"
 #include "proto/recipe/sampling.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -537,7 +537,9 @@ void add_sensitivity(CLI::App& app, Action& parsed) {
       ->check(protocol::whole_number_from(1))
       ->type_name("N")
       ->capture_default_str();
-  command.add_option("--seed", flags.seed, "of the scrambling, or of the trajectories")
+  command
+      .add_option("--seed", flags.seed,
+                  "seed of the scrambled Sobol sequence, or of Morris' trajectories")
       ->check(protocol::whole_number_from(0))
       ->type_name("N")
       ->capture_default_str();

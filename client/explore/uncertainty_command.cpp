@@ -352,7 +352,9 @@ void add_uncertainty(CLI::App& app, Action& parsed) {
   command.add_option("--of", flags.of, std::string(kOutputsHelp))
       ->type_name("OUTPUTS")
       ->capture_default_str();
-  command.add_option("--quantiles", flags.quantiles, "shares of the points below them")
+  command
+      .add_option("--quantiles", flags.quantiles,
+                  "quantiles to print, as fractions of the points: 0.5 is the median")
       ->type_name("P1,P2,...")
       ->capture_default_str();
   command.add_option("--where", flags.where, "condition that points must meet")->type_name("EXPR");

@@ -3,9 +3,9 @@
 
     PYTHONPATH=build/release/python tests/bench/map_check.py map.json --e 1 --preset paper [--points 100000]
 
-Both sides of every vertex must have the modes that it names. Random points are compared with the regions
-that the curves enclose; those within a bracket's width of a curve do not count. Ends with 1 where a side
-is wrong. All flags behind the file but --points are keys that the points share.
+On both sides of every vertex, the modes must be those in the map. Random points are compared with the
+regions that the curves enclose; points within a bracket's width of a curve are ignored. Exit code 1 if a
+mode is wrong. Other flags than --points and --seed set model parameters of all points.
 """
 
 import argparse

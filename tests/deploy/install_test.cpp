@@ -247,7 +247,7 @@ TEST(PackagesTest, TheArchiveRunsWhereItIsUnpackedWithLibrariesOfItsOwn) {
 
 // ---- The library ----
 
-/// The parts library and development, moved after installing.
+/// Installs the components `library` and `development`, then moves them. Returns their folder.
 std::string installed_library(const TemporaryFolder& folder) {
   for (const std::string part : {"library", "development"}) {
     const auto installed = install(folder, folder.file("made here"), part);

@@ -71,7 +71,7 @@ std::vector<std::string> environment_with(const Environment& changes) {
   return all;
 }
 
-/// As system calls take a list of texts; lives as long as they do.
+/// Pointers to `texts` and a final null pointer, as execve() needs them. Valid as long as `texts`.
 std::vector<char*> pointers_to(std::vector<std::string>& texts) {
   std::vector<char*> pointers;
   for (std::string& text : texts) {

@@ -26,7 +26,7 @@ class Server {
   /// lives.
   Server(const TemporaryFolder& folder, const std::string& database,
          const Environment& environment = {});
-  /// At the same ports as one that has ended.
+  /// Starts a server at the ports of `before`, which has ended.
   Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
          const Environment& environment = {});
   /// With these arguments, which say where its database is and where it listens.

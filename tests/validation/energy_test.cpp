@@ -17,8 +17,8 @@ using solver::Motion;
 
 const std::string kBalance = "kinetic + strain + gravity + springs + losses = constant";
 
-/// What the energies of a contact do not add up to, of the work exchanged, taken anew from the
-/// result's parts.
+/// Error of the energy balance, relative to the exchanged energy, computed from the energies in the
+/// result. Expects it to equal the `closure` in the result.
 double closure(const CaseResult& result) {
   const solver::ContactEnergy& e = result.energy;
   const double missing_J =

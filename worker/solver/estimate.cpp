@@ -84,7 +84,8 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
   errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
   errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
-  // One vibration is in both components, so the difference of either may pass through 0.
+  // The same vibration is in both components of the velocity. The difference of a single component
+  // may pass through 0, so the difference of the vectors is used.
   errors.v_out = error_of(rough * std::hypot(result.vt_out_m_s - companion.vt_out_m_s,
                                              result.vn_out_m_s - companion.vn_out_m_s),
                           speed_m_s);

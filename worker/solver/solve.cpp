@@ -148,8 +148,8 @@ class PointSolver {
            have_one_shape(upcoming_->finger.parts()->prepared().chain().tables(), chain.tables());
   }
 
-  /// The contact of a point, whose state at touch is valid until the next call. Passes on the error
-  /// of a point that has none.
+  /// Prepares the contact of a point. The state at touch in it is valid until the next call. If the
+  /// point cannot be solved, passes its error to the sink and returns nothing.
   std::optional<ContactCase> begin(FingerPoint&& point) {
     const Finger::Parts& finger = *point.finger.parts();
     try {

@@ -96,9 +96,9 @@ ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const 
           std::min(steps.restitution_s, longest_s / slower)};
 }
 
-/// Throws SolveError for steps in compression with which Contact::kMostSteps end before the contact
-/// can, and for steps in which the tip, fallen by about the chain's length, moves by less than the
-/// rounding of its position.
+/// Throws SolveError if steps in compression are too short: if the shortest possible contact takes
+/// more than Contact::kMostSteps, or if the tip, after a fall of about the chain's length, moves in
+/// a step by less than its position is rounded.
 void StepChoice::check_can_end(double step_s) const {
   const double length_m = std::accumulate(model_.lengths_m.begin(), model_.lengths_m.end(), 0.0);
   if (step_s < std::numeric_limits<double>::epsilon() * std::sqrt(length_m / model_.g_m_s2)) {

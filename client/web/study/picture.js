@@ -276,8 +276,8 @@ export function askPicture(view, cells, signal) {
 }
 
 /**
- * The cells, bins or points of a picture that have points under another condition: {cells, counts,
- * points}.
+ * Finds which cells, bins or dots of a picture contain points that meet a further condition:
+ * {cells, counts, points}.
  */
 export async function askSelected(view, picture, condition, signal) {
   const where = joined(view.field("where"), condition);

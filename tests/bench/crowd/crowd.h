@@ -37,7 +37,7 @@ std::size_t bytes_of_result();
 class Crowd {
  public:
   explicit Crowd(const CrowdSettings& settings);
-  /// They vanish without a word.
+  /// Closes all connections without taking leave of the server.
   ~Crowd();
   Crowd(const Crowd&) = delete;
   Crowd& operator=(const Crowd&) = delete;

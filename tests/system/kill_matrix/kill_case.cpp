@@ -32,8 +32,9 @@ constexpr const char* kKilledWorkers = "storm:killed workers";
 constexpr const char* kCutConnections = "storm:cut connections";
 constexpr const char* kVanishingPeers = "storm:vanishing peers";
 
-// The first twenty-three have every class of point, every program in both ways of starting it, and
-// both signals: they are what runs always. Occurrences are such that a sound run has them.
+// The first 23 entries run always. They cover every class of kill point, every program in both ways
+// of starting it, and both signals. The last number says at which occurrence of the point the
+// signal is sent; an undisturbed run has at least as many.
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},

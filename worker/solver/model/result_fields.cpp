@@ -256,8 +256,8 @@ constexpr std::array kFields{
         "what does not add up in the energy balance, relative to exchanged_J; never negative", ""),
     error<&Errors::mode_same>(
         "mode_same",
-        "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
-        "another. This and the errors below are there only when they were asked for"),
+        "1 if half the mesh and twice the step give the same mode, ripples merged; else 0. "
+        "This and the errors below need errors = true or --errors"),
     error<&Errors::fn_peak>("fn_peak_error", "estimated error of fn_peak_N, as a fraction of it"),
     error<&Errors::ft_peak>("ft_peak_error",
                             "estimated error of ft_peak_N, as a fraction of fn_peak_N"),

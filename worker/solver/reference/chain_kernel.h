@@ -92,16 +92,17 @@ class ForwardSubstitution {
     return less_product(less_product(far, row.left[1], before[1]), row.left[0], before[0]);
   }
 
-  Real x_[kHalfBandwidth]{};  ///< of the rows before, the last one first
+  Real x_[kHalfBandwidth]{};  ///< components in the last three rows, newest first
   Real y_[kHalfBandwidth]{};
 };
 
-/// D Lᵀ z = y: gives `take(row, x, y)`, the row's pair of z, from row `rows` - 1 up to `first`.
-/// `rows` of `factor`, and kHalfBandwidth more of zeros.
+/// Solves D Lᵀ z = y from row `rows` - 1 down to `first`. Calls `take(row, x, y)` with the two
+/// components of z in each row. `factor` has `rows` rows, followed by kHalfBandwidth rows of zeros.
 template <class Constant, class Real, class Take>
 inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
                             const Real* y, const Take& take) {
-  // Three rows a turn, each in the variables of the row three after it, so that none is moved.
+  // Each turn solves three rows. A row overwrites the variables of the row three before it, so that
+  // none has to be copied.
   Real ax{}, ay{}, bx{}, by{}, cx{}, cy{};
   const auto next = [&](std::size_t row, Real& zx, Real& zy, const Real& x_1, const Real& y_1,
                         const Real& x_2, const Real& y_2) {

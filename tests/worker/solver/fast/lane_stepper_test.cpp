@@ -114,7 +114,7 @@ TEST(LaneStepper, GivesALaneTheSameBitsBesideOtherChainsAsBesideItsOwn) {
   }
 }
 
-/// The state that ExplicitMotion, the reference, comes to by as many of the same steps.
+/// The state of the reference, ExplicitMotion, after `steps` steps of the same length.
 std::vector<double> by_reference(const Chain& chain, int steps) {
   const ExplicitMotion motion(chain);
   ChainState state = chain.at_rest();

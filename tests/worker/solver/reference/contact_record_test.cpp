@@ -321,7 +321,8 @@ TEST(ReactionPeaks, TheLargestOfSeveralCountsWhereverItLies) {
 }
 
 TEST(ReactionPeaks, APeakBetweenInstantsCountsThoughAnInstantOfAnotherIsHigher) {
-  // 1 - (t - 1)^2 is met at its top, 1.005 - (t - 3.1)^2 a tenth beside it on either side.
+  // The instants include the maximum of the first parabola. The nearest ones to the maximum of the
+  // second, 3.1, are 0.1 before and after it, where it is lower than the first.
   ReactionPeaks peaks(1);
   for (int i = 0; i <= 20; ++i) {
     const double t_s = 0.2 * i;
