@@ -132,7 +132,7 @@ class Residuals : public Eigen::DenseFunctor<double> {
         angles_(std::move(angles)),
         free_(std::move(free)) {}
 
-  /// What the calls of `evaluate` are called.
+  /// Names the next calls of `evaluate`, for progress messages.
   void describe(std::string what) { what_ = std::move(what); }
 
   int operator()(const VectorXd& x, VectorXd& residuals) {
@@ -238,8 +238,8 @@ class Residuals : public Eigen::DenseFunctor<double> {
   std::vector<Evaluation> evaluations_;
 };
 
-/// By how much the linearised model lets chi2 fall: the squared length of the residuals' projection
-/// on the columns of the Jacobian.
+/// Decrease of chi2 that the linearised model predicts: the squared length of the projection of the
+/// residuals on the columns of the Jacobian.
 double predicted_fall(const MatrixXd& jacobian, const VectorXd& residuals) {
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(jacobian);
   const VectorXd rotated = qr.householderQ().adjoint() * residuals;
@@ -340,7 +340,7 @@ std::vector<Index> all_but(std::size_t count, std::optional<Index> fixed = {}) {
   return numbers;
 }
 
-/// What the Jacobian at a minimum says.
+/// Which unknowns the data determine at a minimum, from the Jacobian.
 struct Information {
   MatrixXd covariance;  ///< of the angles; 0 for unknowns at a bound and without effect
   MatrixXd correlation;
@@ -353,9 +353,9 @@ bool is_at_bound(double angle) {
   return std::abs(std::sin(angle)) < kAtBound;
 }
 
-/// With the columns of J scaled to length 1, J = U S V^T D: covariance D^-1 V S^-2 V^T D^-1. A
-/// singular value at the noise of the differences is a combination that the data leave open, whose
-/// unknowns are the large parts of its vector in V.
+/// With the columns of J scaled to length 1, J = U S V^T D, and the covariance is D^-1 V S^-2 V^T
+/// D^-1. A singular value no larger than the noise of the differences belongs to a combination of
+/// unknowns that the data do not determine: those with large components in its vector of V.
 Information information_of(const FitStep& minimum) {
   Information found;
   const MatrixXd& jacobian = minimum.jacobian;

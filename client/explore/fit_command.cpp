@@ -183,7 +183,7 @@ int fit_to_paper(const FitFlags& flags, Console& console) {
 
 // ---- Measured numbers ----
 
-/// Of KEY=FROM:TO or KEY=FROM:TO:START.
+/// Parses KEY=FROM:TO or KEY=FROM:TO:START.
 Unknown unknown_of_flag(const std::string& text) {
   const auto equals = std::min(text.find('='), text.size());
   const auto parts =
@@ -356,7 +356,7 @@ std::string settings_of(const MeasuredFit& fit, const FitProblem& problem, bool 
 
 // ---- Report ----
 
-/// What is printed of a fit.
+/// The printed report of a fit.
 struct Report {
   const MeasuredFit& fitted;
   const Fit& fit;

@@ -187,7 +187,7 @@ class ShiftSearch {
   /// One of `every` vertices of each curve, and at least one.
   ShiftSearch(const MapGrid& grid, const Borders& borders, std::size_t every);
 
-  /// As of BorderSearch.
+  /// The next points to solve, as for BorderSearch.
   std::vector<LatticePoint> next();
   void set_regions(const std::vector<int>& regions);
   std::vector<Shift> shifts() const;

@@ -67,7 +67,7 @@ struct Deviation {
   bool is_relative;
 };
 
-/// By output; that of all outputs without their own has an empty name.
+/// By output; the one with an empty name applies to outputs without their own.
 std::map<std::string, Deviation, std::less<>> deviations_of(
     const std::vector<std::string>& texts, const std::vector<std::string>& outputs) {
   std::map<std::string, Deviation, std::less<>> deviations;

@@ -84,7 +84,7 @@ struct DrawnInput {
   }
 };
 
-/// What is analysed, checked.
+/// A checked request: study, inputs and outputs.
 struct SensitivityProblem {
   SensitivityMethod method = SensitivityMethod::kSobol;
   protocol::Recipe sample;  ///< a sample with the distributions of the inputs

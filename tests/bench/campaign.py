@@ -36,7 +36,7 @@ def run_s(program, points, falls, workers):
 
 
 def solve_s(points, falls):
-    """Seconds that solving so many points with so many values of E takes here."""
+    """Seconds that this process takes to solve `points` points with `falls` values of E."""
     draw = np.random.default_rng(1)
     keys = {key: draw.uniform(*limits, points) for key, limits in RANGES.items()}
     keys["E"] = np.resize(np.linspace(*RANGES["E"], falls), points)

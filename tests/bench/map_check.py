@@ -52,7 +52,8 @@ def segments(found):
         middle = points.index((vertex["x"], vertex["y"])) + (1 if at_begin else 0)
         before, behind = path[max(middle - 1, 0)], path[min(middle + 1, len(path) - 1)]
         direction = np.subtract(behind, before)
-        # The bracket points from `from` to `to`: to the left where it turns left from the curve's direction.
+        # Direction of the bracket from `from` to `to`: left if it points to the left of the
+        # direction of the curve.
         turn = -direction[1] if vertex["along"] == "x" else direction[0]
         left, right = (vertex["to"], vertex["from"]) if turn > 0 else (vertex["from"], vertex["to"])
         for one, other in zip(path, path[1:]):
@@ -62,7 +63,8 @@ def segments(found):
 
 
 def judged(found, x, y):
-    """The region of each point: that on its side of the nearest chord to the right, else to the left."""
+    """The region of each point: the region on its side of the nearest chord to its right or, without one, to its
+    left."""
     rows, sides = segments(found)
     names = [region["name"] for region in found["regions"]]
     order = np.argsort(y)

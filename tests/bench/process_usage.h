@@ -4,10 +4,10 @@
 
 namespace oblique::bench {
 
-/// What a living process has used so far; zeros for one that is gone.
+/// Resources that a running process has used so far; zeros if it has ended.
 struct Usage {
-  double cpu_s = 0.0;               ///< of all its threads
-  double first_thread_cpu_s = 0.0;  ///< of the one that it began with
+  double cpu_s = 0.0;               ///< of all threads
+  double first_thread_cpu_s = 0.0;  ///< of its first thread
   double resident_MB = 0.0;
   double peak_MB = 0.0;
 };

@@ -23,8 +23,8 @@
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 
-/// Whole studies through real processes: what they take of the clock, of each process's CPU and
-/// memory, and of the disk. README.md says how to run it.
+/// Benchmark of whole studies with real processes: elapsed time, CPU time and memory of each
+/// process, and disk usage. See README.md.
 namespace oblique::bench {
 namespace {
 
@@ -42,7 +42,7 @@ std::vector<std::string> study_of(std::uint64_t points) {
       "0.2:1.0" + count, "--name", "bench"};
 }
 
-/// As many points, each of a model of its own.
+/// `points` points, each with its own model.
 std::vector<std::string> models_of(std::uint64_t points) {
   return {"--k",      "1e7:9e7:" + std::to_string(points),
           "--preset", "paper",
@@ -58,7 +58,7 @@ double megabytes(const std::string& file) {
   return missing ? 0.0 : static_cast<double>(bytes) / 1e6;
 }
 
-/// One study, submitted and watched to its end by `oblique`.
+/// Submits a study with `oblique` and waits until it is done.
 struct Study {
   explicit Study(std::uint64_t points) : Study(study_of(points)) {}
   explicit Study(std::vector<std::string> flags) : arguments(std::move(flags)) {}
@@ -119,7 +119,7 @@ void bench_server_alone(const std::vector<std::string>& flags) {
   std::fflush(stdout);
 }
 
-/// Runs `oblique` to its end and gives what it took.
+/// Runs `oblique` until it ends and returns the elapsed time.
 Usage run_and_watch(const test::TemporaryFolder& folder,
                     const std::vector<std::string>& arguments) {
   test::Process process(folder, test::client_program(), arguments);
@@ -133,7 +133,7 @@ Usage run_and_watch(const test::TemporaryFolder& folder,
   return last;
 }
 
-/// A finished study merged into an empty database, and once more.
+/// Merges a finished study into an empty database, then a second time.
 void bench_merge(std::uint64_t points) {
   Study study(points);
   {
@@ -159,7 +159,7 @@ void wait_for(const std::function<bool()>& condition) {
   }
 }
 
-/// A study under way, whose highest settled run of points shows what is still out.
+/// A running study.
 struct Underway : Study {
   explicit Underway(std::uint64_t points) : Study(points) {
     std::vector<std::string> submit{"submit", "--server", server.client_url()};
@@ -169,8 +169,8 @@ struct Underway : Study {
   double count() const { return database.rows(); }
 };
 
-/// How long after a worker's death the last point that it held was solved by another and taken by
-/// the server: points of a second attempt are those.
+/// Time from the end of a worker until the last point of its batches, solved by another worker, is
+/// stored. These are the points with a second attempt.
 void bench_worker_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker survivor(study.folder, study.server.worker_url());
@@ -181,15 +181,15 @@ void bench_worker_killed(std::uint64_t points) {
   victim.wait();
   std::this_thread::sleep_for(std::chrono::seconds(5));
   const double held = study.database.number("SELECT count(*) FROM results WHERE attempt > 1");
-  // Days since 4714 BC, as SQLite counts them, in seconds since 1970.
+  // Converts days since 4714 BC, the unit of SQLite, to seconds since 1970.
   const double solved_s = study.database.number(
       "SELECT (julianday(max(solved_at)) - 2440587.5) * 86400 FROM results WHERE attempt > 1");
   std::printf("| %.3g | %.0f | %.2f |\n", static_cast<double>(points), held,
               solved_s - std::chrono::duration<double>(killed).count());
 }
 
-/// How long after a server's death (and start at once) both workers hold batches of the new one and
-/// rows come again.
+/// Time from the end of the server, which is started again at once, until both workers have batches
+/// and rows are stored again.
 void bench_server_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker one(study.folder, study.server.worker_url());

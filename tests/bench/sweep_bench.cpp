@@ -54,7 +54,7 @@ void count_cases(benchmark::State& bench, std::size_t cases_an_iteration) {
       benchmark::Counter::kIsRate);
 }
 
-/// A contact of one case, one number at a time.
+/// The contact of one case, without lanes.
 void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::StepChoice& steps,
                   const Point& point) {
   const solver::ExplicitMotion motion(chain);
@@ -64,7 +64,7 @@ void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::St
                             steps.contact(point.e_star), fall.state_at(point.H_m), {}));
 }
 
-/// What a script would do: the model built and the fall solved for every case, no lanes.
+/// As a simple script does it: builds the model and solves the fall for every case, without lanes.
 void naive(benchmark::State& bench) {
   const std::vector<Point> points = sweep();
   std::size_t next = 0;
@@ -74,13 +74,13 @@ void naive(benchmark::State& bench) {
     const solver::StepChoice steps(chain, model);
     const auto fall = solver::solve_stepped_fall(chain, steps.fall_s());
     solve_scalar(chain, *fall, steps, points[next]);
-    next = (next + 37) % points.size();  // all over the sweep
+    next = (next + 37) % points.size();  // spread over the sweep
   }
   count_cases(bench, 1);
 }
 BENCHMARK(naive)->Unit(benchmark::kMillisecond);
 
-/// One fall for all cases, still one number at a time.
+/// One fall for all cases, without lanes.
 void shared_fall(benchmark::State& bench) {
   const ModelParameters model = with_elements(bench.range(0));
   const Chain chain(model);
@@ -96,7 +96,7 @@ void shared_fall(benchmark::State& bench) {
 }
 BENCHMARK(shared_fall)->Arg(4)->Arg(16)->Unit(benchmark::kMicrosecond);
 
-/// One fall, vector lanes, and so many threads.
+/// One fall, vector lanes, and `threads` threads.
 void lanes_and_threads(benchmark::State& bench) {
   const Finger finger(with_elements(bench.range(0)));
   const auto threads = static_cast<std::size_t>(bench.range(1));
@@ -143,7 +143,8 @@ void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>&
       });
 }
 
-/// Every case has k and eta2 of its own; one fall serves all, the same drop or one of 8 drops.
+/// Every case has its own k and eta2. One fall serves all cases, with a single drop or with 8
+/// drops.
 void distinct_contacts(benchmark::State& bench) {
   const ModelParameters model = solver::preset("paper");
   const auto fallen = solver::solve_falls({&model, 1}).front().fallen;
@@ -163,7 +164,8 @@ void distinct_contacts(benchmark::State& bench) {
 }
 BENCHMARK(distinct_contacts)->ArgName("drops")->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond);
 
-/// Every case has E, I and lengths of its own, so a fall of its own too; two sets of lanes each.
+/// Every case has its own E, I and lengths, and so its own fall. Falls and contacts each fill two
+/// sets of lanes.
 void distinct_chains(benchmark::State& bench) {
   const std::size_t cases = 2 * solver::runnable_lane_kernels().front().lanes;
   int round = 0;
@@ -186,7 +188,7 @@ void distinct_chains(benchmark::State& bench) {
 }
 BENCHMARK(distinct_chains)->ArgName("n")->Arg(4)->Arg(16)->Unit(benchmark::kMillisecond);
 
-/// One point of a model that nobody has solved before.
+/// One point of a model whose fall is not cached.
 void fresh_point(benchmark::State& bench) {
   for (auto _ : bench) {
     benchmark::DoNotOptimize(Finger(with_elements(bench.range(0))).solve(1.0, 0.4, 1.0));

@@ -50,7 +50,7 @@ std::optional<ProcessState> state_of(pid_t pid) {
 /// `changes`, each as NAME=value.
 std::vector<std::string> environment_with(const Environment& changes) {
   std::vector<std::string> all;
-  // What is installed on this machine is not what is tested.
+  // Ignores the configuration of programs that are installed on this machine.
   Environment set{{"OBLIQUE_SERVER_CONFIG", "/dev/null"}, {"OBLIQUE_WORKER_CONFIG", "/dev/null"}};
   for (const auto& [name, value] : changes) {
     set[name] = value;

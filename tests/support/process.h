@@ -53,7 +53,7 @@ class Process {
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
-  /// As of wait; nothing while it runs.
+  /// The exit code as from wait(); nothing while it runs.
   std::optional<int> exit_code();
   /// Waits for the end. The exit code, or minus the signal that ended it: a program that ends in
   /// order because of SIGINT gives 130, one that SIGINT ends gives −2.

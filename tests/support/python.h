@@ -6,7 +6,7 @@
 
 namespace oblique::test {
 
-/// What a program in Python prints that runs with `folder` as its current one; errors too.
+/// Output and errors of a Python program that runs in `folder`.
 std::string said_by_python(const TemporaryFolder& folder, const std::string& program);
 
 }  // namespace oblique::test

@@ -98,7 +98,7 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum);
 }
 
-/// What the explicit way ends with, in the coordinates of the constrained chain.
+/// Final state of the explicit integrator, in the coordinates of the constrained chain.
 Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlphaMotion& motion) {
   ChainState state;
   state.q = in_columns(outcome.position);

@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 
 /// One message of a real worker.
 constexpr std::uint64_t kResultsATurn = 1000;
-/// Real workers report so often while a batch is solved.
+/// Interval at which real workers report while they solve a batch.
 constexpr double kReportInterval_s = 0.1;
 
 double now_s() {
@@ -135,8 +135,8 @@ class Crowd::Parts {
     }
   }
 
-  /// Takes what has come and reports some of what is due; what is sent may swallow the sign that
-  /// something came.
+  /// Receives waiting messages, then reports some of the due points. A send may clear the event
+  /// that signals further input, so receiving comes first.
   void work_on(std::size_t number) {
     receive_all(number);
     while (report_due(number) && receive_all(number)) {
@@ -159,7 +159,7 @@ class Crowd::Parts {
     return any;
   }
 
-  /// Reports the points of the first batch that are solved by now. False when there are none.
+  /// Reports the solved points of the first batch. False if there are none.
   bool report_due(std::size_t number) {
     Member& member = *members_[number];
     if (member.jobs.empty() || !member.conversation.may_solve()) {
@@ -167,7 +167,7 @@ class Crowd::Parts {
     }
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
-    // The others get their turn.
+    // The thread then serves the other workers.
     std::uint64_t solved = std::min<std::uint64_t>(left, kResultsATurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {

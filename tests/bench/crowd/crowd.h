@@ -13,27 +13,28 @@ namespace oblique::bench {
 struct CrowdSettings {
   std::string worker_url;
   std::size_t workers = 1;
-  /// What a point takes each of them; 0: nothing, they answer at once.
+  /// Time that a worker takes for each point; 0: it answers at once
   double point_s = 0.0;
   std::optional<protocol::KeyFile> key = {};  ///< of all of them
 };
 
-/// What the workers together have seen so far.
+/// Totals over all workers so far.
 struct CrowdCounts {
   std::uint64_t batches = 0;
   std::uint64_t results = 0;   ///< made
-  std::uint64_t messages = 0;  ///< that they sent
-  std::uint64_t connects = 0;  ///< of all workers; more than there are workers: some were dropped
+  std::uint64_t messages = 0;  ///< sent by the workers
+  std::uint64_t connects = 0;  ///< of all workers; more than workers: some connected again
   std::uint64_t welcomed = 0;
-  /// So late was its thread for all of them once. Beyond 2 s they take the server for silent.
+  /// Longest time that the thread needed to serve all workers once. Above 2 s the workers count the
+  /// server as silent.
   double longest_gap_s = 0.0;
 };
 
-/// Bytes of the result that each of them answers every point with.
+/// Size of the result with which every point is answered [bytes].
 std::size_t bytes_of_result();
 
-/// Many workers on one thread, each with a socket and a conversation of its own, as real ones have,
-/// that solve nothing: the answer to every point is one result that was solved beforehand.
+/// Many workers on one thread. Each has its own socket and conversation, as real workers have, but
+/// solves nothing: it answers every point with the same result.
 class Crowd {
  public:
   explicit Crowd(const CrowdSettings& settings);

@@ -22,8 +22,8 @@
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 
-/// Many workers that answer at once against one real server on loopback: results a second, what
-/// they cost the server, and how soon a client is answered meanwhile. README.md says how to run it.
+/// Benchmark: many workers that answer at once, and one real server on loopback. Measures results
+/// per second, CPU time and memory of the server, and latency for a client. See README.md.
 namespace oblique::bench {
 namespace {
 
@@ -96,8 +96,8 @@ void submit(const Place& place, const test::Server& server) {
   check(test::run_oblique(place.folder, words));
 }
 
-/// One row: a fresh server and database, the crowd, then the study, all measured from its first
-/// result on.
+/// One row of the table: a new server and database, the crowd, then the study. All values are
+/// measured from its first result on.
 void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_keys) {
   const Place place(with_keys);
   const test::Database database(place.folder.file("bench.db"));

@@ -12,8 +12,8 @@
 
 namespace oblique::bench {
 
-/// A client that asks a server for the status of a study at fixed times, whether the last answer
-/// has come or not, on a thread of its own.
+/// A client that requests the status of a study at fixed times, even if the last reply has not
+/// arrived. It has its own thread.
 class StatusProbe {
  public:
   struct Seen {
@@ -23,18 +23,18 @@ class StatusProbe {
     std::uint64_t leased = 0;
     std::uint32_t workers = 0;
 
-    /// The latency that this share of the answers did not exceed; 0 without answers.
+    /// Quantile of the latencies; 0 without replies.
     double quantile_ms(double share) const;
   };
 
-  /// Asks until it is stopped.
+  /// Sends requests until it is stopped.
   StatusProbe(std::string client_url, std::optional<protocol::KeyFile> key, std::string study,
               std::chrono::milliseconds interval);
   ~StatusProbe();
   StatusProbe(const StatusProbe&) = delete;
   StatusProbe& operator=(const StatusProbe&) = delete;
 
-  /// Waits a second for the last answers, and gives what was seen. To be called once.
+  /// Waits a second for the last replies and returns the measurements. May be called once.
   Seen stop();
 
  private:
@@ -44,7 +44,7 @@ class StatusProbe {
   std::optional<protocol::KeyFile> key_;
   std::string study_;
   std::chrono::milliseconds interval_;
-  Seen seen_;  // of the thread until it has ended
+  Seen seen_;  // used by the thread only, until it has ended
   std::atomic<bool> stopping_ = false;
   std::thread thread_;
 };

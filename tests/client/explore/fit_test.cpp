@@ -98,7 +98,7 @@ TEST(Fit, OfAStraightLineHasTheCovarianceOfLinearRegression) {
   EXPECT_NEAR(found.estimates[1].sd.value(), sd_b, 1e-4);
   EXPECT_NEAR(found.correlation(0, 1), -6.0 / std::sqrt(14.0 * 4.0), 1e-4);
   EXPECT_EQ(found.degrees_of_freedom, 2U);
-  // Of a linear problem the profile is the parabola of the covariance.
+  // The profile of a linear problem is the parabola given by the covariance.
   EXPECT_NEAR(found.estimates[0].lower.value(), a - 1.95996 * sd_a, 0.01 * sd_a);
   EXPECT_NEAR(found.estimates[1].upper.value(), b + 1.95996 * sd_b, 0.01 * sd_b);
   EXPECT_THAT(found.inseparable, IsEmpty());

@@ -16,7 +16,7 @@ struct Entry {
   const char* program;
   const char* point;
   int signal;
-  int highest;  ///< occurrence, or milliseconds, that is drawn
+  int highest;  ///< occurrence of the point, or milliseconds
 };
 
 constexpr bool kApart = false;
@@ -27,7 +27,7 @@ constexpr const char* kWorker = "oblique-worker";
 constexpr const char* kNoProcess = "";
 constexpr int kNoSignal = 0;
 
-// Points that are a storm.
+// Points that stand for repeated disturbances until the study is done.
 constexpr const char* kKilledWorkers = "storm:killed workers";
 constexpr const char* kCutConnections = "storm:cut connections";
 constexpr const char* kVanishingPeers = "storm:vanishing peers";
@@ -59,7 +59,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kNoProcess, kKilledWorkers, kNoSignal, 1},
     Entry{kApart, kNoProcess, kCutConnections, kNoSignal, 1},
     Entry{kApart, kNoProcess, kVanishingPeers, kNoSignal, 1},
-    // Those of the server.
+    // Further entries of the server.
     Entry{kApart, kServer, "before-commit", SIGSTOP, 8},
     Entry{kApart, kServer, "time", SIGSTOP, 1500},
     Entry{kApart, kServer, "after-receive:submit", SIGKILL, 1},
@@ -76,7 +76,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kServer, "after-receive:goodbye", SIGKILL, 2},
     Entry{kApart, kServer, "before-send:stopping", SIGKILL, 2},
     Entry{kApart, kServer, "after-send:stopping", SIGSTOP, 2},
-    // Those of a worker.
+    // Further entries of a worker.
     Entry{kApart, kWorker, "time", SIGKILL, 1200},
     Entry{kApart, kWorker, "before-send:hello", SIGKILL, 1},
     Entry{kApart, kWorker, "after-send:hello", SIGSTOP, 1},
@@ -89,14 +89,14 @@ constexpr std::array kMatrix{
     Entry{kApart, kWorker, "after-receive:results_stored", SIGSTOP, 2},
     Entry{kApart, kWorker, "before-send:heartbeat", SIGKILL, 1},
     Entry{kApart, kWorker, "after-send:goodbye", SIGSTOP, 1},
-    // Those of a client. Nothing waits for one that only watches.
+    // Further entries of a client. No process depends on a client that only watches.
     Entry{kApart, kClient, "before-send:submit", SIGKILL, 1},
     Entry{kApart, kClient, "after-send:submit", SIGSTOP, 1},
     Entry{kApart, kClient, "after-receive:submit", SIGKILL, 1},
     Entry{kApart, kClient, "before-send:status", SIGKILL, 12},
     Entry{kApart, kClient, "after-send:status", SIGSTOP, 12},
     Entry{kApart, kClient, "time", SIGSTOP, 800},
-    // `oblique run` and its children; at first while it starts them.
+    // Further entries of `oblique run` and its children; the first ones while it starts them.
     Entry{kRun, kClient, "time", SIGKILL, 40},
     Entry{kRun, kClient, "time", SIGSTOP, 800},
     Entry{kRun, kClient, "before-send:submit", SIGKILL, 1},
@@ -154,16 +154,18 @@ KillCase draw_case(std::uint64_t seed) {
   drawn.storm = storm_of(drawn.point);
   drawn.signal = entry.signal;
   drawn.occurrence = up_to(entry.highest);
-  // At once a message is still in the process; 20 ms later it has left.
+  // Without a pause a message is still in the process; after 20 ms it was sent.
   drawn.pause = milliseconds(random() % 2 == 0 ? 0 : 20);
   drawn.server_stops_first = random() % 2 == 0;
   if (drawn.signal == SIGSTOP) {
-    // Workers and server give each other up after 3 s, a client its request after 10 s.
+    // Workers and server count each other as lost after 3 s; a client repeats its request after 10
+    // s.
     constexpr std::array kStopped{milliseconds(300), milliseconds(1500), milliseconds(4500)};
     drawn.stopped = kStopped.at(random() % kStopped.size());
     drawn.then = random() % 3 == 0 ? SIGKILL : SIGCONT;
   }
-  // Goodbyes and the server's own are only said to somebody who is there.
+  // A worker says goodbye only to a running server, and the server's own goodbye needs a running
+  // worker.
   if (drawn.point.ends_with(":goodbye")) {
     drawn.server_stops_first = false;
   } else if (drawn.point.ends_with(":stopping")) {

@@ -24,11 +24,11 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenLooks{5};
 constexpr int kMostAttempts = 6;
-constexpr int kPointsFailed = 1;  ///< exit code: the study is at its end, with its failures
+constexpr int kPointsFailed = 1;  ///< exit code: the study is done and has failed points
 
-// Several models, so that batches end before the study does. The points of the first block take
-// long enough for heartbeats and for a score of commits. Of the second a filter leaves half out.
-// The last two have no answer.
+// Has several models, so that batches end before the study does. The points of the first block take
+// long enough for heartbeats and about twenty commits. A filter leaves out half of the second. The
+// last two points fail.
 constexpr const char* kStudy = R"(name = "matrix"
 [model]
 preset = "paper"
@@ -60,8 +60,8 @@ bool says_end_of_study(const Process& process) {
          process.err().find("points failed") != std::string::npos;
 }
 
-/// The one blow of a cycle. The struck process does it to itself, by the library kill_points; here
-/// it is armed for it, and wakes or ends when it was halted.
+/// The signal of a cycle. The library kill_points sends it within the target process; this class
+/// prepares its environment, and later continues or kills a process that was stopped.
 class Blow {
  public:
   Blow(const TemporaryFolder& folder, const KillCase& kill_case)
@@ -69,7 +69,8 @@ class Blow {
         folder_(folder.path().string()),
         mark_(folder.file("struck")),
         library_(folder.file("kill_points.so")) {
-    // LD_PRELOAD ends a path at a space or colon, which that of the build folder may have.
+    // LD_PRELOAD separates paths by spaces and colons, which the path of the build folder may
+    // contain.
     std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
     if (case_.signal == SIGSTOP) {
       halt_ = std::jthread([this](const std::stop_token& stop) { end_the_halt(stop); });
@@ -78,7 +79,7 @@ class Blow {
   Blow(const Blow&) = delete;
   Blow& operator=(const Blow&) = delete;
 
-  /// What `program` is started with: with the order when it is the one that is meant.
+  /// Environment of `program`; if it is the target, with the order for kill_points.
   Environment environment(const std::string& program) const {
     Environment all = bystander();
     if (program == case_.program) {
@@ -90,12 +91,13 @@ class Blow {
     }
     return all;
   }
-  /// What a process is started with that is to be left alone. By this every process of a cycle is
-  /// known, those too that its processes start.
+  /// Environment of a process that gets no signal. Its TMPDIR identifies all processes of a cycle,
+  /// including their children.
   Environment bystander() const { return {{"TMPDIR", folder_}}; }
 
   bool has_struck() const { return struck() > 0; }
-  /// Whether that exit code of that program is the blow's. Only once: it strikes one process.
+  /// Whether this exit code of this program was caused by the signal. True only once, because a
+  /// single process gets it.
   bool explains(const std::string& program, int exit_code) {
     if (explained_ || program != case_.program || exit_code != -SIGKILL || !case_.is_killed() ||
         !has_struck()) {
@@ -106,7 +108,7 @@ class Blow {
   }
 
  private:
-  /// The process that was struck; −1 when none is yet.
+  /// The process that got the signal; −1: none yet.
   pid_t struck() const {
     std::ifstream mark(mark_);
     pid_t pid = -1;
@@ -171,7 +173,7 @@ class ApartCycle {
   bool had_storm() const { return storm_ && storm_->blows() > 0; }
 
  private:
-  /// Killed before it is ready, it is started once more, at other ports.
+  /// A server that is killed before it is ready is started again, at other ports.
   void start_server() {
     try {
       server_ = std::make_unique<Server>(folder_, database_, blow_.environment("oblique-server"));
@@ -183,19 +185,19 @@ class ApartCycle {
     }
   }
 
-  /// At the same ports.
+  /// Starts the server again at the same ports.
   void start_server_again() {
     server_ = std::make_unique<Server>(folder_, database_, *server_, blow_.bystander());
   }
 
-  /// One thread each: so few cores are shared by so many cycles.
+  /// One thread each, because several cycles share the cores.
   void start_worker(std::unique_ptr<Worker>& worker, bool first) {
     worker = std::make_unique<Worker>(
         folder_, server_->worker_url(), std::vector<std::string>{"--threads", "1"},
         first ? blow_.environment("oblique-worker") : blow_.bystander());
   }
 
-  /// Starts again what the blow has ended. Nothing else may end.
+  /// Restarts the process that the signal ended. No other process may have ended.
   void look_after() {
     if (const auto code = server_->process().exit_code()) {
       expect_explained("oblique-server", *code, server_->process());
@@ -215,9 +217,9 @@ class ApartCycle {
     }
   }
 
-  /// False when it is to be done again.
+  /// False if the client must be started again.
   bool submit_and_watch(bool first) {
-    // What a killed server was asked is asked again of the next one: the client does not give up.
+    // A client sends its request again to the restarted server and does not give up.
     Process client(
         folder_, client_program(),
         {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "600"},
@@ -247,7 +249,7 @@ class ApartCycle {
   }
 
   void stop(const std::string& program, Process& process) {
-    // Until a program has said that it begins a signal may end it as any program.
+    // Before a program reports that it has begun, a signal may end it with any exit code.
     wait_until(program + " has begun",
                [&] { return process.exit_code() || !process.err().empty(); });
     if (!process.exit_code()) {
@@ -270,7 +272,7 @@ class ApartCycle {
 
 // ---- `oblique run` ------------------------------------------------------------------------------
 
-/// False when the same command is to be given again.
+/// False if the same command must be run again.
 bool run_once(const TemporaryFolder& folder, const KillStudy& study, const KillCase& kill_case,
               Blow& blow, bool first) {
   Process run(folder, client_program(),
@@ -281,7 +283,8 @@ bool run_once(const TemporaryFolder& folder, const KillStudy& study, const KillC
   if (code == kPointsFailed && says_end_of_study(run)) {
     return true;
   }
-  // It goes on without one of its workers, and says so when it loses its server.
+  // `oblique run` continues without one of its workers, but reports an error if it loses its
+  // server.
   const bool server_lost = code == 1 && kill_case.program == "oblique-server" &&
                            run.err().find("was killed by signal 9") != std::string::npos;
   if (!first || !blow.has_struck() || !(server_lost || blow.explains("oblique", code))) {
@@ -327,11 +330,11 @@ constexpr unsigned kAtOncePerCore = 4;
 
 struct CycleOutcome {
   bool struck = false;                 ///< the point was reached
-  std::optional<std::string> failure;  ///< what was wrong, with what the processes said
+  std::optional<std::string> failure;  ///< what was wrong, with the output of the processes
 };
 
-/// Runs the study in a folder of its own, with the blow of the case, to its end, and compares what
-/// is stored with the undisturbed database.
+/// Runs the study in its own folder, disturbed as the case says, until it is done. Then compares
+/// the stored rows with those of the undisturbed database.
 CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
   const TemporaryFolder folder;
   CycleOutcome outcome;
@@ -374,7 +377,8 @@ std::vector<Table> tables() {
        "",
        "study_id"},
       {"models", {"model_id"}, "", "definition"},
-      // The model's number is one by order of arrival, so its definition stands in for it.
+      // Model numbers depend on the order of arrival, so rows show the definition of the model
+      // instead.
       {"results",
        {"model_id", "wall_s", "worker_id", "attempt", "solved_at", "checksum"},
        " JOIN models USING (model_id)",
@@ -382,9 +386,10 @@ std::vector<Table> tables() {
   };
 }
 
-/// Every row as one text. The columns are asked for, so that new ones are compared too.
+/// Every row as one text. The names of the columns are read from the database, so that new columns
+/// are compared, too.
 std::vector<std::string> rows_of(const Database& database, const Table& table) {
-  // quote() writes numbers so that they are read again as the same ones.
+  // quote() writes numbers with all digits.
   std::string row = table.joined.empty() ? "''" : "quote(models.definition)";
   for (const std::string& column :
        database.texts("SELECT name FROM pragma_table_info('" + table.name + "')")) {

@@ -11,17 +11,19 @@
 
 namespace oblique::test {
 
-/// What is struck in one cycle of the kill matrix, where, and what becomes of it.
+/// One cycle of the kill matrix: which program gets which signal at which point, and how it
+/// continues.
 struct KillCase {
   std::uint64_t seed = 0;
   bool all_in_one = false;  ///< `oblique run`, else programs started one by one
-  std::string program;      ///< who is struck; empty: nobody, there is a storm in its place
+  std::string program;      ///< the target; empty: none, there are repeated disturbances instead
   std::optional<StormKind> storm{};  ///< goes on until the study is done
   std::string point;                 ///< as kill_points.cpp names them
-  int occurrence = 1;  ///< at which one; of the point `time`: milliseconds after the start
-  int signal = 0;      ///< SIGKILL or SIGSTOP
+  int occurrence =
+      1;           ///< occurrence of the point; for the point `time`: milliseconds after the start
+  int signal = 0;  ///< SIGKILL or SIGSTOP
   std::chrono::milliseconds pause{0};  ///< between point and signal
-  // Of SIGSTOP only.
+  // For SIGSTOP only.
   std::chrono::milliseconds stopped{0};  ///< for how long
   int then = 0;                          ///< SIGCONT or SIGKILL
   bool server_stops_first = false;       ///< at the end, before the workers
@@ -29,10 +31,10 @@ struct KillCase {
   bool is_killed() const;
 };
 
-/// The case of a seed: the entry of the matrix goes round with the seed, the rest is drawn from it.
+/// The case of a seed: the entry is seed modulo size of the matrix; other members are random.
 KillCase draw_case(std::uint64_t seed);
 
-/// Cases until each entry of the matrix has had its turn.
+/// Number of entries of the matrix.
 std::uint64_t entries_of_matrix();
 
 /// On one line, for people.
@@ -41,7 +43,7 @@ std::string describe(const KillCase& kill_case);
 /// "before-send" of "before-send:results".
 std::string class_of(const std::string& point);
 
-/// The study of every cycle, and the database of a run of it in which nothing happened.
+/// The study of every cycle, and the database of an undisturbed run.
 class KillStudy {
  public:
   KillStudy();
@@ -50,7 +52,8 @@ class KillStudy {
   std::string undisturbed() const { return folder_.file("undisturbed.db"); }
 
   static constexpr const char* kName = "matrix";
-  static constexpr int kFailing = 2;  ///< points whose step is beyond the limit of stability
+  static constexpr int kFailing =
+      2;  ///< points that fail, because their step is above the stability limit
 
  private:
   TemporaryFolder folder_;
@@ -62,14 +65,14 @@ struct MatrixReport {
   std::vector<std::string> failures;  ///< the case and what was wrong
 };
 
-/// Runs the cases of `count` seeds from `first_seed`, several at once, because a cycle mostly waits
-/// until a halted process counts as lost.
+/// Runs the cases of `count` seeds from `first_seed`. Several run at once, because a cycle mostly
+/// waits until a stopped process counts as lost.
 MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count);
 
-/// The first difference between two databases in what must not depend on who solved what and when:
-/// studies, models and results, row for row and to the last bit, without numbers given in order of
-/// arrival, times of day, durations, and by whose key a study came, which is none without keys.
-/// Empty when there is none.
+/// The first difference between two databases, or an empty text. Compares studies, models and
+/// results, row by row and bit by bit, except for values that depend on who solved what and when:
+/// numbers given in the order of arrival, times of day, durations, and the key that submitted the
+/// study.
 std::string first_difference(const std::string& database, const std::string& other);
 
 }  // namespace oblique::test

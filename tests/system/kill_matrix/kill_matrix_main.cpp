@@ -1,4 +1,4 @@
-// oblique-kill-matrix FIRST_SEED COUNT: runs the cycles of so many seeds and names those that fail.
+// oblique-kill-matrix FIRST_SEED COUNT: runs the cycles of COUNT seeds and prints those that fail.
 #include <chrono>
 #include <cstdint>
 #include <exception>

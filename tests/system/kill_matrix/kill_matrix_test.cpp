@@ -12,7 +12,7 @@
 namespace oblique::test {
 namespace {
 
-/// More of them: `oblique-kill-matrix`.
+/// The program `oblique-kill-matrix` runs more of them.
 constexpr std::uint64_t kCycles = 23;
 
 TEST(KillMatrixTest, WhoeverIsKilledOrHaltedWhereverTheDatabaseIsThatOfAnUndisturbedRun) {
@@ -21,7 +21,7 @@ TEST(KillMatrixTest, WhoeverIsKilledOrHaltedWhereverTheDatabaseIsThatOfAnUndistu
   for (const std::string& failure : report.failures) {
     ADD_FAILURE() << failure;
   }
-  // Where messages are grouped otherwise a late occurrence may not come.
+  // A late occurrence may not be reached if messages are grouped differently.
   EXPECT_LE(report.not_struck, kCycles / 5) << "too many cycles without a blow to be a test";
 }
 
@@ -43,7 +43,7 @@ TEST(KillMatrixTest, TheCyclesThatRunAlwaysHaveEveryClassOfPointProgramAndSignal
 
 class ComparisonTest : public ::testing::Test {
  protected:
-  /// What is found when this is done to one of two equal databases.
+  /// Changes one of two equal databases by `sql` and returns the difference that is found.
   std::string difference_after(const std::string& sql) {
     const std::string changed = folder_.file("changed.db");
     std::filesystem::copy_file(study_.undisturbed(), changed,

@@ -78,7 +78,7 @@ const Kinds& kinds_of(const std::string& program, bool sent, bool with_client) {
   return by_server ? to_worker : to_server;
 }
 
-/// Takes a varint off the front of `bytes`.
+/// Removes a varint from the front of `bytes` and returns it.
 std::uint64_t take_varint(std::basic_string_view<unsigned char>& bytes) {
   std::uint64_t value = 0;
   for (int shift = 0; !bytes.empty() && shift < 64; shift += 7) {
@@ -92,14 +92,14 @@ std::uint64_t take_varint(std::basic_string_view<unsigned char>& bytes) {
   return value;
 }
 
-/// Name of the kind of message in a frame, empty for none. By hand: a second copy of the generated
-/// code in one process is refused by the Protobuf library.
+/// Name of the kind of message in a frame, empty if there is none. Decoded by hand, because the
+/// Protobuf library refuses a second copy of the generated code in one process.
 std::string kind_of(const std::string& program, bool sent, const void* data, std::size_t size) {
   std::basic_string_view<unsigned char> bytes(static_cast<const unsigned char*>(data), size);
   constexpr unsigned char kNumberInFieldOne = 0x08;
   const bool with_client = !bytes.empty() && bytes.front() == kNumberInFieldOne;
   const Kinds& kinds = kinds_of(program, sent, with_client);
-  // The kind is the first field that is a message; only numbers stand before it.
+  // The kind is the first field that is a message; only numbers precede it.
   while (!bytes.empty()) {
     const std::uint64_t tag = take_varint(bytes);
     constexpr std::uint64_t kNumber = 0;
@@ -158,7 +158,7 @@ class KillPoints {
     }
   }
 
-  /// The thread takes no signal: those sent to the process are for its own threads.
+  /// Blocks all signals in this thread: those sent to the process are for its own threads.
   void start_clock() const {
     sigset_t all;
     sigset_t before;
@@ -176,10 +176,10 @@ class KillPoints {
   std::atomic<int> times_ = 0;
 };
 
-/// What one end of a connection sends, by ZMTP: a greeting, then frames.
+/// The bytes that one end of a ZMTP connection sends: a greeting, then frames.
 class Stream {
  public:
-  /// Calls `take` with the body of every message that is whole now.
+  /// Calls `take` with the body of every complete message.
   template <class Take>
   void receive(std::string_view bytes, const Take& take) {
     buffer_ += bytes;
@@ -225,7 +225,7 @@ struct Connection {
   Stream sent;
 };
 
-/// By descriptor; of the server's one thread that has sockets.
+/// Connections by descriptor. Only one thread of the server uses sockets.
 std::map<int, Connection>& connections() {
   static auto* const only = new std::map<int, Connection>;
   return *only;

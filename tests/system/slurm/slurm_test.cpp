@@ -125,7 +125,7 @@ class SlurmTest : public ::testing::Test {
 #endif
   static constexpr double kPoints = kSide * kSide;
 
-  /// Of jobs: those of a test that was killed end by themselves.
+  /// Time limit of jobs, which ends the jobs of a test that was killed.
   static constexpr const char* kTimeLimit = "--time=5";
 
   TemporaryFolder folder_;
