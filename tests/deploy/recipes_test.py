@@ -131,7 +131,7 @@ class FiguresOfThePaper(Recipe):
         self.assertEqual(len(lines), 11)
         for line in lines[1:-1]:
             *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())
-            # Half of a last digit of what is printed, and the 0.56 % of client/paper.
+            # Tolerance: half of the last printed digit, and the 0.56 % of client/paper.
             self.assertAlmostEqual(fn_kN, published_fn_kN, delta=0.005 + 0.006 * published_fn_kN)
             self.assertAlmostEqual(ft_kN, published_ft_kN, delta=0.005 + 0.006 * published_ft_kN)
         for number in 4, 5, 6, 7:

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kBetweenLooks{2};
 
-/// Empty also if the process of a file in /proc is gone, where a read fails.
+/// Contents of a file; also empty if it is in /proc and its process has ended.
 std::string contents(const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();

@@ -12,31 +12,31 @@
 
 namespace oblique::test {
 
-/// Waits until `condition` holds. Throws std::runtime_error that names `what` after a time that no
-/// sound run needs.
+/// Waits until `condition` is true. Throws std::runtime_error with `what` after a time that is too
+/// long for any correct run.
 void wait_until(const std::string& what, const std::function<bool()>& condition);
 
-/// Whether the process lives; one that ended and is not yet waited for does not.
+/// Whether the process runs. A process that has ended and was not waited for does not.
 bool is_running(pid_t pid);
 
 /// Processes that `pid` started and that still have it as their parent.
 std::vector<pid_t> children_of(pid_t pid);
 
-/// Processes in whose environment the name of this folder stands, whoever their parent is.
+/// Processes whose environment contains the path of this folder, whatever their parent is.
 std::vector<pid_t> processes_of(const TemporaryFolder& folder);
 
 /// Variables for a program, beside our own or in place of them.
 using Environment = std::map<std::string, std::string>;
 
-/// What one run of a program gave.
+/// Exit code and output of a run of a program.
 struct Outcome {
   int exit_code;    ///< as of Process::wait
   std::string out;  ///< standard output
   std::string err;  ///< standard error
 };
 
-/// A program under test, in a process group of its own and with the folder as its current one. It
-/// reads nothing; its output goes to files in the folder.
+/// A program under test, with its own process group and with the folder as its current folder. Its
+/// input is empty; its output goes to files in the folder.
 class Process {
  public:
   /// Starts `program` with `arguments`. It does not inherit environment variables of our programs
@@ -55,8 +55,8 @@ class Process {
   void send(int signal) const;
   /// The exit code as from wait(); nothing while it runs.
   std::optional<int> exit_code();
-  /// Waits for the end. The exit code, or minus the signal that ended it: a program that ends in
-  /// order because of SIGINT gives 130, one that SIGINT ends gives −2.
+  /// Waits for the end. Returns the exit code, or minus the signal that killed the process: 130 if
+  /// the program handled SIGINT and ended, −2 if SIGINT killed it.
   int wait();
   /// What it has written so far to standard output and standard error.
   std::string out() const;

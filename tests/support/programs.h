@@ -15,21 +15,21 @@ std::string client_program();
 std::string server_program();
 std::string worker_program();
 
-/// Runs `oblique` with `arguments` to its end in `folder`, or in one of its own.
+/// Runs `oblique` with `arguments` until it ends, in `folder` or else in a new folder.
 Outcome run_oblique(const TemporaryFolder& folder, const std::vector<std::string>& arguments);
 Outcome run_oblique(const std::vector<std::string>& arguments);
 
 /// An `oblique-server` that is ready when constructed.
 class Server {
  public:
-  /// On loopback at ports that the system picks, and gives nobody else while this or a successor
-  /// lives.
+  /// Starts a server on loopback, at ports that the system picks. No other program gets these ports
+  /// while this server or a successor exists.
   Server(const TemporaryFolder& folder, const std::string& database,
          const Environment& environment = {});
   /// Starts a server at the ports of `before`, which has ended.
   Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
          const Environment& environment = {});
-  /// With these arguments, which say where its database is and where it listens.
+  /// Starts a server with these arguments, which must set its database and ports.
   Server(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
          const Environment& environment = {});
 

@@ -63,7 +63,7 @@ class RawTcp {
     bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
     return bytes;
   }
-  /// All that comes until the server ends the connection.
+  /// All bytes until the server ends the connection.
   std::string read_to_the_end() {
     std::string all;
     for (std::string some = receive(); !some.empty(); some = receive()) {

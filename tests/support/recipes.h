@@ -116,7 +116,7 @@ inline Recipe recipe_of_blocks(const std::vector<Block>& blocks) {
   return recipe;
 }
 
-/// A sample whose points have `falls` falls, in which E takes so many values and k any.
+/// A sample with `falls` different falls: E has that many values, and k is random.
 inline Recipe sample_with_falls(std::uint64_t points, std::uint64_t falls,
                                 SampleKind kind = SAMPLE_RANDOM) {
   return recipe_of_blocks(

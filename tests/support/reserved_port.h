@@ -24,7 +24,7 @@ class ReservedPort {
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t size = sizeof address;
     auto* const any_address = reinterpret_cast<sockaddr*>(&address);
-    // Sockets that all have this option share a port as long as one of them listens at most.
+    // Sockets that all have this option can share a port while at most one of them listens.
     if (setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
         bind(socket_, any_address, size) != 0 || getsockname(socket_, any_address, &size) != 0) {
       throw std::runtime_error(std::string("cannot reserve a port: ") + std::strerror(errno));

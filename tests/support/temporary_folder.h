@@ -5,17 +5,17 @@
 
 namespace oblique::test {
 
-/// A folder of its own for one test; it is gone afterwards, with all that is in it.
+/// A folder for one test, deleted with its contents by the destructor.
 class TemporaryFolder {
  public:
-  /// Below TMPDIR. Throws std::runtime_error where none can be made.
+  /// Creates the folder in TMPDIR. Throws std::runtime_error on failure.
   TemporaryFolder();
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// The path of a file in it, whether or not it exists.
+  /// The path of a file in the folder, whether or not it exists.
   std::string file(const std::string& name) const { return (path_ / name).string(); }
 
  private:

@@ -12,8 +12,9 @@ namespace oblique::test {
 /// cut again and again.
 class TcpProxy {
  public:
-  /// Forwards to the server at that ZeroMQ address. Every byte and every end arrives `delay` later
-  /// in both directions. All connections are cut after each `cut_interval`, unless it is 0.
+  /// Forwards to the server at this ZeroMQ address. All bytes and ends of connections arrive
+  /// `delay` later in both directions. All connections are cut after each `cut_interval`, unless it
+  /// is 0.
   explicit TcpProxy(const std::string& server_url, std::chrono::milliseconds delay = {},
                     std::chrono::milliseconds cut_interval = {});
   ~TcpProxy();
@@ -24,8 +25,8 @@ class TcpProxy {
   std::string url() const;
   /// While true, nothing is forwarded; received bytes are forwarded afterwards.
   void stall(bool holds) { stalls_ = holds; }
-  /// Drops everything on the present connections, their ends too, so that each side is silent for
-  /// the other. Later connections are forwarded.
+  /// Drops all data on the current connections, also their ends, so that each side gets no sign of
+  /// the other. New connections are forwarded.
   void swallow() { ++swallowed_; }
   /// Number of connections so far.
   int connections() const { return connections_; }

@@ -19,12 +19,12 @@ namespace {
 
 using solver::CaseResult;
 
-/// One output of a case, and what an error in it is measured against.
+/// One output of a case, and the scale of its errors.
 struct Output {
   std::string name;
   std::string relative_to;
   std::function<std::vector<double>(const solver::CaseResult&)> values;
-  /// The scale of value i; one for all of an output, or each value's own.
+  /// The scale of value i: a common one for all values of the output, or each value itself.
   std::function<double(const solver::CaseResult&, double value)> scale;
   /// False where the number of values depends on ripples.
   bool is_headline;
@@ -174,7 +174,7 @@ std::vector<Point> grid() {
   return points;
 }
 
-/// Bounds by the name of an output and what it is relative to.
+/// Bounds by name of the output and its scale.
 struct Bound {
   double value;
   std::string reason;
@@ -228,7 +228,7 @@ std::vector<std::vector<double>> values_of(const CaseResult& result) {
   return values;
 }
 
-/// (4 f(h/2) - f(h))/3: what is left when an error of order 2 is taken away.
+/// (4 f(h/2) - f(h))/3: the value without its error of order 2.
 std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const CaseResult& half) {
   auto values = values_of(half);
   const auto coarse = values_of(whole);

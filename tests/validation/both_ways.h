@@ -30,8 +30,8 @@ inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
                                                          {1.00, 1.4, 1.0},
                                                          {1.00, 1.6, 1.0}}};
 
-/// One chain under both integrators. Contacts start from the same state at touch, that of an
-/// explicit fall, so that what differs is the contact's alone.
+/// One chain with both integrators. Contacts start from the same state at touch, from an explicit
+/// fall, so that differences come from the contact alone.
 class BothWays {
  public:
   explicit BothWays(const solver::ModelParameters& model)

@@ -176,7 +176,7 @@ ClampedBeam beam_of(int elements) {
       {kLength_m, kSlenderness * kEI_N_m2 / (kLength_m * kLength_m), kEI_N_m2, elements});
 }
 
-/// Distance of the tip from where the elastica has it, over the length.
+/// Distance between the tip and its position in the elastica, relative to the length.
 double elastica_error(double alpha, int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({alpha * kEI_N_m2 / (kLength_m * kLength_m), 0.0}, 20);
@@ -186,7 +186,8 @@ double elastica_error(double alpha, int elements) {
                     1.0 - tip.x_m / kLength_m - right.u_over_L);
 }
 
-/// Distance of the tip from the clamp, over the length, under the moment that makes a full circle.
+/// Distance between tip and clamp, relative to the length, under the moment that bends the beam to
+/// a full circle.
 double roll_up_error(int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({0.0, 2.0 * M_PI * kEI_N_m2 / kLength_m}, 40);

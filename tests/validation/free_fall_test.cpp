@@ -39,14 +39,14 @@ struct FallErrors {
   double v_m_s = 0.0;
 };
 
-/// An independent explicit solution of order 4 of the preset `paper`, converged to nine digits and
-/// printed to the digits here.
+/// An independent explicit solution of order 4 for the preset `paper`, converged to nine digits and
+/// rounded to the digits given here.
 constexpr std::array<KnownState, 3> kKnown{{{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
                                             {1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
                                             {1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}};
 const std::string kKnownFrom = "independent explicit solution, converged";
 
-/// Three rigid links, whatever A and I: minimal coordinates, Runge-Kutta.
+/// Three rigid links, for which A and I do not matter: minimal coordinates, Runge-Kutta.
 constexpr std::array<KnownState, 1> kRigid{
     {{1.00, 0.430188812, std::numeric_limits<double>::quiet_NaN(), -5.738072, -5.234437}}};
 

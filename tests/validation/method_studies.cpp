@@ -1,5 +1,5 @@
-// The two studies of the method that worker/solver/accuracy.md shows: which mesh is good enough,
-// and what the chosen steps leave.
+// The two studies in worker/solver/accuracy.md: which mesh is fine enough, and the errors that the
+// chosen steps leave.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -68,12 +68,12 @@ std::vector<CaseResult> contacts_of(const solver::Finger& finger,
 // ---- Meshes ----
 
 constexpr double kTolerance = 0.005;  // relative
-// A mesh is good enough when each output is within the tolerance at this part of its points: exit
-// velocities pass through zero, so that no mesh has them all.
+// A mesh is good enough if each output is within the tolerance at this fraction of the points. It
+// is below 1 because exit velocities pass through zero, so that no mesh is accurate at all points.
 constexpr double kMostPoints = 0.8;
 
-/// Errors of one output of a point relative to its limit, a level each; nothing where the mode up
-/// to it is another one than on the finest level.
+/// Errors of one output of a point relative to its limit, one per level; nothing if the mode up to
+/// this output differs from that of the finest level.
 struct PointErrors {
   std::size_t point;
   double limit;
@@ -96,8 +96,8 @@ std::size_t points_within(const OutputStudy& output, std::size_t level) {
                     [&](const PointErrors& point) { return is_within(point.errors[level]); }));
 }
 
-/// Peaks of F_n count as one output, reactions too: the worst of a point's. The largest F_n is one
-/// of the peaks.
+/// All peaks of F_n count as one output with the largest error among them; so do all reactions. The
+/// largest F_n is one of the peaks.
 std::string counted_under(const std::string& name) {
   return name.starts_with("major_peak") ? "major_peaks_N"
          : name.starts_with("reaction") ? "reaction_peaks_N"
@@ -165,7 +165,8 @@ void print_cells(const std::vector<Level>& levels, const std::vector<OutputStudy
   print(std::cout, table, Format::kTable);
 }
 
-/// The coarsest level from which on all are good enough; the number of levels when none is.
+/// The coarsest level for which it and all finer levels are good enough; the number of levels if
+/// there is none.
 std::size_t coarsest_good_enough(std::size_t levels, const std::vector<OutputStudy>& outputs) {
   const auto is_good_enough = [&](std::size_t level) {
     return std::all_of(outputs.begin(), outputs.end(), [&](const OutputStudy& output) {
@@ -248,7 +249,7 @@ void study_meshes() {
 
 // ---- Steps ----
 
-/// A model with the points and the steps that it is judged by.
+/// A model, and the points and steps at which it is tested.
 struct StepCase {
   std::string name;  ///< as "k = 1e+08"
   solver::ModelParameters model;
@@ -269,7 +270,7 @@ struct StepErrors {
   double stick_s = 0.0;
   double exit_m_s = 0.0;         ///< of either exit velocity
   std::int64_t late_sticks = 0;  ///< points whose stick errs by more than 5 ns
-  std::int64_t grazing = 0;      ///< points that have another mode at the other step; not judged
+  std::int64_t grazing = 0;      ///< points whose mode depends on the step; not compared
 };
 
 /// Meshes, contact stiffnesses, restitution, tip masses and lengths around the preset `paper`.

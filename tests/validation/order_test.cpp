@@ -149,8 +149,8 @@ class SmallestOrders {
   std::array<double, kParts.size()> smallest_{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
 };
 
-/// Links so soft that the fall itself bends them far: of the paper's links the vibration in the
-/// fall is so small that a halved step finds rounding.
+/// Links so soft that the fall bends them strongly. With the paper's links vibrations in the fall
+/// are so small that halving the step shows only rounding.
 solver::ModelParameters soft_chain() {
   solver::ModelParameters model = solver::preset("paper");
   model.E_Pa *= 1e-4;

@@ -39,7 +39,7 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
 /// Lets the test decide when each point ends.
 class Gate {
  public:
-  /// Called by the solver: says that a point has begun and waits until it may end.
+  /// Called by the solver: reports that a point has begun and waits until it may end.
   void pass() {
     std::unique_lock lock(mutex_);
     ++begun_;
@@ -78,7 +78,7 @@ void fail_all(
   }
 }
 
-/// A batch solver whose points are solved when the test says so.
+/// A batch solver whose points end when the test allows it.
 class BatchSolverTest : public ::testing::Test {
  protected:
   void TearDown() override { gate_.open(1'000'000); }

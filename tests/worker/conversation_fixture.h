@@ -106,14 +106,14 @@ class ConversationTest : public ::testing::Test {
     receive(study_message(7));
   }
 
-  /// The same by these settings, and holds lease 31, points 0 to 9 of that study.
+  /// A welcomed worker with these settings that has lease 31 with points 0 to 9 of the study.
   void join_with_batch(const ConversationSettings& settings = {}) {
     use(settings);
     join();
     receive(batch_message(7, 31));
   }
 
-  /// The server asks for a hello and welcomes the worker once more.
+  /// The server requests a hello and welcomes the worker again.
   void rejoin(const std::string& database_id = "db") {
     receive(hello_again_message());
     receive(welcome_message(database_id));
@@ -173,7 +173,7 @@ class ConversationTest : public ::testing::Test {
     return found;
   }
 
-  /// Batches asked for by the last effects; 0 when none.
+  /// Number of batches that the last effects request; 0 if none.
   std::uint32_t credit_given() const {
     std::uint32_t batches = 0;
     for (const auto& message : sent(protocol::WorkerMessage::kCredit)) {
@@ -192,7 +192,7 @@ class ConversationTest : public ::testing::Test {
     return all.empty() ? std::nullopt : std::optional(all.front());
   }
 
-  /// Begins anew with other settings.
+  /// Replaces the conversation by a new one with other settings.
   void use(const ConversationSettings& settings) { conversation_.emplace(hello(), settings); }
 
   static protocol::WorkerHello hello() {

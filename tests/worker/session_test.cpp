@@ -26,8 +26,8 @@ protocol::ServerToWorker patient_welcome() {
   return welcome;
 }
 
-/// The server's side of the socket, played by the test. Waiting for a message that never comes is
-/// an error after a time that no sound run needs.
+/// The server's end of the socket, operated by the test. Waiting for a message fails after a time
+/// that is too long for any correct run.
 class ScriptedServer {
  public:
   explicit ScriptedServer(const std::string& endpoint = "tcp://127.0.0.1:*")
@@ -40,7 +40,7 @@ class ScriptedServer {
 
   std::string endpoint() const { return socket_.get(zmq::sockopt::last_endpoint); }
 
-  /// The next message of that kind; others are passed over.
+  /// The next message of this kind; others are skipped.
   WorkerMessage wait_for(WorkerMessage::KindCase kind) {
     while (true) {
       zmq::message_t identity;
@@ -83,7 +83,7 @@ class ScriptedServer {
   std::string worker_;
 };
 
-/// A session on a thread of its own.
+/// A session that runs on its own thread.
 class RunningWorker {
  public:
   explicit RunningWorker(const std::string& server, BatchSolver::SolvePoints solve)

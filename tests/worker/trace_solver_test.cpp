@@ -32,7 +32,7 @@ protocol::TraceOrder order(std::uint64_t id, std::uint64_t every = 1) {
   return order;
 }
 
-/// Answers with 5 rows, and waits before that while it is held.
+/// Returns 5 rows; before that it waits while the test holds it.
 class Solving {
  public:
   TraceSolver::Solve solve() {

@@ -24,7 +24,7 @@ void write_to(const std::string& file, const std::string& text) {
   std::ofstream(file) << text;
 }
 
-/// In a user namespace, where no root is needed; where there are none, as root.
+/// Uses a user namespace, which needs no root; if they are not allowed, root is needed.
 void enter_namespaces() {
   const uid_t user = geteuid();
   const gid_t group = getegid();

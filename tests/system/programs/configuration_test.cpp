@@ -1,4 +1,4 @@
-// What server and worker make of a file, the environment and flags.
+// Settings of server and worker from a file, the environment and flags.
 #include <csignal>
 #include <fstream>
 #include <sstream>

@@ -1,4 +1,5 @@
-// Workers that end while there is work: the rest of it is another's at once, and nobody's loss.
+// Workers that leave while they have points: other workers get these at once, and they do not count
+// as losses.
 #include <csignal>
 #include <optional>
 #include <string>

@@ -1,4 +1,4 @@
-// What server and worker write to standard error.
+// Logs of server and worker on standard error.
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -17,7 +17,7 @@ namespace {
 /// Far from UTC at any time of the year.
 const Environment kInTokyo{{"TZ", "Asia/Tokyo"}};
 
-/// Every line is of the form that logs have, with the time now in UTC.
+/// Expects that every line has the format of logs, with the current time in UTC.
 void expect_log(const std::string& log, const std::string& program) {
   const std::regex form(R"((\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)\.\d{3}Z )" + program +
                         " (info|warning|error): .*");

@@ -1,4 +1,5 @@
-// `oblique view`: a database, its page and a worker, from a program that a browser could ask.
+// `oblique view`: serves a database, its page and a worker. The test requests pages as a browser
+// does.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -26,7 +27,7 @@ std::string printed_url(const Process& view) {
   return view.out().substr(0, view.out().size() - 1);
 }
 
-/// As a browser does with what it is given.
+/// Follows the printed address as a browser does.
 class Browser {
  public:
   explicit Browser(const std::string& address)

@@ -36,7 +36,7 @@ std::string user() {
   return entry == nullptr ? std::string() : std::string(entry->pw_name);
 }
 
-/// Intervals are short, nodes need not be what they say, and nothing is limited or accounted.
+/// Short intervals; no checks of the nodes' hardware; no limits and no accounting.
 constexpr const char* kConfiguration = R"(
 ClusterName=oblique
 SlurmctldHost=localhost(127.0.0.1)
@@ -90,7 +90,8 @@ SlurmCluster::~SlurmCluster() {
   nodes_.clear();
   controller_.reset();
   authentication_.reset();
-  // Jobs and their keepers have other parents, but our variables.
+  // Finds jobs and their slurmstepd by our variables in their environment, because their parents
+  // are other processes.
   for (auto left = processes_of(folder_); !left.empty(); left = processes_of(folder_)) {
     for (const pid_t pid : left) {
       kill(pid, SIGKILL);
@@ -117,7 +118,7 @@ void SlurmCluster::write_configuration() const {
   file << kConfiguration << "SlurmUser=" << user() << "\nSlurmdUser=" << user()
        << "\nSlurmctldPort="
        << controller_port_.number()
-       // A job that is queued again waits as long as a credential counts.
+       // A requeued job waits as long as a credential is valid.
        << "\nAuthInfo=cred_expire=5,socket=" << in("munge.socket")
        << "StateSaveLocation=" << in("state") << "SlurmdSpoolDir=" << in("spool-%n")
        << "SlurmctldPidFile=" << in("slurmctld.pid") << "SlurmdPidFile=" << in("slurmd-%n.pid")
@@ -138,7 +139,7 @@ void SlurmCluster::start_authentication() {
     }
   }
   chmod(folder_.file("munge.key").c_str(), 0600);
-  // Forced: the folder is closed to other users, which is no fault here.
+  // --force, because the folder is closed to other users, which is intended here.
   authentication_ = started(
       "munged",
       {"--foreground", "--force", "--socket=" + folder_.file("munge.socket"),
@@ -212,7 +213,8 @@ void SlurmCluster::wait_for_state(const std::string& job, const std::string& sta
 
 void SlurmCluster::begin_now(const std::string& job) const {
   wait_for_state(job, "PENDING");
-  // A node refuses what was started in the second in which it revoked the job, or earlier.
+  // A node refuses steps that were started in the same second in which the job was revoked, or
+  // earlier.
   const std::time_t revoked = std::time(nullptr);
   wait_until("the next second", [&] { return std::time(nullptr) > revoked; });
   run("scontrol", {"update", "JobId=" + job, "StartTime=now"});

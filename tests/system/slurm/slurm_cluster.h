@@ -17,28 +17,29 @@ namespace oblique::test {
 /// 30 s, both with requeueing, and `urgent`, which preempts them.
 class SlurmCluster {
  public:
-  /// Why it cannot run here; empty: it can.
+  /// Why the cluster cannot run here; empty: it can.
   static std::string objection();
 
   /// All nodes are idle when constructed.
   explicit SlurmCluster(const TemporaryFolder& folder);
-  /// Kills every process that belongs to it, jobs too.
+  /// Kills every process of the cluster, including jobs.
   ~SlurmCluster();
   SlurmCluster(const SlurmCluster&) = delete;
   SlurmCluster& operator=(const SlurmCluster&) = delete;
 
-  /// What programs that ask this Slurm find in their environment.
+  /// Variables for programs that use this cluster.
   Environment environment() const;
 
-  /// Runs `srun`, `squeue`, ... to its end, with more variables; what it wrote to standard output,
-  /// without the last line break. Throws std::runtime_error when it fails.
+  /// Runs a Slurm command such as `srun` or `squeue` with additional variables. Returns its
+  /// standard output without the last line break. Throws std::runtime_error on failure.
   std::string run(const std::string& program, const std::vector<std::string>& arguments,
                   const Environment& more = {}) const;
 
-  /// A field of `scontrol show job`, as "JobState"; empty where there is none, or no such job.
+  /// A field of `scontrol show job`, such as "JobState"; empty if the field or the job does not
+  /// exist.
   std::string field_of(const std::string& job, const std::string& field) const;
   void wait_for_state(const std::string& job, const std::string& state) const;
-  /// A job that waits until a time begins now.
+  /// Starts a job at once that waits for its start time.
   void begin_now(const std::string& job) const;
 
   /// The end of the controller's log, for failures.

@@ -1,5 +1,5 @@
-// Studies that are solved by workers which a real Slurm starts: through deploy/slurm's script, by
-// `oblique autoscale`, and by the recipe of a campaign.
+// Studies solved by workers that a real Slurm starts: with the script in deploy/slurm, by `oblique
+// autoscale`, and by the recipe of a campaign.
 #include <unistd.h>
 
 #include <algorithm>
@@ -71,7 +71,7 @@ class SlurmTest : public ::testing::Test {
     return cluster_->run("sbatch", arguments, all);
   }
 
-  /// Waits until the server has welcomed so many workers since it began.
+  /// Waits until the server has welcomed `count` workers since its start.
   void wait_for_workers(int count) {
     wait_until("workers join", [&] {
       const std::string log = server_->process().err();
@@ -165,8 +165,8 @@ TEST_F(SlurmWorkersTest, OneJobRunsAWorkerOnEachOfItsNodesUntilThereIsNoMoreWork
 }
 
 TEST_F(SlurmWorkersTest, WorkersHaveLeftInOrderBeforeTheirTimeIsOver) {
-  // A minute is the shortest limit that Slurm has: they leave 53 s before, with work at hand unless
-  // this machine is so slow that they begin later.
+  // A minute is Slurm's shortest time limit. Workers leave 53 s before it, normally while they have
+  // points.
   const auto job = submit_workers({"--time=1"}, {{"OBLIQUE_WORKER_LEAVE_BEFORE", "53"}});
   submit_study();
   cluster_->wait_for_state(job, "COMPLETED");  // not TIMEOUT
@@ -258,7 +258,7 @@ TEST_F(SlurmAutoscaleTest, OneThatIsStoppedLeavesItsJobsAndTheNextOneCountsThem)
   EXPECT_EQ(listed_jobs(), 2U);
 }
 
-/// With oblique installed as its user has it.
+/// A campaign with an installed oblique.
 class SlurmCampaignTest : public ::testing::Test {
  protected:
   void SetUp() override {

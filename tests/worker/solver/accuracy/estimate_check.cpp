@@ -1,5 +1,5 @@
-// How good the estimated errors of single results are: random points are solved with estimates, and
-// on a mesh so fine that it stands for the truth.
+// Checks the estimated errors of single results: solves random points with estimates, and again on
+// a mesh so fine that its results count as exact.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -85,7 +85,7 @@ Results solve(const ModelParameters& model, const std::vector<solver::Point>& po
   return results;
 }
 
-/// One kind of error: the estimate, and the true one in the same unit.
+/// One kind of error: estimated and actual, in the same unit.
 struct Output {
   std::string_view name;
   std::optional<double> ErrorEstimate::*estimate;
@@ -164,7 +164,7 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
 
 void tell_modes(const Results& results, const Results& truth,
                 const std::vector<ErrorEstimate>& errors) {
-  std::array<std::array<int, 2>, 2> count{};  // by: the companion has the mode, the truth has it
+  std::array<std::array<int, 2>, 2> count{};  // by: same mode in companion, in exact result
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
       const bool right = results[i]->major_mode == truth[i]->major_mode;

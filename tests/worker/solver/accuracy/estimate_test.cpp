@@ -163,7 +163,7 @@ TEST(EstimatedErrors, TwiceTheEstimateHoldsTheDifferenceToAFinerMesh) {
 
 using Outcomes = std::map<std::uint64_t, Outcome>;
 
-/// What became of the points, each asked for and answered once.
+/// Outcomes of the points. Each point is taken from the source once and has one outcome.
 Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& falls) {
   Outcomes outcomes;
   std::size_t next = 0;
@@ -176,8 +176,8 @@ Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& f
   return outcomes;
 }
 
-/// Points of several models of two elements a link, more than are solved in one go; H = 1.1999 is
-/// reached by none of them.
+/// Points of several models with two elements per link, more than fit into one group. None reaches
+/// H = 1.1999.
 std::vector<FingerPoint> solvable_and_other_points() {
   std::vector<ModelParameters> models(3, coarse_model(2));
   models[1].k_N_m *= 0.5;

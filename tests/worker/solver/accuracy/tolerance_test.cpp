@@ -1,4 +1,4 @@
-// What chosen steps leave in the outputs of a contact.
+// Errors that the chosen steps cause in the outputs of a contact.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ struct Errors {
   double exit_m_s = 0.0;
 };
 
-/// Contacts of one model, from one fall, against steps six times shorter than by default.
+/// Contacts of one model after one fall, compared with steps six times shorter than by default.
 class Steps {
  public:
   explicit Steps(const ModelParameters& model)

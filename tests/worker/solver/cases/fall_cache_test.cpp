@@ -33,7 +33,7 @@ std::vector<ModelParameters> models_with_E(std::size_t count) {
   return models;
 }
 
-/// A fall that cannot be solved: some steps on, Newton's method does not converge.
+/// A fall that fails: after some steps Newton's method does not converge.
 ModelParameters model_that_fails() {
   ModelParameters model = coarse_model();
   model.integrator = Integrator::kGeneralizedAlpha;
@@ -41,7 +41,7 @@ ModelParameters model_that_fails() {
   return model;
 }
 
-/// A cache that writes down which falls are solved, and with which beside them.
+/// A cache that records which falls are solved, and which are solved together.
 struct CountedFalls {
   explicit CountedFalls(const FallCache::Bounds& bounds = {})
       : cache(bounds, [this](std::span<const ModelParameters> models) {

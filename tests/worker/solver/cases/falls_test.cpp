@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Models that differ in what a fall does not depend on.
+/// Models that differ only in parameters that do not change the fall.
 std::vector<ModelParameters> models_of_one_fall() {
   std::vector<ModelParameters> models(5, coarse_model());
   models[1].k_N_m = 1.3e7;
@@ -76,7 +76,8 @@ TEST(Falls, SayHowFarTheyAre) {
 TEST(Falls, OfDifferentShapesAndWaysAreThoseThatEachHasAlone) {
   std::vector<ModelParameters> models(6);
   for (std::size_t i = 0; i < models.size(); ++i) {
-    // Fine meshes fall by collocation, coarse ones and those with a step of their own by steps.
+    // Falls of fine meshes are solved by collocation; those of coarse meshes and those with a given
+    // step by explicit steps.
     models[i].elements_per_link = i % 2 == 0 ? 8 : 9;
     models[i].E_Pa *= 1.0 + 0.1 * static_cast<double>(i);
   }

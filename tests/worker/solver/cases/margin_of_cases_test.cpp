@@ -10,7 +10,8 @@
 namespace oblique::solver {
 namespace {
 
-/// Two frictions between which the mode changes, and the event that is to blame below and above.
+/// Two coefficients of friction between which the mode changes, and the event with the smallest
+/// margin below and above the change.
 struct Change {
   double H_m;
   double e_star;
@@ -52,7 +53,7 @@ TEST(Margin, GoesToZeroInProportionFromBothSidesOfAChangeOfMode) {
       const CaseResult far = solved(change, mu * (1.0 + side * 2.0 * kNear));
       EXPECT_EQ(*near.margin_event, side < 0.0 ? change.below : change.above);
       EXPECT_EQ(*far.margin_event, *near.margin_event);
-      // About as small as what the friction differs by.
+      // The margin is about as small as the difference of the coefficients.
       EXPECT_GT(*near.margin, 0.03 * kNear);
       EXPECT_LT(*near.margin, 3.0 * kNear);
       EXPECT_NEAR(*far.margin / *near.margin, 2.0, 0.2);

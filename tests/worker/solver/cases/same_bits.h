@@ -8,7 +8,7 @@
 
 namespace oblique::solver {
 
-/// Every number of two results but the wall time, bit for bit.
+/// Compares all numbers of two results except the wall time, bit by bit.
 inline void expect_same_bits(const CaseResult& a, const CaseResult& b) {
   EXPECT_EQ(a.H_m, b.H_m);
   EXPECT_EQ(a.mu, b.mu);

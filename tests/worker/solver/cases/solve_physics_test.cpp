@@ -38,7 +38,8 @@ TEST(Impact, WithoutHysteresisNothingIsLostInRestitution) {
 }
 
 TEST(Impact, LossInRestitutionIsThatOfEveryCycleBetweenItsTurns) {
-  // Up a slope k from F_a to F_b costs (F_b^2 - F_a^2)/2k, down k/e*^2 gives e*^2 of it back.
+  // Loading with stiffness k from F_a to F_b takes the work (F_b^2 - F_a^2)/2k; unloading with
+  // k/e*^2 returns e*^2 of it.
   const double e_star = 0.7;
   const CaseResult result = paper_finger().solve(1.0, 0.4, e_star);
   ASSERT_EQ(result.peaks.size(), 3U);
@@ -90,7 +91,7 @@ void expect_finite(const CaseResult& r) {
   }
 }
 
-/// What holds for every contact, whatever the parameters.
+/// Checks properties that every contact has, whatever the parameters.
 void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_GT(r.duration_s, 0.0);
   EXPECT_GT(r.impulse_n_Ns, 0.0);
@@ -135,7 +136,8 @@ void expect_in_order(const CaseResult& r) {
   EXPECT_EQ(r.mode.back(), 'R');
 }
 
-/// A random point, one in six of them at an extreme. Never at the very top, where the tip stands.
+/// A random point; one in six is at an extreme. H is below the largest possible drop, where the tip
+/// stops.
 Point random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);
@@ -207,7 +209,7 @@ TEST(SolveSweep, WhateverTheModelResultsAreFinitePhysicalAndInOrder) {
       {.elements_per_link = 1, .tip_mass_kg = 1e-3},
       {.elements_per_link = 1, .k_N_m = 1e6},
       {.elements_per_link = 1, .k_N_m = 2.7e8},
-      // On a spring four hundred times the default's the step is set by that spring alone.
+      // With a contact stiffness 400 times the default, the spring alone determines the step.
       {.elements_per_link = 1, .k_N_m = 1e10, .worst_closure = 1e-3},
       {.elements_per_link = 1, .eta2 = 5.0},
       {.elements_per_link = 1, .eta2 = 0.3},

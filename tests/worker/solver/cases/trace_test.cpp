@@ -101,7 +101,8 @@ TEST(Trace, PRestsInStickAndMovesWithItsVelocityInSlip) {
       const TraceRow& b = t.rows[i];
       slide_m += std::abs(b.xP_m - a.xP_m);
       if (a.state[0] == 'S') {
-        // Where sliding begins, P is where the cone has it, at an instant located to 1e-13 s.
+        // Where slip begins, P is at the position that the friction cone requires, at an instant
+        // located to 1e-13 s.
         const double end_m = kLocated_s * (std::abs(b.vt_m_s) + cone * std::abs(b.vn_m_s));
         EXPECT_NEAR(b.xP_m, a.xP_m, b.state[0] == 'S' ? 1e-15 : end_m);
         EXPECT_EQ(a.vP_m_s, 0.0);
@@ -135,7 +136,7 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
   }
   for (const Traced& t : many) {
     SCOPED_TRACE(t.result.mode);
-    // Rows of distinct instants, so that both sides of an event count once: 1e-11 s at 1e7 N/s.
+    // One row per instant: the two rows of an event are less than 1e-11 s apart (at 1e7 N/s).
     std::vector<TraceRow> rows;
     for (const TraceRow& row : t.rows) {
       if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
@@ -244,8 +245,8 @@ TEST(Trace, PeaksOfTheReactionsAreThoseOfTheRows) {
         largest_N = std::max(
             largest_N, std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
       }
-      // Rows miss the top between two of them: (omega h)^2/8 of the fastest motion at most, with
-      // one element a link a visible part of the whole.
+      // The largest value lies between two rows, which miss it by at most (omega h)^2/8 of the
+      // fastest vibration. With one element per link this is a visible part of the whole.
       EXPECT_GT(t.result.reaction_peaks[joint].force_N, 0.998 * largest_N);
       EXPECT_LT(t.result.reaction_peaks[joint].force_N, 1.02 * largest_N);
     }

@@ -57,7 +57,8 @@ std::map<std::uint64_t, ContactOutcome> solved(
   return outcomes;
 }
 
-/// Models that differ in all that a chain is made of but its shape, and one in k alone.
+/// Models that differ in all parameters of a chain but have the same shape, and one that differs in
+/// k alone.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());
@@ -67,7 +68,7 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
     models[2].I_m4 *= 1.3;
     models[3].rho_kg_m3 *= 0.9;
     models[3].A_m2 *= 1.1;
-    models[4].k_N_m *= 0.7;  // a chain of its own that equals that of the first
+    models[4].k_N_m *= 0.7;  // its own chain, which equals that of the first model
     std::vector<std::unique_ptr<Coarse>> list;
     for (const ModelParameters& model : models) {
       list.emplace_back(new Coarse{model});  // in place: its parts point at each other

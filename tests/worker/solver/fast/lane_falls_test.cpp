@@ -178,7 +178,7 @@ TEST(CollocationFall, TipStandsStillAtTheLargestDrop) {
   EXPECT_LT(paper().tip_at(largest_m - 1e-9).vy_m_s, 0.0);
 }
 
-/// Chains of one shape, more than any kernel has lanes, none like the next.
+/// Chains of one shape, all different, and more than any kernel has lanes.
 std::deque<Chain> different_chains() {
   std::deque<Chain> chains;
   for (int i = 0; i < 11; ++i) {

@@ -19,7 +19,7 @@ struct Shape {
   int elements_per_link;
 };
 
-/// Unlike in all that chains of one shape may differ in.
+/// Chains of one shape that differ in every parameter that may differ.
 Chain chain_number(std::size_t i, const Shape& shape) {
   const double more = static_cast<double>(i);
   ModelParameters model = preset("paper");
@@ -46,13 +46,13 @@ AffineContactForce<double> push_at_tip(const Chain& chain) {
   return force;
 }
 
-/// A stepper of one kernel, and what became of its lanes.
+/// A stepper of one kernel, with the results of its lanes.
 class Steps {
  public:
   Steps(const Chain& shape, const LaneKernel& kernel)
       : stepper_(shape.tables(), kernel), accept_(kernel.lanes, 1) {}
 
-  /// Puts a chain that moves and is pushed at its tip into a lane.
+  /// Loads a moving chain with a force at its tip into a lane.
   void load(std::size_t lane, const Chain& chain) {
     ChainState state = chain.at_rest();
     state.v.row(1).setLinSpaced(0.0, -1.0);

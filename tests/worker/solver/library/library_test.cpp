@@ -92,7 +92,7 @@ TEST(LibraryTest, APointOfAModelThatIsNotGivenIsRefused) {
   EXPECT_THROW(outcomes_of({coarse_model()}, {{1, {1.0, 0.4, 1.0}}}), InputError);
 }
 
-/// Its fall takes hours: a test that waits for it is ended by its time limit and by nothing else.
+/// Its fall would take hours: a test that waits for it fails by its time limit.
 ModelParameters model_that_falls_for_hours() {
   ModelParameters model = preset("paper");
   model.integrator = Integrator::kGeneralizedAlpha;

@@ -21,8 +21,8 @@ inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   return rows;
 }
 
-/// Matrices of a chain as dense ones, got from its energies and accelerations alone: row 0 (the
-/// pin) is left out, so entry i belongs to row i + 1. Both directions share the mass matrix.
+/// Dense matrices of a chain, computed only from its energies and accelerations. Row 0 (the pin) is
+/// left out, so entry i belongs to row i + 1. Both directions have the same mass matrix.
 class ChainProbe {
  public:
   explicit ChainProbe(const Chain& chain) : chain_(chain) {

@@ -23,7 +23,7 @@ constexpr TipState at(double x_m, double y_m) {
   return {x_m, y_m, 0.0, 0.0};
 }
 
-/// A contact that is driven step by step: the law, what is recorded of it, and where the tip is.
+/// A contact that the test moves step by step: its law, its record, and the position of the tip.
 struct RecordedContact {
   explicit RecordedContact(double vt_in_m_s)
       : tip{0.0, 0.0, vt_in_m_s, -1.0}, law(kParameters, tip), record(law, tip) {}
@@ -190,9 +190,9 @@ TEST(WithoutRipples, WhatSurvivesAlternatesBeginsAndEndsWithAPeakAndKeepsTheLarg
 
 constexpr double k_N_m = 1e6;
 constexpr double kEta2 = 1.25;
-constexpr double kStep_s = 0.97e-6;  // what happens does so inside steps
+constexpr double kStep_s = 0.97e-6;  // the events are inside steps
 
-/// Half a period of V_n, in which it goes from -1 to 1 m/s, but for what is added to it.
+/// Half a period of V_n, from -1 to 1 m/s apart from the added terms.
 TipState half_period(double t_s, double vt_m_s) {
   constexpr double kRate = M_PI / 1e-4;
   return {vt_m_s * t_s, -std::sin(kRate * t_s) / kRate, vt_m_s, -std::cos(kRate * t_s)};
@@ -255,7 +255,8 @@ TEST(ContactMargin, AtTouchIsWhatSeparatesStickFromSlip) {
 }
 
 TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsTheLargest) {
-  // It turns once and leaves as fast as it came; that P never sticks is no matter of chance.
+  // The tip turns once and leaves as fast as it came. P never sticks, and not because of small
+  // differences.
   const Contact contact = followed([](double t_s) { return half_period(t_s, 1e-9); }, 0.0, 1e-3);
   ASSERT_TRUE(contact.finished());
   EXPECT_EQ(contact.margin().nearest(100.0).distance, 1.0);
@@ -280,7 +281,7 @@ TEST(ReactionPeaks, MeansOverSpansGiveThePeakOfWhatTheyAreMeansOf) {
     add(peaks, t_s + kSpan_s, kSpan_s, 7.0 * mean_of_sine(t_s, t_s + kSpan_s));
   }
   const ReactionPeak peak = peaks.peaks().at(0);
-  // The mean is (0.2)^2/24 = 1.7e-3 low; what is left is of order 4.
+  // The mean is too low by (0.2)^2/24 = 1.7e-3; after the correction the error is of order 4.
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 1e-4);
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 1e-3);
 }

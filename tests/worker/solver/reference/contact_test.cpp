@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-/// The contact machine, driven by a tip that moves as the test says, whatever the forces.
+/// A contact whose tip moves as the test says, independent of the forces.
 namespace oblique::solver {
 namespace {
 
@@ -26,7 +26,7 @@ std::string state_of(const Contact& contact) {
   return {contact.law().is_stick() ? 'S' : 's', contact.law().is_compression() ? 'C' : 'R'};
 }
 
-/// Follows the path up to separation or `until_s`; what happened on the way.
+/// Follows the path up to separation or `until_s`. Returns the events on the way.
 std::vector<Event> followed(Contact& contact, const TipPath& path, double until_s) {
   std::vector<Event> events;
   while (!contact.finished() && contact.time_s() < until_s) {
@@ -44,7 +44,8 @@ std::string mode_of(const Contact& contact) {
 }
 
 TEST(Contact, ABumpThatIsHigherOnOneSideOfItsStepIsLocated) {
-  // V_n rises above zero between 0.55 and 0.9 of the first step, and is below at both of its ends.
+  // V_n is above zero between 0.55 and 0.9 of the first step, and below zero at both ends of the
+  // step.
   constexpr double kStep_s = 1e-4;
   const TipPath path = [](double t_s) -> TipState {
     const double z = t_s / kStep_s;
@@ -94,8 +95,8 @@ TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
 }
 
 TEST(Contact, AnEarlierOneInTheOrderTakesOverFromTheOneThatIsSoughtWhereTheyCoincide) {
-  // The polynomials through the first step that sees them put the extremum of F_t before the turn,
-  // so it is the extremum that is sought; the turn shows itself only where both are.
+  // In the first step that contains both events, the polynomials put the extremum of F_t before the
+  // turn, so the contact searches the extremum. The turn is found only at the instant of both.
   struct Step {
     double skew;
     double h_s;
@@ -114,7 +115,8 @@ TEST(Contact, AnEarlierOneInTheOrderTakesOverFromTheOneThatIsSoughtWhereTheyCoin
 }
 
 TEST(Contact, ATurnAndAnExtremumAtOneInstantHappenOnceEach) {
-  // Whatever the polynomials say of their order, and however little time rounding leaves between.
+  // Holds for any order of the events in the polynomials, and for any small time that rounding
+  // leaves between them.
   for (const double skew : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3}) {
     for (const double step_s : {0.6e-4, 0.7e-4, 0.9e-4, 1.1e-4}) {
       SCOPED_TRACE(skew);

@@ -83,8 +83,8 @@ TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
 }
 
 TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
-  // Straight down and at rest: O carries the weight, each joint what hangs below it. The links
-  // stretch a little from rest, so the reactions swing about that.
+  // The chain hangs straight down at rest: O carries the whole weight, each joint the weight below
+  // it. The links stretch a little from rest, so reactions oscillate about these values.
   const ModelParameters model = preset("paper");
   const Chain chain(model);
   const GeneralizedAlphaMotion motion(model);
@@ -110,8 +110,8 @@ TEST(GeneralizedAlpha, ReactionAtThePinHoldsTheHangingChain) {
   }
 }
 
-/// What is left, after `steps` steps a hundred times too long for it, of a link's vibration along
-/// itself.
+/// Remaining amplitude of a link's axial vibration after `steps` steps that are a hundred times too
+/// long for it.
 double stiff_vibration_left(double spectral_radius, int steps) {
   ModelParameters model = coarse_model();
   model.lengths_m = {0.4};
@@ -152,7 +152,8 @@ TEST(GeneralizedAlpha, StepThatNewtonCannotSolveIsASolveErrorWithItsTime) {
 }
 
 TEST(GeneralizedAlpha, AShorterStepAfterALongOneKeepsTheOrder) {
-  // Steps of changing length, as events make them, against equal ones: errors fall by four.
+  // Compares steps of changing length, which events cause, with equal ones: errors fall by a factor
+  // of four.
   const auto error = [](int divisions) {
     MovingChain moving(coarse_model());
     const auto force = push_at(moving.chain.tip(moving.state));

@@ -188,7 +188,7 @@ TEST_F(PefrlOnAChain, ContactIntegralsAreThoseOfTheForceAlongTheWay) {
     std::swap(state, next);
   }
   const auto integrals = advance(kDuration_s, kSteps).integrals;
-  // The trapezoidal rule errs by the square of the step over that of the motion, 1e-6.
+  // The relative error of the trapezoidal rule is the square of step/time of the motion, 1e-6.
   EXPECT_NEAR(integrals.impulse_n, trapezoid.impulse_n, 1e-5 * std::abs(trapezoid.impulse_n));
   EXPECT_NEAR(integrals.impulse_t, trapezoid.impulse_t, 1e-5 * std::abs(trapezoid.impulse_t));
   EXPECT_NEAR(integrals.work_t, trapezoid.work_t, 1e-5 * std::abs(trapezoid.work_t));

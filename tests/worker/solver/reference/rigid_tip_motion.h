@@ -9,8 +9,8 @@
 
 namespace oblique::solver {
 
-/// A rigid body of which only the inverse mass at its tip counts, r'' = W (F_t, F_n), stepped by
-/// PEFRL: what the contact machine needs of an integrator, and nothing else.
+/// A rigid body with a given inverse mass matrix at its tip, r'' = W (F_t, F_n), stepped by PEFRL.
+/// It has exactly what a contact needs from an integrator.
 class RigidTipMotion : public Motion {
  public:
   explicit RigidTipMotion(const Eigen::Matrix2d& W_per_kg)
