@@ -36,20 +36,20 @@ constexpr double kDifference = 3e-3;
 constexpr double kFirstStep = 0.1;
 /// Residual of a missing prediction: large enough to have the step refused.
 constexpr double kMissing = 1e9;
-/// A minimum whose angle is so near to that of a bound is at the bound.
+/// A minimum whose angle is this near to that of a bound counts as at the bound.
 constexpr double kAtBound = 1e-2;
 /// 95 % quantile of chi2 with one degree of freedom.
 constexpr double kChi2Quantile = 3.841458820694124;
 /// An unknown whose whole range changes the residuals by less, in standard deviations, has no
 /// effect.
 constexpr double kLeastEffect = 0.1;
-/// Smallest singular value of the Jacobian with columns of length 1 that is not due to the
-/// differences.
+/// Smallest singular value, of the Jacobian with columns of length 1, that is above the noise of
+/// the differences.
 constexpr double kLeastSingularValue = 1e-3;
 /// Part of a unit vector from which on an unknown belongs to an undetermined combination.
 constexpr double kLeastPart = 0.1;
 constexpr double kLargestCorrelation = 0.99;
-/// A chi2 that is smaller by less is the same minimum.
+/// A chi2 that is smaller by less than this is the same minimum.
 constexpr double kSmallerChi2 = 1e-4;
 /// Least factor of variances: of exact data chi2 is the noise of the differences.
 constexpr double kLeastScale = 1e-6;
@@ -409,8 +409,8 @@ class Profile {
           double limit)
       : problem_(problem), minimum_(minimum), information_(information), limit_(limit) {}
 
-  /// The angle at which the interval of unknown `j` ends below (`side` -1) or above (1); nothing
-  /// where it goes on to the bound. Ends early when `better_angles` is found.
+  /// The angle at which the interval of unknown `j` ends below (`side` -1) or above (1) the
+  /// minimum; nothing if it reaches the bound. Stops early if it finds `better_angles`.
   std::optional<double> end(Index j, double side) {
     constexpr int kMostSteps = 40;
     constexpr double kTolerance = 2e-3;        // of f
@@ -491,7 +491,7 @@ class Profile {
       }
       return {w, std::sqrt(std::max(rise, 0.0) / limit_), step.angles};
     } catch (const solver::SolveError&) {
-      // There the model lacks an output that was measured.
+      // At this point the model has no value of a measured output.
       return {w, std::numeric_limits<double>::infinity(), angles};
     }
   }

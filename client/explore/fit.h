@@ -41,8 +41,8 @@ struct Unknown {
 /// the least chi2 = sum r_i^2, r_i = (f_i - y_i) / sigma_i.
 struct FitProblem {
   /// The predictions of the model for each of the parameter vectors, in the order of `measured`;
-  /// NaN where the model lacks one. `what` describes the round: "iteration 3, chi2 = 12.4". What it
-  /// throws ends the fit and comes out of it.
+  /// NaN if the model has no such value. `what` describes the round: "iteration 3, chi2 = 12.4". An
+  /// exception ends the fit and is passed on.
   using Evaluate = std::function<std::vector<Eigen::VectorXd>(
       const std::vector<Eigen::VectorXd>& parameters, const std::string& what)>;
 
@@ -52,8 +52,9 @@ struct FitProblem {
   std::vector<std::string> names;  ///< of the measured numbers, for errors: "line 3: fn_peak_N"
   Evaluate evaluate;
 
-  /// Throws solver::InputError for bounds that do not rise, a start that is not between them, a
-  /// standard deviation that is not positive, no unknown and more unknowns than measured numbers.
+  /// Throws solver::InputError if bounds do not ascend, a start is not between them, a standard
+  /// deviation is not positive, there is no unknown, or there are more unknowns than measured
+  /// numbers.
   void check() const;
 };
 
@@ -80,7 +81,7 @@ FitStep minimise(const FitProblem& problem, double tolerance = 1e-6,
 struct Estimate {
   double value;
   std::optional<double> sd;  ///< from the covariance; nothing at a bound or if it is undetermined
-  /// Ends of the 95 % profile-likelihood interval; nothing where it goes on to the bound.
+  /// Ends of the 95 % profile-likelihood interval; nothing if it reaches the bound.
   std::optional<double> lower;
   std::optional<double> upper;
   bool is_at_bound = false;
@@ -93,7 +94,7 @@ struct Fit {
   std::size_t degrees_of_freedom = 0;
   double scale = 1.0;                       ///< by which variances are multiplied
   std::vector<std::size_t> without_effect;  ///< unknowns that hardly change any prediction
-  /// Sets of unknowns of which the data determine a combination only.
+  /// Sets of unknowns of which the data determine only a combination.
   std::vector<std::vector<std::size_t>> inseparable;
   /// Pairs whose correlation is beyond 0.99, of those that are not in such a set.
   std::vector<std::pair<std::size_t, std::size_t>> correlated;

@@ -215,7 +215,7 @@ Unknown unknown_of_flag(const std::string& text) {
   }
 }
 
-/// What is fitted, and how its points are made.
+/// The fit problem, and how points are made from its unknowns.
 struct MeasuredFit {
   Measurements measured;
   std::vector<Unknown> unknowns;
@@ -224,8 +224,8 @@ struct MeasuredFit {
   std::vector<std::vector<double>> fixed_values;  ///< of these: one a row, or one
 };
 
-/// Adds H, mu and e of the flags, and the model. Missing ones with a column or among the unknowns
-/// stand in the flags with one value, so that all is checked as flags are.
+/// Adds H, mu and e of the flags, and the model. Keys that have a column or are unknowns get a
+/// placeholder value in the flags, so that the usual checks of flags apply.
 void add_flags(MeasuredFit& fit, PointFlags points, const ReachCheck& check_reach) {
   const auto given = points.axes;
   const auto add = [&](const std::string& key, double value, const char* where) {
@@ -378,7 +378,7 @@ std::string names_of(const Report& report, const std::vector<std::size_t>& numbe
                        : fmt::format("{} and {}", protocol::joined(names), last);
 }
 
-/// What the data do not determine, in sentences.
+/// Sentences about what the data do not determine.
 std::vector<std::string> notes_of(const Report& report) {
   std::vector<std::string> notes;
   const Fit& fit = report.fit;

@@ -20,7 +20,7 @@
 namespace oblique::client {
 namespace {
 
-/// Whether a server that runs already solves the points.
+/// Whether a running server solves the points.
 bool is_elsewhere(const ExploreFlags& flags) {
   return flags.source.database.empty() &&
          !(flags.source.server + environment_variable("OBLIQUE_SERVER").value_or("")).empty();

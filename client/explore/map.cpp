@@ -321,7 +321,7 @@ BorderSearch::Inside BorderSearch::inside_of(const Leaf& leaf) const {
     return inside;
   }
   while (arcs.size() > 1) {
-    // The shortest arc whose neighbours are one region, which goes on behind it.
+    // The shortest arc with the same region before and after it.
     const std::size_t n = arcs.size();
     std::size_t shortest = n;
     for (std::size_t i = 0; i < n; ++i) {

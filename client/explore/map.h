@@ -101,7 +101,7 @@ class BorderSearch {
   };
   /// A change of region on the way around a leaf, counterclockwise.
   struct Crossing {
-    BorderVertex vertex;  ///< of which `low` is right only where the ends are one step apart
+    BorderVertex vertex;  ///< only its `low` is valid, and only if the ends are one step apart
     std::uint32_t width;  ///< distance of its ends, in steps
     Position at;
     int after;  ///< region behind it
@@ -141,7 +141,7 @@ class BorderSearch {
   std::array<LatticePoint, 4> corners_of(const Leaf& leaf) const;
   void split(const Leaf& leaf);
   Sides sides_of(const Leaf& leaf) const;
-  /// Whether it is to be halved for what its sides show.
+  /// Whether the leaf must be halved because of the borders on its sides.
   bool is_complex(const Leaf& leaf, const Sides& sides) const;
   /// Requests what the leaf needs, or halves it. True if it stays and has crossings.
   bool refine(const Leaf& leaf);
@@ -152,8 +152,9 @@ class BorderSearch {
   /// their borders.
   void request_probes();
   std::vector<Arc> arcs_of(const Leaf& leaf, const Sides& sides) const;
-  /// The region between two crossings whose neighbours are one region is cut off by a chord, the
-  /// shortest first; what is left of three regions or more meets in a corner.
+  /// Joins crossings by chords. A region between two crossings with the same region on both sides
+  /// is cut off by a chord, the shortest first. If three or more regions remain, their borders meet
+  /// in a corner.
   Inside inside_of(const Leaf& leaf) const;
   static int region_in(const Inside& inside, const Position& at);
   Leaf leaf_at(const Position& at) const;

@@ -161,7 +161,7 @@ Regions regions_of(const std::string& of) {
   return {.column = of.substr(0, equals), .level = level};
 }
 
-/// The plane of a map: all that its points share, and its axes.
+/// The plane of a map: the values that all points share, and the axes.
 struct Plane {
   solver::ModelParameters model;
   std::vector<protocol::Axis> constants = {};  ///< of one value each, or expressions

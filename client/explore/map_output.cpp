@@ -274,7 +274,8 @@ plot::FigureAxis figure_axis(const MapAxis& axis, const MapGrid& grid) {
   return shown;
 }
 
-/// The raster's cells in the colours of their regions: the largest, and all others as one.
+/// The cells of the raster coloured by region. The largest regions have their own colours; the
+/// others share one.
 plot::Cells cells_of_regions(const FoundMap& map) {
   plot::Cells cells{.name = map.of};
   for (std::size_t i = 0; i <= map.raster_cells; ++i) {

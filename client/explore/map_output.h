@@ -35,13 +35,13 @@ class MapAxis {
   protocol::RangeValues values_;
 };
 
-/// A region of a map, of those with a part of its area.
+/// A region of a map with a nonzero area.
 struct MapRegion {
   std::string name;
   double cells = 0.0;  ///< area, in cells of the coarse grid
 };
 
-/// How far a curve is from that on the finer mesh, as parts of an axis.
+/// Distance of a curve from the same curve on the finer mesh, as fractions of an axis.
 struct CurveShift {
   std::size_t checked = 0;  ///< vertices
   std::size_t lost = 0;     ///< of these: no such border within an eighth of the axis
@@ -73,7 +73,7 @@ struct FoundMap {
 /// "A", "B", ..., "Z", "A2", ...: the letter of a region by its place among `regions`.
 std::string region_letter(std::size_t place);
 
-/// Regions and curves as tables for people, and what they do not show.
+/// Regions and curves as tables, with notes about what a map may miss.
 std::string map_table(const FoundMap& map);
 /// One row a vertex: vertex,curve,x,y,from,to,width,along.
 std::string map_csv(const FoundMap& map);

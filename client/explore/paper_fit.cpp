@@ -24,7 +24,7 @@ solver::ModelParameters model_of(solver::ModelParameters model, const VectorXd& 
   return model;
 }
 
-/// The differences with what a model predicts; 0 stands for what it lacks.
+/// Differences from the predictions of a model; 0 for values that the model does not have.
 std::vector<Difference> with_ours(std::vector<Difference> differences,
                                   const VectorXd& predictions) {
   for (std::size_t i = 0; i < differences.size(); ++i) {

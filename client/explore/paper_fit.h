@@ -13,7 +13,7 @@ namespace oblique::client {
 /// Model keys that the paper does not print, or prints rounded, and that are fitted.
 inline constexpr std::array<std::string_view, 4> kFittedKeys{"A", "I", "k", "eta2"};
 
-/// Where a fit to the paper's numbers stands.
+/// State of a fit to the paper's numbers after an iteration.
 struct PaperFitStep {
   int iteration;                        ///< 0: the start
   solver::ModelParameters model;        ///< with the fitted parameters of this iteration

@@ -120,7 +120,7 @@ std::uint64_t first_rows_of(const SensitivityFlags& flags, SensitivityMethod met
   return flags.rows;
 }
 
-/// Throws solver::InputError for what the flags say wrong.
+/// Throws solver::InputError for flags that are invalid or contradict each other.
 SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach) {
   SensitivityProblem problem;
   problem.method =
@@ -200,7 +200,7 @@ std::string levels_flag(const DrawnInput& input) {
                                 : fmt::format("{}", fmt::join(levels, ",")));
 }
 
-/// Says so where most of the time of these points goes to falls that levels would share.
+/// Prints a note if most of the time of these points goes to falls that levels would share.
 void note_falls(Console& console, const SensitivityProblem& problem, const protocol::Block& block) {
   constexpr std::uint64_t kFew = 100;  // contacts, which take less time than a fall on any mesh
   const auto model = protocol::from_message(problem.sample.model());
@@ -455,7 +455,7 @@ std::string json_of(const SensitivityProblem& problem, const SolvedDesign& solve
   return json.dump(2);
 }
 
-/// A panel of bars a measure, one row of panels an output.
+/// One panel of bars per measure, one row of panels per output.
 plot::Figure figure_of(const SensitivityProblem& problem, const SolvedDesign& solved) {
   plot::Figure figure{
       .title = problem.method == SensitivityMethod::kSobol ? "Sobol\u2019 indices"

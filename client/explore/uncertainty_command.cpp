@@ -54,13 +54,13 @@ struct UncertaintyFlags {
   AnswerFlags answer;
 };
 
-/// A statistic of the first points of a study and of more and more of them.
+/// A statistic of a growing number of the first points of a study.
 struct Statistic {
   std::string name;  ///< "mean", "sd", "quantile 0.05", "pearson mu", "spearman mu" or a text
   std::vector<Estimate> of_parts = {};
 };
 
-/// The statistics of an output; of one with texts the probability of each, the largest first.
+/// The statistics of an output. For texts, the probability of each, the largest first.
 struct OutputStatistics {
   std::string name;
   bool has_texts = false;
@@ -218,7 +218,7 @@ void add_rows(protocol::Table& table, const OutputStatistics& output) {
   }
 }
 
-/// The statistics of all points with intervals, and beside them those of the first parts.
+/// Statistics of all points with intervals, and for comparison those of the first parts.
 std::string table_of(const OutputStatistics& output) {
   protocol::Table table{
       .columns = {output.name, output.has_texts ? "probability" : "value", "95 %"}};

@@ -8,8 +8,8 @@
 namespace oblique::solver {
 
 /// One step of Gauss collocation for the lanes of `Pack`, a LanePack; compiled once for each
-/// instruction set. Unknowns are the accelerations of all stages, found by a simplified Newton
-/// method: one tangent a step, at the middle of what is predicted (collocation.md).
+/// instruction set. The unknowns are the accelerations of all stages. A simplified Newton method
+/// finds them, with one tangent per step, at the middle of the predicted motion (collocation.md).
 template <class Pack>
 class CollocationStep {
  public:
@@ -28,7 +28,7 @@ class CollocationStep {
   inline void prepare() const;
   /// One iteration in the lanes that are active; writes the squared size of their corrections.
   inline void iterate() const;
-  /// Writes the state at the end of the step, and the squared size of what was hard to resolve.
+  /// Writes the state at the end of the step, and the squared size of the unresolved part.
   inline void finish() const;
 
  private:

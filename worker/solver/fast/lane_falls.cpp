@@ -21,17 +21,18 @@ namespace oblique::solver {
 namespace {
 
 constexpr std::size_t kStages = GaussCollocation::kStages;
-/// Numbers in the states that a fall keeps at most: 16 MB. With fewer a state at a drop costs more
-/// than it should beside a contact; more leave room for fewer falls.
+/// Maximum count of numbers in the stored states of a fall: 16 MB. With fewer, finding the state at
+/// a drop would take long compared with a contact; with more, the cache holds fewer falls.
 constexpr std::size_t kMostOfStates = (std::size_t{16} << 20) / sizeof(double);
-/// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
-/// length): collocation.md.
+/// Steps are so long that the unresolved part is this times the requested accuracy, relative to
+/// sqrt(g length): collocation.md.
 constexpr double kUnresolved = 1.5;
 /// First step, in parts of sqrt(length/g).
 constexpr double kFirstStep = 1.0 / 4000.0;
-/// No step is longer, in the same parts: the chain turns by some 0.1 then.
+/// Longest step, relative to sqrt(length/g): the chain turns by about 0.1 rad in it.
 constexpr double kLongestStep = 1.0 / 100.0;
-/// Newton's method leaves positions this wrong at most, in parts of the length and of the accuracy.
+/// Allowed error of positions by Newton's method, relative to the length and to the requested
+/// accuracy.
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 /// Steps in a fall beyond which it is given up.
@@ -178,8 +179,8 @@ struct CoordinateOverStep {
   }
 };
 
-/// Fraction of the step at which the height y first stops falling; above 1 when it falls on. Looks
-/// at the stages and at the end.
+/// Fraction of the step at which the height y first stops falling; above 1 if it falls during the
+/// whole step. Evaluated at the stages and at the end.
 double turn_of(const CoordinateOverStep& y) {
   const GaussCollocation& rule = gauss_collocation();
   double low = 0.0;
@@ -199,8 +200,8 @@ double turn_of(const CoordinateOverStep& y) {
   return 2.0;
 }
 
-/// Fraction of the step, up to `last`, at which the height y is -H_m. Newton's method held by
-/// bisection, which takes over near the largest drop, where the speed vanishes.
+/// Fraction of the step, up to `last`, at which the height y is -H_m. Newton's method, safeguarded
+/// by bisection near the largest drop, where the speed vanishes.
 double fraction_at_drop(const CoordinateOverStep& y, double H_m, double last) {
   double low = 0.0;
   double high = last;
@@ -227,7 +228,7 @@ double fraction_at_drop(const CoordinateOverStep& y, double H_m, double last) {
 /// which it solves steps again, with the same bits.
 class CollocationFall : public Fall {
  public:
-  /// `chain` must outlive this. `error_m` is that of the lanes' steps.
+  /// `chain` must outlive this. `error_m` is the allowed error, as in the lanes' steps.
   CollocationFall(const LaneKernel& kernel, const Chain& chain, double error_m)
       : kernel_(kernel), chain_(chain), error_m_(error_m) {}
 
@@ -281,7 +282,7 @@ class CollocationFall : public Fall {
     return within(number, step, fraction_at_drop(step[tip_y()], H_m, last));
   }
 
-  /// The last step that begins at `value` of that member or before.
+  /// The last step at whose start this member is at most `value`.
   std::size_t step_from(double value, double Step::*member) const {
     const auto after = std::ranges::upper_bound(steps_, value, {}, member);
     return static_cast<std::size_t>(after - steps_.begin() - 1);
@@ -344,8 +345,8 @@ class CollocationFall : public Fall {
   std::vector<std::vector<double>> states_;  ///< position, rates, mean acceleration
 };
 
-/// How long steps are. Changed seldom and by little: while it does not change, the method is
-/// symplectic.
+/// Chooses the step length. It changes seldom and little, because the method is symplectic only
+/// with constant steps.
 class StepControl {
  public:
   StepControl(double length_m, double gravity_m_s2, double accuracy)
@@ -355,7 +356,7 @@ class StepControl {
 
   double h_s() const { return h_s_; }
 
-  /// True when the step is to be taken; false when it is to be tried again with the new h_s().
+  /// True if the step is accepted; false if it must be repeated with the new h_s().
   bool accepts(const CollocationLanes::Step& attempt) {
     const double error = attempt.unresolved_m_s / allowed_m_s_;
     if (!attempt.converged || error > kRefused) {
@@ -370,7 +371,7 @@ class StepControl {
     if (attempt.iterations >= kManyIterations) {
       change(0.8);
     } else if (steps_ >= kPatience && (mean > 1.0 + kBand || mean < 1.0 - kBand)) {
-      // What is unresolved falls as h^1.4 where it is vibrations of a released chain.
+      // The unresolved part falls as h^1.4 where it consists of vibrations of a released chain.
       change(std::clamp(std::pow(std::max(mean, 1e-6), -0.7), 0.5, 1.5));
     }
     return true;
@@ -418,8 +419,8 @@ class FallingChain {
     step.error_m = error_m_;
   }
 
-  /// Accepts or refuses the lane's last attempt. The fall once it is complete, else nullptr. Throws
-  /// SolveError when it is given up.
+  /// Accepts or refuses the lane's last attempt. Returns the fall if it is complete, else nullptr.
+  /// Throws SolveError if the fall fails.
   std::shared_ptr<const Fall> judge(CollocationLanes& lanes, std::size_t lane) {
     CollocationLanes::Step& step = lanes.step(lane);
     step.is_accepted = control_.accepts(step);

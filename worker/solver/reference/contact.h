@@ -23,9 +23,9 @@ class Contact {
  public:
   /// Time within which a contact must end [s].
   static constexpr double kLongest_s = 20e-3;
-  /// More events mean that states follow each other without time passing.
+  /// With more events, states would follow each other without time passing.
   static constexpr int kMostEvents = 10'000;
-  /// Ten thousand times the steps that a contact takes by default.
+  /// Ten thousand times the number of steps of a contact by default.
   static constexpr std::int64_t kMostSteps = 5'000'000;
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);

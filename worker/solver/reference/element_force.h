@@ -114,7 +114,7 @@ inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
                                           const PlanarVector<Real>& p_j,
                                           const PlanarVector<Real>& s_j,
                                           const ElementConstants<Constant>& k) {
-  // By components, not pairs, which compilers copy through memory.
+  // By components, because compilers copy pairs through memory.
   using Vector = PlanarVector<Real>;
   const Vector u{p_j.x - p_i.x, p_j.y - p_i.y};
   const Vector d{s_j.x - s_i.x, s_j.y - s_i.y};
