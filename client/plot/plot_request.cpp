@@ -203,9 +203,9 @@ std::string without_spaces(std::string_view text) {
              : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
 }
 
-/// Returns which of two open axes is better drawn as lines than as an axis of a map; nothing if the
-/// map is better. Lines are better if the axis has few values, because cells between them would
-/// cover values that the study does not have.
+/// If two axes are open and one has few values, that axis gives the lines, because cells between
+/// its values would cover values that the study does not have. Returns the other axis, along which
+/// lines run; nullptr if a map is better.
 const StudyAxis* axis_of_few_lines(const std::vector<const StudyAxis*>& open) {
   constexpr std::size_t kFew = 3;
   if (open.size() != 2 || !open[0]->is_listed || !open[1]->is_listed ||

@@ -41,7 +41,8 @@ double unresolved_waves(const ModelParameters& model) {
   return std::pow(element_m * wavenumber_1_m / std::numbers::pi, 4);
 }
 
-/// Factor of the difference of an output whose error has that order.
+/// Factor from the difference between the two meshes to the error of an output whose error has
+/// order `order`.
 double factor(const ModelParameters& model, int order) {
   const ModelParameters companion = companion_model(model);
   const double ratio = static_cast<double>(model.elements_per_link) / companion.elements_per_link;

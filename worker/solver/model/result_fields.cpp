@@ -252,8 +252,7 @@ constexpr std::array kFields{
     energy<&Energy::gravity_change_J>("potential energy at separation less that at touch"),
     energy<&Energy::exchanged_J>(
         "work that the contact forces exchanged with the finger, to and fro both counted"),
-    energy<&Energy::closure>(
-        "what does not add up in the energy balance, relative to exchanged_J; never negative", ""),
+    energy<&Energy::closure>("absolute error of the energy balance, relative to exchanged_J", ""),
     error<&Errors::mode_same>(
         "mode_same",
         "1 if half the mesh and twice the step give the same mode, ripples merged; else 0. "

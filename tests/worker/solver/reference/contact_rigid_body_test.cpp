@@ -85,7 +85,7 @@ void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-
   const std::vector<double> maxima_N = tangential_maxima_N(exact);
   ASSERT_EQ(result.ft_peaks.size(), maxima_N.size());
   for (std::size_t i = 0; i < maxima_N.size(); ++i) {
-    // Kinks are met by samples to a 5000th of the duration only.
+    // The exact solution is sampled at 5000 instants, which miss kinks by up to one interval.
     EXPECT_NEAR(result.ft_peaks[i].ft_N, maxima_N[i], 2e-3 * force_N);
   }
   const Eigen::Vector2d impulse = p.W_per_kg.inverse() * (exact.velocity_out_m_s() - p.V0_m_s);
