@@ -101,7 +101,7 @@ class BorderSearch {
   };
   /// A change of region on the way around a leaf, counterclockwise.
   struct Crossing {
-    BorderVertex vertex;  ///< only its `low` is valid, and only if the ends are one step apart
+    BorderVertex vertex;  ///< its `low` is valid only if the ends are one step apart
     std::uint32_t width;  ///< distance of its ends, in steps
     Position at;
     int after;  ///< region behind it
