@@ -143,7 +143,7 @@ std::string fault_of_lists(const PointResult& message) {
     const Numbers& numbers = (message.*kLists[i].numbers)();
     const int elements = numbers.size() / kLists[i].members;
     if (elements > kMaxListElements) {
-      return fmt::format("the worker sent {} {}, and a result has at most {}", elements, name,
+      return fmt::format("the worker sent {} {}; at most {} are allowed", elements, name,
                          kMaxListElements);
     }
     if (numbers.size() % kLists[i].members != 0) {
@@ -213,7 +213,7 @@ std::string fault_of(const PointResult& message) {
     return "the worker sent a text that is too long";
   }
   if (message.ByteSizeLong() > kMaxResultBytes) {
-    return fmt::format("the worker sent a result of {} bytes, and one has at most {}",
+    return fmt::format("the worker sent a result of {} bytes; at most {} are allowed",
                        message.ByteSizeLong(), kMaxResultBytes);
   }
   if (!message.error().empty()) {

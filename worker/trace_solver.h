@@ -19,7 +19,8 @@ namespace oblique::worker {
 /// which phases end, and the last.
 class TraceRows {
  public:
-  /// `every`: K; 0: the smallest power of 2 with which the rows have at most `most_bytes`.
+  /// `every` is K. If it is 0, K is the smallest power of 2 for which the rows have at most
+  /// `most_bytes`.
   TraceRows(std::uint64_t every, std::size_t most_bytes);
 
   void add(const solver::TraceRow& row);

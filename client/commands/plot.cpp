@@ -66,7 +66,7 @@ struct PlotFlags {
   PointSource source;
 };
 
-/// What the flags mean together.
+/// The picture that the flags define together.
 struct PictureChoice {
   plot::PictureFormat format;
   std::optional<plot::Size> size;

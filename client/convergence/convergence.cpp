@@ -195,8 +195,9 @@ const char* name_of(Kind kind) {
 
 std::string described(const ContactChange& change) {
   if (change.kind == Kind::kRipple) {
-    return fmt::format("a peak of F_n at {} us, near the depth below which ripples are merged",
-                       fixed_number(change.t0_s * kMicro, 2));
+    return fmt::format(
+        "a peak of F_n at {} us that is close to the limit between a ripple and a major peak",
+        fixed_number(change.t0_s * kMicro, 2));
   }
   const char* cause = change.kind == Kind::kStick  ? "P's velocity grazes 0"
                       : change.kind == Kind::kSlip ? "|F_t| grazes mu F_n"

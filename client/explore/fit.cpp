@@ -153,7 +153,7 @@ struct Residuals : public Eigen::DenseFunctor<double> {
 FitStep minimise(const FitProblem& problem, double tolerance,
                  const std::function<void(const FitStep&)>& after_each) {
   namespace Space = Eigen::LevenbergMarquardtSpace;
-  constexpr int kMostTrials = 200;
+  constexpr int kMaxTrials = 200;
   problem.check();
   VectorXd angles(index_of(problem.unknowns.size()));
   for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
@@ -166,7 +166,7 @@ FitStep minimise(const FitProblem& problem, double tolerance,
   method.diag() = VectorXd::Ones(angles.size());
   method.setXtol(1e-7);
   method.setFtol(1e-9);
-  method.setMaxfev(kMostTrials);
+  method.setMaxfev(kMaxTrials);
   auto status = method.minimizeInit(angles);
   FitStep step = residuals.last;
   for (Index i = 0; i < step.predictions.size(); ++i) {
@@ -189,7 +189,7 @@ FitStep minimise(const FitProblem& problem, double tolerance,
     }
   }
   if (status == Space::TooManyFunctionEvaluation) {
-    throw solver::SolveError(fmt::format("the fit has found no minimum in {} trials", kMostTrials));
+    throw solver::SolveError(fmt::format("the fit has found no minimum in {} trials", kMaxTrials));
   }
   return step;
 }
@@ -295,13 +295,13 @@ class IntervalEnd {
   bool is_cut() const { return is_cut_; }
 
   void take(const FitStep& step) {
-    constexpr int kMostCorrections = 4;
+    constexpr int kMaxCorrections = 4;
     constexpr double kSmallFall = 2e-3;  // of the limit
     const bool is_better = step.chi2 < best_.chi2 - kSmallFall * limit_;
     if (step.chi2 < best_.chi2) {
       best_ = step;
     }
-    if (is_better && best_.is_complete && corrections_ < kMostCorrections &&
+    if (is_better && best_.is_complete && corrections_ < kMaxCorrections &&
         correct(best_, kSmallFall * limit_)) {
       ++corrections_;
       return;
@@ -409,7 +409,7 @@ class IntervalEnd {
 /// Fills in the intervals, all ends side by side. Returns the step with the least chi2 if that is
 /// below the minimum; with `ends_early` it returns it at once.
 std::optional<FitStep> add_intervals(const FitProblem& problem, bool ends_early, Fit& fit) {
-  constexpr int kMostRounds = 40;
+  constexpr int kMaxRounds = 40;
   constexpr double kSmallerChi2 = 1e-4;  // less is the same minimum
   const double limit = kChi2Quantile * fit.scale;
   std::vector<IntervalEnd> ends;
@@ -419,7 +419,7 @@ std::optional<FitStep> add_intervals(const FitProblem& problem, bool ends_early,
   }
   std::optional<FitStep> better;
   double least = fit.minimum.chi2 - kSmallerChi2 - 0.01 * limit;
-  for (int round = 1; round <= kMostRounds && !(ends_early && better); ++round) {
+  for (int round = 1; round <= kMaxRounds && !(ends_early && better); ++round) {
     std::vector<IntervalEnd*> open;
     std::vector<VectorXd> places;
     for (IntervalEnd& end : ends) {
@@ -461,14 +461,14 @@ double Fit::correlation(Index i, Index j) const {
 }
 
 Fit fit(FitProblem problem, bool is_scaled) {
-  constexpr int kMostStarts = 4;
+  constexpr int kMaxStarts = 4;
   if (is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");
   }
   for (int start = 1;; ++start) {
     Fit found = fit_at(problem, minimise(problem), is_scaled);
-    const auto better = add_intervals(problem, start < kMostStarts, found);
-    if (!better || start == kMostStarts) {
+    const auto better = add_intervals(problem, start < kMaxStarts, found);
+    if (!better || start == kMaxStarts) {
       found.has_other_minimum = better.has_value();
       return found;
     }

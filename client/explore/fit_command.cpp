@@ -138,7 +138,7 @@ int fit_to_paper(const FitFlags& flags, Console& console) {
 
 // ---- Measured numbers ----
 
-/// Of KEY=FROM:TO or KEY=FROM:TO:START.
+/// Parses KEY=FROM:TO or KEY=FROM:TO:START.
 Unknown unknown_of_flag(const std::string& text) {
   const auto equals = std::min(text.find('='), text.size());
   std::vector<double> numbers;
@@ -424,7 +424,8 @@ Answer answer_of(const MeasuredFit& fitted, const Fit& fit, const GrowingStudy& 
 
 int fit_to_measurements(const FitFlags& flags, Console& console) {
   if (flags.from != kUsualFrom) {
-    throw InputError("--from is for the fit of the paper's numbers: here --preset is the model");
+    throw InputError(
+        "--from is allowed only in a fit to the paper's numbers: use --preset to choose the model");
   }
   auto fitted = measured_fit(flags, tip_reach(console));
   std::string columns;

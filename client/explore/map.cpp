@@ -15,7 +15,7 @@ namespace {
 
 /// How often cells are halved that a border enters, and that more than two borders enter.
 constexpr std::uint32_t kHalvings = 2;
-constexpr std::uint32_t kMostHalvings = 4;
+constexpr std::uint32_t kMaxHalvings = 4;
 
 struct Position {
   double x;
@@ -184,7 +184,7 @@ bool BorderSearch::refine() {
       }
       const bool is_simple = crossings.size() <= 2;
       if (!crossings.empty() &&
-          cell.size > grid_.cell() >> (is_simple ? kHalvings : kMostHalvings)) {
+          cell.size > grid_.cell() >> (is_simple ? kHalvings : kMaxHalvings)) {
         for (const auto& corner : Cell{cell.low, cell.size / 2}.corners()) {
           next.push_back({corner, cell.size / 2});
           for (const auto& point : next.back().corners()) {
@@ -403,7 +403,7 @@ bool bisect(std::vector<Sample>& samples, const RegionsOf& regions_of) {
 }  // namespace
 
 MapGrid MapGrid::of(std::uint32_t cells, double bracket) {
-  MapGrid grid{.cells = cells, .halvings = kMostHalvings};
+  MapGrid grid{.cells = cells, .halvings = kMaxHalvings};
   while (1.0 / grid.last() > bracket) {
     ++grid.halvings;
   }

@@ -313,11 +313,11 @@ FoundMap find_map(Console& console, const MapFlags& flags, protocol::StopSignals
 }
 
 void check_map_flags(const MapFlags& flags) {
-  constexpr std::uint32_t kMostCells = 512;  // whose points fit into the definition of a study
+  constexpr std::uint32_t kMaxCells = 512;  // whose points fit into the definition of a study
   constexpr double kLeastBracket = 1e-8;
-  if (flags.cells < 2 || flags.cells > kMostCells) {
+  if (flags.cells < 2 || flags.cells > kMaxCells) {
     throw InputError(
-        fmt::format("--cells {} is not allowed: it must be from 2 to {}", flags.cells, kMostCells));
+        fmt::format("--cells {} is not allowed: it must be from 2 to {}", flags.cells, kMaxCells));
   }
   if (!(flags.bracket >= kLeastBracket && flags.bracket <= 1.0 / flags.cells)) {
     throw InputError(fmt::format(

@@ -176,7 +176,7 @@ std::string json_of(const FoundMap& map) {
 
 /// The raster in the colours of the regions: the largest, and all others as one.
 plot::Cells cells_of_regions(const FoundMap& map) {
-  constexpr std::size_t kMostCategories = 16;
+  constexpr std::size_t kMaxCategories = 16;
   constexpr double kLeastShare = 1.0 / 400;
   plot::Cells cells{.name = map.of};
   for (auto* axis : {&cells.x, &cells.y}) {
@@ -191,7 +191,7 @@ plot::Cells cells_of_regions(const FoundMap& map) {
   }
   const double all = static_cast<double>(map.grid.cells) * map.grid.cells;
   for (const auto& region : map.regions) {
-    if (cells.categories.size() < kMostCategories && region.cells >= kLeastShare * all) {
+    if (cells.categories.size() < kMaxCategories && region.cells >= kLeastShare * all) {
       cells.categories.push_back({.name = region.name});
     }
   }

@@ -31,6 +31,7 @@
 #include "proto/recipe/sampling.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
+#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {

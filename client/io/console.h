@@ -79,7 +79,7 @@ class Console {
 
   /// Writes a line to `notes` with control characters made visible (proto/text.h).
   void note(std::string_view sentence);
-  /// As `note`, only with kVerbose.
+  /// Prints a note, but only with kVerbose.
   void detail(std::string_view sentence);
   /// Writes an error as "oblique query: message"; the message may have several lines.
   void error(std::string_view command, std::string_view message);

@@ -53,7 +53,8 @@ double value_at(const PaperCase& one, double t_s, plot::Column value) {
 /// Adds published numbers of a case to a curve as diamonds.
 using AddPublished = std::function<void(const PaperCase& one, Curve& diamonds)>;
 
-/// Published peaks of F_n, or of F_t at the largest |F_t| around them, at our instants.
+/// Adds the published peaks of F_n, or of F_t. Times are those of our peaks, because the paper
+/// gives none; a peak of F_t is at the largest |F_t| around a peak of F_n.
 void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   const auto& published = of_ft ? one.published.ft_kN : one.published.fn_kN;
   std::size_t next = 0;

@@ -61,7 +61,7 @@ std::vector<double> round_edges(const Range& range, double bins) {
   std::vector<double> edges;
   for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
        ++i) {
-    // Below 1 a quotient of whole numbers is the double that people write.
+    // Below 1, dividing two whole numbers gives the same double as the decimal that people write.
     edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
   }
   return edges;

@@ -98,7 +98,7 @@ double nearest_value(const StudyAxis& axis, double wanted) {
   });
 }
 
-/// Whether a typed value means that of the axis: tables show only six digits.
+/// Whether a typed value stands for `value` of the axis: tables show only six digits.
 bool means(double typed, double value) {
   return std::abs(value - typed) <= 1e-5 * std::abs(typed);
 }
@@ -203,8 +203,9 @@ std::string without_spaces(std::string_view text) {
              : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
 }
 
-/// Of two open axes the one whose values become lines, if lines are better than a map: the other
-/// axis has few values, and cells between them would cover values that the study does not have.
+/// If two axes are open and one has few values, that axis gives the lines, because cells between
+/// its values would cover values that the study does not have. Returns the other axis, along which
+/// lines run; nullptr if a map is better.
 const StudyAxis* axis_of_few_lines(const std::vector<const StudyAxis*>& open) {
   constexpr std::size_t kFew = 3;
   if (open.size() != 2 || !open[0]->is_listed || !open[1]->is_listed ||

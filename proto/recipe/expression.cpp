@@ -205,7 +205,7 @@ class Expression::Parser {
 
   void close() {
     if (!take(')')) {
-      throw InputError(next() == ',' ? kComma : "a bracket is open at its end");
+      throw InputError(next() == ',' ? kComma : "a bracket is not closed");
     }
   }
 

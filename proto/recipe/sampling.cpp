@@ -43,7 +43,7 @@ std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
   if (n < 2) {
     return 0;
   }
-  // Repeats the permutation of all numbers of as many bits until the result is below n.
+  // Permutes all numbers with as many bits as n - 1, repeatedly until the result is below n.
   const auto bits = static_cast<int>(std::bit_width(n - 1));
   do {
     i = shuffled_bits(i, bits, key);

@@ -175,7 +175,8 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
     fewest =
         static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / settings_.batch_target_s);
   }
-  if (studies_.at(id).points.has_filter()) {  // it may include all points of the next batch
+  if (studies_.at(id).points.has_filter()) {
+    // All points of the next batch may pass the filter, even if most of the last did not.
     const double in_time =
         pace.s_per_solved() > 0.0
             ? settings_.lanes_batch_s * worker.threads / pace.s_per_solved()

@@ -284,8 +284,9 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     kept.push_back(std::move(job));
   };
   for (WriteJob& job : jobs) {
-    // After a waiting job, later jobs that can wait are not tried, nor any change of its study,
-    // because "done, then retried" must not become "retried, then done".
+    // Changes of a study must keep their order: "done, then retried" must not become "retried, then
+    // done". So once a job waits, later jobs that may wait do so, too, and all later changes of its
+    // study are refused.
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

@@ -21,7 +21,7 @@ RANGES = {"H": (0.8, 1.1), "mu": (0.1, 2.0), "e": (0.5, 1.0), "E": (60e9, 80e9),
 
 
 def run_s(program, points, falls, workers):
-    """Seconds that `oblique run` takes for a sample of so many points with so many values of E."""
+    """Seconds that `oblique run` takes for a sample of `points` points with `falls` values of E."""
     axes = "".join(
         f"{key} = {{ from = {low:g}, to = {high:g}{f', count = {falls}' if key == 'E' else ''} }}\n"
         for key, (low, high) in RANGES.items())
@@ -36,7 +36,7 @@ def run_s(program, points, falls, workers):
 
 
 def solve_s(points, falls):
-    """Seconds that solving so many points with so many values of E takes here."""
+    """Seconds that this process takes to solve `points` points with `falls` values of E."""
     draw = np.random.default_rng(1)
     keys = {key: draw.uniform(*limits, points) for key, limits in RANGES.items()}
     keys["E"] = np.resize(np.linspace(*RANGES["E"], falls), points)

@@ -59,7 +59,8 @@ def segments(found):
 
 
 def judged(found, x, y):
-    """The region of each point: that on its side of the nearest chord to the right, else to the left."""
+    """The region of each point: the region on its side of the nearest chord to its right or, without one, to its
+    left."""
     rows, sides = segments(found)
     names = [region["name"] for region in found["regions"]]
     order = np.argsort(y)

@@ -1,8 +1,7 @@
 #!/usr/bin/python3
-"""How well `oblique study check` predicts the time of `oblique run`: both for each case, one after
-the other, each with a database of its own. Prints the times and predicted/measured.
-    tests/bench/predicted_time.py build/release/bin [CASE ...]
-"""
+"""Compares the time that `oblique study check` predicts with that of `oblique run`, for each case, each with its
+own database. Prints the times and predicted/measured. tests/bench/predicted_time.py build/release/bin [CASE
+...]"""
 
 import json
 import pathlib

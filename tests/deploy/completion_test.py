@@ -15,7 +15,7 @@ PROGRAMS = pathlib.Path(sys.argv.pop(1))
 DRIVER = {
     # As bash does: the word before the cursor, and the words between blanks and =.
     "bash": 'COMP_WORDS=("${@:2}"); COMP_CWORD=$(($# - 2)); "_$2" "$2" "$1" && printf "%s\\n" "${COMPREPLY[@]}"',
-    # What the script hands to zsh for a word; the part that it has taken off goes before it.
+    # These functions replace those of zsh. They print the words that the script offers, with the prefix that compset removed.
     "zsh": """compset() { local taken=${(M)PREFIX##${~2}}; [[ -z $taken ]] || { PREFIX=${PREFIX##${~2}}; BEFORE+=$taken; } }
 _describe() { local each; for each in ${(P)2}; do [[ ${each%%:*} != $PREFIX* ]] || print -r -- $BEFORE${each%%:*}; done }
 _files() { : }

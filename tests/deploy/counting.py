@@ -1,5 +1,5 @@
-"""Runs the tests of a file so that those which could not be run are seen: it ends with 77, which ctest counts as
-skipped, where none failed and some were skipped, and says which and why."""
+"""Runs the tests of a file. If none failed and some were skipped, ends with exit code 77, which ctest counts as
+skipped, and prints which tests and why."""
 import sys
 import unittest
 

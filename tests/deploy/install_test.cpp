@@ -247,7 +247,7 @@ TEST(PackagesTest, TheArchiveRunsWhereItIsUnpackedWithLibrariesOfItsOwn) {
 
 // ---- The library ----
 
-/// The parts library and development, moved after installing.
+/// Installs the components `library` and `development`, then moves them. Returns their folder.
 std::string installed_library(const TemporaryFolder& folder) {
   for (const std::string part : {"library", "development"}) {
     const auto installed = install(folder, folder.file("made here"), part);
@@ -345,7 +345,8 @@ TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
     EXPECT_EQ(verified.err, "") << unit << ": what it ignores it prints and lets pass";
-    // Of 100: 1.2 of 10 for the network, local sockets and libzmq's threads.
+    // The threshold is in tenths of the exposure level. The network, local sockets and libzmq's
+    // threads need 1.2.
     const auto judged =
         run_tool(folder, "systemd-analyze",
                  {"security", "--offline=true", "--threshold=13", "--no-pager", unit});

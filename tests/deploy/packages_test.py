@@ -77,7 +77,6 @@ class Packages(unittest.TestCase):
             self.assertNotRegex(field(package, "Depends"), r"python|chromium|node|oblique")
             self.assertEqual(field(package, "Multi-Arch"), "foreign")
             self.assertEqual(field(package, "Section"), "science")
-        # What is not there cannot be asked too much.
         self.assertNotRegex(field("oblique-worker", "Depends"), "sqlite|microhttpd|systemd")
         self.assertIn("systemd-sysusers", field("oblique-server", "Depends"))
 
@@ -91,7 +90,7 @@ class Packages(unittest.TestCase):
         self.assertEqual(script(library, "shlibs"), f"liboblique {soname} {library} (>= {VERSION})\n")
         for package in library, "liboblique-dev":
             self.assertEqual(field(package, "Multi-Arch"), "same")
-            # One architecture's differ from another's only where the architecture is in the path.
+            # Packages of two architectures differ only in paths that contain the architecture.
             self.assertEqual([f for f in files(package) if re.match(r"/usr/lib/(?!%s/)" % triplet, f)], [])
 
     def test_the_python_module_depends_on_python_and_numpy_only(self):
@@ -143,7 +142,7 @@ class Packages(unittest.TestCase):
     def test_lintian_has_no_errors_and_warns_of_nothing(self):
         if not shutil.which("lintian"):
             self.skipTest("there is no lintian here")
-        # Built as sanitizers or assertions want it, programs are not what is shipped.
+        # Builds with sanitizers or assertions differ from the packages that are shipped.
         if "CMAKE_BUILD_TYPE:STRING=Release" not in (BUILD / "CMakeCache.txt").read_text():
             self.skipTest("what is built is not what is shipped")
         run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",

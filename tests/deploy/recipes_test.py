@@ -112,7 +112,7 @@ class PictureOfARunningStudy(Recipe):
         url, workers = self.start_server()
         self.run_in_folder("oblique", "submit", "--name", "first", "--preset", "paper", "--H", "1", "--mu", "0.1:2:40", "--e", "0.8,1",
                            OBLIQUE_SERVER=url)
-        # Nobody solves it before a picture was drawn.
+        # The worker starts only after the first picture is drawn.
         drawing = self.start(PYTHON, "-u", "running.py", "oblique.db", "first")
         self.wait_for(drawing, "0 of 80 points, running\n")
         self.start("oblique-worker", "--server", workers)
@@ -131,7 +131,7 @@ class FiguresOfThePaper(Recipe):
         self.assertEqual(len(lines), 11)
         for line in lines[1:-1]:
             *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())
-            # Half of a last digit of what is printed, and the 0.56 % of client/paper.
+            # Tolerance: half of the last printed digit, and the 0.56 % of client/paper.
             self.assertAlmostEqual(fn_kN, published_fn_kN, delta=0.005 + 0.006 * published_fn_kN)
             self.assertAlmostEqual(ft_kN, published_ft_kN, delta=0.005 + 0.006 * published_ft_kN)
         for number in 4, 5, 6, 7:

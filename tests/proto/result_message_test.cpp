@@ -131,12 +131,12 @@ TEST(PointResultTest, AListHasAtMost4096ElementsAndAResultAMebibyte) {
   message.mutable_peaks()->Resize(3 * 4096, 1e-5);
   EXPECT_EQ(fault_of(message), "");
   message.mutable_peaks()->Resize(3 * 100'000, 1e-5);
-  EXPECT_THAT(fault_of(message), HasSubstr("bytes, and one has at most 1048576"));
+  EXPECT_THAT(fault_of(message), HasSubstr("bytes; at most 1048576"));
   message.mutable_peaks()->Resize(3 * 4097, 1e-5);
-  EXPECT_EQ(fault_of(message), "the worker sent 4097 peaks, and a result has at most 4096");
+  EXPECT_EQ(fault_of(message), "the worker sent 4097 peaks; at most 4096 are allowed");
   PointResult failed = failed_point(0, "why");
   failed.mutable_major_peaks()->Resize(1 << 20, 300);
-  EXPECT_THAT(fault_of(failed), HasSubstr("and one has at most 1048576"));
+  EXPECT_THAT(fault_of(failed), HasSubstr("at most 1048576 are allowed"));
 }
 
 TEST(PointResultTest, InvalidResultsAreRefused) {

@@ -331,8 +331,8 @@ class SimulatedClient {
   std::uint64_t mark() const { return mark_; }
   /// Whether a submission was acknowledged.
   bool was_acknowledged() const { return acknowledged_; }
-  /// Throws Violation if a server restored this state of the study, but another one was
-  /// acknowledged and this one not requested since.
+  /// Checks the state of the study that a restarted server read. Throws Violation unless it is the
+  /// last acknowledged state or one that was requested after it.
   void check_found(server::StudyState state) const {
     if (possible_ && state != StudyState::kDone && !possible_->contains(state)) {
       throw Violation("an acknowledged change of " + name_ + " was forgotten: it is " +

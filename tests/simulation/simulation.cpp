@@ -166,7 +166,7 @@ class Simulation {
           .part(std::move(parted), world_.between(500, 15'000));
       ++outcome_["partitions"];
     } else if (kind == 7) {
-      // By hours in both directions, and sometimes by the time that a server was down.
+      // Sets the clock forwards or backwards by hours, or by the time that a server was down.
       world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
                                           : world_.between(-20'000'000, 20'000'000));
       ++outcome_["clock jumps"];

@@ -59,7 +59,8 @@ ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   return state;
 }
 
-/// Largest difference of the contact force from `right` over [0, duration_s], over `scale_N`.
+/// Largest difference between the contact force and `right` in [0, duration_s], divided by
+/// `scale_N`.
 double force_error(const Motion& motion, const solver::AffineContactForce<double>& force,
                    ChainState state, double dt_s, double duration_s, double scale_N,
                    const std::function<double(double)>& right) {

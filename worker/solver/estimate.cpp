@@ -41,7 +41,8 @@ double unresolved_waves(const ModelParameters& model) {
   return std::pow(element_m * wavenumber_1_m / std::numbers::pi, 4);
 }
 
-/// Factor of the difference of an output whose error has that order.
+/// Factor from the difference between the two meshes to the error of an output whose error has
+/// order `order`.
 double factor(const ModelParameters& model, int order) {
   const ModelParameters companion = companion_model(model);
   const double ratio = static_cast<double>(model.elements_per_link) / companion.elements_per_link;
@@ -143,7 +144,8 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
   errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
   errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
-  // One vibration is in both components, so the difference of either may pass through 0.
+  // The same vibration is in both components of the velocity. The difference of a single component
+  // may pass through 0, so the difference of the vectors is used.
   errors.v_out = error_of(rough * std::hypot(result.vt_out_m_s - companion.vt_out_m_s,
                                              result.vn_out_m_s - companion.vn_out_m_s),
                           speed_m_s);

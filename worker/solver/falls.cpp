@@ -27,8 +27,8 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// Most explicit steps in sqrt(2 length / g) for which they are faster than collocation
-/// (fast/README.md).
+/// Maximum number of explicit steps in sqrt(2 length / g) for which they are faster than
+/// collocation (fast/README.md).
 constexpr double kFewSteps = 150'000.0;
 
 bool falls_by_collocation(const FallenChain& chain) {

@@ -148,8 +148,8 @@ class PointSolver {
            have_one_shape(upcoming_->finger.parts()->prepared().chain().tables(), chain.tables());
   }
 
-  /// The contact of a point, whose state at touch is valid until the next call. Passes on the error
-  /// of a point that has none.
+  /// Prepares the contact of a point. The state at touch in it is valid until the next call. If the
+  /// point cannot be solved, passes its error to the sink and returns nothing.
   std::optional<ContactCase> begin(FingerPoint&& point) {
     const Finger::Parts& finger = *point.finger.parts();
     try {
@@ -210,7 +210,7 @@ class PointSolver {
   const FingerPoints& source_;
   const TakeOutcome& sink_;
   const Tracing& tracing_;
-  std::shared_ptr<const FallenChain> fallen_;  ///< that of touches_
+  std::shared_ptr<const FallenChain> fallen_;  ///< the fall that touches_ belong to
   std::map<double, ChainState> touches_;       ///< by H
   std::optional<FingerPoint> upcoming_;        ///< taken from the source, not begun
   bool has_ended_ = false;

@@ -22,8 +22,8 @@ class StepChoice {
   /// Steps that are chosen, or lengthened by a step factor, are at most this fraction of the
   /// stability limit.
   static constexpr double kLongestFraction = 0.9;
-  /// In the fall: fraction of the stability limit at the tolerance kFallTolerance; for others it
-  /// follows by order 4, up to kLongestFraction.
+  /// The step of the fall at the tolerance kFallTolerance, as a fraction of the stability limit. At
+  /// other tolerances it is scaled by (tolerance/kFallTolerance)^(1/4), up to kLongestFraction.
   static constexpr double kFallFraction = 0.5;
   static constexpr double kFallTolerance = 3e-7;
   /// Generalized-alpha at the default tolerance: fraction of sqrt(length/g) in the fall (5 us for

@@ -45,7 +45,10 @@ const looks = [
 export const otherLook = looks.length - 1;
 const mostAtFirst = 12;
 
-/** Assigns looks to the categories of a study; a category keeps its look while the page is open. */
+/**
+ * Assigns looks (colour and pattern) to the categories of a study. A category keeps its look while
+ * the page is open.
+ */
 export class CategoryLooks {
   #looks = new Map();
 

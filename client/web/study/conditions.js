@@ -33,7 +33,7 @@ export function rounded(value, width) {
   return Number((Math.round(value / step) * step).toPrecision(12));
 }
 
-/** The values of a side within a range, ascending; if none, the one nearest to its middle. */
+/** The values of a picture axis within a range, ascending; if none, the one nearest its middle. */
 function valuesIn({ values }, [from, to]) {
   const sorted = Array.from(values).sort((a, b) => a - b);
   const inside = sorted.filter((value) => value >= from && value <= to);
@@ -42,7 +42,7 @@ function valuesIn({ values }, [from, to]) {
   return [sorted.reduce((best, value) => (distance(value) < distance(best) ? value : best))];
 }
 
-/** A range of a side in the form of the address: ends of bins, or indices of values on the axis. */
+/** A range of a picture axis as in the address of the page: ends of bins, or indices of values on the axis. */
 export function addressOf(side, range) {
   const width = range[1] - range[0];
   if (side.edges) return range.map((end) => String(rounded(end, width)));
@@ -50,7 +50,7 @@ export function addressOf(side, range) {
   return [Math.min(...numbers), Math.max(...numbers)].map(String);
 }
 
-/** A range of a side as a condition. */
+/** A range of a picture axis as a condition. */
 function partOf(side, range) {
   const column = columnOfAxis(side.name);
   if (side.edges) {
@@ -67,7 +67,7 @@ function partOf(side, range) {
   return within(column, shortBetween(before, sorted[first]), shortBetween(sorted[last], after));
 }
 
-/** The condition for the shown values of a side, if it shows only a part of the axis. */
+/** The condition for the shown values of a picture axis, if it shows only a part of the values. */
 export function shownPart(side, isZoomed) {
   if (!isZoomed || !side.name) return "";
   return partOf(

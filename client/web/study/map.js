@@ -10,7 +10,7 @@ const margin = { left: 64, right: 14, top: 10, bottom: 46 };
 const leastDrag = 6; // pixels
 const clickReach = 14;
 
-/** Ascending edges of the cells of a side: {order of the values, edges, scale}. */
+/** Edges of the cells along a picture axis: {order: of the values, edges: ascending, scale}. */
 function cellsOf(side, wantsLog) {
   const order = [...side.values.keys()].sort((a, b) => side.values[a] - side.values[b]);
   const sorted = order.map((i) => side.values[i]);
@@ -116,8 +116,8 @@ function cellImage(picture, look, cells, selected, width, height) {
   const dark = colours.isDark();
   const nx = picture.x.values.length;
   const of = scale(look.from, look.to, look.zLog);
-  // Computed once per cell instead of once per pixel: a colour, a look, or -1 - the kind of an
-  // empty cell.
+  // Computed once per cell instead of once per pixel: a colour, the look
+  // of a category, or, for an empty cell, -1 minus the index of its kind.
   const codes = Int32Array.from(picture.values, (value, i) => {
     const why = picture.whyEmpty(i);
     if (why) return -1 - emptyKinds.indexOf(why);

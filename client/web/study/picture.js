@@ -17,7 +17,7 @@ export const emptyKinds = ["missing", "failed", "left_out", "none", "filtered"];
 
 /** Maximum number of points drawn one by one; more are grouped in bins. */
 export const mostDots = 20_000;
-const mostCells = 256; // a side
+const mostCells = 256; // along each axis
 const firstCells = 96;
 const mostLines = 8;
 const mostBins = 96;
@@ -71,7 +71,7 @@ async function slice(view, query, signal) {
   };
 }
 
-/** A side of equal bins, or one bin around a single value. */
+/** A picture axis of equal bins, or with one bin around a single value. */
 function binSide(name, unit, least, most, bins, isLog) {
   if (!(most > least)) {
     const half = Math.abs(least) * 0.05 || 0.5;
@@ -276,8 +276,8 @@ export function askPicture(view, cells, signal) {
 }
 
 /**
- * The cells, bins or points of a picture that have points under another condition: {cells, counts,
- * points}.
+ * Finds which cells, bins or dots of a picture contain points that meet a further condition:
+ * {cells, counts, points}.
  */
 export async function askSelected(view, picture, condition, signal) {
   const where = joined(view.field("where"), condition);

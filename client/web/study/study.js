@@ -18,7 +18,7 @@ import { PointTable } from "./table.js";
 
 const refreshEveryMs = 1500;
 
-/** Looks of the categories of a study's columns, kept while the page is open. */
+/** Colours and patterns of categories, by study and column, kept while the page is open. */
 const looksOfColumns = new Map();
 
 function looksOf(study, column) {

@@ -64,7 +64,7 @@ const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key
   return axis == axes.end() ? nullptr : &*axis;
 }
 
-/// One side of a slice: the shown values of an axis.
+/// One axis of a slice, with the shown values.
 struct Side {
   const AxisLayout* axis = nullptr;  ///< null: the slice is a line
   std::uint64_t first = 0;           ///< index of the first value in the selected part
@@ -369,7 +369,7 @@ struct BinSide {
   double most = 0.0;
 
   bool has_typed_ends() const { return typed_least && typed_most; }
-  /// The SQL condition for rows whose value may be in a bin of this side.
+  /// The SQL condition for rows whose value may be in a bin of this axis.
   std::string has_place_sql() const {
     return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
   }
@@ -466,7 +466,8 @@ StudyAnswer::Next BinsAnswer::next(const ServedStudy& study) {
   return counts_.empty() ? Next(counts_query()) : Next(answer(study.id));
 }
 
-/// A query of the solved points that meet the condition and have values for all sides.
+/// A query of the solved points that meet the condition and have values on both axes of the
+/// picture.
 protocol::StudyQuery BinsAnswer::query() const {
   std::string where =
       condition().empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition());

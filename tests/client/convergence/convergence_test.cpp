@@ -161,7 +161,7 @@ TEST(ContactChanges, FindEventsThatOnlyOneLevelHas) {
 
 constexpr double kHighestOrder = 4.0;
 
-// A contact of two peaks on step h, whose every output is its limit plus h^2 of itself.
+// A contact with two peaks, solved with step h: each output is its limit times 1 + h^2.
 CaseResult second_order(double h) {
   const double factor = 1.0 + h * h;
   CaseResult result{};

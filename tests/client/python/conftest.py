@@ -1,4 +1,4 @@
-"""What tests of the module share: the programs of the same build, and a study that one of them solved."""
+"""Shared by the tests of the module: the programs of the same build, and a study solved with them."""
 
 import json
 import os
@@ -17,7 +17,7 @@ def run_oblique(*arguments):
 
 
 def solved_by_program(*arguments):
-    """What `oblique solve --json` says, but for the time that it took."""
+    """Output of `oblique solve --json` without its wall time."""
     return without_time(json.loads(run_oblique("solve", "--json", *arguments)))
 
 
@@ -25,8 +25,8 @@ def without_time(result):
     return {**result, "solver": {**result["solver"], "wall_s": None}}
 
 
-#: How scripts of their own begin that work without end, which is to be ended: where it is not, the
-#: time limit of all tests says so, and the alarm takes the script away behind that.
+#: Beginning of scripts that work without end and are interrupted. If one is not, the test fails by the
+#: time limit of all tests, and the alarm ends the script.
 BEGINNING = """
 import os, signal, sys, threading
 signal.alarm(1000)
@@ -39,7 +39,8 @@ def wait_for_threads(more_than, of):
 
 
 def ended_script(script, *arguments):
-    """What became of a script behind BEGINNING. One that does not end is the time limit's to judge."""
+    """Runs BEGINNING followed by `script` and returns its outcome. A script that does not end is stopped by the
+    time limit of all tests."""
     return subprocess.run(
         [sys.executable, "-c", BEGINNING + script, *arguments], capture_output=True, text=True
     )
@@ -58,7 +59,7 @@ def pytest_terminal_summary(terminalreporter):
 
 
 def pytest_sessionfinish(session, exitstatus):
-    """Ends with 77, which ctest counts as skipped, where none failed and some were skipped."""
+    """Exit code 77, which ctest counts as skipped, if no test failed and some were skipped."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if exitstatus == 0 and reporter.stats.get("skipped"):
         session.exitstatus = 77

@@ -1,7 +1,5 @@
-"""What ends, forks and outlasts work: Ctrl-C, the end of Python, children, and what stays in memory.
-
-Work here would go on for hours. A test that waits for it is ended by the time limit of all tests, and by nothing else.
-"""
+"""Interruption by Ctrl-C, the end of Python, forked children, and memory that stays allocated. The work here would
+take hours; if a test hangs, the time limit of all tests ends it."""
 
 import multiprocessing
 import os
@@ -38,7 +36,7 @@ def test_ctrl_c_ends_work_with_keyboard_interrupt(work, database):
     assert process.returncode in (-signal.SIGINT, 130)
 
 
-#: Python ends only after threads had time to take its lock.
+#: Threads get time to take the lock of Python before it ends.
 ENDS_LATE = """
 import time
 class EndsLate:

@@ -115,7 +115,7 @@ TEST(Connection, SendsARequestAgainIfTheServerDied) {
     }
     return true;
   };
-  // Long enough that only the new connection causes another request.
+  // The timeouts are so long that only the new connection causes another request.
   Connection connection(
       {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
       replace_when_taken);

@@ -69,12 +69,12 @@ TEST_F(NotifierTest, SendsReadinessEachStatusOnceAndStoppingWithItsLongestTime) 
 TEST_F(NotifierTest, FeedsTheWatchdogAtHalfOfItsTimeOnlyWhenCalled) {
   setenv("WATCHDOG_USEC", "1000000", 1);
   Notifier notifier;
-  std::size_t said = 0;
+  std::size_t sent = 0;
   for (int turn = 0; turn < 100; ++turn, now_ += 100ms) {  // 10 s
     notifier.feed_watchdog(now_);
     sent += received().size();
   }
-  EXPECT_EQ(said, 20U);
+  EXPECT_EQ(sent, 20U);
 }
 
 TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {

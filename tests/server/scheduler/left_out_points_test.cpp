@@ -12,7 +12,7 @@
 namespace oblique::server {
 namespace {
 
-/// `numbers` points with mu from 0 to numbers - 1, of which those are left in for which this is
+/// `numbers` points with mu from 0 to numbers - 1. The filter keeps those for which `where` is
 /// true.
 std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers,
                                                            const std::string& where) {

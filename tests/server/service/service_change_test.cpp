@@ -132,7 +132,7 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
     EXPECT_THAT(last_error(), HasSubstr("disk full"));
     EXPECT_EQ(status_of("a").state(), "running");
   }
-  // What the disk stored of the refused changes could count after a crash.
+  // A crash may bring back refused changes that reached the disk, so the state is stored again.
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(ports_.jobs.size(), 1U);
   write_all();

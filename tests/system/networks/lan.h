@@ -34,7 +34,7 @@ class Host {
   void plug_cable() const;
   /// Drops `percent` percent of the arriving packets at random.
   void lose_percent(int percent) const;
-  /// Drops all packets to and from it, so that neither side of a connection is notified.
+  /// Drops all packets from and to this machine, so that no peer is notified.
   void lose_everything() const;
   void lose_nothing() const;
   /// Changes its addresses to those that end in `last`.

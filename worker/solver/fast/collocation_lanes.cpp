@@ -82,7 +82,7 @@ void CollocationLanes::attempt() {
   }
 }
 
-/// One iteration of Newton's method, from 1. True when a lane needs another one.
+/// Iteration number `iteration` of Newton's method, from 1. True if a lane needs another one.
 bool CollocationLanes::iterate(int iteration) {
   kernel_.iterate(gauss_collocation(), arrays_);
   bool is_any_active = false;
@@ -93,7 +93,7 @@ bool CollocationLanes::iterate(int iteration) {
     Step& step = steps_[lane];
     step.iterations = iteration;
     const double size_m = std::sqrt(arrays_.squares[lane] / total_kg_[lane]);
-    // What is left is the next correction and those after it: a geometric series.
+    // The remaining error is the sum of the next corrections: a geometric series.
     const double ratio = iteration > 1 ? size_m / correction_m_[lane] : 1.0;
     const bool is_rounding =
         iteration > 2 && ratio > 0.1 && size_m <= kRoundingErrors * step.error_m;

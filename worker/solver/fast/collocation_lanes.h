@@ -18,11 +18,11 @@ class CollocationLanes {
 
   std::size_t lanes() const { return memory_.lanes(); }
 
-  /// A lane's next step, and what became of the last attempt.
+  /// A lane's next step, and the outcome of the last attempt.
   struct Step {
     double h_s = 0.0;      ///< 0 leaves the lane alone
     double error_m = 0.0;  ///< allowed error of positions, mean square over the chain's mass
-    /// False when Newton's method did not converge: there is no new state then.
+    /// False if Newton's method did not converge. Then there is no new state.
     bool converged = false;
     int iterations = 0;
     /// Speed [m/s] that the step hardly resolves: h times the two highest Legendre coefficients of
@@ -40,7 +40,7 @@ class CollocationLanes {
   void set_state(std::size_t lane, const std::vector<double>& q_v_mean);
   /// Tries the step of each lane.
   void attempt();
-  /// Takes the states at the end of the last attempt in the lanes whose step is_accepted.
+  /// Accepts the states at the end of the last attempt in the lanes whose step is_accepted.
   void accept();
 
   /// One coordinate of a lane at the start of the last attempt, and its accelerations at the

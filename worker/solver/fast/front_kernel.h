@@ -32,8 +32,8 @@ constexpr std::size_t chain_factors(std::size_t links, std::size_t elements_per_
 
 namespace front_detail {
 
-/// Unknowns eliminated with an element: those of its left node, at a joint also the slope of the
-/// inner link, at the tip all.
+/// Number of unknowns eliminated with an element: those of its left node; at a joint also the slope
+/// of the inner link; at the tip all.
 template <class Constant>
 inline std::size_t pivots_of(const ChainTables<Constant>& chain, std::size_t element) {
   const bool ends_link = (element + 1) % chain.elements_per_link == 0;
@@ -110,7 +110,8 @@ inline void substitute_backward(const Complex<Real>* factors, Complex<Real> (&x)
   for_each_place<0, pivots>([&](auto place) {
     constexpr std::size_t k = pivots - 1 - decltype(place)::value;
     Complex<Real> value = product(x[k], factors[front_factors(k)]);
-    // The row that became known last comes last: what waits for it is then short.
+    // The row that was solved last enters the sum last, which shortens the chain of dependent
+    // operations.
     for_each_place<0, 7 - k>([&](auto later) {
       constexpr std::size_t i = 7 - decltype(later)::value;
       value = less(value, factors[front_factors(k) + i - k], x[i]);
@@ -119,7 +120,7 @@ inline void substitute_backward(const Complex<Real>* factors, Complex<Real> (&x)
   });
 }
 
-/// Puts a block of M + z K at (row, column); entries above the diagonal do not count.
+/// Writes a block of M + z K at (row, column); entries above the diagonal are ignored.
 template <class Real, class Constant>
 inline void put_block(Complex<Real> (&front)[8][8], std::size_t row, std::size_t column,
                       const Constant& mass, const Complex<Real>& z, const SymmetricPair<Real>& K) {

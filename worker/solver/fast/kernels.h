@@ -104,7 +104,7 @@ struct LaneKernel {
   /// One iteration in the lanes that are active. Leaves in `squares` the sum over stages and rows
   /// of mass times squared correction [kg m^2].
   void (*iterate)(const GaussCollocation& rule, const CollocationArrays& arrays);
-  /// Puts the state at the end. Leaves in `squares` h^2 times the sum over rows of mass times the
+  /// Writes the state at the end. Leaves in `squares` h^2 times the sum over rows of mass times the
   /// squares of the two highest Legendre coefficients of the accelerations [kg m^2/s^2].
   void (*finish)(const GaussCollocation& rule, const CollocationArrays& arrays);
 };

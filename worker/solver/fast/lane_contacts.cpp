@@ -18,13 +18,13 @@ using Clock = std::chrono::steady_clock;
 using Source = std::function<std::optional<ContactCase>()>;
 using Sink = std::function<void(Outcome&&)>;
 
-/// Largest group: the first case and those that branch off.
+/// Maximum size of a group: the first case and its branches.
 constexpr std::size_t kLargestGroup = 16;
-/// A span shorter than this fraction of a step, as beside an event, gives no mean of a reaction
-/// that rounding leaves alone.
+/// In a span shorter than this fraction of a step, as next to an event, rounding dominates the mean
+/// of a reaction, so it is not used.
 constexpr double kShortestSpan = 1e-3;
 
-/// A contact on its way, and what its result needs besides.
+/// An unfinished contact, with the other data for its result.
 struct Progress {
   Contact contact;
   TipState touch;
@@ -108,13 +108,13 @@ class ContactLanes {
       trace_instant(*slot.motion, tracing_, tip, slot.progress->contact, touch);
       return;
     }
-    // The state at touch is in the lane: the source may overwrite it.
+    // The state at touch was copied to the lane, so the source may overwrite it.
     while (slot.followers.size() + 1 < kLargestGroup && peek() && upcoming_->group == next.group) {
       slot.followers.push_back(take());
     }
   }
 
-  /// Whether the source has another case, which is upcoming_ then.
+  /// Takes the next case from the source into upcoming_. False if there is none.
   bool peek() {
     if (!upcoming_ && !is_exhausted_) {
       upcoming_ = source_();

@@ -29,9 +29,10 @@ constexpr std::size_t kMaxOfStates = (std::size_t{16} << 20) / sizeof(double);
 constexpr double kUnresolved = 1.5;
 /// First step, in parts of sqrt(length/g).
 constexpr double kFirstStep = 1.0 / 4000.0;
-/// No step is longer, in the same parts: the chain turns by some 0.1 then.
+/// Longest step, relative to sqrt(length/g): the chain turns by about 0.1 rad in it.
 constexpr double kLongestStep = 1.0 / 100.0;
-/// Newton's method leaves positions this wrong at most, in parts of the length and of the accuracy.
+/// Allowed error of positions by Newton's method, relative to the length and to the requested
+/// accuracy.
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 /// Steps in a fall beyond which it is given up.
@@ -171,8 +172,8 @@ struct CoordinateOverStep {
   }
 };
 
-/// Fraction of the step at which the height y first stops falling; above 1 when it falls on. Looks
-/// at the stages and at the end.
+/// Fraction of the step at which the height y first stops falling; above 1 if it falls during the
+/// whole step. Evaluated at the stages and at the end.
 double turn_of(const CoordinateOverStep& y) {
   const GaussCollocation& rule = gauss_collocation();
   double low = 0.0;
@@ -196,7 +197,7 @@ double turn_of(const CoordinateOverStep& y) {
 /// which it solves steps again, with the same bits.
 class CollocationFall : public Fall {
  public:
-  /// `chain` must outlive this. `error_m` is that of the lanes' steps.
+  /// `chain` must outlive this. `error_m` is the allowed error, as in the lanes' steps.
   CollocationFall(const LaneKernel& kernel, const Chain& chain, double error_m)
       : kernel_(kernel), chain_(chain), error_m_(error_m) {}
 
@@ -257,7 +258,7 @@ class CollocationFall : public Fall {
     return within(number, step, at);
   }
 
-  /// The last step that begins at `value` of that member or before.
+  /// The last step at whose start this member is at most `value`.
   std::size_t step_from(double value, double Step::*member) const {
     const auto after = std::ranges::upper_bound(steps_, value, {}, member);
     return static_cast<std::size_t>(after - steps_.begin() - 1);
@@ -320,8 +321,8 @@ class CollocationFall : public Fall {
   std::vector<std::vector<double>> states_;  ///< position, rates, mean acceleration
 };
 
-/// How long steps are. Changed seldom and by little: while it does not change, the method is
-/// symplectic.
+/// Chooses the step length. It changes seldom and little, because the method is symplectic only
+/// with constant steps.
 class StepControl {
  public:
   StepControl(double length_m, double gravity_m_s2, double accuracy)
@@ -331,7 +332,7 @@ class StepControl {
 
   double h_s() const { return h_s_; }
 
-  /// True when the step is to be taken; false when it is to be tried again with the new h_s().
+  /// True if the step is accepted; false if it must be repeated with the new h_s().
   bool accepts(const CollocationLanes::Step& attempt) {
     const double error = attempt.unresolved_m_s / allowed_m_s_;
     if (!attempt.converged || error > kRefused) {
@@ -346,7 +347,7 @@ class StepControl {
     if (attempt.iterations >= kManyIterations) {
       change(0.8);
     } else if (steps_ >= kPatience && (mean > 1.0 + kBand || mean < 1.0 - kBand)) {
-      // What is unresolved falls as h^1.4 where it is vibrations of a released chain.
+      // The unresolved part falls as h^1.4 where it consists of vibrations of a released chain.
       change(std::clamp(std::pow(std::max(mean, 1e-6), -0.7), 0.5, 1.5));
     }
     return true;

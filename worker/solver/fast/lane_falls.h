@@ -15,8 +15,8 @@ namespace oblique::solver {
 /// (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 
-/// A chain whose fall is wanted. What is pointed to must outlive the fall, `progress` only its
-/// solution.
+/// A chain whose fall is requested. The chain must outlive the fall; `progress` is used only while
+/// it is solved.
 struct FallRequest {
   const Chain* chain;
   std::shared_ptr<const Motion> motion;  ///< explicit, of that chain

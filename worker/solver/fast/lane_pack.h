@@ -84,7 +84,7 @@ struct LanePack {
   inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
 };
 
-/// As those of element_force.h; c and a are packs of the same kind or numbers.
+/// As the functions in element_force.h; c and a are packs of the same kind or numbers.
 template <class C, class A, class Hardware, std::size_t count>
 inline auto plus_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
   using Pack = LanePack<Hardware, count>;

@@ -42,7 +42,7 @@ class LaneStepper {
   /// Squared magnitudes of the mean reactions on the links' inner ends over the last step [N^2],
   /// element [link * lanes + lane].
   const double* mean_reactions_squared_N2() const { return arrays_.reactions; }
-  /// Makes the trial states accepted in the lanes with accept[lane] != 0; the others stay.
+  /// Accepts the trial states of the lanes with accept[lane] != 0; the others keep their states.
   void settle(std::span<const unsigned char> accept);
 
  private:

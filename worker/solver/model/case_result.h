@@ -79,7 +79,7 @@ struct ErrorEstimate {
 
 struct SolverReport {
   std::string integrator;
-  double dt_s;          ///< step in contact (in compression; restitution at low e* steps shorter)
+  double dt_s;          ///< time step in compression; in restitution at low e* it is shorter
   std::int64_t steps;   ///< accepted steps in contact
   double wall_s;        ///< wall time of the contact; not reproducible
   std::string version;  ///< solver version

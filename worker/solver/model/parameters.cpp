@@ -285,8 +285,8 @@ ModelParameters fall_model(const ModelParameters& model) {
 bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
   ModelParameters one = model;
   ModelParameters other = model;
-  key.set(one, 1.0);  // no key takes these two values for one
-  key.set(other, 2.0);
+  key.set(one, 1.0);
+  key.set(other, 2.0);  // different from 1 for every key, also for those that round
   return !(fall_model(one) == fall_model(other));
 }
 

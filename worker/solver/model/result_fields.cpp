@@ -101,7 +101,7 @@ constexpr ResultList kPeaks =
         "ripple, the second major peak is major_peak_2_N");
 constexpr ResultList kFtPeaks =
     list_of<&Result::ft_peaks, &TangentialPeak::t_s, &TangentialPeak::ft_N>(
-        "s, N", "every peak of the tangential magnitude: t_s counted from touch and ft_N");
+        "s, N", "peaks of the tangential magnitude: t_s from touch, and ft_N");
 constexpr ResultList kPhases = list_of<&Result::phases, &Phase::kind, &Phase::t0_s, &Phase::t1_s>(
     "s", "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch");
 constexpr ResultList kStickIntervals =
@@ -252,12 +252,11 @@ constexpr std::array kFields{
     energy<&Energy::gravity_change_J>("potential energy at separation less that at touch"),
     energy<&Energy::exchanged_J>(
         "work that the contact forces exchanged with the finger, to and fro both counted"),
-    energy<&Energy::closure>(
-        "what does not add up in the energy balance, relative to exchanged_J; never negative", ""),
+    energy<&Energy::closure>("absolute error of the energy balance, relative to exchanged_J", ""),
     error<&Errors::mode_same>(
         "mode_same",
-        "1: half the mesh and twice the step give the same mode, ripples merged; 0: "
-        "another. This and the errors below are there only when they were asked for"),
+        "1 if half the mesh and twice the step give the same mode, ripples merged; else 0. "
+        "This and the errors below need errors = true or --errors"),
     error<&Errors::fn_peak>("fn_peak_error", "estimated error of fn_peak_N, as a fraction of it"),
     error<&Errors::ft_peak>("ft_peak_error",
                             "estimated error of ft_peak_N, as a fraction of fn_peak_N"),

@@ -77,7 +77,8 @@ const ResultField* find_result_column(std::string_view column);
 /// The list with that column, or nullptr.
 const ResultList* find_result_list(std::string_view column);
 
-/// Calls `take` with each field of type T in a row of a result, and its member.
+/// Calls `take` for each field of type T that is stored in a row: with the field, and with the
+/// pointer to its member of CaseResult.
 template <class T, class Take>
 void for_each_stored(const Take& take) {
   for (const ResultField& field : result_fields()) {

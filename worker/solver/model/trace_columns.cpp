@@ -41,8 +41,8 @@ constexpr std::array kColumns{
     TraceColumn{"momentum_y_Ns", "N s", "linear momentum of the whole chain along y",
                 &TraceRow::momentum_y_Ns},
     TraceColumn{"node{}x_m node{}y_m", "m",
-                "only where the shape is asked for: positions of the nodes, O first, the tip last; "
-                "as many a link as it has elements, joints once",
+                "only if the shape is requested: positions of the nodes from O to the tip; "
+                "joints are listed once",
                 TraceVectors{&TraceRow::nodes_m, false}},
 };
 

@@ -22,7 +22,7 @@ struct FactorRow {
 /// Constants of the momentum balance of a link and all links beyond it.
 template <class Constant>
 struct LinkBalance {
-  Constant inner_end_kg;     ///< the link's own share of the row of its inner end
+  Constant inner_end_kg;     ///< mass that the link adds to the row of its inner end
   Constant weight_beyond_N;  ///< of the link and all beyond it
 };
 
@@ -36,14 +36,14 @@ struct ChainTables {
   std::size_t elements_per_link;
   const ElementConstants<Constant>* link;  ///< of an element of each link
   const FactorRow<Constant>* mass_factor;  ///< `rows`, and kHalfBandwidth more of zeros
-  const Constant* weight_N;     ///< generalised gravity along y, one a row; there is none along x
-  const Constant* momentum_kg;  ///< one a row: the chain's momentum is the sum of these times v
+  const Constant* weight_N;                ///< generalised gravity along y, per row; zero along x
+  const Constant* momentum_kg;  ///< per row: the chain's momentum is the sum of these times v
   const LinkBalance<Constant>* balance;  ///< of each link
   const Constant* tip_mass_kg;
 };
 
-/// Rows of an element whose inner node's position is in `row`: at a joint the inner link's slope
-/// comes before the position.
+/// Rows of an element; `row` is that of the position of its inner node. At a joint, the slope of
+/// the inner link has the row before the position.
 struct ElementRows {
   std::size_t p_i;
   std::size_t s_i;
@@ -66,8 +66,9 @@ inline void put_pair(Real* values, std::size_t row, const PlanarVector<Real>& pa
   values[2 * row + 1] = pair.y;
 }
 
-/// L y = f, row by row downwards. The row just before enters each sum last, so that a row waits for
-/// one multiply-add. By components, here and below: compilers copy pairs of packs through memory.
+/// Solves L y = f row by row downwards. The preceding row enters each sum last, so that a row waits
+/// for one multiply-add only. By components, here and below, because compilers copy pairs of packs
+/// through memory.
 template <class Real>
 class ForwardSubstitution {
  public:
@@ -92,16 +93,17 @@ class ForwardSubstitution {
     return less_product(less_product(far, row.left[1], before[1]), row.left[0], before[0]);
   }
 
-  Real x_[kHalfBandwidth]{};  ///< of the rows before, the last one first
+  Real x_[kHalfBandwidth]{};  ///< components in the last three rows, newest first
   Real y_[kHalfBandwidth]{};
 };
 
-/// D Lᵀ z = y: gives `take(row, x, y)`, the row's pair of z, from row `rows` - 1 up to `first`.
-/// `rows` of `factor`, and kHalfBandwidth more of zeros.
+/// Solves D Lᵀ z = y from row `rows` - 1 down to `first`. Calls `take(row, x, y)` with the two
+/// components of z in each row. `factor` has `rows` rows, followed by kHalfBandwidth rows of zeros.
 template <class Constant, class Real, class Take>
 inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
                             const Real* y, const Take& take) {
-  // Three rows a turn, each in the variables of the row three after it, so that none is moved.
+  // Each turn solves three rows. A row overwrites the variables of the row three before it, so that
+  // none has to be copied.
   Real ax{}, ay{}, bx{}, by{}, cx{}, cy{};
   const auto next = [&](std::size_t row, Real& zx, Real& zy, const Real& x_1, const Real& y_1,
                         const Real& x_2, const Real& y_2) {
@@ -139,7 +141,7 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
     y[2 * row + 1] = y_row.y;
   };
   std::size_t row = 0;      // of the position at the element's left end
-  Vector pull_from_left{};  // by the elements to the left: what they take from p and s
+  Vector pull_from_left{};  // contributions of the elements to the left to the rows of p and s
   for (std::size_t link = 0; link < chain.links; ++link) {
     const ElementConstants<Constant>& constants = chain.link[link];
     Vector turn_from_left{Real{}, Real{} - chain.weight_N[row + 1]};

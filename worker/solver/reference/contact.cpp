@@ -29,7 +29,7 @@ Contact::Contact(const ContactParameters& parameters, const TipState& touch,
       tip_(touch),
       vt_sign_(sign_of(touch.vx_m_s)),
       trial_s_(steps.compression_s),
-      // Both forces are zero at touch, so both sides of the cone are.
+      // At touch both forces are zero, and so are both limits of the friction cone.
       fresh_(bit(ContactEvent::kSlipForward) | bit(ContactEvent::kSlipBackward)),
       record_(law_, touch),
       margin_(law_, touch) {}
@@ -91,8 +91,8 @@ void Contact::start_search(const EventGuess& guess, double h_s) {
 
 bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals) {
   const double t = trial_s_;
-  // Over a shorter time the mean of a velocity is rounding, and the last event would be found
-  // again.
+  // Over a shorter time the mean of a velocity consists of rounding, and the last event would be
+  // found again.
   if (t > kSimultaneous_s) {
     const auto first = earliest_event(end, t);
     if (first && first->event != search_.event &&

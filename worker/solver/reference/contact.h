@@ -36,8 +36,8 @@ class Contact {
 
   /// Whether the last accepted step ended at the first turn. Up to there e* has no effect.
   bool is_at_first_turn() const { return record_.turned_once_at(t_s_); }
-  /// This contact with another e* and other steps in restitution, as if it had them from touch on.
-  /// Only at the first turn.
+  /// A copy of this contact that continues with another e* and other steps in restitution. It
+  /// equals a contact solved with them from touch. Requires is_at_first_turn().
   Contact branched(double e_star, const ContactSteps& steps) const;
 
   /// Complete once finished.

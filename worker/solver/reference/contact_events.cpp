@@ -74,7 +74,7 @@ Cubic event_polynomial(const ContactLaw& law, ContactEvent event, const TipState
 std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh) {
-  // Events are rarely near, and the rest costs much more.
+  // Most steps have no event nearby, and then skip the expensive rest.
   if (is_far(law, event, start, end, h_s, vt_sign)) {
     return std::nullopt;
   }

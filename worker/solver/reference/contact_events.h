@@ -7,8 +7,8 @@
 
 namespace oblique::solver {
 
-/// The end of a regime. Events within kSimultaneous_s are taken in this order: the first may make a
-/// later one void.
+/// An event that may end a regime. Simultaneous events (within kSimultaneous_s) are taken in this
+/// order, because the first may cancel a later one.
 enum class ContactEvent {
   kSeparation,          ///< eq. 25, restitution: F_n falls to 0
   kTurn,                ///< eq. 22, V_n changes sign: compression <-> restitution
@@ -23,7 +23,7 @@ inline constexpr std::array kContactEvents{
 
 inline constexpr double kSimultaneous_s = 1e-12;
 
-/// Function phi whose rise through zero is the event, and its time derivative.
+/// The event happens when phi rises through zero; with its time derivative.
 struct EventFunction {
   double value;
   double rate;  ///< zero for functions of velocity, whose rate needs accelerations
@@ -68,8 +68,8 @@ inline EventFunction event_function(const ContactLaw& law, ContactEvent event, c
   return {-1.0, 0.0};
 }
 
-/// The displacement of a step in place of a velocity. Event functions of velocities are linear, so
-/// of this they give their integral over the step.
+/// Replaces a velocity by the displacement of a step. Event functions of velocities are linear, so
+/// this gives their integral over the step.
 inline TipState displacement(const TipState& start, const TipState& end) {
   return {start.x_m, start.y_m, end.x_m - start.x_m, end.y_m - start.y_m};
 }
@@ -85,14 +85,14 @@ struct EventGuess {
   double peak_fraction;  ///< where the polynomial is largest; meaningful with inside_only
 };
 
-/// Nothing when phi does not rise through zero. `fresh`: the event's complement has just happened,
-/// so that phi starts at zero and a crossing at the start does not count.
+/// Nothing if phi does not rise through zero. `fresh`: the opposite event has just happened, so phi
+/// starts at zero, and a crossing at the start does not count.
 std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh);
 
-/// Whether the polynomial of guess_event() is negative over the whole step because all its
-/// Bernstein coefficients are. Those of velocities are multiplied by the step.
+/// Whether the polynomial of guess_event() is negative over the whole step, because all its
+/// Bernstein coefficients are negative. For velocities they are multiplied by the step.
 [[gnu::always_inline]] inline bool is_far(const ContactLaw& law, ContactEvent event,
                                           const TipState& start, const TipState& end, double h_s,
                                           double vt_sign) {

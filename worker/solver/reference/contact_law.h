@@ -61,7 +61,7 @@ class ContactLaw {
   double xP_m(const TipState& tip) const { return tip.x_m - ux_m(tip); }
   /// Eq. 24: P's velocity in slip, V_t + s mu eta2 (k_n/k) V_n.
   double slip_velocity_m_s(const TipState& tip) const { return s_ * slip_speed_m_s(tip, s_); }
-  /// P's speed in `direction` (1 or -1), if it slid in that direction.
+  /// The speed that P would have if it slid in `direction` (1 or -1).
   double slip_speed_m_s(const TipState& tip, double direction) const {
     return direction * tip.vx_m_s + slip_coupling_ * tip.vy_m_s;
   }

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kRippleFraction = 0.05;
 
-/// How far F_t is from the side of the cone where P would slide in `direction`.
+/// Distance of F_t from the limit of the cone at which P would slide in `direction`.
 double to_cone_N(const ContactLaw& law, double direction, const TipState& tip) {
   return law.mu() * law.fn_N(tip) + direction * law.ft_N(tip);
 }
@@ -106,7 +106,7 @@ std::string ContactRecord::mode(const std::vector<bool>& survives) const {
   std::string text;
   std::string last;
   for (const State& state : states_) {
-    // A state lies between two turns; its kind is the parity of the surviving turns before it.
+    // Compression and restitution alternate at each turn that is not part of a merged ripple.
     bool compression = true;
     for (std::size_t i = 0; i < turns_.size() && turns_[i].t_s <= state.t0_s; ++i) {
       compression = survives[i] ? !compression : compression;
@@ -157,7 +157,7 @@ CaseResult ContactRecord::result() const {
   return result;
 }
 
-/// Of a function that is positive at the start and not at the end: its integral up to the zero.
+/// Integral, up to its zero, of a function that is positive at the start and not at the end.
 double ContactMargin::Course::path_while_positive_m() const {
   const double a = rise0() / h_s;
   const double b = (rise1() - rise0()) / (2.0 * h_s);
@@ -174,7 +174,8 @@ ContactMargin::ContactMargin(const ContactLaw& law, const TipState& touch)
 }
 
 void ContactMargin::add_speed(double distance_m_s, std::string_view event) {
-  // Inside a step a function may come nearer than at both ends by this fraction of the speed.
+  // Within a step a function may be nearer to zero than at both ends, by at most this fraction of
+  // the speed.
   constexpr double kInside = 0.005;
   speed_m_s_.add(distance_m_s, event);
   near_m_s_ = -(speed_m_s_.distance + kInside * touch_speed_m_s_);
@@ -193,8 +194,8 @@ void ContactMargin::follow(Approach& approach, const Course& course, std::string
   approach.rises = approach.is_near && course.rise1() > 0.0;
 }
 
-/// k_t times the speed at which P would slide is the rate at which F_t nears that side of the cone,
-/// so F_t is nearest to it where P would reverse.
+/// F_t nears a limit of the cone at the rate k_t times the speed at which P would slide. So F_t is
+/// nearest to it where this speed changes sign.
 void ContactMargin::follow_cone(const ContactLaw& law, const TipState& start, const TipState& end,
                                 double h_s) {
   for (const double direction : {1.0, -1.0}) {
@@ -277,7 +278,8 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
   ReactionPeak peak{last_.middle_s, std::sqrt(reaction.last_N2)};
   const double right = (std::sqrt(next_N2) - peak.force_N) / (next.middle_s - last_.middle_s);
   if (reaction.before_N2 < 0.0) {
-    // It falls from the start: the straight line through the first two values, at the start.
+    // A reaction that falls from the start: the straight line through the first two values, at the
+    // start.
     const double back_s = right <= 0.0 ? 0.5 * last_.width_s : 0.0;
     peak = {last_.middle_s - back_s, peak.force_N - right * back_s};
   } else {
@@ -292,8 +294,8 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
     }
   }
   if (peak.force_N > reaction.largest.force_N) {
-    // Where steps resolve the motion, a parabola through three neighbours rises above the middle
-    // one by less than a twentieth of it.
+    // If steps resolve the motion, a parabola through three neighbours exceeds the middle value by
+    // less than a twentieth.
     constexpr double kThreshold = 0.9;
     reaction.largest = peak;
     reaction.threshold_N2 = kThreshold * peak.force_N * peak.force_N;

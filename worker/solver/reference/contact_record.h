@@ -21,11 +21,11 @@ class ContactRecord {
   /// An accepted step from `start` to `end` in one regime.
   void add_step(const ContactLaw& law, const TipState& start, const TipState& end,
                 const ContactIntegrals<double>& integrals);
-  /// A turn at t_s; `before` is the law that held up to it.
+  /// Records a turn (compression to restitution or back) at t_s; `before` is the law up to it.
   void add_turn(const ContactLaw& before, const TipState& tip, double t_s);
   /// A local maximum of |F_t|.
   void add_tangential_peak(double ft_N, double t_s);
-  /// The regime from t_s on. A regime of no duration is dropped.
+  /// Records the regime that begins at t_s. A regime of zero duration is dropped.
   void add_state(const ContactLaw& law, const TipState& tip, double t_s);
   /// Separation: closes phases, stick, slide and peaks.
   void finish(const ContactLaw& law, const TipState& tip, double t_s);
@@ -130,15 +130,15 @@ class ContactMargin {
   double last_vn_m_s_ = 0.0;  ///< at the start of the last step
   double last_step_s_ = 1.0;
   bool has_turned_ = false;
-  bool stick_follows_slip_ = false;     ///< the present stick did not begin at touch
-  double back_m_s_ = 0.0;               ///< P's largest speed against the last slip, had it slid on
-  double left_side_ = 0.0;              ///< side of the cone that F_t leaves in the next step, or 0
+  bool stick_follows_slip_ = false;  ///< the present stick did not begin at touch
+  double back_m_s_ = 0.0;            ///< largest speed that P would have had against its last slip
+  double left_side_ = 0.0;           ///< limit of the cone that F_t leaves in the next step, or 0
   std::optional<double> slip_began_m_;  ///< P at the start of the last slip after a stick
 };
 
 inline void ContactMargin::add_step(const ContactLaw& law, const TipState& start,
                                     const TipState& end, double h_s) {
-  // Over a shorter time the mean of a velocity is rounding.
+  // Over a shorter time the mean of a velocity consists of rounding.
   constexpr double kShortest_s = 1e-9;
   if (h_s < kShortest_s) {
     return;
@@ -161,8 +161,9 @@ inline void ContactMargin::add_step(const ContactLaw& law, const TipState& start
   }
 }
 
-/// The largest magnitude of each reaction over a contact, by the parabola through the three values
-/// around it. Values are at instants, or means over spans w, which are corrected by w^2 f''/24.
+/// Finds the largest magnitude of each reaction in a contact, from the parabola through the three
+/// values around it. Values are at instants, or means over spans w, which are corrected by w^2
+/// f''/24.
 class ReactionPeaks {
  public:
   explicit ReactionPeaks(std::size_t reactions) : reactions_(reactions) {}

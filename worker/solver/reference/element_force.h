@@ -79,12 +79,13 @@ struct ElementConstants {
   Constant inverse_length;
   Constant axial;    ///< EA l [N m]
   Constant bending;  ///< 2 EI/l [N m]
-  Constant m_pp;     ///< mass matrix (eq. 6): p_i with itself; so on, s_j and p_j by symmetry
-  Constant m_ps;     ///< p_i with s_i, -(p_j with s_j)
-  Constant m_ss;
-  Constant n_pp;  ///< p_i with p_j
-  Constant n_ps;  ///< s_i with p_j, -(p_i with s_j)
-  Constant n_ss;  ///< -(s_i with s_j)
+  // Entries of the mass matrix M (eq. 6), by position p and slope s of the nodes i and j.
+  Constant m_pp;  ///< M(p_i, p_i) = M(p_j, p_j)
+  Constant m_ps;  ///< M(p_i, s_i) = -M(p_j, s_j)
+  Constant m_ss;  ///< M(s_i, s_i) = M(s_j, s_j)
+  Constant n_pp;  ///< M(p_i, p_j)
+  Constant n_ps;  ///< M(s_i, p_j) = -M(p_i, s_j)
+  Constant n_ss;  ///< -M(s_i, s_j)
 };
 
 /// Derivatives of one element's strain energy U: -dU/dq is pull on p_i, -pull on p_j, by_d - by_t
@@ -113,7 +114,7 @@ inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
                                           const PlanarVector<Real>& p_j,
                                           const PlanarVector<Real>& s_j,
                                           const ElementConstants<Constant>& k) {
-  // By components, not pairs, which compilers copy through memory.
+  // By components, because compilers copy pairs through memory.
   using Vector = PlanarVector<Real>;
   const Vector u{p_j.x - p_i.x, p_j.y - p_i.y};
   const Vector d{s_j.x - s_i.x, s_j.y - s_i.y};

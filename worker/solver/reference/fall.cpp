@@ -129,7 +129,7 @@ ChainState SteppedFall::state_at_time(double t_s) const {
   }
   state.t_s = time_s(last_step);
   const double h_s = t_s - state.t_s;
-  // Shorter implicit steps would divide rounding by their square.
+  // With shorter implicit steps, dividing by their square would amplify rounding.
   if (h_s > 1e-3 * dt_s_) {
     std::swap(before, state);
     motion_->step(before, kNoContact, h_s, state);

@@ -35,9 +35,9 @@ class Fall {
   /// depend on earlier calls. Throws InputError when H_m is not in (0, largest_drop_m()].
   ChainState state_at(double H_m) const;
 
-  /// The state t_s seconds after release, for t_s up to the time of a state_at(). A stepped fall
-  /// may return the state at the last step before, less than a thousandth of a step away, with its
-  /// time.
+  /// The state t_s seconds after release. t_s must not exceed the time of a state that state_at()
+  /// returns. A fall that is solved in steps may return the state at the end of the last step
+  /// before t_s, if t_s is less than a thousandth of a step later; its time is that of this step.
   virtual ChainState state_at_time(double t_s) const = 0;
 
   /// Memory of its states.

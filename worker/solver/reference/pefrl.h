@@ -30,9 +30,10 @@ struct UnwatchedStep {
 };
 
 /// Eqs. 13 and 15: steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next,
-/// which may be q and v themselves. `scratch` has the same size. For numbers and lanes, as
-/// chain_kernel.h. Calls `watch` with the rates at the start and at the end of the step, row by row
-/// from the tip to the row after the pin, while they are in registers.
+/// which may be q and v themselves. `scratch` has the same size. `Real` is a number or a pack with
+/// one number per lane, as in chain_kernel.h. Calls `watch` for each row, from the tip to the row
+/// after the pin: with its rates at the start of the step, and later with those at its end. They
+/// are still in registers then, so that this costs little.
 template <class Constant, class Real, class Watch = UnwatchedStep<Real>>
 inline ContactIntegrals<Real> pefrl_step(const ChainTables<Constant>& chain,
                                          const AffineContactForce<Real>& force, const Real& h_s,

@@ -14,7 +14,8 @@
 namespace oblique::solver {
 namespace {
 
-/// A balance that misses this much of the exchanged work means the step resolves nothing.
+/// Maximum error of the energy balance, relative to the exchanged energy. With a larger one the
+/// step is too long to resolve the contact.
 constexpr double kWorstClosure = 1e-2;
 /// Work below this fraction of the energies at touch drowns in their rounding.
 constexpr double kLeastExchanged = 1e-10;
@@ -37,9 +38,9 @@ void balance(const Energies& in, const Energies& out, const ContactRecord& recor
                            energy.gravity_change_J - record.work_n_J() - record.work_t_J();
   energy.closure = std::abs(missing_J) / energy.exchanged_J;
   if (!(energy.closure < kWorstClosure)) {
-    throw SolveError("the energy balance of the contact misses " + readable_number(energy.closure) +
-                     " of the exchanged work, more than " + exact_number(kWorstClosure) +
-                     ": dt is too long");
+    throw SolveError("the error of the energy balance of the contact is " +
+                     readable_number(energy.closure) + " times the exchanged energy, more than " +
+                     exact_number(kWorstClosure) + ": choose a shorter dt");
   }
 }
 

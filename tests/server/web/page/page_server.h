@@ -31,7 +31,7 @@ inline WebSettings page_settings(bool shows_without_token = false) {
   return settings;
 }
 
-/// Parses an answer with numbers and their head.
+/// An answer of the page: a JSON header, then binary numbers.
 struct Numbers {
   nlohmann::json head;
   std::string bytes;
