@@ -17,6 +17,7 @@
 #include "client/explore/fit.h"
 #include "client/explore/growing_study.h"
 #include "client/explore/measurements.h"
+#include "client/explore/outputs.h"
 #include "client/explore/paper_fit.h"
 #include "client/io/console.h"
 #include "client/io/row_output.h"
@@ -93,7 +94,7 @@ solver::ModelParameters paper_start(const FitFlags& flags) {
   return start;
 }
 
-Answer answer_of(const PaperFitStep& end, const solver::ModelParameters& start) {
+Answer paper_fit_answer(const PaperFitStep& end, const solver::ModelParameters& start) {
   const solver::ModelParameters preset = solver::preset("paper");
   const auto& [counted_numbers, missing, rms_percent, largest_percent, largest] = end.summary;
   nlohmann::ordered_json json = {{"elements_per_link", end.model.elements_per_link},
@@ -132,7 +133,7 @@ int fit_to_paper(const FitFlags& flags, Console& console) {
     }
     console.notes() << text << "  rms " << fixed_number(step.summary.rms_percent, 3) << " %\n";
   });
-  put_out(console, flags.answer, answer_of(end, start));
+  put_out(console, flags.answer, paper_fit_answer(end, start));
   return kDone;
 }
 
@@ -266,8 +267,7 @@ std::vector<VectorXd> predictions_of(const Measurements& measured, const protoco
     auto& prediction = predictions.emplace_back(static_cast<Index>(measured.numbers.size()));
     Index i = 0;
     for (const auto& number : measured.numbers) {
-      prediction[i++] = number_of(results.rows[first + number.row][number.output], "MEASURED.csv",
-                                  measured.outputs[number.output]);
+      prediction[i++] = number_in(results.rows[first + number.row][number.output]);
     }
   }
   return predictions;
@@ -280,9 +280,7 @@ std::string settings_of(const MeasuredFit& fit, const FitFlags& flags) {
       fmt::format("{} {} {} {} {}", protocol::canonical_model(fit.model), flags.is_scaled,
                   fmt::join(flags.fit, " "), fmt::join(measured.begin(), measured.end(), " "),
                   fmt::join(sd.begin(), sd.end(), " "));
-  for (const Output& output : fit.measured.outputs) {
-    text += " " + output.name;
-  }
+  text += fmt::format(" {}", fmt::join(fit.measured.outputs, " "));
   for (const auto& [key, values] : fit.conditions) {
     text += fmt::format(" {} {}", key, fmt::join(values, " "));
   }
@@ -344,7 +342,7 @@ protocol::Table table_of_residuals(const Measurements& measured, const FitStep& 
   for (std::size_t i = 0; i < measured.numbers.size(); ++i) {
     const auto& number = measured.numbers[i];
     table.rows.push_back({static_cast<std::int64_t>(number.row + 1),
-                          measured.outputs[number.output].name, number.value, number.sd,
+                          measured.outputs[number.output], number.value, number.sd,
                           minimum.predictions[static_cast<Index>(i)],
                           minimum.residuals[static_cast<Index>(i)]});
   }
@@ -363,7 +361,7 @@ plot::Figure figure_of(const Measurements& measured, const FitStep& minimum) {
       {std::min(-2.0, minimum.residuals.minCoeff()), std::max(2.0, minimum.residuals.maxCoeff())},
       0.05);
   for (std::size_t output = 0; output < measured.outputs.size(); ++output) {
-    const std::string& name = measured.outputs[output].name;
+    const std::string& name = measured.outputs[output];
     plot::Curve values{.stroke = output, .mark = Mark::kDots};
     auto& rows = residuals.curves.emplace_back(
         plot::Curve{.name = name, .stroke = output, .mark = Mark::kDots});
@@ -388,7 +386,7 @@ plot::Figure figure_of(const Measurements& measured, const FitStep& minimum) {
   return figure;
 }
 
-Answer answer_of(const MeasuredFit& fitted, const Fit& fit, const GrowingStudy& study) {
+Answer fit_answer(const MeasuredFit& fitted, const Fit& fit, const GrowingStudy& study) {
   const auto& unknowns = fitted.problem.unknowns;
   const auto notes = notes_of(unknowns, fit);
   const auto table = table_of_unknowns(unknowns, fit);
@@ -428,17 +426,14 @@ int fit_to_measurements(const FitFlags& flags, Console& console) {
         "--from is allowed only in a fit to the paper's numbers: use --preset to choose the model");
   }
   auto fitted = measured_fit(flags, tip_reach(console));
-  std::string columns;
-  for (const Output& output : fitted.measured.outputs) {
-    columns += (columns.empty() ? "" : ", ") + output.sql;
-  }
+  const auto columns = fmt::format("{}", fmt::join(fitted.measured.outputs, ", "));
   const auto name = explored_name(flags.explore, "fit", settings_of(fitted, flags));
   return run_exploration(console, [&](protocol::StopSignals& stop) {
     GrowingStudy study(console, flags.explore, name, fitted.model, stop);
     fitted.problem.evaluate = [&](const std::vector<VectorXd>& points, const std::string& what) {
       return predictions_of(fitted.measured, study.solve(block_of(fitted, points), columns, what));
     };
-    put_out(console, flags.answer, answer_of(fitted, fit(fitted.problem, flags.is_scaled), study));
+    put_out(console, flags.answer, fit_answer(fitted, fit(fitted.problem, flags.is_scaled), study));
     return kDone;
   });
 }
@@ -446,7 +441,7 @@ int fit_to_measurements(const FitFlags& flags, Console& console) {
 int fit_command(const FitFlags& given, Console& console) {
   FitFlags flags = given;
   flags.answer.format = flags.json ? "json" : flags.answer.format;
-  static_cast<void>(choice_of(flags.answer));
+  check(flags.answer);
   return flags.file.empty() ? fit_to_paper(flags, console) : fit_to_measurements(flags, console);
 }
 

@@ -27,6 +27,7 @@
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "proto/text.h"
+#include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -84,18 +85,19 @@ struct AxisFlag {
 
 /// What tells regions apart: texts, or numbers up to and above a level.
 struct RegionRule {
-  Output output;
+  std::string output;
   std::optional<double> level = {};
 
   /// Parses --of. Throws InputError.
   static RegionRule of_flag(const std::string& text) {
     const auto equals = text.rfind('=');
-    const auto outputs = outputs_of_flag("--of", text.substr(0, equals));
+    const auto outputs = outputs_of_flag(text.substr(0, equals), true);
     RegionRule rule{outputs.front()};
     if (equals != std::string::npos) {
       rule.level = solver::number_of(text.substr(equals + 1));
     }
-    if (outputs.size() != 1 || rule.level.has_value() == has_texts(rule.output)) {
+    const bool is_text = server::kind_of_values(rule.output) == protocol::CellKind::kText;
+    if (outputs.size() != 1 || rule.level.has_value() == is_text) {
       throw InputError(fmt::format(
           "--of {}: write mode, major_mode, or COLUMN=LEVEL, as stick_total_s=0", text));
     }
@@ -105,9 +107,8 @@ struct RegionRule {
     if (std::holds_alternative<std::monostate>(value)) {
       return "failed";
     }
-    return level ? fmt::format("{} {} {}", output.name,
-                               number_of(value, "--of", output) > *level ? ">" : "<=",
-                               solver::exact_number(*level))
+    return level ? fmt::format("{} {} {}", output,
+                               number_in(value) > *level ? ">" : "<=", solver::exact_number(*level))
                  : std::get<std::string>(value);
   }
 };
@@ -221,7 +222,7 @@ class MapSolver {
     block.set_zip(true);
     constexpr std::uint32_t kOtherRounds = 50;  // of halved cells and of the finer mesh
     return study_
-        .solve(block, rule_.output.sql + (more.empty() ? "" : ", " + more),
+        .solve(block, rule_.output + (more.empty() ? "" : ", " + more),
                fmt::format("round {} of about {}", study_.rounds() + 1,
                            map_.grid.halvings + kOtherRounds))
         .rows;
@@ -276,11 +277,8 @@ void set_regions(FoundMap& map, const std::vector<std::string>& names) {
 
 FoundMap find_map(Console& console, const MapFlags& flags, protocol::StopSignals& stop) {
   const auto rule = RegionRule::of_flag(flags.of);
-  const auto over =
-      flags.over.empty() ? std::vector<Output>() : outputs_of_flag("--over", flags.over);
-  if (!over.empty()) {
-    refuse_texts("--over", over.front());
-  }
+  const auto over = flags.over.empty() ? std::vector<std::string>()
+                                       : outputs_of_flag(flags.over, false, "--over");
   const MapPlane plane = plane_of(console, flags);
   const auto grid = MapGrid::of(flags.cells, flags.bracket);
   const auto axis_of = [&](const AxisFlag& axis) {
@@ -296,9 +294,9 @@ FoundMap find_map(Console& console, const MapFlags& flags, protocol::StopSignals
   MapSolver solver(study, map, plane, rule);
   map.borders = find_borders(grid, [&](const std::vector<LatticePoint>& points) {
     const bool is_grid = study.rounds() == 0 && !over.empty();
-    const auto rows = solver.solve(points, 0, is_grid ? over.front().sql : "");
+    const auto rows = solver.solve(points, 0, is_grid ? over.front() : "");
     for (std::size_t i = 0; is_grid && i < rows.size(); ++i) {
-      map.over.push_back(number_of(rows[i].back(), "--over", over.front()));
+      map.over.push_back(number_in(rows[i].back()));
     }
     return solver.regions_of(rows);
   });
@@ -324,7 +322,7 @@ void check_map_flags(const MapFlags& flags) {
         "--bracket {} is not allowed: it must be from {} to 1/{}, a cell's part of an axis",
         flags.bracket, kLeastBracket, flags.cells));
   }
-  static_cast<void>(choice_of(flags.answer));
+  check(flags.answer);
 }
 
 int run_map(const MapFlags& flags, Console& console) {

@@ -59,7 +59,7 @@ std::string key_of_column(const std::string& name) {
 }
 
 void add_numbers(const CsvFile& file, double relative_sd, Measurements& measured) {
-  const std::string& column = measured.outputs.back().name;
+  const std::string& column = measured.outputs.back();
   const auto values = file.numbers(column);
   std::vector<std::optional<double>> deviations(values.size());
   if (const std::string name = column + std::string(kDeviation);
@@ -91,7 +91,7 @@ Measurements read_measurements(const CsvFile& file, double relative_sd) {
     if (const auto key = key_of_column(column); !key.empty()) {
       measured.conditions.emplace_back(key, file.values(column, protocol::axis_key(key)));
     } else if (is_output(column)) {
-      measured.outputs.push_back({column, column});
+      measured.outputs.push_back(column);
       add_numbers(file, relative_sd, measured);
     } else if (!is_deviation(file, column)) {
       refuse_column(column);

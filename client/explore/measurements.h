@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "client/explore/outputs.h"
 #include "client/study/csv_file.h"
 
 namespace oblique::client {
@@ -24,7 +23,7 @@ struct Measurements {
   std::size_t rows = 0;
   /// H, mu, e and model keys that have a column, with a value for each row.
   std::vector<std::pair<std::string, std::vector<double>>> conditions;
-  std::vector<Output> outputs;
+  std::vector<std::string> outputs;  ///< columns of results
   std::vector<MeasuredNumber> numbers;
 };
 

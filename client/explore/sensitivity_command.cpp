@@ -180,10 +180,7 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
     double half_width = 0.0;
     for (std::size_t i = 0; i < values.size(); ++i) {
       for (const auto& row : table.rows) {
-        const auto* whole = std::get_if<std::int64_t>(&row[i]);  // of a condition
-        const auto* real = std::get_if<double>(&row[i]);
-        const double other = real == nullptr ? kNaN : *real;
-        values[i].push_back(whole == nullptr ? other : static_cast<double>(*whole));
+        values[i].push_back(number_in(row[i]));
       }
       const auto estimate = problem.is_sobol ? sobol_indices : morris_effects;
       found.push_back(estimate(values[i], problem.inputs.size(), kSeed));
