@@ -139,10 +139,10 @@ TEST(MapCommand, TakesModelAndSingleValuesOfAStudyAndLevelsOfAnOutput) {
 TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
   const test::TemporaryFolder folder;
   const std::vector<std::pair<std::vector<std::string>, std::string>> wrong{
-      {{"--of", "colour"}, "--of colour"},
+      {{"--of", "colour"}, "--of: unknown output `colour`"},
       {{"--of", "major_modes=3"}, "unknown output `major_modes`"},
       {{"--of", "fn_peak_N"}, "COLUMN=LEVEL"},
-      {{"--over", "mode"}, "--over mode"},
+      {{"--over", "mode"}, "--over: the values of mode are texts"},
       {{"--out", "map.doc"}, "map.doc"},
       {{"--mu", "0.4"}, "mu is an axis of the map"},
       {{"--k", "1e7,2e7"}, "--k has several values"}};
