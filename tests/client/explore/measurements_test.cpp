@@ -39,7 +39,7 @@ TEST(Measurements, AreNumbersWithDeviationsUnderTheConditionsOfTheirRow) {
               ElementsAre(Pair("H", ElementsAre(1.0, 0.9)), Pair("mu", ElementsAre(0.4, 0.6)),
                           Pair("E", ElementsAre(7e10, 6e10))));
   ASSERT_EQ(found.outputs.size(), 2U);
-  EXPECT_EQ(found.outputs[1].name, "duration_s");
+  EXPECT_EQ(found.outputs[1], "duration_s");
   ASSERT_EQ(found.numbers.size(), 3U);  // an empty field was not measured
   EXPECT_EQ(found.numbers[0].value, 5058.0);
   EXPECT_EQ(found.numbers[0].sd, 50.0);
