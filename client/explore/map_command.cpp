@@ -73,8 +73,8 @@ struct AxisFlag {
     const auto first = solver::number_of(ends.front());
     const auto second = solver::number_of(ends.back());
     if (ends.size() != 2 || !first || !second) {
-      throw InputError(
-          fmt::format("{} {} is no axis: write KEY=FROM:TO, as mu=0.05:2", flag, text));
+      throw InputError(fmt::format(
+          "{} is required as KEY=FROM:TO, for example mu=0.05:2; got \"{}\"", flag, text));
     }
     key = text.substr(0, equals);
     from = *first;
@@ -167,6 +167,10 @@ struct MapPlane {
 
 /// Throws InputError for values that no point may have, those at the ends of the axes included.
 MapPlane plane_of(Console& console, const MapFlags& flags) {
+  // An unknown study is reported before other flags, as in all commands.
+  const auto stored = flags.study.empty()
+                          ? std::optional<protocol::Recipe>()
+                          : stored_recipe(console, flags.explore.source, flags.study);
   MapPlane plane{.axes = {AxisFlag{"--x", flags.x}, AxisFlag{"--y", flags.y}}};
   auto points = flags.points;
   for (const auto& [key, from, to] : plane.axes) {
@@ -176,8 +180,8 @@ MapPlane plane_of(Console& console, const MapFlags& flags) {
           fmt::format("{} is an axis of the map: leave {} out", key, flag_of_key(key)));
     }
   }
-  if (!flags.study.empty()) {
-    take_from_study(points, stored_recipe(console, flags.explore.source, flags.study), flags.study);
+  if (stored) {
+    take_from_study(points, *stored, flags.study);
   }
   const auto recipe = recipe_of_flags(points, tip_reach(console));
   check_points(protocol::PointTable(recipe), places_of(points));
@@ -345,8 +349,8 @@ void add_map(CLI::App& app, Action& parsed) {
       .add_option("STUDY", flags.study,
                   "study whose model and single values the map takes; or give them by flags")
       ->type_name("");
-  command.add_option("--x", flags.x, "horizontal axis")->type_name("KEY=FROM:TO")->required();
-  command.add_option("--y", flags.y, "vertical axis")->type_name("KEY=FROM:TO")->required();
+  command.add_option("--x", flags.x, "horizontal axis")->type_name("KEY=FROM:TO");
+  command.add_option("--y", flags.y, "vertical axis")->type_name("KEY=FROM:TO");
   command
       .add_option(
           "--of", flags.of,

@@ -87,7 +87,7 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
   }
   if (!commands.empty() && command.get_subcommands().empty() &&
       error.get_name() == "RequiredError") {
-    return "a command is missing; the commands are " + joined(commands);
+    return "a command is required; the commands are " + joined(commands);
   }
   const std::string message = error.what();
   if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {

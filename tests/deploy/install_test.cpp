@@ -306,8 +306,7 @@ TEST(InstalledLibraryTest, ItsHeadersIncludeNothingButTheStandardLibraryAndEachO
             "#include <oblique/solver/case_result.h>\n#include <oblique/solver/errors.h>\n"
             "#include <oblique/solver/estimate.h>\n#include <oblique/solver/fall_cache.h>\n"
             "#include <oblique/solver/parameters.h>\n#include <oblique/solver/solve.h>\n"
-            "#include <oblique/solver/solve_many.h>\n#include <oblique/solver/trace.h>\n"
-            "#include <oblique/solver/version.h>\n");
+            "#include <oblique/solver/solve_many.h>\n#include <oblique/solver/trace.h>\n");
 }
 
 TEST(InstalledLibraryTest, ItExportsOnlyTheNamesOfItsHeaders) {

@@ -144,7 +144,7 @@ TEST_F(DatabaseFilesTest, ADatabaseInUseMayBeASourceButNotTheTargetOfAMerge) {
   submit_to(server);
   const Outcome from = run_oblique(folder_, {"merge", file_, "--db", folder_.file("all.db")});
   EXPECT_EQ(from.exit_code, 0) << from.err;
-  EXPECT_TRUE(contains(from.err, "1 study new")) << from.err;
+  EXPECT_TRUE(contains(from.err, "added 1 study")) << from.err;
   EXPECT_TRUE(contains(from.err, "A server uses")) << from.err;
   const Outcome into = run_oblique(folder_, {"merge", folder_.file("all.db"), "--db", file_});
   EXPECT_EQ(into.exit_code, 1);

@@ -126,7 +126,7 @@ TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
       {"study check pipe.toml", "the CSV file pipe cannot be read: it is a pipe"},
       {"study check --H @pipe --mu 1 --e 1", "the CSV file ./pipe cannot"},
       {"status --keys pipe", "the key file pipe cannot be read: it is a pipe"},
-      {"status --db pipe", "pipe is a pipe: a database is a regular file"},
+      {"status --db pipe", "pipe is a pipe: a database must be a regular file"},
       {"run --db pipe --H 1 --mu 1 --e 1", "pipe is a pipe"},
       {"merge pipe", "pipe is a pipe"},
       {"backup saved.db --db pipe --salvage", "pipe is a pipe"},

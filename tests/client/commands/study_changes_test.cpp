@@ -61,7 +61,7 @@ TEST_F(StudyChanges, ADifferentStudyOfTheSameNameIsRefusedWithTheDifferences) {
 
 TEST_F(StudyChanges, AStudyIsRenamed) {
   ASSERT_EQ(run_study(1).exit_code, 0);
-  EXPECT_EQ(ask({"rename", "friction", "slip"}).out, "friction is called slip now\n");
+  EXPECT_EQ(ask({"rename", "friction", "slip"}).out, "friction is now called slip\n");
   EXPECT_EQ(ask({"query", "slip", "--select", "point", "--format", "csv"}).out, "point\n0\n1\n");
   const auto unknown = ask({"rename", "slop", "other"});
   EXPECT_EQ(unknown.exit_code, 1);

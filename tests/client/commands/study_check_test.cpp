@@ -93,9 +93,9 @@ TEST(StudyCheck, EndsWithTwoAndThePlaceOfAnError) {
   const auto flags = test::run_oblique(
       {"study", "check", "--H", "1", "--mu", "0.4", "--e", "1", "--where", "mu > 1"});
   EXPECT_EQ(flags.exit_code, 2);
-  EXPECT_THAT(flags.err, HasSubstr("--where mu > 1: it leaves no point in"));
+  EXPECT_THAT(flags.err, HasSubstr("--where mu > 1: it leaves out all points"));
   EXPECT_THAT(test::run_oblique({"study"}).err,
-              HasSubstr("a command is required; there are check"));
+              HasSubstr("a command is required; the commands are check"));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "oblique.db"));
   EXPECT_EQ(test::run_oblique({"study", "chekc"}).exit_code, 2);
 }

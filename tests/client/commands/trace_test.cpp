@@ -154,7 +154,7 @@ TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
   EXPECT_EQ(outcome.exit_code, 0) << "the trace is what was asked for";
   EXPECT_THAT(outcome.err, HasSubstr("differs from the stored row"));
   EXPECT_THAT(outcome.err, HasSubstr("fn_peak_N"));
-  EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now by "));
+  EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now solved by "));
 
   const auto failed = run({"trace", "made-up", "1", "--out", "failed.csv"});
   EXPECT_EQ(failed.exit_code, 1);

@@ -151,11 +151,11 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
     EXPECT_EQ(ran.exit_code, 2) << ran.out;
     EXPECT_THAT(ran.err, HasSubstr(message));
   }
-  for (const auto& [x, message] :
-       std::vector<std::pair<std::string, std::string>>{{"mu", "is no axis"},
-                                                        {"mu=2:1", "mu"},
-                                                        {"wind=0:1", "wind"},
-                                                        {"mu=0:1:5", "is no axis"}}) {
+  for (const auto& [x, message] : std::vector<std::pair<std::string, std::string>>{
+           {"mu", "is required as KEY=FROM:TO"},
+           {"mu=2:1", "mu"},
+           {"wind=0:1", "wind"},
+           {"mu=0:1:5", "is required as KEY=FROM:TO"}}) {
     const auto ran = test::run_oblique(folder, {"map", "--x", x, "--y", "H=0.3:1", "--e", "1"});
     EXPECT_EQ(ran.exit_code, 2) << ran.out;
     EXPECT_THAT(ran.err, HasSubstr(message));

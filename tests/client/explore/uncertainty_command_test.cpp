@@ -59,8 +59,9 @@ TEST_F(Uncertainty, StatisticsOfAnInputAreThoseOfItsDistribution) {
 TEST_F(Uncertainty, ModesHaveProbabilitiesThatAddUpToOne) {
   const auto outcome = uncertainty({"spread", "--of", "major_mode", "--format", "json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
   double sum = 0.0;
-  for (const auto& row : nlohmann::json::parse(outcome.out)["rows"]) {
+  for (const auto& row : json["rows"]) {
     const double value = row["value"];
     sum += value;
     EXPECT_LE(row["value_from"], value);

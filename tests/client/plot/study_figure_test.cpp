@@ -87,7 +87,7 @@ TEST(Map, WithARangeMentionsValuesOutside) {
   const Figure figure = figure_from({.map = "fn_peak_N", .range = "2:20"}, kMapColumns,
                                     {{1.0, 0.5, 1.0, "solved"}, {2.0, 0.5, 30.0, "solved"}});
   EXPECT_EQ(figure.colours->range, (Range{2.0, 20.0}));
-  EXPECT_THAT(figure.notes, Contains(HasSubstr("Values from 1 to 30; those outside the scale")));
+  EXPECT_THAT(figure.notes, Contains(HasSubstr("Values range from 1 to 30; those outside the scale")));
 }
 
 TEST(Map, WithoutRowsStatesThis) {
@@ -344,15 +344,15 @@ TEST(StudyShape, OfASampleIsNoGridAndHasNoListedValues) {
       "H = { from = 0.3, to = 1.1 }\nmu = { from = 0.1, to = 2 }\ne = 1\n");
   EXPECT_FALSE(shape.is_grid);
   EXPECT_FALSE(shape.find("mu")->is_listed);
-  EXPECT_THAT(error_of({.at = {"H=0.5"}}, shape), HasSubstr("lie scattered"));
+  EXPECT_THAT(error_of({.at = {"H=0.5"}}, shape), HasSubstr("are scattered"));
 }
 
 TEST(Condition, FixesAnOpenAxisAtItsFirstValueAndReportsIt) {
   const auto condition = condition_of({}, grid(), {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "H = 0.5 AND e = 0.5");
   EXPECT_THAT(condition.said,
-              ElementsAre(HasSubstr("H has the values 0.5, 1; H = 0.5 is drawn"),
-                          HasSubstr("e has the values 0.5, 0.8, 1; e = 0.5 is drawn")));
+              ElementsAre(HasSubstr("H has the values 0.5, 1; drawn: H = 0.5"),
+                          HasSubstr("e has the values 0.5, 0.8, 1; drawn: e = 0.5")));
 }
 
 TEST(Condition, LeavesAxesOpenThatWhereMentions) {

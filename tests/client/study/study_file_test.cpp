@@ -222,7 +222,7 @@ TEST(StudyFile, NamesThePlaceOfWrongValuesThatDependOnThePoint) {
       {block_with("mu = 'log(-1)'"), "mu", "study.toml:3:6: point 0: mu = nan is not allowed"},
       {block_with("mu = '-1'"), "mu", "study.toml:3:6: point 0: mu = -1 is not allowed"},
       {kPoint + "where = 'mu > 1'\n", "where",
-       "study.toml:5:9: where = \"mu > 1\": it leaves no point in"},
+       "study.toml:5:9: where = \"mu > 1\": it leaves out all points"},
       {kPoint + "[[block]]\nH = 1\nmu = [0.4, 0.5]\ne = 1\nI = 'log(-mu)'\n", "I",
        "study.toml:9:5: block 2: point 1: I = nan"},
   };

@@ -47,9 +47,9 @@ TEST(MeshNote, IsForTheCoarsestMeshBelowEightElements) {
       {"elements_per_link = 8", "", ""},
       {"preset = 'paper'", "elements_per_link = [8, 16]\n", ""},
       {"elements_per_link = 7", "", "7 elements a link give errors of up to 3"},
-      {"elements_per_link = 2", "", "durations by more than 12"},
-      {"", "elements_per_link = [16, 4]\n", "on 4 elements"},
-      {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "on 2 elements"},
+      {"elements_per_link = 2", "", "more than 12 % in durations"},
+      {"", "elements_per_link = [16, 4]\n", "Note: 4 elements"},
+      {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "Note: 2 elements"},
   };
   for (const auto& [model, axis, says] : cases) {
     const auto note = mesh_note(model, axis);

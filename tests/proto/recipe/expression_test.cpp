@@ -125,7 +125,7 @@ TEST(ExpressionTest, AnInvalidTextIsRefusedWithTheReason) {
            {"1e", "missing after a number"},
            {"0x10", "missing after a number"},
            {"1e999", "invalid number"},
-           {"(1 + 2", "open"},
+           {"(1 + 2", "is not closed"},
            {"1 + 2)", "closing"},
            {"1, 2", "arguments of a function"},
            {"(1, 2)", "arguments of a function"},
