@@ -87,7 +87,8 @@ TEST(Map, WithARangeMentionsValuesOutside) {
   const Figure figure = figure_from({.map = "fn_peak_N", .range = "2:20"}, kMapColumns,
                                     {{1.0, 0.5, 1.0, "solved"}, {2.0, 0.5, 30.0, "solved"}});
   EXPECT_EQ(figure.colours->range, (Range{2.0, 20.0}));
-  EXPECT_THAT(figure.notes, Contains(HasSubstr("Values range from 1 to 30; those outside the scale")));
+  EXPECT_THAT(figure.notes,
+              Contains(HasSubstr("Values range from 1 to 30; those outside the scale")));
 }
 
 TEST(Map, WithoutRowsStatesThis) {
