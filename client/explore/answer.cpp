@@ -82,7 +82,8 @@ void check(const AnswerFlags& flags) {
 Answer answer_of(nlohmann::ordered_json facts, protocol::Table rows, plot::Figure figure) {
   facts["rows"] =
       nlohmann::ordered_json::parse(text_of({protocol::chunk_of(rows)}, {.format = Format::kJson}));
-  return {.tables = text_of(with_intervals(rows)),
+  auto tables = text_of(with_intervals(rows));
+  return {.tables = std::move(tables),
           .rows = std::move(rows),
           .json = facts.dump(2),
           .figure = std::move(figure)};

@@ -145,8 +145,8 @@ Sensitivity sobol_indices(std::span<const double> values, std::size_t inputs, st
   const auto finite =
       std::find_if(values.begin(), values.end(), [](double f) { return std::isfinite(f); });
   const double f0 = finite == values.end() ? 0.0 : *finite;
-  const auto append_terms = [inputs, f0](std::uint64_t, std::span<const double> f,
-                                         std::vector<double>& terms) {
+  const auto append_terms = [f0](std::uint64_t, std::span<const double> f,
+                                 std::vector<double>& terms) {
     const double a = f[0] - f0;
     const double b = f[1] - f0;
     terms.insert(terms.end(), {a + b, a * a + b * b});

@@ -187,7 +187,7 @@ TEST(SobolIndicesTest, ARowWithAFailedPointIsDroppedWholeAndCounted) {
   EXPECT_EQ(dropped.rows, 62U);
   EXPECT_EQ(dropped.dropped, 2U);
   for (std::size_t i = 0; i < 3; ++i) {
-    // The compiler may contract sums of the two calls differently.
+    // The two calls subtract different constants, so sums round differently.
     EXPECT_NEAR(dropped.measures[0].of_inputs[i].value, never.measures[0].of_inputs[i].value,
                 1e-12);
     EXPECT_NEAR(dropped.measures[1].of_inputs[i].to, never.measures[1].of_inputs[i].to, 1e-12);
