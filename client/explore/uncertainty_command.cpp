@@ -182,8 +182,7 @@ int uncertainty(const UncertaintyFlags& flags, Console& console) {
     }
   }
   plot::Figure figure{.title = flags.study,
-                      .columns = std::min<std::size_t>(2, study.outputs.size()),
-                      .panel_size = {480.0, 300.0}};
+                      .columns = std::min<std::size_t>(2, study.outputs.size())};
   query.select += fmt::format("{}", fmt::join(study.outputs, ", "));
   study.columns = plot::read_columns(*source->rows(request_for(query)));
   if (study.columns.front().numbers.empty()) {
