@@ -74,8 +74,14 @@ void add_answer_flags(CLI::App& command, AnswerFlags& flags) {
 
 void check(const AnswerFlags& flags) {
   static_cast<void>(format_named(flags.format, kTextFormats));
-  if (!flags.file.empty() && !numbers_format(flags.file)) {
-    static_cast<void>(plot::picture_format({}, flags.file));
+  const auto pictures = plot::picture_format_names();
+  const auto ending = std::filesystem::path(flags.file).extension().string();
+  if (!flags.file.empty() && !numbers_format(flags.file) &&
+      std::find(pictures.begin(), pictures.end(), ending.substr(ending.empty() ? 0 : 1)) ==
+          pictures.end()) {
+    throw solver::InputError(fmt::format(
+        "--out {}: the ending is not a format: it must be one of .svg, .pdf, .png, .gp, .csv, .json",
+        flags.file));
   }
 }
 

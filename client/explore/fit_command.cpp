@@ -306,7 +306,7 @@ std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fi
     const auto* const what =
         !fitted.has_effect   ? "has no effect on these data."
         : fitted.is_at_bound ? "is at a bound: wider bounds may fit better."
-        : !has_ends          ? "has no interval within its bounds: an end is open."
+        : !has_ends          ? "has an interval that reaches a bound, where the end is left empty."
         : fitted.is_cut ? "has an interval that ends where an output jumps, or is missing, because "
                           "the sequence of states changes."
                         : "";

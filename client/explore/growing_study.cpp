@@ -17,6 +17,7 @@
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
+
 void add_explore_flags(CLI::App& command, ExploreFlags& flags) {
   command
       .add_option("--name", flags.name,

@@ -42,9 +42,9 @@ constexpr const char* kMapExamples = R"(Examples:
   oblique map friction --x mu=0.01:2 --y e=0.5:1 --of fn_peak_N=5000
   oblique map --x mu=0.05:2 --y H=0.3:1.05 --e 1 --over fn_peak_N --out peaks.svg
 
-Finds the borders between regions, as of modes, on a plane of two keys. The points form a study that grows
-round by round: it is stored, and the same command continues it. Of a STUDY the model and the keys with
-one value are taken; other flags override them.)";
+Finds the borders between regions of the plane of two keys, for example between modes. The points
+form a study that grows round by round: it is stored, and the same command continues it. A STUDY
+gives the model and the keys that have one value in it; other flags override these keys.)";
 
 struct MapFlags {
   std::string study;
@@ -165,7 +165,7 @@ struct MapPlane {
   }
 };
 
-/// Throws InputError for values that no point may have, those at the ends of the axes included.
+/// Throws InputError for a value that no point may have, also at the ends of the axes.
 MapPlane plane_of(Console& console, const MapFlags& flags) {
   // An unknown study is reported before other flags, as in all commands.
   const auto stored = flags.study.empty()

@@ -104,9 +104,9 @@ std::string shifts_sentence(const FoundMap& map) {
     largest = std::max(largest, shift.largest.value_or(0.0));
   }
   return fmt::format(
-      "On twice as many elements a link {} of {} vertices have the same border within 1/8 of the "
-      "axis, shifted by at most {} %.\n",
-      all.checked - all.lost, all.checked, solver::readable_number(100.0 * largest, 2));
+      "{} of {} checked vertices have no such border within 1/8 of the axis on twice as many "
+      "elements; the others shift by at most {} %.\n",
+      all.lost, all.checked, solver::readable_number(100.0 * largest, 2));
 }
 
 std::string tables_of(const FoundMap& map) {

@@ -74,10 +74,10 @@ void add_numbers(const CsvFile& file, double relative_sd, Measurements& measured
     const double sd = deviations[row].value_or(relative_sd * std::abs(*values[row]));
     const auto name = fmt::format("{}: {}", file.place_of_row(row), column);
     if (!(sd > 0.0)) {
-      throw InputError(fmt::format(
-          "{} has the standard deviation {}, which must be positive: fill in the column {}{}, or "
-          "give --sd 1%",
-          name, solver::exact_number(sd), column, kDeviation));
+      throw InputError(fmt::format("{} has {}: fill in the column {}{}, or give --sd 1%", name,
+                                   deviations[row] ? "a standard deviation that is not positive"
+                                                   : "no standard deviation",
+                                   column, kDeviation));
     }
     measured.numbers.push_back({row, measured.outputs.size() - 1, *values[row], sd, name});
   }

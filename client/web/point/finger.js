@@ -104,7 +104,7 @@ function figureOf(caption, label) {
   };
 }
 
-/** The largest power of ten that shows the motion as at most a quarter of the finger. */
+/** Returns the largest power of ten that enlarges the motion to at most a quarter of the finger. */
 function enlargementOf(trace, size) {
   const rest = trace.nodes(0);
   let moved = 1e-12;

@@ -25,7 +25,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// Long enough that a signal arrives before its end.
+// Writes a study that runs long enough for a signal to arrive before it ends.
 void write_study(const test::TemporaryFolder& folder, int points) {
   std::ofstream(folder.path() / "study.toml")
       << "name = 'many'\n[model]\npreset = 'paper'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, "

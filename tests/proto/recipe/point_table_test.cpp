@@ -208,7 +208,7 @@ TEST(PointInputs, AreComparedAlsoInTextsOfModels) {
   }
 }
 
-TEST(PointInputs, WithoutAModelAreThoseOfAStudyThatLaterGrewByModels) {
+TEST(PointInputs, StayValidWithoutAModelAfterTheStudyGrewByModels) {
   const Axis H = listed("H", {0.8});
   const Axis mu = listed("mu", {0.0, 0.4});
   const Axis e = listed("e", {0.9});

@@ -370,7 +370,7 @@ TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
 
 // ---- Tables, views and triggers -----------------------------------------------------------------
 
-/// A database with three solved points, changed by other programs.
+/// A database with three solved points, which the tests change as other programs could.
 class SchemaTest : public StoreFixture {
  protected:
   SchemaTest() {
