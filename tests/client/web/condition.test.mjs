@@ -106,9 +106,9 @@ test("lines show a selection made elsewhere, and keys read their values", async 
   await page.close();
 });
 
-test("few points are drawn one by one, and chosen by pointing at them; many are gathered, and it is said", async () => {
+test("few points are drawn one by one, and chosen by pointing at them; many are grouped in bins, and the page says so", async () => {
   const page = await web.study(`#/study/${web.studies.scattered}?x=mu&y=fn_peak_N&z=H`);
-  await web.facts(page, /^300 points, each drawn/);
+  await web.facts(page, /^300 points, drawn one by one/);
   const id = web.studies.scattered;
   const [[lowest, mu]] = await web.rowsOf(page, id, {
     select: "point,mu",
@@ -124,9 +124,9 @@ test("few points are drawn one by one, and chosen by pointing at them; many are 
   const many = await web.study(`#/study/${web.studies.many}?x=mu&y=fn_peak_N&z=H`);
   await web.facts(
     many,
-    /^20\u202f100 points in [\d\u202f]+ bins\. More than 20\u202f000 points are gathered/,
+    /^20\u202f100 points in [\d\u202f]+ bins\. More than 20\u202f000 points are grouped in bins/,
   );
   await web.write(many, web.whereField, "mu < 0.5");
-  await web.facts(many, /each drawn/);
+  await web.facts(many, /drawn one by one/);
   await many.close();
 });

@@ -127,7 +127,7 @@ test("a sample is drawn as points; their lines are medians and quartiles; its hi
       };
     },
   });
-  await web.facts(page, /^300 points, each drawn/);
+  await web.facts(page, /^300 points, drawn one by one/);
   await page.select(".controls select", "lines");
   await web.facts(page, /Median and quartiles of 300 points in \d+ bins/);
   await web.shows(page, ".legend", /median25 % lie below75 % lie below/);
@@ -305,7 +305,7 @@ test("a server that does not answer is reported, and requests to it are repeated
   });
   await page.setOfflineMode(true);
   await web.slideTo(page, ".sliders input", 2);
-  await web.shows(page, "p.said", /^The server does not answer: the last answer is shown\.$/);
+  await web.shows(page, "p.said", /^The server does not answer\. The last answer is shown\.$/);
   await web.goTo(page, "#/study/1/point/3");
   await web.shows(page, "main [role=alert]", /^The server does not answer\.$/);
   await page.evaluate(() => history.back());
