@@ -1,4 +1,4 @@
-// Installed and packed files, whether programs run from there, and systemd's opinion of the units.
+// Installed and packaged files, programs that run from them, and checks of the units by systemd.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -26,7 +26,7 @@ using ::testing::IsSupersetOf;
 using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
-/// Runs `program` (searched in PATH) to its end in `folder`.
+/// Runs `program`, which is searched in PATH, to its end in `folder`.
 Outcome run_tool(const TemporaryFolder& folder, const std::string& program,
                  const std::vector<std::string>& arguments, const Environment& environment = {}) {
   std::vector<std::string> line{program};
@@ -35,13 +35,13 @@ Outcome run_tool(const TemporaryFolder& folder, const std::string& program,
   return process.outcome();
 }
 
-/// Whether PATH contains this program.
+/// Returns true if PATH contains `program`.
 bool is_there(const TemporaryFolder& folder, const std::string& program) {
   return run_tool(folder, "which", {program}).exit_code == 0;
 }
 
-/// Installs `component`, or everything if it is empty, for `prefix`, below `destination` if that is
-/// not empty. Returns the output of cmake --install.
+/// Installs `component` (empty: all) for `prefix`, in the staging folder `destination` if one is
+/// given. Returns the outcome of cmake --install.
 Outcome install(const TemporaryFolder& folder, const std::string& prefix,
                 const std::string& component = "", const std::string& destination = "") {
   std::vector<std::string> arguments{"--install", OBLIQUE_BUILD_FOLDER, "--prefix", prefix};
@@ -67,7 +67,7 @@ std::string text_of(const std::string& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// The same without manual pages, which exist only if help2man was installed for the build.
+/// Lists the files below `root` without manual pages, which exist only if the build had help2man.
 std::vector<std::string> files_beside_pages(const std::string& root) {
   auto files = files_below(root);
   std::erase_if(files, [](const std::string& file) { return file.starts_with("usr/share/man/"); });
@@ -204,7 +204,7 @@ TEST(InstallTest, EditedConfigurationStays) {
   EXPECT_EQ(text_of(configuration), "# mine\n");
 }
 
-// The packages that cpack makes.
+// Makes packages with cpack and returns their paths.
 std::vector<std::string> packages(const TemporaryFolder& folder, const std::string& generator) {
   const auto packing = run_tool(folder, OBLIQUE_CPACK,
                                 {"--config", OBLIQUE_BUILD_FOLDER "/CPackConfig.cmake", "-G",
@@ -324,12 +324,12 @@ TEST(InstalledLibraryTest, ItExportsOnlyTheNamesOfItsHeaders) {
 
 // ---- Units ----
 
-// Installed units, by file.
+// Installs everything and returns the paths of the systemd units.
 std::vector<std::string> installed_units(const TemporaryFolder& folder) {
   const std::string prefix = folder.file("prefix");
   EXPECT_EQ(install(folder, prefix).exit_code, 0);
   const std::string units = prefix + "/lib/systemd/system/";
-  // The template as one instance.
+  // Renames the template unit to the instance `lab`.
   std::filesystem::rename(units + "oblique-worker@.service", units + "oblique-worker@lab.service");
   return {units + "oblique-server.service", units + "oblique-worker.service",
           units + "oblique-worker@lab.service"};
@@ -344,8 +344,8 @@ TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
     EXPECT_EQ(verified.err, "") << unit << ": what it ignores it prints and lets pass";
-    // The threshold is in tenths of the exposure level. The network, local sockets and libzmq's
-    // threads need 1.2.
+    // The threshold is in tenths of systemd's exposure level. The access to network, local sockets
+    // and threads that the programs need has the level 1.2.
     const auto judged =
         run_tool(folder, "systemd-analyze",
                  {"security", "--offline=true", "--threshold=13", "--no-pager", unit});

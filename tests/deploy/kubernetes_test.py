@@ -56,7 +56,7 @@ class Manifests(unittest.TestCase):
 
     def test_programs_take_the_variables_that_pods_have(self):
         for workload, program in (SERVER, "oblique-server"), (WORKER, "oblique-worker"):
-            # Environment variables whose values the cluster sets.
+            # Stand-ins for values that the cluster sets.
             values = {n: v or {"OBLIQUE_WORKER_THREADS": "4"}.get(n, "pod-1")
                       for n, v in variables(workload).items()}
             printed = subprocess.run([PROGRAMS / program, "--print-config"], env=values, text=True,
@@ -108,7 +108,7 @@ class Manifests(unittest.TestCase):
             mount = mounts[str(file.parent)]
             self.assertTrue(mount["readOnly"])
             secret = next(v for v in pod(workload)["volumes"] if v["name"] == mount["name"])["secret"]
-            # The group's; a key that others may read is refused.
+            # The group may read the key; the programs refuse keys that others may read.
             self.assertEqual(secret["defaultMode"], 0o440)
             self.assertRegex(readme, f"create secret generic {secret['secretName']} .*--from-file=keys/{file.name}")
 

@@ -64,7 +64,7 @@ class Origin(InAFolder):
         self.assertEqual(self.origin_of(tree), (commit, "2026-11-20", "false"))
         (tree / ORIGIN / "origin.h").write_text("changed")
         self.assertEqual(self.origin_of(tree), (commit, "2026-11-20", "true"))
-        # A hook of another repository builds it.
+        # GIT_DIR names another repository, as it does in a hook of that repository.
         self.assertEqual(self.origin_of(tree, GIT_DIR="/nowhere"), (commit, "2026-11-20", "true"))
 
     def test_the_same_answer_leaves_the_file_alone(self):

@@ -90,7 +90,7 @@ class Packages(unittest.TestCase):
         self.assertEqual(script(library, "shlibs"), f"liboblique {soname} {library} (>= {VERSION})\n")
         for package in library, "liboblique-dev":
             self.assertEqual(field(package, "Multi-Arch"), "same")
-            # Packages of two architectures differ only in paths that contain the architecture.
+            # Packages of two architectures may differ only in paths that contain the architecture.
             self.assertEqual([f for f in files(package) if re.match(r"/usr/lib/(?!%s/)" % triplet, f)], [])
 
     def test_the_python_module_depends_on_python_and_numpy_only(self):
@@ -142,7 +142,7 @@ class Packages(unittest.TestCase):
     def test_lintian_has_no_errors_and_warns_of_nothing(self):
         if not shutil.which("lintian"):
             self.skipTest("there is no lintian here")
-        # Builds with sanitizers or assertions differ from the packages that are shipped.
+        # Only release builds are shipped; builds with sanitizers or assertions differ from them.
         if "CMAKE_BUILD_TYPE:STRING=Release" not in (BUILD / "CMakeCache.txt").read_text():
             self.skipTest("what is built is not what is shipped")
         run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",

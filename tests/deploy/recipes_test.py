@@ -41,7 +41,7 @@ class Recipe(unittest.TestCase):
         for file in (TREE / "deploy/examples").iterdir():
             shutil.copy(file, self.folder)
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("OBLIQUE_")}
-        # As where packages are installed, and pictures need no folder of fonts at home.
+        # PATH is as with installed packages; matplotlib stores its fonts outside the home folder.
         self.environment |= {"PATH": f"{PROGRAMS}:/usr/bin:/bin", "PYTHONPATH": str(MODULE),
                              "MPLCONFIGDIR": str(self.folder / "fonts")}
 
@@ -93,15 +93,15 @@ class StudyFromAScript(Recipe):
         rows = self.rows_of("friction.csv")
         self.assertEqual([round(float(r["mu"]), 9) for r in rows], [0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.4, 1.6])
         self.assertEqual(max(float(r["fn_peak_N"]) for r in rows), float(said.split()[-2]))
-        # Again: nothing is solved twice, and the answer is the same.
+        # A second run solves no point again and prints the same result.
         self.assertEqual(self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url),
                          said.replace(" 0 done", " 16 done; the server already had it"))
-        # Cancelled, it is not done: 1.
+        # A cancelled study is not done: exit code 1.
         self.run_in_folder("oblique", "submit", "--name", "long", "--preset", "paper", "--H", "1", "--mu", "0.1:2:1000", "--e",
                            "0.5:1:1000", OBLIQUE_SERVER=url)
         self.run_in_folder("oblique", "cancel", "long", OBLIQUE_SERVER=url)
         self.run_in_folder("oblique", "watch", "long", "--quiet", code=1, OBLIQUE_SERVER=url)
-        # Wrong usage: 2.
+        # Wrong usage: exit code 2.
         self.run_in_folder("sh", "study.sh", "", code=2, OBLIQUE_SERVER=url)
 
 
@@ -131,7 +131,7 @@ class FiguresOfThePaper(Recipe):
         self.assertEqual(len(lines), 11)
         for line in lines[1:-1]:
             *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())
-            # Tolerance: half of the last printed digit, and the 0.56 % of client/paper.
+            # Tolerance: half of the last printed digit, plus the rms difference of 0.56 % in client/paper.
             self.assertAlmostEqual(fn_kN, published_fn_kN, delta=0.005 + 0.006 * published_fn_kN)
             self.assertAlmostEqual(ft_kN, published_ft_kN, delta=0.005 + 0.006 * published_ft_kN)
         for number in 4, 5, 6, 7:

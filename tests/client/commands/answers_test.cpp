@@ -1,4 +1,4 @@
-// Valid and invalid answers of a server.
+// How `oblique` handles valid and invalid answers of a server.
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -15,7 +15,7 @@
 namespace oblique::client {
 namespace {
 
-/// A chunk with rows of one column, `point`.
+/// A chunk of rows with one column, `point`.
 protocol::QueryReply chunk_of(std::uint64_t number, const std::vector<std::int64_t>& points,
                               bool ends) {
   protocol::ChunkWriter rows({"point"});
@@ -36,7 +36,7 @@ std::string frame_of(std::uint64_t request_id, const protocol::QueryReply& chunk
   return protocol::encode(reply);
 }
 
-/// A server that returns two rows for a query; `more` makes its answer to each request for more.
+/// Answers a query with two rows, and each request for more rows with the result of `more`.
 ScriptedServer::Answer gives(
     std::function<std::vector<std::string>(std::uint64_t request_id, std::uint64_t taken)> more) {
   return [more](const protocol::ClientRequest& request) -> std::vector<std::string> {
@@ -50,7 +50,7 @@ ScriptedServer::Answer gives(
   };
 }
 
-/// A server with one study in `state`.
+/// Answers as a server with one study, whose state is `state`.
 ScriptedServer::Answer has_study(const std::string& state) {
   return [state](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
@@ -117,7 +117,7 @@ TEST(Answers, ThatStopEndWithOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
-  do {  // again if the first part was too late
+  do {  // repeats if the first chunk exceeded the timeout
     csv = ask(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);

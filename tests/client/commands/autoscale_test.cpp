@@ -29,17 +29,17 @@ TEST(JobsToSubmit, AreOnePerShareOfOpenPointsWithinLimitsMinusExistingJobs) {
     std::size_t submitted;
   } cases[] = {
       {0, 0, 0, 5, 0},      // nothing to do
-      {1, 0, 0, 5, 1},      // any open point needs a job
-      {100, 0, 0, 5, 1},    // 100 points per job
+      {1, 0, 0, 5, 1},      // one open point needs one job
+      {100, 0, 0, 5, 1},    // one job for each 100 points
       {101, 0, 0, 5, 2},    // rounded up
       {101, 1, 0, 5, 1},    // one job exists
-      {101, 2, 0, 5, 0},    // the wanted number exists
-      {101, 4, 0, 5, 0},    // more than wanted: they end by themselves
+      {101, 2, 0, 5, 0},    // both needed jobs exist
+      {101, 4, 0, 5, 0},    // surplus jobs end by themselves
       {1'000, 0, 0, 5, 5},  // the maximum
-      {1'000, 3, 0, 5, 2},  // the maximum, some of which exist
-      {1'000, 9, 0, 5, 0},  // more than the maximum exist
+      {1'000, 3, 0, 5, 2},  // maximum of 5 jobs, 3 exist
+      {1'000, 9, 0, 5, 0},  // maximum of 5 jobs, 9 exist
       {0, 0, 2, 5, 2},      // the minimum
-      {0, 1, 2, 5, 1},      // the minimum, one of which exists
+      {0, 1, 2, 5, 1},      // minimum of 2 jobs, 1 exists
       {~std::uint64_t{0}, 0, 0, 10'000, 10'000},
   };
   for (const auto& each : cases) {
@@ -56,12 +56,12 @@ TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
     const char* waits_for;
     std::uint64_t open;
   } cases[] = {
-      {"running", 100, 30, "", 65},  // 3 failed, 2 left out
+      {"running", 100, 30, "", 65},  // 3 points failed, a filter leaves out 2
       {"running", 100, 30, "a worker", 65},
       {"running", 100, 30, "the database, which accepts no results: disk full", 0},
       {"paused", 100, 30, "", 0},
       {"done", 100, 95, "", 0},
-      {"running", 10, 30, "", 0},  // wrong counts of a server
+      {"running", 10, 30, "", 0},  // impossible: more points solved than exist
   };
   protocol::StatusReply all;
   std::uint64_t sum = 0;
@@ -81,7 +81,7 @@ TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
   EXPECT_EQ(open_points(all), sum);
 }
 
-/// The program with a server and fake `squeue` and `sbatch`.
+/// `oblique autoscale` with a server and fake programs `squeue` and `sbatch`.
 class Autoscale : public testing::Test {
  protected:
   Autoscale() {

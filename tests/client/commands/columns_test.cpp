@@ -23,7 +23,7 @@ std::set<std::string> described_columns() {
   return names;
 }
 
-// The members of a JSON object; members of nested objects as energy.friction_J.
+// Returns the member names of a JSON object; a nested name has the form energy.friction_J.
 std::set<std::string> members_of(const nlohmann::ordered_json& json) {
   std::set<std::string> names;
   for (const auto& [name, value] : json.items()) {
@@ -38,7 +38,7 @@ std::set<std::string> members_of(const nlohmann::ordered_json& json) {
   return names;
 }
 
-// One point solved by `solve --json` and by `run`, with every column of `query`.
+// Results of one point: the output of `solve --json`, and all columns that `run` stored.
 class TwoWays : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -79,7 +79,7 @@ TEST_F(TwoWays, EveryMemberOfSolveJsonIsDescribedAndNoOther) {
   EXPECT_EQ(names, members_of(solved));
 }
 
-// Rows contain all digits of scalars and eight of numbers in lists.
+// Stored rows contain all digits of scalars, but only eight digits of numbers in lists.
 void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_json& member,
                  const std::string& name, bool is_in_list = false) {
   if (member.is_structured()) {

@@ -1,4 +1,4 @@
-// Queries of a database file, by the program itself.
+// Runs `oblique query` on a database file.
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// A folder with oblique.db, which contains four results of the study `a`.
+/// A folder whose oblique.db contains four results of the study `a`.
 class DatabaseQuery : public testing::Test {
  protected:
   DatabaseQuery() {

@@ -1,4 +1,4 @@
-// `oblique doctor`, whose output belongs to a defect report.
+// `oblique doctor`, whose output users attach to defect reports.
 #include <sys/stat.h>
 
 #include <filesystem>
@@ -29,13 +29,13 @@ class Doctor : public testing::Test {
     flags.insert(flags.begin(), "doctor");
     return test::run_oblique(folder_, flags);
   }
-  /// Its output, with exit code 0.
+  /// Returns the output of `oblique doctor`; expects exit code 0.
   std::string healthy(const std::vector<std::string>& flags) const {
     const auto outcome = outcome_of(flags);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
     return outcome.out;
   }
-  /// Its lines with errors, with exit code 1.
+  /// Returns the lines that report errors; expects exit code 1.
   std::string errors(const std::vector<std::string>& flags) const {
     const auto outcome = outcome_of(flags);
     EXPECT_EQ(outcome.exit_code, 1) << outcome.out << outcome.err;
@@ -71,7 +71,7 @@ TEST_F(Doctor, ReadsADatabaseWhoseServerWasKilled) {
   {
     server::Store store(folder_.file("data/alive.db"));
     test::add_study(store, "friction", 4, 2);
-    // Files of a killed server.
+    // These copies equal the files that a killed server leaves.
     std::filesystem::copy(folder_.file("data/alive.db"), folder_.file("data/dead.db"));
     std::filesystem::copy(folder_.file("data/alive.db-wal"), folder_.file("data/dead.db-wal"));
     EXPECT_THAT(healthy({"--db", "data/alive.db"}), HasSubstr("1 study, in use by a server"));

@@ -59,13 +59,13 @@ void expect_wrong_usage(const Words& words, const std::string& says) {
   EXPECT_THAT(outcome.err, AllOf(StartsWith("oblique"), HasSubstr(says))) << typed;
 }
 
-/// A command, or a command of a command.
+/// A command, such as `study`, or a subcommand, such as `study check`.
 struct Listed {
   Words words;       ///< as typed
   std::string help;  ///< its help
 };
 
-/// The names listed under "Subcommands:".
+/// Returns the names that a help text lists under "Subcommands:".
 Words listed_in(const std::string& help) {
   Words names;
   const auto begin = help.find("\nSubcommands:\n");
@@ -103,13 +103,12 @@ const std::vector<Listed>& every_command() {
   return commands;
 }
 
-/// The usage line of the help.
 std::string usage_of(const Listed& command) {
   const auto at = command.help.find("Usage: ");
   return command.help.substr(at, command.help.find('\n', at) - at);
 }
 
-/// A word for each required argument, and the required flags.
+/// Returns a value for each required argument, and the required flags with values.
 Words needed_words(const Listed& command) {
   Words words;
   std::istringstream usage(usage_of(command).substr(std::string("Usage: oblique").size()));
@@ -129,7 +128,7 @@ Words needed_words(const Listed& command) {
   return words;
 }
 
-/// Flags with a value, by the value's name in the help.
+/// Returns each flag that takes a value, with the value's name in the help, such as NUMBER.
 std::vector<std::pair<std::string, std::string>> flags_with_values(const Listed& command) {
   std::vector<std::pair<std::string, std::string>> flags;
   const std::regex line("\n  (--[A-Za-z0-9-]+) ([A-Z]+)(?![a-z|])");
@@ -143,7 +142,7 @@ std::vector<std::pair<std::string, std::string>> flags_with_values(const Listed&
 TEST(EveryCommand, HasAtLeastTwoExamplesInItsHelp) {
   ASSERT_GT(every_command().size(), 20U);
   for (const auto& command : every_command()) {
-    // Commands of a command share its examples.
+    // Subcommands share the examples of their command.
     const std::string call = "\n  oblique " + command.words.front();
     std::size_t examples = 0;
     for (auto at = command.help.find(call); at != std::string::npos;
@@ -268,7 +267,7 @@ TEST(Flags, ShowErrorsThatCannotControlTheTerminal) {
   }
 }
 
-/// A folder with oblique.db, which contains the study `friction`.
+/// A folder whose oblique.db contains the study `friction`.
 class EveryCommandThatReads : public testing::Test {
  protected:
   EveryCommandThatReads() {
@@ -291,7 +290,7 @@ TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingOneAndFailsWithO
     if (const Words rest = needed_words(command); rest.size() > 1) {
       words = with(words, {rest.begin() + 1, rest.end()});
     }
-    for (const char* flag : {"--yes", "--show"}) {  // some commands need these in a pipe
+    for (const char* flag : {"--yes", "--show"}) {  // required without a terminal
       if (command.help.find(flag + std::string(" ")) != std::string::npos) {
         words.emplace_back(flag);
       }

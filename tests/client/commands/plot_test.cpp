@@ -29,14 +29,14 @@ std::string contents_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-/// A folder with oblique.db: a study `a` with results for 4 of 12 points.
+/// A folder whose oblique.db contains a study `a` with results for 4 of 12 points.
 class Plot : public testing::Test {
  protected:
   Plot() {
     server::Store store(folder_.file("oblique.db"));
     test::add_study(store, "a", 12, 4);
   }
-  /// Draws SVG on standard output, unless the arguments say otherwise.
+  /// Runs `oblique plot`, which writes SVG to standard output unless `arguments` set an output.
   test::Outcome plot(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "plot");
     const auto says_where = [](const std::string& word) {

@@ -17,7 +17,7 @@ std::string text_of(const std::string& name) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The text between the mark of `command` and the end mark.
+// Returns the text between the HTML comment that names `command` and the end comment.
 std::string shown(const std::string& text, const std::string& command) {
   const std::string mark = "<!-- $ " + command + " -->\n";
   const auto begin = text.find(mark);
@@ -28,7 +28,7 @@ std::string shown(const std::string& text, const std::string& command) {
   return text.substr(from, text.find("<!-- end -->", from) - from);
 }
 
-// A command and its output as .ci/tables writes them.
+// Returns a command and its output in the format that .ci/tables writes.
 std::string block_of(const std::string& command, const std::string& printed) {
   return "\n```\n$ " + command + "\n" + printed + "```\n\n";
 }

@@ -33,7 +33,7 @@ void write_study(const test::TemporaryFolder& folder, int points) {
       << points << " }\ne = 0.9\n";
 }
 
-// Waits for a condition; the test's time limit ends a wait without success.
+// Waits until `condition` holds; the test's time limit ends an endless wait.
 void wait_for(const std::function<bool()>& condition) {
   while (!condition()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -50,7 +50,7 @@ std::uint64_t solved(const test::TemporaryFolder& folder) {
   }
 }
 
-// Starts the program and waits for the first results.
+// Waits for the first results, and expects three child processes of the program.
 void wait_until_at_work(const test::TemporaryFolder& folder, const test::Process& program) {
   wait_for([&] { return solved(folder) > 0; });
   ASSERT_EQ(test::children_of(program.pid()).size(), 3U);
@@ -114,7 +114,7 @@ TEST(Run, EstimatesErrorsOfAllPointsOrNone) {
                " FROM runs GROUP BY study ORDER BY study",
                "--format", "csv"});
   EXPECT_THAT(sql.out, HasSubstr("with,2,2,2,2\nwithout,2,0,0,0\n"));
-  // The same name with another definition is another study.
+  // A study of the same name exists, and its definition differs.
   const auto refused = run({"--name", "with"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.err, HasSubstr("errors: stored true, given false"));
@@ -127,7 +127,7 @@ TEST(Run, OfAStudyPausedElsewhereNamesTheRemedyAndEndsWithOne) {
   arguments.push_back("--verbose");
   test::Process program(folder, test::client_program(), arguments);
   wait_until_at_work(folder, program);
-  // The server's log contains its address for clients and the folder with the keys.
+  // The log contains the server's address for clients and the folder of the keys.
   const auto said = program.err();
   const auto word_after = [&said](const std::string& words) {
     const auto rest = said.substr(said.find(words) + words.size());

@@ -1,4 +1,4 @@
-// Studies that grow, are renamed and deleted, from the command line.
+// Commands that extend, rename and delete studies.
 #include <fstream>
 #include <string>
 #include <vector>
@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// A study file with that many points; the first ones are always the same.
+/// A study file of `blocks` blocks with two points each. More blocks only append points.
 std::string study_text(int blocks) {
   std::string text = "name = \"friction\"\n[model]\npreset = \"paper\"\n";
   for (int block = 0; block < blocks; ++block) {

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 const std::string kExampleStudies = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
 
-/// The output of `study check --json` with these arguments.
+/// Returns the output of `study check --json` with these arguments.
 nlohmann::json checked(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {"study", "check", "--json"});
   const auto outcome = test::run_oblique(arguments);

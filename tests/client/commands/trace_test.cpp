@@ -1,4 +1,4 @@
-// Points solved again by the program itself: in this process, by a worker, and when both fail.
+// `oblique trace` solves a point again, in its own process or on a worker, and reports errors.
 #include <algorithm>
 #include <csignal>
 #include <fstream>
@@ -22,7 +22,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// A study over models with errors, and one with fixed steps; both on coarse meshes to save time.
+/// A study of two models with error estimates, and one with fixed steps. Coarse meshes save time.
 const std::map<std::string, const char*> kStudies{{"models", R"(name = "models"
 errors = true
 [model]
@@ -48,13 +48,13 @@ class TraceCommand : public testing::Test {
   test::Outcome run(const std::vector<std::string>& arguments) {
     return test::run_oblique(folder_, arguments);
   }
-  /// Solves that study in oblique.db.
+  /// Solves the study `name` and stores it in oblique.db.
   void solve_study(const std::string& name) {
     write_file(name);
     const auto outcome = run({"run", name + ".toml"});
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   }
-  /// Stores that study in oblique.db without results.
+  /// Stores the study `name` in oblique.db without results.
   void store_study(const std::string& name) {
     write_file(name);
     const Study study = parse_study(kStudies.at(name), name + ".toml", pretended_reach());
@@ -192,7 +192,7 @@ TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   }
   EXPECT_THAT(text_of("fall_here.csv"), testing::AllOf(StartsWith("t_s,"), HasSubstr(",falling,")));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
-  // Rows of each 50th instant, the ends of phases and the last instant, whoever solves the point.
+  // `--every 50` prints each 50th instant, ends of phases and the last instant.
   const auto thinned = ask({"models", "3", "--every", "50"});
   EXPECT_EQ(thinned.out, ask({"models", "3", "--every", "50", "--local"}).out);
   const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
@@ -201,7 +201,7 @@ TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
   EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
-  // A paused study: its points are solved for a trace, and stored only later.
+  // The first worker is killed before or during the trace of an unsolved point.
   std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"
 [model]
 elements_per_link = 12

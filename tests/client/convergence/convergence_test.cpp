@@ -21,7 +21,7 @@ using solver::CaseResult;
 
 constexpr double kNoRounding = 0.0;
 
-// limit + c h^p for h = 1, 1/2, 1/4, ...
+// Returns the values limit + c h^p for h = 1, 1/2, 1/4, ...
 std::vector<double> sequence(double limit, double c, double p, int values) {
   std::vector<double> all;
   for (int i = 0; i < values; ++i) {
@@ -33,7 +33,7 @@ std::vector<double> sequence(double limit, double c, double p, int values) {
 TEST(Richardson, FindsOrderLimitAndErrorOfAPureErrorTermExactly) {
   for (const double order : {0.5, 1.0, 2.0, 3.7}) {
     auto values = sequence(7.0, -3.0, order, 4);
-    values.insert(values.begin(), 1000.0);  // only the finest three count
+    values.insert(values.begin(), 1000.0);  // ignored: only the last three values count
     const auto found = extrapolate(values, 4.0, kNoRounding);
     EXPECT_EQ(found.trend, Trend::kMonotone);
     EXPECT_NEAR(found.order.value(), order, 1e-12);
@@ -43,7 +43,7 @@ TEST(Richardson, FindsOrderLimitAndErrorOfAPureErrorTermExactly) {
 }
 
 TEST(Richardson, ErrorEstimateIsRightToLeadingOrderWhenAHigherTermIsPresent) {
-  // v(h) = 2 + h^2 + h^3: on h = 1/16, 1/32, 1/64 the next term is h = 1/64 of the first.
+  // v(h) = 2 + h^2 + h^3 at h = 1/16, 1/32, 1/64: at the last h, h^3 is 1/64 of h^2.
   std::vector<double> values;
   for (const double h : {1.0 / 16, 1.0 / 32, 1.0 / 64}) {
     values.push_back(2.0 + h * h + h * h * h);
@@ -55,7 +55,7 @@ TEST(Richardson, ErrorEstimateIsRightToLeadingOrderWhenAHigherTermIsPresent) {
 }
 
 TEST(Richardson, DoesNotTrustALastDifferenceThatIsSmallByChance) {
-  // Differences 16 and 1e-6: an order of 24, which no method of order 2 has.
+  // The differences 16 and 1e-6 give order 24, which a method of order 2 cannot have.
   const std::vector<double> values{0.0, 16.0, 16.000001};
   const auto found = extrapolate(values, 2.0, kNoRounding);
   EXPECT_GT(found.order.value(), 20.0);
@@ -86,7 +86,7 @@ TEST(Richardson, ExtrapolatesOnlyMonotoneValues) {
 using Kind = ContactChange::Kind;
 using solver::PhaseKind;
 
-// A contact with these turns (peak, valley, peak, ...) that ends at 100 us.
+// A contact that ends at 100 us, with alternating force peaks and valleys at `turns_us`.
 CaseResult with_turns(const std::vector<double>& turns_us) {
   CaseResult result{};
   double start_s = 0.0;
@@ -279,7 +279,7 @@ TEST(StepLevels, StartAtTheShortestStepOfTheModelAndHalveBothSteps) {
   ASSERT_EQ(levels.size(), 3U);
   EXPECT_EQ(levels[1].name, "dt/2");
   EXPECT_DOUBLE_EQ(levels[1].model.dt_s, levels[0].model.dt_s / 2.0);
-  // Restitution at e* = 0.2 takes shorter steps than compression.
+  // At e* = 0.2 restitution is stiffer than compression and needs shorter steps.
   EXPECT_LT(levels[0].model.dt_s, step_levels({}, 1.0, 2)[0].model.dt_s);
   solver::ModelParameters model = solver::preset("paper");
   model.dt_fall_s = 2e-6;
@@ -332,7 +332,7 @@ TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
       "step",
       solve_levels(step_levels(model, 1.0, 2), {1.0, 0.4, 1.0}, line, [](const SolvedLevel&) {}));
   EXPECT_TRUE(converges(refinement));
-  // The exit speed converges last and is far above rounding; the order must be at least 3.8.
+  // The exit speed converges last, and its error is far above rounding.
   const auto& vn_out = named(refinement.convergence, "vn_out_m_s");
   EXPECT_GT(vn_out.extrapolation.order.value(), 3.8);
   EXPECT_LT(vn_out.extrapolation.error.value(), 1e-5);
@@ -357,7 +357,7 @@ std::string shown(const Refinement& refinement) {
 TEST(Verdict, GivesTheLargestErrorsOfThePointThatConverges) {
   const auto text =
       shown(refinement_with({second_order(0.1), second_order(0.05), second_order(0.025)}));
-  // h^2 of the value: 0.0625 % at h = 0.025, 1 % at 0.1.
+  // The relative error is h^2: 0.0625 % at h = 0.025, 1 % at h = 0.1.
   EXPECT_NE(text.find("The step converges; largest estimated error on dt/4: 0.062 %"),
             std::string::npos)
       << text;
@@ -404,7 +404,7 @@ TEST(Verdict, NamesOutputsThatStillChangeByMoreThanAThousandthOfTheirScale) {
   auto middle = second_order(0.05);
   coarsest.vt_out_m_s = -1.001;
   middle.vt_out_m_s = -1.0;
-  finest.vt_out_m_s = -1.005;  // of a speed of 7 m/s at touch
+  finest.vt_out_m_s = -1.005;  // changes by 0.07 % of the speed at touch, 7 m/s
   EXPECT_TRUE(converges(refinement_with({coarsest, middle, finest})));
 }
 

@@ -8,7 +8,7 @@
 namespace oblique::client {
 namespace {
 
-/// All output that a command can write at a verbosity.
+/// Returns the messages that a console writes at a verbosity, of all kinds.
 std::string written_at(Verbosity verbosity) {
   std::ostringstream out;
   std::ostringstream err;

@@ -56,10 +56,10 @@ TEST(Progress, DrawsPlainLinesWithoutATerminal) {
   EXPECT_NE(text.find("10 points/s, 1 min 10 s left"), std::string::npos) << text;
 }
 
-/// A study of 5000 points on a terminal.
+/// The progress bar of a study of 5000 points on a terminal.
 class Drawn {
  public:
-  /// The bar after an update.
+  /// Updates the bar and returns its text.
   std::string at(double elapsed_s, std::uint64_t completed) {
     progress_.update(
         {.study = "s", .points = 5000, .completed = completed, .elapsed_s = elapsed_s});
@@ -82,7 +82,7 @@ TEST(Progress, FollowsTheRateOfTheLastSeconds) {
     bar.at(static_cast<double>(second), 990 + second);
   }
   EXPECT_THAT(bar.at(70.0, 1060), HasSubstr(" 1 points/s"));
-  bar.at(600.0, 1061);  // the server was unreachable
+  bar.at(600.0, 1061);  // the server was unreachable for 530 s
   bar.at(605.0, 1561);
   EXPECT_THAT(bar.at(611.0, 2161), HasSubstr(" 100 points/s, 28 s left"));
 }
@@ -145,7 +145,7 @@ class Description {
     };
   }
   void wait_until_drawn() const {
-    while (drawn_ < 2) {  // the first drawing is complete by then
+    while (drawn_ < 2) {  // the second drawing starts after the first is complete
       std::this_thread::yield();
     }
   }
@@ -155,7 +155,7 @@ class Description {
   std::atomic<int> drawn_{0};
 };
 
-/// The final screen of a terminal after this output.
+/// Returns the text on a terminal after the output `written`.
 std::string on_screen(const std::string& written) {
   std::string screen;
   std::string line;
@@ -164,7 +164,7 @@ std::string on_screen(const std::string& written) {
       screen += line + '\n';
       line.clear();
     } else if (written[i] == '\r') {
-      line.clear();  // every drawing begins with this and erases the rest
+      line.clear();  // each drawing begins with \r and erases the rest of the line
     } else if (written.compare(i, 3, "\x1b[K") == 0) {
       i += 2;
     } else {

@@ -1,4 +1,4 @@
-// Destinations of rows: files that are written atomically.
+// Output of rows to files, which are written atomically.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -35,7 +35,7 @@ class RowOutputTest : public testing::Test {
                       std::filesystem::directory_iterator()));
   }
 
-  /// Writes the column a with the value 1 to `file`.
+  /// Writes one row, with the value 1 in the column `a`, to `file`.
   void write(const std::string& file, Format format = Format::kCsv) const {
     RowOutput out({.format = format, .file = file});
     out.print(row_);

@@ -1,4 +1,4 @@
-// Rows as tables, CSV and JSON.
+// Rows printed as tables, CSV and JSON.
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -62,7 +62,7 @@ TEST(JsonLines, HaveAnObjectALine) {
       "{\"n\":null,\"x\":1e-300,\"s\":\"\\\"\"}\n");
 }
 
-/// The JSON value of a column with that text.
+/// Returns the JSON value that is printed for the cell `text` of a column.
 std::string json_value(const std::string& column, const std::string& text) {
   const std::string line = printed(Format::kJsonLines, {chunk_of({column}, {{text}})});
   const std::size_t begin = column.size() + 4;

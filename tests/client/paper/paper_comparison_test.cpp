@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-// Two cases: one with two peaks, two phases and a stick time, one without numbers.
+// Two published cases: one with two peaks, two phases and a stick time, one without numbers.
 PublishedTable small_table() {
   PublishedCase counted;
   counted.H_m = 1.0;
@@ -37,10 +37,10 @@ PublishedTable small_table() {
           .misprints = {{.where = "column 3", .printed = {"7.0 kN"}, .why = "it is column 2"}}};
 }
 
-// The third peak is a ripple.
+// A list of three peaks; the third is a ripple.
 constexpr const char* kLateRipple = "[[1e-5,4040,2020,1],[2e-5,1000,500,1],[3e-5,990,495,0]]";
 
-/// The row of a point with e = 1.
+/// A stored row of a point with e* = 1.
 protocol::Table rows_of_point(double H_m, double mu, const std::string& peaks = kLateRipple) {
   protocol::Table rows;
   rows.rows.push_back({std::int64_t{0}, H_m, mu, 1.0, peaks,
@@ -77,7 +77,8 @@ TEST(Comparison, IgnoresPhasesOfARowFromTheFirstRippleOn) {
 TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
   using solver::PhaseKind;
   solver::CaseResult result{};
-  // Turns at 4000, 100, 200, 150, 1000 N: the peak of 200 and the valley of 150 are a ripple.
+  // The force turns at 4000, 100, 200, 150, 1000 N; the peak of 200 N and the valley of 150 N form
+  // a ripple.
   result.phases = {
       {PhaseKind::kCompression, 0.0, 1.0, 4000.0}, {PhaseKind::kRestitution, 1.0, 3.0, 100.0},
       {PhaseKind::kCompression, 3.0, 4.0, 200.0},  {PhaseKind::kRestitution, 4.0, 5.0, 150.0},

@@ -20,7 +20,7 @@ const std::vector<PaperFigure>& figures() {
   return all;
 }
 
-/// The diamonds of a panel; empty if nothing is published.
+/// Returns the published numbers of a panel, which are drawn as diamonds; empty if it has none.
 plot::Curve published_in(const plot::Panel& panel) {
   return panel.curves.back().mark == plot::Curve::Mark::kDiamonds ? panel.curves.back()
                                                                   : plot::Curve{};
@@ -34,8 +34,8 @@ std::size_t published_in(const PaperFigure& figure) {
   return count;
 }
 
-/// The smallest distance between a line of the panel and the point, as a share of the panel's
-/// height.
+/// Returns the smallest difference in y between the point (x, y) and a line of the panel, as a
+/// share of y.
 double nearest_share(const plot::Panel& panel, double x, double y) {
   double nearest = 1e9;
   for (const auto& curve : panel.curves) {
@@ -63,8 +63,8 @@ TEST(PaperFigures, AreFigures3To7WithTheGroupsOfThePaper) {
 
 TEST(PaperFigures, MarkEveryPublishedNumberOfTheirGroups) {
   EXPECT_EQ(published_in(figures()[0]), 9U);   // peaks at three e*
-  EXPECT_EQ(published_in(figures()[1]), 60U);  // 6 + 9 + 9 + 6 peaks of F_n, as many of F_t
-  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases over e*; those of e* = 1 thrice
+  EXPECT_EQ(published_in(figures()[1]), 60U);  // F_n has 6 + 9 + 9 + 6 peaks, F_t too
+  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases; 4 of them thrice more
   EXPECT_EQ(published_in(figures()[3]), 3U);   // ends of stick
   EXPECT_EQ(published_in(figures()[4]), 0U);   // nothing is published
 }

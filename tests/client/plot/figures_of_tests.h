@@ -23,7 +23,7 @@ inline Panel panel_over_mu_and_H() {
   return panel;
 }
 
-/// n by m cells, all solved, with the values 0, 1, 2, ...
+/// A grid of solved cells with the values 0, 1, 2, ...
 inline Cells counted_cells(std::size_t columns, std::size_t rows) {
   const auto along = [](double from, double step, std::size_t count) {
     return cells_between({.range = {from, from + step * static_cast<double>(count)}}, count);
@@ -52,7 +52,7 @@ inline Figure map_of(Cells cells) {
   return figure;
 }
 
-/// A map of numbers with one unsolved, one excluded and one failed cell, and one without a value.
+/// A map of numbers in which one cell is unsolved, one excluded, one failed, and one has no value.
 inline Figure gappy_map() {
   Cells cells = counted_cells(6, 4);
   const std::vector<std::pair<std::size_t, CellState>> gaps{{3, CellState::kNoResult},
@@ -66,7 +66,7 @@ inline Figure gappy_map() {
   return map_of(std::move(cells));
 }
 
-/// A map of three categories, the last of which is for others, with one unsolved cell.
+/// A map of three categories, with one unsolved cell. The third category combines rare modes.
 inline Figure category_map(const std::string& name = "SC sR") {
   Cells cells = counted_cells(30, 20);
   for (std::size_t i = 0; i < cells.values.size(); ++i) {
@@ -130,7 +130,8 @@ inline Figure named_bars(const std::string& name = "SC sR") {
   return figure_with(std::move(panel));
 }
 
-/// Two panels as for a point: spans, curves with a gap, published numbers, and one scale.
+/// Forces of a point with spans, a gap and a published number; a shape with equal scales of x and
+/// y.
 inline Figure panels() {
   Panel forces;
   forces.title = "Forces";

@@ -1,4 +1,4 @@
-// Rows of answers grouped in cells and lines.
+// Rows of query results, grouped into the cells of maps and the points of lines.
 #include "client/plot/figure.h"
 
 #include <cmath>
@@ -27,7 +27,7 @@ AnswerColumn numbers(std::vector<double> values) {
   return {.name = "v", .unit = {}, .numbers = std::move(values)};
 }
 
-/// One text per row; empty: none.
+/// A column with one text per row; an empty text means no value.
 AnswerColumn texts(const std::vector<std::string>& values) {
   AnswerColumn column{.name = "t", .unit = {}};
   for (const auto& value : values) {
@@ -37,7 +37,7 @@ AnswerColumn texts(const std::vector<std::string>& values) {
   return column;
 }
 
-/// A stream of prepared chunks.
+/// A stream that returns prepared chunks of rows.
 class Chunks : public RowStream {
  public:
   explicit Chunks(std::vector<protocol::QueryReply> chunks) : chunks_(std::move(chunks)) {

@@ -1,4 +1,4 @@
-// Figures as gnuplot scripts, gnuplot's pictures of them, and figures as CSV.
+// Figures written as gnuplot scripts, drawn by gnuplot, and written as CSV.
 #include "client/plot/picture_file.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Pictures of a point.
+// Figures of the time history of one point.
 #include <cmath>
 #include <string>
 
@@ -16,8 +16,8 @@ using testing::ElementsAre;
 using testing::Field;
 using testing::HasSubstr;
 
-/// An invented contact of 200 us with rising and falling force: it sticks for a quarter of the
-/// time, is compressed for a half, and e* = 0.5 makes restitution four times as stiff.
+/// An invented contact of 200 us whose force rises and falls. The tip sticks for a quarter of the
+/// time, compression takes a half, and e* = 0.5 makes restitution four times as stiff.
 PointHistory small_history() {
   PointHistory history{.name = "Point 3 of a study",
                        .model = solver::preset("paper"),
@@ -74,7 +74,7 @@ TEST(PointPanels, HysteresisSeparatesBranchesThatMeetAtTheTurn) {
   const auto curves = panel_of(small_history(), PointPanel::kLoop).curves;
   ASSERT_EQ(curves.size(), 2U);
   EXPECT_EQ(curves[0].name, "compression");
-  ASSERT_EQ(curves[0].x.size(), 12U);  // eleven instants and the gap
+  ASSERT_EQ(curves[0].x.size(), 12U);  // eleven instants and one gap
   EXPECT_DOUBLE_EQ(curves[0].y[10], 1000.0);
   EXPECT_TRUE(std::isnan(curves[0].x[11]));
   EXPECT_DOUBLE_EQ(curves[1].x[0], curves[0].x[10]);
@@ -88,10 +88,10 @@ TEST(PointEnergies, AreLostByPOrStoredInTheElement) {
   const auto& friction = curves[3].y;
   const auto& element = curves[4].y;
   EXPECT_DOUBLE_EQ(friction[5], 0.0) << "P sticks";
-  // In stick both elements are springs: energy is half of force times deformation.
+  // During stick both contact elements are springs with energy force * deformation / 2.
   const auto& stuck = history.rows[5];
   EXPECT_NEAR(element[5], 0.5 * stuck.fn_N * (-stuck.uy_m - stuck.ux_m), 1e-12);
-  // At the end the tangential spring is empty, and the normal one has lost 1 - e*^2 of its work.
+  // At the end the tangential spring has no energy, and the normal one has lost 1 - e*^2 of it.
   EXPECT_NEAR(element.back(), 0.5 * 1000.0 * 1e-4 * (1.0 - 0.25), 1e-12);
   EXPECT_GT(friction.back(), 0.0);
   EXPECT_DOUBLE_EQ(curves[0].y.back(), -1.0);

@@ -1,4 +1,4 @@
-// From rows of a source to a figure.
+// Figures made from the rows of a study.
 #include "client/plot/plot_request.h"
 
 #include <cmath>
@@ -49,7 +49,7 @@ class MadeRows : public Source {
   protocol::QueryReply answer_;
 };
 
-/// The figure of these rows, for a study of H in {0.5, 1} and mu in {1, 2, 3}.
+/// Returns the figure of `rows` for a study with H in {0.5, 1} and mu in {1, 2, 3}.
 Figure figure_from(PlotRequest request, const std::vector<std::string>& columns, const Rows& rows) {
   const auto study = parse_study("name = \"s\"\n[[block]]\nH = [0.5, 1]\nmu = [1, 2, 3]\ne = 1\n",
                                  "s.toml", [](const auto&...) {});

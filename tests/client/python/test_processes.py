@@ -36,7 +36,7 @@ def test_ctrl_c_ends_work_with_keyboard_interrupt(work, database):
     assert process.returncode in (-signal.SIGINT, 130)
 
 
-#: Threads get time to take the lock of Python before it ends.
+#: Delays the end of Python, so that other threads have time to take its global lock.
 ENDS_LATE = """
 import time
 class EndsLate:

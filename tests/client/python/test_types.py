@@ -36,5 +36,5 @@ def test_a_program_that_uses_the_module_is_typed_strictly(tmp_path):
 
 
 def test_the_module_itself_is_typed_strictly(tmp_path):
-    # pandas of Debian 12 has no types.
+    # Debian 12's pandas has no type annotations.
     strictly_typed(tmp_path, "--ignore-missing-imports", "-p", "oblique")

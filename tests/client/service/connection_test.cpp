@@ -84,7 +84,7 @@ TEST(Connection, ThrowsTheServersErrors) {
   }
 }
 
-/// A reply to a status request with that number of workers.
+/// A reply to a status request that reports `workers` workers.
 std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
                                        std::uint32_t workers) {
   auto reply = reply_to(request);
@@ -115,7 +115,7 @@ TEST(Connection, SendsARequestAgainIfTheServerDied) {
     }
     return true;
   };
-  // The timeouts are so long that only the new connection causes another request.
+  // With such long timeouts only a new connection causes the client to send the request again.
   Connection connection(
       {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
       replace_when_taken);
@@ -168,7 +168,7 @@ TEST(Connection, WithATellReportsSilenceAndTheNextAnswer) {
           port.url());
     }
   };
-  // Far longer than the timeout of an answer.
+  // The server starts only after this timeout of 10 ms.
   Connection connection(at(port.url(), 10));
   EXPECT_EQ(connection.status("", tell).at(0).points(), 5U);
   ASSERT_EQ(sentences.size(), 2U);
@@ -176,7 +176,7 @@ TEST(Connection, WithATellReportsSilenceAndTheNextAnswer) {
   EXPECT_NE(sentences[1].find("answers again"), std::string::npos) << sentences[1];
 }
 
-/// StillWorking, which a server sends while a query waits or runs.
+/// The message StillWorking, which a server sends while a query waits or runs.
 std::string still_working(const protocol::ClientRequest& request, bool runs) {
   protocol::ClientReply word;
   word.set_request_id(UINT64_MAX);
@@ -192,7 +192,7 @@ TEST(Connection, ReportsAQueryThatTheServerHasNotFinishedInTime) {
       return std::vector{still_working(request, runs)};
     });
     std::string message;
-    do {  // again if the message of the server was too late
+    do {  // repeats if the server's message exceeded the timeout
       Connection connection(at(server.url(), 500));
       try {
         connection.query("SELECT 1");

@@ -14,11 +14,11 @@
 
 namespace oblique::client {
 
-/// A server that answers each request with the result of `answer` until it is destroyed. Then its
-/// connections end, as when a process is killed.
+/// A server that answers each request with the result of `answer`. Its destructor ends all
+/// connections, as a kill of the process does.
 class ScriptedServer {
  public:
-  /// Returns replies to send; none: the request is ignored.
+  /// Returns the replies to a request; if it returns none, the request is ignored.
   using Answer = std::function<std::vector<std::string>(const protocol::ClientRequest&)>;
 
   explicit ScriptedServer(Answer answer, const std::string& endpoint = "tcp://127.0.0.1:*")
@@ -53,7 +53,7 @@ class ScriptedServer {
         }
       }
     } catch (const zmq::error_t&) {
-      // The context was shut down; it waits for its socket to be closed.
+      // The destructor has shut down the context, which waits until the socket is closed.
       socket_.close();
     }
   }

@@ -28,7 +28,7 @@
 namespace oblique::client {
 namespace {
 
-/// A current folder; the test sets OBLIQUE_SERVER.
+/// Runs tests in a temporary current folder, and unsets OBLIQUE_SERVER before and after.
 class SourceTest : public ::testing::Test {
  protected:
   SourceTest() {
@@ -59,7 +59,7 @@ class SourceTest : public ::testing::Test {
   }
 
   std::unique_ptr<Source> open(const SourceFlags& flags) { return open_source(console_, flags); }
-  /// The name of a source's only study; a file's study is named after the file.
+  /// Returns the name of the source's only study, which identifies the source.
   std::string study_of(const SourceFlags& flags) { return open(flags)->status({}).at(0).name(); }
 
   std::ostringstream err_;
@@ -196,8 +196,7 @@ TEST(WaitMessages, ReportAChangedReason) {
   EXPECT_EQ(update(messages, 6, "the database"), "The study waits for the database.");
 }
 
-// ---- Studies that are renamed
-// --------------------------------------------------------------------
+// ---- Renamed studies ----------------------------------------------------------------------------
 
 /// A source with one study.
 class OneStudy : public Source {

@@ -53,7 +53,7 @@ TEST(CsvFile, TakesIntegratorsByName) {
   EXPECT_EQ(file.values("integrator", protocol::axis_key("integrator")), (std::vector{0.0, 1.0}));
 }
 
-// Lines are counted in the file, including line breaks in quotes.
+// Line numbers count every line break of the file, also those in quoted fields.
 TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(csv_error("drop\n0.4\n0.x\n"),
               HasSubstr("measured.csv:3: column `drop`: \"0.x\" is not a number"));

@@ -6,7 +6,7 @@
 
 namespace oblique::client {
 
-/// A share of the length near the paper's: 1.179156 m of 1.2 m.
+/// Invented largest drop: a fixed share of the length, as the paper's finger: 1.179156 m of 1.2 m.
 inline double pretended_drop_m(const solver::ModelParameters& model) {
   return 0.98263 * std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
 }

@@ -14,7 +14,7 @@ TEST(Reach, AFallIsSolvedOnceForAllBlocksThatShareIt) {
   std::string text;
   for (int i = 0; i < 50; ++i) {
     text += "[[block]]\nH = 1.1\nmu = 0." + std::to_string(100 + i) + "\ne = 1\n";
-    text += "k = [1e7, 2e7]\n";  // the contact's stiffness does not change the fall
+    text += "k = [1e7, 2e7]\n";  // k, the contact's stiffness, does not change the fall
   }
   ReachChecker checker(pretended_drop_m);
   EXPECT_EQ(parse_study(text, "x.toml", std::ref(checker)).recipe.blocks_size(), 50);

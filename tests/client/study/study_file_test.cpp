@@ -83,7 +83,7 @@ TEST(StudyFile, WithoutANameIsNamedAfterTheFile) {
   EXPECT_EQ(parsed(kPoint, "some/where/sweep.toml").name, "sweep");
 }
 
-/// The message of an error while reading a file.
+/// Returns the error message of reading a study file, or "accepted".
 std::string error_of_file(const std::string& path) {
   try {
     read_study_file(path, pretended_reach());
@@ -105,7 +105,7 @@ TEST(StudyFile, IsNamedIfItCannotBeRead) {
   EXPECT_THAT(error_of_file(folder.file("-x.toml")), testing::HasSubstr("name = \"-x\""));
 }
 
-/// A folder with a CSV file for studies.
+/// A folder with the CSV file to which study files refer.
 class StudyBesideAFile : public testing::Test {
  protected:
   StudyBesideAFile() {

@@ -9,7 +9,7 @@ namespace oblique::client {
 
 inline const std::string kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
 
-/// A block of one point with one line replaced or added.
+/// A block of one point in which `line` replaces a line or is added.
 inline std::string block_with(const std::string& line) {
   std::string text = "[[block]]\n";
   for (const std::string key : {"H = 1\n", "mu = 0.4\n", "e = 1\n"}) {
@@ -18,7 +18,7 @@ inline std::string block_with(const std::string& line) {
   return text;
 }
 
-/// The study of a file with this text, with invented falls.
+/// Parses the text of a study file. Falls are not solved but invented.
 inline Study parsed(const std::string& text, const std::string& file = "x.toml") {
   return parse_study(text, file, pretended_reach());
 }

@@ -17,10 +17,10 @@ namespace {
 
 using protocol::BlockKind;
 
-/// Does not check whether the tip reaches H.
+/// Accepts every study, even if the tip does not reach H.
 void no_reach_check(const protocol::PointTable&) {}
 
-/// Random recipes of every kind.
+/// Makes random recipes with every kind of block.
 class DrawnRecipe {
  public:
   explicit DrawnRecipe(unsigned seed) : random_(seed) {}
@@ -62,7 +62,7 @@ class DrawnRecipe {
     return model;
   }
 
-  /// A list, a range or an expression; in a sample also a distribution.
+  /// A random axis: a list or, in samples, a distribution; elsewhere a list, range or expression.
   protocol::Axis axis(const std::string& name, BlockKind kind, double from, double to) {
     const auto& key = protocol::axis_key(name);
     if (chance(0.3)) {
@@ -94,7 +94,7 @@ class DrawnRecipe {
   protocol::Block block() {
     const auto kind = static_cast<BlockKind>(below(3));
     std::vector<protocol::Axis> axes{axis("H", kind, 0.2, 0.8), axis("mu", kind, 0.1, 2.0)};
-    // At least one sampled axis, and no expression of itself.
+    // A sample needs a distribution. e is no expression, because expressions contain e.
     axes.push_back(kind == BlockKind::kSample
                        ? protocol::uniform("e", 0.5, 1.0)
                        : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0)));

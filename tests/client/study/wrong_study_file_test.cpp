@@ -11,12 +11,12 @@ namespace oblique::client {
 namespace {
 
 struct Wrong {
-  std::string text;   // of a file, of [model], or a line of a block
+  std::string text;   // whole file, content of [model], or line of a block
   std::string place;  // line and column
-  std::string says;   // a part of the message
+  std::string says;   // part of the error message
 };
 
-/// The file of each case consists of `before`, the text and `after`.
+/// `whole` turns the text of a case into a complete study file.
 template <typename Whole>
 void expect_refused(const std::vector<Wrong>& cases, Whole whole) {
   for (const auto& [text, place, says] : cases) {

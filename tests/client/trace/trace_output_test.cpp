@@ -1,4 +1,4 @@
-// Output of a trace, and separation of its fall.
+// Output of a trace to a file, and separation of the fall from the contact.
 #include "client/trace/solve_again.h"
 
 #include <cstddef>

@@ -9,10 +9,10 @@ const need = createRequire(join(process.env.OBLIQUE_NODE_MODULES, "x"));
 const puppeteer = need("puppeteer-core");
 const axeSource = need("axe-core").source;
 
-/** Only ends a wait that hangs. */
+/** Longest time that a test waits for an event. It only ends tests that hang. */
 const hangMs = 300_000;
 
-/** Shows a database with `oblique view` until `stop`. */
+/** Runs `oblique view` on a database until `stop` is called. */
 export class Server {
   constructor(oblique) {
     this.oblique = oblique;
@@ -42,7 +42,7 @@ export class Server {
   }
 }
 
-/** A browser that adds every error to `objections`. */
+/** A browser that adds every error of its pages to `objections`. */
 export class Browser {
   objections = [];
 
@@ -56,7 +56,7 @@ export class Browser {
       args: ["--disable-gpu", "--disable-dev-shm-usage", ...sandbox],
     });
     const first = await this.#tab();
-    await first.goto(server.address); // the token becomes a cookie
+    await first.goto(server.address); // sets a cookie from the token in the address
     await first.close();
   }
 
@@ -67,8 +67,8 @@ export class Browser {
   }
 
   /**
-   * A tab with a view. `early` runs before the page's scripts; with `isHurried` the page's timers
-   * are short; console lines that match `expected` are not errors.
+   * Opens a tab with a view. `early` runs before the page's scripts. `isHurried` shortens the page's
+   * timers. Console lines that match `expected` are not errors.
    */
   async open(view, { isHurried = false, expected = /^$/, early = () => {}, ...look } = {}) {
     const page = await this.#tab();
@@ -97,7 +97,7 @@ export class Browser {
     return page;
   }
 
-  /** The window of a tab and the reader's preferences. */
+  /** Sets the window size of a tab, and the colour scheme and motion that the reader prefers. */
   async look(page, { width = 1400, height = 900, scheme = "light", motion = "reduce" }) {
     await page.setViewport({ width, height });
     await page.emulateMediaFeatures([
@@ -106,7 +106,7 @@ export class Browser {
     ]);
   }
 
-  /** Errors that axe-core finds in a tab. */
+  /** Returns the accessibility errors that axe-core finds in a tab. */
   async faults(page) {
     if (!(await page.evaluate(() => "axe" in window))) await page.evaluate(axeSource);
     return page.evaluate(async () => {
@@ -121,7 +121,7 @@ export class Browser {
   }
 }
 
-/** Waits until `look` returns a value in the tab, and returns it. `look` may throw before. */
+/** Repeats `look` in the tab until it returns a value, and returns that value. Ignores its errors. */
 export async function until(page, look, ...given) {
   let cause;
   for (const end = Date.now() + hangMs; Date.now() < end;) {

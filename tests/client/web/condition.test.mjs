@@ -1,4 +1,4 @@
-// Conditions of the query language: the filter and the selection.
+// The filter and the selection of the page, which are conditions of the query language.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as web from "./setup.mjs";

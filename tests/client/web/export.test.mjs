@@ -1,4 +1,4 @@
-// Files, links and commands of a view, and refining.
+// Files, links and commands that a view offers, and the button Refine.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { readFileSync } from "node:fs";
@@ -6,7 +6,7 @@ import { join } from "node:path";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-/** Runs a command that the page shows. */
+/** Runs a command that the page shows, and returns its output. */
 function outputOf(command) {
   const words = web.wordsOf(command);
   assert.equal(words[words.indexOf("--db") + 1], web.server.database, command);
@@ -86,7 +86,7 @@ test("Refine submits the shown part of a map as a new study and shows it as it i
   ends.forEach((end, i) => assert.ok(Math.abs(end / expected[i] - 1) < 1e-12, `${ends}`));
   const name = ".picture .row input";
   assert.equal(await page.$eval(name, (one) => one.value), "friction-refined-2");
-  await web.write(page, name, "scattered"); // the browser has a saved file
+  await web.write(page, name, "scattered"); // a study of this name exists
   await page.click(".refine");
   await web.shows(page, "p.said.bad", /scattered/);
   await page.close();

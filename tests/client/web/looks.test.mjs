@@ -1,11 +1,11 @@
-// Every view, light and dark, wide and narrow.
+// Layout and colours of every view, light and dark, in wide and narrow windows.
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-/** Addresses, and elements that exist when they are drawn. */
+/** Address of each view, and selector of an element that exists once the view is drawn. */
 const views = {
   overview: ["#/", "tbody tr"],
   map: ["#/study/1?cell=3", ".choice a"],

@@ -1,7 +1,7 @@
-// Times that readers wait, from the click to what is painted: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]. Of a
-// database a copy is worked on; PAGE is the address of a server, with its token. The largest grid of which a tenth is solved
-// is looked at. PARTs are opening, modes, scatter, slider and large; all when none is named. OBLIQUE_FIGURES=FILE gets the
-// times as JSON as well.
+// Measures the time from a click to the painted picture: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]. The
+// script copies FILE.db before use; PAGE is the address of a server, with its token. It shows the largest study of which at
+// least a tenth is solved. PARTs are opening, modes, scatter, slider and large (default: all). OBLIQUE_FIGURES=FILE also
+// stores the times as JSON.
 import { constants, copyFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Browser, Server, until } from "./browser.mjs";
@@ -29,8 +29,8 @@ function say(part, what, times, wanted) {
 }
 
 /**
- * Runs in a tab before its scripts: painted_ms is the time of the first picture, `next` that of the
- * next one.
+ * Runs in a tab before its scripts. Stores in `paintedMs` when the first picture is painted; `next()`
+ * waits for the next picture and returns when it is painted.
  */
 function watchPictures() {
   const painted = () =>
@@ -66,7 +66,7 @@ async function opening(part, what, view) {
   await page.close();
 }
 
-/** Times from each step of a slider to its picture. */
+/** Measures the time from each step of a slider to the new picture. */
 async function sliding(view) {
   const page = await browser.open(view, { early: watchPictures });
   await until(page, () => window.paintedMs);
@@ -87,7 +87,7 @@ async function sliding(view) {
   await page.close();
 }
 
-/** A study of 10^9 points with some results. */
+/** Submits a study of 10^9 points, pauses it after its first results, and returns its number. */
 const beginLarge = (page) =>
   page.evaluate(async () => {
     const axis = (key, from, to) => ({ key, from, to, count: 1000 });

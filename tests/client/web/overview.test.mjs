@@ -5,11 +5,11 @@ import { join } from "node:path";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-/** Text fields of the form, by position. */
+/** Positions of the form's text fields. */
 const fields = { name: 0, H: 1, mu: 2, e: 3, sample: 4, where: 5 };
 
 async function form(how = {}) {
-  // All input is checked, also if it is not a study.
+  // The server checks each input, and answers 4xx if it is not a valid study.
   const page = await web.browser.open("#/new", { expected: /status of 4/, ...how });
   await page.waitForSelector("form");
   return page;
@@ -82,7 +82,7 @@ test("the form shows points, models, falls and size, and the errors of the serve
   assert.deepEqual(bare, [`oblique run ${flags}`, `oblique study check ${flags}`]);
   await fill(page, { H: "0.5:1.19:4" });
   await says(page, /H above 1\.08 m fail if the tip does not fall that far/);
-  await fill(page, { name: "friction", H: "1" }); // there is one, of other points
+  await fill(page, { name: "friction", H: "1" }); // a study of this name with other points exists
   await says(page, /different falls/);
   await page.click("form button");
   await web.shows(page, "form [role=alert]", /friction/);
@@ -115,7 +115,7 @@ test("the command of a form submits the same study as the form: model and sample
   assert.equal(points(web.server.database), points(other));
 });
 
-/** A server with many studies; a test sends its events. */
+/** Replaces the server in a tab by a fake one with many studies, whose events a test sends. */
 function manyStudies() {
   const real = window.fetch;
   const study = {

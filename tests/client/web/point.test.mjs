@@ -1,4 +1,4 @@
-// A point: time histories, moving finger, numbers.
+// The view of a point: time histories, moving finger, numbers.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
@@ -6,7 +6,7 @@ import * as web from "./setup.mjs";
 const time = (page) => web.textOf(page, ".player output");
 const finger = (page) => page.$eval(".two canvas[role=img]", (canvas) => canvas.toDataURL());
 
-/** Runs in a tab before its scripts: time and frames advance only by `goOn`. */
+/** Runs in a tab before its scripts. Then only `goOn` advances the clock and animation frames. */
 function framesByHand() {
   let now = 0;
   let next = 0;

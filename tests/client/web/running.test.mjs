@@ -1,4 +1,4 @@
-// Focus and cursor stay while a running study is loaded again.
+// Focus and cursor stay where they are when the page reloads a running study.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as web from "./setup.mjs";

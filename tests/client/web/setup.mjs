@@ -1,6 +1,5 @@
-// The server and the browser of a file's tests, and what they do in its tabs.
-// OBLIQUE_BIN: the folder of programs; OBLIQUE_NODE_MODULES; OBLIQUE_CHROMIUM; OBLIQUE_PAGE_DB: the database of which each file
-// has a copy.
+// Server and browser of one test file, and actions in the browser's tabs. Environment variables: OBLIQUE_BIN (folder of the
+// programs), OBLIQUE_NODE_MODULES, OBLIQUE_CHROMIUM, and OBLIQUE_PAGE_DB (database that each test file copies).
 import assert from "node:assert/strict";
 import { copyFileSync } from "node:fs";
 import { join } from "node:path";
@@ -12,14 +11,14 @@ export { until };
 export const server = new Server(join(process.env.OBLIQUE_BIN, "oblique"));
 export const browser = new Browser();
 export const mapCanvas = ".map canvas[tabindex]";
-/** Area that a test drags over. */
+/** Selector of the picture in which tests drag the mouse. */
 export const pictureIn = (view) => (/pic=(lines|histogram)/.test(view) ? ".u-over" : mapCanvas);
 export const whereField = ".conditions > div:first-child input";
 export const markField = ".marks input";
 
 /**
- * Studies by number: a grid, scattered points, more scattered points than are drawn one by one, a
- * single point.
+ * Numbers of the studies: a grid, scattered points, too many scattered points to draw each of them,
+ * a single point.
  */
 export const studies = { grid: 1, scattered: 2, many: 3, one: 4 };
 
@@ -47,12 +46,12 @@ export const shows = (page, selector, pattern) =>
   );
 
 export const facts = (page, pattern) => shows(page, ".facts", pattern);
-/** Waits until the table shows its number of rows. */
+/** Waits until the line with the table's number of rows matches `pattern`. */
 export const rowsSaid = (page, pattern) => shows(page, ".rows p[role=status]", pattern);
 export const fieldOf = (page, name) =>
   page.evaluate((of) => new URLSearchParams(location.hash.split("?")[1]).get(of) ?? "", name);
 
-/** A tab with the picture and the table of a study. */
+/** Opens a tab with the picture and the table of a study. */
 export async function study(view = "#/study/1", how = {}) {
   const page = await browser.open(view, how);
   await facts(page, /solved|points?[ ,]/);
@@ -60,14 +59,14 @@ export async function study(view = "#/study/1", how = {}) {
   return page;
 }
 
-/** A tab with a point that has been solved again. */
+/** Opens a tab with a point, and waits until the point has been solved again. */
 export async function point(how = {}) {
   const page = await browser.open("#/study/1/point/100", how);
   await until(page, () => document.querySelectorAll(".uplot").length === 4);
   return page;
 }
 
-/** Requests JSON from the server. */
+/** Sends a request to the server's API and returns the JSON answer. */
 export const api = (page, path, body) =>
   page.evaluate(
     async (of, text) => {
@@ -89,7 +88,7 @@ export async function submit(page, name, axes) {
   return (await api(page, "/api/studies", { name, model: { preset: "paper" }, recipe })).id;
 }
 
-/** A study that takes minutes. */
+/** Axes of a study that takes minutes. */
 export const longAxes = { H: [0.2, 1.1, 200], mu: [0.1, 2, 200], e: [0.5, 1, 50] };
 
 /** Goes to another view in the same tab. */
@@ -120,8 +119,8 @@ export const slideTo = (page, selector, value) =>
   );
 
 /**
- * Drags the mouse between positions in an element, given as shares of its size (of the area within
- * the margins for maps).
+ * Drags the mouse between two positions in an element. A position is a share of the element's size,
+ * in maps of the area within the margins.
  */
 export async function drag(page, selector, [x0, y0], [x1, y1]) {
   const box = await (await page.waitForSelector(selector)).boundingBox();
@@ -136,14 +135,14 @@ export async function drag(page, selector, [x0, y0], [x1, y1]) {
   await page.mouse.up();
 }
 
-/** A command on the page, split as a shell does. */
+/** Splits a command into words as a shell does, and drops the first word. */
 export const wordsOf = (command) =>
   command
     .match(/'(?:[^']|'\\'')*'|\S+/g)
     .map((word) => word.replace(/^'|'$/g, "").replaceAll("'\\''", "'"))
     .slice(1);
 
-/** Runs in a tab before its scripts: keeps the files that the page saves. */
+/** Runs in a tab before its scripts. Stores each file that the page saves in `saved` or `image`. */
 export function keepSaved() {
   const make = URL.createObjectURL;
   URL.createObjectURL = (blob) => {

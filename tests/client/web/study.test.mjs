@@ -1,4 +1,4 @@
-// A study: its map, its other pictures, its points.
+// The view of a study: map, other pictures, and table of points.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
@@ -18,7 +18,7 @@ test("a map shows the value of a cell; a click chooses it, a double click opens 
   const page = await web.study("#/study/1");
   await web.facts(page, /12 × 7 cells, 84 solved/);
   const box = await (await page.$(web.mapCanvas)).boundingBox();
-  const first = [box.x + 75, box.y + box.height - 60]; // at the bottom left
+  const first = [box.x + 75, box.y + box.height - 60]; // a cell at the bottom left
   await page.mouse.move(...first);
   await web.shows(page, ".reading", /mu 0.1, H 0.5 m: fn_peak_N [\d.]+ N/);
   const told = Number((await web.textOf(page, ".reading")).match(/fn_peak_N ([\d.]+)/)[1]);
@@ -181,7 +181,7 @@ test("a slider shows other values, and writes the address a few times, however f
       slider.value = String(i % 3);
       slider.dispatchEvent(new Event("input"));
     }
-    document.querySelector("h2.name").click(); // a click updates it
+    document.querySelector("h2.name").click(); // a click updates the address
     return [written, location.hash];
   });
   assert.ok(times <= 3, `${times} times`);
@@ -196,7 +196,7 @@ test("rows are turned a page at a time and sorted, by keys too, and the page is 
   await web.press(page, "Next");
   await web.rowsSaid(page, /^26 to 50 of 252 rows\.$/);
   await web.until(page, () => location.hash.includes("page=2"));
-  await web.write(page, web.whereField, "mu > 1"); // other rows start at the first page
+  await web.write(page, web.whereField, "mu > 1"); // a new filter returns to the first page
   await web.rowsSaid(page, /^1 to 25 of 126 rows/);
   await page.evaluate(() =>
     [...document.querySelectorAll("th button")].find((one) => one.textContent === "mu").focus(),
@@ -288,7 +288,7 @@ test("a study with failed points shows their number and the reason, and lists th
   const page = await web.browser.open("#/");
   const axes = { H: [1.15, 1.19, 3], mu: [0.5, 1, 2], e: [0.9, 1, 2] };
   const id = await web.submit(page, "too far", axes);
-  await web.goTo(page, `#/study/${id}`); // the tip turns back at 1.179 m
+  await web.goTo(page, `#/study/${id}`); // the tip falls at most 1.179 m
   const why = /^Point 8 failed: H = 1\.19 m is not allowed.* 1\.179\d* m.*Show all 4$/;
   await web.shows(page, ".failure", why);
   await page.click(".failure a");
