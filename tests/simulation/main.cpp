@@ -1,5 +1,5 @@
-// simulate FIRST COUNT [storms | forgetful]: runs COUNT seeds from FIRST on and prints those that
-// fail.
+// Usage: simulate FIRST COUNT [storms | forgetful]. Runs the seeds FIRST to FIRST + COUNT - 1 and
+// prints those that fail.
 #include <cstdint>
 #include <exception>
 #include <iostream>

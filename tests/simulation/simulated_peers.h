@@ -28,12 +28,12 @@ inline std::uint64_t mark_of(double H) {
   return static_cast<std::uint64_t>((H - 1.0) / kMarkInH);
 }
 
-/// H of all points of the study with that mark.
+/// Returns the H of all points of a study, which encodes the number `mark` of the study.
 inline double marked_H(std::uint64_t mark) {
   return 1.0 + static_cast<double>(mark) * kMarkInH;
 }
 
-/// An invented result for a point. Its values identify study (by its mark) and point.
+/// Returns an invented result for a point. Its values contain the mark of the study and the point.
 inline protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) {
   solver::CaseResult result{};
   result.duration_s = static_cast<double>(mark);
@@ -41,12 +41,12 @@ inline protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) 
   return protocol::to_message(point, result);
 }
 
-/// The real conversation of a worker with a simulated solver. It can be killed, frozen or stopped,
-/// and is always restarted.
+/// A worker with a simulated solver that runs the real protocol code. It can be killed, frozen or
+/// stopped, and is always restarted.
 class SimulatedWorker {
  public:
-  /// `peer` is its number in the network. For some workers the first point of a model takes longer.
-  /// One that `leaves` sometimes has a time limit, after which another worker starts.
+  /// `peer` is the worker's number in the network. Some workers need longer for the first point of
+  /// a model. With `leaves` the worker sometimes has a time limit, after which another one starts.
   SimulatedWorker(World& world, Network& network, std::uint64_t peer, bool leaves)
       : world_(world),
         network_(network),
@@ -55,8 +55,7 @@ class SimulatedWorker {
         ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)),
         ms_per_fall_(world.chance(0.3) ? world.between(5, 50) : 0) {}
 
-  /// Kills the process, if there is one, and starts another one after a while. Also starts the
-  /// first one.
+  /// Kills the process if it runs, and starts another after `away_ms`.
   void restart(std::int64_t away_ms) {
     ++life_;
     ++sockets_;
@@ -82,7 +81,7 @@ class SimulatedWorker {
     }
   }
 
-  /// The results in that message of the socket, or nullptr.
+  /// Returns the results that the socket `link` sent in message `sequence`, or nullptr.
   const protocol::Results* sent(Network::LinkId link, std::uint64_t sequence) const {
     const auto found = sent_.find({link, sequence});
     return found == sent_.end() ? nullptr : &found->second;
@@ -109,7 +108,7 @@ class SimulatedWorker {
     conversation_.emplace(hello, settings);
     apply(conversation_->start(world_.now_ms()));
   }
-  /// Runs `what` if this process is still the same, as soon as it is not frozen.
+  /// Runs `what` when the process is not frozen; never if the process is replaced before.
   void when_awake(std::function<void()> what) {
     if (world_.now_ms() >= frozen_until_ms_) {
       what();
@@ -226,7 +225,7 @@ class SimulatedWorker {
     all.push_back(std::move(progress));
     apply(conversation_->on_progress(std::move(all), world_.now_ms()));
   }
-  /// The position of the next point that passes the study's filter, or the end of the batch.
+  /// Returns the position of the next point that passes the study's filter, or the batch's size.
   static std::uint64_t next_position(const Work& work) {
     return work.batch.first_to_solve(work.solved, work.batch.size());
   }
@@ -247,22 +246,23 @@ class SimulatedWorker {
   std::int64_t ms_per_point_;
   std::int64_t ms_per_fall_;
   std::int64_t busy_ms_ = 0;                                // time spent on the next point
-  std::pair<std::uint64_t, std::uint64_t> fallen_model_{};  // study and model that were solved last
+  std::pair<std::uint64_t, std::uint64_t> fallen_model_{};  // study and model solved last
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;
   std::deque<Work> batches_;
   bool solving_ = false;
   std::int64_t frozen_until_ms_ = 0;
   std::int64_t planned_time_ms_ = -1;
-  std::uint64_t life_ = 0;     // counts processes; plans of earlier ones are dropped
-  std::uint64_t sockets_ = 0;  // counts sockets; messages of earlier ones are dropped
+  std::uint64_t life_ = 0;     // number of processes; events of earlier processes are ignored
+  std::uint64_t sockets_ = 0;  // number of sockets; messages of earlier sockets are ignored
   std::map<std::pair<Network::LinkId, std::uint64_t>, protocol::Results> sent_;
 };
 
 using server::StudyState;
 
-/// A recipe of `points` points with this H. Models have `points_a_model` points each, the last one
-/// the rest. Every third model has the same fall, so points with the same fall are apart.
+/// Returns a recipe of `points` points with this H. Each model has `points_a_model` points; the
+/// last one has the rest. E determines the fall and cycles through three values, so models with the
+/// same fall are not neighbours.
 inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model,
                                          double H) {
   using protocol::listed;
@@ -285,8 +285,7 @@ inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t poi
   return protocol::recipe_of(blocks);
 }
 
-/// The same with a filter in each block that leaves out some points; nothing if some filter would
-/// leave out all.
+/// Adds `filter` to each block of `recipe`. Returns nothing if it leaves out all points of a block.
 inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe recipe,
                                                                    const char* filter) {
   for (protocol::Block& block : *recipe.mutable_blocks()) {
@@ -301,13 +300,14 @@ inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Rec
   }
 }
 
-/// Submits one study until it is acknowledged, sometimes cancels and continues it. During faults it
-/// sometimes appends points, renames the study, or deletes it and starts a new one with its name.
+/// A client that repeats the submission of one study until it is acknowledged, and sometimes
+/// cancels and continues the study. During faults it sometimes appends points, renames the study,
+/// or deletes it and submits a new study with its name.
 class SimulatedClient {
  public:
-  /// `peer` is its number in the network. `mark` tells the answers of its study from others
-  /// (answer_to), and goes up by `kClients` with each study that follows a deleted one. Most
-  /// studies have several models, of a point or a few.
+  /// `peer` is the client's number in the network. `mark` identifies the results of its study
+  /// (answer_to); a study that replaces a deleted one has a mark higher by `kClients`. Most studies
+  /// have several models.
   SimulatedClient(World& world, Network& network, std::uint64_t peer, std::string name,
                   std::uint64_t points, std::uint64_t mark)
       : world_(world), network_(network), peer_(peer), name_(std::move(name)), mark_(mark) {
@@ -326,22 +326,21 @@ class SimulatedClient {
 
   const std::string& name() const { return name_; }
   std::uint64_t points() const { return points_; }
-  /// Number of points that pass the filters.
+  /// Returns the number of points that pass the filters.
   std::uint64_t left_in() const { return left_in_; }
   std::uint64_t mark() const { return mark_; }
-  /// Whether a submission was acknowledged.
+  /// Returns true if a submission was acknowledged.
   bool was_acknowledged() const { return acknowledged_; }
-  /// Checks the state of the study that a restarted server read. Throws Violation unless it is the
-  /// last acknowledged state or one that was requested after it.
+  /// Checks the study's state after a restart of the server. Throws Violation unless it is the last
+  /// acknowledged state or a state requested later.
   void check_found(server::StudyState state) const {
     if (possible_ && state != StudyState::kDone && !possible_->contains(state)) {
       throw Violation("an acknowledged change of " + name_ + " was forgotten: it is " +
                       server::state_name(state));
     }
   }
-  /// Whether the last acknowledged request is a submission.
+  /// Returns true if the last request is a submission that was acknowledged.
   bool wants_results() const { return acknowledged_ && intent_ == Intent::kSubmit && is_answered_; }
-  /// Number of deletions.
   std::uint64_t growths = 0;
   std::uint64_t renamings = 0;
   std::uint64_t deletions = 0;
@@ -350,12 +349,11 @@ class SimulatedClient {
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
   void connect() {
-    // A late request from a closed socket would undo later changes.
+    // Without lingering: a late request from a closed socket would undo later changes.
     network_.close(link_, false);
     link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
   }
-  /// A new recipe with that number of points, of which a filter may leave out some; appended to the
-  /// present one, if any.
+  /// Appends `points` points to the recipe, which is empty at first. A filter may leave out some.
   void set_recipe(std::uint64_t points) {
     points_ += points;
     const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
@@ -381,7 +379,7 @@ class SimulatedClient {
     appended_ = static_cast<std::uint64_t>(world_.between(1, 60));
     set_recipe(appended_);
   }
-  /// The study was deleted: starts another one with its name.
+  /// Makes a new study with the name of the deleted one.
   void begin_anew() {
     acknowledged_ = false;
     study_id_ = 0;
@@ -407,17 +405,18 @@ class SimulatedClient {
                                                : protocol::STUDY_CHANGE_DELETE);
     } else if (intent_ == Intent::kChange) {
       request.mutable_change()->set_study(name_);
-      // Any of cancel, pause, resume and retry.
+      // Draws one of cancel, pause, resume and retry.
       const auto asked = static_cast<protocol::StudyChange>(world_.between(1, 4));
       request.mutable_change()->set_change(asked);
       expect(asked);
     } else {
       expect(protocol::STUDY_CHANGE_RESUME);
       request.mutable_submit()->set_name(name_);
-      // The store's model contains solved results, not copies.
+      // StoreModel contains only solved results, not copies from other studies.
       request.mutable_submit()->set_no_reuse(true);
       if (world_.chance(0.3)) {
-        // Submitting with another priority changes it; the change is durable before the reply.
+        // A submission with another priority changes the study's priority; this is durable before
+        // the reply.
         request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
       }
       *request.mutable_submit()->mutable_recipe() = recipe_;
@@ -473,7 +472,7 @@ class SimulatedClient {
     for (const StudyState state :
          {StudyState::kRunning, StudyState::kPaused, StudyState::kCancelled}) {
       if (told == server::state_name(state)) {
-        // The state may come from another of these changes that is still pending.
+        // If several changes are pending, the state may come from any of them.
         possible_ = asked_.size() > 1 ? std::nullopt : std::optional(std::set{state});
         return;
       }
@@ -481,7 +480,7 @@ class SimulatedClient {
     possible_.reset();
   }
   void change_mind() {
-    // After the end of faults the study is submitted for the last time.
+    // After the end of faults the client submits the study for the last time.
     const bool last = !world_.faults;
     if (is_answered_ && (!last || intent_ != Intent::kSubmit)) {
       const bool is_free = !last && intent_ == Intent::kSubmit && acknowledged_;
@@ -524,7 +523,7 @@ class SimulatedClient {
   std::uint64_t peer_;
   std::string name_;
   std::uint64_t points_ = 0;
-  std::uint64_t left_in_ = 0;  // number of points that pass filters
+  std::uint64_t left_in_ = 0;  // number of points that pass the filters
   std::uint64_t mark_;
   std::uint64_t study_id_ = 0;  // from the acknowledgement
   std::string new_name_;
@@ -533,12 +532,12 @@ class SimulatedClient {
   Network::LinkId link_ = 0;
   std::uint64_t request_ = 0;
   bool acknowledged_ = false;
-  Intent intent_ = Intent::kSubmit;  // intent of the request
-  bool is_answered_ = false;         // whether it was answered
-  // changes sent with this request, which may change when it is repeated
+  Intent intent_ = Intent::kSubmit;  // purpose of the last request
+  bool is_answered_ = false;         // the last request was answered
+  // changes sent under this request number: a repeated request may contain another change
   std::set<protocol::StudyChange> asked_;
-  /// Possible states of the study besides done: the last acknowledged one and those requested
-  /// since. Nothing if all are possible.
+  /// States that the study may have, besides done: the last acknowledged one and those requested
+  /// since. Without a value all states are possible.
   std::optional<std::set<server::StudyState>> possible_;
 };
 

@@ -14,20 +14,21 @@
 
 namespace oblique::simulation {
 
-/// The real service, scheduler and store on a simulated disk and network. It can be killed at any
-/// moment, stopped in an orderly way or for a while, and starts again from what the disk has.
+/// The real service, scheduler and store on a simulated disk and network. The server can be killed
+/// at any moment, frozen, or stopped in an orderly way. Then another starts with the contents of
+/// the disk.
 class SimulatedServer final : public server::Ports {
  public:
-  /// Called before each acknowledgement is sent; its results must be durable.
+  /// Called before each acknowledgement of results, which must be durable then.
   using OnAcknowledged = std::function<void(const std::string& identity, std::uint64_t sequence)>;
 
-  /// Called with the studies that a starting server restored.
+  /// Called with the contents that a starting server has read from the store.
   using OnStarted = std::function<void(const Found& found)>;
 
   SimulatedServer(World& world, SimulatedDisk& disk, std::uint32_t max_losses)
       : world_(world), disk_(disk), max_losses_(max_losses) {}
 
-  /// Tries to start until the disk allows it.
+  /// Starts the server, and tries again while the disk fails.
   void start() {
     ++life_;
     Found found;
@@ -63,7 +64,7 @@ class SimulatedServer final : public server::Ports {
     disk_.crash(power_is_lost);
     end();
   }
-  /// Ends normally, as after SIGTERM; another server starts after a while.
+  /// Stops the server in an orderly way, as SIGTERM does. Another server starts later.
   void stop() {
     service_->stop(now());
     while (!jobs_.empty() && !disk_.died()) {
@@ -87,7 +88,7 @@ class SimulatedServer final : public server::Ports {
   /// Freezes the process for a while, as SIGSTOP does.
   void freeze(std::int64_t duration_ms) { frozen_until_ms_ = world_.now_ms() + duration_ms; }
   bool runs() const { return service_.has_value(); }
-  /// Whether no rows of deleted studies are left.
+  /// Returns true if no rows of deleted studies are left.
   bool has_cleared() const { return commits_.has_value() && !commits_->has_to_clear(); }
   const server::Service& service() const { return *service_; }
 
@@ -129,13 +130,13 @@ class SimulatedServer final : public server::Ports {
   OnAcknowledged on_acknowledged;
   OnStarted on_started;
   std::uint64_t crashes = 0;
-  std::uint64_t power_losses = 0;      // number of these with a power failure
-  std::uint64_t deaths_in_writes = 0;  // number of crashes in a write
+  std::uint64_t power_losses = 0;      // number of crashes with a power failure
+  std::uint64_t deaths_in_writes = 0;  // number of crashes during a write
   std::uint64_t failed_syncs = 0;      // number of crashes after a failed sync
 
  private:
   server::Instant now() const { return {world_.now_ms(), world_.utc_ms()}; }
-  /// Runs `what` after a delay if this process is still the same, as soon as it is not frozen.
+  /// Runs `what` after a delay when the process is not frozen; never if it is replaced before.
   void after(std::int64_t delay_ms, std::function<void()> what) {
     world_.after(delay_ms, [this, life = life_, what = std::move(what)] {
       if (life != life_) {
@@ -177,7 +178,7 @@ class SimulatedServer final : public server::Ports {
     clients->break_links();
     after(world_.faults ? world_.between(1, 5000) : 10, [this] { start(); });
   }
-  /// Whether the process died in a write or must end after a failed sync.
+  /// Returns true, after a crash, if the process died in a write or a sync has failed.
   bool ends() {
     const bool sync_failed = commits_->is_gone();
     if (!disk_.died() && !sync_failed) {
@@ -196,7 +197,8 @@ class SimulatedServer final : public server::Ports {
     if (ends()) {
       return;
     }
-    if (world_.faults && world_.chance(0.003)) {  // after the commit, before its reports are read
+    if (world_.faults &&
+        world_.chance(0.003)) {  // after the commit, before the service gets the reports
       crash(world_.chance(0.4));
       return;
     }
@@ -213,7 +215,7 @@ class SimulatedServer final : public server::Ports {
       ends();
     }
   }
-  /// As the writer: between groups, in steps of some rows.
+  /// Clears rows of deleted studies in small steps between commits, as the server's writer does.
   void clear_some() {
     if (clearing_ || !commits_->has_to_clear()) {
       return;
@@ -245,10 +247,10 @@ class SimulatedServer final : public server::Ports {
   std::optional<server::GroupCommit> commits_;
   std::deque<server::WriteJob> jobs_;
   bool writing_ = false;
-  bool clearing_ = false;  // a step is planned
+  bool clearing_ = false;  // a step of clear_some() is planned
   std::int64_t frozen_until_ms_ = 0;
-  std::deque<std::function<void()>> held_;  // frames received meanwhile, in order
-  std::uint64_t life_ = 0;                  // counts starts; plans of earlier processes are dropped
+  std::deque<std::function<void()>> held_;  // frames received while frozen, in order
+  std::uint64_t life_ = 0;  // number of processes; events of earlier processes are ignored
 };
 
 }  // namespace oblique::simulation

@@ -24,7 +24,8 @@ class Simulation {
       : settings_(settings),
         world_(seed),
         disk_(world_),
-        // Random crashes also hit sound points, so failures of points are tested in separate runs.
+        // Only storms use the real limit of lost workers per point: random crashes also hit sound
+        // points.
         server_(world_, disk_, settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
@@ -101,7 +102,7 @@ class Simulation {
     });
   }
 
-  /// One fault of a storm. To the first worker only disconnections happen.
+  /// Causes one fault of a storm. The first worker is only disconnected, never killed or frozen.
   void blow() {
     const std::int64_t last = static_cast<std::int64_t>(workers_.size()) - 1;
     SimulatedWorker& victim = *workers_[static_cast<std::size_t>(world_.between(1, last))];
@@ -125,10 +126,9 @@ class Simulation {
     }
   }
 
-  /// A peer that joins as a worker, requests many batches and disappears, each time under a new
-  /// name.
+  /// Adds a peer that joins as a worker under a new name, requests many batches and disappears.
   void come_and_vanish() {
-    constexpr std::uint64_t kFirstPeer = 1000;  // numbers in the network above all workers
+    constexpr std::uint64_t kFirstPeer = 1000;  // above the numbers of all workers
     ++came_;
     const auto has_points = std::make_shared<bool>(false);
     const auto link = workers_network_.open(kFirstPeer + came_, [has_points](const auto& frame) {
@@ -166,7 +166,7 @@ class Simulation {
           .part(std::move(parted), world_.between(500, 15'000));
       ++outcome_["partitions"];
     } else if (kind == 7) {
-      // Sets the clock forwards or backwards by hours, or by the time that a server was down.
+      // Moves the clock by up to 6 s or by up to 5.5 hours, forwards or backwards.
       world_.set_clock(world_.chance(0.5) ? world_.between(-6000, 6000)
                                           : world_.between(-20'000'000, 20'000'000));
       ++outcome_["clock jumps"];
@@ -183,7 +183,7 @@ class Simulation {
         if (server_.runs()) {
           server_.crash(world_.chance(0.4));
         } else if (world_.chance(0.3)) {
-          disk_.crash(true);  // the machine, after the server
+          disk_.crash(true);  // the power fails while no server runs
         }
         break;
       case 2:
@@ -250,7 +250,7 @@ class Simulation {
     const auto link = workers_network_.link_of(identity);
     for (const auto& worker : workers_) {
       const auto* results = worker->sent(link, sequence);
-      // Results of a deleted study are acknowledged and not stored.
+      // The server acknowledges results of a deleted study but does not store them.
       if (results == nullptr || results->study_id() == server::kProbeStudy ||
           disk_.model().study(results->study_id()) == nullptr) {
         continue;
@@ -288,7 +288,7 @@ class Simulation {
 
   void check_end() {
     if (!server_.runs()) {
-      throw Violation("no server runs at the end");  // one is started soon after each end
+      throw Violation("no server runs at the end");  // a new server starts soon after each end
     }
     for (const auto& client : clients_) {
       const auto* study = disk_.model().study(client->name());
@@ -342,8 +342,8 @@ class Simulation {
   Network clients_network_;
   std::vector<std::unique_ptr<SimulatedClient>> clients_;
   std::vector<std::unique_ptr<SimulatedWorker>> workers_;
-  std::uint64_t came_ = 0;      // peers that disappear
-  std::uint64_t vanished_ = 0;  // of these, peers with a batch of a study
+  std::uint64_t came_ = 0;      // number of peers that disappear
+  std::uint64_t vanished_ = 0;  // number of these that had received a batch of a study
   SimulationOutcome outcome_;
 };
 

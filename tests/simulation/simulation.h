@@ -8,16 +8,17 @@ namespace oblique::simulation {
 
 struct SimulationSettings {
   std::int64_t chaos_ms = 25'000;     ///< duration of faults
-  std::int64_t healing_ms = 600'000;  ///< after that, time in which all studies must be done
-  /// A failed sync loses its data and later ones succeed, as on Linux. SQLite cannot handle that:
-  /// commits acknowledged after such a failure can be lost.
+  std::int64_t healing_ms = 600'000;  ///< time limit after the faults for all studies to be done
+  /// If true, a failed sync loses its data and later syncs succeed, as on Linux. SQLite cannot
+  /// handle that: commits acknowledged after such a failure can be lost.
   bool forgetful_syncs = false;
-  /// The only faults are: all workers but one are killed and frozen again and again, connections
-  /// are cut, and peers take batches and disappear. No point may fail because of them.
+  /// If true, the only faults are workers that are killed or frozen again and again (all but one),
+  /// cut connections, and peers that take batches and disappear. No point may fail because of
+  /// these.
   bool storms = false;
 };
 
-/// Counts of events in one or more runs, by name, which show that the faults happened.
+/// Number of events by name in one or more runs. It shows that the faults happened.
 using SimulationOutcome = std::map<std::string, std::uint64_t>;
 void add(SimulationOutcome& all, const SimulationOutcome& more);
 std::string text_of(const SimulationOutcome& outcome);

@@ -12,7 +12,7 @@
 namespace oblique::simulation {
 namespace {
 
-/// Runs seeds and prints the first that fails. `simulate SEED 1` repeats it.
+/// Runs seeds until one fails, and prints that seed. `simulate SEED 1` repeats the run.
 SimulationOutcome simulate_seeds(std::uint64_t first, std::uint64_t count,
                                  const SimulationSettings& settings) {
   SimulationOutcome all;
@@ -31,8 +31,8 @@ std::uint64_t seeds(int quick, int all) {
   return static_cast<std::uint64_t>(test::amount(quick, all));
 }
 
-/// Seeds in parts that CTest runs in parallel. In every second part a failed sync loses its data,
-/// as on Linux.
+/// The parameter is a group of seeds; CTest runs groups in parallel. In odd groups a failed sync
+/// loses its data, as on Linux.
 class SimulationTest : public testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(SimulationTest, EveryPointEndsWithOneRightRowDespiteFaults) {

@@ -13,21 +13,21 @@
 
 namespace oblique::simulation {
 
-/// A simulated program did something that must not happen.
+/// Thrown if a simulated program did something that must not happen.
 class Violation : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// The clock, the random numbers and the list of future events. Everything follows from the seed,
-/// so that a failing run can be repeated.
+/// The clock, the random numbers and the list of future events. All depend only on the seed, so a
+/// failing run can be repeated.
 class World {
  public:
   explicit World(std::uint64_t seed) : random_(seed) {}
 
   /// The steady clock.
   std::int64_t now_ms() const { return now_ms_; }
-  /// The system clock, which may jump.
+  /// Returns the time of the system clock, which may jump.
   std::int64_t utc_ms() const { return utc_at_zero_ms_ + now_ms_; }
   void set_clock(std::int64_t forward_ms) { utc_at_zero_ms_ += forward_ms; }
 
@@ -50,12 +50,12 @@ class World {
   bool chance(double probability) {
     return static_cast<double>(random_() >> 11U) * 0x1p-53 < probability;
   }
-  /// A random whole number from `low` to `high`, both inclusive.
+  /// Returns a random integer from `low` to `high`, both inclusive.
   std::int64_t between(std::int64_t low, std::int64_t high) {
     return low + static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(high - low + 1));
   }
 
-  /// Whether faults still happen.
+  /// True while faults happen.
   bool faults = true;
 
  private:
@@ -66,11 +66,11 @@ class World {
   std::map<std::pair<std::int64_t, std::uint64_t>, std::function<void()>> to_come_;
 };
 
-/// Simulated connections of ZeroMQ sockets over TCP: messages arrive in order and complete until
-/// the connection breaks. Then all messages in transit are lost, and the peer returns with another
-/// identity. Half-open connections lose messages before they break. A partition separates several
-/// peers from the server: messages wait, as TCP repeats them, until the partition ends or the
-/// connections break. On request of the sender, results may also be duplicated or reordered.
+/// Simulated ZeroMQ sockets over TCP. Messages arrive in order and complete until a connection
+/// breaks. Then all messages in transit are lost, and the peer reconnects with another identity. A
+/// half-open connection loses messages before it breaks. A partition separates several peers from
+/// the server: messages wait, because TCP repeats them, until the partition ends or the connections
+/// break. A sender may allow that a message is duplicated or reordered.
 class Network {
  public:
   using ToServer = std::function<void(const std::string& identity, const std::string& frame)>;
@@ -79,7 +79,7 @@ class Network {
 
   Network(World& world, ToServer to_server) : world_(world), to_server_(std::move(to_server)) {}
 
-  /// Opens a new socket of that peer; `to_peer` receives the server's messages.
+  /// Opens a new socket of `peer`; `to_peer` receives the server's messages.
   LinkId open(std::uint64_t peer, ToPeer to_peer) {
     const LinkId id = ++last_link_;
     links_.emplace(id, Link{new_identity(id), peer, std::move(to_peer), 0, 0, false, false, 0});
@@ -90,7 +90,7 @@ class Network {
     return id;
   }
 
-  /// Closes the socket: messages to it are lost. With `linger` its own messages still arrive.
+  /// Closes the socket. Messages to it are lost; messages that it sent still arrive with `linger`.
   void close(LinkId id, bool linger) {
     links_.erase(id);
     if (!linger) {
@@ -98,7 +98,7 @@ class Network {
     }
   }
 
-  /// `loosely`: may be duplicated or reordered.
+  /// Sends `frame` to the server. With `loosely` it may be duplicated or reordered.
   void send(LinkId id, const std::string& frame, bool loosely) {
     const auto found = links_.find(id);
     if (found == links_.end() || found->second.cut_up) {
@@ -124,7 +124,7 @@ class Network {
     world_.after(link.last_up_ms - world_.now_ms(), deliver);
   }
 
-  /// False if no connection has that identity.
+  /// Sends `frame` to a peer. Returns false if no connection has this identity.
   bool send_to(const std::string& identity, const std::string& frame) {
     const LinkId id = link_of(identity);
     const auto found = links_.find(id);
@@ -146,7 +146,7 @@ class Network {
     return true;
   }
 
-  /// Separates these peers from the server for this time. Connections that stall too long break.
+  /// Separates `peers` from the server for `duration_ms`. Connections that stall too long break.
   void part(std::set<std::uint64_t> peers, std::int64_t duration_ms) {
     parted_ = std::move(peers);
     parted_until_ms_ = world_.now_ms() + duration_ms;
@@ -160,7 +160,7 @@ class Network {
     });
   }
 
-  /// Breaks the connections of that peer, or all, as when the server dies; the sockets reconnect.
+  /// Breaks the connections of `peer`, or all, as when the server dies. The sockets then reconnect.
   void break_links(std::optional<std::uint64_t> peer = std::nullopt) {
     for (auto& [id, link] : links_) {
       if (!peer || link.peer == *peer) {
@@ -184,7 +184,7 @@ class Network {
   }
 
  private:
-  /// A connection without input for this time breaks.
+  /// A connection breaks after this time without input.
   static constexpr std::int64_t kPatience_ms = 10'000;
 
   struct Link {
@@ -195,7 +195,7 @@ class Network {
     std::int64_t last_down_ms;
     bool cut_up;
     bool cut_down;
-    std::uint64_t breaks;  // number of breaks; earlier messages are lost
+    std::uint64_t breaks;  // number of breaks; messages sent before a break are lost
   };
 
   std::string new_identity(LinkId id) {
@@ -244,8 +244,8 @@ class Network {
   ToServer to_server_;
   std::map<LinkId, Link> links_;
   std::map<std::string, LinkId> identities_;
-  std::set<LinkId> silenced_;       // closed sockets whose messages do not arrive
-  std::set<std::uint64_t> parted_;  // end of the partition by peer
+  std::set<LinkId> silenced_;       // closed sockets whose messages are lost
+  std::set<std::uint64_t> parted_;  // peers separated by the partition
   std::int64_t parted_until_ms_ = 0;
   LinkId last_link_ = 0;
   std::uint64_t last_identity_ = 0;

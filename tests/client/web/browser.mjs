@@ -67,8 +67,8 @@ export class Browser {
   }
 
   /**
-   * Opens a tab with a view. `early` runs before the page's scripts. `isHurried` shortens the page's
-   * timers. Console lines that match `expected` are not errors.
+   * Opens a tab with a view. `early` runs before the page's scripts. `isHurried` shortens timers of
+   * the page. Console lines that match `expected` are not errors.
    */
   async open(view, { isHurried = false, expected = /^$/, early = () => {}, ...look } = {}) {
     const page = await this.#tab();
@@ -121,7 +121,7 @@ export class Browser {
   }
 }
 
-/** Repeats `look` in the tab until it returns a value, and returns that value. Ignores its errors. */
+/** Repeats `look` in the tab, whatever it throws, until it returns a value; returns this value. */
 export async function until(page, look, ...given) {
   let cause;
   for (const end = Date.now() + hangMs; Date.now() < end;) {

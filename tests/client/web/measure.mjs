@@ -29,8 +29,8 @@ function say(part, what, times, wanted) {
 }
 
 /**
- * Runs in a tab before its scripts. Stores in `paintedMs` when the first picture is painted; `next()`
- * waits for the next picture and returns when it is painted.
+ * Runs in a tab before its scripts. `paintedMs` becomes the time of the first painted picture;
+ * `next()` waits for the next picture and returns its time.
  */
 function watchPictures() {
   const painted = () =>

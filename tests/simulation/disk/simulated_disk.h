@@ -41,21 +41,21 @@ std::uint64_t study_of(const Kind& change) {
   }
 }
 
-/// The contents that a store returns to a starting server.
+/// Contents of the store that a starting server finds.
 struct Found {
   std::vector<server::StoredStudy> studies;
   std::uint64_t last_study_id = 0;
   std::uint64_t last_worker_id = 0;
-  std::uint64_t starts = 0;  ///< starts of servers, including this one
+  std::uint64_t starts = 0;  ///< number of server starts, including this one
 };
 
-/// A simple model of the contents that a store must have. The real store is compared with it.
-/// Throws Violation if they differ.
+/// A simple model of the contents that a store must have. Compares the real store with itself;
+/// throws Violation if they differ.
 class StoreModel {
  public:
   using Rows = std::map<std::uint64_t, std::shared_ptr<const protocol::PointResult>>;
 
-  /// The store has stored these changes. None may be a result for a point that has one.
+  /// Adds changes that the store has committed. Throws Violation if a point gets a second result.
   void stored(std::span<const server::Change> changes) {
     bool control = false;
     bool writes = false;
@@ -64,30 +64,31 @@ class StoreModel {
                             !std::holds_alternative<AddResults>(change));
       writes = apply(change, now_) || writes;
     }
-    // A transaction that changes nothing writes nothing, and so syncs nothing.
+    // A transaction without a change causes neither a write nor a sync.
     if (control && writes) {
       synced();
     } else if (writes) {
       entries_.push_back({{changes.begin(), changes.end()}, true});
     }
   }
-  /// The store refused these changes. As long as nothing was written in their place, a crash may
+  /// Adds changes whose commit failed. Until other changes are written in their place, a crash may
   /// bring them back, all or none.
   void refused(std::span<const server::Change> changes) {
     ++failed_commits;
     entries_.push_back({{changes.begin(), changes.end()}, false});
   }
 
-  /// A commit with a full sync of something that this model does not contain.
+  /// Records a commit with a full sync of data that this model does not contain.
   void synced() {
     synced_ = now_;
     entries_.clear();
   }
 
-  /// Compares the contents after a restart with everything that was stored; after a power failure
-  /// the commits since the last full sync may be missing. Adopts them as the new state.
+  /// Compares the contents after a restart with all stored changes. After a power failure the
+  /// commits since the last full sync may be missing. The contents found become the state of the
+  /// model.
   void restarted(const Found& found, bool power_was_lost) {
-    // Without a power failure only changes refused since the last commit are in doubt.
+    // Without a power failure only changes whose commit failed last may exist or not.
     const auto last_stored =
         std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& e) { return e.stored; });
     auto entry = power_was_lost ? entries_.begin() : last_stored.base();
@@ -125,13 +126,13 @@ class StoreModel {
       synced_ = now_;
       entries_.clear();
     } else if (came_back != entries_.end()) {
-      // It counts from now on. Other refused changes may still appear instead.
+      // This change now counts as stored. A later crash may replace it by another refused one.
       came_back->stored = true;
       std::rotate(came_back, came_back + 1, entries_.end());
     }
   }
 
-  /// The study called `name`, or nullptr.
+  /// Returns the study called `name`, or nullptr.
   const server::StoredStudy* study(const std::string& name) const {
     for (const auto& [id, study] : now_.studies) {
       if (study.name == name) {
@@ -151,8 +152,8 @@ class StoreModel {
   }
 
   std::uint64_t failed_commits = 0;
-  std::uint64_t undone_commits = 0;  ///< commits undone by power failures
-  std::uint64_t refused_kept = 0;    ///< refused changes that existed after a crash
+  std::uint64_t undone_commits = 0;  ///< commits that power failures undid
+  std::uint64_t refused_kept = 0;    ///< refused changes that a crash brought back
 
  private:
   struct Contents {
@@ -160,7 +161,7 @@ class StoreModel {
     std::map<std::uint64_t, Rows> rows;
     std::uint64_t last_study_id = 0;  ///< including deleted studies
     std::uint64_t last_worker_id = 0;
-    bool has_deleted = false;  ///< rows of workers may then be gone, even the last one
+    bool has_deleted = false;  ///< then rows of workers may be missing
 
     bool operator==(const Found& found) const {
       return last_study_id == found.last_study_id &&
@@ -184,7 +185,7 @@ class StoreModel {
     std::vector<server::Change> changes;
     bool stored;
   };
-  /// Whether anything had to be written.
+  /// Applies a change; returns true if the store has to write for it.
   static bool apply(const server::Change& change, Contents& contents) {
     if (const auto* study = std::get_if<AddStudy>(&change)) {
       contents.last_study_id = std::max(contents.last_study_id, study->study_id);
@@ -203,7 +204,7 @@ class StoreModel {
     const std::uint64_t id = std::visit([](const auto& of) { return study_of(of); }, change);
     const auto known = contents.studies.find(id);
     if (known == contents.studies.end()) {
-      return false;  // results of a deleted study are dropped
+      return false;  // the store drops results of a deleted study
     }
     server::StoredStudy& study = known->second;
     if (const auto* state = std::get_if<SetStudyState>(&change)) {
@@ -270,17 +271,17 @@ class StoreModel {
 
   Contents now_;
   Contents synced_;             // contents at the last commit with a full sync
-  std::vector<Entry> entries_;  // later changes, in order
+  std::vector<Entry> entries_;  // changes after that commit, in order
 };
 
-// The store locks a file there; the contents are in memory.
+// Path of a lock file that the store creates; the contents of the database are in memory.
 inline const std::string& database_path() {
   static const test::TemporaryFolder kFolder;
   static const std::string kPath = kFolder.file("database");
   return kPath;
 }
 
-/// A database without studies, made once.
+/// Returns a database without studies, which is made once.
 inline const std::string& empty_database() {
   static const std::string kImage = [] {
     World world(0);
@@ -292,11 +293,11 @@ inline const std::string& empty_database() {
   return kImage;
 }
 
-/// The file that the first server finds.
+/// Content of the database file that the first server finds.
 enum class DiskAtFirst { kEmptyDatabase, kEmptyFile };
 
-/// The real store on simulated files, compared with a model after each restart. After a commit the
-/// caller must check whether the process died in it.
+/// The real store on simulated files. Each restart compares the store with a model. After a commit
+/// the caller must check whether the process died during it.
 class SimulatedDisk final : public server::Storage {
  public:
   explicit SimulatedDisk(World& world, DiskAtFirst at_first = DiskAtFirst::kEmptyDatabase)
@@ -323,9 +324,9 @@ class SimulatedDisk final : public server::Storage {
     model_.synced();
     return found;
   }
-  /// Ends the server normally.
+  /// Closes the store, as a server does that ends normally.
   void close() { store_.reset(); }
-  /// Kills the server or cuts the power; also possible while no server runs.
+  /// Kills the server or cuts the power. Allowed without a running server.
   void crash(bool power_is_lost) {
     if (power_is_lost) {
       files_.lose_power();
@@ -335,9 +336,9 @@ class SimulatedDisk final : public server::Storage {
     }
     store_.reset();
   }
-  /// Whether the process died during a write.
+  /// Returns true if the process died during a write.
   bool died() const { return !files_.is_used(); }
-  /// A store may fail.
+  /// Returns true if operations of the store may fail.
   bool is_at_fault() const {
     return died() || files_.full || files_.failing || files_.sync_failed();
   }
@@ -359,7 +360,7 @@ class SimulatedDisk final : public server::Storage {
     cleared_rows += store_->cleared_rows() - before;
     return cleared;
   }
-  std::uint64_t cleared_rows = 0;  ///< rows of deleted studies
+  std::uint64_t cleared_rows = 0;  ///< cleared rows of deleted studies
 
   /// Compares every row with the model and runs SQLite's checks. Throws Violation.
   void check_rows() {
@@ -417,7 +418,7 @@ class SimulatedDisk final : public server::Storage {
   World& world_;
   SimulatedFiles files_;
   StoreModel model_;
-  bool power_was_lost_ = false;  // since the store was last open
+  bool power_was_lost_ = false;  // since the store was closed
   int checkpoint_pages_;
   std::uint64_t starts_ = 0;
   std::unique_ptr<server::Store> store_;

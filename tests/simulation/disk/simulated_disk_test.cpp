@@ -1,4 +1,4 @@
-// The store on the simulated disk alone, interrupted at every operation of a short run.
+// The store on a simulated disk, without a server, interrupted at each operation of a short run.
 #include "tests/simulation/disk/simulated_disk.h"
 
 #include <memory>
@@ -31,7 +31,7 @@ server::AddResults result(const server::AddStudy& study, std::uint64_t point) {
   return results;
 }
 
-/// Opens the store and makes the missing changes.
+/// Opens the store and commits all studies and results that it does not contain yet.
 void solve_all(SimulatedDisk& disk) {
   disk.open();
   for (std::uint64_t id = 1; id <= 3; ++id) {
@@ -49,7 +49,7 @@ void solve_all(SimulatedDisk& disk) {
   }
 }
 
-/// Solves all points and closes the store. False if the process died.
+/// Solves all points and closes the store. Returns false if the process died.
 bool live(SimulatedDisk& disk) {
   try {
     solve_all(disk);
@@ -72,12 +72,12 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
         solve_all(disk);
       } catch (const server::StorageGone&) {
         ended = true;
-        if (seed % 3 == 0) {  // a server that ends by itself does not merge such a log
+        if (seed % 3 == 0) {  // an orderly end does not merge a log after a failed sync
           disk.close();
           EXPECT_TRUE(disk.files().exists(disk.files().path() + "-wal"));
         }
       } catch (const server::StorageError&) {
-        ended = true;  // the sync of the log at the start
+        ended = true;  // the sync of the log during start failed
         EXPECT_LE(sync, 2);
       }
       if (disk.files().awaits_failing_sync()) {
@@ -87,14 +87,14 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
       }
       ++failures;
       EXPECT_TRUE(ended) << "sync " << sync << ", seed " << seed;
-      // A restarted server continues from the contents, and then the power fails.
+      // In half of the cases a restarted server solves the rest before the power fails.
       const bool starts_again = seed % 2 == 0;
       if (starts_again) {
         disk.crash(false);
         ASSERT_NO_THROW(solve_all(disk)) << "sync " << sync << ", seed " << seed;
       }
       disk.crash(true);
-      // The model detects missing acknowledged changes.
+      // open() throws if an acknowledged change is missing.
       ASSERT_NO_THROW(disk.open()) << "sync " << sync << ", seed " << seed;
       disk.check_rows();
     }

@@ -17,9 +17,8 @@
 namespace oblique::simulation {
 namespace {
 
-// ---- SQLite's side: a VFS in the place of the default one, which says of itself what that says of
-// a Unix file system
-// --------------------------------------------------------------------------------
+// ---- SQLite's side: a VFS that replaces the default VFS of SQLite and reports the properties of a
+// Unix file system --------
 
 struct Vfs {
   sqlite3_vfs methods{};
@@ -27,7 +26,7 @@ struct Vfs {
   std::map<std::string, SimulatedFiles*> files;  // by the path of the database
   std::mt19937_64 random;
 
-  /// The files that a name belongs to, as database, log or journal; or nullptr.
+  /// Returns the files to which the database, log or journal `name` belongs, or nullptr.
   SimulatedFiles* owner_of(std::string_view name) const {
     for (const auto& [path, owner] : files) {
       if (name.starts_with(path)) {
@@ -47,12 +46,12 @@ struct Handle : sqlite3_file {
   SimulatedFiles* files = nullptr;
   std::shared_ptr<SimulatedFile> file;
   std::uint64_t life = 0;
-  bool syncs_directory = false;  // its name may not be synced yet
+  bool syncs_directory = false;  // syncs also make the file name durable
   std::shared_ptr<SharedMemory> memory;
   std::array<bool, SQLITE_SHM_NLOCK> shared{};
   std::array<bool, SQLITE_SHM_NLOCK> exclusive{};
 
-  /// Whether its process is gone.
+  /// Returns true if the process that opened the handle has ended.
   bool is_dead() const { return life != files->life(); }
 };
 
@@ -126,7 +125,7 @@ int file_size(sqlite3_file* raw, sqlite3_int64* size) {
   return handle.is_dead() ? SQLITE_IOERR_FSTAT : SQLITE_OK;
 }
 
-/// The highest level at which another connection holds the database file.
+/// Returns the highest lock level that another connection has on the database file.
 int level_of_others(const Handle& handle) {
   int highest = SQLITE_LOCK_NONE;
   for (const auto& [who, level] : handle.files->locks) {
@@ -243,7 +242,7 @@ int open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* fla
   handle->files = files;
   handle->file = std::move(opened);
   handle->life = files->life();
-  // As the default VFS: for a database the log and journal do this.
+  // As in the default VFS, log and journal sync the folder for the database file too.
   handle->syncs_directory = (flags & SQLITE_OPEN_CREATE) != 0 && (flags & SQLITE_OPEN_MAIN_DB) == 0;
   if (flags_out != nullptr) {
     *flags_out = flags;
@@ -294,21 +293,22 @@ void add_to_vfs(SimulatedFiles& files, std::uint64_t seed) {
   register_once();
   vfs().files[files.path()] = &files;
   vfs().random.seed(seed);
-  sqlite3_randomness(0, nullptr);  // SQLite seeds its own generator again
+  sqlite3_randomness(0, nullptr);  // SQLite reseeds its own generator from the VFS
 }
 
 void remove_from_vfs(SimulatedFiles& files) {
   vfs().files.erase(files.path());
 }
 
-// ---- The disk's side ----------------------------------------------------------------------------
+// ---- The disk's side: which bytes survive
+// ----------------------------------------------------------------------------
 
-/// Size that disks write atomically.
+/// Number of bytes that a disk writes atomically.
 constexpr std::size_t kSector = 512;
-/// Size of pages that systems cache and write.
+/// Size of the pages that an operating system caches and writes [bytes].
 constexpr std::size_t kPage = 4096;
 
-/// The part of a write that is done before it fails.
+/// Returns a random first part of `bytes`, which a failing write still writes.
 std::string_view some_of(World& world, std::string_view bytes) {
   return bytes.substr(
       0, static_cast<std::size_t>(world.between(0, static_cast<std::int64_t>(bytes.size()))));
@@ -318,8 +318,8 @@ std::string_view some_of(World& world, std::string_view bytes) {
 
 // ---- One file ----------------------------------------------------------------------------------
 
-/// Draws which steps reached the disk: the first ones and part of the next, or any subset per
-/// sector.
+/// Draws at random which writes reached the disk before a power failure: either the first ones and
+/// a part of the next, or any subset for each sector.
 class SimulatedFile::Losses {
  public:
   Losses(World& world, const std::vector<Step>& steps)
@@ -338,7 +338,7 @@ class SimulatedFile::Losses {
   }
 
   bool keeps_size(std::int64_t step) const { return step < kept_; }
-  /// The size of the file after a partial step.
+  /// Returns the file size after a partly done step, which would have ended at `end`.
   std::size_t torn_end(std::int64_t step, std::size_t end) const {
     return step == kept_ && !reordered_ ? std::min(end, torn_before_ * kSector) : 0;
   }
@@ -358,7 +358,7 @@ class SimulatedFile::Losses {
   std::int64_t steps_;
   bool reordered_;
   std::int64_t kept_;
-  std::size_t torn_before_ = 0;  // sectors of step kept_ before this one are kept too
+  std::size_t torn_before_ = 0;  // sectors of step kept_ before this sector survive
   std::map<std::size_t, std::int64_t> kept_of_sector_;
 };
 

@@ -16,7 +16,7 @@
 
 namespace oblique::simulation {
 
-/// One file on a simulated disk: the contents for readers, and what survives a power failure.
+/// One file on a simulated disk: its present contents, and the part that survives a power failure.
 class SimulatedFile {
  public:
   SimulatedFile() = default;
@@ -26,18 +26,18 @@ class SimulatedFile {
   void write(std::size_t offset, std::string_view bytes);
   void truncate(std::size_t size);
   void sync();
-  /// A sync fails and the system marks the pages as clean, as Linux does: their contents can be
-  /// read, but reach the disk only if they are written again.
+  /// Simulates a failed sync after which the system marks the pages as written, as Linux does:
+  /// reads return their contents, but only another write brings them to the disk.
   void forget_unsynced();
 
-  /// Loses power. Synced contents are kept; of later writes any part is: sectors are atomic, may
-  /// reach the disk in any order, and may have any of their states. The file size is kept or not in
-  /// the same way. Bytes inside the file that were never written are zero.
+  /// Simulates a power failure. Synced contents survive. Of later writes any part survives: sectors
+  /// are atomic, reach the disk in any order, and each may keep any of its earlier states. The same
+  /// is true of the file size. Bytes inside the file that were never written are zero.
   void lose_power(World& world);
 
  private:
   struct Step {
-    std::size_t offset;  // offset, or the new size
+    std::size_t offset;  // position of `bytes`, or the new file size
     std::string bytes;
     bool truncates;
   };
@@ -50,7 +50,7 @@ class SimulatedFile {
   std::set<std::size_t> forgotten_pages_;
 };
 
-/// The write-ahead index that connections to one database share. A crash loses it.
+/// The index of the write-ahead log, which all connections to a database share. A crash loses it.
 struct SharedMemory {
   static constexpr std::size_t kRegion = 32768;
   std::vector<std::unique_ptr<std::array<std::byte, kRegion>>> regions;
@@ -58,12 +58,12 @@ struct SharedMemory {
   std::array<bool, SQLITE_SHM_NLOCK> exclusive{};
 };
 
-/// The files of one database in memory, under the faults that disks have. While it lives, SQLite
-/// finds them at `path` through its default VFS; what is at other paths it finds where it is. One
-/// thread may use such files in a process.
+/// The files of one database, in memory, with simulated faults of the disk. While this object
+/// exists, the default VFS of SQLite finds these files at `path`, and all other paths in the real
+/// file system. Only one thread of a process may use such files.
 class SimulatedFiles {
  public:
-  /// Starts with `image` as durable database. SQLite's random numbers follow from `world` too.
+  /// `image` is the initial, durable database. `world` also seeds SQLite's random numbers.
   SimulatedFiles(World& world, std::string path, const std::string& image);
   ~SimulatedFiles();
   SimulatedFiles(const SimulatedFiles&) = delete;
@@ -72,29 +72,30 @@ class SimulatedFiles {
   const std::string& path() const { return path_; }
   std::string contents() const { return entries_.at(path_)->contents(); }
 
-  /// A process starts to use the files.
+  /// Starts a process that uses the files.
   void start();
-  /// The process ends: its handles do nothing more; its writes are kept.
+  /// Ends the process: its handles do nothing more; its writes survive.
   void kill();
   bool is_used() const { return used_; }
-  /// The power fails: files and names are as on the disk.
+  /// Simulates a power failure: only the files and file names on the disk survive.
   void lose_power();
-  /// The process dies in that write, sync, truncation or deletion, counted from now; 0: never.
+  /// Lets the process die during the given write, sync, truncation or deletion, counted from now;
+  /// 0: never.
   void plan_death(std::int64_t operations) { death_in_ = operations; }
-  /// That sync, counted from now, fails once and loses its data; 0: none.
+  /// Lets the given sync, counted from now, fail once and lose its data; 0: none.
   void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
-  /// Whether the planned failure is still to come.
+  /// Returns true until the planned sync has failed.
   bool awaits_failing_sync() const { return failing_sync_in_ > 0; }
-  /// Whether a sync has failed since the process started.
+  /// Returns true if a sync has failed since the process started.
   bool sync_failed() const { return sync_failed_; }
-  /// Counts processes.
+  /// Number of processes so far.
   std::uint64_t life() const { return life_; }
 
-  bool full = false;     ///< whether no file can grow
-  bool failing = false;  ///< whether reads, writes and syncs fail now and then
-  bool forgets = false;  ///< whether a failed sync loses its data
+  bool full = false;     ///< the disk is full: no file can grow
+  bool failing = false;  ///< reads, writes and syncs fail sometimes
+  bool forgets = false;  ///< a failed sync loses its data
 
-  // Functions for the VFS. Numbers are SQLite's result codes.
+  // Functions for the VFS. An int result is a result code of SQLite.
   std::shared_ptr<SimulatedFile> open(const std::string& name, bool create);
   bool exists(const std::string& name) const { return entries_.contains(name); }
   int remove(const std::string& name, bool sync_directory);
@@ -103,7 +104,7 @@ class SimulatedFiles {
   int sync(SimulatedFile& file, bool and_directory);
   bool read_fails() { return failing && world_.chance(0.02); }
 
-  std::map<const void*, int> locks;  ///< levels of the connections on the database file
+  std::map<const void*, int> locks;  ///< lock level of each connection to the database file
   std::weak_ptr<SharedMemory> memory;
 
  private:
