@@ -14,7 +14,7 @@ struct Close {
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 };
 
-/// Calls `take` for each row.
+/// Calls `take` for each row that the statement `sql` returns.
 void for_each_row(const std::string& file, const std::string& sql,
                   const std::function<void(sqlite3_stmt*)>& take) {
   sqlite3* opened = nullptr;

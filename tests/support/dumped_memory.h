@@ -47,7 +47,7 @@ inline std::vector<MappedRange> mapped_ranges() {
   return ranges;
 }
 
-/// False with sanitizers, which forbid reading all memory.
+/// True unless a sanitizer forbids to read all memory of the process.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kAllMemoryMayBeRead = false;
 #elif defined(__has_feature)
@@ -60,7 +60,8 @@ inline constexpr bool kAllMemoryMayBeRead = true;
 inline constexpr bool kAllMemoryMayBeRead = true;
 #endif
 
-/// Whether a core dump of this process would contain these bytes. Requires `kAllMemoryMayBeRead`.
+/// Returns true if a core dump of this process would contain `bytes`. Requires
+/// `kAllMemoryMayBeRead`.
 inline bool is_in_a_core_dump(std::string_view bytes) {
   for (const MappedRange& range : mapped_ranges()) {
     if (range.is_writable && !range.has("dd") &&

@@ -17,7 +17,7 @@ inline std::shared_ptr<const protocol::PointTable> table_of(std::uint64_t points
         protocol::listed("e", {1.0})}}));
 }
 
-/// The points of a batch message, in the order in which they are to be solved.
+/// Returns the points of a batch message in the order in which a worker solves them.
 inline std::vector<std::uint64_t> points_of(const protocol::Batch& batch) {
   std::vector<std::uint64_t> points;
   std::uint64_t reached = 0;
@@ -30,7 +30,7 @@ inline std::vector<std::uint64_t> points_of(const protocol::Batch& batch) {
   return points;
 }
 
-/// A solved point with invented outputs, all different and none equal to a short decimal.
+/// A solved point. Its invented outputs all differ, and none has a short decimal form.
 inline protocol::PointResult solved_point(std::uint64_t point) {
   solver::CaseResult result{};
   const double third = 1.0 / 3.0 + static_cast<double>(point);
@@ -59,7 +59,7 @@ inline protocol::PointResult solved_point(std::uint64_t point) {
   return protocol::to_message(point, result);
 }
 
-/// The same with the inputs of that study, as a worker sends it.
+/// A solved point with the inputs of the study `table`, as a worker sends it.
 inline protocol::PointResult solved_point(std::uint64_t point, const protocol::PointTable& table) {
   protocol::PointResult result = solved_point(point);
   protocol::set_inputs(result, table);

@@ -22,21 +22,21 @@ namespace {
 
 constexpr std::chrono::milliseconds kPollInterval{2};
 
-/// Also empty if the file in /proc belongs to a process that has ended.
+/// Returns the contents of a file in /proc; empty if the process has ended.
 std::string contents(const std::string& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   return text.str();
 }
 
-/// State and parent of a process, from /proc; nothing if it has ended.
+/// State letter and parent of a process, as in /proc/PID/stat.
 struct ProcessState {
   char state;
   pid_t parent;
 };
 std::optional<ProcessState> state_of(pid_t pid) {
   const std::string stat = contents("/proc/" + std::to_string(pid) + "/stat");
-  const std::size_t name_end = stat.rfind(')');  // the name before it may contain any character
+  const std::size_t name_end = stat.rfind(')');  // the name may contain `)` itself
   if (name_end == std::string::npos) {
     return std::nullopt;
   }
@@ -46,11 +46,11 @@ std::optional<ProcessState> state_of(pid_t pid) {
   return rest ? std::optional(state) : std::nullopt;
 }
 
-/// The environment of this process with `changes`, without the variables of our programs and of
-/// systemd; each as NAME=value.
+/// Returns the environment of this process with `changes`, each variable as NAME=value. Variables
+/// of oblique's programs and of systemd are removed.
 std::vector<std::string> environment_with(const Environment& changes) {
   std::vector<std::string> all;
-  // Configuration files of this machine must not affect tests.
+  // Installed configuration files must not affect tests.
   Environment set{{"OBLIQUE_SERVER_CONFIG", "/dev/null"}, {"OBLIQUE_WORKER_CONFIG", "/dev/null"}};
   for (const auto& [name, value] : changes) {
     set[name] = value;

@@ -12,35 +12,36 @@
 
 namespace oblique::test {
 
-/// Waits until `condition` holds. Throws std::runtime_error that names `what` after kHangLimit.
+/// Waits until `condition` holds. After kHangLimit throws std::runtime_error that contains `what`.
 void wait_until(const std::string& what, const std::function<bool()>& condition);
 
-/// Whether the process runs; false for a zombie.
+/// Returns true if the process runs, false if it is a zombie.
 bool is_running(pid_t pid);
 
-/// Child processes of `pid`.
+/// Returns the child processes of `pid`.
 std::vector<pid_t> children_of(pid_t pid);
 
-/// Processes whose environment contains the path of this folder, whatever their parent.
+/// Returns all processes whose environment contains the path of `folder`, of any parent.
 std::vector<pid_t> processes_of(const TemporaryFolder& folder);
 
-/// Variables for a program, added to those of this process or in place of them.
+/// Variables that a program gets in addition to those of this process, or that replace them.
 using Environment = std::map<std::string, std::string>;
 
 /// Result of one run of a program.
 struct Outcome {
-  int exit_code;    ///< as of Process::wait
+  int exit_code;    ///< as Process::wait returns it
   std::string out;  ///< standard output
   std::string err;  ///< standard error
 };
 
-/// A program under test, in its own process group, with `folder` as its current folder. Its input
-/// is empty; its output goes to files in the folder.
+/// A program under test. It runs in its own process group and in `folder`. Its input is empty; its
+/// output goes to files in the folder.
 class Process {
  public:
-  /// Starts `program` with `arguments`. Variables of our programs and of systemd are removed unless
-  /// `environment` sets them, and configuration files of this machine are not read. `ready_fd`,
-  /// unless −1, becomes its descriptor 3. Throws std::runtime_error if it does not start.
+  /// Starts `program` with `arguments`. Variables of oblique's programs and of systemd are removed
+  /// unless `environment` sets them, and installed configuration files are not read. `ready_fd`,
+  /// unless −1, becomes the program's descriptor 3. Throws std::runtime_error if the program does
+  /// not start.
   Process(const TemporaryFolder& folder, const std::string& program,
           const std::vector<std::string>& arguments, const Environment& environment = {},
           int ready_fd = -1);
@@ -51,15 +52,15 @@ class Process {
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
-  /// As wait(); nothing while it runs.
+  /// Returns what wait() returns, or nothing while the process runs.
   std::optional<int> exit_code();
-  /// Waits for the end. Returns the exit code, or minus the signal that ended it: a program that
-  /// handles SIGINT and exits returns 130, one that SIGINT kills returns −2.
+  /// Waits until the process ends. Returns its exit code, or minus the signal that ended it: a
+  /// program that handles SIGINT and exits returns 130; SIGINT without a handler gives −2.
   int wait();
-  /// Standard output and standard error so far.
+  /// Return standard output and standard error so far.
   std::string out() const;
   std::string err() const;
-  /// Waits for the end.
+  /// Waits until the process ends.
   Outcome outcome();
 
  private:

@@ -10,7 +10,7 @@
 
 namespace oblique::test {
 
-// Paths of our programs.
+// Paths of the programs under test.
 std::string client_program();
 std::string server_program();
 std::string worker_program();
@@ -19,17 +19,17 @@ std::string worker_program();
 Outcome run_oblique(const TemporaryFolder& folder, const std::vector<std::string>& arguments);
 Outcome run_oblique(const std::vector<std::string>& arguments);
 
-/// An `oblique-server`, ready when constructed.
+/// An `oblique-server`. The constructor waits until the server is ready.
 class Server {
  public:
-  /// On loopback at ports that the system picks and reserves while this object or a successor
-  /// exists.
+  /// Listens on loopback at ports that the system picks. They stay reserved while this object, or
+  /// one constructed from it, exists.
   Server(const TemporaryFolder& folder, const std::string& database,
          const Environment& environment = {});
-  /// At the ports of `before`, which has ended.
+  /// Listens at the ports of `before`, which has ended.
   Server(const TemporaryFolder& folder, const std::string& database, const Server& before,
          const Environment& environment = {});
-  /// With these arguments, which must name its database and addresses.
+  /// Starts with these arguments, which must contain the database and the addresses.
   Server(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
          const Environment& environment = {});
 
@@ -55,7 +55,7 @@ class Server {
   std::optional<Process> process_;
 };
 
-/// An `oblique-worker` of `server`.
+/// An `oblique-worker` that connects to `server_url`.
 class Worker : public Process {
  public:
   Worker(const TemporaryFolder& folder, const std::string& server_url,

@@ -19,10 +19,10 @@
 
 namespace oblique::test {
 
-/// A TCP connection to a server on 127.0.0.1 that sends and receives bytes.
+/// A TCP connection to a server on 127.0.0.1, for raw bytes.
 class RawTcp {
  public:
-  /// `endpoint` ends with :PORT, as in tcp://127.0.0.1:7601; `source` is the local IPv4 address,
+  /// `endpoint` ends with :PORT, such as tcp://127.0.0.1:7601. `source` is the local IPv4 address,
   /// which the server sees.
   explicit RawTcp(const std::string& endpoint, const std::string& source = "127.0.0.1")
       : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -39,7 +39,7 @@ class RawTcp {
     }
   }
 
-  /// Returns false if the server has closed the connection.
+  /// Sends all bytes. Returns false if the server has closed the connection.
   bool send_all(std::string_view bytes) {
     while (!bytes.empty()) {
       const ssize_t sent = ::send(number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -50,11 +50,11 @@ class RawTcp {
     }
     return true;
   }
-  /// Reads once; empty if the server has closed the connection.
+  /// Returns the bytes of one read; empty if the server has closed the connection.
   std::string receive(int flags = 0, std::size_t most = 65536) {
     std::string bytes(most, '\0');
     ssize_t count = 0;
-    do {  // the end of a child process interrupts a call with a time limit
+    do {  // a child that ends interrupts a recv() that has a timeout
       count = ::recv(number(), bytes.data(), bytes.size(), flags);
     } while (count < 0 && errno == EINTR);
     if (count < 0 && errno == EAGAIN && (flags & MSG_DONTWAIT) == 0) {
@@ -63,7 +63,7 @@ class RawTcp {
     bytes.resize(static_cast<std::size_t>(count < 0 ? 0 : count));
     return bytes;
   }
-  /// Reads until the server closes the connection.
+  /// Returns all bytes until the server closes the connection.
   std::string read_to_the_end() {
     std::string all;
     for (std::string some = receive(); !some.empty(); some = receive()) {

@@ -10,7 +10,7 @@
 
 namespace oblique::protocol {
 
-/// A model in which no parameter has its default.
+/// A model in which no parameter has its default value.
 inline solver::ModelParameters unusual_model() {
   solver::ModelParameters model = solver::preset("paper");
   model.lengths_m = {0.5, 0.25};
@@ -49,14 +49,14 @@ inline Axis range(const std::string& key, double from, double to, std::uint64_t 
   return axis;
 }
 
-/// The same with equal ratios of neighbours.
+/// An axis of `count` values from `from` to `to` inclusive, with equal ratios of neighbours.
 inline Axis log_range(const std::string& key, double from, double to, std::uint64_t count) {
   Axis axis = range(key, from, to, count);
   axis.set_spacing(SPACING_LOGARITHMIC);
   return axis;
 }
 
-/// An axis whose value is an expression of others.
+/// An axis whose value is an expression of other axes.
 inline Axis following(const std::string& key, const std::string& expression) {
   Axis axis;
   axis.set_key(key);
@@ -64,7 +64,7 @@ inline Axis following(const std::string& key, const std::string& expression) {
   return axis;
 }
 
-/// An axis of a sample with a uniform distribution between two values.
+/// An axis of a sample, uniformly distributed between `from` and `to`.
 inline Axis uniform(const std::string& key, double from, double to) {
   Axis axis;
   axis.set_key(key);
@@ -73,7 +73,7 @@ inline Axis uniform(const std::string& key, double from, double to) {
   return axis;
 }
 
-/// A grid of these axes, filtered by `where`.
+/// A block that is a grid of `axes`, filtered by `where`.
 inline Block filtered(const std::vector<Axis>& axes, const std::string& where) {
   Block block;
   for (const Axis& axis : axes) {
@@ -83,7 +83,7 @@ inline Block filtered(const std::vector<Axis>& axes, const std::string& where) {
   return block;
 }
 
-/// A block whose axes are paired (zip).
+/// A block that pairs the values of its axes (zip).
 inline Block zipped(const std::vector<Axis>& axes) {
   Block block = filtered(axes, "");
   block.set_zip(true);
@@ -98,7 +98,7 @@ inline Sample sample_of(SampleKind kind, std::uint64_t count, std::uint64_t seed
   return sample;
 }
 
-/// A sample of `count` points.
+/// A block that is a sample of `count` points.
 inline Block sampled(const std::vector<Axis>& axes, SampleKind kind, std::uint64_t count,
                      std::uint64_t seed = 1) {
   Block block = filtered(axes, "");
@@ -116,7 +116,7 @@ inline Recipe recipe_of_blocks(const std::vector<Block>& blocks) {
   return recipe;
 }
 
-/// A sample with `falls` falls: E has that many values, and k is drawn for each point.
+/// A sample that needs `falls` falls: E has `falls` values, and each point has a random k.
 inline Recipe sample_with_falls(std::uint64_t points, std::uint64_t falls,
                                 SampleKind kind = SAMPLE_RANDOM) {
   return recipe_of_blocks(

@@ -13,8 +13,8 @@
 namespace oblique::test {
 
 /// A port of 127.0.0.1 that the system gives to no other program while this object exists.
-/// Connections are refused until a ZeroMQ socket of any process binds to the port by number; this
-/// may be repeated.
+/// Connections are refused until a ZeroMQ socket of any process binds to the port by number.
+/// Sockets may do so repeatedly.
 class ReservedPort {
  public:
   ReservedPort() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {

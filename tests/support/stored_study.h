@@ -9,7 +9,7 @@
 
 namespace oblique::test {
 
-/// Adds a study of `points` points with the number 1; its first `solved` points have a result.
+/// Adds a study with the number 1 and `points` points; the first `solved` points have a result.
 inline void add_study(server::Store& store, const std::string& name, std::uint64_t points,
                       std::uint64_t solved) {
   const auto table = server::table_of(points);

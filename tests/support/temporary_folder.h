@@ -5,17 +5,17 @@
 
 namespace oblique::test {
 
-/// A temporary folder, deleted with its contents by the destructor.
+/// A temporary folder. The destructor deletes it with its contents.
 class TemporaryFolder {
  public:
-  /// Creates it below TMPDIR. Throws std::runtime_error if this fails.
+  /// Creates the folder in TMPDIR. Throws std::runtime_error if this fails.
   TemporaryFolder();
   ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// Path of a file in the folder; the file need not exist.
+  /// Returns the path of a file in the folder; the file need not exist.
   std::string file(const std::string& name) const { return (path_ / name).string(); }
 
  private:

@@ -1,5 +1,5 @@
-// Databases that are deleted or replaced while their server runs, or that other programs read while
-// the server ends.
+// Databases that are deleted or replaced while their server runs, or that another program reads
+// while the server ends.
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A read-only connection, as of another program.
+/// Reads a database as another program does.
 class OtherReader {
  public:
   explicit OtherReader(const std::string& file) {
@@ -31,7 +31,7 @@ class OtherReader {
   OtherReader(const OtherReader&) = delete;
   OtherReader& operator=(const OtherReader&) = delete;
 
-  /// Starts a query and leaves it unfinished. Returns false if it has no row.
+  /// Starts a query and leaves it unfinished. Returns false if the query has no row.
   bool read_one() { return sqlite3_step(statement_) == SQLITE_ROW; }
   void finish_query() { sqlite3_reset(statement_); }
 

@@ -1,4 +1,4 @@
-// Programs of deploy/examples that read a database.
+// Example programs in deploy/examples that read a database.
 #include <cstdlib>
 #include <sstream>
 #include <string>
@@ -14,7 +14,7 @@ namespace {
 
 using Rows = std::vector<std::vector<double>>;
 
-/// The numbers of a CSV table whose header begins with H, mu and fn_peak_N.
+/// Returns the numbers of a CSV table whose header begins with H, mu and fn_peak_N.
 Rows numbers_of(const std::string& csv) {
   std::istringstream lines(csv);
   std::string line;
@@ -31,12 +31,12 @@ Rows numbers_of(const std::string& csv) {
   return rows;
 }
 
-/// A program that reads a database, and a command that succeeds if the program can run here.
+/// An example program, and a command `needs` that succeeds if the program can run here.
 struct Example {
   std::string name;
   std::vector<std::string> command;
   std::string needs;
-  double relative_error = 0.0;  ///< allowed, of the printed numbers
+  double relative_error = 0.0;  ///< allowed error of the printed numbers
 };
 
 class Examples : public testing::TestWithParam<Example> {};
@@ -77,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(
                             {"/usr/bin/sqlite3", "-readonly", "grid.db",
                              ".read '" + kExamples + "/forces.sql'"},
                             "test -x /usr/bin/sqlite3",
-                            1e-14},  // the shell prints 15 digits
+                            1e-14},  // the shell of SQLite prints 15 digits
                     Example{"Python",
                             {"/usr/bin/python3", kExamples + "/forces.py", "grid.db"},
                             "/usr/bin/python3 -c 'import sqlite3'"},

@@ -16,11 +16,11 @@ using solver::KnownImpact;
 
 /// Allowed relative error at the default step.
 constexpr double kTolerance = 3e-5;
-/// Allowed error of instants, relative to the duration. Minima of the force are flat, so that the
-/// default step moves one by 0.003 µs.
+/// Allowed error of instants, relative to the duration. Near a minimum the force is flat, so the
+/// error of the default step moves the instant by 0.003 µs.
 constexpr double kTimeTolerance = 6e-6;
 
-/// Allowed error of a value that is rounded to multiples of `digit`.
+/// Compares a value with a known one that is rounded to multiples of `digit`.
 void expect_close(double value, double known, double digit, const std::string& what) {
   EXPECT_NEAR(value, known, 0.5 * digit + kTolerance * std::abs(known)) << what;
 }
@@ -49,7 +49,7 @@ void expect_times(const Database& database, const KnownImpact& known, const std:
       database.numbers("SELECT 1e6 * (t1_s - t0_s)" + where(known, "phases") + " ORDER BY seq");
   ASSERT_EQ(phases_us.size(), known.phases_us.size()) << name;
   for (std::size_t i = 0; i < phases_us.size(); ++i) {
-    // Phases end where the force turns; the error of such an instant scales with the duration.
+    // A phase ends at an extremum of the force; the error of this instant scales with the duration.
     EXPECT_NEAR(phases_us[i], known.phases_us[i], 0.0005 + kTimeTolerance * known.contact_us)
         << name << ": phase " << i;
   }
@@ -96,7 +96,7 @@ TEST(KnownAnswersTest, RunningTheSameStudyAgainSolvesNothing) {
 TEST(KnownAnswersTest, AFailedPointIsARowWithTheReasonAndTheOthersAreSolved) {
   const TemporaryFolder folder;
   const Database database(folder.file("steps.db"));
-  // 20 µs is above the stability limit.
+  // The step of 20 µs is above the stability limit, so this point fails.
   const Outcome ran = run_oblique(
       folder, {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1", "--dt",
                "4e-6,2e-5", "--name", "steps", "--db", folder.file("steps.db")});

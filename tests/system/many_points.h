@@ -11,9 +11,9 @@ constexpr int kSide = 30;  ///< sanitizers make programs about twenty times slow
 constexpr int kSide = 140;
 #endif
 
-/// Appends to `command` the arguments of a study that takes seconds, long enough to cause faults
-/// while it is solved.
 constexpr double kManyPoints = kSide * kSide;
+/// Appends to `command` the arguments of a study that takes seconds, so that a test can cause
+/// faults while it is solved.
 inline std::vector<std::string> many_points(const std::string& name,
                                             std::vector<std::string> command) {
   const std::string count = std::to_string(kSide);

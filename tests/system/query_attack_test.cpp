@@ -1,4 +1,4 @@
-// Statements that would run for hours, sent to a real server.
+// SQL statements that would run for hours, sent to a real server.
 #include <csignal>
 #include <deque>
 #include <string>
@@ -11,7 +11,7 @@
 namespace oblique::test {
 namespace {
 
-/// A statement that compares bytes for hours and does not check for an interrupt.
+/// A statement that compares bytes for hours, during which SQLite does not check for interrupts.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 class QueryAttackTest : public testing::Test {

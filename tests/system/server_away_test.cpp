@@ -1,4 +1,4 @@
-// Watching a study while its server stops and starts.
+// Clients that watch a study while its server stops and starts.
 #include <csignal>
 #include <memory>
 #include <stdexcept>
@@ -75,7 +75,7 @@ TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
     std::vector<std::unique_ptr<Process>> clients;
     for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
       clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
-      // Watching requires an existing study.
+      // The next client may only watch a study that exists.
       wait_until("the study is stored", [this] {
         const std::string count = "SELECT count(*) FROM studies";
         try {

@@ -26,8 +26,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using protocol::Descriptor;
 constexpr int kLongestPoll_ms = 5;
-/// Buffered bytes per direction, above which nothing more is read. So large that a delay does not
-/// limit the rate.
+/// Maximum number of buffered bytes per direction; the proxy reads no more above it. It is so large
+/// that a delay does not limit the rate.
 constexpr std::size_t kMaxUnderWay = std::size_t{4} << 20U;
 
 sockaddr_in on_loopback(std::uint16_t port) {
@@ -60,7 +60,7 @@ class Direction {
     under_way_.push_back({due, std::move(bytes)});
   }
 
-  /// Sends bytes that are due. Returns false after the end of the connection.
+  /// Sends the bytes that are due. Returns false after the end of the connection.
   bool pass_on(int to, Clock::time_point now) {
     while (!under_way_.empty() && under_way_.front().due <= now) {
       std::string& bytes = under_way_.front().bytes;
@@ -94,7 +94,7 @@ class Direction {
   bool has_end_ = false;
 };
 
-/// The connections to a peer and to the server, and the bytes between them.
+/// A forwarded connection: the sockets to peer and server, and the bytes between them.
 struct Line {
   Descriptor peer;
   Descriptor server;
@@ -102,7 +102,7 @@ struct Line {
   Direction to_peer = {};
   bool is_swallowed = false;
 
-  /// Returns false if a connection has ended.
+  /// Forwards bytes in both directions. Returns false if either connection has ended.
   bool move(Clock::time_point now, std::chrono::milliseconds delay, bool stalls) {
     for (auto [direction, from, to] :
          {std::tuple(&to_server, &peer, &server), std::tuple(&to_peer, &server, &peer)}) {

@@ -8,28 +8,29 @@
 
 namespace oblique::test {
 
-/// Forwards TCP connections on loopback to a server: slowly, with stalls, with silent losses, or
-/// cut again and again.
+/// Forwards TCP connections on loopback to a server. It can delay, stall, silently drop or
+/// repeatedly cut them.
 class TcpProxy {
  public:
-  /// Forwards to the server at that ZeroMQ address. Bytes and ends of connections arrive `delay`
-  /// later, in both directions. All connections are cut after each `cut_interval`, unless it is 0.
+  /// Forwards to the server at the ZeroMQ address `server_url`. Bytes and ends of connections
+  /// arrive `delay` later, in both directions. All connections are cut after each `cut_interval`,
+  /// unless it is 0.
   explicit TcpProxy(const std::string& server_url, std::chrono::milliseconds delay = {},
                     std::chrono::milliseconds cut_interval = {});
   ~TcpProxy();
   TcpProxy(const TcpProxy&) = delete;
   TcpProxy& operator=(const TcpProxy&) = delete;
 
-  /// ZeroMQ address of the proxy.
+  /// Returns the ZeroMQ address of the proxy.
   std::string url() const;
-  /// While true, nothing is forwarded. Bytes received meanwhile are forwarded afterwards.
+  /// stall(true) stops forwarding. stall(false) forwards the bytes received since, and continues.
   void stall(bool holds) { stalls_ = holds; }
-  /// Drops everything on the present connections, including their ends, so that each side becomes
-  /// silent for the other. Later connections are forwarded.
+  /// Drops all bytes on the present connections, and also hides their ends, so that neither side
+  /// gets anything from the other. Later connections are forwarded.
   void swallow() { ++swallowed_; }
-  /// Number of connections so far.
+  /// Returns the number of connections so far.
   int connections() const { return connections_; }
-  /// Number of cut connections so far.
+  /// Returns the number of cut connections so far.
   int cuts() const { return cuts_; }
 
  private:
@@ -44,7 +45,7 @@ class TcpProxy {
   std::atomic<int> swallowed_ = 0;
   std::atomic<int> connections_ = 0;
   std::atomic<int> cuts_ = 0;
-  std::jthread thread_;  ///< last: it uses the other members
+  std::jthread thread_;  ///< last member, because it uses the others
 };
 
 }  // namespace oblique::test

@@ -1,5 +1,5 @@
-// A library that a test loads into a program with LD_PRELOAD. While the file named by
-// OBLIQUE_FAIL_SYNC exists, file syncs fail.
+// A library that a test loads into a program with LD_PRELOAD. File syncs of the program fail while
+// the file named by OBLIQUE_FAIL_SYNC exists.
 #include <dlfcn.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// Full disks, failing syncs, and runs that are stopped or killed.
+// Full disks, failing syncs, and `oblique run` when it is stopped or killed.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 
 // ---- Disks ----
 
-/// Limits the size of files of a process, to simulate a full disk.
+/// Limits the size of the files that a process writes, to simulate a full disk.
 void limit_files(pid_t pid, rlim_t bytes) {
   const rlimit limit{bytes, RLIM_INFINITY};
   ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
@@ -51,7 +51,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
   const Outcome refused =
       run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                            "--name", "another", "--server", server.client_url()});
-  // Some rows may still fit.
+  // The submission succeeds if its rows still fit below the limit.
   EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
       << refused.err;
   EXPECT_TRUE(is_running(server.process().pid()));
@@ -68,7 +68,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
 TEST(FailedSyncTest, AServerExitsWithOneAndTheNextServerRecovers) {
   const TemporaryFolder folder;
   const std::string file = folder.file("failing.db");
-  // LD_PRELOAD separates paths at spaces and colons, which the build folder may contain.
+  // The link avoids spaces and colons of the build folder, at which LD_PRELOAD separates paths.
   const std::string library = folder.file("failing_sync.so");
   std::filesystem::create_symlink(OBLIQUE_FAILING_SYNC, library);
   const std::string mark = folder.file("fails");
@@ -96,7 +96,7 @@ TEST(FailedSyncTest, AServerExitsWithOneAndTheNextServerRecovers) {
 
 // ---- Runs ----
 
-/// `oblique run` with a study that takes long enough to be interrupted.
+/// Runs `oblique run` on a study that takes long enough to be interrupted.
 class RunTest : public ::testing::Test {
  protected:
   std::vector<std::string> arguments() const {
@@ -104,7 +104,7 @@ class RunTest : public ::testing::Test {
   }
   static constexpr double kPoints = kManyPoints;
 
-  /// Returns the server and workers of a run as soon as all of them work.
+  /// Waits until results are stored, and returns the server and the workers of a run.
   std::vector<pid_t> started_by(const Process& run) {
     wait_until("rows in the database", [&] { return database_.rows() >= kPoints / 400; });
     const auto children = children_of(run.pid());
@@ -124,7 +124,7 @@ class RunTest : public ::testing::Test {
 TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
-  kill(-run.pid(), SIGINT);  // to the whole group, as a terminal does
+  kill(-run.pid(), SIGINT);  // to the process group, as a terminal does
   EXPECT_EQ(run.wait(), 128 + SIGINT);
   EXPECT_NE(run.err().find("the same command continues"), std::string::npos) << run.err();
   EXPECT_EQ(run.out(), "");
@@ -173,7 +173,7 @@ TEST(WorkerOfARunTest, EndsIfTheRunWasKilledBeforeTheWorkerStarted) {
 TEST_F(RunTest, ARunContinuesWhenOneOfItsWorkersIsKilled) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
-  // the process started last
+  // `oblique run` starts its workers after the server
   const pid_t worker = *std::max_element(children.begin(), children.end());
   kill(worker, SIGKILL);
   EXPECT_EQ(run.wait(), 0) << run.err();

@@ -1,4 +1,4 @@
-// Servers that are killed while studies grow, are renamed or deleted.
+// Servers that are killed while studies are extended, renamed or deleted.
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -22,7 +22,7 @@ constexpr int kPointsABlock = 200;
 
 class GrowthKillTest : public ::testing::Test {
  protected:
-  /// A study file with `blocks` blocks of 200 points each, none of which another study has.
+  /// Writes a study file with `blocks` blocks of 200 points. No other study contains these points.
   std::string study_file(const std::string& name, double k, int blocks) const {
     const std::string path = folder_.file(name + ".toml");
     std::ofstream file(path);
@@ -74,14 +74,14 @@ TEST_F(GrowthKillTest, AcknowledgedChangesSurviveAKillAtAnyTime) {
               kPointsABlock * (round + 1))
         << round;
     if (deleting != nullptr) {
-      // The client repeats the request at the next server; the killed one may already have executed
-      // it.
+      // The client sends the request again to the next server, but the killed server may already
+      // have deleted the study.
       const int code = deleting->wait();
       EXPECT_TRUE(code == 0 || deleting->err().find("no study") != std::string::npos)
           << round << ": " << deleting->err();
       EXPECT_EQ(number("SELECT count(*) FROM studies WHERE name = '" + victim + "'"), 0) << round;
     }
-    // When the next round deletes it, its rows are stored or arrive at that moment.
+    // The next round deletes this study after its results are stored, or while they arrive.
     victim = "victim " + std::to_string(round);
     const auto next = submit(study_file(victim, 1e7 + round, 2));
     EXPECT_EQ(next->wait(), 0) << next->err();

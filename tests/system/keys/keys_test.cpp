@@ -1,5 +1,5 @@
-// Peers with a listed key are admitted. Others are refused at once, and both sides report the
-// reason.
+// The server admits peers with a listed key. It refuses all others at once, and both sides report
+// the reason.
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -20,7 +20,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A server with keys, and folders with other keys.
+/// A server with keys, and folders with keys that the server does not list.
 class KeysTest : public ::testing::Test {
  protected:
   KeysTest() {
@@ -51,7 +51,7 @@ class KeysTest : public ::testing::Test {
     wait_until("the message " + words,
                [&] { return process.err().find(words) != std::string::npos; });
   }
-  /// Expects exit code and message of a refused client.
+  /// Expects that a client with `key_file` is refused and prints a message with `words`.
   void expect_turned_away(const std::string& key_file, const std::string& words) const {
     const Outcome outcome = ask({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
@@ -158,7 +158,7 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   EXPECT_THAT(change_keys({"list"}).out, Not(HasSubstr("late")));
   const auto worker = worker_with(key("late"));
   wait_until_said(*worker, "did not accept this key");
-  // `keys add --public` adds the public key from the file to the list again.
+  // `keys add --public` adds the public key of the file `late` to the list again.
   std::string line;
   std::ifstream file(key("late"));
   while (std::getline(file, line) && !line.starts_with("public = \"")) {

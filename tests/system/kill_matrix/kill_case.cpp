@@ -16,7 +16,7 @@ struct Entry {
   const char* program;
   const char* point;
   int signal;
-  int highest;  ///< largest occurrence, or time [ms], that is drawn
+  int highest;  ///< maximum of the random occurrence, or time [ms]
 };
 
 constexpr bool kApart = false;
@@ -27,14 +27,14 @@ constexpr const char* kWorker = "oblique-worker";
 constexpr const char* kNoProcess = "";
 constexpr int kNoSignal = 0;
 
-// Storms in place of a point.
+// Entries with a storm have one of these in place of a point.
 constexpr const char* kKilledWorkers = "storm:killed workers";
 constexpr const char* kCutConnections = "storm:cut connections";
 constexpr const char* kVanishingPeers = "storm:vanishing peers";
 
-// The first 23 entries are the test that always runs. They contain every class of point, every
-// program both started apart and by `oblique run`, and both signals. An undisturbed run reaches
-// every occurrence.
+// The test that always runs uses the first 23 entries. They contain every class of point, every
+// program both started apart and by `oblique run`, and both signals. Without a signal a run reaches
+// every point as often as an entry requires.
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},
@@ -96,7 +96,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kClient, "before-send:status", SIGKILL, 12},
     Entry{kApart, kClient, "after-send:status", SIGSTOP, 12},
     Entry{kApart, kClient, "time", SIGSTOP, 800},
-    // `oblique run` and its children; the first entry hits it while it starts them.
+    // Signals to `oblique run` and its children. The first one arrives while it starts them.
     Entry{kRun, kClient, "time", SIGKILL, 40},
     Entry{kRun, kClient, "time", SIGSTOP, 800},
     Entry{kRun, kClient, "before-send:submit", SIGKILL, 1},
@@ -154,17 +154,17 @@ KillCase draw_case(std::uint64_t seed) {
   drawn.storm = storm_of(drawn.point);
   drawn.signal = entry.signal;
   drawn.occurrence = up_to(entry.highest);
-  // Without a pause a message is still in the process; after 20 ms it has been sent.
+  // Without a pause the process has not sent the message yet; after 20 ms it has.
   drawn.pause = milliseconds(random() % 2 == 0 ? 0 : 20);
   drawn.server_stops_first = random() % 2 == 0;
   if (drawn.signal == SIGSTOP) {
-    // Server and workers are silent for each other after 3 s; a client's request times out after 10
-    // s.
+    // Server and workers regard each other as lost after 3 s without messages; requests of a client
+    // time out after 10 s.
     constexpr std::array kStopped{milliseconds(300), milliseconds(1500), milliseconds(4500)};
     drawn.stopped = kStopped.at(random() % kStopped.size());
     drawn.then = random() % 3 == 0 ? SIGKILL : SIGCONT;
   }
-  // A worker sends a goodbye only to a running server, and a server its end only to running
+  // A worker sends `goodbye` only to a running server; a server sends `stopping` only to running
   // workers.
   if (drawn.point.ends_with(":goodbye")) {
     drawn.server_stops_first = false;

@@ -26,9 +26,9 @@ constexpr std::chrono::milliseconds kPollInterval{5};
 constexpr int kMaxAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code of a complete study with failed points
 
-// Several models, so that batches end before the study does. The first block takes long enough for
-// heartbeats and about twenty commits. A filter leaves out half of the second block. The two points
-// of the last block fail.
+// The study has several models, so that batches end before the study does. The first block takes
+// long enough for heartbeats and about twenty commits. A filter leaves out half of the second
+// block. Both points of the last block fail.
 constexpr const char* kStudy = R"(name = "matrix"
 [model]
 preset = "paper"
@@ -60,8 +60,9 @@ bool reports_end_of_study(const Process& process) {
          process.err().find("points failed") != std::string::npos;
 }
 
-/// The signal of a cycle. The process sends it to itself, by the library kill_points. This class
-/// sets the environment for that, and continues or kills a halted process.
+/// Injects the signal of a cycle. A process sends the signal to itself by the library kill_points,
+/// which this class controls by environment variables. This class also continues or kills a halted
+/// process.
 class FaultInjection {
  public:
   FaultInjection(const TemporaryFolder& folder, const KillCase& kill_case)
@@ -69,7 +70,7 @@ class FaultInjection {
         folder_(folder.path().string()),
         mark_(folder.file("mark")),
         library_(folder.file("kill_points.so")) {
-    // LD_PRELOAD separates paths at spaces and colons, which the build folder may contain.
+    // The link avoids spaces and colons of the build folder, at which LD_PRELOAD separates paths.
     std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
     if (case_.signal == SIGSTOP) {
       halt_ = std::jthread([this](const std::stop_token& stop) { end_halt(stop); });
@@ -78,7 +79,7 @@ class FaultInjection {
   FaultInjection(const FaultInjection&) = delete;
   FaultInjection& operator=(const FaultInjection&) = delete;
 
-  /// Environment of `program`; if it is the program of the case, with the order to kill_points.
+  /// Returns the environment of `program`. In the program of the case it orders the signal.
   Environment environment(const std::string& program) const {
     Environment all = plain_environment();
     if (program == case_.program) {
@@ -90,13 +91,13 @@ class FaultInjection {
     }
     return all;
   }
-  /// Environment of processes that get no signal. TMPDIR marks all processes of a cycle, including
-  /// their children (`processes_of`).
+  /// Returns the environment of processes that get no signal. `processes_of` finds all processes of
+  /// a cycle, also children of children, by TMPDIR.
   Environment plain_environment() const { return {{"TMPDIR", folder_}}; }
 
   bool has_happened() const { return target() > 0; }
-  /// Whether the signal explains that exit code of that program. True at most once, because one
-  /// process gets the signal.
+  /// Returns true if the signal explains that `program` ended with `exit_code`. This is true at
+  /// most once, because only one process gets the signal.
   bool explains(const std::string& program, int exit_code) {
     if (explained_ || program != case_.program || exit_code != -SIGKILL || !case_.is_killed() ||
         !has_happened()) {
@@ -107,7 +108,7 @@ class FaultInjection {
   }
 
  private:
-  /// The process that got the signal; −1 if none has yet.
+  /// Returns the process that got the signal, or −1 before the signal.
   pid_t target() const {
     std::ifstream mark(mark_);
     pid_t pid = -1;
@@ -131,10 +132,11 @@ class FaultInjection {
   std::string mark_;
   std::string library_;
   bool explained_ = false;
-  std::jthread halt_;  ///< last: it uses the other members
+  std::jthread halt_;  ///< last member, because it uses the others
 };
 
-// ---- Server, workers and client, each started apart ---------------------------------------------
+// ---- Server, workers and client as separate programs
+// ---------------------------------------------
 
 class ApartCycle {
  public:
@@ -172,7 +174,7 @@ class ApartCycle {
   bool had_storm() const { return storm_ && storm_->faults() > 0; }
 
  private:
-  /// If the server is killed before it is ready, starts it again at other ports.
+  /// Starts the server; if it is killed before it is ready, starts another at other ports.
   void start_server() {
     try {
       server_ =
@@ -190,14 +192,14 @@ class ApartCycle {
         std::make_unique<Server>(folder_, database_, *server_, injection_.plain_environment());
   }
 
-  /// With one thread, because many cycles share the cores.
+  /// The worker has one thread, because many cycles share the cores.
   void start_worker(std::unique_ptr<Worker>& worker, bool first) {
     worker = std::make_unique<Worker>(
         folder_, server_->worker_url(), std::vector<std::string>{"--threads", "1"},
         first ? injection_.environment("oblique-worker") : injection_.plain_environment());
   }
 
-  /// Restarts the process that the signal has ended. Fails if another one has ended.
+  /// Restarts the process that the signal has ended. Fails if another process has ended.
   void restart_killed() {
     if (const auto code = server_->process().exit_code()) {
       expect_explained("oblique-server", *code, server_->process());
@@ -217,9 +219,9 @@ class ApartCycle {
     }
   }
 
-  /// Returns false if the client was killed and must be started again.
+  /// Runs the client. Returns false if it was killed and must be started again.
   bool submit_and_watch(bool first) {
-    // The long timeout makes the client repeat requests that a killed server has received.
+    // With this timeout the client sends requests again that a killed server had received.
     Process client(
         folder_, client_program(),
         {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "600"},
@@ -249,7 +251,7 @@ class ApartCycle {
   }
 
   void stop(const std::string& program, Process& process) {
-    // Before its first log line a program may not handle signals yet.
+    // A program may not handle signals before its first log line.
     wait_until(program + " has begun",
                [&] { return process.exit_code() || !process.err().empty(); });
     if (!process.exit_code()) {
@@ -272,7 +274,7 @@ class ApartCycle {
 
 // ---- `oblique run` ------------------------------------------------------------------------------
 
-/// Returns false if the command ended early and must be repeated.
+/// Runs `oblique run`. Returns false if it ended early and must be repeated.
 bool run_once(const TemporaryFolder& folder, const KillStudy& study, const KillCase& kill_case,
               FaultInjection& injection, bool first) {
   Process run(folder, client_program(),
@@ -283,7 +285,7 @@ bool run_once(const TemporaryFolder& folder, const KillStudy& study, const KillC
   if (code == kPointsFailed && reports_end_of_study(run)) {
     return true;
   }
-  // It continues without one of its workers, and reports the loss of its server.
+  // `oblique run` survives the loss of a worker, but ends if its server is killed.
   const bool server_lost = code == 1 && kill_case.program == "oblique-server" &&
                            run.err().find("was killed by signal 9") != std::string::npos;
   if (!first || !injection.has_happened() ||
@@ -329,12 +331,12 @@ std::string error_output(const TemporaryFolder& folder) {
 constexpr unsigned kAtOncePerCore = 4;
 
 struct CycleOutcome {
-  bool reached = false;                ///< the point, or at least one fault of the storm
-  std::optional<std::string> failure;  ///< reason, and error output of the processes
+  bool reached = false;                ///< the signal was sent, or a fault of the storm happened
+  std::optional<std::string> failure;  ///< reason, and standard error of the processes
 };
 
-/// Runs the study in a temporary folder with the signal of the case, and compares the database with
-/// the undisturbed one.
+/// Runs the study in a temporary folder with the signal of the case, and compares its database with
+/// that of an undisturbed run.
 CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
   const TemporaryFolder folder;
   CycleOutcome outcome;
@@ -377,7 +379,8 @@ std::vector<Table> tables() {
        "",
        "study_id"},
       {"models", {"model_id"}, "", "definition"},
-      // Numbers of models depend on the order of arrival; their definitions are compared instead.
+      // The number of a model depends on the order of arrival, so its definition is compared
+      // instead.
       {"results",
        {"model_id", "wall_s", "worker_id", "attempt", "solved_at", "checksum"},
        " JOIN models USING (model_id)",
@@ -385,7 +388,7 @@ std::vector<Table> tables() {
   };
 }
 
-/// Every row as one text. Columns are read from the schema, so that new ones are compared too.
+/// Returns every row as one text. The schema gives the columns, so new columns are compared too.
 std::vector<std::string> rows_of(const Database& database, const Table& table) {
   // quote() writes numbers with all their digits.
   std::string row = table.joined.empty() ? "''" : "quote(models.definition)";

@@ -11,35 +11,35 @@
 
 namespace oblique::test {
 
-/// One cycle of the kill matrix: which process gets which signal, where, and what follows.
+/// One cycle of the kill matrix: the signal, the process that gets it, the time, and what follows.
 struct KillCase {
   std::uint64_t seed = 0;
-  bool all_in_one = false;           ///< `oblique run`; otherwise each program is started apart
-  std::string program;               ///< that gets the signal; empty: none, or a storm
-  std::optional<StormKind> storm{};  ///< continues until the study is done
-  std::string point;                 ///< as kill_points.cpp names them
-  int occurrence = 1;  ///< of the point, from 1; for `time`: milliseconds after the start
+  bool all_in_one = false;           ///< `oblique run` starts all programs
+  std::string program;               ///< gets the signal; empty: no signal or a storm
+  std::optional<StormKind> storm{};  ///< storm that lasts until the study is done
+  std::string point;                 ///< name of a point in kill_points.cpp
+  int occurrence = 1;  ///< n-th time at the point, from 1; for `time`: milliseconds after the start
   int signal = 0;      ///< SIGKILL or SIGSTOP
   std::chrono::milliseconds pause{0};  ///< between point and signal
   // For SIGSTOP only.
   std::chrono::milliseconds stopped{0};  ///< duration of the halt
   int then = 0;                          ///< SIGCONT or SIGKILL, after the halt
-  bool server_stops_first = false;       ///< at the end; otherwise the workers stop first
+  bool server_stops_first = false;       ///< order of stopping; false: workers first
 
   bool is_killed() const;
 };
 
-/// The case of a seed: entry `seed` modulo the size of the matrix; the rest is drawn at random from
-/// the seed.
+/// Returns the case of a seed: the matrix entry `seed` modulo the number of entries. The seed also
+/// determines all random choices.
 KillCase draw_case(std::uint64_t seed);
 
-/// Number of entries of the matrix.
+/// Returns the number of entries of the matrix.
 std::uint64_t entries_of_matrix();
 
-/// Description on one line.
+/// Returns a description of the case on one line.
 std::string describe(const KillCase& kill_case);
 
-/// "before-send" of "before-send:results".
+/// Returns the class of a point, such as "before-send" for "before-send:results".
 std::string class_of(const std::string& point);
 
 /// The study of all cycles, and the database of an undisturbed run.
@@ -51,7 +51,7 @@ class KillStudy {
   std::string undisturbed() const { return folder_.file("undisturbed.db"); }
 
   static constexpr const char* kName = "matrix";
-  static constexpr int kFailing = 2;  ///< points that fail: their step is above the stability limit
+  static constexpr int kFailing = 2;  ///< points whose step is too long to be stable, so they fail
 
  private:
   TemporaryFolder folder_;
@@ -59,17 +59,17 @@ class KillStudy {
 
 struct MatrixReport {
   std::uint64_t cycles = 0;
-  std::uint64_t not_reached = 0;      ///< cycles whose study ended before the point
+  std::uint64_t not_reached = 0;      ///< cycles whose study ended before the signal
   std::vector<std::string> failures;  ///< case and reason
 };
 
-/// Runs the cases of `count` seeds from `first_seed`. Several run at once, because a cycle mostly
-/// waits until a halted process counts as lost.
+/// Runs the cases of `count` seeds from `first_seed`. Cycles run in parallel, because a cycle
+/// mostly waits until a halted process counts as lost.
 MatrixReport run_matrix(std::uint64_t first_seed, std::uint64_t count);
 
-/// Returns the first difference between two databases; empty if there is none. Compares all bits of
-/// studies, models and results, except columns that depend on chance: numbers given in order of
-/// arrival, times, durations, attempts, workers, and the key of the submitter.
+/// Returns the first difference between two databases, or an empty text. Compares studies, models
+/// and results bit by bit, except columns that depend on chance: numbers given in order of arrival,
+/// times, durations, attempts, workers, and the submitter's key.
 std::string first_difference(const std::string& database, const std::string& other);
 
 }  // namespace oblique::test

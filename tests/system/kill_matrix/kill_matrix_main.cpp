@@ -1,4 +1,4 @@
-// oblique-kill-matrix FIRST_SEED COUNT: runs the cycles of COUNT seeds and prints those that fail.
+// `oblique-kill-matrix FIRST_SEED COUNT` runs the cycles of COUNT seeds and prints failed cycles.
 #include <chrono>
 #include <cstdint>
 #include <exception>

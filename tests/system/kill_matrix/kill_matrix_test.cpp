@@ -12,7 +12,7 @@
 namespace oblique::test {
 namespace {
 
-/// The program `oblique-kill-matrix` runs more.
+/// Number of cycles in this test; the program `oblique-kill-matrix` runs more.
 constexpr std::uint64_t kCycles = 23;
 
 TEST(KillMatrixTest, TheDatabaseEqualsThatOfAnUndisturbedRunWhicheverProcessIsKilledOrHalted) {
@@ -21,7 +21,7 @@ TEST(KillMatrixTest, TheDatabaseEqualsThatOfAnUndisturbedRunWhicheverProcessIsKi
   for (const std::string& failure : report.failures) {
     ADD_FAILURE() << failure;
   }
-  // A late occurrence may be missing if messages are grouped differently.
+  // A run may combine messages, and then reaches a point less often than the case requires.
   EXPECT_LE(report.not_reached, kCycles / 5) << "too many cycles ended before their point";
 }
 
@@ -43,7 +43,7 @@ TEST(KillMatrixTest, TheFirstCyclesContainEveryClassOfPointProgramAndSignalOfThe
 
 class ComparisonTest : public ::testing::Test {
  protected:
-  /// The difference found after `sql` has changed one of two equal databases.
+  /// Returns the difference found after `sql` has changed one of two equal databases.
   std::string difference_after(const std::string& sql) {
     const std::string changed = folder_.file("changed.db");
     std::filesystem::copy_file(study_.undisturbed(), changed,
@@ -62,7 +62,7 @@ class ComparisonTest : public ::testing::Test {
 TEST_F(ComparisonTest, FindsDifferencesThatMustNotBeAndNoOthers) {
   EXPECT_EQ(difference_after("SELECT 1"), "");
   EXPECT_EQ(difference_after("UPDATE results SET attempt = 7, wall_s = 1, solved_at = 'then'"), "");
-  // By offset, because a filter leaves out some point numbers.
+  // Selects the 300th stored point, because a filter leaves out some point numbers.
   const std::string one = " WHERE point = (SELECT point FROM results LIMIT 1 OFFSET 300)";
   for (const std::string& change : std::vector<std::string>{
            "UPDATE results SET fn_peak_N = fn_peak_N + 1" + one,

@@ -1,16 +1,16 @@
-// A library that a test loads into a program with LD_PRELOAD. It intercepts the calls with which
-// the program commits, sends and receives, and sends the program a signal at one of them. So the
-// programs under test need no hooks of their own.
+// A library that a test loads into a program with LD_PRELOAD, so that the program needs no hooks.
+// The library intercepts the calls with which the program commits, sends and receives, and sends it
+// a signal at one of them.
 //
-// OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" defines when:
-//   PROGRAM     name of the program; children of other names inherit the variable and ignore it
+// OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" defines the signal:
+//   PROGRAM     name of the program; other programs inherit the variable and ignore it
 //   POINT       before-commit, after-commit, before-send:KIND, after-send:KIND, after-receive:KIND
-//               with a kind of proto/oblique.proto, or time
-//   OCCURRENCE  of the point, from 1; for time: milliseconds after the start
+//               or time; KIND is a kind of message in proto/oblique.proto
+//   OCCURRENCE  n-th time at the point, from 1; for time: milliseconds after the start
 //   SIGNAL      number of the signal
 //   PAUSE_MS    sleep before the signal, for example until a message has been sent
-//   MARK        file with the process id, created before the signal is sent. If it exists,
-//               another process already got the signal, and this one continues.
+//   MARK        file for the process id, written before the signal is sent. If the file exists,
+//               another process already got the signal, and this process continues.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -57,7 +57,7 @@ std::optional<Order> order_for(const std::string& program) {
 
 // ---- Kinds of messages --------------------------------------------------------------------------
 
-/// Names of the kinds of a message, the first one being field `first`.
+/// Names of the kinds of a message, in the order of their Protobuf fields from `first` on.
 struct Kinds {
   std::uint64_t first;
   std::vector<std::string> names;
@@ -92,14 +92,14 @@ std::uint64_t take_varint(std::basic_string_view<unsigned char>& bytes) {
   return value;
 }
 
-/// Name of the kind of message in a frame; empty if unknown. Decoded by hand, because the Protobuf
+/// Returns the kind of message in a frame; empty if unknown. Decodes by hand, because the Protobuf
 /// library refuses a second copy of the generated code in one process.
 std::string kind_of(const std::string& program, bool sent, const void* data, std::size_t size) {
   std::basic_string_view<unsigned char> bytes(static_cast<const unsigned char*>(data), size);
   constexpr unsigned char kNumberInFieldOne = 0x08;
   const bool with_client = !bytes.empty() && bytes.front() == kNumberInFieldOne;
   const Kinds& kinds = kinds_of(program, sent, with_client);
-  // The kind is the first field that is a message; only numbers precede it.
+  // The first field that contains a message is the kind; only numbers precede it.
   while (!bytes.empty()) {
     const std::uint64_t tag = take_varint(bytes);
     constexpr std::uint64_t kNumber = 0;
@@ -127,7 +127,7 @@ class KillPoints {
   }
 
   bool armed() const { return order_.has_value(); }
-  /// The server implements ZMTP itself; the other programs use libzmq.
+  /// Only the server uses sockets directly, for ZMTP; the other programs use libzmq.
   bool watches_sockets() const { return armed() && program_ == "oblique-server"; }
 
   void reached(const std::string& point) {
@@ -158,7 +158,7 @@ class KillPoints {
     }
   }
 
-  /// The thread blocks all signals, so that the program's own threads receive them.
+  /// Starts the timer thread. It blocks all signals, so that the program's own threads get them.
   void start_clock() const {
     sigset_t all;
     sigset_t before;
@@ -176,10 +176,10 @@ class KillPoints {
   std::atomic<int> times_ = 0;
 };
 
-/// The bytes that one side of a ZMTP connection sends: a greeting, then frames.
+/// Parses the bytes that one side of a ZMTP connection sends: a greeting, then frames.
 class Stream {
  public:
-  /// Calls `take` with the body of every complete message.
+  /// Adds bytes, and calls `take` with the body of every complete message.
   template <class Take>
   void receive(std::string_view bytes, const Take& take) {
     buffer_ += bytes;
@@ -225,13 +225,13 @@ struct Connection {
   Stream sent;
 };
 
-/// Connections by descriptor. Only one thread of the server uses sockets.
+/// Connections by descriptor, without a lock, because one thread of the server uses all sockets.
 std::map<int, Connection>& connections() {
   static auto* const only = new std::map<int, Connection>;
   return *only;
 }
 
-/// Never destroyed, because threads may call it until the process ends.
+/// The object is never destroyed, because threads may use it until the process ends.
 KillPoints& points() {
   static auto* const only = new KillPoints;
   return *only;
@@ -291,7 +291,7 @@ extern "C" int zmq_msg_recv(zmq_msg_t* message, void* socket, int flags) {
   return received;
 }
 
-/// False for the sockets to query processes.
+/// Returns true for TCP sockets, false for the Unix sockets to query processes.
 static bool is_of_a_peer(int socket) {
   int domain = 0;
   socklen_t size = sizeof domain;

@@ -24,7 +24,7 @@ void write_to(const std::string& file, const std::string& text) {
   std::ofstream(file) << text;
 }
 
-/// Tries a user namespace, which needs no root; without one, root is needed.
+/// Enters new namespaces. Root is only needed if the system allows no user namespaces.
 void enter_namespaces() {
   const uid_t user = geteuid();
   const gid_t group = getegid();
@@ -64,9 +64,9 @@ protocol::Descriptor new_network() {
   return made;
 }
 
-/// Runs the command in the namespaces of this thread.
+/// Runs `command` in the namespaces of this thread and returns its output.
 std::string run_here(const TemporaryFolder& folder, const std::string& command) {
-  // The PATH of other users than root may lack sbin.
+  // The PATH of users other than root may lack sbin.
   const Outcome ran =
       Process(folder, "/bin/sh", {"-ec", command}, {{"PATH", "/usr/sbin:/usr/bin:/sbin:/bin"}})
           .outcome();
@@ -78,8 +78,7 @@ std::string run_here(const TemporaryFolder& folder, const std::string& command) 
 
 }  // namespace
 
-// ---- Namespaces of this thread
-// ---------------------------------------------------------------------
+// ---- Namespaces of this thread ------------------------------------------------------------------
 
 Inside::Inside(const Host& host) : before_(present_network()) {
   if (setns(host.network(), CLONE_NEWNET) != 0) {
@@ -164,7 +163,7 @@ Lan::~Lan() {
 
 Host& Lan::add(const std::string& name, int last) {
   Host& host = *hosts_.emplace_back(std::unique_ptr<Host>(new Host(*folder_, name, last)));
-  // The path names the descriptor in this process, so that the command can open it.
+  // The `ip` command opens the namespace by the path of a descriptor of this process.
   run_here(*folder_, fmt::format("ip link add name to-{0} type veth peer name cable;"
                                  "ip link set dev cable netns /proc/{1}/fd/{2};"
                                  "ip link set dev to-{0} master switch up",

@@ -11,33 +11,33 @@
 
 namespace oblique::test {
 
-/// The system refuses to create namespaces; the message has the reason.
+/// Thrown if the system refuses to create namespaces; the message contains the reason.
 class NoNamespaces : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A machine of a test's network: a network namespace with loopback and one cable, eth0, to the
-/// switch, to which the test is connected. Programs that are started while an `Inside` exists run
-/// on it.
+/// A virtual machine of a test: a network namespace with loopback and one virtual cable, eth0, to
+/// the switch. The test is connected to the switch. Programs run on the machine if they are started
+/// while an `Inside` for it exists.
 class Host {
  public:
   const std::string& name() const { return name_; }
-  /// Its addresses without prefix length, as 10.77.0.2, fd77::2 and fe80::4d:2.
+  /// The machine's addresses without prefix length, such as 10.77.0.2, fd77::2 and fe80::4d:2.
   std::string v4() const;
   std::string v6() const;
   std::string link_local() const;
   int network() const { return network_.number(); }
 
-  /// Unplugs or plugs in its cable at the switch.
+  /// Unplugs or plugs in the machine's cable at the switch.
   void pull_cable() const;
   void plug_cable() const;
   /// Drops `percent` percent of the arriving packets at random.
   void lose_percent(int percent) const;
-  /// Drops all packets from and to this machine, so that no peer is notified.
+  /// Drops all packets from and to this machine. Its peers get no notice that it is unreachable.
   void lose_everything() const;
   void lose_nothing() const;
-  /// Changes its addresses to those that end in `last`.
+  /// Changes the machine's addresses to 10.77.0.`last` and fd77::`last`.
   void renumber(int last);
   /// Runs a shell command on the machine and returns its output. Throws std::runtime_error if the
   /// command fails.
@@ -53,7 +53,7 @@ class Host {
   protocol::Descriptor network_;
 };
 
-/// While this object exists, this thread and the programs that it starts run on that machine.
+/// While this object exists, this thread and the programs that it starts run on `host`.
 class Inside {
  public:
   explicit Inside(const Host& host);
@@ -65,11 +65,11 @@ class Inside {
   protocol::Descriptor before_;
 };
 
-/// A switch with machines, in user, mount and network namespaces of this process. These need no
-/// root, are invisible outside, and end with this process and its children.
+/// A switch with machines, in user, mount and network namespaces of this process. These namespaces
+/// need no root, are invisible to other processes, and end with this process and its children.
 class Lan {
  public:
-  /// Moves this process, which must be single-threaded, to new namespaces. Throws NoNamespaces.
+  /// Moves this process, which must have one thread, to new namespaces. Throws NoNamespaces.
   explicit Lan(const TemporaryFolder& folder);
   ~Lan();
   Lan(const Lan&) = delete;
@@ -77,7 +77,7 @@ class Lan {
 
   /// Adds a machine with the addresses 10.77.0.`last` and fd77::`last`.
   Host& add(const std::string& name, int last);
-  /// Makes programs on all machines resolve `name`, and only this name, to these addresses.
+  /// Makes `name` resolve to `addresses` on all machines. No other name resolves.
   void set_addresses(const std::string& name, const std::vector<std::string>& addresses) const;
 
  private:

@@ -1,5 +1,5 @@
-// Programs on separate machines: broken, lossy and stalled lines, changed addresses, eavesdroppers,
-// and the commands of README.md for a second machine.
+// Programs on separate machines: broken, lossy and stalled connections, changed addresses, captured
+// packets, and the commands of README.md for a second machine.
 #include <arpa/inet.h>
 #include <linux/if_packet.h>
 #include <net/ethernet.h>
@@ -43,8 +43,8 @@ using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A server, two workers and a client, each on its own machine, and a study that takes seconds.
-/// Skipped if no networks can be created.
+/// A server, two workers and a client, each on its own machine, and a study that takes seconds. The
+/// tests are skipped if no networks can be created.
 class StudyOnLan : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -63,7 +63,7 @@ class StudyOnLan : public ::testing::Test {
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
 
-  /// The options with which a client or worker (`role`) reaches the server.
+  /// Returns the options for a client or worker (`role`) to connect to the server.
   std::vector<std::string> access(const std::string& role) const {
     const std::string port = role == "worker" ? "7601" : "7600";
     std::vector<std::string> options{"--server", "tcp://" + server_name_ + ":" + port};
@@ -84,7 +84,7 @@ class StudyOnLan : public ::testing::Test {
     }
     server_ = std::make_unique<Server>(folder_, arguments);
   }
-  /// A worker on that machine, with its name.
+  /// Starts a worker on `host`; the worker has the name of the host.
   std::unique_ptr<Process> worker_on(const Host& host) const {
     const Inside inside(host);
     auto arguments = access("worker");
@@ -92,7 +92,7 @@ class StudyOnLan : public ::testing::Test {
                                        "--stop-with-parent", std::to_string(getpid())});
     return std::make_unique<Process>(folder_, worker_program(), arguments);
   }
-  /// Starts `oblique` with these arguments and the server's address on the client's machine.
+  /// Starts `oblique` on the client's machine with `arguments` and the server's address.
   std::unique_ptr<Process> client(std::vector<std::string> arguments) const {
     const Inside inside(*client_host_);
     const auto options = access("client");
@@ -100,9 +100,9 @@ class StudyOnLan : public ::testing::Test {
     return std::make_unique<Process>(folder_, client_program(), arguments);
   }
 
-  /// Starts all programs that do not run yet. When the first results are stored it calls `fault`,
-  /// which causes and repairs a fault. Then the study must complete (small_study.h) and all workers
-  /// must still run. Prints the time until new results.
+  /// Starts all programs that do not run yet, and calls `fault` when the first results are stored;
+  /// `fault` causes and repairs a fault. Then the study must complete (small_study.h), and all
+  /// workers must still run. Prints the time until new results are stored.
   void expect_completion_after(const std::function<void()>& fault, std::size_t workers = 2) {
     if (server_ == nullptr) {
       start_server();
@@ -134,9 +134,9 @@ class StudyOnLan : public ::testing::Test {
   std::array<Host*, 2> worker_hosts_{};
   Host* client_host_ = nullptr;
 
-  /// The server's name for workers and clients; at first its IPv4 address.
+  /// The host name of the server in addresses; initially its IPv4 address.
   std::string server_name_;
-  std::string keys_;  ///< folder of the keys of all programs; empty: no keys
+  std::string keys_;  ///< folder with the keys of all programs; empty: no keys
 
   std::unique_ptr<Server> server_;
   std::vector<std::unique_ptr<Process>> workers_;
@@ -144,7 +144,7 @@ class StudyOnLan : public ::testing::Test {
   Database database_{folder_.file("study.db")};
 };
 
-// ---- Lines that break ---------------------------------------------------------------------------
+// ---- Broken connections -------------------------------------------------------------------------
 
 class BrokenLines : public StudyOnLan {
  protected:
@@ -179,7 +179,7 @@ TEST_F(BrokenLines, AWorkerIsCutOffSilentlyAndRestarted) {
     worker_hosts_[0]->lose_everything();
     workers_[0]->send(SIGKILL);
     workers_[0]->wait();
-    worker_hosts_[0]->lose_nothing();  // the server still has the connection of the first worker
+    worker_hosts_[0]->lose_nothing();  // the server still has a connection to the killed worker
     workers_[0] = worker_on(*worker_hosts_[0]);
   });
 }
@@ -203,7 +203,7 @@ TEST_F(BrokenLines, TheServersMachineGoesDownSilentlyAndComesBack) {
   });
 }
 
-// ---- Other addresses ----------------------------------------------------------------------------
+// ---- Changed addresses --------------------------------------------------------------------------
 
 using ChangedAddresses = StudyOnLan;
 
@@ -281,8 +281,8 @@ class Capture {
     cable.sll_family = AF_PACKET;
     cable.sll_protocol = htons(ETH_P_ALL);
     cable.sll_ifindex = static_cast<int>(if_nametoindex(("to-" + host.name()).c_str()));
-    // A large buffer, so that no packet is lost on a busy machine. Without the right to exceed the
-    // system's limit the default must suffice.
+    // A large buffer avoids lost packets on a busy machine. Without the right to exceed the
+    // system's limit the default buffer must suffice.
     constexpr int kWaitingBytes = 64 << 20;
     static_cast<void>(setsockopt(socket_.number(), SOL_SOCKET, SO_RCVBUFFORCE, &kWaitingBytes,
                                  sizeof kWaitingBytes));
@@ -301,7 +301,7 @@ class Capture {
 
  private:
   void run(const std::stop_token& stop) {
-    // Virtual cables transmit large packets that a real one would split.
+    // The buffer is large, because virtual cables transmit packets that a real cable would split.
     std::vector<char> packet(std::size_t{1} << 17U);
     while (!stop.stop_requested()) {
       pollfd polled{socket_.number(), POLLIN, 0};
@@ -315,7 +315,7 @@ class Capture {
 
   protocol::Descriptor socket_;
   std::string bytes_;
-  std::jthread thread_;  ///< last: it uses the other members
+  std::jthread thread_;  ///< last member, because it uses the others
 };
 
 class PlainText : public StudyOnLan {
@@ -324,7 +324,8 @@ class PlainText : public StudyOnLan {
   std::string captured() {
     Capture capture(*server_host_);
     start_server();
-    workers_.push_back(worker_on(*worker_hosts_[0]));  // its hello contains its name, worker1
+    workers_.push_back(
+        worker_on(*worker_hosts_[0]));  // its first message contains its name, worker1
     using Words = std::vector<std::string>;
     for (const Words& asked :
          {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
@@ -337,8 +338,8 @@ class PlainText : public StudyOnLan {
     return capture.bytes();
   }
 
-  /// Revealing texts: names of study and worker, a column, words of a statement, states of a
-  /// contact and a value.
+  /// Texts that plain traffic reveals: names of study and worker, a column, a word of a statement,
+  /// states of a contact and a value.
   const std::vector<std::string> revealing_texts_{"conspicuous", "worker1", "fn_peak_N",
                                                   "SELECT",      "SC SR",   "0.95"};
 };
@@ -366,7 +367,7 @@ std::string readme() {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Returns the content of the first fenced block of language `kind` after `place`.
+/// Returns the first fenced code block with the language `kind` after the text `place`.
 std::string block_after(const std::string& text, const std::string& place,
                         const std::string& kind) {
   const std::string fence = "\n```" + kind + "\n";
@@ -374,7 +375,7 @@ std::string block_after(const std::string& text, const std::string& place,
   return text.substr(begin, text.find("\n```", begin) + 1 - begin);
 }
 
-/// A command and the machine on which it is typed.
+/// A command of README.md and the machine on which a user types it.
 struct Typed {
   std::string machine;
   std::string command;
@@ -398,8 +399,8 @@ class ReadmeCommands : public StudyOnLan {
     }
   }
 
-  /// Runs the command on its machine. scp, which needs a login, is replaced by cp between the
-  /// machines' folders.
+  /// Runs the command on its machine. Replaces scp, which needs a login, by cp between the folders
+  /// of the machines.
   std::unique_ptr<Process> type(const Typed& typed) const {
     const bool is_coordinator = typed.machine == "coordinator";
     const Inside inside(is_coordinator ? *server_host_ : *client_host_);

@@ -1,4 +1,4 @@
-// Lines that are slow, stall, or break silently, on loopback.
+// Connections on loopback that are slow, stall or break silently.
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -19,10 +19,10 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A server with keys, and two workers and a client on a slow line to it.
+/// A server with keys, and two workers and a client with slow connections to it.
 class LongLines : public ::testing::Test {
  protected:
-  /// Starts all programs and waits for the first result; every byte is delayed by `delay`.
+  /// Starts all programs and waits for the first result. All bytes are delayed by `delay`.
   void start(milliseconds delay) {
     ASSERT_EQ(run_oblique(folder_, {"keygen", keys_}).exit_code, 0);
     server_ = std::make_unique<Server>(folder_, folder_.file("study.db"),
@@ -34,7 +34,7 @@ class LongLines : public ::testing::Test {
                       std::vector<std::string>{"--threads", "1", "--keys", keys_ + "/worker.key"});
     }
     auto arguments = submit_and_watch();
-    // On a busy machine a slow line may exceed the default of ten seconds.
+    // On a busy machine slow connections may exceed the default timeout of ten seconds.
     arguments.insert(arguments.end(), {"--server", to_clients_port_->url(), "--keys", client_key_,
                                        "--timeout", "600"});
     client_.emplace(folder_, client_program(), arguments);
@@ -62,7 +62,7 @@ class LongLines : public ::testing::Test {
 };
 
 TEST_F(LongLines, AHandshakeMayTakeLongerThanTheFirstTimeout) {
-  start(milliseconds(600));  // until a study is submitted and points are stored
+  start(milliseconds(600));  // waits until a study is submitted and points are stored
   EXPECT_GE(to_workers_port_->connections(), 4) << "both workers reconnected";
 }
 

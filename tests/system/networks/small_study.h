@@ -16,12 +16,12 @@
 
 namespace oblique::test {
 
-/// Arguments of `oblique` to submit and watch the study, without the server's address.
+/// Returns arguments of `oblique` to submit and watch the study, without the server's address.
 inline std::vector<std::string> submit_and_watch() {
   return many_points("many", {"submit", "--watch"});
 }
 
-/// Waits until at least that many results are stored.
+/// Waits until at least `at_least` results are stored.
 inline void wait_for_rows(const Database& database, double at_least) {
   wait_until("rows", [&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -36,8 +36,8 @@ inline void print_measured(const std::string& what, std::chrono::steady_clock::t
   std::printf("[ MEASURED ] %s: %s: %.1f s\n", test->name(), what.c_str(), time.count());
 }
 
-/// Expects that the watching `client` reports the end of the study, that each point has one row and
-/// none failed, and that no worker in `workers` (output of `oblique workers --format json`) is set
+/// Expects that `client`, which watches the study, reports its end; that each point has one row and
+/// none failed; and that no worker in `workers` (output of `oblique workers --format json`) is set
 /// aside.
 inline void expect_completed(Process& client, const Database& database,
                              const std::function<std::string()>& workers) {

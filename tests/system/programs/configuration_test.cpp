@@ -19,7 +19,7 @@ std::string write(const std::string& file, const std::string& text) {
   return file;
 }
 
-/// Removes the first line, a comment that names the file.
+/// Removes the first line, a comment with the path of the configuration file.
 std::string values_of(const std::string& printed) {
   return printed.substr(printed.find('\n'));
 }

@@ -17,7 +17,7 @@
 namespace oblique::test {
 namespace {
 
-/// Acts as service manager for one program. The system queues at most ten messages; more are lost.
+/// Fake systemd for one program. The system queues at most ten messages; further ones are lost.
 class Manager {
  public:
   explicit Manager(const TemporaryFolder& folder, const std::string& name = "notify")
@@ -36,13 +36,13 @@ class Manager {
   Environment environment() const {
     return {{"NOTIFY_SOCKET", path_}, {"OBLIQUE_SERVER_DRAIN", "600"}};
   }
-  /// Environment of a service with a watchdog.
+  /// Returns the environment of a service with a watchdog.
   Environment watching() const {
     Environment all = environment();
     all["WATCHDOG_USEC"] = "400000";
     return all;
   }
-  /// Whether that message has been received.
+  /// Returns true if a message with the text `what` has been received.
   bool received(const std::string& what) {
     std::array<char, 4096> bytes{};
     ssize_t got = 0;
@@ -60,7 +60,7 @@ class Manager {
 
 class DrainTest : public testing::Test {
  protected:
-  /// Points whose fall takes more than a minute.
+  /// Submits points whose fall takes more than a minute to solve.
   void submit() {
     const Outcome outcome = run_oblique(
         folder_, {"submit", "--server", server_.client_url(), "--preset", "paper", "--H", "1",
@@ -96,7 +96,7 @@ TEST_F(DrainTest, WaitsForRunningBatchesAndReportsThisToClientsAndSystemd) {
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_NE(refused.err.find("draining"), std::string::npos) << refused.err;
   EXPECT_NE(status().out.find("draining"), std::string::npos);
-  worker.send(SIGTERM);  // it gives its batch back
+  worker.send(SIGTERM);  // the worker returns its batch
   EXPECT_EQ(server_.process().wait(), 0);
   const std::string log = server_.process().err();
   EXPECT_NE(log.find(" drained: "), std::string::npos) << log;

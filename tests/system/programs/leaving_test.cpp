@@ -1,4 +1,5 @@
-// Workers that end while there is work: another worker gets the rest at once, and no loss counts.
+// Workers that leave while points are open: others get their points at once, and none counts as
+// lost.
 #include <csignal>
 #include <optional>
 #include <string>
@@ -31,8 +32,8 @@ std::optional<nlohmann::json> worker_named(const TemporaryFolder& folder, const 
 
 class LeavingProgramTest : public testing::Test {
  protected:
-  /// Submits points whose fall takes more than a minute, so that a batch is given back before it
-  /// has results.
+  /// Submits points whose fall takes more than a minute to solve, so that a worker returns its
+  /// batch before it has results.
   void submit_slow_points() const {
     const Outcome outcome = run_oblique(
         folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu", "0.1:2:40", "--e",
@@ -113,8 +114,9 @@ TEST_F(LeavingProgramTest, AWorkerThatNeverReachedItsServerExitsWithOneAndNamesT
 
 TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
-  EXPECT_EQ(refused.wait(),
-            1);  // after the first attempt, which takes 3 s, and before the end of the second
+  EXPECT_EQ(
+      refused.wait(),
+      1);  // 5 s are after the first attempt, which takes 3 s, and before the end of the second
   const std::string said = refused.err();
   EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << said;
   EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;

@@ -14,10 +14,10 @@
 namespace oblique::test {
 namespace {
 
-/// A time zone that differs from UTC in all seasons.
+/// A time zone that differs from UTC all year.
 const Environment kInTokyo{{"TZ", "Asia/Tokyo"}};
 
-/// Expects that every line has the format of a log line and the present time in UTC.
+/// Expects that every line has the log format and contains the present time in UTC.
 void expect_log(const std::string& log, const std::string& program) {
   const std::regex form(R"((\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)\.\d{3}Z )" + program +
                         " (info|warning|error): .*");

@@ -58,7 +58,7 @@ TEST(UsageTest, WrongArgumentsExitWithTwoAndTheMessageNamesThem) {
   }
 }
 
-/// Flags with a value, from the help of a program.
+/// Returns the flags that take a value, from the help of `program`.
 std::vector<std::string> flags_with_values(const TemporaryFolder& folder,
                                            const std::string& program) {
   Process help(folder, program, {"--help"});

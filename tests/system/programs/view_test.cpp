@@ -1,4 +1,4 @@
-// `oblique view`: serves the page of a database and solves traces with a worker of its own.
+// `oblique view` serves the page of a database, and solves traces with its own worker.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -20,13 +20,13 @@ using server::RawHttp;
 using server::status_of_answer;
 using testing::HasSubstr;
 
-/// Waits until the address is printed and returns it.
+/// Waits until `oblique view` prints its address, and returns the address.
 std::string printed_url(const Process& view) {
   wait_until("the address is printed", [&] { return view.out().ends_with("\n"); });
   return view.out().substr(0, view.out().size() - 1);
 }
 
-/// Opens the printed address and keeps the cookie, as a browser does.
+/// Opens an address and stores the cookie, as a browser does.
 class Browser {
  public:
   explicit Browser(const std::string& address)

@@ -18,7 +18,7 @@
 namespace oblique::test {
 namespace {
 
-/// Path of a program in PATH or sbin; empty if it is not installed.
+/// Returns the path of a program in PATH or sbin; empty if it is not installed.
 std::string installed(const std::string& program) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(std::string(path == nullptr ? "" : path) + ":/usr/sbin:/sbin");
@@ -36,7 +36,7 @@ std::string user() {
   return entry == nullptr ? std::string() : std::string(entry->pw_name);
 }
 
-/// Short intervals; the real size of nodes is not checked; no limits, no accounting.
+/// Configuration with short intervals, without accounting, limits and checks of the node size.
 constexpr const char* kConfiguration = R"(
 ClusterName=oblique
 SlurmctldHost=localhost(127.0.0.1)
@@ -90,7 +90,7 @@ SlurmCluster::~SlurmCluster() {
   nodes_.clear();
   controller_.reset();
   authentication_.reset();
-  // Jobs and slurmstepd have other parents but inherit our environment.
+  // Jobs and slurmstepd are not our children, but they inherit our environment.
   for (auto left = processes_of(folder_); !left.empty(); left = processes_of(folder_)) {
     for (const pid_t pid : left) {
       kill(pid, SIGKILL);
@@ -117,7 +117,8 @@ void SlurmCluster::write_configuration() const {
   file << kConfiguration << "SlurmUser=" << user() << "\nSlurmdUser=" << user()
        << "\nSlurmctldPort="
        << controller_port_.number()
-       // A requeued job waits until its credential has expired, so that is short.
+       // Credentials expire after 5 s, because a requeued job waits until its credential has
+       // expired.
        << "\nAuthInfo=cred_expire=5,socket=" << in("munge.socket")
        << "StateSaveLocation=" << in("state") << "SlurmdSpoolDir=" << in("spool-%n")
        << "SlurmctldPidFile=" << in("slurmctld.pid") << "SlurmdPidFile=" << in("slurmd-%n.pid")
@@ -138,7 +139,7 @@ void SlurmCluster::start_authentication() {
     }
   }
   chmod(folder_.file("munge.key").c_str(), 0600);
-  // --force, because munged objects that other users cannot access the folder.
+  // munged requires a folder that other users can access; --force turns this error into a warning.
   authentication_ = started(
       "munged",
       {"--foreground", "--force", "--socket=" + folder_.file("munge.socket"),
@@ -154,7 +155,7 @@ void SlurmCluster::start_authentication() {
 
 std::unique_ptr<Process> SlurmCluster::started(const std::string& program,
                                                const std::vector<std::string>& arguments) const {
-  // The daemons end with this process.
+  // setpriv lets the daemons end with this process.
   std::vector<std::string> words{"--pdeathsig", "KILL", installed(program)};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return std::make_unique<Process>(folder_, installed("setpriv"), words, environment());
@@ -212,7 +213,7 @@ void SlurmCluster::wait_for_state(const std::string& job, const std::string& sta
 
 void SlurmCluster::begin_now(const std::string& job) const {
   wait_for_state(job, "PENDING");
-  // A node refuses a job whose start is not later than the second in which the job was revoked.
+  // A node refuses a job that starts in the same second in which the job was revoked.
   const std::time_t revoked = std::time(nullptr);
   wait_until("the next second", [&] { return std::time(nullptr) > revoked; });
   run("scontrol", {"update", "JobId=" + job, "StartTime=now"});

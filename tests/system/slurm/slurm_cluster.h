@@ -11,13 +11,13 @@
 
 namespace oblique::test {
 
-/// A Slurm cluster on loopback: munged, slurmctld, and a slurmd for each of two nodes, n1 and n2,
-/// which are this machine under two names, with one core each. All its files are in the folder.
-/// Partitions: `work` (the default) and `grace` (30 s for preempted jobs), both with requeueing;
-/// `urgent` preempts them.
+/// A Slurm cluster on loopback: munged, slurmctld, and one slurmd for each of two nodes, n1 and n2.
+/// The nodes are this machine under two names, with one core each. All files of the cluster are in
+/// the folder. The partitions `work` (the default) and `grace` (30 s for preempted jobs) requeue
+/// jobs; the partition `urgent` preempts their jobs.
 class SlurmCluster {
  public:
-  /// Reason why Slurm cannot run here; empty if it can.
+  /// Returns the reason why Slurm cannot run here; empty if it can.
   static std::string objection();
 
   /// Starts the daemons and waits until all nodes are idle.
@@ -27,21 +27,21 @@ class SlurmCluster {
   SlurmCluster(const SlurmCluster&) = delete;
   SlurmCluster& operator=(const SlurmCluster&) = delete;
 
-  /// Environment of programs that use this cluster.
+  /// Returns the environment of programs that use this cluster.
   Environment environment() const;
 
-  /// Runs `srun`, `squeue`, ... with additional variables. Returns its standard output without the
-  /// last line break. Throws std::runtime_error if it fails.
+  /// Runs a Slurm command, such as `squeue`, with additional variables. Returns its standard output
+  /// without the last line break. Throws std::runtime_error if the command fails.
   std::string run(const std::string& program, const std::vector<std::string>& arguments,
                   const Environment& more = {}) const;
 
-  /// A field of `scontrol show job`, such as "JobState"; empty if the field or the job is unknown.
+  /// Returns a field of `scontrol show job`, such as "JobState"; empty if field or job is unknown.
   std::string field_of(const std::string& job, const std::string& field) const;
   void wait_for_state(const std::string& job, const std::string& state) const;
   /// Sets the start time of a pending job to now.
   void begin_now(const std::string& job) const;
 
-  /// The last lines of the controller's log.
+  /// Returns the last lines of the controller's log.
   std::string log() const;
 
  private:

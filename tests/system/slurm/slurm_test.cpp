@@ -1,4 +1,4 @@
-// A real Slurm starts workers: by the script of deploy/slurm, by `oblique autoscale`, and by
+// Workers that a real Slurm starts, by the script of deploy/slurm, by `oblique autoscale`, or by
 // deploy/examples/campaign.sh.
 #include <unistd.h>
 
@@ -24,7 +24,7 @@
 namespace oblique::test {
 namespace {
 
-/// A server with keys, and a Slurm for its workers. Skipped if Slurm is not installed.
+/// A server with keys, and a Slurm for its workers. Tests are skipped if Slurm is not installed.
 class SlurmTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -49,19 +49,19 @@ class SlurmTest : public ::testing::Test {
     }
   }
 
-  /// Key file of a role: server, client, reader or worker.
+  /// Returns the key file of a role: server, client, reader or worker.
   std::string key_of(const std::string& role) const {
     return folder_.file("keys/" + role + ".key");
   }
 
-  /// Variables of the batch script.
+  /// Returns the environment variables that the batch script requires.
   Environment worker_environment() const {
     return {{"OBLIQUE_WORKER_SERVER", server_->worker_url()},
             {"OBLIQUE_WORKER_KEYS", key_of("worker")},
             {"OBLIQUE_WORKER_PROGRAM", worker_program()}};
   }
 
-  /// Submits the batch script with additional arguments and variables. Returns the id of the job.
+  /// Submits the batch script with additional arguments and variables. Returns the id of its job.
   std::string submit_workers(std::vector<std::string> arguments = {},
                              const Environment& more = {}) const {
     Environment all = more;
@@ -71,7 +71,7 @@ class SlurmTest : public ::testing::Test {
     return cluster_->run("sbatch", arguments, all);
   }
 
-  /// Waits until the server has welcomed `count` workers since its start.
+  /// Waits until `count` workers have joined the server since its start.
   void wait_for_workers(int count) {
     wait_until("workers join", [&] {
       const std::string log = server_->process().err();
@@ -83,7 +83,7 @@ class SlurmTest : public ::testing::Test {
     });
   }
 
-  /// Submits another study of `kPoints` points.
+  /// Submits a new study of `kPoints` points.
   void submit_study() {
     const std::string side = std::to_string(kSide);
     const auto submitted = run_oblique(
@@ -95,7 +95,7 @@ class SlurmTest : public ::testing::Test {
 
   double rows() const { return Database(database_).rows(); }
 
-  /// Waits until workers of the job have delivered `points` points of the last study.
+  /// Waits until workers of `job` have solved `points` points of the latest study.
   void wait_until_solved_by(const std::string& job, int points) const {
     wait_until("job " + job + " solves points", [&] {
       return Database(database_).number(
@@ -125,7 +125,7 @@ class SlurmTest : public ::testing::Test {
 #endif
   static constexpr double kPoints = kSide * kSide;
 
-  /// Time limit of jobs [min], so that the jobs of a killed test end.
+  /// Time limit of jobs [min], which ends the jobs of a killed test.
   static constexpr const char* kTimeLimit = "--time=5";
 
   TemporaryFolder folder_;
@@ -165,8 +165,8 @@ TEST_F(SlurmWorkersTest, OneJobRunsAWorkerOnEachOfItsNodesUntilThereIsNoMoreWork
 }
 
 TEST_F(SlurmWorkersTest, WorkersLeaveInOrderBeforeTheirTimeLimit) {
-  // One minute is the shortest limit of Slurm. The workers leave 53 s before it, while there is
-  // work unless this machine is so slow that they start later.
+  // One minute is the shortest time limit in Slurm. The workers leave 53 s before it. Points are
+  // still open then, unless this machine is so slow that the workers start later.
   const auto job = submit_workers({"--time=1"}, {{"OBLIQUE_WORKER_LEAVE_BEFORE", "53"}});
   submit_study();
   cluster_->wait_for_state(job, "COMPLETED");  // not TIMEOUT
@@ -202,7 +202,7 @@ class SlurmAutoscaleTest : public SlurmTest {
     return arguments;
   }
 
-  /// Variables for the client: Slurm's, and those that the jobs inherit.
+  /// Returns the environment of the client: Slurm's variables, and variables that jobs inherit.
   Environment environment() const {
     Environment all = cluster_->environment();
     all.merge(worker_environment());
@@ -258,7 +258,7 @@ TEST_F(SlurmAutoscaleTest, AfterItIsStoppedItsJobsContinueAndTheNextAutoscalerCo
   EXPECT_EQ(listed_jobs(), 2U);
 }
 
-/// With oblique installed in a folder, as for a user.
+/// Tests of campaign.sh with oblique installed in a folder.
 class SlurmCampaignTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -312,7 +312,7 @@ TEST_F(SlurmCampaignTest, JobsSolveAStudyWriteItsResultsToAFileAndLeaveNothingRu
                 .number("SELECT count(*) FROM workers WHERE name LIKE 'slurm-%'"),
             1.0);
   EXPECT_EQ(cluster_->run("squeue", {"--noheader"}), "");
-  // The second time nothing is left to solve, and no job is needed.
+  // A second run has nothing to solve and needs no job.
   Process again(folder_, "/bin/sh", {"campaign.sh", "sticking.toml", "1"}, environment());
   EXPECT_EQ(again.wait(), 0) << again.err();
   EXPECT_NE(again.out().find("80 results in sticking.csv\n"), std::string::npos);

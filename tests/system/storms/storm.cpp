@@ -34,8 +34,8 @@ std::string worker_solver_version() {
   return version;
 }
 
-/// A peer that joins as a worker, requests batches and disappears. Returns whether it got a batch
-/// of a study.
+/// Joins as a worker, requests batches and disappears. Returns true if the peer got a batch of a
+/// study.
 bool vanish_with_points(const std::string& server_url, const std::string& solver_version,
                         int number) {
   zmq::context_t context;
@@ -55,7 +55,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
     static_cast<void>(
         socket.send(zmq::buffer(protocol::encode(*message)), zmq::send_flags::dontwait));
   }
-  constexpr int kMaxMessages = 4;  // Welcome, study, two batches
+  constexpr int kMaxMessages = 4;  // welcome, study and two batches
   for (int i = 0; i < kMaxMessages; ++i) {
     zmq::message_t frame;
     protocol::ServerToWorker message;

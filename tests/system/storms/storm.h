@@ -10,25 +10,25 @@
 
 namespace oblique::test {
 
-/// A storm: repeated faults of one kind around a server, in addition to sound workers. No point may
-/// fail because of it.
+/// A storm: faults of one kind that are repeated while undisturbed workers solve a study. No point
+/// may fail because of it.
 enum class StormKind {
-  kKilledWorkers,   ///< a worker is killed shortly after its start, again and again
-  kCutConnections,  ///< the connection of a worker is cut again and again
+  kKilledWorkers,   ///< a worker is killed shortly after each start
+  kCutConnections,  ///< the connection of a worker is cut repeatedly
   kVanishingPeers   ///< peers that take batches and disappear, each under a new name
 };
 
 class Storm {
  public:
-  /// Starts the storm at the server with the workers' address `server_url`. `environment` is for
-  /// the processes that it starts.
+  /// Starts the storm. `server_url` is the server's address for workers; `environment` is for the
+  /// processes that the storm starts.
   Storm(StormKind kind, const TemporaryFolder& folder, const std::string& server_url,
         const Environment& environment = {});
   ~Storm();
   Storm(const Storm&) = delete;
   Storm& operator=(const Storm&) = delete;
 
-  /// Number of killed workers, cut connections, or peers that disappeared with points.
+  /// Returns the number of killed workers, cut connections, or peers that disappeared with points.
   int faults() const { return proxy_ ? proxy_->cuts() : faults_.load(); }
   /// Ends the storm and all its processes.
   void end();
@@ -43,7 +43,7 @@ class Storm {
   std::atomic<int> faults_ = 0;
   std::unique_ptr<TcpProxy> proxy_;
   std::unique_ptr<Worker> behind_proxy_;
-  std::jthread thread_;  ///< last: it uses the other members
+  std::jthread thread_;  ///< last member, because it uses the others
 };
 
 }  // namespace oblique::test

@@ -1,4 +1,4 @@
-// Every point is solved although workers are lost repeatedly, as long as one worker stays.
+// Every point is solved although workers are lost repeatedly, if one worker is undisturbed.
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,8 +15,8 @@ namespace {
 
 class StormTest : public ::testing::Test {
  protected:
-  /// During the storm one undisturbed worker solves studies of many points, of which `filter`
-  /// leaves out some, until at least `faults` faults have happened.
+  /// One undisturbed worker solves studies of many points during a storm, until at least `faults`
+  /// faults have happened. `filter` leaves out some points.
   void solve_during(StormKind kind, int faults, const std::string& filter = {}) {
     Server server(folder_, folder_.file("many.db"));
     Storm storm(kind, folder_, server.worker_url());
