@@ -1,4 +1,4 @@
-"""The completion scripts that the programs print, in bash and in zsh.
+"""Tests the completion scripts that the programs print, in bash and in zsh.
 
   completion_test.py FOLDER-OF-THE-PROGRAMS
 """
@@ -42,7 +42,7 @@ class Completion(unittest.TestCase):
         shutil.rmtree(cls.folder)
 
     def offers(self, program, *words, word=None):
-        """Completions of a word: the last one, unless bash would pass another part of it."""
+        """Returns the completions of the last word, or of `word` if bash would pass only that part of it."""
         words = [program, *words]
         script = f"{'compdef() { : }; ' if self.shell == 'zsh' else ''}. '{self.folder / program}'; {DRIVER[self.shell]}"
         done = subprocess.run([self.shell, "-c", script, self.shell, words[-1] if word is None else word, *words],

@@ -1,5 +1,5 @@
-"""Runs the tests of a file. If none failed and some were skipped, ends with exit code 77, which ctest counts as
-skipped, and prints which tests and why."""
+"""Runs the tests of a file. If none failed and some were skipped, prints the skipped tests with reasons and exits
+with 77, which ctest counts as skipped."""
 import sys
 import unittest
 

@@ -31,14 +31,14 @@ def help_of(words):
 
 
 def offered(words):
-    """The commands and flags that completion offers after these words."""
+    """Returns the commands and flags that completion offers after `words`."""
     done = subprocess.run(["bash", "-c", f'{output_of(words[0], "completion", "bash")}\n"_$1_offers" "${{*:2}}" && printf "%s\\n" "${{offers[@]}}"',
                            "bash", *words], capture_output=True, text=True, check=True)
     return done.stdout.split()
 
 
 def verbs_below(words):
-    """All commands by their words, the program itself first."""
+    """Returns the words of all commands below `words`, and first `words` itself."""
     listed = re.search(r"^Subcommands:\n((?:  .*\n)+)", help_of(words), re.M)
     names = re.findall(r"^  ([a-z][\w-]*)", listed[1], re.M) if listed else []
     return [words] + [verb for name in names for verb in verbs_below([*words, name])]
@@ -52,7 +52,7 @@ def flags_in_help(words):
 
 
 def numbered_in_help(words):
-    """Names before the numbers of "--length1, --length2, ..."."""
+    """Returns names of numbered flags, such as --length for "--length1, --length2, ..."."""
     return set(re.findall(r"(--[\w-]+?)1, \1(?:2), \.\.\.", help_of(words)))
 
 

@@ -22,7 +22,7 @@ FOLDER = TREE / "deploy/kubernetes"
 
 
 def objects():
-    """All objects that the kustomization names, by kind and name."""
+    """Returns all objects that the kustomization lists, by kind and name."""
     files = yaml.safe_load((FOLDER / "kustomization.yaml").read_text())["resources"]
     found = [o for f in files for o in yaml.safe_load_all((FOLDER / f).read_text())]
     return {(o["kind"], o["metadata"]["name"]): o for o in found}

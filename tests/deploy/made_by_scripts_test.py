@@ -1,4 +1,4 @@
-"""Results of build scripts: the commit of a program, and Debian's changelogs.
+"""Tests build scripts that write the commit of a program and Debian's changelogs.
 
   made_by_scripts_test.py TREE
 """

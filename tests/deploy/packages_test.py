@@ -1,5 +1,5 @@
-"""Debian's packages, made by cpack from the build: contents, dependencies, and installation by dpkg in a
-separate root without chroot.
+"""Debian packages that cpack makes from the build: contents, dependencies, and installation by dpkg in a
+separate root folder without chroot.
 
   packages_test.py CPACK BUILD-FOLDER
 """
@@ -19,7 +19,7 @@ SERVICES = ("oblique-server", "oblique-worker")
 
 
 def run(*words, **more):
-    """The output of a command, which must succeed."""
+    """Runs a command, which must succeed, and returns its output."""
     done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False, **more)
     if done.returncode != 0:
         raise AssertionError(f"{words}: {done.stdout}{done.stderr}")
@@ -27,14 +27,14 @@ def run(*words, **more):
 
 
 def pack(folder):
-    """Packages by name, uncompressed to save time."""
+    """Makes the packages, uncompressed to save time, and returns their files by name."""
     run(CPACK, "--config", BUILD / "CPackConfig.cmake", "-G", "DEB", "-B", folder,
         "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=none", env={**os.environ, "SOURCE_DATE_EPOCH": "1800000000"})
     return {file.name.split("_")[0]: file for file in sorted(folder.glob("*.deb"))}
 
 
 def older(package, folder):
-    """The same package as an earlier version with another configuration."""
+    """Makes a copy of a package with an earlier version number and another configuration file."""
     tree = folder / package
     run("dpkg-deb", "--raw-extract", PACKAGES[package], tree)
     for name in ("control", "prerm"):
@@ -156,7 +156,7 @@ class Packages(unittest.TestCase):
 
 
 class AtWork(unittest.TestCase):
-    """dpkg installs, upgrades and removes in an empty root, which scripts see as DPKG_ROOT."""
+    """dpkg installs, upgrades and removes packages in an empty root folder; scripts get it as DPKG_ROOT."""
 
     def setUp(self):
         if os.geteuid() != 0:
@@ -177,7 +177,7 @@ class AtWork(unittest.TestCase):
         return self.dpkg("--install", *(PACKAGES.get(package, package) for package in packages))
 
     def enable(self, unit, link):
-        """As systemctl enable does."""
+        """Enables a unit as `systemctl enable` does, and returns the link."""
         wants = self.root / "etc/systemd/system/multi-user.target.wants"
         wants.mkdir(parents=True, exist_ok=True)
         (wants / link).symlink_to(f"/usr/lib/systemd/system/{unit}")

@@ -19,12 +19,12 @@ MAIN = READMES[0].read_text()
 
 
 def blocks(text):
-    """The fenced blocks of commands."""
+    """Returns the fenced blocks, which contain commands."""
     return re.findall(r"^```\n(.*?)^```$", text, re.M | re.S)
 
 
 def commands(text):
-    """The words of commands of our programs in fenced blocks and code spans."""
+    """Yields the words of each command that runs one of oblique's programs, from blocks and code spans."""
     lines = [l for b in blocks(text) for l in b.replace("\\\n", " ").splitlines()]
     lines += re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S))
     for line in lines:
@@ -39,7 +39,7 @@ def commands(text):
 
 
 def help_of(words):
-    """The help of the program and of the commands in the words."""
+    """Returns the help of the program and of the commands in `words`."""
     text = ""
     for n in range(1, min(3, len(words)) + 1):
         if n > 1 and not re.fullmatch(r"[a-z]+", words[n - 1]):
@@ -50,7 +50,7 @@ def help_of(words):
 
 
 def settings():
-    """The default settings of oblique-server."""
+    """Returns the default settings of oblique-server."""
     return subprocess.run([PROGRAMS / "oblique-server", "--no-config", "--print-config"], text=True,
                           capture_output=True, check=True).stdout
 

@@ -2,7 +2,7 @@
 
   recipes_test.py TREE FOLDER-OF-THE-PROGRAMS FOLDER-OF-THE-PYTHON-MODULE RECIPE
 
-Ends with 77, and says why, where what the recipe needs is not here.
+If a program or module that the recipe needs is missing, prints its name and exits with 77.
 """
 import csv
 import os
@@ -19,11 +19,11 @@ import counting
 
 TREE, PROGRAMS, MODULE = map(pathlib.Path, sys.argv[1:4])
 PYTHON = "/usr/bin/python3"
-HANGS_S = 300  # ends what hangs
+HANGS_S = 300  # ends a test that hangs
 
 
 def missing(modules):
-    """The first module that Python cannot import; None: all are installed."""
+    """Returns the first module that Python cannot import, or None."""
     for module in modules:
         if subprocess.run([PYTHON, "-c", f"import {module}"], capture_output=True, check=False,
                           env=os.environ | {"PYTHONPATH": str(MODULE)}).returncode != 0:
@@ -32,7 +32,7 @@ def missing(modules):
 
 
 class Recipe(unittest.TestCase):
-    NEEDS = ()  # modules of Python
+    NEEDS = ()  # required Python modules
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -71,7 +71,7 @@ class Recipe(unittest.TestCase):
         return self.wait_for(server, r"clients at (\S+), workers at (\S+),").groups()
 
     def wait_for(self, process, pattern):
-        """Waits until the process has printed a match, and returns it."""
+        """Waits until the output of the process matches, and returns the match."""
         end = time.monotonic() + HANGS_S
         while not (found := re.search(pattern, printed := self.log_of(process).read_text())):
             self.assertIn(process.poll(), (None, 0), printed)

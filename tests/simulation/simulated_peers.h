@@ -91,7 +91,7 @@ class SimulatedWorker {
  private:
   struct Work {
     worker::Batch batch;
-    std::uint64_t solved;  ///< number of positions
+    std::uint64_t solved;  ///< number of solved positions
   };
   void start() {
     protocol::WorkerHello hello;
@@ -245,7 +245,7 @@ class SimulatedWorker {
   bool leaves_;
   std::int64_t ms_per_point_;
   std::int64_t ms_per_fall_;
-  std::int64_t busy_ms_ = 0;                                // time spent on the next point
+  std::int64_t busy_ms_ = 0;                                // solving time of the present point
   std::pair<std::uint64_t, std::uint64_t> fallen_model_{};  // study and model solved last
   std::optional<worker::Conversation> conversation_;
   Network::LinkId link_ = 0;
@@ -349,7 +349,7 @@ class SimulatedClient {
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
   void connect() {
-    // Without lingering: a late request from a closed socket would undo later changes.
+    // No linger: a late request from the closed socket would undo later changes.
     network_.close(link_, false);
     link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
   }
@@ -438,7 +438,7 @@ class SimulatedClient {
       if (acknowledged_ && reply.error().message().find("not stored") == std::string::npos) {
         throw Violation("an acknowledged study is refused: " + reply.error().message());
       }
-      return;  // will be repeated
+      return;  // the client sends the request again
     }
     is_answered_ = true;
     if (reply.has_submit()) {

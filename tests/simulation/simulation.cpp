@@ -24,8 +24,8 @@ class Simulation {
       : settings_(settings),
         world_(seed),
         disk_(world_),
-        // Only storms use the real limit of lost workers per point: random crashes also hit sound
-        // points.
+        // The limit of lost workers per point is high, except in storms, because random crashes
+        // also hit sound points.
         server_(world_, disk_, settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
@@ -128,7 +128,7 @@ class Simulation {
 
   /// Adds a peer that joins as a worker under a new name, requests many batches and disappears.
   void come_and_vanish() {
-    constexpr std::uint64_t kFirstPeer = 1000;  // above the numbers of all workers
+    constexpr std::uint64_t kFirstPeer = 1000;  // higher than the number of any worker
     ++came_;
     const auto has_points = std::make_shared<bool>(false);
     const auto link = workers_network_.open(kFirstPeer + came_, [has_points](const auto& frame) {

@@ -25,7 +25,7 @@ class World {
  public:
   explicit World(std::uint64_t seed) : random_(seed) {}
 
-  /// The steady clock.
+  /// Returns the time of the steady clock.
   std::int64_t now_ms() const { return now_ms_; }
   /// Returns the time of the system clock, which may jump.
   std::int64_t utc_ms() const { return utc_at_zero_ms_ + now_ms_; }

@@ -35,7 +35,7 @@ class Server {
 
   const std::string& worker_url() const { return worker_url_; }
   const std::string& client_url() const { return client_url_; }
-  /// For example http://127.0.0.1:7602.
+  /// Address of the page, for example http://127.0.0.1:7602.
   const std::string& http_url() const { return http_url_; }
   Process& process() { return *process_; }
 

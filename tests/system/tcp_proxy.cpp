@@ -47,7 +47,7 @@ class Direction {
  public:
   bool takes_more() const { return !has_end_ && bytes_ < kMaxUnderWay; }
 
-  /// Reads available bytes.
+  /// Reads the available bytes, which are forwarded at `due`.
   void take(int from, Clock::time_point due) {
     std::string bytes(65536, '\0');
     const ssize_t count = recv(from, bytes.data(), bytes.size(), MSG_DONTWAIT);
@@ -87,7 +87,7 @@ class Direction {
  private:
   struct Piece {
     Clock::time_point due;
-    std::string bytes;  ///< empty: the end
+    std::string bytes;  ///< empty: the sender has closed the connection
   };
   std::deque<Piece> under_way_;
   std::size_t bytes_ = 0;

@@ -45,7 +45,7 @@ class TcpProxy {
   std::atomic<int> swallowed_ = 0;
   std::atomic<int> connections_ = 0;
   std::atomic<int> cuts_ = 0;
-  std::jthread thread_;  ///< last member, because it uses the others
+  std::jthread thread_;  ///< declared last, because the thread uses the other members
 };
 
 }  // namespace oblique::test

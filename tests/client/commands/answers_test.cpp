@@ -117,7 +117,7 @@ TEST(Answers, ThatStopEndWithOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
-  do {  // repeats if the first chunk exceeded the timeout
+  do {  // repeats the query if the first chunk was too late
     csv = ask(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);

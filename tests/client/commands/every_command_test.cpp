@@ -62,7 +62,7 @@ void expect_wrong_usage(const Words& words, const std::string& says) {
 /// A command, such as `study`, or a subcommand, such as `study check`.
 struct Listed {
   Words words;       ///< as typed
-  std::string help;  ///< its help
+  std::string help;  ///< output of --help
 };
 
 /// Returns the names that a help text lists under "Subcommands:".
@@ -75,7 +75,7 @@ Words listed_in(const std::string& help) {
   while (std::getline(lines, line) && line.starts_with("  ")) {
     std::string name;
     std::istringstream(line) >> name;
-    if (line[2] != ' ') {  // a wrapped description
+    if (line[2] != ' ') {  // else a wrapped description
       names.push_back(name);
     }
   }
@@ -290,7 +290,8 @@ TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingOneAndFailsWithO
     if (const Words rest = needed_words(command); rest.size() > 1) {
       words = with(words, {rest.begin() + 1, rest.end()});
     }
-    for (const char* flag : {"--yes", "--show"}) {  // required without a terminal
+    for (const char* flag :
+         {"--yes", "--show"}) {  // some commands require these without a terminal
       if (command.help.find(flag + std::string(" ")) != std::string::npos) {
         words.emplace_back(flag);
       }

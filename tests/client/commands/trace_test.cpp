@@ -22,7 +22,8 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// A study of two models with error estimates, and one with fixed steps. Coarse meshes save time.
+/// Two studies on coarse meshes, which save time: one of two models with error estimates, one with
+/// fixed steps.
 const std::map<std::string, const char*> kStudies{{"models", R"(name = "models"
 errors = true
 [model]
@@ -201,7 +202,7 @@ TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
   EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
-  // The first worker is killed before or during the trace of an unsolved point.
+  // A trace succeeds although its worker is killed, because another worker joins.
   std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"
 [model]
 elements_per_link = 12

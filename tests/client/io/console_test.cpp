@@ -8,7 +8,7 @@
 namespace oblique::client {
 namespace {
 
-/// Returns the messages that a console writes at a verbosity, of all kinds.
+/// Writes a message of each kind and returns those that appear at this verbosity.
 std::string written_at(Verbosity verbosity) {
   std::ostringstream out;
   std::ostringstream err;

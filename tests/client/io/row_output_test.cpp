@@ -105,7 +105,7 @@ TEST_F(RowOutputTest, ALinkToADeviceOrInACircleIsNotReplaced) {
 TEST_F(RowOutputTest, AnOpenFileIsAppendedTo) {
   const int open_file = open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   ASSERT_EQ(::write(open_file, "b\n", 2), 2);
-  const std::string link = folder_.file("stdout");  // as for /dev/stdout
+  const std::string link = folder_.file("stdout");  // a link, like /dev/stdout
   std::filesystem::create_symlink("/proc/self/fd/" + std::to_string(open_file), link);
   write(link);
   write(link, Format::kJsonLines);

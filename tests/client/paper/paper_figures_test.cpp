@@ -62,9 +62,9 @@ TEST(PaperFigures, AreFigures3To7WithTheGroupsOfThePaper) {
 }
 
 TEST(PaperFigures, MarkEveryPublishedNumberOfTheirGroups) {
-  EXPECT_EQ(published_in(figures()[0]), 9U);   // peaks at three e*
-  EXPECT_EQ(published_in(figures()[1]), 60U);  // F_n has 6 + 9 + 9 + 6 peaks, F_t too
-  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases; 4 of them thrice more
+  EXPECT_EQ(published_in(figures()[0]), 9U);   // three peaks at each of three e*
+  EXPECT_EQ(published_in(figures()[1]), 60U);  // 30 peaks of F_n and 30 of F_t
+  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases, 6 of them in three panels
   EXPECT_EQ(published_in(figures()[3]), 3U);   // ends of stick
   EXPECT_EQ(published_in(figures()[4]), 0U);   // nothing is published
 }

@@ -130,8 +130,7 @@ inline Figure named_bars(const std::string& name = "SC sR") {
   return figure_with(std::move(panel));
 }
 
-/// Forces of a point with spans, a gap and a published number; a shape with equal scales of x and
-/// y.
+/// Two panels: forces with spans, a gap and a published number; a shape with equal x and y scales.
 inline Figure panels() {
   Panel forces;
   forces.title = "Forces";

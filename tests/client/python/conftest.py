@@ -1,4 +1,4 @@
-"""Shared by the tests of the module: the programs of the same build, and a study solved with them."""
+"""Shared by the tests of the module: the programs of the same build, and a study that they solved."""
 
 import json
 import os
@@ -17,7 +17,7 @@ def run_oblique(*arguments):
 
 
 def solved_by_program(*arguments):
-    """Output of `oblique solve --json` without its wall time."""
+    """Returns the output of `oblique solve --json` without its wall time."""
     return without_time(json.loads(run_oblique("solve", "--json", *arguments)))
 
 
@@ -59,7 +59,7 @@ def pytest_terminal_summary(terminalreporter):
 
 
 def pytest_sessionfinish(session, exitstatus):
-    """Exit code 77, which ctest counts as skipped, if no test failed and some were skipped."""
+    """Exits with 77, which ctest counts as skipped, if no test failed and some were skipped."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if exitstatus == 0 and reporter.stats.get("skipped"):
         session.exitstatus = 77

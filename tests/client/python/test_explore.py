@@ -1,4 +1,4 @@
-"""Explorations: the commands of the program, as arrays."""
+"""Explorations: results of the commands, as arrays."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Fits: the same as the program, as arrays."""
+"""Fits: results equal those of the program and are arrays."""
 
 import json
 

@@ -1,5 +1,5 @@
-"""Interruption by Ctrl-C, the end of Python, forked children, and memory that stays allocated. The work here would
-take hours; if a test hangs, the time limit of all tests ends it."""
+"""Interruption by Ctrl-C, the end of Python, forked children, and memory that stays allocated. Each call would take
+hours; the time limit of all tests ends a test that hangs."""
 
 import multiprocessing
 import os

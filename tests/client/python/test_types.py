@@ -1,4 +1,4 @@
-"""Type hints, as mypy reads them; skipped where mypy is not."""
+"""Type hints of the module, checked with mypy; skipped if mypy is not installed."""
 
 import os
 import pathlib

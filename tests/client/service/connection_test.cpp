@@ -192,7 +192,7 @@ TEST(Connection, ReportsAQueryThatTheServerHasNotFinishedInTime) {
       return std::vector{still_working(request, runs)};
     });
     std::string message;
-    do {  // repeats if the server's message exceeded the timeout
+    do {  // repeats the query if the server's message was too late
       Connection connection(at(server.url(), 500));
       try {
         connection.query("SELECT 1");

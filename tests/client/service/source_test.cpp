@@ -28,7 +28,7 @@
 namespace oblique::client {
 namespace {
 
-/// Runs tests in a temporary current folder, and unsets OBLIQUE_SERVER before and after.
+/// Runs tests in a temporary current folder, without OBLIQUE_SERVER at first.
 class SourceTest : public ::testing::Test {
  protected:
   SourceTest() {

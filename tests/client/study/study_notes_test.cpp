@@ -40,7 +40,7 @@ TEST(MeshNote, IsForTheCoarsestMeshBelowEightElements) {
   const struct {
     const char* model;
     const char* axis;
-    const char* says;  // empty: nothing
+    const char* says;  // empty: no note
   } cases[] = {
       {"", "", ""},
       {"preset = 'converged'", "", ""},

@@ -62,7 +62,7 @@ class DrawnRecipe {
     return model;
   }
 
-  /// A random axis: a list or, in samples, a distribution; elsewhere a list, range or expression.
+  /// Draws an axis: in samples a list or a distribution, elsewhere a list, range or expression.
   protocol::Axis axis(const std::string& name, BlockKind kind, double from, double to) {
     const auto& key = protocol::axis_key(name);
     if (chance(0.3)) {
@@ -94,7 +94,7 @@ class DrawnRecipe {
   protocol::Block block() {
     const auto kind = static_cast<BlockKind>(below(3));
     std::vector<protocol::Axis> axes{axis("H", kind, 0.2, 0.8), axis("mu", kind, 0.1, 2.0)};
-    // A sample needs a distribution. e is no expression, because expressions contain e.
+    // e is never an expression, because the expressions of other axes contain e.
     axes.push_back(kind == BlockKind::kSample
                        ? protocol::uniform("e", 0.5, 1.0)
                        : protocol::listed_axis(protocol::axis_key("e"), several(0.5, 1.0)));

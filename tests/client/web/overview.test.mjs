@@ -54,7 +54,7 @@ test("a form with an error shows what is allowed and cannot be submitted", async
   const page = await form();
   for (const [values, sentence] of [
     [{ mu: "0.1:2" }, /FROM:TO:COUNT/],
-    [{ mu: "-1" }, /mu/], // only the server can check this
+    [{ mu: "-1" }, /mu/], // only the server checks the range of mu
     [{ mu: "1:2:x" }, /"x" is not a number/],
     [{ mu: "1", H: "0.5:1.25:4" }, /H = 1.25 m is not allowed: the tip drops at most the length/],
     [{ H: "1", sample: "some:10" }, /kinds are random, lhs, sobol/],

@@ -36,7 +36,7 @@ after(async () => {
 
 export const textOf = (page, selector) => page.$eval(selector, (one) => one.textContent);
 
-/** Waits until the text of an element matches. */
+/** Waits until the text of an element matches `pattern`. */
 export const shows = (page, selector, pattern) =>
   until(
     page,

@@ -49,8 +49,8 @@ struct Found {
   std::uint64_t starts = 0;  ///< number of server starts, including this one
 };
 
-/// A simple model of the contents that a store must have. Compares the real store with itself;
-/// throws Violation if they differ.
+/// A simple model of the contents that a store must have, with which the real store is compared.
+/// Throws Violation if they differ.
 class StoreModel {
  public:
   using Rows = std::map<std::uint64_t, std::shared_ptr<const protocol::PointResult>>;
@@ -88,7 +88,7 @@ class StoreModel {
   /// commits since the last full sync may be missing. The contents found become the state of the
   /// model.
   void restarted(const Found& found, bool power_was_lost) {
-    // Without a power failure only changes whose commit failed last may exist or not.
+    // Without a power failure only changes refused since the last commit are uncertain.
     const auto last_stored =
         std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& e) { return e.stored; });
     auto entry = power_was_lost ? entries_.begin() : last_stored.base();
@@ -161,7 +161,7 @@ class StoreModel {
     std::map<std::uint64_t, Rows> rows;
     std::uint64_t last_study_id = 0;  ///< including deleted studies
     std::uint64_t last_worker_id = 0;
-    bool has_deleted = false;  ///< then rows of workers may be missing
+    bool has_deleted = false;  ///< if true, rows of workers may be missing
 
     bool operator==(const Found& found) const {
       return last_study_id == found.last_study_id &&
@@ -418,7 +418,7 @@ class SimulatedDisk final : public server::Storage {
   World& world_;
   SimulatedFiles files_;
   StoreModel model_;
-  bool power_was_lost_ = false;  // since the store was closed
+  bool power_was_lost_ = false;  // since the store was last opened
   int checkpoint_pages_;
   std::uint64_t starts_ = 0;
   std::unique_ptr<server::Store> store_;

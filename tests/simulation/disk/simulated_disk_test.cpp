@@ -72,7 +72,7 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
         solve_all(disk);
       } catch (const server::StorageGone&) {
         ended = true;
-        if (seed % 3 == 0) {  // an orderly end does not merge a log after a failed sync
+        if (seed % 3 == 0) {  // after a failed sync an orderly end does not merge the log
           disk.close();
           EXPECT_TRUE(disk.files().exists(disk.files().path() + "-wal"));
         }

@@ -23,7 +23,7 @@ namespace {
 struct Vfs {
   sqlite3_vfs methods{};
   sqlite3_vfs* original = nullptr;
-  std::map<std::string, SimulatedFiles*> files;  // by the path of the database
+  std::map<std::string, SimulatedFiles*> files;  // key: path of the database
   std::mt19937_64 random;
 
   /// Returns the files to which the database, log or journal `name` belongs, or nullptr.
@@ -46,7 +46,7 @@ struct Handle : sqlite3_file {
   SimulatedFiles* files = nullptr;
   std::shared_ptr<SimulatedFile> file;
   std::uint64_t life = 0;
-  bool syncs_directory = false;  // syncs also make the file name durable
+  bool syncs_directory = false;  // a sync also makes the file name durable
   std::shared_ptr<SharedMemory> memory;
   std::array<bool, SQLITE_SHM_NLOCK> shared{};
   std::array<bool, SQLITE_SHM_NLOCK> exclusive{};

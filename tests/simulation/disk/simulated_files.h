@@ -79,10 +79,10 @@ class SimulatedFiles {
   bool is_used() const { return used_; }
   /// Simulates a power failure: only the files and file names on the disk survive.
   void lose_power();
-  /// Lets the process die during the given write, sync, truncation or deletion, counted from now;
+  /// Lets the process die during the `operations`-th write, sync, truncation or deletion from now;
   /// 0: never.
   void plan_death(std::int64_t operations) { death_in_ = operations; }
-  /// Lets the given sync, counted from now, fail once and lose its data; 0: none.
+  /// Lets the `syncs`-th sync from now fail and lose its data; 0: no sync.
   void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
   /// Returns true until the planned sync has failed.
   bool awaits_failing_sync() const { return failing_sync_in_ > 0; }

@@ -68,7 +68,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
 TEST(FailedSyncTest, AServerExitsWithOneAndTheNextServerRecovers) {
   const TemporaryFolder folder;
   const std::string file = folder.file("failing.db");
-  // The link avoids spaces and colons of the build folder, at which LD_PRELOAD separates paths.
+  // LD_PRELOAD separates paths at spaces and colons, so a link whose path has none is used.
   const std::string library = folder.file("failing_sync.so");
   std::filesystem::create_symlink(OBLIQUE_FAILING_SYNC, library);
   const std::string mark = folder.file("fails");

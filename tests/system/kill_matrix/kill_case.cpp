@@ -96,7 +96,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kClient, "before-send:status", SIGKILL, 12},
     Entry{kApart, kClient, "after-send:status", SIGSTOP, 12},
     Entry{kApart, kClient, "time", SIGSTOP, 800},
-    // Signals to `oblique run` and its children. The first one arrives while it starts them.
+    // Signals to `oblique run` and its children. The first arrives during their start.
     Entry{kRun, kClient, "time", SIGKILL, 40},
     Entry{kRun, kClient, "time", SIGSTOP, 800},
     Entry{kRun, kClient, "before-send:submit", SIGKILL, 1},

@@ -70,7 +70,7 @@ class FaultInjection {
         folder_(folder.path().string()),
         mark_(folder.file("mark")),
         library_(folder.file("kill_points.so")) {
-    // The link avoids spaces and colons of the build folder, at which LD_PRELOAD separates paths.
+    // LD_PRELOAD separates paths at spaces and colons, so a link whose path has none is used.
     std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
     if (case_.signal == SIGSTOP) {
       halt_ = std::jthread([this](const std::stop_token& stop) { end_halt(stop); });
@@ -79,7 +79,7 @@ class FaultInjection {
   FaultInjection(const FaultInjection&) = delete;
   FaultInjection& operator=(const FaultInjection&) = delete;
 
-  /// Returns the environment of `program`. In the program of the case it orders the signal.
+  /// Returns the environment of `program`, with the order for a signal if the case names `program`.
   Environment environment(const std::string& program) const {
     Environment all = plain_environment();
     if (program == case_.program) {
@@ -132,7 +132,7 @@ class FaultInjection {
   std::string mark_;
   std::string library_;
   bool explained_ = false;
-  std::jthread halt_;  ///< last member, because it uses the others
+  std::jthread halt_;  ///< declared last, because the thread uses the other members
 };
 
 // ---- Server, workers and client as separate programs

@@ -14,13 +14,13 @@ namespace oblique::test {
 /// One cycle of the kill matrix: the signal, the process that gets it, the time, and what follows.
 struct KillCase {
   std::uint64_t seed = 0;
-  bool all_in_one = false;           ///< `oblique run` starts all programs
-  std::string program;               ///< gets the signal; empty: no signal or a storm
+  bool all_in_one = false;           ///< true: `oblique run` starts all programs
+  std::string program;               ///< program that gets the signal; empty: no signal or a storm
   std::optional<StormKind> storm{};  ///< storm that lasts until the study is done
   std::string point;                 ///< name of a point in kill_points.cpp
   int occurrence = 1;  ///< n-th time at the point, from 1; for `time`: milliseconds after the start
   int signal = 0;      ///< SIGKILL or SIGSTOP
-  std::chrono::milliseconds pause{0};  ///< between point and signal
+  std::chrono::milliseconds pause{0};  ///< delay of the signal after the point
   // For SIGSTOP only.
   std::chrono::milliseconds stopped{0};  ///< duration of the halt
   int then = 0;                          ///< SIGCONT or SIGKILL, after the halt

@@ -4,7 +4,7 @@
 //
 // OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" defines the signal:
 //   PROGRAM     name of the program; other programs inherit the variable and ignore it
-//   POINT       before-commit, after-commit, before-send:KIND, after-send:KIND, after-receive:KIND
+//   POINT       before-commit, after-commit, before-send:KIND, after-send:KIND, after-receive:KIND,
 //               or time; KIND is a kind of message in proto/oblique.proto
 //   OCCURRENCE  n-th time at the point, from 1; for time: milliseconds after the start
 //   SIGNAL      number of the signal

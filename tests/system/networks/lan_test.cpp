@@ -315,7 +315,7 @@ class Capture {
 
   protocol::Descriptor socket_;
   std::string bytes_;
-  std::jthread thread_;  ///< last member, because it uses the others
+  std::jthread thread_;  ///< declared last, because the thread uses the other members
 };
 
 class PlainText : public StudyOnLan {

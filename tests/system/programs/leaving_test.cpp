@@ -1,5 +1,5 @@
-// Workers that leave while points are open: others get their points at once, and none counts as
-// lost.
+// Workers that leave while points are open. Other workers get these points at once, and the server
+// counts no lost worker.
 #include <csignal>
 #include <optional>
 #include <string>
@@ -114,9 +114,8 @@ TEST_F(LeavingProgramTest, AWorkerThatNeverReachedItsServerExitsWithOneAndNamesT
 
 TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
-  EXPECT_EQ(
-      refused.wait(),
-      1);  // 5 s are after the first attempt, which takes 3 s, and before the end of the second
+  EXPECT_EQ(refused.wait(),
+            1);  // 5 s end after the first attempt, which takes 3 s, and before the second ends
   const std::string said = refused.err();
   EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << said;
   EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;

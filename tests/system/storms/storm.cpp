@@ -34,7 +34,7 @@ std::string worker_solver_version() {
   return version;
 }
 
-/// Joins as a worker, requests batches and disappears. Returns true if the peer got a batch of a
+/// Joins as a worker, requests batches and disappears. Returns true if it got a batch of a
 /// study.
 bool vanish_with_points(const std::string& server_url, const std::string& solver_version,
                         int number) {

@@ -43,7 +43,7 @@ class Storm {
   std::atomic<int> faults_ = 0;
   std::unique_ptr<TcpProxy> proxy_;
   std::unique_ptr<Worker> behind_proxy_;
-  std::jthread thread_;  ///< last member, because it uses the others
+  std::jthread thread_;  ///< declared last, because the thread uses the other members
 };
 
 }  // namespace oblique::test
