@@ -131,7 +131,7 @@ class FiguresOfThePaper(Recipe):
         self.assertEqual(len(lines), 11)
         for line in lines[1:-1]:
             *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())
-            # Tolerance: half of the last printed digit, plus the rms difference of 0.56 % in client/paper.
+            # Tolerance: half of the last printed digit, plus the rms difference of 0.56 % to the paper.
             self.assertAlmostEqual(fn_kN, published_fn_kN, delta=0.005 + 0.006 * published_fn_kN)
             self.assertAlmostEqual(ft_kN, published_ft_kN, delta=0.005 + 0.006 * published_ft_kN)
         for number in 4, 5, 6, 7:

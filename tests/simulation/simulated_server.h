@@ -198,7 +198,7 @@ class SimulatedServer final : public server::Ports {
       return;
     }
     if (world_.faults &&
-        world_.chance(0.003)) {  // after the commit, before the service gets the reports
+        world_.chance(0.003)) {  // a crash after a commit, before the service gets the reports
       crash(world_.chance(0.4));
       return;
     }

@@ -12,9 +12,8 @@ struct SimulationSettings {
   /// If true, a failed sync loses its data and later syncs succeed, as on Linux. SQLite cannot
   /// handle that: commits acknowledged after such a failure can be lost.
   bool forgetful_syncs = false;
-  /// If true, the only faults are workers that are killed or frozen again and again (all but one),
-  /// cut connections, and peers that take batches and disappear. No point may fail because of
-  /// these.
+  /// If true, workers (all but one) are killed or frozen repeatedly, connections are cut, and peers
+  /// take batches and disappear. There are no other faults, and no point may fail.
   bool storms = false;
 };
 

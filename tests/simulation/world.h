@@ -133,7 +133,7 @@ class Network {
     }
     Link& link = found->second;
     if (link.cut_down) {
-      return true;  // the server has not noticed yet
+      return true;  // the server has not noticed the break yet
     }
     wait_for_partition(link);
     link.last_down_ms = std::max(link.last_down_ms, world_.now_ms() + delay_ms());

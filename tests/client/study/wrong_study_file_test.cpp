@@ -11,7 +11,7 @@ namespace oblique::client {
 namespace {
 
 struct Wrong {
-  std::string text;   // whole file, content of [model], or line of a block
+  std::string text;   // a whole file, lines of [model], or a line of a block
   std::string place;  // line and column
   std::string says;   // part of the error message
 };

@@ -91,7 +91,7 @@ export async function submit(page, name, axes) {
 /** Axes of a study that takes minutes. */
 export const longAxes = { H: [0.2, 1.1, 200], mu: [0.1, 2, 200], e: [0.5, 1, 50] };
 
-/** Goes to another view in the same tab. */
+/** Opens another view in the same tab. */
 export const goTo = (page, view) => page.evaluate((to) => void (location.hash = to), view);
 
 /** Fills a field and presses Enter. */

@@ -126,7 +126,7 @@ class StoreModel {
       synced_ = now_;
       entries_.clear();
     } else if (came_back != entries_.end()) {
-      // This change now counts as stored. A later crash may replace it by another refused one.
+      // The change counts as stored now. A later crash may bring back another refused change.
       came_back->stored = true;
       std::rotate(came_back, came_back + 1, entries_.end());
     }
@@ -418,7 +418,7 @@ class SimulatedDisk final : public server::Storage {
   World& world_;
   SimulatedFiles files_;
   StoreModel model_;
-  bool power_was_lost_ = false;  // since the store was last opened
+  bool power_was_lost_ = false;  // after the store was last opened
   int checkpoint_pages_;
   std::uint64_t starts_ = 0;
   std::unique_ptr<server::Store> store_;

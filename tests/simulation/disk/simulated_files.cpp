@@ -17,8 +17,7 @@
 namespace oblique::simulation {
 namespace {
 
-// ---- SQLite's side: a VFS that replaces the default VFS of SQLite and reports the properties of a
-// Unix file system --------
+// ---- SQLite's side: a VFS instead of the default one, with the same properties ------------------
 
 struct Vfs {
   sqlite3_vfs methods{};
@@ -242,7 +241,7 @@ int open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* fla
   handle->files = files;
   handle->file = std::move(opened);
   handle->life = files->life();
-  // As in the default VFS, log and journal sync the folder for the database file too.
+  // In SQLite the sync of log or journal also makes the name of the database file durable.
   handle->syncs_directory = (flags & SQLITE_OPEN_CREATE) != 0 && (flags & SQLITE_OPEN_MAIN_DB) == 0;
   if (flags_out != nullptr) {
     *flags_out = flags;
@@ -300,8 +299,7 @@ void remove_from_vfs(SimulatedFiles& files) {
   vfs().files.erase(files.path());
 }
 
-// ---- The disk's side: which bytes survive
-// ----------------------------------------------------------------------------
+// ---- The disk's side: which bytes survive -------------------------------------------------------
 
 /// Number of bytes that a disk writes atomically.
 constexpr std::size_t kSector = 512;
@@ -316,7 +314,7 @@ std::string_view some_of(World& world, std::string_view bytes) {
 
 }  // namespace
 
-// ---- One file ----------------------------------------------------------------------------------
+// ---- One file -----------------------------------------------------------------------------------
 
 /// Draws at random which writes reached the disk before a power failure: either the first ones and
 /// a part of the next, or any subset for each sector.
@@ -439,7 +437,7 @@ void SimulatedFile::lose_power(World& world) {
   forgotten_pages_.clear();
 }
 
-// ---- All files of a database -------------------------------------------------------------------
+// ---- All files of a database --------------------------------------------------------------------
 
 SimulatedFiles::SimulatedFiles(World& world, std::string path, const std::string& image)
     : world_(world), path_(std::move(path)) {

@@ -124,7 +124,7 @@ class RunTest : public ::testing::Test {
 TEST_F(RunTest, CtrlCLeavesNothingRunningAndTheSameCommandContinues) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
-  kill(-run.pid(), SIGINT);  // to the process group, as a terminal does
+  kill(-run.pid(), SIGINT);  // signals the process group, as a terminal does
   EXPECT_EQ(run.wait(), 128 + SIGINT);
   EXPECT_NE(run.err().find("the same command continues"), std::string::npos) << run.err();
   EXPECT_EQ(run.out(), "");

@@ -135,8 +135,7 @@ class FaultInjection {
   std::jthread halt_;  ///< declared last, because the thread uses the other members
 };
 
-// ---- Server, workers and client as separate programs
-// ---------------------------------------------
+// ---- Server, workers and client as separate programs --------------------------------------------
 
 class ApartCycle {
  public:
@@ -221,7 +220,7 @@ class ApartCycle {
 
   /// Runs the client. Returns false if it was killed and must be started again.
   bool submit_and_watch(bool first) {
-    // With this timeout the client sends requests again that a killed server had received.
+    // The long timeout lets the client send requests again that a killed server had received.
     Process client(
         folder_, client_program(),
         {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "600"},
@@ -326,7 +325,7 @@ std::string error_output(const TemporaryFolder& folder) {
   return output.str();
 }
 
-// ---- Many cycles -------------------------------------------------------------------------------
+// ---- Many cycles --------------------------------------------------------------------------------
 
 constexpr unsigned kAtOncePerCore = 4;
 
@@ -363,7 +362,7 @@ CycleOutcome run_cycle(const KillStudy& study, const KillCase& kill_case) {
   return outcome;
 }
 
-// ---- Rows that must be equal ----------------------------------------------------------------
+// ---- Rows that must be equal --------------------------------------------------------------------
 
 struct Table {
   std::string name;

@@ -18,12 +18,12 @@ struct KillCase {
   std::string program;               ///< program that gets the signal; empty: no signal or a storm
   std::optional<StormKind> storm{};  ///< storm that lasts until the study is done
   std::string point;                 ///< name of a point in kill_points.cpp
-  int occurrence = 1;  ///< n-th time at the point, from 1; for `time`: milliseconds after the start
+  int occurrence = 1;  ///< n-th arrival at the point; for `time`: milliseconds after the start
   int signal = 0;      ///< SIGKILL or SIGSTOP
   std::chrono::milliseconds pause{0};  ///< delay of the signal after the point
   // For SIGSTOP only.
   std::chrono::milliseconds stopped{0};  ///< duration of the halt
-  int then = 0;                          ///< SIGCONT or SIGKILL, after the halt
+  int then = 0;                          ///< signal after the halt: SIGCONT or SIGKILL
   bool server_stops_first = false;       ///< order of stopping; false: workers first
 
   bool is_killed() const;

@@ -6,7 +6,7 @@
 //   PROGRAM     name of the program; other programs inherit the variable and ignore it
 //   POINT       before-commit, after-commit, before-send:KIND, after-send:KIND, after-receive:KIND,
 //               or time; KIND is a kind of message in proto/oblique.proto
-//   OCCURRENCE  n-th time at the point, from 1; for time: milliseconds after the start
+//   OCCURRENCE  n-th arrival at the point, from 1; for time: milliseconds after the start
 //   SIGNAL      number of the signal
 //   PAUSE_MS    sleep before the signal, for example until a message has been sent
 //   MARK        file for the process id, written before the signal is sent. If the file exists,
@@ -158,7 +158,7 @@ class KillPoints {
     }
   }
 
-  /// Starts the timer thread. It blocks all signals, so that the program's own threads get them.
+  /// Starts the timer thread, which blocks all signals, so that the program's own threads get them.
   void start_clock() const {
     sigset_t all;
     sigset_t before;
@@ -248,7 +248,7 @@ Function* next(const char* name) {
 
 }  // namespace
 
-// ---- Replacements of library functions ---------------------------------------------------
+// ---- Replacements of library functions ----------------------------------------------------------
 
 extern "C" int sqlite3_exec(sqlite3* database, const char* sql,
                             int (*take)(void*, int, char**, char**), void* context,

@@ -90,7 +90,7 @@ Inside::~Inside() {
   static_cast<void>(setns(before_.number(), CLONE_NEWNET));
 }
 
-// ---- A machine --------------------------------------------------------------------------------
+// ---- A machine ----------------------------------------------------------------------------------
 
 Host::Host(const TemporaryFolder& folder, std::string name, int last)
     : folder_(&folder), name_(std::move(name)), last_(last), network_(new_network()) {}
@@ -142,7 +142,7 @@ void Host::renumber(int last) {
                            v4(), v6()));
 }
 
-// ---- The network ------------------------------------------------------------------------------
+// ---- The network --------------------------------------------------------------------------------
 
 Lan::Lan(const TemporaryFolder& folder) : folder_(&folder) {
   enter_namespaces();

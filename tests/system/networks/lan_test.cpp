@@ -325,7 +325,7 @@ class PlainText : public StudyOnLan {
     Capture capture(*server_host_);
     start_server();
     workers_.push_back(
-        worker_on(*worker_hosts_[0]));  // its first message contains its name, worker1
+        worker_on(*worker_hosts_[0]));  // the worker's first message contains its name, worker1
     using Words = std::vector<std::string>;
     for (const Words& asked :
          {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
