@@ -8,7 +8,8 @@
 
 namespace oblique::solver {
 
-/// Rows of positions, the pin first. Slopes lie between them, one at a node and two at a joint.
+/// Returns the rows of positions, starting with the pin. The other rows are slopes: one at a node,
+/// two at a joint.
 inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   std::vector<Eigen::Index> rows{0};
   const std::size_t links = model.lengths_m.size();
@@ -21,8 +22,9 @@ inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   return rows;
 }
 
-/// Dense matrices of a chain, computed from its energies and accelerations only. Row 0, the pin, is
-/// left out, so entry i belongs to row i + 1. Both directions share the mass matrix.
+/// Computes dense matrices of a chain from its energies and accelerations alone. The fixed row 0,
+/// the pin, is left out, so entry i belongs to row i + 1. Both directions have the same mass
+/// matrix.
 class ChainProbe {
  public:
   explicit ChainProbe(const Chain& chain) : chain_(chain) {
@@ -50,19 +52,19 @@ class ChainProbe {
   const Eigen::MatrixXd& mass() const { return mass_; }
   const Pairs& gravity() const { return gravity_; }
 
-  /// Accelerations of the free rows.
+  /// Returns the accelerations of all rows except the pin.
   Pairs accelerations(const Coordinates& q, double ft_N, double fn_N) const {
     Coordinates a(2, q.cols());
     chain_.accelerations(q.data(), ft_N, fn_N, a.data());
     return a.rightCols(mass_.rows()).transpose();
   }
 
-  /// -dU/dq, computed as M q'' - Q.
+  /// Returns the elastic force -dU/dq, computed as M q'' - Q.
   Pairs elastic_force(const Coordinates& q) const {
     return mass_ * accelerations(q, 0.0, 0.0) - gravity_;
   }
 
-  /// A randomly deformed state at rest, with the pin at the origin.
+  /// Returns the coordinates of a randomly deformed chain with the pin at the origin.
   Coordinates random_coordinates(std::mt19937_64& generator, double size) const {
     std::uniform_real_distribution<double> uniform(-size, size);
     Coordinates q = chain_.at_rest().q;
