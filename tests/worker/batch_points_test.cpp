@@ -65,8 +65,7 @@ std::string bits_of(const protocol::PointResult& result) {
   return protocol::to_message(0, outputs).SerializeAsString();
 }
 
-/// Adds a model axis to the only block of a recipe, after its other model axes and before H, mu and
-/// e.
+/// Adds a model axis to the only block, after other model axes and before H, mu and e.
 void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector<double>& values) {
   protocol::Block& block = *recipe.mutable_blocks(0);
   protocol::Axis& axis = *block.add_axes();

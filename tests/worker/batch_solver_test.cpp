@@ -36,7 +36,7 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
   return {1, 7, ranges, points};
 }
 
-/// Makes the solver of a point wait until the test lets it end.
+/// Holds each point in the solver until the test lets it end.
 class Gate {
  public:
   /// Counts a point as begun and waits until it may end. The solver calls this.

@@ -89,8 +89,7 @@ inline protocol::ServerToWorker heartbeat_reply_message() {
   return message;
 }
 
-/// Provides a worker's conversation whose time and messages the test controls. Keeps the effects of
-/// the last event.
+/// A worker's conversation with time and messages from the test. Keeps the last event's effects.
 class ConversationTest : public ::testing::Test {
  protected:
   void start() { take(conversation_->start(now_ms_)); }

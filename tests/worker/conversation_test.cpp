@@ -325,11 +325,9 @@ TEST_F(ConversationTest, ASecondStopEndsTheWorkerAtOnceUnlessItFollowsWithinASec
   }
 }
 
-// ---- --until and --idle-exit
-// ---------------------------------------------------------------------------
+// ---- --until and --idle-exit --------------------------------------------------------------------
 
-/// Starts workers with a time limit or a limit of idle time. A worker leaves 3 s before its time
-/// limit.
+/// Starts workers with a limit of time or idle time. They leave 3 s before the limit of time.
 class ExitTest : public ConversationTest {
  protected:
   void leave_within(std::int64_t until_ms, std::int64_t idle_exit_ms = kNever_ms) {

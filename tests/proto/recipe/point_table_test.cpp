@@ -15,8 +15,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// Returns a study with every feature: several blocks, listed and ranged axes, model axes in two
-/// blocks.
+/// Returns a study with several blocks, listed and ranged axes, and model axes in two blocks.
 Recipe varied_recipe() {
   Recipe recipe = recipe_of({
       {listed("H", {0.96, 1.0, 1.04}), listed("mu", {0.4, 0.8}), range("e", 0.5, 1.0, 6)},
@@ -36,8 +35,7 @@ struct ExpectedPoint {
   double e_star;
 };
 
-/// Appends the points of a block to `points` by nested loops over its axes. The first axis is the
-/// outermost loop.
+/// Appends a block's points to `points` by nested loops over its axes, the first axis outermost.
 void enumerate(const Block& block, int depth, ExpectedPoint current,
                std::vector<ExpectedPoint>& points) {
   if (depth == block.axes_size()) {
@@ -268,8 +266,7 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
   EXPECT_THAT(size.examples, Each(AllOf(Ge(15U), Le(20U))));
 }
 
-// Tolerance: a third of 10^4 examined points pass, and 0.02 is four standard deviations of that
-// share.
+// A third of 10^4 examined points pass; 0.02 is four standard deviations of that share.
 TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
   const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
   const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");

@@ -133,8 +133,8 @@ Quantiles normal(double mean, double sd, double from, double to) {
   return of_kind(protocol::DISTRIBUTION_NORMAL, from, to, mean, sd);
 }
 
-/// Returns the mean of `of` at the midpoints of kParts equal parts of the probability, which
-/// approximates its expected value.
+/// Returns the mean of `of` over kParts quantiles of equal probability, which approximates its
+/// expected value.
 double mean_of(const Quantiles& distribution, const std::function<double(double)>& of) {
   constexpr int kParts = 100'000;
   double sum = 0.0;
@@ -171,8 +171,9 @@ TEST(NormalTest, QuantileAndProbabilityAreInverse) {
   }
 }
 
-// A normal distribution truncated at a and b (in units of sd from the mean) has the mean (phi(a) -
-// phi(b))/Z and the variance 1 + (a phi(a) - b phi(b))/Z - mean^2, where Z = Phi(b) - Phi(a).
+// A normal distribution truncated at a and b, in units of sd from the mean, has
+//   mean = (phi(a) - phi(b))/Z and variance = 1 + (a phi(a) - b phi(b))/Z - mean^2
+// with Z = Phi(b) - Phi(a).
 TEST(DistributionTest, ATruncatedNormalHasTheTheoreticalMoments) {
   const auto phi = [](double z) {
     return std::isinf(z) ? 0.0 : std::exp(-z * z / 2.0) / std::sqrt(2.0 * std::acos(-1.0));

@@ -1,5 +1,4 @@
-// Runs the whole server in the test process, on loopback sockets, with simulated workers and
-// clients.
+// Runs the whole server in this process, on loopback sockets, with simulated workers and clients.
 #include "server/event_loop/event_loop.h"
 
 #include <atomic>
@@ -188,8 +187,8 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
   for (int i = 0; i < 2; ++i) {
     SimulatedClient client(server.client_endpoint());
     client.send(SimulatedClient::query_request(kDeaf));
-    EXPECT_TRUE(
-        client.submit("a", 10).has_submit());  // after this reply the query has arrived, too
+    // The reply to this later request shows that the query has arrived.
+    EXPECT_TRUE(client.submit("a", 10).has_submit());
   }
   SimulatedClient client(server.client_endpoint());
   EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
@@ -236,8 +235,8 @@ std::size_t resident_bytes() {
   return resident_pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// Memory that a server may need in addition to that for peers; the address sanitizer adds a shadow
-/// byte for each eight.
+/// Returns the memory that `bytes` bytes of the server may take with a sanitizer. The address
+/// sanitizer adds only one byte per eight.
 constexpr std::size_t with_shadows(std::size_t bytes) {
 #if defined(__SANITIZE_THREAD__)
   return 5 * bytes;  // the thread sanitizer needs four more bytes per byte

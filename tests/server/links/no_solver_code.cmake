@@ -1,6 +1,5 @@
 # Fails if a linked target or a symbol of a program belongs to the solver, except to its model/.
-#   cmake -DPROGRAM=oblique-server -DTARGETS=a,b,c -DSOLVER_ARCHIVES=x.a,y.a -DNM=nm -P
-# no_solver_code.cmake
+#   cmake -DPROGRAM=oblique-server -DTARGETS=a,b,c -DSOLVER_ARCHIVES=x.a,y.a -DNM=nm -P no_solver_code.cmake
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" TARGETS "${TARGETS}")
 string(REPLACE "," ";" SOLVER_ARCHIVES "${SOLVER_ARCHIVES}")
@@ -11,9 +10,8 @@ foreach(target IN LISTS TARGETS)
   endif()
 endforeach()
 
-# functions_of(FILE KINDS VARIABLE) stores the mangled names of the oblique functions that FILE
-# defines. KINDS are letters of nm: T for functions with external linkage, t for functions made
-# local by a linker.
+# functions_of(FILE KINDS VARIABLE): stores the mangled names of the oblique functions that FILE
+# defines. KINDS are letters of nm: T for external linkage, t for functions made local by a linker.
 function(functions_of file kinds variable)
   execute_process(COMMAND ${NM} --defined-only ${file} OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
   if(failed)

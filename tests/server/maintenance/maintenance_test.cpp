@@ -110,7 +110,7 @@ TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) 
   const struct {
     const char* what;
     std::function<void(const std::string&)> damage;
-    double least_share;  ///< expected share of saved rows
+    double least_share;  ///< minimum share of saved rows
   } cases[] = {{"one page of rows",
                 [&](const auto& file) {
                   overwrite_page(file, static_cast<std::int64_t>(size) / 2 / kPageBytes + 1);
@@ -294,8 +294,7 @@ TEST_F(MaintenanceTest, ADoneStudyWithRowsDeletedByHandIsSound) {
   EXPECT_THAT(diagnose(path_).remarks, Contains("study a is done: 7 of 10 points have a result"));
 }
 
-/// Provides a database with three completed points, of which the last has failed. The rows have no
-/// checksums.
+/// Provides a database with three completed points, the last failed. The rows have no checksums.
 class RowFaultsTest : public StoreFixture {
  protected:
   RowFaultsTest() {

@@ -98,8 +98,7 @@ struct CurveClient {
     return data += box(std::string(64, '\0'), curve_nonce("CurveZMQHELLO---", number), server,
                        short_term.secret_key);
   }
-  /// Decrypts the data of the command WELCOME; returns false if it is not encrypted for this
-  /// client.
+  /// Decrypts the data of WELCOME; returns false if it is not encrypted for this client.
   bool take_welcome(std::string_view data) {
     const auto text = opened(data.substr(16), curve_nonce("WELCOME-", data.substr(0, 16)), server,
                              short_term.secret_key);
@@ -124,8 +123,7 @@ struct CurveClient {
            box(text, curve_nonce("CurveZMQINITIATE", number), server_short_term,
                short_term.secret_key);
   }
-  /// Returns an encrypted message. The encrypted flags are 1 for "more frames follow" and 2 for
-  /// "command".
+  /// Returns an encrypted message. Flags: 1 if more frames follow, 2 for a command.
   std::string sealed(std::string_view body, unsigned flags = 0) {
     const std::string number = next_number();
     const std::string text = static_cast<char>(flags) + std::string(body);
@@ -133,8 +131,7 @@ struct CurveClient {
                       box(text, curve_nonce("CurveZMQMESSAGEC", number), server_short_term,
                           short_term.secret_key));
   }
-  /// Returns flags and body of a MESSAGE from the server, or nothing if it is not encrypted for
-  /// this client.
+  /// Returns flags and body of a MESSAGE, or nothing if it is not encrypted for this client.
   std::optional<std::string> opened_message(std::string_view message) const {
     return opened(message.substr(16), curve_nonce("CurveZMQMESSAGES", message.substr(8, 8)),
                   server_short_term, short_term.secret_key);

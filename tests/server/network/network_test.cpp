@@ -1,5 +1,4 @@
-// Tests of the network and its limits: raw TCP connections with and without keys, and sockets of
-// libzmq.
+// Tests of the network and its limits, with raw TCP connections and sockets of libzmq.
 #include "server/network/network.h"
 
 #include <algorithm>
@@ -100,8 +99,7 @@ class NetworkTest : public testing::Test {
     std::ranges::generate(peers, [&] { return keyed_peer(worker_, server_.public_key, source); });
     return peers;
   }
-  /// Runs the network until the peer has received at least `bytes` bytes. Returns all received
-  /// bytes.
+  /// Runs the network until the peer has received at least `bytes` bytes. Returns all of them.
   std::string received_by(KeyedPeer& peer, std::size_t bytes) {
     std::string received;
     run_until([&] { return (received += peer.tcp.receive_available()).size() >= bytes; });
@@ -122,8 +120,7 @@ class NetworkTest : public testing::Test {
     static_cast<void>(received_by(*peer, 1));
     return peer;
   }
-  /// Sends a message from a peer without a key. Returns the identity that the network gives this
-  /// peer.
+  /// Sends a message from a peer without a key. Returns the identity that the peer has got.
   std::string identity_of(RawPeer& peer) {
     peer.send(zmtp_frame("hello"));
     return next().identity;
@@ -504,7 +501,7 @@ TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
   crowd[0]->say_hello();
   take_welcome(*crowd[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  const auto silent = keyed_peers(1, kElsewhere);  // takes the place of `second`, which is admitted
+  const auto silent = keyed_peers(1, kElsewhere);  // takes the place that `second` has left
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(crowd[0]->tcp.receive(), "") << "in the place of the oldest";
 }
@@ -585,8 +582,7 @@ class LibzmqPeersTest : public NetworkTest {
   std::unique_ptr<Dealer> dealer(const protocol::KeyPair& own, const protocol::CurveKey& server) {
     return std::make_unique<Dealer>(context_, network_.endpoint(keyed_), &own, &server);
   }
-  /// Runs the network until the socket reports a failed handshake. Returns event and value of the
-  /// report.
+  /// Runs the network until the socket reports a failed handshake. Returns event and value.
   std::pair<int, int> failure_of(Dealer& dealer) {
     std::optional<std::pair<int, int>> failure;
     run_until([&] { return (failure = dealer.failure()).has_value(); });

@@ -1,5 +1,4 @@
-// Tests of the protocol ZMTP without keys and with keys. The client of the tests can also send
-// messages that no library sends.
+// Tests of ZMTP with and without keys. The client can also send messages that no library sends.
 #include "server/network/zmtp.h"
 
 #include <cstddef>
@@ -288,7 +287,7 @@ TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNoPeer) {
   for (std::size_t at = 0; at < kGreetingBytes; ++at) {
     Link link = greeted();
     const std::string answers = link.send(flipped(curve_greeting(), at) + link.hello_frame());
-    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // the server ignores some bytes
+    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // it ignores some bytes
     EXPECT_FALSE(link.zmtp.is_open()) << at;
   }
   const std::string hello = greeted().hello_frame();

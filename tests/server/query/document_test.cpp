@@ -18,8 +18,7 @@ namespace {
 
 using Comments = std::map<std::string, std::string>;
 
-/// Returns the comment of each column in a CREATE TABLE statement. A comment is at the end of the
-/// column's line or on the lines before it.
+/// Returns the comments of columns in CREATE TABLE: on the column's line or on the lines before it.
 Comments comments_of(const std::string& create) {
   static const std::regex kLine("[ \n]*(\\w*)[^\n]*?(?:-- ([^\n]*))?(?:\n|$)");
   Comments comments;

@@ -78,7 +78,7 @@ class PlanTest : public StoreFixture {
   std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
     return texts(plan(database_.get(), asked).sql);
   }
-  /// Returns the output of EXPLAIN QUERY PLAN for a question.
+  /// Returns the output of EXPLAIN QUERY PLAN for a study query.
   std::string steps_of(const protocol::StudyQuery& asked) const {
     return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
                                                                  plan(database_.get(), asked).sql),

@@ -107,8 +107,8 @@ class Drawn {
     return recipe;
   }
 
-  /// Returns a condition, mostly a conjunction. Its columns include axes and others, its numbers
-  /// include values of axes and others.
+  /// Returns a condition, mostly a conjunction. Its columns are axes or outputs, and its numbers
+  /// are values of axes or arbitrary.
   std::string condition(const Recipe& recipe, int depth = 0) {
     const std::size_t kind = depth == 0 && !once_in(4) ? 5 : below(depth < 3 ? 9 : 4);
     const auto inner = [&] { return condition(recipe, depth + 1); };
@@ -216,8 +216,7 @@ class Drawn {
   std::mt19937 engine_;
 };
 
-/// Returns a study with results. Each study whose number is a multiple of 4 lacks a third of its
-/// rows.
+/// Returns a study with results. Each fourth study lacks a third of its rows.
 std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
   const Table points = table(recipe);
   AddResults results{number, points, 0, "", "", 1, "now", {}};

@@ -151,8 +151,7 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
 }
 
-/// Provides study "a" with points 0 to 9, of which 5 is not solved. Four rows of `wide_rows` fill a
-/// chunk.
+/// Study "a" has points 0 to 9, of which 5 is not solved. Four rows of `wide_rows` fill a chunk.
 class AnswerTest : public StoreFixture {
  protected:
   AnswerTest() { commit({study_, worker(1), solved(study_, {0, 1, 2, 3, 4, 6, 7, 8, 9})}); }

@@ -1,5 +1,4 @@
-// Tests of left-out points: workers report them, and the server counts them as completed without a
-// row.
+// Tests of left-out points, which workers report and the server completes without a row.
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,8 +26,7 @@ std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers
 /// A filter that keeps every second point.
 constexpr const char* kEven = "floor(mu / 2) == mu / 2";
 
-/// Answers the whole batch and stores the answer; the worker then requests another batch. Returns
-/// all effects.
+/// Answers the whole batch, stores the answer and requests another batch. Returns all effects.
 std::vector<Effect> solve(SchedulerBench& bench, const protocol::PointTable& table,
                           const SendBatch& batch) {
   auto effects = bench.solve_and_store(batch, 1e-3, &table);

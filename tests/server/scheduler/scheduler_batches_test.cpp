@@ -96,8 +96,8 @@ TEST(SchedulerPace, ABatchGrowsAtMostByTheGrowthFactor) {
 
 // ---- Ends of batches ----
 
-/// Returns two models of 10 points each, then 30 points of the base model, then 40 models of one
-/// point each.
+/// Two models of 10 points each, then 30 points of the base model, then 40 models of one point
+/// each.
 PointTable mixed_table() {
   return PointTable(protocol::recipe_of(
       {{listed("E", {6e10, 7e10}), listed("H", {1.0}), range("mu", 0.1, 1.0, 10), listed("e", {1})},
@@ -145,7 +145,7 @@ std::shared_ptr<const PointTable> table_of_models(std::uint64_t models, std::uin
         points == 1 ? listed("mu", {0.4}) : range("mu", 0.1, 1.0, points), listed("e", {1.0})}}));
 }
 
-/// Returns the model of a batch's first point in a study with kMany points per model.
+/// In a study with kMany points per model, `model_of` returns the model of a batch's first point.
 constexpr std::uint64_t kMany = 100'000;
 std::uint64_t model_of(const SendBatch& batch) {
   return batch.first_point() / kMany;

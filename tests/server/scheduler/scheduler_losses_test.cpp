@@ -190,8 +190,7 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
 
 TEST(SchedulerLosses, ANewWorkerThatReconnectsIsNotLost) {
   SchedulerBench bench(table_of(1'000'000));
-  // Four processes each get a batch and then reconnect; the new connection replaces the earlier
-  // one.
+  // Four processes each get a batch and reconnect. The new connection replaces the old connection.
   for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
     const std::string process = "sound " + std::to_string(worker);
     ASSERT_EQ(only<SendBatch>(bench.join_as(process, worker, 1)).size(), 1U);

@@ -132,8 +132,7 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
   bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
-  // The limit is ten times the time in which the quick worker would solve eight points side by
-  // side.
+  // The limit is ten times the time of eight points side by side on the quick worker.
   bench.pass(780'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});

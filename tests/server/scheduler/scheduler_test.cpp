@@ -169,8 +169,7 @@ TEST(SchedulerTest, ABatchThatNeverReachedItsWorkerIsLeasedAgain) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   bench.now_ms += 1000;
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}})
-                  .empty());  // the worker may not have received the batch yet
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());  // the batch may not have arrived
   bench.pass(3000, {1});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {batch.lease}}).empty());
   bench.feed(HeartbeatReceived{1, {}});

@@ -1,5 +1,4 @@
-// Tests of changes to studies (pause, resume, retry, grow, rename, delete) and of the rights of
-// keys.
+// Tests of changes (pause, resume, retry, grow, rename, delete) and of the rights of keys.
 #include <memory>
 #include <string>
 #include <utility>
@@ -133,8 +132,7 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
     EXPECT_THAT(last_error(), HasSubstr("disk full"));
     EXPECT_EQ(status_of("a").state(), "running");
   }
-  // A refused change may have reached the disk and return after a crash. So the service stores the
-  // state again.
+  // A refused change may be on the disk and reappear after a crash, so the state is stored again.
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(ports_.jobs.size(), 1U);
   write_all();

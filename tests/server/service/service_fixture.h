@@ -225,8 +225,7 @@ class ServiceTest : public testing::Test {
     request(message);
     return last_reply().status().studies(0);
   }
-  /// Completes all waiting writes. If `error` is not empty, the writes that report failures fail
-  /// with it.
+  /// Completes all waiting writes. Writes that can fail end with `error` unless it is empty.
   void write_all(const std::string& error = {}) {
     for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
       const bool refused = !error.empty() && job.answer_failure;

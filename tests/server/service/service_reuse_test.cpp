@@ -35,14 +35,13 @@ class ServiceReuseTest : public ServiceTest {
     message.mutable_submit()->set_no_reuse(false);
     return message;
   }
-  /// Returns the same submission with ten more points.
+  /// Returns the submission of `reusing` with ten more points.
   ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
     return message;
   }
-  /// Submits study 2, "b". Afterwards the study is stored, and its first reuse of results waits for
-  /// the writer.
+  /// Submits and stores study 2, "b". Its first reuse of results then waits for the writer.
   void submit_study() {
     solve_some();
     request(reusing("b"));

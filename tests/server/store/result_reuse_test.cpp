@@ -41,8 +41,7 @@ class ResultReuseTest : public StoreFixture {
     commit({ReuseResults{study, points, first, "1.0", outcome}});
     return *outcome;
   }
-  /// Returns "POINT of STUDY/POINT" for each copied row: its own point, and study and point of its
-  /// source.
+  /// Returns "POINT of STUDY/POINT" for each copied row, where STUDY/POINT is its source.
   std::vector<std::string> copies(std::uint64_t study) const {
     return rows(
         fmt::format("SELECT point || ' of ' || reused_from FROM results"
@@ -158,8 +157,7 @@ TEST_F(ResultReuseTest, AModelWithoutRowsCostsOneProbe) {
 
 // ---- Random studies, compared with a lookup in a map --------------------------------------------
 
-/// Returns a block with few values per key, so that studies have points in common and contain some
-/// points twice.
+/// Returns a block with few values per key, so that many points occur several times.
 protocol::Block random_block(std::mt19937& random) {
   const auto pick = [&](const std::string& key, std::vector<double> values) {
     std::shuffle(values.begin(), values.end(), random);
@@ -203,7 +201,7 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
 
 TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
   std::mt19937 random(4711);
-  std::map<Inputs, std::string> solved;  // source by inputs, as in `reused_from`
+  std::map<Inputs, std::string> solved;  // first row with these inputs, as in `reused_from`
   std::size_t reused = 0;
   std::size_t open = 0;
   for (std::uint64_t study = 1; study <= 60; ++study) {
@@ -235,8 +233,8 @@ TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
     EXPECT_EQ(copies(study), expected) << "study " << study;
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
-    // Solves some of the other points. A copy is never the source of another copy, because its own
-    // source comes first.
+    // Solves some of the other points. A copy is never a source, because its own source comes
+    // first.
     AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {

@@ -150,8 +150,7 @@ TEST_F(ResultRowsTest, AFailedPointHasAReasonAndNoOutputs) {
 
 TEST_F(ResultRowsTest, AGridTakesLessThan850BytesAPointWithAllIndices) {
   constexpr std::uint64_t kPoints = 20'000;
-  // Lists as long as in an ordinary contact (mu 0.4, e 0.9): two peaks, four phases, one stick
-  // interval.
+  // An ordinary contact (mu 0.4, e 0.9) has two peaks, four phases and one stick interval.
   auto result = listed();
   result.errors = {};
   result.peaks = {{0.000123456789, 1234.56789, 456.789123, true},

@@ -55,7 +55,7 @@ class EchoServer {
     passed_ = passed_.load() + time;
     server_.wake();
   }
-  /// Number of pending answers and streams.
+  /// Returns the number of pending answers and streams.
   long in_progress() const { return token_.use_count() - 1; }
   static constexpr std::size_t kLargeBytes = 50'000'000;  // more than socket buffers hold
   /// Wakes the server again and again, as its owner does, until `count` answers are pending.
@@ -97,8 +97,7 @@ class EchoServer {
   HttpServer server_;  // the last member, because its thread uses the others
 };
 
-/// Returns a peer that has requested a path and, for a stream or a long body, has read the head of
-/// the answer.
+/// Returns a peer that has requested a path. For a stream or /large it has read the answer's head.
 std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
   auto peer = std::make_unique<RawHttp>(server.url());
   peer->send("GET " + path + kEnd);

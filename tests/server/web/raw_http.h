@@ -10,12 +10,12 @@
 
 namespace oblique::server {
 
-/// Sends and receives single bytes on a TCP connection to an HTTP server on 127.0.0.1.
+/// A TCP connection to an HTTP server on 127.0.0.1, on which tests can send any bytes.
 class RawHttp : public test::RawTcp {
  public:
   using RawTcp::RawTcp;
 
-  /// Returns false if the server has closed the connection.
+  /// Sends all bytes; returns false if the server has closed the connection.
   bool send(const std::string& bytes) { return send_all(bytes); }
   /// Receives bytes up to and including `end`; later bytes stay in the socket.
   std::string read_until(const std::string& end) {

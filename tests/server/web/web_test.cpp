@@ -203,8 +203,7 @@ TEST(Metrics, ShowTheSnapshot) {
   snapshot.refusals.at(static_cast<std::size_t>(RefusalCause::kUnknownKey)) = 7;
   snapshot.database_fault = "disk I/O error";
   auto values = metrics_of(snapshot).values;
-  EXPECT_EQ(values["oblique_threads_wanted"],
-            10.0);  // threads needed for 1000 points of 0.6 s in 60 s
+  EXPECT_EQ(values["oblique_threads_wanted"], 10.0);  // 1000 points of 0.6 s within 60 s
   EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"0.1\"}"], 2.0);
   EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"1\"}"], 3.0);
   EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"+Inf\"}"], 4.0);

@@ -195,7 +195,7 @@ TEST_F(PageStudyTest, ASliceMarksCellsThatDoNotMeetACondition) {
   const std::string slice = "/api/studies/1/slice?x=mu&y=H&at=e@1&z=";
   const Numbers some =
       page_.numbers(slice + "fn_peak_N&where=point%20%3E%203%20AND%20fn_peak_N%20%3C%20140000");
-  EXPECT_EQ(some.head["filtered"], 7);  // 12 points 1, 3, ..., 23 without 5, 7, ..., 13
+  EXPECT_EQ(some.head["filtered"], 7);  // points 1, 3, ..., 23 except 5, 7, ..., 13
   EXPECT_EQ(some.head["solved"], 5);
   const auto bits = some.read<std::uint32_t>(56, 12);
   EXPECT_EQ(bits[1], 0x7fc00004U);

@@ -1,5 +1,4 @@
-// Tests of access to the page, and of its requests to a whole server. page_pictures_test.cpp tests
-// pictures.
+// Tests of access to the page and of its requests, except for pictures, with a whole server.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -216,7 +215,7 @@ std::string body_with(const std::string& H, const std::string& others = "",
          R"(},{"key":"e","values":[1]}],"where":")" + where + R"("}]}})";
 }
 
-/// Returns the elements of a JSON array by the value of one of their members.
+/// Maps the value of a member to the element of a JSON array that has this value.
 std::map<std::string, json> named(const json& list, const char* member) {
   std::map<std::string, json> found;
   for (const json& element : list) {

@@ -1,5 +1,4 @@
-// Tests of the page's answers about a study, and of the requests that they send to the service. The
-// test takes the role of the service.
+// Tests of answers about a study and of the requests for them. The test takes the service's role.
 #include "server/web/answers/study_answers.h"
 
 #include <cstdint>

@@ -54,8 +54,7 @@ ModelParameters model_of(const Settings& settings, int elements_per_link) {
   return model;
 }
 
-/// Returns points with H between a sixth and 0.96 of the length of the chain (1.15 m for three
-/// links).
+/// Returns random points. H is between a sixth and 0.96 of the chain's length.
 std::vector<solver::Point> random_points(const Settings& settings) {
   constexpr double kLeastDrop = 1.0 / 6.0;
   constexpr double kLargestDrop = 0.96;
@@ -165,8 +164,7 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
 
 void tell_modes(const Results& results, const Results& truth,
                 const std::vector<ErrorEstimate>& errors) {
-  std::array<std::array<int, 2>, 2>
-      count{};  // [same mode in the companion][same mode in the exact result]
+  std::array<std::array<int, 2>, 2> count{};  // [companion agrees][exact result agrees]
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
       const bool right = results[i]->major_mode == truth[i]->major_mode;

@@ -14,13 +14,12 @@ namespace oblique::solver {
 namespace {
 
 struct Errors {
-  double relative = 0.0;  ///< largest of peaks, duration and slide
+  double relative = 0.0;  ///< largest error of peaks, duration and slide
   double stick_s = 0.0;
   double exit_m_s = 0.0;
 };
 
-/// Solves contacts after the same fall, and compares them with contacts whose steps are six times
-/// shorter.
+/// Compares contacts after the same fall with contacts whose steps are six times shorter.
 class Steps {
  public:
   explicit Steps(const ModelParameters& model)

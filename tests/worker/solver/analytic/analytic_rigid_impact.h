@@ -6,16 +6,16 @@
 
 namespace oblique::solver {
 
-/// A rigid body that strikes the ground through the local compliant contact, in closed form
-/// (Stronge, Impact Mechanics). Of the body, only the inverse mass at the tip counts,
-/// d(V_t, V_n)/dt = W (F_t, F_n), with W symmetric and positive definite. In each regime the force
-/// is F_0 - K r, where r is the displacement of the tip since the regime began, so that
+/// Closed form of a rigid body that strikes the ground through the local compliant contact
+/// (Stronge, Impact Mechanics). The inverse mass W at the tip, symmetric and positive definite,
+/// describes the body: d(V_t, V_n)/dt = W (F_t, F_n). In each regime the force is F_0 - K r, where
+/// r is the displacement of the tip since the regime began, so that
 ///
-///   r'' = W F_0 - W K r,   K = diag(k/eta2, k_n) in stick,   rows (0, -s mu k_n), (0, k_n) in
-///   slip,
+///   r'' = W F_0 - W K r,
+///   K = diag(k/eta2, k_n) in stick, with the rows (0, -s mu k_n) and (0, k_n) in slip.
 ///
-/// which is solved by eigenmodes. Regimes end at roots of functions of that solution, found by
-/// scanning and bisection. No code is shared with the solver.
+/// Eigenmodes solve this equation. A regime ends at a root of a function of the solution, found by
+/// scanning and bisection. The closed form shares no code with the solver.
 class RigidImpact {
  public:
   struct Parameters {
@@ -44,8 +44,7 @@ class RigidImpact {
   Eigen::Vector2d velocity_out_m_s() const { return V_m_s_; }
   double slide_m() const { return slide_m_; }
   double stick_s() const { return stick_s_; }
-  /// Work of F_n on the body, summed over all compressions (negative) and over all restitutions
-  /// (positive).
+  /// Work of F_n on the body in all compressions (negative) and in all restitutions (positive).
   double compression_work_J() const { return compression_work_J_; }
   double restitution_work_J() const { return restitution_work_J_; }
   /// Return (V_t, V_n) and (F_t, F_n) at a time from 0 to duration_s().

@@ -28,8 +28,7 @@ TEST(BeamEndOnSpring, HasTheKnownPeak) {
 TEST(BeamEndOnSpring, SatisfiesItsIntegralEquation) {
   const BeamEndOnSpring beam(1.35, 1400.0, 2.6e7, 1.0);
   const double C = std::sqrt(2.0) / (std::pow(1.35, 0.75) * std::pow(1400.0, 0.25));
-  // Computes the half integral of F at t. The substitution s = t - u^2 removes the singularity of
-  // the integrand.
+  // Computes the half integral of F at t. With s = t - u^2 the integrand has no singularity.
   constexpr int kIntervals = 1000;
   for (const double t : {10e-6, 50e-6, 90e-6}) {
     double sum = 0.0;

@@ -27,8 +27,7 @@ class BeamEndOnSpring {
   double V0_m_s_;
 };
 
-/// Returns E_{3/2,b}(z) by its series. Requires |z| <= 20, where cancellation costs at most seven
-/// digits.
+/// Returns E_{3/2,b}(z) by its series. For |z| <= 20 cancellation costs at most seven digits.
 double mittag_leffler_three_halves(double b, double z);
 
 /// End of a rod that moves along its axis at V0 and hits a spring of stiffness k at t = 0:

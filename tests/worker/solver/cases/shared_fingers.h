@@ -4,8 +4,7 @@
 
 namespace oblique::solver {
 
-/// The finger of the preset `paper`. All tests of a process share it, because its fall takes half a
-/// second to solve.
+/// The finger of the preset `paper`. All tests share it, because its fall takes half a second.
 inline const Finger& paper_finger() {
   static const Finger finger{preset("paper")};
   return finger;

@@ -16,8 +16,7 @@ TEST(Impact, AVeryHeavyTipBouncesLikeItsMassAlone) {
   ModelParameters model = coarse_model();
   model.tip_mass_kg = kMass_kg;
   const CaseResult result = Finger{model}.solve(0.3, 0.0, 1.0);
-  // The contact lasts half a period on the spring. Gravity and the links (1.7 kg) change that by
-  // one percent.
+  // The contact lasts half a period on the spring, within one percent due to gravity and links.
   EXPECT_NEAR(result.duration_s, M_PI * std::sqrt(kMass_kg / model.k_N_m),
               0.03 * result.duration_s);
   EXPECT_NEAR(result.fn_peak_N, -result.vn_in_m_s * std::sqrt(kMass_kg * model.k_N_m),
@@ -106,8 +105,7 @@ void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_LT(r.energy.closure, worst_closure);
 }
 
-/// Expects that phases alternate and fill the contact, that peaks lie between phases, and that
-/// stick intervals lie inside the contact.
+/// Expects alternating phases that fill the contact, peaks between phases, and stick inside.
 void expect_in_order(const CaseResult& r) {
   ASSERT_EQ(r.phases.size(), 2 * r.peaks.size());
   double t_s = 0.0;

@@ -27,8 +27,7 @@ Traced traced(double H_m, double mu, double e_star) {
   return traced;
 }
 
-/// Returns contacts with slip only, with stick and slip, with low restitution, and without
-/// friction.
+/// Contacts with slip only, with stick and slip, with low restitution, and without friction.
 const std::vector<Traced>& traces() {
   static const std::vector<Traced> list{traced(1.0, 0.4, 1.0), traced(1.0, 1.4, 0.8),
                                         traced(0.9, 0.9, 0.2), traced(0.9, 0.0, 0.8)};
@@ -48,8 +47,7 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
     EXPECT_EQ(first.state[1], 'C');
     const TraceRow& last = t.rows.back();
     EXPECT_EQ(last.t_s, t.result.duration_s);
-    // Separation is located to 1e-13 s. The tolerance is the change of the restitution spring's
-    // force in this time.
+    // The tolerance is the change of the restitution spring's force in 1e-13 s.
     const double fn_N = kLocated_s * coarse_finger().model().k_N_m * std::abs(last.vn_m_s) /
                         (t.result.e_star * t.result.e_star);
     EXPECT_NEAR(last.fn_N, 0.0, fn_N);
@@ -103,8 +101,7 @@ TEST(Trace, PIsAtRestInStickAndMovesWithItsVelocityInSlip) {
       const TraceRow& b = t.rows[i];
       slide_m += std::abs(b.xP_m - a.xP_m);
       if (a.state[0] == 'S') {
-        // Sliding begins at an instant exact to 1e-13 s, so P may have moved by `end_m` in that
-        // row.
+        // The start of sliding is exact to 1e-13 s, in which P moves by `end_m`.
         const double end_m = kLocated_s * (std::abs(b.vt_m_s) + cone * std::abs(b.vn_m_s));
         EXPECT_NEAR(b.xP_m, a.xP_m, b.state[0] == 'S' ? 1e-15 : end_m);
         EXPECT_EQ(a.vP_m_s, 0.0);
@@ -123,8 +120,7 @@ TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
       impulse_n_Ns += half_s * (t.rows[i].fn_N + t.rows[i - 1].fn_N);
       impulse_t_Ns += half_s * (t.rows[i].ft_N + t.rows[i - 1].ft_N);
     }
-    // The trapezoidal rule has a relative error of (omega h)^2/12, where omega is the highest
-    // frequency in the motion.
+    // The trapezoidal rule has a relative error of (omega h)^2/12 for a vibration omega.
     EXPECT_NEAR(impulse_n_Ns, t.result.impulse_n_Ns, 5e-3 * t.result.impulse_n_Ns);
     EXPECT_NEAR(impulse_t_Ns, t.result.impulse_t_Ns, 5e-3 * t.result.impulse_n_Ns);
   }
@@ -204,8 +200,7 @@ TEST(Trace, MomentumChangesByTheImpulsesOfPinContactAndWeight) {
       impulse_y_Ns +=
           half_s * (a.reactions_N[1] + b.reactions_N[1] + a.fn_N + b.fn_N - 2.0 * weight_N);
       largest_Ns = std::max({largest_Ns, std::abs(impulse_x_Ns), std::abs(impulse_y_Ns)});
-      // The trapezoidal rule has a relative error of (omega h)^2/12, where omega is the highest
-      // frequency in the motion.
+      // The trapezoidal rule has a relative error of (omega h)^2/12 for a vibration omega.
       EXPECT_NEAR(b.momentum_x_Ns - first.momentum_x_Ns, impulse_x_Ns, 2e-2 * largest_Ns);
       EXPECT_NEAR(b.momentum_y_Ns - first.momentum_y_Ns, impulse_y_Ns, 2e-2 * largest_Ns);
     }

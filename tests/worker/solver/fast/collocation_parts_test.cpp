@@ -37,8 +37,7 @@ TangentBlocks<double> tangent_of(const ElementCoordinates& q) {
   return element_tangent(pair(0), pair(1), pair(2), pair(3), constants());
 }
 
-/// Dense matrix M + z K of two links with two differently bent elements each. The rows are those of
-/// Chain.
+/// Dense matrix M + z K of two links with two different bent elements each, with rows as in Chain.
 struct DenseChain {
   static constexpr std::size_t kLinks = 2;
   static constexpr std::size_t kElements = 2;

@@ -57,8 +57,7 @@ std::map<std::uint64_t, Outcome> solved(
   return outcomes;
 }
 
-/// Returns models whose chains have the same shape but differ otherwise. The last model differs
-/// from the first in k only.
+/// Returns models whose chains differ but have one shape. The last and the first differ in k only.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());
@@ -168,7 +167,7 @@ TEST(LaneContacts, PeaksOfReactionsFromMomentaAgreeWithThoseFromAccelerations) {
     for (const double mu : {0.0, 0.4, 1.4}) {
       for (const double e_star : {1.0, 0.6, 0.1}) {
         ContactCase one = coarse().contact(cases.size(), cases.size() / 3, mu, e_star, touch);
-        // With these steps a link of one element has its fast vibrations resolved.
+        // These steps resolve the fast vibrations of a link with a single element.
         one.steps = {0.25 * one.steps.compression_s, 0.25 * one.steps.restitution_s};
         cases.push_back(one);
       }

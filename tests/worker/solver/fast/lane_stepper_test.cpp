@@ -114,7 +114,7 @@ TEST(LaneStepper, ALaneHasTheSameBitsBesideOtherChainsAndBesideEqualChains) {
   }
 }
 
-/// Returns the same numbers from the reference implementation, ExplicitMotion, after `steps` steps.
+/// Returns state and integrals of the reference, ExplicitMotion, after `steps` steps.
 std::vector<double> by_reference(const Chain& chain, int steps) {
   const ExplicitMotion motion(chain);
   ChainState state = chain.at_rest();

@@ -8,8 +8,8 @@
 
 namespace oblique::solver {
 
-/// Returns the rows of positions, starting with the pin. The other rows are slopes: one at a node,
-/// two at a joint.
+/// Returns the rows of positions, the pin first. Other rows are slopes: one per node, two per
+/// joint.
 inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   std::vector<Eigen::Index> rows{0};
   const std::size_t links = model.lengths_m.size();
@@ -22,9 +22,8 @@ inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   return rows;
 }
 
-/// Computes dense matrices of a chain from its energies and accelerations alone. The fixed row 0,
-/// the pin, is left out, so entry i belongs to row i + 1. Both directions have the same mass
-/// matrix.
+/// Computes dense matrices of a chain from energies and accelerations alone. Entry i belongs to row
+/// i + 1, because row 0 is the fixed pin. Both directions have the same mass matrix.
 class ChainProbe {
  public:
   explicit ChainProbe(const Chain& chain) : chain_(chain) {
@@ -33,7 +32,7 @@ class ChainProbe {
     gravity_.resize(n, 2);
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j <= i; ++j) {
-        // T(i + j) - T(i) - T(j) = M_ij, and T(i) = M_ii/2.
+        // The kinetic energy T of unit velocities gives M_ij = T(i + j) - T(i) - T(j).
         const double entry =
             i == j ? 2.0 * kinetic({i, i}) : kinetic({i, j}) - kinetic({i, i}) - kinetic({j, j});
         mass_(i, j) = entry;

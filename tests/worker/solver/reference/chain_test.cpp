@@ -122,8 +122,7 @@ TEST(Chain, TurningAboutThePinItHasTheMomentOfInertiaOfARod) {
   model.tip_mass_kg = 0.3;
   const Chain chain(model);
   const double L = length_m(model);
-  // At 2 rad/s, the velocities are twice the coordinates rotated by a right angle. The same holds
-  // for slopes.
+  // At 2 rad/s, velocities are twice the coordinates rotated by a right angle, slopes included.
   const Coordinates v = 2.0 * turned(chain, 0.5 * M_PI);
   const double inertia = model.rho_kg_m3 * model.A_m2 * L * L * L / 3.0 + model.tip_mass_kg * L * L;
   EXPECT_NEAR(chain.kinetic_energy_J(v), 0.5 * inertia * 4.0, 1e-12 * inertia);

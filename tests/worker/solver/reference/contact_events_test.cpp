@@ -31,8 +31,7 @@ struct TipMotion {
   }
 };
 
-/// Returns a motion with V_n = a + b z + c z^2 and V_t = 1, where z goes from 0 to 1 during the
-/// step.
+/// Returns a motion with V_t = 1 and V_n = a + b z + c z^2; z goes from 0 to 1 in the step.
 TipMotion with_normal_velocity(double a, double b, double c) {
   const double h = kStep_s;
   return {[](double t) { return t; },

@@ -198,8 +198,7 @@ TipState half_period(double t_s, double vt_m_s) {
   return {vt_m_s * t_s, -std::sin(kRate * t_s) / kRate, vt_m_s, -std::cos(kRate * t_s)};
 }
 
-/// Returns the state of a tip whose V_n rises from -1 m/s to `nearest_m_s`, just below zero, within
-/// 50 us and falls back to -1 m/s.
+/// Returns a tip whose V_n rises from -1 m/s to -`nearest_m_s` in 50 us and falls back to -1 m/s.
 TipState grazing(double t_s, double nearest_m_s) {
   constexpr double kRate = 2.0 * M_PI / 1e-4;
   const double amplitude = 0.5 * (1.0 - nearest_m_s);
@@ -282,8 +281,7 @@ TEST(ReactionPeaks, MeansOverIntervalsGiveThePeakOfTheFunction) {
     add(peaks, t_s + kSpan_s, kSpan_s, 7.0 * mean_of_sine(t_s, t_s + kSpan_s));
   }
   const ReactionPeak peak = peaks.peaks().at(0);
-  // A mean is lower than the peak by (0.2)^2/24 = 1.7e-3. The corrected value has an error of order
-  // 4.
+  // Means are lower than the peak by (0.2)^2/24 = 1.7e-3. Corrected means have an error of order 4.
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 1e-4);
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 1e-3);
 }
@@ -324,8 +322,8 @@ TEST(ReactionPeaks, TheLargestOfSeveralPeaksCounts) {
 }
 
 TEST(ReactionPeaks, APeakBetweenInstantsCountsEvenIfAnInstantOfAnotherPeakIsHigher) {
-  // One instant is at the top of 1 - (t - 1)^2. The nearest instants are 0.1 away from the top of
-  // 1.005 - (t - 3.1)^2.
+  // The top of 1 - (t - 1)^2 is at an instant. The top of 1.005 - (t - 3.1)^2 is 0.1 from any
+  // instant.
   ReactionPeaks peaks(1);
   for (int i = 0; i <= 20; ++i) {
     const double t_s = 0.2 * i;

@@ -137,7 +137,7 @@ TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
   };
   for (const auto& p :
        {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0), impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
-    // The ratio is 16 for order 4. It scatters, because events lie at different places in their
+    // A half step divides the error by 16, with scatter from the position of events within their
     // steps.
     EXPECT_GT(error(p, 0.2) / error(p, 0.05), 11.3 * 11.3);
     EXPECT_GT(error(p, 0.1) / error(p, 0.025), 11.3 * 11.3);
@@ -145,8 +145,7 @@ TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
 }
 
 TEST(ContactOfARigidBody, ABallWithEqualStiffnessesSticksUntilSeparationOnTheFrictionCone) {
-  // Both forces reach zero together, so separation coincides with the start of slip in both
-  // directions. Separation takes precedence.
+  // Both forces reach zero together. Separation and both slips coincide; separation comes first.
   const auto p = impact(1.0, 0.0, 1.0, 2.0, 1.0, 0.5, -1.0, 1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "SC SR");

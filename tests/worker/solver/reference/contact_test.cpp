@@ -44,8 +44,7 @@ std::string mode_of(const Contact& contact) {
 }
 
 TEST(Contact, AnAsymmetricCrossingInsideAStepIsLocated) {
-  // V_n is above zero between 0.55 and 0.9 of the first step, and below zero at its beginning and
-  // end.
+  // V_n is above zero between 0.55 and 0.9 of the first step, and below zero at both of its ends.
   constexpr double kStep_s = 1e-4;
   const TipPath path = [](double t_s) -> TipState {
     const double z = t_s / kStep_s;

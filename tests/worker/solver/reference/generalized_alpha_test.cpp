@@ -40,7 +40,7 @@ AffineContactForce<double> push_at(const TipState& tip) {
   return force;
 }
 
-/// A bent, moving chain, both with eliminated and with constrained joints.
+/// The state of a bent, moving chain, once with eliminated joints and once with constraints.
 struct MovingChain {
   explicit MovingChain(const ModelParameters& parameters)
       : model(parameters), chain(model), motion(model) {
@@ -152,7 +152,7 @@ TEST(GeneralizedAlpha, AStepForWhichNewtonFailsIsASolveErrorWithItsTime) {
 }
 
 TEST(GeneralizedAlpha, StepsOfChangingLengthKeepTheOrder) {
-  // Steps change their length around events. Half as long steps must give a quarter of the error.
+  // Steps change their length around events. Half the length must give a quarter of the error.
   const auto error = [](int divisions) {
     MovingChain moving(coarse_model());
     const auto force = push_at(moving.chain.tip(moving.state));
