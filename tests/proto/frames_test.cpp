@@ -74,7 +74,7 @@ TEST(FramesTest, TextThatIsNotUtf8IsRefused) {
 }
 
 TEST(FramesTest, TheLongestFrameIsReadAndALongerOneIsNot) {
-  constexpr std::size_t kHead = 5;  // a tag of one byte, a length of four
+  constexpr std::size_t kHead = 5;  // a tag of one byte and a length of four bytes
   Notice notice;
   notice.set_text(std::string(kMaxFrameBytes - kHead, 'x'));
   const std::string longest = encode(notice);

@@ -278,8 +278,8 @@ TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
 
 TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
   submit_filtered();
-  // From the fourth worker on the batch is a probe, because three new workers were lost. So the
-  // ranges that are only wrong for a batch of the study come first.
+  // From the fourth worker on the batch is a probe, because three new workers were lost. Therefore
+  // ranges that are wrong only for batches of the study come first.
   const std::vector<std::vector<std::uint64_t>> wrong{
       {0, 12}, {11, 1}, {0}, {0, 0}, {3, ~std::uint64_t{0}}, {~std::uint64_t{0}, 2}, {0, 1, 5}};
   for (const auto& numbers : wrong) {

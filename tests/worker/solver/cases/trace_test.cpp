@@ -120,7 +120,7 @@ TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
       impulse_n_Ns += half_s * (t.rows[i].fn_N + t.rows[i - 1].fn_N);
       impulse_t_Ns += half_s * (t.rows[i].ft_N + t.rows[i - 1].ft_N);
     }
-    // The trapezoidal rule has a relative error of (omega h)^2/12 for a vibration omega.
+    // The trapezoidal rule has a relative error of (omega h)^2/12 for the frequency omega.
     EXPECT_NEAR(impulse_n_Ns, t.result.impulse_n_Ns, 5e-3 * t.result.impulse_n_Ns);
     EXPECT_NEAR(impulse_t_Ns, t.result.impulse_t_Ns, 5e-3 * t.result.impulse_n_Ns);
   }
@@ -200,7 +200,7 @@ TEST(Trace, MomentumChangesByTheImpulsesOfPinContactAndWeight) {
       impulse_y_Ns +=
           half_s * (a.reactions_N[1] + b.reactions_N[1] + a.fn_N + b.fn_N - 2.0 * weight_N);
       largest_Ns = std::max({largest_Ns, std::abs(impulse_x_Ns), std::abs(impulse_y_Ns)});
-      // The trapezoidal rule has a relative error of (omega h)^2/12 for a vibration omega.
+      // The trapezoidal rule has a relative error of (omega h)^2/12 for the frequency omega.
       EXPECT_NEAR(b.momentum_x_Ns - first.momentum_x_Ns, impulse_x_Ns, 2e-2 * largest_Ns);
       EXPECT_NEAR(b.momentum_y_Ns - first.momentum_y_Ns, impulse_y_Ns, 2e-2 * largest_Ns);
     }

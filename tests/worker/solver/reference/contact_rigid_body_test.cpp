@@ -137,8 +137,7 @@ TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
   };
   for (const auto& p :
        {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0), impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
-    // A half step divides the error by 16, with scatter from the position of events within their
-    // steps.
+    // Halving the step divides the error by about 16, depending on where events lie within steps.
     EXPECT_GT(error(p, 0.2) / error(p, 0.05), 11.3 * 11.3);
     EXPECT_GT(error(p, 0.1) / error(p, 0.025), 11.3 * 11.3);
   }
