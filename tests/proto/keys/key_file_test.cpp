@@ -152,8 +152,8 @@ TEST_F(KeyFileTest, ErrorsHaveFileLineAndKeyAndNoSecret) {
               AllOf(HasSubstr("none.key"), HasSubstr("No such file")));
 }
 
-/// Writes a key file in a child process, so that this process never has the secret in its memory.
-/// Returns `path`.
+/// Writes a key file in a child process, so that a reader has the only copy of the secret in
+/// memory. Returns `path`.
 std::string file_of_another_process(const std::string& path) {
   const pid_t writer = fork();
   if (writer == 0) {

@@ -101,7 +101,7 @@ TEST(Trace, PIsAtRestInStickAndMovesWithItsVelocityInSlip) {
       const TraceRow& b = t.rows[i];
       slide_m += std::abs(b.xP_m - a.xP_m);
       if (a.state[0] == 'S') {
-        // The start of sliding is exact to 1e-13 s, in which P moves by `end_m`.
+        // The start of sliding is exact to 1e-13 s, in which P moves by at most `end_m`.
         const double end_m = kLocated_s * (std::abs(b.vt_m_s) + cone * std::abs(b.vn_m_s));
         EXPECT_NEAR(b.xP_m, a.xP_m, b.state[0] == 'S' ? 1e-15 : end_m);
         EXPECT_EQ(a.vP_m_s, 0.0);
