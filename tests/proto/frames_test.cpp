@@ -45,7 +45,7 @@ TEST(FramesTest, ATruncatedFrameIsNotTheWholeMessage) {
       EXPECT_NE(received.kind_case(), WorkerMessage::kResults) << length << " bytes";
     }
   }
-  // Of the truncations only the empty frame is a message, one without a kind.
+  // Of all truncations only the empty frame is decoded, as a message without a kind.
   EXPECT_EQ(refused, static_cast<int>(frame.size()) - 1);
 }
 
@@ -74,7 +74,7 @@ TEST(FramesTest, TextThatIsNotUtf8IsRefused) {
 }
 
 TEST(FramesTest, TheLongestFrameIsReadAndALongerOneIsNot) {
-  constexpr std::size_t kHead = 5;  // a tag, and a length of four bytes
+  constexpr std::size_t kHead = 5;  // a tag of one byte and a length of four bytes
   Notice notice;
   notice.set_text(std::string(kMaxFrameBytes - kHead, 'x'));
   const std::string longest = encode(notice);

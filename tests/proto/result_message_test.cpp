@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
-/// A result in which all fields differ.
+/// Returns a result in which every field has another value.
 solver::CaseResult distinct_result() {
   solver::CaseResult result{};
   result.fall_time_s = 0.43;

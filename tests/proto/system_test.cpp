@@ -1,4 +1,4 @@
-// Files, memory and addresses.
+// Tests of functions for files, memory and addresses.
 #include <filesystem>
 #include <fstream>
 #include <string>

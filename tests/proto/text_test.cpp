@@ -24,7 +24,8 @@ TEST(VisibleText, EscapesTextThatControlsATerminalForgesALineOrIsInvisible) {
            {"\u200e\u200f\u061c\u2028\u2029", "\\u200e\\u200f\\u061c\\u2028\\u2029"},
            {"\u00ad\u200b\u200c\u2060\ufeff", "\\u00ad\\u200b\\u200c\\u2060\\ufeff"},
            {"\ufe0f\U000e0041", "\\ufe0f\\ue0041"},
-           // Bytes that are not UTF-8: foreign, truncated, overlong, half a pair, too large.
+           // Not UTF-8: bytes that never occur, a truncated and an overlong character, half a
+           // surrogate pair, a code point beyond U+10FFFF.
            {"a\xff\xfe", "a\\xff\\xfe"},
            {"\xe2\x80", "\\xe2\\x80"},
            {"\xc0\x9b", "\\xc0\\x9b"},

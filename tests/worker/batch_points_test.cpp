@@ -58,14 +58,14 @@ std::vector<protocol::PointResult> solved(const Batch& batch) {
   return solved(batch, falls);
 }
 
-/// The encoded outputs of a result without `wall_s`.
+/// Returns the encoded outputs of a result. `wall_s`, which differs in every run, is set to 0.
 std::string bits_of(const protocol::PointResult& result) {
   auto outputs = protocol::from_message(result);
   outputs.solver.wall_s = 0.0;
   return protocol::to_message(0, outputs).SerializeAsString();
 }
 
-/// Adds a model axis to the only block, after its other model axes and before H, mu and e.
+/// Adds a model axis to the only block, after other model axes and before H, mu and e.
 void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector<double>& values) {
   protocol::Block& block = *recipe.mutable_blocks(0);
   protocol::Axis& axis = *block.add_axes();
@@ -79,7 +79,7 @@ void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector
   }
 }
 
-/// `points` points for each pair of E and k, on a coarse mesh.
+/// Returns a recipe with `points` points for each pair of E and k, on a coarse mesh.
 protocol::Recipe recipe_with_models(std::uint64_t points, const std::vector<double>& E_Pa,
                                     const std::vector<double>& k_N_m) {
   protocol::Recipe recipe = recipe_with_points(points);
@@ -91,7 +91,7 @@ protocol::Recipe recipe_with_models(std::uint64_t points, const std::vector<doub
   return recipe;
 }
 
-/// Solves falls and counts them.
+/// Solves falls and records their models.
 struct CountedFalls {
   solver::FallCache::Solve solve = [this](std::span<const solver::ModelParameters> models) {
     const std::lock_guard lock(mutex);
@@ -216,7 +216,7 @@ TEST(PointsOfABatch, AFailingFallIsSolvedOnceAndFailsOnlyThePointsOfItsModels) {
   model.elements_per_link = 1;
   model.integrator = solver::Integrator::kGeneralizedAlpha;
   *recipe.mutable_model() = protocol::to_message(model);
-  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // with 0.025 s Newton's method fails
+  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails with 0.025 s
   const Batch batch = batch_of(recipe);
   CountedFalls falls;
   solver::FallCache cache({}, falls.solve);
@@ -233,7 +233,7 @@ TEST(PointsOfABatch, AFailingFallIsSolvedOnceAndFailsOnlyThePointsOfItsModels) {
 
 TEST(PointsOfABatch, EstimatedErrorsAreAddedIfTheStudyWantsThemAndChangeNothingElse) {
   protocol::Recipe recipe = recipe_with_models(3, {7e10, 6e10}, {2.7e7, 1e7});
-  recipe.mutable_model()->set_elements_per_link(2);  // one element has no coarser mesh
+  recipe.mutable_model()->set_elements_per_link(2);  // a mesh of one element has no coarser mesh
   const auto without = solved(batch_of(recipe));
   recipe.set_errors(true);
   const auto with = solved(batch_of(recipe));
@@ -248,7 +248,7 @@ TEST(PointsOfABatch, EstimatedErrorsAreAddedIfTheStudyWantsThemAndChangeNothingE
   }
 }
 
-/// The order of a trace of a point.
+/// Returns the server's order to trace a point.
 protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
   const protocol::Point point = batch.points().point(number);
   protocol::TraceOrder order;
@@ -260,15 +260,15 @@ protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
   return order;
 }
 
-/// Solves a batch of `points` points of each of two models, then traces its first and last point.
-/// The results of both must be equal bit for bit.
+/// Solves a batch with `points` points of each of two models, then traces the first and the last
+/// point. A trace must give the same bits as the batch.
 void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, bool errors,
                              bool shape) {
   solver::ModelParameters model = solver::preset("paper");
   model.integrator = integrator;
   model.elements_per_link = 2;
   if (integrator == solver::Integrator::kGeneralizedAlpha) {
-    model.dt_fall_s = 1e-3;  // longer than the chosen step, to save time
+    model.dt_fall_s = 1e-3;  // longer than the default, to save time
   }
   protocol::Recipe recipe = recipe_with_points(points);
   *recipe.mutable_model() = protocol::to_message(model);

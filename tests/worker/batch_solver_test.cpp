@@ -21,13 +21,13 @@
 namespace oblique::worker {
 namespace {
 
-/// A batch of a study without filter.
+/// Returns a batch of a study without a filter.
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
             std::uint64_t study_id = 7) {
   return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000)};
 }
 
-/// A batch of a study of a thousand points with mu from 0 to 999.
+/// Returns a batch of a study with a filter and a thousand points, with mu from 0 to 999.
 Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string& where) {
   const auto points = std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
       {protocol::filtered({protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 999.0, 1000),
@@ -36,10 +36,10 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
   return {1, 7, ranges, points};
 }
 
-/// Lets the test decide when each point ends.
+/// Holds each point in the solver until the test lets it end.
 class Gate {
  public:
-  /// Called by the solver: counts a begun point and waits until it may end.
+  /// Counts a point as begun and waits until it may end. The solver calls this.
   void pass() {
     std::unique_lock lock(mutex_);
     ++begun_;
@@ -68,7 +68,7 @@ class Gate {
   int open_ = 0;
 };
 
-/// Fails all points of a source; calls `before` before each.
+/// Reports all points of a source as failed. Calls `before` before each report.
 void fail_all(
     solver::PointSource& points, const solver::TakeOutcome& take,
     const std::function<void()>& before = [] {}) {
@@ -78,7 +78,7 @@ void fail_all(
   }
 }
 
-/// A batch solver whose points end when the test opens the gate.
+/// Provides a batch solver whose points end when the test opens the gate.
 class BatchSolverTest : public ::testing::Test {
  protected:
   void TearDown() override { gate_.open(1'000'000); }
@@ -276,7 +276,7 @@ TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolve
       [&](const Batch& at_hand, auto& points, const auto& take) {
         if (at_hand.number() == 1 && ++taken_up > 2) {
           ADD_FAILURE() << "a dropped batch was started";
-          std::abort();  // otherwise the test would not end
+          std::abort();  // otherwise the test would never end
         }
         fail_all(points, take, [&] {
           if (at_hand.number() == 1) {
@@ -290,9 +290,9 @@ TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolve
       },
       [] {}, 2);
   shared.add(batch(1, 0, 6));
-  dropped_batch.wait_begun(2);  // both threads solve it
+  dropped_batch.wait_begun(2);  // both threads solve the first batch
   shared.drop_batch(1);
-  dropped_batch.open(1);  // one of them becomes free
+  dropped_batch.open(1);  // lets one thread end its point
   shared.add(batch(2, 0, 1));
   next_is_solved.wait(false);
   dropped_batch.open(1000);

@@ -16,7 +16,7 @@
 
 namespace oblique::worker {
 
-/// A recipe of `points` points of one model.
+/// Returns a recipe with `points` points of one model.
 inline protocol::Recipe recipe_with_points(std::uint64_t points) {
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
@@ -89,7 +89,7 @@ inline protocol::ServerToWorker heartbeat_reply_message() {
   return message;
 }
 
-/// A worker's conversation whose time and messages the test controls. Keeps the last effects.
+/// A worker's conversation with time and messages from the test. Keeps the last event's effects.
 class ConversationTest : public ::testing::Test {
  protected:
   void start() { take(conversation_->start(now_ms_)); }
@@ -98,21 +98,21 @@ class ConversationTest : public ::testing::Test {
     take(conversation_->on_message(message, now_ms_));
   }
 
-  /// Starts, is welcomed, and receives study 7 of 100 points.
+  /// Starts the conversation and receives a welcome and study 7, which has 100 points.
   void join() {
     start();
     receive(welcome_message());
     receive(study_message(7));
   }
 
-  /// The same with these settings, and receives lease 31 of points 0 to 9 of that study.
+  /// Like `join`, but with these settings. Also receives lease 31 of points 0 to 9.
   void join_with_batch(const ConversationSettings& settings = {}) {
     use(settings);
     join();
     receive(batch_message(7, 31));
   }
 
-  /// The server requests a hello and welcomes the worker again.
+  /// Lets the server request a new hello and welcome the worker again.
   void rejoin(const std::string& database_id = "db") {
     receive(hello_again_message());
     receive(welcome_message(database_id));
@@ -153,7 +153,7 @@ class ConversationTest : public ::testing::Test {
     return !effects_of<Kind>().empty();
   }
 
-  /// Messages of one kind among the last effects.
+  /// Returns the messages of one kind among the last effects.
   std::vector<protocol::WorkerMessage> sent(protocol::WorkerMessage::KindCase kind) const {
     std::vector<protocol::WorkerMessage> found;
     for (const Send& send : effects_of<Send>()) {
@@ -172,7 +172,7 @@ class ConversationTest : public ::testing::Test {
     return found;
   }
 
-  /// Credit in the last effects; 0 if none.
+  /// Returns the number of batches that the last effects request.
   std::uint32_t credit_given() const {
     std::uint32_t batches = 0;
     for (const auto& message : sent(protocol::WorkerMessage::kCredit)) {
@@ -181,7 +181,7 @@ class ConversationTest : public ::testing::Test {
     return batches;
   }
 
-  /// Nothing before the conversation has ended.
+  /// Returns nothing until the conversation has ended.
   std::optional<int> exit_code() const {
     return finish() ? std::optional(finish()->exit_code) : std::nullopt;
   }
@@ -191,7 +191,7 @@ class ConversationTest : public ::testing::Test {
     return all.empty() ? std::nullopt : std::optional(all.front());
   }
 
-  /// Replaces the conversation by one with other settings.
+  /// Replaces the conversation by one with these settings.
   void use(const ConversationSettings& settings) { conversation_.emplace(hello(), settings); }
 
   static protocol::WorkerHello hello() {

@@ -160,7 +160,7 @@ TEST_F(ConversationTest, SolvedPointsOfADroppedBatchAreSentWithoutALease) {
   join_with_batch();
   rejoin();
   receive(study_message(7));
-  receive(batch_message(7, 31));  // a restarted server reuses the lease number
+  receive(batch_message(7, 31));  // a restarted server uses lease number 31 again
   solve(1, 0, 3, false);
   ASSERT_EQ(sent_results().size(), 1U);
   EXPECT_EQ(sent_results()[0].lease_id(), 0U);
@@ -293,7 +293,7 @@ TEST_F(ConversationTest, TracesOfAnEarlierSessionAreForgotten) {
 
 TEST_F(ConversationTest, AStoppingWorkerDeclinesTraces) {
   join_with_batch();
-  solve(1, 0, 1, false);  // it waits until this is stored
+  solve(1, 0, 1, false);  // the worker waits until this result is stored
   stop();
   EXPECT_TRUE(has<DropAll>());
   receive(trace_order(5));

@@ -19,15 +19,15 @@ namespace {
 
 using protocol::WorkerMessage;
 
-/// A welcome with which the worker tolerates a slow server.
+/// Returns a welcome after which the worker waits for a slow server.
 protocol::ServerToWorker patient_welcome() {
   protocol::ServerToWorker welcome = welcome_message();
   welcome.mutable_welcome()->set_lost_after_ms(600'000);
   return welcome;
 }
 
-/// The server's side of the socket, controlled by the test. Waiting for a message that never
-/// arrives is an error after ten minutes.
+/// The server's side of the socket, controlled by the test. Waiting for a message fails after ten
+/// minutes.
 class ScriptedServer {
  public:
   explicit ScriptedServer(const std::string& endpoint = "tcp://127.0.0.1:*")
@@ -40,7 +40,7 @@ class ScriptedServer {
 
   std::string endpoint() const { return socket_.get(zmq::sockopt::last_endpoint); }
 
-  /// Returns the next message of that kind; skips others.
+  /// Waits for a message of this kind and returns it. Discards other messages.
   WorkerMessage wait_for(WorkerMessage::KindCase kind) {
     while (true) {
       zmq::message_t identity;
@@ -59,7 +59,7 @@ class ScriptedServer {
     }
   }
 
-  /// Sends to the worker of the last received message.
+  /// Sends a message to the worker from which the last message came.
   void send(const protocol::ServerToWorker& message) { send_frame(protocol::encode(message)); }
   void send_frame(const std::string& frame) {
     socket_.send(zmq::buffer(worker_), zmq::send_flags::sndmore);
@@ -83,7 +83,7 @@ class ScriptedServer {
   std::string worker_;
 };
 
-/// A session on its own thread.
+/// Runs a session on a thread of its own.
 class RunningWorker {
  public:
   explicit RunningWorker(const std::string& server, BatchSolver::SolvePoints solve)

@@ -32,7 +32,7 @@ protocol::TraceOrder order(std::uint64_t id, std::uint64_t every = 1) {
   return order;
 }
 
-/// Answers with 5 rows; while held it waits first.
+/// Solves each trace with 5 rows. After `hold`, waits for `release` first.
 class Solving {
  public:
   TraceSolver::Solve solve() {
@@ -64,8 +64,9 @@ protocol::Trace answer_of(TraceSolver& solver) {
   }
 }
 
-/// Adds a fall of 3 rows and a contact of `instants` rows, whose second third is restitution, to
-/// TraceRows limited to `most_rows` rows. Fills `trace` and returns the times of its rows.
+/// Adds a fall of 3 rows and a contact of `instants` rows to TraceRows, which keep at most
+/// `most_rows` rows. The second third of the contact is restitution. Fills `trace` and returns the
+/// times of its rows.
 std::vector<double> times_of(std::uint64_t every, int instants, std::size_t most_rows,
                              protocol::Trace& trace) {
   trace.Clear();
@@ -111,8 +112,8 @@ TEST(TraceRowsTest, TooManyAreRefusedWithAKThatFits) {
 
 TEST(TraceRowsTest, IfNoKFitsTheAnswerIsOneBeyondAllInstants) {
   protocol::Trace trace;
-  EXPECT_TRUE(times_of(1, 100, 5, trace)
-                  .empty());  // even the fall, the ends of phases and the last row are too many
+  // The fall, the ends of phases and the last row alone exceed 5 rows.
+  EXPECT_TRUE(times_of(1, 100, 5, trace).empty());
   EXPECT_EQ(trace.every(), trace.instants() + 1);
 }
 

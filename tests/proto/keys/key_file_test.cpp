@@ -152,8 +152,8 @@ TEST_F(KeyFileTest, ErrorsHaveFileLineAndKeyAndNoSecret) {
               AllOf(HasSubstr("none.key"), HasSubstr("No such file")));
 }
 
-/// A key file written by another process, so that this one has no other copy of the secret in
-/// memory.
+/// Writes a key file in a child process, so that a reader has the only copy of the secret in
+/// memory. Returns `path`.
 std::string file_of_another_process(const std::string& path) {
   const pid_t writer = fork();
   if (writer == 0) {
@@ -191,8 +191,9 @@ TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   expect_no_copy_in_a_core_dump(made.pair.secret_key);
   const KeyFile key = read_key_file(file_of_another_process(folder_.file("worker.key")));
   expect_no_copy_in_a_core_dump(key.pair.secret_key);
-  // Nor as text, whose end freed memory would keep. The searched bytes themselves are not dumped
-  // either.
+  // A core dump must not contain the secret as text either. The test searches for the end of the
+  // text, because freeing memory overwrites its beginning. The searched bytes themselves are in
+  // memory that core dumps leave out.
   constexpr std::size_t kEnd = 24;
   SecretKey end;
   std::string text = z85(key.pair.secret_key.bytes());

@@ -45,7 +45,7 @@ class ConfigurationTest : public testing::Test {
     variables_.push_back(name);
   }
 
-  /// Parses; error output goes to `errors_`, settings to `options_` and `printed_`.
+  /// Parses `words`. Stores error output in `errors_`, settings in `options_` and `printed_`.
   std::optional<int> parse(std::vector<std::string> words) {
     options_ = Options();
     CLI::App app("A program under test", "program");

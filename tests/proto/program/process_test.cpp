@@ -22,7 +22,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Plays the service manager: receives datagrams on its socket.
+/// Takes the role of the service manager: receives the program's datagrams on a socket.
 class NotifierTest : public testing::Test {
  protected:
   NotifierTest() {
@@ -89,7 +89,7 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
   EXPECT_TRUE(received().empty());
 }
 
-/// Returns what `stop_with_parent` returns in a child process, and whether the child gets SIGTERM
+/// Returns the result of `stop_with_parent` in a child process, and whether the child gets SIGTERM
 /// when its parent ends.
 std::pair<bool, bool> stops_with(pid_t parent) {
   const pid_t child = fork();
@@ -135,7 +135,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
 TEST(StopSignals, ItsEndRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
-    raise(SIGTERM);  // would end this process below if it stayed pending
+    raise(SIGTERM);  // a pending SIGTERM would end this process below
   }
   sigset_t blocked;
   ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);

@@ -28,7 +28,7 @@ TEST(AxisTest, ARangeHasExactEndsAndRisesBetweenThem) {
   }
 }
 
-// Tests 1,000 grids that start between 0 and 5, or at 1e7, with steps of up to 50 units of their
+// Tests 1,000 grids that start between 0 and 5, or at 1e7. Their steps are up to 50 units of the
 // last decimal.
 TEST(AxisTest, EveryValueOfADecimalGridEqualsTheTypedNumber) {
   std::mt19937 random(1);
@@ -216,7 +216,7 @@ std::vector<std::uint64_t> left_in(const PointTable& table) {
   return points;
 }
 
-/// mu = 0, 0.1, ..., 1 for each of two e.
+/// Returns a block with mu = 0, 0.1, ..., 1 for each of two values of e.
 Block grid(const std::string& where) {
   return filtered({listed("H", {0.5}), range("mu", 0.0, 1.0, 11), listed("e", {0.5, 1.0})}, where);
 }

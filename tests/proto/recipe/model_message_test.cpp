@@ -29,8 +29,8 @@ TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedUnlessReadUnchecked) {
   EXPECT_THROW(from_message_unchecked(message), solver::InputError) << "no model could hold it";
 }
 
-// Databases and names of studies contain these texts. A changed text needs another version in its
-// first word, and another schema.
+// Databases store these texts. A changed text needs a new version in its first word and a new
+// schema number.
 TEST(Canonical, TheTextOfAModelNeverChanges) {
   EXPECT_EQ(canonical_model(solver::preset("paper")),
             "oblique-model-1 lengths=0.4,0.4,0.4 E=7e+10 A=0.0005309 I=2.243e-08 rho=2700 g=9.81 "

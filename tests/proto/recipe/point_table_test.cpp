@@ -15,7 +15,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// A study with every feature: several blocks, listed and ranged axes, model axes in two blocks.
+/// Returns a study with several blocks, listed and ranged axes, and model axes in two blocks.
 Recipe varied_recipe() {
   Recipe recipe = recipe_of({
       {listed("H", {0.96, 1.0, 1.04}), listed("mu", {0.4, 0.8}), range("e", 0.5, 1.0, 6)},
@@ -35,7 +35,7 @@ struct ExpectedPoint {
   double e_star;
 };
 
-/// Enumerates the points of a block by nested loops over its axes, the first outermost.
+/// Appends a block's points to `points` by nested loops over its axes, the first axis outermost.
 void enumerate(const Block& block, int depth, ExpectedPoint current,
                std::vector<ExpectedPoint>& points) {
   if (depth == block.axes_size()) {
@@ -266,7 +266,7 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
   EXPECT_THAT(size.examples, Each(AllOf(Ge(15U), Le(20U))));
 }
 
-// 0.02 is four standard deviations of a share of a third in 10^4 points.
+// A third of 10^4 examined points pass; 0.02 is four standard deviations of that share.
 TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
   const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
   const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");
@@ -279,7 +279,7 @@ TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
   EXPECT_EQ(counted.points, 1'001U);
 }
 
-// 400 is more than four standard deviations of the estimate.
+// The tolerance of 400 is more than four standard deviations of the estimate.
 TEST(StudySize, EstimatesTheFallsFromTenThousandPointsAboveThatNumber) {
   const auto shared = size_of_blocks(
       {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});

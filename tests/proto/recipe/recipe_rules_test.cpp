@@ -1,4 +1,4 @@
-// Rules of recipes, and the messages for violations.
+// Tests of the rules for recipes, and of the messages when a rule is broken.
 #include <limits>
 #include <string>
 #include <vector>
@@ -36,7 +36,7 @@ const Axis kH = listed("H", {0.5});
 const Axis kMu = listed("mu", {0.4});
 const Axis kE = listed("e", {1.0});
 
-/// A product block with this axis of mu, and one with a further model key.
+/// Return a block with the given axis of mu, and one with an additional axis for a model parameter.
 Block of_mu(const Axis& mu) {
   return filtered({listed("H", {1.0}), mu, kE}, "");
 }
@@ -74,7 +74,7 @@ Axis with_value(Axis axis, double value) {
 struct Refused {
   Block block;
   std::string key = {};   ///< key of the error
-  std::string says = {};  ///< part of the message; empty: the block is allowed
+  std::string says = {};  ///< part of the message; empty if the block is allowed
 };
 
 void expect_refusals(const std::vector<Refused>& blocks) {
@@ -204,7 +204,7 @@ TEST(RecipeRules, AStudyHasABoundedNumberOfExpressionsBlocksAndPoints) {
   EXPECT_THAT(refusal(recipe_of_blocks(std::vector<Block>(kMaxBlocks + 1, of_mu(kMu)))),
               HasSubstr("10001 blocks, more than 10000"));
   const std::uint64_t huge = std::numeric_limits<std::uint64_t>::max();
-  const std::uint64_t half = std::uint64_t{1} << 32U;  // half * half would overflow to 0
+  const std::uint64_t half = std::uint64_t{1} << 32U;  // half * half overflows to 0
   const Block most =
       filtered({kH, range("mu", 0, 1, 1'000'000), range("e", 0.5, 1, 1'000'000)}, "");
   EXPECT_EQ(refusal(most), "");

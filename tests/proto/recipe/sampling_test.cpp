@@ -1,4 +1,4 @@
-// Sample points in the unit cube, and quantiles of distributions.
+// Tests of sample points in the unit cube, and of quantiles of distributions.
 #include "proto/recipe/sampling.h"
 
 #include <algorithm>
@@ -27,8 +27,8 @@ using protocol::SAMPLE_SOBOL;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Digest of points in all dimensions; each coordinate times 2^64 in eight bytes, least significant
-/// first.
+/// Returns a digest of the coordinates of points in all dimensions. Each coordinate times 2^64 is
+/// eight bytes, least significant byte first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   std::string bytes;
   for (std::uint64_t index = first; index < first + count; ++index) {
@@ -42,8 +42,8 @@ std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   return protocol::sha256_of(bytes);
 }
 
-// Digests of boost::random::sobol(32) of Boost 1.74, which leaves out the origin, so its point i is
-// our i + 1. The later points follow `seed(2^40 - 17)`.
+// Digests of the points of boost::random::sobol(32), Boost 1.74. Boost leaves out the origin, so
+// its point i is our point i + 1. The later points follow `seed(2^40 - 17)`.
 TEST(SobolTest, AllDimensionsEqualThoseOfBoost) {
   EXPECT_EQ(digest_of_points(1, 4096),
             "9ec19155dfd8ef8b7ce1b7bd2e7c349bf4734b172ed36d96519d9b3f7f30f0dc");
@@ -52,8 +52,8 @@ TEST(SobolTest, AllDimensionsEqualThoseOfBoost) {
   EXPECT_THROW(sobol_bits(3, kSobolDimensions), std::out_of_range);
 }
 
-// Scrambling is nested: digit k of the result depends only on the digits up to k. So two values
-// have equally many common leading digits before and after.
+// Scrambling is nested: digit k of the result depends only on digits 1 to k of the value. So it
+// does not change the number of leading digits that two values have in common.
 TEST(OwenScramblingTest, ScramblingKeepsTheNumberOfCommonLeadingDigits) {
   for (int shared = 0; shared < kSobolBits; ++shared) {
     const std::uint64_t value = 0x9e3779b97f4a7 ^ (std::uint64_t{1} << shared);
@@ -104,7 +104,7 @@ TEST(SampleTest, RandomAndSobolPointsKeepTheirValuesWhenTheCountGrowsUnlikeLatin
   }
 }
 
-// Stored studies contain these points.
+// Stored studies rely on these points, so they must not change.
 TEST(SampleTest, ValuesAreThoseOfTheFirstVersion) {
   for (const auto& [kind, of_first, of_last] :
        {std::tuple{SAMPLE_RANDOM, 0.73936814972315379, 0.22969086515040626},
@@ -133,8 +133,8 @@ Quantiles normal(double mean, double sd, double from, double to) {
   return of_kind(protocol::DISTRIBUTION_NORMAL, from, to, mean, sd);
 }
 
-/// Mean of `of` at the midpoints of `n` equal parts: approximately the integral over the
-/// distribution.
+/// Returns the mean of `of` over kParts quantiles of equal probability, which approximates its
+/// expected value.
 double mean_of(const Quantiles& distribution, const std::function<double(double)>& of) {
   constexpr int kParts = 100'000;
   double sum = 0.0;
@@ -153,8 +153,8 @@ double variance(const Quantiles& distribution) {
   return mean_of(distribution, [&](double x) { return (x - center) * (x - center); });
 }
 
-// Values from M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, table 26.5, and
-// from 1e-10 on the check values of AS 241.
+// The values are from M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, table
+// 26.5. The values from 1e-10 on are the check values of AS 241.
 TEST(NormalTest, QuantilesAreThoseOfTheTables) {
   EXPECT_NEAR(normal_quantile(0.5), 0.0, 1e-17);
   EXPECT_NEAR(normal_quantile(0.25), -0.6744897501960817, 1e-15);
@@ -163,7 +163,7 @@ TEST(NormalTest, QuantilesAreThoseOfTheTables) {
   EXPECT_NEAR(normal_quantile(1e-20), -9.262340089798408, 1e-14);
 }
 
-// A relative error of 1e-16 in z gives one of z^2 times 1e-16 in p.
+// A relative error of 1e-16 in z causes a relative error of z^2 times 1e-16 in p.
 TEST(NormalTest, QuantileAndProbabilityAreInverse) {
   for (double p = 1e-300; p < 0.5; p *= 1.7) {
     const double z = normal_quantile(p);
@@ -171,8 +171,9 @@ TEST(NormalTest, QuantileAndProbabilityAreInverse) {
   }
 }
 
-// Mean and variance of a normal distribution truncated at a and b, in units of sd from the mean:
-// with Z = Phi(b) - Phi(a), (phi(a) - phi(b))/Z and 1 + (a phi(a) - b phi(b))/Z - mean^2.
+// A normal distribution truncated at a and b, in units of sd from the mean, has
+//   mean = (phi(a) - phi(b))/Z and variance = 1 + (a phi(a) - b phi(b))/Z - mean^2
+// with Z = Phi(b) - Phi(a).
 TEST(DistributionTest, ATruncatedNormalHasTheTheoreticalMoments) {
   const auto phi = [](double z) {
     return std::isinf(z) ? 0.0 : std::exp(-z * z / 2.0) / std::sqrt(2.0 * std::acos(-1.0));
@@ -208,7 +209,7 @@ TEST(DistributionTest, ValuesRiseWithTheFractionAndStayBetweenTheEnds) {
   EXPECT_FALSE(std::isnormal(normal(0.0, 1.0, 38.0, 39.0).part_left()));
 }
 
-// Stored studies contain these values, up to the last bits of <cmath>.
+// Stored studies rely on these values, up to the last bits of <cmath>.
 TEST(DistributionTest, ValuesAreThoseOfTheFirstVersion) {
   EXPECT_DOUBLE_EQ(uniform(0.3, 1.1).value_at(0.123), 0.39839999999999998);
   EXPECT_DOUBLE_EQ(log_uniform(0.01, 2.0).value_at(0.123), 0.019187866556359772);

@@ -1,4 +1,4 @@
-// Chunks: writing and reading, and detection of inconsistent ones.
+// Tests of writing and reading chunks of rows, and of the detection of inconsistent chunks.
 #include <cmath>
 #include <limits>
 
@@ -65,7 +65,8 @@ TEST(Chunk, WithInconsistentCellsIsNotSound) {
   EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_cells()->pop_back(); }));
   EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_cells()->push_back('\0'); }));
   EXPECT_FALSE(broken([](QueryReply& chunk) { chunk.mutable_cells()->front() = '\x7'; }));
-  EXPECT_FALSE(broken([](QueryReply& chunk) {  // the length of the last text
+  // The length of the last text is too large.
+  EXPECT_FALSE(broken([](QueryReply& chunk) {
     chunk.mutable_cells()->replace(chunk.cells().size() - 4, 4, 4, '\xff');
   }));
   QueryReply endless;

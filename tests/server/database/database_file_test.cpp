@@ -22,7 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A database in a read-only folder: two rows in the file and, if it has a log, a third one there.
+/// Two databases in read-only folders. Both files have two rows; one folder has a third row in a
+/// log.
 class ReadOnlyFolderTest : public StoreFixture {
  protected:
   ReadOnlyFolderTest() {
@@ -47,8 +48,8 @@ class ReadOnlyFolderTest : public StoreFixture {
     return folder_.file(name + "/some % results?.db");
   }
 
-  /// Runs `what` in a child process as a user who can write only in `out`, because root could write
-  /// everywhere. The process ends with 0 if `what` returns true.
+  /// Runs `what` as a user who can write only in `out`, because root could write everywhere. Then
+  /// ends the process, with status 0 if `what` returned true.
   void as_stranger(const std::function<bool()>& what) const {
     constexpr uid_t kNoProcess = 65534;
     if (::geteuid() == 0 && (::setgid(kNoProcess) != 0 || ::setuid(kNoProcess) != 0)) {

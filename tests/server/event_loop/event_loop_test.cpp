@@ -1,4 +1,4 @@
-// The whole server in this process, on loopback sockets, with a simulated worker and client.
+// Runs the whole server in this process, on loopback sockets, with simulated workers and clients.
 #include "server/event_loop/event_loop.h"
 
 #include <atomic>
@@ -99,7 +99,8 @@ TEST_F(EventLoopTest, AStoppingServerNotifiesWorkersAndCommitsReceivedResults) {
   worker.send(heartbeat);
   bool received = false;
   bool stored = false;
-  while (!received) {  // its answer shows that the results before it have arrived
+  // The reply to the heartbeat shows that the results sent before it have arrived.
+  while (!received) {
     const auto message = worker.receive();
     received = message.has_heartbeat_reply();
     stored = stored || message.has_results_stored();
@@ -163,7 +164,7 @@ TEST_F(EventLoopTest, ALongRecipeIsStoredAndLeasedWithoutDelayingOthers) {
   EXPECT_TRUE(worker.receive().has_batch());
 }
 
-/// Compares bytes for hours without checking for an interrupt.
+/// SQLite compares bytes for hours in this query, without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 TEST_F(EventLoopTest, ALongQueryDelaysNothingElse) {
@@ -180,12 +181,14 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
   QueueSettings queue;
   queue.readers = 2;
   ClientHandlerSettings clients;
-  clients.still_working_every_ms = 1'000'000;  // no failed reply reveals that the client is gone
+  // Without periodic replies only the closed connection shows that the client is gone.
+  clients.still_working_every_ms = 1'000'000;
   RunningServer server(path_, queue, {}, clients);
   for (int i = 0; i < 2; ++i) {
     SimulatedClient client(server.client_endpoint());
     client.send(SimulatedClient::query_request(kDeaf));
-    EXPECT_TRUE(client.submit("a", 10).has_submit());  // so that the query has arrived
+    // The reply to this later request shows that the query has arrived.
+    EXPECT_TRUE(client.submit("a", 10).has_submit());
   }
   SimulatedClient client(server.client_endpoint());
   EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
@@ -219,11 +222,11 @@ TEST_F(EventLoopTest, StatusShowsWhichPeersAreAdmitted) {
   }
 }
 
-// ---- Malicious peers, by raw TCP ----------------------------------------------------------------
+// ---- Malicious peers on raw TCP connections -----------------------------------------------------
 
 constexpr std::size_t kMiB = std::size_t{1} << 20U;
 
-/// Memory of this process, including the server.
+/// Returns the resident memory of the test process, which includes the server.
 std::size_t resident_bytes() {
   std::ifstream statm("/proc/self/statm");
   std::size_t total_pages = 0;
@@ -232,11 +235,11 @@ std::size_t resident_bytes() {
   return resident_pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// Memory that a server may need in addition to that for peers; the address sanitizer adds a shadow
-/// byte for each eight.
+/// Returns the memory that `bytes` bytes of the server may take with a sanitizer. The address
+/// sanitizer adds only one byte per eight.
 constexpr std::size_t with_shadows(std::size_t bytes) {
 #if defined(__SANITIZE_THREAD__)
-  return 5 * bytes;  // the thread sanitizer needs four more per byte
+  return 5 * bytes;  // the thread sanitizer needs four more bytes per byte
 #else
   return bytes;
 #endif
@@ -285,7 +288,7 @@ TEST_F(EventLoopTest, AClientThatReadsNothingCannotExhaustMemory) {
   RawPeer silent(server.client_endpoint());
   silent.complete_handshake();
   const std::size_t before = resident_bytes();
-  // Their answers would have more than a gigabyte.
+  // The replies to all requests would have more than a gigabyte.
   const std::string requests = repeated(status_frame(), 1000);
   for (int i = 0; i < 50; ++i) {
     silent.flood(requests);

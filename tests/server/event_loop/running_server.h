@@ -33,7 +33,7 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// A server on ports chosen by the system; the destructor stops it.
+/// Runs a server on ports chosen by the system; the destructor stops it.
 class RunningServer {
  public:
   explicit RunningServer(const std::string& database, QueueSettings queue = {},
@@ -75,7 +75,7 @@ class RunningServer {
     settings.worker_port = "*";
     settings.client_port = "*";
     settings.service.solver_version = "1.0";
-    // Simulated workers send no heartbeats and may wait long on a busy machine.
+    // The server must not drop simulated workers, which send no heartbeats and may be slow.
     settings.service.scheduler.lost_after_ms = kLongestSilence_ms;
     settings.queries.reader_program = OBLIQUE_SERVER_PROGRAM;
     return settings;
@@ -90,7 +90,7 @@ class RunningServer {
   std::thread thread_;
 };
 
-/// A DEALER socket that sends and receives messages.
+/// Sends messages of type `Out` and receives messages of type `In` on a DEALER socket.
 template <typename Out, typename In>
 class Peer {
  public:
@@ -110,7 +110,7 @@ class Peer {
                    i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);
     }
   }
-  /// Waits until the server ends the connection; false after a timeout.
+  /// Waits until the server ends the connection; returns false after a timeout.
   bool is_cut_off() { return disconnections_.check_event(kLongest_ms); }
   In receive() {
     zmq::message_t frame;
@@ -159,10 +159,10 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
     message.mutable_credit()->set_batches(batches);
     send(message);
   }
-  /// Sets the points that it reports as failed.
+  /// Makes `solve` report these points as failed.
   void fail(std::set<std::uint64_t> points) { failing_ = std::move(points); }
-  /// Sends a result for each point of the batch, or reports it as left out. Returns the number of
-  /// left-out points.
+  /// Sends a result for each point of the batch, or reports the point as left out. Returns the
+  /// number of left-out points.
   std::uint64_t solve(const protocol::Batch& batch) {
     WorkerMessage message;
     auto& results = *message.mutable_results();
@@ -188,7 +188,7 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
     send(message);
     return points.size();
   }
-  /// Solves batches, one at a time, until `points` points are stored.
+  /// Solves batches, one at a time, until `points` points are acknowledged as stored.
   void work(std::uint64_t points) {
     std::uint64_t waiting = points;
     credit(1);
@@ -238,13 +238,13 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
     return request;
   }
   ClientReply query(const std::string& sql) { return ask(query_request(sql)); }
-  /// The rows of the first chunk.
+  /// Runs a query and returns the rows of the first chunk.
   protocol::Table rows(const std::string& sql) {
     protocol::Table table;
     protocol::append_rows(query(sql).query(), table);
     return table;
   }
-  /// Sends a query that takes minutes and waits until it runs.
+  /// Sends a query that takes minutes; returns when the server has started it.
   void start_query(const std::string& sql) {
     ClientRequest request = query_request(sql);
     request.set_request_id(++id_);

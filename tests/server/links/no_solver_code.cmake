@@ -1,4 +1,4 @@
-# Checks that neither the targets nor the symbols of a program belong to the solver, except model/.
+# Fails if a linked target or a symbol of a program belongs to the solver, except to its model/.
 #   cmake -DPROGRAM=oblique-server -DTARGETS=a,b,c -DSOLVER_ARCHIVES=x.a,y.a -DNM=nm -P no_solver_code.cmake
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" TARGETS "${TARGETS}")
@@ -10,8 +10,8 @@ foreach(target IN LISTS TARGETS)
   endif()
 endforeach()
 
-# functions_of(FILE KINDS VARIABLE): the mangled names of our functions that FILE defines. KINDS: T
-# for functions that only one file of an archive defines, t for those that a linker made local.
+# functions_of(FILE KINDS VARIABLE): stores the mangled names of the oblique functions that FILE
+# defines. KINDS are letters of nm: T for external linkage, t for functions made local by a linker.
 function(functions_of file kinds variable)
   execute_process(COMMAND ${NM} --defined-only ${file} OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
   if(failed)

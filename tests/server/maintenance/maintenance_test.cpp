@@ -1,4 +1,4 @@
-// Copies, salvage, checks, and changes of studies without a server.
+// Tests of copies, salvage, checks, and changes of studies without a server.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -37,19 +37,19 @@ using testing::SizeIs;
 
 constexpr std::int64_t kPageBytes = 8192;
 
-/// Makes a page unreadable.
+/// Overwrites a page with bytes that SQLite cannot read.
 void overwrite_page(const std::string& path, std::int64_t page) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   file.seekp((page - 1) * kPageBytes);
   file << std::string(kPageBytes, '\x5a');
 }
 
-/// A database with one study of ten points, five of them solved.
+/// Provides a database with one study of ten points, of which five are solved.
 class MaintenanceTest : public StoreFixture {
  protected:
   MaintenanceTest() { commit({study_, worker(1), solved(study_, numbers(0, 5))}); }
 
-  /// The root page of a table.
+  /// Returns the number of a table's root page.
   static std::int64_t page_of(const std::string& path, const std::string& table) {
     return std::stoll(
         rows(path, "SELECT rootpage FROM sqlite_schema WHERE name = '" + table + "'").at(0));
@@ -88,7 +88,7 @@ TEST_F(MaintenanceTest, OnlyOurDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) 
 
 class SalvageTest : public MaintenanceTest {
  protected:
-  /// Study, point and checksum of each row, in the order of the texts.
+  /// Returns "STUDY/POINT CHECKSUM" of each row, in ascending order.
   static std::vector<std::string> rows_of(const std::string& file) {
     return rows(file,
                 "SELECT printf('%02d/%06d %d', study_id, point, checksum) FROM results"
@@ -97,7 +97,7 @@ class SalvageTest : public MaintenanceTest {
 };
 
 TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) {
-  constexpr std::uint64_t kPoints = 1500;  // with more points the root of their tree splits
+  constexpr std::uint64_t kPoints = 1500;  // with more points, the root page of their B-tree splits
   const std::string whole = folder_.file("whole.db");
   const auto large = study_of(kPoints);
   Store(whole).commit(std::vector<Change>{large, worker(1), solved(large, numbers(0, kPoints)),
@@ -110,7 +110,7 @@ TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) 
   const struct {
     const char* what;
     std::function<void(const std::string&)> damage;
-    double least_share;  ///< least share of the rows. Inner pages of a tree come after its leaves.
+    double least_share;  ///< minimum share of saved rows
   } cases[] = {{"one page of rows",
                 [&](const auto& file) {
                   overwrite_page(file, static_cast<std::int64_t>(size) / 2 / kPageBytes + 1);
@@ -185,7 +185,7 @@ TEST_F(SalvageTest, ATableThatLostAColumnIsSavedWithoutItUnlessItsRowsNeedTheCol
 }
 
 TEST_F(SalvageTest, ReusedResultsAreCountedAgainAndPointsThatAFilterLeavesOutAreExaminedAgain) {
-  const auto filtered = filtered_table("mu < 0.4");  // points 0 to 3
+  const auto filtered = filtered_table("mu < 0.4");  // keeps points 0 to 3
   const auto outcome = std::make_shared<ReusedResults>();
   commit({study_of(filtered, 2, "b"), ReuseResults{2, filtered, 0, "0.1", outcome},
           AddResults{2, filtered, 1, "0.1", "avx2", 1, "now", {}, IntervalSet(4, 10)},
@@ -216,7 +216,7 @@ TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
 }
 
 TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheErrorHasTheRemedy) {
-  close();  // all rows are in the database file
+  close();  // moves all rows from the log to the database file
   overwrite_page(path_, page_of(path_, "studies"));
   EXPECT_FALSE(faults().empty());
   EXPECT_THROW(back_up(path_, copy_), StorageError);
@@ -294,7 +294,7 @@ TEST_F(MaintenanceTest, ADoneStudyWithRowsDeletedByHandIsSound) {
   EXPECT_THAT(diagnose(path_).remarks, Contains("study a is done: 7 of 10 points have a result"));
 }
 
-/// Three points, the last of them failed; their rows have no checksums.
+/// Provides a database with three completed points, the last failed. The rows have no checksums.
 class RowFaultsTest : public StoreFixture {
  protected:
   RowFaultsTest() {
@@ -389,7 +389,7 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   commit({solved(study_, numbers(5, 10))});
   close();
   EXPECT_TRUE(delete_study(path_, 1));
-  { const Store next(path_); }  // a start deletes orphaned rows
+  { const Store next(path_); }  // opening the database deletes orphaned rows
   for (const char* table :
        {"studies", "models", "workers", "results", "completed_ranges", "deletions"}) {
     EXPECT_EQ(number(std::string("SELECT count(*) FROM ") + table), 0) << table;
@@ -406,7 +406,7 @@ TEST_F(OfflineStudyTest, TheStoredRecipeCanBeReadWhileAServerWorks) {
 TEST_F(OfflineStudyTest, ATooLongRecipeIsNotParsed) {
   close();
   const std::string block =
-      study_.table->recipe().SerializeAsString();  // a longer recipe continues like this
+      study_.table->recipe().SerializeAsString();  // repetitions of it form a valid recipe
   std::string bytes;
   while (bytes.size() <= protocol::kMaxFrameBytes) {
     bytes += block;
@@ -431,7 +431,7 @@ TEST_F(OfflineStudyTest, RemainingRowsOfADeletedStudyAreNeitherFaultsNorMerged) 
   EXPECT_EQ(merged.results_added, 0U);
 }
 
-// ---- Files that another version of the program wrote --------------------------------------------
+// ---- Files written by another version of the program --------------------------------------------
 
 TEST_F(MaintenanceTest, AFileOfAnotherSchemaIsRefusedWithBothNumbersAndTheRemedy) {
   const std::vector<std::pair<std::string, std::function<void()>>> openers{

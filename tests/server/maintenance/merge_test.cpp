@@ -29,7 +29,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// Results of one study in one database.
+/// Results of one study, to be stored in a database.
 struct Part {
   std::string study = "a";
   Table table = table_of(10);
@@ -41,12 +41,12 @@ struct Part {
   double closure = 0.0;  ///< added to `closure` of each result
 };
 
-/// Makes databases and merges them into the one called `all`.
+/// Makes databases and merges them into the database `all`.
 class MergeTest : public StoreFixture {
  protected:
   std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
 
-  /// Makes a database with these studies and results, or adds them to it.
+  /// Adds these studies and results to a database, which it creates if it does not exist.
   void make(const std::string& name, const std::vector<Part>& parts) const {
     Store store(file(name));
     for (const Part& part : parts) {
@@ -100,7 +100,7 @@ class MergeTest : public StoreFixture {
     return texts(name, sql).at(0);
   }
 
-  /// The completed points of its studies.
+  /// Returns the ranges of completed points of all studies in a database, as "first+count,...".
   std::string ranges(const std::string& name) const {
     return text(name, "SELECT group_concat(first_point || '+' || points) FROM completed_ranges");
   }
@@ -233,8 +233,8 @@ TEST_F(MergeTest, TheSourceIsNotChangedAndItsStateIsCopied) {
             "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
-/// Makes each new connection kill the process when it updates a study, which happens after its last
-/// row.
+/// Makes the process kill itself when any new connection updates a study. A merge updates a study
+/// after the last row of the study.
 void kill_when_a_study_is_updated() {
   const auto watch = [](sqlite3* database) {
     sqlite3_update_hook(

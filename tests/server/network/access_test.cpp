@@ -1,4 +1,4 @@
-// Admission of peers, and the addresses of ports and peers.
+// Tests of the admission of peers, and of the addresses of ports and peers.
 #include "server/network/access.h"
 
 #include <cstdint>
@@ -79,7 +79,7 @@ class AccessControlTest : public testing::Test {
   }
   ~AccessControlTest() override { spdlog::set_default_logger(logger_); }
 
-  /// Log lines since the last call.
+  /// Returns the log lines since the last call.
   std::string take_log() {
     const std::string text = log_.str();
     log_.str("");
@@ -94,7 +94,7 @@ class AccessControlTest : public testing::Test {
   }
   AccessControl control() const { return AccessControl({"127.0.0.1", server_key_, false}); }
   bool refresh(AccessControl& control) { return control.refresh(now_ms_ += 500); }
-  /// The name of an admitted key, or the cause of its refusal.
+  /// Returns the name of the key if it is admitted, otherwise the cause of the refusal.
   static std::string result_of(const AccessControl& control, const protocol::CurveKey& key,
                                PortRole port = PortRole::kWorkers) {
     const AuthResult result = control.security(port)->authenticate(key);
@@ -203,7 +203,7 @@ TEST_F(AccessControlTest, WithoutProtectionAWarningIsLoggedEveryTenMinutes) {
 
 // ---- Addresses of both families -----------------------------------------------------------------
 
-/// An IPv6 address, or an IPv4 one mapped into IPv6.
+/// Returns an IPv6 address, or an IPv4 address mapped into IPv6.
 sockaddr_in6 system_address(const std::string& address, int port) {
   sockaddr_in6 v6{};
   EXPECT_EQ(inet_pton(AF_INET6, address.c_str(), &v6.sin6_addr), 1) << address;
@@ -216,7 +216,7 @@ PeerAddress peer_address(const std::string& address, int port = 1) {
   return PeerAddress(system_address(address, port));
 }
 
-/// Nothing if the machine has no IPv6.
+/// Listens on an address; returns nothing if the machine has no IPv6.
 std::optional<Listener> listening(const std::string& address) {
   try {
     return Listener(address, "*");

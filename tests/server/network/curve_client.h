@@ -15,7 +15,7 @@
 
 namespace oblique::server {
 
-/// Admits the keys added to it or to a copy of it.
+/// Admits listed keys. Copies share one list, so that a key added to one copy is admitted by all.
 class ListAuthenticator {
  public:
   void add(const protocol::CurveKey& key, const std::string& name) {
@@ -45,8 +45,8 @@ inline std::string curve_greeting() {
   return bytes.replace(12, 5, "CURVE");
 }
 
-/// The client's side of CURVE (rfc.zeromq.org 26). Tests change its fields to send what no library
-/// sends.
+/// Implements the client's side of CURVE (rfc.zeromq.org 26). Tests change its fields to send
+/// messages that no library sends.
 struct CurveClient {
   CurveClient(const protocol::KeyPair& own_keys, const protocol::CurveKey& servers_key)
       : own(own_keys), server(servers_key) {}
@@ -54,14 +54,14 @@ struct CurveClient {
   protocol::KeyPair own;
   protocol::CurveKey server;
   protocol::KeyPair short_term = protocol::generate_key_pair();  // C', c'
-  std::uint64_t nonce = 1;                                       // number of the next command
+  std::uint64_t nonce = 1;                                       // counter of the next command
   std::string properties = zmtp_properties("DEALER");
 
   // Set by WELCOME.
   protocol::CurveKey server_short_term{};  // S'
   std::string cookie;
 
-  // Replacements for a wrong vouch.
+  // Tests set these to forge a wrong vouch.
   std::optional<protocol::CurveKey> vouched_short_term = {};
   std::optional<protocol::CurveKey> vouched_server = {};
   std::optional<protocol::SecretKey> vouching_secret = {};
@@ -88,7 +88,7 @@ struct CurveClient {
     return text;
   }
 
-  /// The data of HELLO.
+  /// Returns the data of the command HELLO.
   std::string hello() {
     std::string data("\1\0", 2);
     data.append(72, '\0');
@@ -98,7 +98,7 @@ struct CurveClient {
     return data += box(std::string(64, '\0'), curve_nonce("CurveZMQHELLO---", number), server,
                        short_term.secret_key);
   }
-  /// Handles the data of WELCOME; false if it is not for this client.
+  /// Decrypts the data of WELCOME; returns false if it is not encrypted for this client.
   bool take_welcome(std::string_view data) {
     const auto text = opened(data.substr(16), curve_nonce("WELCOME-", data.substr(0, 16)), server,
                              short_term.secret_key);
@@ -109,7 +109,7 @@ struct CurveClient {
     cookie = text->substr(32);
     return true;
   }
-  /// The data of INITIATE.
+  /// Returns the data of the command INITIATE.
   std::string initiate() {
     const std::string vouch_nonce(16, 'v');
     std::string text = text_of_key(own.public_key) + vouch_nonce;
@@ -123,7 +123,7 @@ struct CurveClient {
            box(text, curve_nonce("CurveZMQINITIATE", number), server_short_term,
                short_term.secret_key);
   }
-  /// An encrypted frame with these flags inside: 1 more, 2 command.
+  /// Returns an encrypted message. Flags: 1 if more frames follow, 2 for a command.
   std::string sealed(std::string_view body, unsigned flags = 0) {
     const std::string number = next_number();
     const std::string text = static_cast<char>(flags) + std::string(body);
@@ -131,7 +131,7 @@ struct CurveClient {
                       box(text, curve_nonce("CurveZMQMESSAGEC", number), server_short_term,
                           short_term.secret_key));
   }
-  /// Flags and body of a MESSAGE of the server; nothing if it is not for this client.
+  /// Returns flags and body of a MESSAGE, or nothing if it is not encrypted for this client.
   std::optional<std::string> opened_message(std::string_view message) const {
     return opened(message.substr(16), curve_nonce("CurveZMQMESSAGES", message.substr(8, 8)),
                   server_short_term, short_term.secret_key);

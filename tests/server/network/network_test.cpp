@@ -1,4 +1,4 @@
-// The network and its limits: raw TCP connections with and without keys, and sockets of libzmq.
+// Tests of the network and its limits, with raw TCP connections and sockets of libzmq.
 #include "server/network/network.h"
 
 #include <algorithm>
@@ -31,7 +31,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A TCP connection with the client's side of CURVE.
+/// A TCP connection with an implementation of the client's side of CURVE.
 struct KeyedPeer {
   KeyedPeer(const std::string& endpoint, const CurveClient& keys, const char* source)
       : tcp(endpoint, source), curve(keys) {}
@@ -41,7 +41,7 @@ struct KeyedPeer {
   CurveClient curve;
 };
 
-/// A network with one port that needs keys and one that does not.
+/// Provides a network with two ports: one requires keys, the other accepts peers without keys.
 class NetworkTest : public testing::Test {
  protected:
   explicit NetworkTest(NetworkLimits limits = {}) : network_(limits) {
@@ -50,7 +50,7 @@ class NetworkTest : public testing::Test {
     authenticator_.add(worker_.public_key, "anna");
   }
 
-  /// Runs the network until `done`; fails the test after a timeout.
+  /// Runs the network until `done` returns true; fails the test after a timeout.
   template <typename Done>
   void run_until(const Done& done) {
     const auto give_up = std::chrono::steady_clock::now() + test::kHangLimit;
@@ -99,7 +99,7 @@ class NetworkTest : public testing::Test {
     std::ranges::generate(peers, [&] { return keyed_peer(worker_, server_.public_key, source); });
     return peers;
   }
-  /// Runs the network until the peer has received that many bytes, and returns them.
+  /// Runs the network until the peer has received at least `bytes` bytes. Returns all of them.
   std::string received_by(KeyedPeer& peer, std::size_t bytes) {
     std::string received;
     run_until([&] { return (received += peer.tcp.receive_available()).size() >= bytes; });
@@ -120,7 +120,7 @@ class NetworkTest : public testing::Test {
     static_cast<void>(received_by(*peer, 1));
     return peer;
   }
-  /// Takes a message of a peer without a key and returns the peer's identity.
+  /// Sends a message from a peer without a key. Returns the identity that the peer has got.
   std::string identity_of(RawPeer& peer) {
     peer.send(zmtp_frame("hello"));
     return next().identity;
@@ -152,7 +152,7 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   }
   EXPECT_EQ(next().body, "flood");
   RawPeer modest(network_.endpoint(open_));
-  // In one packet, so that everything has arrived when the server answers with READY.
+  // One packet holds everything, so both messages have arrived when the server answers with READY.
   modest.send(zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("first") + zmtp_frame("second"));
   std::size_t received = 0;
   run_until([&] {
@@ -201,7 +201,8 @@ TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndItIsReportedOnce) {
 
 TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   auto leaving = open_peer();
-  std::size_t received = 0;  // unread input would reset the connection and lose its output
+  // The peer reads all input, because closing a socket with unread input discards its output.
+  std::size_t received = 0;
   run_until([&] {
     received += leaving->receive_available().size();
     return received == kGreetingBytes + zmtp_ready("ROUTER").size();
@@ -334,7 +335,8 @@ TEST_F(TightNetworkTest, TheMostSilentConnectionMakesRoomUnlessAllAreActive) {
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> at_work;
-  for (int i = 0; i < 3; ++i) {  // one after another, because handshakes make room first
+  // Each peer completes its handshake first, because a new peer replaces unfinished handshakes.
+  for (int i = 0; i < 3; ++i) {
     at_work.push_back(open_peer());
     identity_of(*at_work.back());
   }
@@ -361,7 +363,7 @@ TEST_F(TightNetworkTest, NewHandshakesReplaceEachOtherAndNoAdmittedPeer) {
   EXPECT_EQ(network_.send(identity, "still there"), Delivery::kSent);
 }
 
-// ---- Peers with keys: those who are refused cost the others nothing -----------------------------
+// ---- Peers with keys: refused peers cost others nothing -----------------------------------------
 
 TEST_F(NetworkTest, RefusedHandshakesAreCountedAndLeaveNothingBehind) {
   constexpr std::size_t kPeers = 80;
@@ -417,7 +419,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   run_until([&] {
     while (const auto incoming = network_.next(keyed_, anybody)) {
       bodies.push_back(incoming->body);
-      EXPECT_TRUE(network_.has_more());  // most of the flood still waits
+      EXPECT_TRUE(network_.has_more());  // most messages of the flood still wait
     }
     return bodies.size() >= 2;
   });
@@ -499,7 +501,7 @@ TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
   crowd[0]->say_hello();
   take_welcome(*crowd[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  const auto silent = keyed_peers(1, kElsewhere);  // `second` made room for it
+  const auto silent = keyed_peers(1, kElsewhere);  // takes the place that `second` has left
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(crowd[0]->tcp.receive(), "") << "in the place of the oldest";
 }
@@ -514,7 +516,7 @@ TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
   for (auto& peer : peers) {
     peer = admitted();
   }
-  now_ms_ += 60'000;  // all have been silent for long
+  now_ms_ += 60'000;  // all peers have been silent for a minute
   RawPeer newcomer(network_.endpoint(keyed_));
   run_until([&] { return refused(RefusalCause::kBound) == 1; });
   EXPECT_EQ(newcomer.receive(), "");
@@ -522,7 +524,7 @@ TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
 }
 
 TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedWhateverItsStep) {
-  const auto peers = keyed_peers(2);  // one of them is silent
+  const auto peers = keyed_peers(2);  // the second peer stays silent
   peers[0]->say_hello();
   take_welcome(*peers[0]);
   now_ms_ += 1000;
@@ -555,7 +557,7 @@ struct Dealer {
     socket.connect(endpoint);
   }
   void send(const std::string& body) { socket.send(zmq::buffer(body), zmq::send_flags::dontwait); }
-  /// Kind and value of the next handshake failure.
+  /// Returns event and value of the next handshake failure that the monitor reports.
   std::optional<std::pair<int, int>> failure() {
     zmq::message_t event;
     while (monitor.recv(event, zmq::recv_flags::dontwait)) {
@@ -580,7 +582,7 @@ class LibzmqPeersTest : public NetworkTest {
   std::unique_ptr<Dealer> dealer(const protocol::KeyPair& own, const protocol::CurveKey& server) {
     return std::make_unique<Dealer>(context_, network_.endpoint(keyed_), &own, &server);
   }
-  /// Runs the network until the socket reports a failed handshake, and returns how.
+  /// Runs the network until the socket reports a failed handshake. Returns event and value.
   std::pair<int, int> failure_of(Dealer& dealer) {
     std::optional<std::pair<int, int>> failure;
     run_until([&] { return (failure = dealer.failure()).has_value(); });

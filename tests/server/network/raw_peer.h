@@ -18,7 +18,7 @@ inline std::string zmtp_greeting() {
   return bytes;
 }
 
-/// A message, or with `more` a part of one.
+/// Returns a frame with a whole message, or with a part of a message if `more` is true.
 inline std::string zmtp_frame(std::string_view body, bool more = false) {
   std::string bytes = message_header(body.size()).append(body);
   bytes[0] = static_cast<char>(static_cast<unsigned>(bytes[0]) | (more ? kFrameMore : 0U));
@@ -36,24 +36,24 @@ inline std::string zmtp_ping() {
   return command_frame("PING", std::string("\0\0context", 9));
 }
 
-/// A TCP connection to one of the ports.
+/// A TCP connection to a port of the server.
 class RawPeer : public test::RawTcp {
  public:
   using RawTcp::RawTcp;
 
   void complete_handshake() { send(zmtp_greeting() + zmtp_ready("DEALER")); }
-  /// Throws if the server has ended the connection.
+  /// Sends all bytes; throws if the server has ended the connection.
   void send(std::string_view bytes) {
     if (!send_all(bytes)) {
       throw std::runtime_error("the server takes no more");
     }
   }
-  /// Sends as much as fits; returns the number of bytes.
+  /// Sends as many bytes as the socket accepts without waiting; returns their number.
   std::size_t send_what_fits(std::string_view bytes) {
     const ssize_t sent = ::send(number(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return sent < 0 ? 0 : static_cast<std::size_t>(sent);
   }
-  /// Sends as much of `frames` as fits, and the rest with the next calls.
+  /// Sends as much of `frames` as the socket accepts. The next calls send the rest.
   void flood(const std::string& frames) {
     if (left_.empty()) {
       left_ = frames;
@@ -64,7 +64,7 @@ class RawPeer : public test::RawTcp {
   std::string receive_available() { return receive(MSG_DONTWAIT); }
 
  private:
-  std::string left_;  // rest of a flood
+  std::string left_;  // bytes that `flood` has not sent yet
 };
 
 }  // namespace oblique::server

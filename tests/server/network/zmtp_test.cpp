@@ -1,4 +1,4 @@
-// The protocol without keys, and with keys and a client that can send what no library sends.
+// Tests of ZMTP with and without keys. The client can also send messages that no library sends.
 #include "server/network/zmtp.h"
 
 #include <cstddef>
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// A connection whose handshake is done.
+/// Returns a connection after its handshake.
 Zmtp opened() {
   Zmtp zmtp;
   zmtp.receive(zmtp_greeting() + zmtp_ready("DEALER"));
@@ -94,9 +94,9 @@ std::string flipped(std::string bytes, std::size_t at) {
   return bytes;
 }
 
-/// Both sides of a connection.
+/// Client and server of one connection.
 struct Link {
-  /// Returns the server's answer to these bytes.
+  /// Passes bytes to the server and returns its answer.
   std::string send(std::string_view bytes) {
     zmtp.receive(bytes);
     while (zmtp.pending_step() != Zmtp::PendingStep::kNone) {
@@ -106,7 +106,7 @@ struct Link {
   }
   std::string hello_frame() { return command_frame("HELLO", client.hello()); }
   std::string initiate_frame() { return command_frame("INITIATE", client.initiate()); }
-  /// Expects that the server refuses these bytes, with that answer or without one.
+  /// Expects that the server refuses these bytes with `answer`, which may be empty.
   void expect_refused(std::string_view bytes, const std::string& answer = error_frame("500")) {
     EXPECT_EQ(send(bytes), answer);
     EXPECT_THAT(zmtp.fault(), Not(IsEmpty()));
@@ -122,13 +122,13 @@ class CurveTest : public testing::Test {
   CurveTest() { authenticator_.add(own_.public_key, "anna"); }
 
   CurveClient client() const { return {own_, server_.public_key}; }
-  /// The server's greeting has been read.
+  /// Returns a connection on which the client has received the server's greeting.
   Link greeted() const {
     Link link{Zmtp(&security_), client()};
     static_cast<void>(link.zmtp.take_answers());
     return link;
   }
-  /// The client has taken WELCOME.
+  /// Returns a connection on which the client has received WELCOME.
   Link welcomed(const CurveClient& client) const {
     Link link = greeted();
     link.client = client;
@@ -206,7 +206,7 @@ TEST_F(CurveTest, APeerThatDoesNotHoldItsKeyIsRefusedWhetherOrNotTheKeyIsListed)
 }
 
 TEST_F(CurveTest, KeysOfSmallOrderAreRefused) {
-  // Points of small order: the shared secret is always zero.
+  // With a public key of small order the shared secret is zero, whatever the other key.
   for (const std::uint8_t first : {std::uint8_t{0}, std::uint8_t{1}}) {
     Link link = greeted();
     link.client.short_term.public_key = {first};
@@ -287,7 +287,7 @@ TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNoPeer) {
   for (std::size_t at = 0; at < kGreetingBytes; ++at) {
     Link link = greeted();
     const std::string answers = link.send(flipped(curve_greeting(), at) + link.hello_frame());
-    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // some bytes are ignored
+    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // it ignores some bytes
     EXPECT_FALSE(link.zmtp.is_open()) << at;
   }
   const std::string hello = greeted().hello_frame();
@@ -346,11 +346,11 @@ TEST_F(CurveTest, CommandsOutOfOrderAreRefused) {
 
 TEST_F(CurveTest, CountersThatDoNotGrowEndTheConnection) {
   Link link = welcomed();
-  link.client.nonce = 1;  // the counter of HELLO
+  link.client.nonce = 1;  // HELLO used this counter
   link.expect_refused(link.initiate_frame());
 
   Link opened = open();
-  opened.client.nonce = 2;  // the counter of INITIATE
+  opened.client.nonce = 2;  // INITIATE used this counter
   opened.expect_refused(opened.client.sealed("with the counter of the handshake"), "");
 
   const auto ends_after_first_message = [&](const auto& second) {
@@ -429,11 +429,12 @@ TEST_F(CurveTest, AMessageWithAFlippedBitIsRefused) {
 
 TEST_F(CurveTest, MessagesOfTheServerHaveCountersThatGrow) {
   Link link = open();
-  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has the first counter
+  for (std::uint64_t counter = 2; counter < 6; ++counter) {  // READY has counter 1
     std::string_view body = "reply";
     const std::string frame = link.zmtp.begin_message(body);
     EXPECT_THAT(body, IsEmpty());
-    EXPECT_EQ(frame[0], 0);  // libzmq reads the outer bit as the inner one
+    // libzmq takes an outer flag "more" for the encrypted flag, so the outer flags must be 0.
+    EXPECT_EQ(frame[0], 0);
     EXPECT_EQ(link.client.opened_message(frame.substr(2)), std::string("\0reply", 6));
     EXPECT_EQ(number_of(std::string_view(frame).substr(10, 8)), counter);
   }
@@ -467,7 +468,7 @@ TEST_F(CurveTest, IncompleteOrPlainFramesEndTheConnection) {
     Link link = open();
     link.expect_refused(bytes_of(link.client), "");
   };
-  for (const unsigned flags : {1U, 2U, 3U, 4U, 0x80U}) {  // more, command, both, reserved
+  for (const unsigned flags : {1U, 2U, 3U, 4U, 0x80U}) {  // flags: more, command, both, reserved
     ends([flags](CurveClient& c) { return c.sealed("\x04PING\0\0", flags); });
   }
   ends([](CurveClient&) { return zmtp_frame("not encrypted"); });

@@ -1,5 +1,5 @@
-// Compares server/store/tables.md with the comments of the schema and the columns of `oblique
-// columns`.
+// Compares server/store/tables.md with its sources: the comments in the schema and the columns that
+// `oblique columns` prints.
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -18,7 +18,7 @@ namespace {
 
 using Comments = std::map<std::string, std::string>;
 
-/// The comment on each column of a table: beside it, or on the lines before it.
+/// Returns the comments of columns in CREATE TABLE: on the column's line or on the lines before it.
 Comments comments_of(const std::string& create) {
   static const std::regex kLine("[ \n]*(\\w*)[^\n]*?(?:-- ([^\n]*))?(?:\n|$)");
   Comments comments;
@@ -35,7 +35,7 @@ Comments comments_of(const std::string& create) {
   return comments;
 }
 
-/// Unit and meaning of the columns of the views of lists.
+/// Units and meanings of the columns of views that show the lists of a result.
 const Comments& list_columns() {
   static const Comments kColumns{
       {"seq",
@@ -55,7 +55,7 @@ class DocumentTest : public StoreFixture {
  protected:
   DocumentTest() { store(); }
 
-  /// For the table `results`, `comments` take precedence over `oblique columns`.
+  /// Returns the section on a table or view. `comments` take precedence over `oblique columns`.
   std::string table_text(const std::string& title, const Comments& comments, bool has_units) const {
     const std::string table = title.substr(0, title.find(' '));
     std::string text =
@@ -85,7 +85,7 @@ class DocumentTest : public StoreFixture {
   }
 };
 
-/// With OBLIQUE_WRITE_TABLES=1 in the environment it writes the document instead.
+/// With OBLIQUE_WRITE_TABLES=1 in the environment, this test writes the document instead.
 TEST_F(DocumentTest, EveryTableViewAndColumnIsDocumentedAsItsSourceDescribesIt) {
   std::string tables;
   Comments of_results;

@@ -28,8 +28,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-/// Study "a" has ten solved points with e = 1, H = 1 and mu from 0 to 1. Of the five points of
-/// "it's" 0, 1 and 2 are solved and 4 failed.
+/// Provides two studies. Study "a" has ten solved points with e = 1, H = 1 and mu from 0 to 1.
+/// Study "it's" has five points, of which 0, 1 and 2 are solved and 4 has failed.
 class PlanTest : public StoreFixture {
  protected:
   PlanTest() {
@@ -67,7 +67,7 @@ class PlanTest : public StoreFixture {
     return question;
   }
 
-  /// The first value of each row, as text; NULL as nothing.
+  /// Returns the first value of each row as text, and an empty text for NULL.
   std::vector<std::string> texts(const std::string& sql) const {
     auto values = rows(database_.get(), sql);
     for (std::string& value : values) {
@@ -78,7 +78,7 @@ class PlanTest : public StoreFixture {
   std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
     return texts(plan(database_.get(), asked).sql);
   }
-  /// SQLite's query plan for a question.
+  /// Returns the output of EXPLAIN QUERY PLAN for a study query.
   std::string steps_of(const protocol::StudyQuery& asked) const {
     return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
                                                                  plan(database_.get(), asked).sql),
@@ -94,7 +94,7 @@ class PlanTest : public StoreFixture {
   PlannedColumn column(const std::string& select) const {
     return plan(database_.get(), question(select)).columns.at(0);
   }
-  /// The error message; empty: the query is valid.
+  /// Returns the error message, which is empty if the query is valid.
   std::string error(const protocol::StudyQuery& asked) const {
     try {
       plan(database_.get(), asked);
@@ -142,7 +142,7 @@ TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
   EXPECT_EQ(columns.back().name, "phases[0].t1_s");
 }
 
-/// The axes among the usual columns.
+/// Returns the axes among the columns that a query shows by default.
 std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
   auto columns = usual_columns(recipe);
   columns.erase(std::find(columns.begin(), columns.end(), "status"), columns.end());
@@ -183,7 +183,7 @@ TEST_F(PlanTest, FunctionsAggregateTheNumbersOfRows) {
 }
 
 TEST_F(PlanTest, CorrIsPearsonsCorrelationOfRowsWithBothValues) {
-  // Of 0, 1, 2 with 0, 1, 4: covariance 2, variances 1 and 13/3.
+  // The values 0, 1, 2 and 0, 1, 4 have the covariance 2 and the variances 1 and 13/3.
   EXPECT_NEAR(number("corr(point, point * point)", "point < 3"), 2.0 / std::sqrt(13.0 / 3.0),
               1e-15);
   EXPECT_NEAR(number("corr(nullif(point, 9), nullif(point * point, 64))"),
@@ -208,7 +208,7 @@ TEST_F(PlanTest, ElementsEqualThoseOfTheListsInTheView) {
   const auto expect_same = [&](const std::string& written, const std::string& sql) {
     const auto shown = texts("SELECT " + sql + " FROM runs WHERE study = 'a' ORDER BY point");
     EXPECT_EQ(texts(question(written)), shown) << written;
-    // `links` is a column that only the view has.
+    // Only the view has the column `links`, so this query reads the view.
     EXPECT_EQ(texts(question(written + ", links")), shown) << written;
   };
   for (const auto& [list, members] : lists) {
@@ -382,20 +382,20 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
 }
 
 TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedOnes) {
-  // SQLite 3.40 reads a neighbouring double for each of these.
+  // SQLite 3.40 parses each of these texts as a neighbouring double.
   for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
     EXPECT_EQ(number(typed), std::stod(typed));
     EXPECT_EQ(number(std::string("DISTINCT ") + typed), std::stod(typed));
   }
   EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
   EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
-  // True for one row if both numbers are equal.
+  // The condition holds for one row if both numbers are equal.
   const std::string is_it = "point = 3 AND 0.1166477 = 1166477 / 1e7";
   EXPECT_EQ(number(question("count(*)", "", is_it)), 9.0);
   EXPECT_EQ(number(question("point", "", "", is_it + " DESC")), 3.0);
 }
 
-/// The error message for a text; empty: it is allowed.
+/// Returns the error message for a condition, which is empty if the condition is allowed.
 std::string objection(const std::string& text) {
   try {
     check_sql_part("--where", text);

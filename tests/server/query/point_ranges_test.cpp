@@ -1,4 +1,4 @@
-// Ranges of points from conditions, and whole plans compared with SQLite alone.
+// Tests the ranges of points that conditions give, and compares whole plans with plain SQLite.
 #include "server/query/plan.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using protocol::range;
 using protocol::Recipe;
 using Ranges = std::vector<PointRange>;
 
-/// Ten values each of H from 0.1, mu from 0.2 and e from 0.1.
+/// Returns a grid of ten values each of H from 0.1, mu from 0.2 and e from 0.1.
 Recipe cube() {
   return protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10), range("mu", 0.2, 2.0, 10), range("e", 0.1, 1.0, 10)}});
@@ -78,7 +78,7 @@ TEST(PointRanges, AreFewInHugeStudies) {
 
 // ---- Random studies and conditions --------------------------------------------------------------
 
-/// Random studies and conditions, equal on every machine.
+/// Draws random studies and conditions, which are the same on every machine.
 class Drawn {
  public:
   explicit Drawn(unsigned seed) : engine_(seed) {}
@@ -107,8 +107,8 @@ class Drawn {
     return recipe;
   }
 
-  /// A condition over columns with and without an axis, and values of axes and others. Most
-  /// conditions are conjunctions.
+  /// Returns a condition, mostly a conjunction. Its columns are axes or outputs, and its numbers
+  /// are values of axes or arbitrary.
   std::string condition(const Recipe& recipe, int depth = 0) {
     const std::size_t kind = depth == 0 && !once_in(4) ? 5 : below(depth < 3 ? 9 : 4);
     const auto inner = [&] { return condition(recipe, depth + 1); };
@@ -132,7 +132,7 @@ class Drawn {
   }
 
  private:
-  /// Makes the block a zip or sample, or adds an expression or filter, or changes nothing.
+  /// Makes the block a zip or a sample, or adds an expression or a filter, or leaves it as it is.
   void make_unusual(protocol::Block& block) {
     auto& e = *block.mutable_axes(block.axes_size() - 1);
     switch (below(6)) {
@@ -216,7 +216,7 @@ class Drawn {
   std::mt19937 engine_;
 };
 
-/// A study with that number; every fourth one has only some of its rows.
+/// Returns a study with results. Each fourth study lacks a third of its rows.
 std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
   const Table points = table(recipe);
   AddResults results{number, points, 0, "", "", 1, "now", {}};

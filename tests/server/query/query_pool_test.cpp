@@ -1,4 +1,4 @@
-// Queries in real reader processes, including statements that cannot be interrupted.
+// Tests queries in real reader processes, including statements that cannot be interrupted.
 #include "server/query/query_pool.h"
 
 #include <fcntl.h>
@@ -37,15 +37,15 @@ using Kind = QueryReport::Kind;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-/// Compares bytes for hours without checking for an interrupt.
+/// SQLite compares bytes for hours in this query, without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
-/// Some megabytes: more than is sent ahead.
+/// The result has some megabytes, more than a reader sends before the client takes chunks.
 constexpr const char* kLong =
     "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 60000) "
     "SELECT i, hex(zeroblob(50)) FROM n";
 
-/// A pool with a clock that only the tests advance.
+/// Provides a pool with a clock that only the tests advance.
 class QueryPoolTest : public testing::Test {
  protected:
   QueryPoolTest() {
@@ -62,7 +62,8 @@ class QueryPoolTest : public testing::Test {
   }
   void advance_ms(std::int64_t time_ms) {
     now_ms_ += time_ms;
-    pool().cancel(UINT64_MAX);  // no such query: only makes the pool check its clock
+    // No query has this number; the call only makes the pool check its clock.
+    pool().cancel(UINT64_MAX);
   }
   std::uint64_t ask(const std::string& sql, const std::string& client = "") {
     QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
@@ -72,7 +73,7 @@ class QueryPoolTest : public testing::Test {
     return last_ticket_;
   }
 
-  /// What was reported about a query so far.
+  /// The reports on a query so far, added up.
   struct Answer {
     bool runs = false;
     bool ended = false;
@@ -114,7 +115,7 @@ class QueryPoolTest : public testing::Test {
     }
     return now;
   }
-  /// Uses a shell script as the reader program.
+  /// Makes the pool run a shell script instead of the reader program. Returns its path.
   std::string use_script(const std::string& commands) {
     settings_.reader_program = folder_.file("reader");
     std::ofstream(settings_.reader_program) << "#!/bin/sh\n" << commands << '\n';
@@ -122,7 +123,7 @@ class QueryPoolTest : public testing::Test {
     return settings_.reader_program;
   }
   std::string error_of(const std::string& sql) { return take_all(ask(sql)).error; }
-  /// The first value of the only row.
+  /// Returns the first value of the only row.
   std::int64_t number_of(const std::string& sql) {
     const Answer answer = take_all(ask(sql));
     EXPECT_EQ(answer.rows, 1U) << answer.error;
@@ -164,7 +165,7 @@ class QueryPoolTest : public testing::Test {
   std::condition_variable changed_;
   std::map<std::uint64_t, Answer> answers_;
   std::uint64_t last_ticket_ = 0;
-  std::optional<QueryPool> pool_;  // last: it uses the other members
+  std::optional<QueryPool> pool_;  // the last member, because it uses the others
 };
 
 TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledDuringItsStartRunsNoQuery) {
@@ -206,7 +207,7 @@ TEST_F(QueryPoolTest, AQueryIsKilledAtItsDeadline) {
 
 TEST_F(QueryPoolTest, QueriesThatNeedTooMuchMemoryFailWithThatReason) {
   EXPECT_THAT(error_of("SELECT hex(zeroblob(450000000))"), HasSubstr("exceeds the allowed 16 MiB"));
-  // SQLite's printf returns NULL for a text over the limit.
+  // SQLite's printf returns NULL for a text that exceeds the limit.
   EXPECT_EQ(number_of("SELECT printf('%.*c', 900000000, 'x') IS NULL"), 1);
   const std::string megabytes =
       "(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000)"
@@ -295,7 +296,7 @@ class QueryQueueTest : public testing::Test {
     job.request.set_sql(sql);
     return queue_.add(std::move(job));
   }
-  /// Starts all queries that may run now; returns them as "client:ticket".
+  /// Starts all queries that may run now. Returns them as "client:ticket".
   std::vector<std::string> start() {
     std::vector<std::string> started;
     while (const auto job = queue_.start_next()) {

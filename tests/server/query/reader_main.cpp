@@ -1,4 +1,4 @@
-// A reader process for tests without a server.
+// Program of a reader process, for tests that run no server.
 #include "server/query/query_pool.h"
 
 int main(int, char** arguments) {

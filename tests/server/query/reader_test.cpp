@@ -37,7 +37,7 @@ class ReaderTest : public StoreFixture {
     }
     return "it ran";
   }
-  /// The values of the first row.
+  /// Returns the values of the first row.
   protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows.at(0); }
 };
 
@@ -151,12 +151,12 @@ TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
   EXPECT_EQ(Reader(path_).study_status("a").at(0).state(), "done");
 }
 
-/// Study "a" has points 0 to 9; point 5 is not solved yet. A row is a quarter of a chunk.
+/// Study "a" has points 0 to 9, of which 5 is not solved. Four rows of `wide_rows` fill a chunk.
 class AnswerTest : public StoreFixture {
  protected:
   AnswerTest() { commit({study_, worker(1), solved(study_, {0, 1, 2, 3, 4, 6, 7, 8, 9})}); }
 
-  /// Full chunks only, even on a slow machine.
+  /// Limits with which a reader sends only full chunks, even on a slow machine.
   static QueryLimits full_chunks() {
     QueryLimits limits;
     limits.longest_chunk_ms = INT64_MAX;
@@ -169,7 +169,7 @@ class AnswerTest : public StoreFixture {
     request.mutable_question()->add_select("'" + std::string(kChunkBytes / 4, 'x') + "' AS x");
     return request;
   }
-  /// Points of a chunk.
+  /// Returns the numbers of the points in a chunk.
   static std::vector<std::int64_t> points_of(const protocol::QueryReply& chunk) {
     std::vector<std::int64_t> points;
     protocol::ChunkRows rows(chunk);

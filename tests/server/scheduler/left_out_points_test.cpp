@@ -1,4 +1,4 @@
-// Left-out points: workers report them, and they are completed without a row.
+// Tests of left-out points, which workers report and the server completes without a row.
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,8 +12,8 @@
 namespace oblique::server {
 namespace {
 
-/// `numbers` points with mu from 0 to numbers - 1. The filter keeps those for which `where` is
-/// true.
+/// Returns a table of `numbers` points with mu from 0 to numbers - 1. Its filter keeps the points
+/// for which `where` is true.
 std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers,
                                                            const std::string& where) {
   return std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
@@ -23,10 +23,10 @@ std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers
                           where)}));
 }
 
-/// Every second point.
+/// A filter that keeps every second point.
 constexpr const char* kEven = "floor(mu / 2) == mu / 2";
 
-/// The worker answers the whole batch, the answer is stored, and the worker requests another batch.
+/// Answers the whole batch, stores the answer and requests another batch. Returns all effects.
 std::vector<Effect> solve(SchedulerBench& bench, const protocol::PointTable& table,
                           const SendBatch& batch) {
   auto effects = bench.solve_and_store(batch, 1e-3, &table);
@@ -126,7 +126,7 @@ TEST_F(LeftOutPointsTest, AWorkerThatReportsPointsOfABlockWithoutAFilterIsDiscon
 TEST_F(LeftOutPointsTest, AfterTheEndOfALeaseResultsCountAndLeftOutRangesDoNot) {
   const SendBatch batch = bench_.join(1, 1).at(0);
   ResultsReceived event = bench_.answer_to(batch, 1e-3, table_.get());
-  event.lease = 0;  // as after a server restart
+  event.lease = 0;  // results sent after a server restart have no lease
   const auto stores = only<StoreResults>(bench_.feed(event));
   ASSERT_EQ(stores.size(), 1U);
   EXPECT_EQ(stores[0].accepted.size(), event.outcomes.size());
@@ -154,7 +154,7 @@ TEST_F(LeftOutPointsTest, PointsAddedByGrowthMayBeLeftOutToo) {
   EXPECT_EQ(bench_.scheduler.study(1).left_out, 58U);
 }
 
-/// The size of the batch that a worker gets after `batches` others that took no time.
+/// Returns the size of the batch that a worker gets after `batches` others that took no time.
 std::uint64_t batch_size_after(int batches, const std::string& where) {
   const auto table = filtered_table(1'000'000, where);
   SchedulerBench bench(table, trusting());

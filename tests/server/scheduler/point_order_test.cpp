@@ -23,7 +23,7 @@ std::uint64_t fall_of(const PointTable& table, std::uint64_t point) {
   return solver::fall_hash(table.model(table.point(point).model));
 }
 
-/// The falls in the order of places, once per run of places with the same fall.
+/// Returns the hash of the fall at each place of the order. Equal neighbours count once.
 std::vector<std::uint64_t> runs_of_falls(const PointTable& table, const PointOrder& order) {
   std::vector<std::uint64_t> falls;
   for (std::uint64_t place = 0; place < table.size(); ++place) {

@@ -1,4 +1,4 @@
-// Sizes of batches, and which points they contain.
+// Tests of the sizes of batches, and of the points that batches contain.
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -22,7 +22,7 @@ using protocol::range;
 
 // ---- Pace ----
 
-/// The size of batches depends on pace only.
+/// Settings with which the size of batches depends only on the worker's time per point.
 SchedulerSettings by_pace_alone() {
   SchedulerSettings settings = trusting();
   settings.tail_batches_per_thread = 0;
@@ -94,9 +94,10 @@ TEST(SchedulerPace, ABatchGrowsAtMostByTheGrowthFactor) {
   EXPECT_EQ(bench.next_after(first, 1e-6).count(), 4 * first.count());
 }
 
-// ---- Where a batch ends ----
+// ---- Ends of batches ----
 
-/// Two models of 10 points each, then 30 points of the base model, then 40 models of one point.
+/// Two models of 10 points each, then 30 points of the base model, then 40 models of one point
+/// each.
 PointTable mixed_table() {
   return PointTable(protocol::recipe_of(
       {{listed("E", {6e10, 7e10}), listed("H", {1.0}), range("mu", 0.1, 1.0, 10), listed("e", {1})},
@@ -137,14 +138,14 @@ TEST(BatchCut, ABatchStaysWithinTheFreePoints) {
 
 // ---- Several models ----
 
-/// `models` models of `points` points each.
+/// Returns a table of `models` models with `points` points each.
 std::shared_ptr<const PointTable> table_of_models(std::uint64_t models, std::uint64_t points) {
   return std::make_shared<const PointTable>(protocol::recipe_of(
       {{range("E", 6e10, 7e10, models), listed("H", {1.0}),
         points == 1 ? listed("mu", {0.4}) : range("mu", 0.1, 1.0, points), listed("e", {1.0})}}));
 }
 
-/// In a study of models with many points: the model of a batch's first point.
+/// In a study with kMany points per model, `model_of` returns the model of a batch's first point.
 constexpr std::uint64_t kMany = 100'000;
 std::uint64_t model_of(const SendBatch& batch) {
   return batch.first_point() / kMany;
@@ -247,14 +248,14 @@ TEST(SchedulerModels, ALongBatchCountsAsSeveralInTheShareOfAStudy) {
   EXPECT_NEAR(busy_s[1] / busy_s[2], 1.0, 0.1);
 }
 
-// ---- Falls that lie apart ----
+// ---- Points of one fall that are not adjacent ----
 
 std::shared_ptr<const PointTable> sample(std::uint64_t points, std::uint64_t falls) {
   return std::make_shared<const PointTable>(
       protocol::sample_with_falls(points, falls, protocol::SAMPLE_LATIN_HYPERCUBE));
 }
 
-/// Every `step`-th of `numbers` points, including the first.
+/// Returns every `step`-th of `numbers` points, starting with point 0.
 IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
   IntervalSet points;
   for (std::uint64_t point = 0; point < numbers; point += step) {
@@ -263,7 +264,7 @@ IntervalSet every(std::uint64_t step, std::uint64_t numbers) {
   return points;
 }
 
-/// The points of all batches, in order.
+/// Returns the points of all batches, in the order of the batches.
 std::vector<std::uint64_t> points_in(const std::vector<SendBatch>& batches) {
   std::vector<std::uint64_t> points;
   for (const SendBatch& batch : batches) {
@@ -322,7 +323,7 @@ TEST(SchedulerFalls, PointsOfALostWorkerAreReturnedAndAFailedPointHasItsNumber) 
   EXPECT_EQ(again[0].points, (std::vector<Interval>{{failed, failed + 1}}));
 }
 
-// ---- Points between completed ones, as where a finer grid has reused a coarser one ----
+// ---- Open points between completed points, as in a fine grid that has reused a coarse grid ----
 
 StudyPoints points_without(std::uint64_t numbers, IntervalSet completed) {
   return {StudyTable(table_of(numbers)), std::move(completed), 0, LossLimits{}};

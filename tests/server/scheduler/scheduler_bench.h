@@ -11,7 +11,7 @@
 
 namespace oblique::server {
 
-/// The effects of one type, in order.
+/// Returns the effects of type `Kind`, in order.
 template <typename Kind>
 std::vector<Kind> only(const std::vector<Effect>& effects) {
   std::vector<Kind> kept;
@@ -23,19 +23,19 @@ std::vector<Kind> only(const std::vector<Effect>& effects) {
   return kept;
 }
 
-/// Settings with which new workers get all requested batches.
+/// Settings with which a new worker gets as many batches as it requests.
 inline SchedulerSettings trusting() {
   SchedulerSettings settings;
   settings.newcomer_batches = 1'000'000;
   return settings;
 }
 
-/// A scheduler whose invariants are checked after each event, with a settable clock.
+/// Runs a scheduler with a clock that the tests set, and checks its invariants after each event.
 class SchedulerBench {
  public:
   explicit SchedulerBench(const SchedulerSettings& settings = {}, std::string solver_version = {})
       : scheduler(settings, std::move(solver_version)) {}
-  /// Starts with study 1.
+  /// Adds study 1 with the points of `table`.
   explicit SchedulerBench(const std::shared_ptr<const protocol::PointTable>& table,
                           const SchedulerSettings& settings = {}, std::string solver_version = {})
       : SchedulerBench(settings, std::move(solver_version)) {
@@ -48,20 +48,20 @@ class SchedulerBench {
     return effects;
   }
 
-  /// Joins a worker with `credit` batches; returns the batches that it gets at once.
+  /// Makes a worker join and request `credit` batches. Returns the batches that it gets at once.
   std::vector<SendBatch> join(WorkerId worker, std::uint32_t credit, std::uint32_t threads = 1) {
     feed(WorkerJoined{worker, threads});
     return only<SendBatch>(feed(CreditGiven{worker, credit}));
   }
 
-  /// As `join`, for a worker of that process.
+  /// Like `join`, but names the worker's process. Returns all effects.
   std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
     auto effects = feed(WorkerJoined{worker, 1, process});
     append(effects, feed(CreditGiven{worker, credit}));
     return effects;
   }
 
-  /// The worker solves the probe and requests another batch.
+  /// Makes the worker solve the probe and request another batch. Returns all effects.
   std::vector<Effect> solve_probe(const SendProbe& probe) {
     auto effects = feed(ResultsReceived{
         probe.worker, kProbeStudy, probe.lease, ++sequence, true, 1e-3, {{0, false}}});
@@ -70,8 +70,8 @@ class SchedulerBench {
     return effects;
   }
 
-  /// The message of a worker that solved the whole batch in `busy_s`, except points that the filter
-  /// of `table` leaves out.
+  /// Returns the message of a worker that solved the whole batch in `busy_s`, except the points
+  /// that the filter of `table` leaves out.
   ResultsReceived answer_to(const SendBatch& batch, double busy_s = 1e-3,
                             const protocol::PointTable* table = nullptr) {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++sequence, true, busy_s, {}};
@@ -90,7 +90,7 @@ class SchedulerBench {
     return feed(answer_to(batch, busy_s));
   }
 
-  /// Receives results and makes them durable. Returns the effects of both.
+  /// Receives results and reports them as durable. Returns the effects of both events.
   std::vector<Effect> store(const ResultsReceived& event) {
     auto effects = feed(event);
     for (const StoreResults& store : only<StoreResults>(effects)) {
@@ -107,8 +107,8 @@ class SchedulerBench {
     return store(answer_to(batch, busy_s, table));
   }
 
-  /// Solves the batches in turn, and those that follow, until none is left. Returns all in the
-  /// order of solving.
+  /// Solves these batches and all that follow, in turn. Returns all batches in the order of
+  /// solving.
   std::vector<SendBatch> solve_all(std::vector<SendBatch> batches, double s_per_point = 1e-3,
                                    const protocol::PointTable* table = nullptr) {
     for (std::size_t i = 0; i < batches.size(); ++i) {
@@ -123,13 +123,13 @@ class SchedulerBench {
     return batches;
   }
 
-  /// The batch that the worker gets after solving this one at that pace.
+  /// Solves a batch in `s_per_point` per point. Returns the batch that the worker gets next.
   SendBatch next_after(const SendBatch& batch, double s_per_point) {
     solve_and_store(batch, s_per_point * static_cast<double>(batch.count()));
     return only<SendBatch>(feed(CreditGiven{batch.worker, 1})).at(0);
   }
 
-  /// Lets time pass in steps, as in the server's loop; workers in `alive` send heartbeats with
+  /// Advances the clock in the steps of the server's loop. Workers in `alive` send heartbeats with
   /// their leases. Returns all effects.
   std::vector<Effect> pass(std::int64_t duration_ms, const std::vector<WorkerId>& alive = {}) {
     std::vector<Effect> all;

@@ -1,4 +1,4 @@
-// Lost workers: no sound point fails because of them.
+// Tests of lost workers: they must not cause the failure of harmless points.
 #include <algorithm>
 #include <cstdint>
 #include <deque>
@@ -18,7 +18,7 @@
 namespace oblique::server {
 namespace {
 
-/// Workers 1, 2 and 3 are lost with points before they have solved any.
+/// Makes workers 1, 2 and 3 join, get a batch, and vanish before they have solved a point.
 void lose_newcomers(SchedulerBench& bench) {
   for (const WorkerId newcomer : {1U, 2U, 3U}) {
     bench.join(newcomer, 1);
@@ -190,7 +190,7 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
 
 TEST(SchedulerLosses, ANewWorkerThatReconnectsIsNotLost) {
   SchedulerBench bench(table_of(1'000'000));
-  // Each of four processes has an earlier connection, which held a batch, replaced by a new one.
+  // Four processes each get a batch and reconnect. The new connection replaces the old connection.
   for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
     const std::string process = "sound " + std::to_string(worker);
     ASSERT_EQ(only<SendBatch>(bench.join_as(process, worker, 1)).size(), 1U);
@@ -238,10 +238,10 @@ TEST(WorkerProcesses, TheLatestAbsentProcessesAreKept) {
   EXPECT_EQ(processes.join("process 2", 101), 199U) << "it was forgotten";
 }
 
-// ---- Points that cost workers ----
+// ---- Points that kill workers ----
 
-/// Workers started one after another, as by a supervisor, each a new process. Each dies of any
-/// batch with a harmful point.
+/// Simulates a supervisor that starts a new worker process whenever one dies. Each worker dies of
+/// any batch that contains a harmful point.
 class Supervised {
  public:
   Supervised(SchedulerBench& bench, std::set<std::uint64_t> killers, std::uint32_t prefetch,
@@ -263,7 +263,7 @@ class Supervised {
   bool finished = false;
 
  private:
-  /// False if the worker died.
+  /// Takes the worker's next step; returns false if the worker dies.
   bool live() {
     if (probe_) {
       take(bench_.solve_probe(*std::exchange(probe_, std::nullopt)));
@@ -330,8 +330,8 @@ TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
     const std::set<std::uint64_t> killers{137, 777};
     Supervised supervised(bench, killers, 3, points.get());
     supervised.run();
-    // Each harmful point costs two workers until it is suspect, one for each split of at most 1000
-    // points by eight, and three when it is alone.
+    // Upper bound for each harmful point: two lost workers until it is suspect, four more because
+    // 1000 points are split by eight at most four times, and three when the point is alone.
     EXPECT_LE(supervised.deaths, 2 * (2 + 4 + 3));
     ASSERT_EQ(supervised.failed.size(), 2U);
     EXPECT_TRUE(supervised.failed.contains(137) && supervised.failed.contains(777));
@@ -342,7 +342,7 @@ TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
 }
 
 TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
-  // No worker can become proven by another point, so each gets a probe.
+  // No other point can prove that a worker is sound, so each worker gets a probe.
   SchedulerBench bench(table_of(1));
   Supervised supervised(bench, {0}, 2);
   supervised.run();
@@ -351,10 +351,10 @@ TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
   EXPECT_EQ(supervised.failed.size(), 1U);
 }
 
-/// Proven workers, and the points that are left.
+/// Provides proven workers, that is workers that have solved a point, and further points.
 class SuspectTest : public testing::Test {
  protected:
-  /// Workers 1 to `workers` each solve one point of a study; `left` points remain.
+  /// Lets each of workers 1 to `workers` solve one point of a study, so that `left` points remain.
   void prove(WorkerId workers, std::uint64_t left) {
     bench_.feed(StudyAdded{1, table_of(workers + left), {}});
     for (WorkerId worker = 1; worker <= workers; ++worker) {
@@ -427,7 +427,8 @@ TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherRisky) {
   for (WorkerId worker = 1; worker <= 5; ++worker) {
     bench_.feed(CreditGiven{worker, 2});
     bench_.feed(WorkerUnreachable{worker});
-    bench_.join_as(name(worker), worker + 10, 0);  // it returns, so that the points stay together
+    // The process reconnects, so the two points stay together.
+    bench_.join_as(name(worker), worker + 10, 0);
   }
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
 }
@@ -452,7 +453,8 @@ TEST_F(SuspectTest, ARiskyPointIsReservedForTheLongestProvenWorkerForSomeSeconds
 
 TEST(SchedulerSuspects, SuspectPointsGoToAProvenWorkerThatHoldsNothingElse) {
   SchedulerBench bench(table_of(1000));
-  for (const WorkerId worker : {1U, 2U}) {  // two losses make the batches suspect
+  // After two lost workers the points of their batches are suspect.
+  for (const WorkerId worker : {1U, 2U}) {
     EXPECT_EQ(bench.join(worker, 2).size(), 2U);
     bench.pass(3250);
   }
@@ -491,10 +493,10 @@ TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
   bench.pass(3250);
   const auto second = bench.join(2, 1).at(0);
   EXPECT_EQ(second.attempt, 2U);
-  const auto busy = bench.join(3, 2);  // holds two ordinary batches
+  const auto busy = bench.join(3, 2);  // worker 3 holds two ordinary batches
   ASSERT_EQ(busy.size(), 2U);
   std::deque<SendBatch> held(busy.begin(), busy.end());
-  bench.pass(3250, {3});  // worker 2 dies: its points are suspect now
+  bench.pass(3250, {3});  // worker 2 is lost, so its points are suspect
   EXPECT_FALSE(bench.scheduler.has_worker(2));
   bool suspect_was_leased = false;
   for (int i = 0; i < 200 && !held.empty() && !suspect_was_leased; ++i) {

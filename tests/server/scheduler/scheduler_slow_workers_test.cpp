@@ -1,4 +1,4 @@
-// Slow workers: others get their points, and nothing counts as lost.
+// Tests of slow workers: other workers get their points, and nothing counts as lost.
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -43,7 +43,7 @@ TEST(SchedulerStall, AStudyEndsDespiteWorkersThatOnlySendHeartbeats) {
   EXPECT_TRUE(is_finished) << bench.scheduler.study(1).leased << " points are still leased";
 }
 
-/// Worker 1 holds the only four points.
+/// Provides a study of four points, all leased to worker 1.
 class StallTest : public testing::Test {
  protected:
   StallTest() { EXPECT_EQ(batch_.count(), 4U); }
@@ -132,26 +132,26 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
   bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
-  // Ten times the time of eight points side by side.
+  // The limit is ten times the time of eight points side by side on the quick worker.
   bench.pass(780'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-/// As StallTest, with worker 2 waiting.
+/// Like StallTest, but worker 2 waits for a batch.
 class StragglerTest : public StallTest {
  protected:
   StragglerTest() { EXPECT_TRUE(bench_.join(2, 1).empty()); }
 
-  /// The batch that worker 2 gets when the first one straggles.
+  /// Returns the batch that worker 2 gets when worker 1 is late.
   SendBatch second() {
     const auto batches = only<SendBatch>(bench_.pass(1500, {1, 2}));
     EXPECT_EQ(batches.size(), 1U);
     return batches.at(0);
   }
 
-  /// Answers some points of a batch durably.
+  /// Receives results of some points of a batch and reports them as durable.
   std::vector<Effect> answer(const SendBatch& batch, const std::vector<std::uint64_t>& points,
                              bool done) {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench_.sequence, done, 0.0, {}};
@@ -176,7 +176,8 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
   SchedulerBench bench(settings());
   bench.feed(StudyAdded{1, table_of(4), {}});
   bench.join(1, 1);
-  for (const WorkerId id : {11U, 12U, 13U}) {  // losses of new workers set aside later ones
+  // After three lost new workers, later new workers must solve a probe first.
+  for (const WorkerId id : {11U, 12U, 13U}) {
     bench.feed(StudyAdded{id, table_of(1), {}});
     bench.join_as("vanishes " + std::to_string(id), id, 1);
     bench.feed(WorkerUnreachable{id});
@@ -280,7 +281,7 @@ TEST_F(StragglerTest, AHarmfulBatchIsFoundAlthoughTwoWorkersHeldIt) {
   bench_.join(3, 1);
   EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty()) << "not given to a third worker";
   const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
-  // After two lost workers the points are suspect and go to a proven worker.
+  // Two workers are lost, so the points are suspect and need a proven worker.
   ASSERT_EQ(probe.size(), 1U);
   EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U) << "split";
 }

@@ -1,4 +1,4 @@
-// Studies: sharing of workers, reuse, growth and deletion.
+// Tests of studies: how they share workers, reuse results, grow and are deleted.
 #include <cstdint>
 #include <map>
 #include <string>
@@ -15,7 +15,7 @@ namespace {
 using testing::IsEmpty;
 using testing::SizeIs;
 
-/// The number of the next `batches` batches that each study gets.
+/// Returns how many of the next `batches` batches each study gets.
 std::map<StudyId, int> shares(SchedulerBench& bench, std::uint32_t batches) {
   std::map<StudyId, int> counts;
   for (const auto& batch : only<SendBatch>(bench.feed(CreditGiven{1, batches}))) {
@@ -75,7 +75,7 @@ TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStayCompleted) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 7U);
 }
 
-// ---- Results of other studies ----
+// ---- Reuse of results of other studies ----
 
 StudyAdded held_study(std::uint64_t points) {
   StudyAdded added{1, table_of(points), {}};
@@ -130,7 +130,8 @@ TEST(SchedulerReuse, AHeldStudyCanBePausedCancelledAndReopened) {
 
 TEST(SchedulerReuse, SuspectPointsAreReusedToo) {
   SchedulerBench bench(table_of(3));
-  for (WorkerId worker = 1; worker <= 2; ++worker) {  // both are lost with all points
+  // Both workers are lost with all points.
+  for (WorkerId worker = 1; worker <= 2; ++worker) {
     bench.join(worker, 4);
     bench.feed(WorkerUnreachable{worker});
   }
@@ -238,7 +239,7 @@ TEST(SchedulerRemovalTest, ResultsBeingWrittenAreAcknowledged) {
 
 TEST(SchedulerRemovalTest, LossesOfItsPointsAreForgotten) {
   SchedulerBench bench(table_of(1));
-  // The point is failing: three proven processes were lost with it alone.
+  // Six processes are lost with batches, so the scheduler stores losses for points of both studies.
   bench.feed(StudyAdded{2, table_of(1000), {}});
   for (WorkerId worker = 1; worker <= 6; ++worker) {
     bench.join_as("process " + std::to_string(worker), worker, 1);
@@ -256,7 +257,7 @@ TEST(SchedulerRemovalTest, LossesOfItsPointsAreForgotten) {
 
 // ---- Solver versions ----
 
-/// A study of 100 points, the first of which has a result of version 1.0.
+/// Returns a study of 100 points; the first point has a result of solver version 1.0.
 StudyAdded old_study(std::uint64_t failed = 0) {
   StudyAdded added{.study = 1, .table = table_of(100), .completed = IntervalSet(0, 1)};
   added.failed = failed;

@@ -140,7 +140,7 @@ TEST(SchedulerTest, ALateResultOfAnOldAttemptIsStoredWhileThePointIsOpen) {
   EXPECT_FALSE(bench.scheduler.has_worker(1));
   const auto again = bench.join(2, 1).at(0);
   ASSERT_EQ(again.first_point(), old.first_point());
-  bench.join(3, 0);  // the lost worker returns with a new number
+  bench.join(3, 0);  // the lost worker rejoins as number 3
   const auto late = only<StoreResults>(
       bench.feed(ResultsReceived{3, 1, old.lease, 1, true, 0.1, {{old.first_point(), false}}}));
   EXPECT_EQ(late.at(0).accepted.size(), 1U);
@@ -169,7 +169,7 @@ TEST(SchedulerTest, ABatchThatNeverReachedItsWorkerIsLeasedAgain) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   bench.now_ms += 1000;
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());  // the batch may be on its way
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());  // the batch may not have arrived
   bench.pass(3000, {1});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {batch.lease}}).empty());
   bench.feed(HeartbeatReceived{1, {}});
@@ -258,14 +258,14 @@ TEST(SchedulerTest, ResultsOfAnUnknownStudyAreAcknowledgedSoThatTheWorkerDropsTh
   EXPECT_EQ(only<AcknowledgeResults>(bench.feed(ResultsStored{1, 77, 4, {}})).size(), 1U);
 }
 
-// ---- Batches that a worker gives back ----
+// ---- Batches that a worker returns unsolved ----
 
 TEST(SchedulerTest, AReturnedBatchIsFreeAtOnceAndNoLoss) {
   SchedulerBench bench(table_of(100), trusting());
   const SendBatch batch = only<SendBatch>(bench.join_as("a", 1, 1)).at(0);
   ASSERT_GT(batch.count(), 1U);
-  bench.join_as("b", 2, 1000);  // gets all others and waits for more
-  // One point is solved, the others are returned.
+  bench.join_as("b", 2, 1000);  // gets all other points and waits for more
+  // The worker has solved one point of the batch and returns the others.
   bench.feed(ResultsReceived{1, 1, batch.lease, 1, false, 1e-3, {{batch.first_point(), false}}});
   const auto again = only<SendBatch>(bench.feed(BatchesReturned{1, {batch.lease}}));
   std::uint64_t next = batch.first_point() + 1;
@@ -302,7 +302,7 @@ TEST(SchedulerTest, ReturningLeasesOfOthersOrUnknownOnesHasNoEffect) {
 
 TEST(SchedulerTest, AReturnedSuspectPointStaysSuspect) {
   SchedulerBench bench(table_of(1), trusting());
-  // After the loss of two processes the point is suspect.
+  // The loss of two processes makes the point suspect.
   bench.join_as("a", 1, 1);
   bench.feed(WorkerUnreachable{1});
   bench.join_as("b", 2, 1);
@@ -329,11 +329,11 @@ TEST(SchedulerTest, AReturnedProbeIsSentAgain) {
   EXPECT_FALSE(only<SendProbe>(bench.pass(2000, {3})).empty());
 }
 
-// ---- Costs of many workers and studies, in examined workers ----
+// ---- Cost of events with many workers and studies, measured in examined workers ----
 
 constexpr WorkerId kWorkers = 1000;
 
-/// A thousand workers that request batches when there are none.
+/// Provides a thousand workers that have requested batches while no study is open.
 class IdleCrowd : public testing::Test {
  protected:
   IdleCrowd() {

@@ -1,4 +1,4 @@
-// Changes of studies (pause, resume, retry, grow, rename, delete) and rights of keys.
+// Tests of changes (pause, resume, retry, grow, rename, delete) and of the rights of keys.
 #include <memory>
 #include <string>
 #include <utility>
@@ -96,7 +96,7 @@ TEST_F(ServiceTest, EachChangeWaitsForThePreviousOne) {
     ports_.replies.clear();
     request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
     request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
-    // a client that repeats its request
+    // The client repeats its request.
     request(change_request("a", protocol::STUDY_CHANGE_CANCEL));
     request(change_request("a", protocol::STUDY_CHANGE_RESUME));
     ASSERT_EQ(ports_.jobs.size(), 1U);
@@ -132,7 +132,7 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
     EXPECT_THAT(last_error(), HasSubstr("disk full"));
     EXPECT_EQ(status_of("a").state(), "running");
   }
-  // A crash may bring back refused changes that reached the disk, so the state is stored again.
+  // A refused change may be on the disk and reappear after a crash, so the state is stored again.
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(ports_.jobs.size(), 1U);
   write_all();
@@ -145,7 +145,7 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
 
 // ---- Growth, names, deletion ----
 
-/// `points` points, followed by a block of `further`.
+/// Returns a recipe of `points` points, followed by a block of `further` points.
 protocol::Recipe grown_recipe(std::uint64_t points, std::uint64_t further) {
   protocol::Recipe recipe = table_of(points)->recipe();
   *recipe.add_blocks() = table_of(further)->recipe().blocks(0);
@@ -169,7 +169,7 @@ class ServiceGrowthTest : public ServiceTest {
     message.mutable_change()->set_study_id(id);
     request(message);
   }
-  /// One worker solves all points of study 1.
+  /// Lets one worker solve all points of study 1.
   void solve_everything() {
     hello();
     for (int batch = 0; batch < 100 && service_->scheduler().study(1).open() > 0; ++batch) {
@@ -340,7 +340,7 @@ TEST_F(ServiceGrowthTest, TheRecipeOfAStudyIsDescribed) {
   EXPECT_THAT(last_error(), HasSubstr("did you mean `friction`?"));
 }
 
-// ---- Keys and bounds ----
+// ---- Rights of keys, and limits ----
 
 std::shared_ptr<const KeyIdentity> holder_of(const std::string& name,
                                              protocol::Role role = protocol::Role::kClient) {

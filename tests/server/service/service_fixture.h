@@ -23,8 +23,7 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// Records everything that the service sends. Writes, queries and checks get their outcome from the
-/// test.
+/// Records everything that the service sends. The test decides how writes, queries and checks end.
 class FakePorts final : public Ports {
  public:
   Delivery to_worker(const std::string& identity, const std::string& frame) override {
@@ -75,7 +74,7 @@ inline ClientRequest client_request(std::uint64_t request_id = 0) {
   return message;
 }
 
-/// A submission with a recipe of at least that many bytes.
+/// Returns a submission with a recipe of at least `bytes` bytes.
 inline ClientRequest long_submission(const std::string& name, std::size_t bytes) {
   ClientRequest message = client_request(7);
   message.mutable_submit()->set_name(name);
@@ -88,14 +87,14 @@ inline ClientRequest long_submission(const std::string& name, std::size_t bytes)
   return message;
 }
 
-/// Size of a request that is parsed on the check thread.
+/// A request of this size is parsed on the check thread.
 inline constexpr std::size_t kLongRequest = std::size_t{100} * 1024;
 
 class ServiceTest : public testing::Test {
  protected:
   ServiceTest() { start({}); }
 
-  /// Starts another server on a database with these studies.
+  /// Replaces the service by one on a database with these studies.
   void start(ServiceSettings settings, std::vector<StoredStudy> studies = {}) {
     settings.solver_version = "1.0";
     settings.database_id = "db";
@@ -107,7 +106,7 @@ class ServiceTest : public testing::Test {
     service_->client_frame("client", protocol::encode(message), now_, holder);
     service_->scheduler().check_invariants();
   }
-  /// The same from another connection.
+  /// Sends a message on the connection `identity`.
   void send(const ClientRequest& message, const std::string& identity,
             const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     service_->client_frame(identity, protocol::encode(message), now_, holder);
@@ -118,7 +117,7 @@ class ServiceTest : public testing::Test {
     send(message, identity);
   }
   std::string last_error() { return last_reply().error().message(); }
-  /// Submits without reuse of results.
+  /// Returns a submission that does not reuse results.
   ClientRequest submit_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = client_request(42);
     message.mutable_submit()->set_name(name);
@@ -126,7 +125,7 @@ class ServiceTest : public testing::Test {
     message.mutable_submit()->set_no_reuse(true);
     return message;
   }
-  /// Submits a study and stores it.
+  /// Submits a study and completes its write.
   void submit(const std::string& name, std::uint64_t points = 10) {
     request(submit_request(name, points));
     write_all();
@@ -140,12 +139,12 @@ class ServiceTest : public testing::Test {
   ClientRequest cancel_request(const std::string& name) {
     return change_request(name, protocol::STUDY_CHANGE_CANCEL);
   }
-  /// Requests a change and stores it.
+  /// Requests a change and completes its write.
   void change(const std::string& name, protocol::StudyChange change) {
     request(change_request(name, change));
     write_all();
   }
-  /// Results for the last batch; points from `first_failed` on failed.
+  /// Answers the last batch and completes the write. Points from `first_failed` on have failed.
   void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
     const auto batch = last_message().batch();
     WorkerMessage message;
@@ -169,11 +168,11 @@ class ServiceTest : public testing::Test {
     worker_says(message, identity);
     write_all();
   }
-  /// A result of that point as a worker sends it.
+  /// Returns a worker's result for a point.
   protocol::PointResult solved(std::uint64_t point, StudyId study = 1) const {
     return solved_point(point, *service_->states().record(study).table.get());
   }
-  /// A message with results of these points.
+  /// Returns a message with results for these points.
   WorkerMessage results_of(const std::vector<std::uint64_t>& points, StudyId study = 1,
                            std::uint64_t lease = 0) {
     WorkerMessage message;
@@ -190,7 +189,7 @@ class ServiceTest : public testing::Test {
     service_->worker_frame(identity, protocol::encode(message), now_);
     service_->scheduler().check_invariants();
   }
-  /// A worker joins and gets a batch.
+  /// Lets a worker join and request a batch.
   void hello_and_credit() {
     hello();
     credit(1);
@@ -226,7 +225,7 @@ class ServiceTest : public testing::Test {
     request(message);
     return last_reply().status().studies(0);
   }
-  /// Completes all waiting writes, with `error` unless that is empty.
+  /// Completes all waiting writes. Writes that can fail end with `error` unless it is empty.
   void write_all(const std::string& error = {}) {
     for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
       const bool refused = !error.empty() && job.answer_failure;
@@ -236,7 +235,7 @@ class ServiceTest : public testing::Test {
     }
     service_->scheduler().check_invariants();
   }
-  /// Gives the `index`-th query that answer.
+  /// Ends the `index`-th query with this reply.
   void answer_query(std::size_t index, const std::string& reply) {
     service_->query_report({QueryReport::Kind::kAnswered, ports_.queries.at(index).ticket, reply});
   }
@@ -247,7 +246,7 @@ class ServiceTest : public testing::Test {
     }
     service_->scheduler().check_invariants();
   }
-  /// Lets time pass in ticks.
+  /// Advances the clock in steps of 100 ms, with a tick of the service after each.
   void pass(std::int64_t duration_ms) {
     for (const std::int64_t end_ms = now_.steady_ms + duration_ms; now_.steady_ms < end_ms;) {
       now_.steady_ms += 100;

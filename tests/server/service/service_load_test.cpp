@@ -1,4 +1,4 @@
-// The service when the disk or a peer is slow.
+// Tests of the service when the disk or a peer is slow.
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -18,7 +18,7 @@ using testing::HasSubstr;
 
 class ServiceLoadTest : public ServiceTest {
  protected:
-  /// Starts again with other settings, a study of 1000 points and a worker.
+  /// Replaces the service by one with other settings, a study of 1000 points and a worker.
   void begin(const ServiceSettings& settings) {
     start(settings);
     submit("a", 1000);
@@ -101,7 +101,7 @@ TEST_F(ServiceLoadTest, AWorkerThatDoesNotReadGetsNoFurtherBatch) {
   EXPECT_EQ(batches_sent(), 2U);
 }
 
-/// A service with small limits.
+/// Provides a service with small limits.
 class FloodedServiceTest : public ServiceTest {
  protected:
   FloodedServiceTest() {
@@ -143,13 +143,13 @@ class WriteLedgerTest : public testing::Test {
  protected:
   static LedgerLimits small() { return {.bytes = 200, .writes = 24, .changes = 3}; }
 
-  /// A Results message of that size.
+  /// Queues the results of a message of `bytes` bytes.
   void write_results(std::size_t bytes) {
     AddResults change{};
     change.message_bytes = bytes;
     ledger_.write(std::move(change), [this](Instant) { outcomes_.emplace_back("results"); });
   }
-  /// A change that a client waits for.
+  /// Queues a change whose result a client waits for.
   void write_change() {
     ledger_.write(
         SetStudyState{1, StudyState::kPaused, ""},

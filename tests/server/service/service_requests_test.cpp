@@ -1,4 +1,4 @@
-// Long requests: checks of recipes, queries and traces.
+// Tests of requests that take long: checks of recipes, queries and traces.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -72,7 +72,7 @@ TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsNumber) {
 
 // ---- Queries ----
 
-/// The frame of an answer.
+/// Returns a chunk of an answer, encoded as a reply.
 std::string reply_of(const protocol::QueryReply& query) {
   protocol::ClientReply reply;
   *reply.mutable_query() = query;
@@ -93,7 +93,7 @@ class ServiceQueryTest : public ServiceTest {
     message.mutable_more_rows()->set_received(taken);
     send(message, identity);
   }
-  /// A reader gives another chunk of the answer.
+  /// Lets the reader of the `index`-th query deliver one more chunk.
   void give(std::size_t index) {
     protocol::QueryReply chunk;
     chunk.set_chunk_rows(1);
@@ -240,7 +240,7 @@ class ServiceTraceTest : public ServiceTest {
     send(trace_request(id, point), identity);
   }
 
-  /// Trace orders sent to workers.
+  /// Returns the trace orders that the service has sent to workers.
   std::vector<protocol::TraceOrder> orders() const {
     std::vector<protocol::TraceOrder> found;
     for (const ServerToWorker& message : ports_.worker_messages) {
@@ -354,7 +354,7 @@ TEST_F(ServiceTraceTest,
   worker_sends(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
-  // The reply to a too long trace has the `every` that would fit.
+  // The reply for a trace that is too long contains the value of `every` that would fit.
   ask(9, 3);
   trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
@@ -493,7 +493,7 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
                 trace.clear_states();
               }),
               HasSubstr("no rows"));
-  worker_sends(trace_of({}, ""));  // belongs to no order
+  worker_sends(trace_of({}, ""));  // a trace without an order is ignored
   ask(99, 60);
   worker_sends(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());

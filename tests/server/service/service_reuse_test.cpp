@@ -1,4 +1,4 @@
-// Reused results and left-out points.
+// Tests of reused results and of left-out points.
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -22,7 +22,7 @@ class ServiceReuseTest : public ServiceTest {
   static constexpr std::uint64_t kSource = 1;
   static constexpr std::uint64_t kStudy = 2;
 
-  /// Study 1, "a", is partly solved.
+  /// Submits study 1, "a", and solves some of its points.
   void solve_some() {
     request(submit_request("a"));
     write_all();
@@ -35,19 +35,19 @@ class ServiceReuseTest : public ServiceTest {
     message.mutable_submit()->set_no_reuse(false);
     return message;
   }
-  /// The same with ten more points.
+  /// Returns the submission of `reusing` with ten more points.
   ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
     return message;
   }
-  /// Study 2, "b", is durable and its first part waits for the writer.
+  /// Submits and stores study 2, "b". Its first reuse of results then waits for the writer.
   void submit_study() {
     solve_some();
     request(reusing("b"));
     write_all();
   }
-  /// The first points of parts that wait for the writer.
+  /// Returns the first point of each reuse of results that waits for the writer.
   std::vector<std::uint64_t> parts() const {
     std::vector<std::uint64_t> firsts;
     for (const WriteJob& job : ports_.jobs) {
@@ -57,7 +57,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return firsts;
   }
-  /// The study whose EndReuse waits for the writer; 0: none.
+  /// Returns the study whose EndReuse waits for the writer, or 0.
   std::uint64_t ended() const {
     for (const WriteJob& job : ports_.jobs) {
       if (const auto* end = std::get_if<EndReuse>(&job.change)) {
@@ -66,7 +66,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return 0;
   }
-  /// Completes all waiting writes; a waiting part has this outcome.
+  /// Completes all waiting writes. A waiting reuse of results has this outcome.
   void write_part(const ReusedResults& outcome) {
     for (WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
@@ -216,7 +216,7 @@ TEST_F(ServiceReuseTest, AServerContinuesAnUnfinishedLookup) {
 
 class FilteredStudyTest : public ServiceTest {
  protected:
-  /// mu = 0, 0.1, ..., 1.
+  /// Returns a submission of a study with mu = 0, 0.1, ..., 1 and a filter.
   ClientRequest filtered_request(const std::string& where) {
     ClientRequest message = submit_request("filtered");
     *message.mutable_submit()->mutable_recipe() = protocol::recipe_of_blocks(
@@ -278,7 +278,8 @@ TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
 
 TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
   submit_filtered();
-  // After three lost workers the next one gets a probe: the first two are of its batch.
+  // From the fourth worker on the batch is a probe, because three new workers were lost. Therefore
+  // ranges that are wrong only for batches of the study come first.
   const std::vector<std::vector<std::uint64_t>> wrong{
       {0, 12}, {11, 1}, {0}, {0, 0}, {3, ~std::uint64_t{0}}, {~std::uint64_t{0}, 2}, {0, 1, 5}};
   for (const auto& numbers : wrong) {

@@ -1,4 +1,4 @@
-// Studies and workers, message by message: acknowledgements and refused peers.
+// Tests of studies and workers, message by message: acknowledgements and refused peers.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -124,7 +124,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
-  // The database records that the study is done.
+  // The service stores that the study is done.
   ASSERT_EQ(ports_.jobs.size(), 1U);
   EXPECT_EQ(std::get<SetStudyState>(ports_.jobs[0].change).state, StudyState::kDone);
 }
@@ -377,7 +377,7 @@ class ProcessesTest : public ServiceTest {
     message.mutable_hello()->set_process_id(process_id);
     worker_says(message, identity);
   }
-  /// Three new workers get batches and are lost.
+  /// Makes three new workers join, get batches and vanish.
   void let_newcomers_vanish() {
     for (const char* identity : {"x", "y", "z"}) {
       hello_as(identity, identity);

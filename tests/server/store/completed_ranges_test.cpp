@@ -18,7 +18,7 @@ using testing::ElementsAre;
 
 class CompletedRangesTest : public StoreFixture {
  protected:
-  /// "first+points" of each range of a study.
+  /// Returns "first+points" for each range of completed points of a study.
   static std::vector<std::string> ranges(sqlite3* database, unsigned study) {
     return rows(database, fmt::format("SELECT first_point || '+' || points FROM completed_ranges"
                                       " WHERE study_id = {} ORDER BY first_point",
@@ -35,7 +35,7 @@ TEST_F(CompletedRangesTest, RetriedFailuresLeaveTheirRangeAndTheStudyStaysCounte
   EXPECT_THAT(ranges(), ElementsAre("0+9"));
   commit({ForgetFailures{1, IntervalSet(4, 7), "now"}});
   EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3")) << "only failures are forgotten";
-  // A failure stored in a transaction can be deleted in the same one.
+  // One transaction may store a failure and delete it again.
   commit({failed(study, {4}), ForgetFailures{1, IntervalSet(4, 5), "now"}});
   EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3"));
   EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));
@@ -58,7 +58,7 @@ TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsAreOpenAfterTheNext
   EXPECT_EQ(store().studies().at(1).completed, IntervalSet(0, 2));
 }
 
-/// Random additions and removals of points and ranges.
+/// Adds and removes random points and ranges.
 TEST_F(CompletedRangesTest, RandomChangesGiveTheFewestRanges) {
   constexpr std::uint64_t kPoints = 60;
   const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);

@@ -1,4 +1,4 @@
-// Reuse of rows of other studies: lookup and copy.
+// Tests of the reuse of rows of other studies: lookup and copy.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -32,7 +32,7 @@ class ResultReuseTest : public StoreFixture {
   void add(std::uint64_t study, const std::string& name, const Table& points) {
     commit({study_of(points, study, name)});
   }
-  /// All points are solved.
+  /// Solves all points of a study.
   void solve(std::uint64_t study, const Table& points) {
     commit({solved(study_of(points, study), numbers(0, points->size()))});
   }
@@ -41,7 +41,7 @@ class ResultReuseTest : public StoreFixture {
     commit({ReuseResults{study, points, first, "1.0", outcome}});
     return *outcome;
   }
-  /// "point of STUDY/POINT" of each copy.
+  /// Returns "POINT of STUDY/POINT" for each copied row, where STUDY/POINT is its source.
   std::vector<std::string> copies(std::uint64_t study) const {
     return rows(
         fmt::format("SELECT point || ' of ' || reused_from FROM results"
@@ -53,7 +53,7 @@ class ResultReuseTest : public StoreFixture {
   static constexpr std::uint64_t kOldWorker = 2;
 };
 
-/// Study 1 has solved points 0 to 9, which study 2 has too.
+/// Provides two studies with the same points; points 0 to 9 of study 1 are solved.
 class SamePointsTest : public ResultReuseTest {
  protected:
   SamePointsTest() {
@@ -135,7 +135,7 @@ TEST_F(ResultReuseTest, PartsFollowEachOtherAndSkipCompletedPoints) {
   const std::uint64_t part = *first.next_point;
   EXPECT_LT(part, 5000U);
   EXPECT_EQ(first.points, IntervalSet(0, part));
-  const auto second = reuse_part(2, points, 0);  // as after a server restart
+  const auto second = reuse_part(2, points, 0);  // repeats the lookup, like a restarted server
   EXPECT_EQ(second.points, IntervalSet(part, 2 * part));
   const auto third = reuse_part(2, points, 2 * part);
   EXPECT_EQ(third.points, IntervalSet(2 * part, 10'000));
@@ -155,9 +155,9 @@ TEST_F(ResultReuseTest, AModelWithoutRowsCostsOneProbe) {
   EXPECT_EQ(outcome.next_point, std::nullopt);
 }
 
-// ---- Random studies against a lookup in a map ---------------------------------------------------
+// ---- Random studies, compared with a lookup in a map --------------------------------------------
 
-/// Few values per key, so that studies share points and contain some twice.
+/// Returns a block with few values per key, so that many points occur several times.
 protocol::Block random_block(std::mt19937& random) {
   const auto pick = [&](const std::string& key, std::vector<double> values) {
     std::shuffle(values.begin(), values.end(), random);
@@ -201,13 +201,13 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
 
 TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
   std::mt19937 random(4711);
-  std::map<Inputs, std::string> solved;  // the first row for each set of inputs, as in reused_from
+  std::map<Inputs, std::string> solved;  // first row with these inputs, as in `reused_from`
   std::size_t reused = 0;
   std::size_t open = 0;
   for (std::uint64_t study = 1; study <= 60; ++study) {
     const Table points = random_table(random);
     add(study, "study " + std::to_string(study), points);
-    // Some points have failed or were solved by another version; these keep their rows.
+    // Some points have failed or were solved by another version; their rows are not replaced.
     const AddStudy added = study_of(points, study);
     AddResults own = results_of(added, {}, kWorker);
     AddResults old = results_of(added, {}, kOldWorker);
@@ -233,7 +233,8 @@ TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
     EXPECT_EQ(copies(study), expected) << "study " << study;
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
-    // Solves some of the other points. A copy follows its source, so it is never the first.
+    // Solves some of the other points. A copy is never a source, because its own source comes
+    // first.
     AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {

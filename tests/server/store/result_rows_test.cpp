@@ -23,7 +23,7 @@ class ResultRowsTest : public StoreFixture {
     const auto study = study_of(1000);
     commit({study, worker(1), results_of(study, results)});
   }
-  /// A result with these lists.
+  /// Returns a result with elements in all lists.
   static solver::CaseResult listed() {
     auto result = protocol::from_message(solved_point(2));
     result.peaks = {{0.0, 1234.56789012, 2.0, false}, {1.23456789e-5, 12345678.25, -3.5, true}};
@@ -150,7 +150,7 @@ TEST_F(ResultRowsTest, AFailedPointHasAReasonAndNoOutputs) {
 
 TEST_F(ResultRowsTest, AGridTakesLessThan850BytesAPointWithAllIndices) {
   constexpr std::uint64_t kPoints = 20'000;
-  // A contact of ordinary length (mu 0.4, e 0.9): two peaks, four phases, one stick interval.
+  // An ordinary contact (mu 0.4, e 0.9) has two peaks, four phases and one stick interval.
   auto result = listed();
   result.errors = {};
   result.peaks = {{0.000123456789, 1234.56789, 456.789123, true},

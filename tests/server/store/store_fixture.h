@@ -26,28 +26,28 @@ inline Table table(const protocol::Recipe& recipe) {
   return std::make_shared<const protocol::PointTable>(recipe);
 }
 
-/// Ten points with mu from 0 to 1, of which a filter leaves out some.
+/// Returns ten points with mu from 0 to 1, of which a filter leaves out some.
 inline Table filtered_table(const std::string& where) {
   protocol::Recipe recipe = table_of(10)->recipe();
   recipe.mutable_blocks(0)->set_where(where);
   return table(recipe);
 }
 
-/// Ten points, and ten more after them.
+/// Returns ten points followed by ten more.
 inline Table grown_table() {
   protocol::Recipe recipe = table_of(10)->recipe();
   *recipe.add_blocks() = recipe.blocks(0);
   return table(recipe);
 }
 
-/// The numbers from `first` up to, but not including, `end`.
+/// Returns the numbers from `first` to `end` - 1.
 inline std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end) {
   std::vector<std::uint64_t> found(end - first);
   std::iota(found.begin(), found.end(), first);
   return found;
 }
 
-/// A database in its own folder, and access to it as by other programs.
+/// Provides a database in a folder of its own. Tests can also access the file like another program.
 class StoreFixture : public testing::Test {
  protected:
   static AddStudy study_of(Table points, std::uint64_t id = 1, const std::string& name = "a") {
@@ -96,12 +96,12 @@ class StoreFixture : public testing::Test {
   void commit(const std::vector<Change>& changes) { store().commit(changes); }
   void close() { store_.reset(); }
 
-  /// Runs SQL as another program.
+  /// Runs SQL on a connection of its own, like another program.
   void by_hand(const std::string& sql) const { by_hand(path_, sql); }
   static void by_hand(const std::string& path, const std::string& sql) {
     execute(open_database(path, SQLITE_OPEN_READWRITE).get(), sql);
   }
-  /// The rows of a query, the values of each separated by '|'.
+  /// Returns the rows of a query. The values of a row are separated by '|'.
   std::vector<std::string> rows(const std::string& sql) const { return rows(path_, sql); }
   static std::vector<std::string> rows(const std::string& path, const std::string& sql) {
     return rows(open_database(path, SQLITE_OPEN_READONLY).get(), sql);
@@ -118,10 +118,10 @@ class StoreFixture : public testing::Test {
     return found;
   }
   std::int64_t number(const std::string& sql) const { return std::stoll(rows(sql).at(0)); }
-  /// The faults that a check of the whole file finds.
+  /// Returns the faults that a check of the whole file finds.
   std::vector<std::string> faults() const { return faults(path_); }
   static std::vector<std::string> faults(const std::string& path) { return diagnose(path).faults; }
-  /// Why the database cannot be opened.
+  /// Returns why the database cannot be opened.
   std::string refusal() const {
     try {
       Store opened(path_);

@@ -104,7 +104,7 @@ TEST_F(StoreTest, TheStateOfAStudyIsKept) {
   EXPECT_THAT(rows("SELECT DISTINCT changed_at FROM studies"), ElementsAre("later"));
 }
 
-/// `points` points for each of `models` values of k.
+/// Returns `points` points for each of `models` values of k.
 StudyTable table_of_models(std::uint64_t models, std::uint64_t points) {
   return table(protocol::recipe_of(
       {{protocol::range("k", 1e7, 2e7, models), protocol::listed("H", {1.0}),
@@ -113,7 +113,7 @@ StudyTable table_of_models(std::uint64_t models, std::uint64_t points) {
 
 TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
   const AddStudy first{1, "a", table_of_models(11, 2), "now"};
-  // eleven of its models are the same
+  // 11 of its 101 models occur in study 1, too
   const AddStudy second{2, "b", table_of_models(101, 2), "now"};
   commit({first, second, worker(1)});
   commit({solved(first, {8, 0, 2, 4, 6, 10})});
@@ -173,7 +173,7 @@ TEST_F(StoreTest, ADatabaseOfAnotherProgramIsRefusedByName) {
 TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
   commit({study_of(10, 1, "too elastic"), study_of(10, 2, "b"), study_of(3, 3, "c")});
   close();
-  // Other versions may accept an e that this one refuses.
+  // Another version may have accepted an e that this version refuses.
   const protocol::Recipe recipe =
       protocol::recipe_of({{protocol::listed("H", {1.0}), protocol::range("mu", 0.0, 1.0, 10),
                             protocol::listed("e", {1e-4})}});
@@ -232,7 +232,7 @@ class StudyDeletionTest : public StoreFixture {
     close();
     store();
   }
-  /// A study named by its number, whose points are all solved by the worker of that number.
+  /// Adds study "study ID", whose points are all solved by worker ID.
   void add_solved(std::uint64_t id, const Table& points) {
     const AddStudy study = study_of(points, id, "study " + std::to_string(id));
     commit({study, worker(id), solved(study, numbers(0, points->size()), id)});
@@ -245,7 +245,7 @@ class StudyDeletionTest : public StoreFixture {
   std::int64_t rows_in(const std::string& from) const {
     return number("SELECT count(*) FROM " + from);
   }
-  /// Number of steps until all rows are deleted.
+  /// Deletes all rows of deleted studies, at most `most` per step; returns the number of steps.
   int clear_all(std::size_t most) {
     int steps = 1;
     while (store().clear_away(most) != ClearedAway::kAll) {
@@ -276,7 +276,7 @@ TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsAreDeletedInParts) 
   commit({DeleteStudy{1}});
   EXPECT_THAT(store().studies(), SizeIs(1));
   EXPECT_EQ(rows_in("runs"), 50);
-  commit({study_of(4, 3, "study 1")});  // the name is free
+  commit({study_of(4, 3, "study 1")});  // the name is free again
   EXPECT_EQ(store().clear_away(10), ClearedAway::kPart);
   EXPECT_EQ(rows_in("results WHERE study_id = 1"), 90);
   EXPECT_GT(clear_all(10), 9);
@@ -370,7 +370,7 @@ TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
 
 // ---- Tables, views and triggers -----------------------------------------------------------------
 
-/// A database with three solved points, which the tests change as other programs could.
+/// Provides a database with three solved points. The tests change it like another program.
 class SchemaTest : public StoreFixture {
  protected:
   SchemaTest() {
@@ -431,7 +431,7 @@ class StoreFilesTest : public StoreFixture {
   static std::int64_t rows_of(const std::string& path) {
     return std::stoll(rows(path, "SELECT count(*) FROM results").at(0));
   }
-  /// Number of rows in the database file, without its log.
+  /// Returns the number of rows in the database file alone, without its log.
   std::int64_t rows_of_copy(const std::string& name) {
     fs::copy_file(path_, folder_.file(name));
     return rows_of(folder_.file(name));

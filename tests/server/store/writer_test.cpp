@@ -25,7 +25,7 @@ using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 using Kind = WriteReport::Kind;
 
-/// A database that fails on request.
+/// A storage that fails when a test wants it to.
 class TestStorage final : public Storage {
  public:
   void commit(std::span<const Change> changes) override {
@@ -65,7 +65,7 @@ class TestStorage final : public Storage {
     is_interrupted.notify_all();
   }
 
-  /// Called for each change of a commit; an exception makes the commit fail.
+  /// Runs for each change in a commit. An exception makes the commit fail.
   std::function<void(const Change&)> on_change = [this](const Change&) {
     if (is_full) {
       throw StorageError("the disk is full");
@@ -75,10 +75,10 @@ class TestStorage final : public Storage {
   bool is_gone = false;
   bool goes_in_commit = false;
   int merges = 0;
-  int merged_at = 1;  ///< the call of `merge_log` that succeeds
+  int merged_at = 1;  ///< number of the first call of `merge_log` that succeeds
   std::atomic<int> parts_left = 0;
   std::atomic<bool> is_interrupted = false;
-  std::vector<std::size_t> sizes;      ///< of the commits that succeeded
+  std::vector<std::size_t> sizes;      ///< changes per successful commit
   std::vector<std::uint64_t> workers;  ///< added workers
 };
 
@@ -91,7 +91,7 @@ WriteJob answered(std::uint64_t ticket, std::uint64_t study = 1) {
 
 // ---- Groups of changes --------------------------------------------------------------------------
 
-/// Kinds and tickets of reports.
+/// Kind and ticket of each report.
 using Reports = std::vector<std::pair<Kind, std::uint64_t>>;
 
 Reports kinds_and_tickets(const std::vector<WriteReport>& reports) {
@@ -233,9 +233,9 @@ TEST_F(GroupCommitTest, AFailedDeletionStepIsRepeatedWithoutAReport) {
   EXPECT_THAT(reports, IsEmpty());
 }
 
-// ---- The thread ---------------------------------------------------------------------------------
+// ---- The writer on its thread -------------------------------------------------------------------
 
-/// A writer whose reports a test waits for.
+/// Runs a writer on its thread; tests can wait for its reports.
 class WriterTest : public testing::Test {
  protected:
   Kind wait_for_ticket(std::uint64_t ticket) {

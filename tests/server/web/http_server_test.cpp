@@ -1,5 +1,5 @@
-// The HTTP server on loopback sockets, with correct and malicious peers; and the request rules
-// alone.
+// Tests of the HTTP server on loopback sockets, with correct and malicious peers, and of the rules
+// for requests.
 #include "server/web/http/http_server.h"
 
 #include <algorithm>
@@ -36,8 +36,8 @@ using testing::Not;
 
 const std::string kEnd = " HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
-/// Returns the path of a request; /large returns it many times. /wait is answered after `open`;
-/// /wrong and /broken throw; /loud is an endless stream and /quiet one without output.
+/// Answers a request with its path. Special paths: /large has a long body; /wait is answered after
+/// `open`; /wrong and /broken throw; /loud is an endless stream; /quiet is a stream without data.
 class EchoServer {
  public:
   explicit EchoServer(const HttpLimits& limits = {})
@@ -55,10 +55,10 @@ class EchoServer {
     passed_ = passed_.load() + time;
     server_.wake();
   }
-  /// Number of pending answers and streams.
+  /// Returns the number of pending answers and streams.
   long in_progress() const { return token_.use_count() - 1; }
-  static constexpr std::size_t kLargeBytes = 50'000'000;  // more than sockets buffer
-  /// Wakes the server regularly, as its owner does, until that many are in progress.
+  static constexpr std::size_t kLargeBytes = 50'000'000;  // more than socket buffers hold
+  /// Wakes the server again and again, as its owner does, until `count` answers are pending.
   void wake_until_in_progress(long count) {
     while (in_progress() != count) {
       server_.wake();
@@ -94,10 +94,10 @@ class EchoServer {
   std::atomic<bool> is_open_ = false;
   std::atomic<std::chrono::seconds> passed_ = std::chrono::seconds(0);
   std::shared_ptr<int> token_ = std::make_shared<int>();
-  HttpServer server_;  // last: its thread uses the others
+  HttpServer server_;  // the last member, because its thread uses the others
 };
 
-/// A peer that has requested a path and, for a stream, read the head of the answer.
+/// Returns a peer that has requested a path. For a stream or /large it has read the answer's head.
 std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
   auto peer = std::make_unique<RawHttp>(server.url());
   peer->send("GET " + path + kEnd);
@@ -107,7 +107,7 @@ std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path
   return peer;
 }
 
-/// Peers that have sent the beginning of a request.
+/// Returns peers that have sent only the beginning of a request.
 std::vector<std::unique_ptr<RawHttp>> silent_peers(const EchoServer& server, int count,
                                                    const std::string& from = "127.0.0.1") {
   std::vector<std::unique_ptr<RawHttp>> peers;
@@ -185,7 +185,7 @@ TEST(HttpServer, EndsConnectionsThatSendMoreThanAHead) {
 
 TEST(HttpServer, SurvivesAnyBytes) {
   const EchoServer server;
-  std::mt19937 random(7);  // the same bytes in every run
+  std::mt19937 random(7);  // a fixed seed, so every run sends the same bytes
   const std::vector<std::string> stems{"", "GET /%", "GET / HTTP/1.1\r\nContent-Length: ",
                                        "HEAD / HTTP/1.1\r\nHost: localhost\r\nCookie: ",
                                        "GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"};
@@ -254,7 +254,7 @@ TEST(HttpServer, ATooSlowTransferEnds) {
   const auto large = begin(server, "/large");
   RawHttp halting(server.url());
   halting.send("GET / HTTP/1.1\r\n");
-  get(server.url(), "/a");  // all before it were accepted
+  get(server.url(), "/a");  // this answer shows that all earlier connections were accepted
   server.let_pass(limits.idle);
   EXPECT_EQ(halting.read_to_the_end(), "");
   EXPECT_EQ(body_of(uploading.front()->ask(std::string(8192, 'x'))), "/a\n");
@@ -278,7 +278,7 @@ TEST(HttpServer, AClientThatDisconnectsEndsItsPendingAnswerAndItsStream) {
     closing.reset();
     server.wake_until_in_progress(1);
   }
-  // browsers may close their sending half first
+  // Browsers may close their sending direction before they have received the answer.
   for (const std::string path : {"/wait", "/quiet"}) {
     const auto halving = begin(server, path);
     server.wake_until_in_progress(2);
@@ -401,7 +401,7 @@ using Header = std::pair<std::string, std::string>;
 const Header kHost{"host", "localhost:7602"};
 const Header kOrigin{"origin", "http://localhost:7602"};
 
-/// A request to this server.
+/// A request and its expected status.
 struct RequestRow {
   std::string method;
   std::string path;
@@ -418,7 +418,7 @@ void expect_statuses(const std::vector<RequestRow>& rows) {
 
 TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutALimit) {
   expect_statuses({
-      {"GET", "/", {}, 200},  // HTTP/1.0; every browser sends a Host
+      {"GET", "/", {}, 200},  // as in HTTP/1.0; browsers always send Host
       {"HEAD", "/", {kHost}, 200},
       {"GET", "/", {kHost, kHost}, 400},
       {"GET", "/", {kHost, {"host", "evil.example"}}, 400},
@@ -448,7 +448,7 @@ TEST(RequestRules, RefuseRequestsOfOtherSites) {
       {"POST", "/", {kOrigin}, 403},
       {"GET", "/", {kHost, kOrigin}, 200},
       {"GET", "/", {kHost, same}, 200},
-      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // typed into the address bar
+      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // for an address typed by the user
   });
   for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
                                   "http://localhost", "http://localhost:7603", ""}) {

@@ -10,14 +10,14 @@
 
 namespace oblique::server {
 
-/// A TCP connection to an HTTP server on 127.0.0.1, byte by byte.
+/// A TCP connection to an HTTP server on 127.0.0.1, on which tests can send any bytes.
 class RawHttp : public test::RawTcp {
  public:
   using RawTcp::RawTcp;
 
-  /// False if the server accepts no more.
+  /// Sends all bytes; returns false if the server has closed the connection.
   bool send(const std::string& bytes) { return send_all(bytes); }
-  /// Receives until these bytes have arrived; later bytes wait.
+  /// Receives bytes up to and including `end`; later bytes stay in the socket.
   std::string read_until(const std::string& end) {
     std::string all;
     while (!all.ends_with(end)) {
@@ -33,7 +33,7 @@ class RawHttp : public test::RawTcp {
     send(bytes);
     return read_to_the_end();
   }
-  /// Whether the server has sent something or ended the connection.
+  /// Returns true if the server has sent something or ended the connection.
   bool has_news() const {
     pollfd item{number(), POLLIN, 0};
     return ::poll(&item, 1, 0) == 1;
@@ -44,12 +44,12 @@ inline std::string get(const std::string& url, const std::string& path) {
   return RawHttp(url).ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
 }
 
-/// The status; 0 without an answer.
+/// Returns the status of an HTTP answer, or 0 if the text is no answer.
 inline int status_of_answer(const std::string& answer) {
   return answer.starts_with("HTTP/1.") ? std::stoi(answer.substr(answer.find(' ') + 1)) : 0;
 }
 
-/// The body, of which chunks are joined.
+/// Returns the body of an HTTP answer; joins its chunks.
 inline std::string body_of(const std::string& answer) {
   const auto head = answer.find("\r\n\r\n");
   std::string rest = head == std::string::npos ? "" : answer.substr(head + 4);

@@ -1,4 +1,4 @@
-// Snapshots, metrics and health, alone and of a whole server.
+// Tests of snapshots, metrics and health, with and without a whole server.
 #include "server/web/web.h"
 
 #include <array>
@@ -25,7 +25,7 @@
 namespace oblique::server {
 namespace {
 
-/// Ports that accept everything.
+/// A storage that accepts every write.
 class TakingStorage final : public Storage {
  public:
   void commit(std::span<const Change> /*changes*/) override {}
@@ -63,7 +63,7 @@ TEST_F(SnapshotTest, FollowsThePointsOfAStudy) {
   EXPECT_EQ(snapshot().points_leased, leased);
   EXPECT_EQ(workers(snapshot(), WorkerState::kWorking), 1U);
   now_.steady_ms += 700;
-  answer_batch(points.back());  // the last point failed
+  answer_batch(points.back());  // reports the last point as failed
   const Snapshot after = snapshot();
   EXPECT_EQ(after.points_solved, leased - 1);
   EXPECT_EQ(after.points_failed, 1U);
@@ -139,7 +139,7 @@ TEST(Snapshot, WantsThreadsForOpenPointsOnly) {
   Snapshot snapshot;
   EXPECT_EQ(snapshot.threads_wanted(), 0U);
   snapshot.points_open = 1'000'000'000;
-  EXPECT_EQ(snapshot.threads_wanted(), 1U);  // the time of a point is unknown
+  EXPECT_EQ(snapshot.threads_wanted(), 1U);  // one thread while the time per point is unknown
   snapshot.thread_s_per_point = 1e-9;
   EXPECT_EQ(snapshot.threads_wanted(), 1U);
   snapshot.thread_s_per_point = 6e-3;
@@ -152,7 +152,7 @@ TEST(Snapshot, WantsThreadsForOpenPointsOnly) {
 
 struct Metrics {
   std::map<std::string, std::string> types;
-  std::map<std::string, double> values;  ///< by name and labels, as written
+  std::map<std::string, double> values;  ///< keys are names with labels, as printed
 };
 
 Metrics parse(const std::string& text) {
@@ -203,7 +203,7 @@ TEST(Metrics, ShowTheSnapshot) {
   snapshot.refusals.at(static_cast<std::size_t>(RefusalCause::kUnknownKey)) = 7;
   snapshot.database_fault = "disk I/O error";
   auto values = metrics_of(snapshot).values;
-  EXPECT_EQ(values["oblique_threads_wanted"], 10.0);  // 1000 points of 0.6 s in 60 s
+  EXPECT_EQ(values["oblique_threads_wanted"], 10.0);  // 1000 points of 0.6 s within 60 s
   EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"0.1\"}"], 2.0);
   EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"1\"}"], 3.0);
   EXPECT_EQ(values["oblique_commit_duration_seconds_bucket{le=\"+Inf\"}"], 4.0);
@@ -255,7 +255,7 @@ TEST(Web, ReportsThatTheServerStartsBeforeTheLoopRuns) {
 
 class WebTest : public testing::Test {
  protected:
-  /// The answer when the server has started.
+  /// Returns the answer as soon as the server has started.
   std::string get_started(const std::string& path) const {
     std::string answer = get(server_.http_url(), path);
     while (body_of(answer) == "the server is starting\n") {
@@ -276,7 +276,7 @@ TEST_F(WebTest, MetricsFollowTheServer) {
   EXPECT_THAT(get_started("/metrics"),
               testing::HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8"));
   const auto values = [this] { return parse(body_of(get_started("/metrics"))).values; };
-  auto now = values();  // which may be half a second old
+  auto now = values();  // the first values may be half a second old
   while (now["oblique_points_solved_total"] < 20.0) {
     now = values();
   }

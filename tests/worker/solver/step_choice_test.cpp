@@ -25,7 +25,7 @@ TEST(StepChoice, LimitsAreThoseOfTheStiffestSpringOfEachPhase) {
   const double k = model.k_N_m;
   EXPECT_DOUBLE_EQ(limits(1.25, 0.5).compression_s, limit_s(chain, k));
   EXPECT_DOUBLE_EQ(limits(1.25, 0.5).restitution_s, limit_s(chain, 4.0 * k));
-  // A tangential spring stiffer than the normal one.
+  // With these eta2 the tangential spring is stiffer than the normal spring.
   EXPECT_DOUBLE_EQ(limits(0.125, 0.5).compression_s, limit_s(chain, 8.0 * k));
   EXPECT_DOUBLE_EQ(limits(0.125, 0.5).restitution_s, limit_s(chain, 8.0 * k));
   EXPECT_DOUBLE_EQ(limits(0.125, 0.25).restitution_s, limit_s(chain, 16.0 * k));

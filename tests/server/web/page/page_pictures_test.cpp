@@ -1,4 +1,4 @@
-// Slices and bins of a whole server with a pretended worker.
+// Tests of slices and bins from a whole server with a simulated worker.
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -38,15 +38,15 @@ TEST_F(PageStudyTest, ASliceComputesItsPointsFromTheRecipe) {
       EXPECT_EQ(values[row * 4 + column], force_of(row * 8 + column * 2 + 1)) << row << column;
     }
   }
-  // With the axes exchanged the slice is transposed.
+  // A slice with exchanged axes is transposed.
   const Numbers turned = slice_of("z=fn_peak_N&x=H&y=mu&at=e@1");
   EXPECT_EQ(turned.read<float>(56, 12)[1], values[4]);
-  // A line has one row.
+  // A slice along one axis has one row.
   const Numbers line = slice_of("z=fn_peak_N&x=mu&at=H@2,e@0");
   EXPECT_EQ(line.head["ny"], 1);
   EXPECT_EQ(line.head["y"], nullptr);
   EXPECT_EQ(line.read<float>(32, 4)[3], force_of(16 + 6));
-  // At most the requested number of cells is sent.
+  // The server sends at most the requested number of cells.
   const Numbers few = slice_of("z=fn_peak_N&x=mu&y=H&nx=2&ny=2&x0=1&at=e@0");
   EXPECT_EQ(few.head["x"]["all_lines"], false);
   EXPECT_EQ(few.head["x"]["first"], 1);
@@ -76,7 +76,7 @@ TEST_F(PageStudyTest, InADoneStudyPointsWithoutARowAreLeftOut) {
   sqlite3_busy_timeout(edited.get(), 10'000);
   const std::string slice = "/api/studies/1/slice?z=mode&x=mu&y=H&at=e@0";
   EXPECT_EQ(page_.numbers(slice).head["left_out"], 3);
-  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // as if the worker left it out
+  execute(edited.get(), "DELETE FROM results WHERE point = 4");  // makes point 4 look left out
   EXPECT_EQ(page_.numbers(slice).head["left_out"], 4);
   EXPECT_EQ(page_.numbers(slice).head["missing"], 0);
   EXPECT_EQ(page_.json("/api/studies/1/points/4")["left_out"], true);
@@ -101,7 +101,7 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyOpenOnes) {
                      {{protocol::range("H", 0.1, 1.0, 40), protocol::range("mu", 0.0, 2.0, 40),
                        protocol::range("e", 0.5, 1.0, 40)}}));
   solve(200);
-  std::set<std::uint64_t> solved;  // points of whole batches
+  std::set<std::uint64_t> solved;  // includes all points of each batch
   const json stored = page_.json("/api/studies/1/rows?select=point&limit=64000");
   for (const json& row : stored["rows"]) {
     solved.insert(row[0].get<std::uint64_t>());
@@ -195,7 +195,7 @@ TEST_F(PageStudyTest, ASliceMarksCellsThatDoNotMeetACondition) {
   const std::string slice = "/api/studies/1/slice?x=mu&y=H&at=e@1&z=";
   const Numbers some =
       page_.numbers(slice + "fn_peak_N&where=point%20%3E%203%20AND%20fn_peak_N%20%3C%20140000");
-  EXPECT_EQ(some.head["filtered"], 7);  // of 1, 3, ..., 23 all but 5, 7, ..., 13
+  EXPECT_EQ(some.head["filtered"], 7);  // points 1, 3, ..., 23 except 5, 7, ..., 13
   EXPECT_EQ(some.head["solved"], 5);
   const auto bits = some.read<std::uint32_t>(56, 12);
   EXPECT_EQ(bits[1], 0x7fc00004U);
@@ -238,12 +238,12 @@ TEST_F(PageStudyTest, AConditionFollowsTheQueryLanguage) {
     }
     EXPECT_EQ(page_.status("/api/studies/9/" + picture + "&where=1"), 404);
   }
-  // Other errors are reported before any lookup.
+  // A wrong output is an error, too, although the condition is valid.
   EXPECT_EQ(page_.status("/api/studies/1/slice?z=muu&x=mu&where=1"), 400);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mode&where=1"), 400);
 }
 
-/// The query for a slice of the study `grid`.
+/// Returns the query for a slice of the study `grid`.
 protocol::StudyQuery slice_query(const Fields& fields, const protocol::Recipe& recipe) {
   ServiceClient client;
   const PendingAnswer pending = slice_answer(client, 1, fields);

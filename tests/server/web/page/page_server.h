@@ -31,7 +31,7 @@ inline WebSettings page_settings(bool shows_without_token = false) {
   return settings;
 }
 
-/// An answer of the page: a JSON header, then binary numbers.
+/// An answer to the page that consists of a JSON header and binary numbers.
 struct Numbers {
   nlohmann::json head;
   std::string bytes;
@@ -47,7 +47,7 @@ struct Numbers {
   }
 };
 
-/// A whole server, and a browser with access.
+/// Runs a whole server, and simulates a browser that has access to the page.
 class PageServer {
  public:
   explicit PageServer(const WebSettings& web = page_settings(), const std::string& database = {})
@@ -72,10 +72,10 @@ class PageServer {
     return RawHttp(url()).ask(method + " " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" +
                               headers + "\r\n" + body);
   }
-  /// Sends a request as the page does.
+  /// Sends a request with the cookie that the page received.
   std::string get(const std::string& path) const { return ask("GET", path, cookie_header()); }
   int status(const std::string& path) const { return status_of_answer(get(path)); }
-  /// Sends a request without reading the answer.
+  /// Sends a request; the caller reads the answer.
   std::unique_ptr<RawHttp> begin(const std::string& path) const {
     auto browser = std::make_unique<RawHttp>(url());
     browser->send("GET " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" + cookie_header() +
@@ -110,12 +110,12 @@ class PageServer {
   std::string cookie_;
 };
 
-/// The force in the result of `solved_point`.
+/// Returns the peak force in the result of `solved_point`.
 inline float force_of(std::uint64_t point) {
   return static_cast<float>(std::round((1.0 / 3.0 + static_cast<double>(point)) * 1e4 * 1e5) / 1e5);
 }
 
-/// A server with its page, and studies that a simulated worker solves.
+/// Provides a server with its page, and studies that a simulated worker solves.
 class PageStudyTest : public testing::Test {
  protected:
   void submit(const std::string& name, const protocol::Recipe& recipe) {
@@ -130,7 +130,7 @@ class PageStudyTest : public testing::Test {
     worker.hello();
     worker.work(points);
   }
-  /// A grid of 3 H, 4 mu and 2 e.
+  /// Returns a grid of three values of H, four of mu and two of e.
   static protocol::Recipe grid_recipe() {
     return protocol::recipe_of(
         {{protocol::listed("H", {1.0, 0.9, 0.8}), protocol::range("mu", 0.0, 0.6, 4),

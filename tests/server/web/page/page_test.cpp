@@ -1,4 +1,4 @@
-// Access to the page, and its requests to a whole server except for pictures.
+// Tests of access to the page and of its requests, except for pictures, with a whole server.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -129,11 +129,11 @@ TEST_F(PageStudyTest, ATraceIsCancelledWhenItsBrowserDisconnects) {
   worker.hello();
   auto browser = page_.begin("/api/studies/1/points/3/trace");
   while (!worker.receive().has_trace_order()) {
-    // It got its Welcome before.
+    // Skips the welcome.
   }
   browser.reset();
   while (!worker.receive().has_trace_cancel()) {
-    // Nothing else is awaited.
+    // Skips other messages.
   }
 }
 
@@ -206,7 +206,7 @@ TEST(PageToken, ATokenFileIsCreatedForItsOwnerAndReadAgain) {
 
 // ---- Studies, points and rows -------------------------------------------------------------------
 
-/// A study with these values, as the body of a check.
+/// Returns a study with these values, encoded as the body of a request.
 std::string body_with(const std::string& H, const std::string& others = "",
                       const std::string& model = "{}", const std::string& mu = R"("values":[1])",
                       const std::string& where = "") {
@@ -215,7 +215,7 @@ std::string body_with(const std::string& H, const std::string& others = "",
          R"(},{"key":"e","values":[1]}],"where":")" + where + R"("}]}})";
 }
 
-/// The elements of a JSON array by one of their members.
+/// Maps the value of a member to the element of a JSON array that has this value.
 std::map<std::string, json> named(const json& list, const char* member) {
   std::map<std::string, json> found;
   for (const json& element : list) {

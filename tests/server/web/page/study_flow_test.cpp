@@ -1,4 +1,4 @@
-// Answers about a study and the requests for them; the test plays the service.
+// Tests of answers about a study and of the requests for them. The test takes the service's role.
 #include "server/web/answers/study_answers.h"
 
 #include <cstdint>
@@ -23,7 +23,7 @@ using protocol::ClientRequest;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-/// The points of some queries.
+/// Runs some queries and answers with the points that their rows contain.
 class Points : public StudyAnswer {
  public:
   explicit Points(int queries = 1, const std::string& condition = {})
@@ -42,7 +42,7 @@ class Points : public StudyAnswer {
 
 class StudyFlowTest : public testing::Test {
  protected:
-  /// The requests since the last call.
+  /// Returns the requests since the last call.
   std::vector<ClientRequest> requested() {
     std::vector<ClientRequest> requests;
     for (std::vector<std::string> frames = client_.take(); !frames.empty();
@@ -53,7 +53,7 @@ class StudyFlowTest : public testing::Test {
     }
     return requests;
   }
-  /// Numbers of the requests that were ended since the last call, in order.
+  /// Returns the numbers of the queries that were ended since the last call.
   std::vector<std::uint64_t> ended() {
     std::vector<std::uint64_t> numbers;
     for (const ClientRequest& request : requested()) {
@@ -85,7 +85,7 @@ class StudyFlowTest : public testing::Test {
     EXPECT_EQ(requests.at(0).describe().study(), "a");
     reply(requests.at(0).request_id(), described);
   }
-  /// A flow that has sent its first query.
+  /// Returns a pending answer whose first query is sent.
   PendingAnswer described(int queries = 1, const std::string& condition = {}) {
     PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(queries, condition));
     describe(pending);

@@ -1,5 +1,5 @@
-// Accuracy of estimated errors: random points are solved with estimates, and on a mesh so fine that
-// its results count as exact.
+// Measures how accurate estimated errors are. Solves random points with estimates, and again on a
+// mesh so fine that its results count as exact.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -54,7 +54,7 @@ ModelParameters model_of(const Settings& settings, int elements_per_link) {
   return model;
 }
 
-/// H up to 0.96 of the length of the chain, which is 1.15 m for three links.
+/// Returns random points. H is between a sixth and 0.96 of the chain's length.
 std::vector<solver::Point> random_points(const Settings& settings) {
   constexpr double kLeastDrop = 1.0 / 6.0;
   constexpr double kLargestDrop = 0.96;
@@ -85,7 +85,7 @@ Results solve(const ModelParameters& model, const std::vector<solver::Point>& po
   return results;
 }
 
-/// Estimate and true error of one output, in the same unit.
+/// An output: its estimated error, and the difference of two results in the same unit.
 struct Output {
   std::string_view name;
   std::optional<double> ErrorEstimate::*estimate;
@@ -126,7 +126,7 @@ constexpr std::array kOutputs{
                     std::hypot(a.vt_in_m_s, a.vn_in_m_s);
            }}};
 
-/// Smaller errors are rounding.
+/// Errors below this number are due to rounding.
 constexpr double kRounding = 1e-9;
 
 double quantile(std::vector<double> values, double fraction) {
@@ -164,7 +164,7 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
 
 void tell_modes(const Results& results, const Results& truth,
                 const std::vector<ErrorEstimate>& errors) {
-  std::array<std::array<int, 2>, 2> count{};  // [companion has the mode][exact result has it]
+  std::array<std::array<int, 2>, 2> count{};  // [companion agrees][exact result agrees]
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
       const bool right = results[i]->major_mode == truth[i]->major_mode;

@@ -28,7 +28,7 @@ ContactSteps steps_of(const ModelParameters& model, double e_star) {
   return StepChoice(chain, model).contact(e_star);
 }
 
-/// A contact so soft that two elements a link resolve its waves.
+/// Returns a model with a contact so soft that two elements per link resolve its waves.
 ModelParameters soft_model(int elements_per_link) {
   ModelParameters model = coarse_model(elements_per_link);
   model.k_N_m *= 0.01;
@@ -100,7 +100,8 @@ TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheCoarserMeshDoesNot
   };
   EXPECT_NEAR(error(16, far) / error(16, near), 2.0, 1e-9);
   EXPECT_GT(error(4, near), 5.0 * error(16, near));
-  // With resolved waves the estimate is that of order 2 and ratio 2: d/3.
+  // With resolved waves the error is d/3 (order 2), where d is the difference from the coarser
+  // mesh.
   EXPECT_NEAR(error(64, near), 0.01 / 3.0, 1e-5);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), near).mode_same, 1);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), far).mode_same, 0);
@@ -163,7 +164,7 @@ TEST(EstimatedErrors, TwiceTheEstimateBoundsTheDifferenceToAFinerMesh) {
 
 using Outcomes = std::map<std::uint64_t, Outcome>;
 
-/// Outcomes by point; expects that each point is requested and answered once.
+/// Returns outcomes by point number. Expects that each point is requested and answered once.
 Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& falls) {
   Outcomes outcomes;
   std::size_t next = 0;
@@ -176,8 +177,8 @@ Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& f
   return outcomes;
 }
 
-/// Points of several models with two elements a link, more than are solved together. No model
-/// reaches H = 1.1999.
+/// Returns points of several models with two elements per link, more than are solved together. No
+/// model reaches H = 1.1999 m.
 std::vector<FingerPoint> solvable_and_other_points() {
   std::vector<ModelParameters> models(3, coarse_model(2));
   models[1].k_N_m *= 0.5;

@@ -1,4 +1,4 @@
-// Errors of the chosen steps in the outputs of a contact.
+// Tests how large the errors of a contact's outputs are with the chosen steps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,12 +14,12 @@ namespace oblique::solver {
 namespace {
 
 struct Errors {
-  double relative = 0.0;  ///< of peaks (over the largest peak), duration and slide
+  double relative = 0.0;  ///< largest error of peaks, duration and slide
   double stick_s = 0.0;
   double exit_m_s = 0.0;
 };
 
-/// Contacts of one model from one fall, compared with steps six times shorter than by default.
+/// Compares contacts after the same fall with contacts whose steps are six times shorter.
 class Steps {
  public:
   explicit Steps(const ModelParameters& model)
@@ -29,7 +29,7 @@ class Steps {
     reference_ = solved(shorter);
   }
 
-  /// Largest errors at `factor` times the chosen steps.
+  /// Returns the largest errors with steps of `factor` times the chosen length.
   Errors left_by(double factor) const {
     ModelParameters stepped = model_;
     stepped.step_factor = factor;

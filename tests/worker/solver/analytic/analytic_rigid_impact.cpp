@@ -16,7 +16,7 @@ constexpr int kMaxSamples = 2'000'000;
 constexpr int kMaxRegimes = 100;
 constexpr double kRounding = 1e-10;
 
-/// cos(w t) and sin(w t)/w for w^2 of either sign.
+/// Returns cos(w t) and sin(w t)/w. Negative w^2 gives the hyperbolic functions.
 double even_solution(double w_squared, double t) {
   const double w = std::sqrt(std::abs(w_squared));
   return w_squared < 0.0 ? std::cosh(w * t) : std::cos(w * t);
@@ -28,7 +28,7 @@ double odd_solution(double w_squared, double t) {
   }
   return (w_squared < 0.0 ? std::sinh(w * t) : std::sin(w * t)) / w;
 }
-/// Response to a constant force from rest, (1 - cos(w t))/w^2, without cancellation.
+/// Returns (1 - cos(w t))/w^2, the response to a constant force from rest, without cancellation.
 double forced_solution(double w_squared, double t) {
   const double half = odd_solution(w_squared, 0.5 * t);
   return 2.0 * half * half;
@@ -88,7 +88,7 @@ RigidImpact::Motion RigidImpact::begin(const Regime& regime, const Eigen::Vector
 
 double RigidImpact::slip_velocity_m_s(const Motion& motion, double t_s) const {
   const Eigen::Vector2d V = motion.velocity_m_s(t_s);
-  // u_x = -F_t eta2/k, and in slip F_t = -s mu F_n.
+  // The deformation is u_x = -F_t eta2/k, and in slip F_t = -s mu F_n.
   const double F_n_rate = -motion.K_N_m(1, 1) * V[1];
   return V[0] - motion.regime.s * p_.mu * F_n_rate * p_.eta2 / p_.k_N_m;
 }
@@ -97,7 +97,7 @@ RigidImpact::Ending RigidImpact::end_of(const Motion& motion) const {
   struct Watch {
     End end;
     double s;
-    std::function<double(double)> phi;  // the regime ends where it rises through zero
+    std::function<double(double)> phi;  // the regime ends where phi rises through zero
   };
   const Regime& regime = motion.regime;
   std::vector<Watch> watches;
@@ -121,7 +121,7 @@ RigidImpact::Ending RigidImpact::end_of(const Motion& motion) const {
   const double step_s = motion.shortest_period_s() / kSamplesPerPeriod;
   std::vector<double> before;
   for (const Watch& watch : watches) {
-    // A function that starts at zero (to rounding) counts only after it has been negative.
+    // A function that starts at zero, up to rounding, counts only after it has been negative.
     const double scale = watch.end == End::kSeparation || watch.end == End::kSlip
                              ? p_.V0_m_s.norm() * std::sqrt(p_.k_N_m / p_.W_per_kg(1, 1))
                              : p_.V0_m_s.norm();

@@ -6,20 +6,20 @@
 
 namespace oblique::solver {
 
-/// A rigid body that strikes the ground through the local compliant contact, in closed form
-/// (Stronge, Impact Mechanics). Of the body, only the inverse mass at the tip counts,
-/// d(V_t, V_n)/dt = W (F_t, F_n), with W symmetric and positive definite. In each regime the force
-/// is F_0 - K r, where r is the displacement of the tip since the regime began, so that
+/// Closed form of a rigid body that strikes the ground through the local compliant contact
+/// (Stronge, Impact Mechanics). The inverse mass W at the tip, symmetric and positive definite,
+/// describes the body: d(V_t, V_n)/dt = W (F_t, F_n). In each regime the force is F_0 - K r, where
+/// r is the displacement of the tip since the regime began, so that
 ///
-///   r'' = W F_0 - W K r,   K = diag(k/eta2, k_n) in stick,   rows (0, -s mu k_n), (0, k_n) in
-///   slip,
+///   r'' = W F_0 - W K r,
+///   K = diag(k/eta2, k_n) in stick, with the rows (0, -s mu k_n) and (0, k_n) in slip.
 ///
-/// which is solved by eigenmodes. Regimes end at roots of functions of that solution, found by
-/// scanning and bisection. No code is shared with the solver.
+/// Eigenmodes solve this equation. A regime ends at a root of a function of the solution, found by
+/// scanning and bisection. The closed form shares no code with the solver.
 class RigidImpact {
  public:
   struct Parameters {
-    Eigen::Matrix2d W_per_kg;  ///< rows and columns t, n
+    Eigen::Matrix2d W_per_kg;  ///< inverse mass; order t, n
     double k_N_m;
     double eta2;
     double mu;
@@ -29,25 +29,25 @@ class RigidImpact {
   struct Regime {
     bool stick;
     bool compression;
-    double s;     ///< direction in which P slides
+    double s;     ///< direction in which P slides: 1 or -1
     double t0_s;  ///< start
   };
 
   explicit RigidImpact(const Parameters& parameters);
 
   const std::vector<Regime>& regimes() const { return regimes_; }
-  /// For example "SC SR sR".
+  /// Returns the states in order, for example "SC SR sR".
   std::string mode() const;
   double duration_s() const { return duration_s_; }
-  /// Normal force at each end of compression.
+  /// Returns the normal force at the end of each compression.
   const std::vector<double>& fn_peaks_N() const { return fn_peaks_N_; }
   Eigen::Vector2d velocity_out_m_s() const { return V_m_s_; }
   double slide_m() const { return slide_m_; }
   double stick_s() const { return stick_s_; }
-  /// Work of F_n on the body during all compression (negative) and all restitution (positive).
+  /// Work of F_n on the body in all compressions (negative) and in all restitutions (positive).
   double compression_work_J() const { return compression_work_J_; }
   double restitution_work_J() const { return restitution_work_J_; }
-  /// (V_t, V_n) and (F_t, F_n) at t_s in [0, duration_s()].
+  /// Return (V_t, V_n) and (F_t, F_n) at a time from 0 to duration_s().
   Eigen::Vector2d velocity_m_s(double t_s) const;
   Eigen::Vector2d force_N(double t_s) const;
 
@@ -71,7 +71,7 @@ class RigidImpact {
   struct Ending {
     End end;
     double t_s;  ///< since the start of the regime
-    double s;    ///< direction of slip after kSlip
+    double s;    ///< direction in which P slides after kSlip
   };
 
   Motion begin(const Regime& regime, const Eigen::Vector2d& F_N) const;

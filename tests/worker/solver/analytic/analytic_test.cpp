@@ -11,7 +11,7 @@ namespace {
 
 TEST(MittagLeffler, HasKnownValuesAndDerivative) {
   EXPECT_DOUBLE_EQ(mittag_leffler_three_halves(2.0, 0.0), 1.0);
-  // d/dt (t E_{3/2,2}(-t^{3/2})) = E_{3/2,1}(-t^{3/2}).
+  // The derivative of t E_{3/2,2}(-t^{3/2}) by t is E_{3/2,1}(-t^{3/2}).
   const auto f = [](double t) { return t * mittag_leffler_three_halves(2.0, -std::pow(t, 1.5)); };
   for (const double t : {0.5, 1.0, 2.0, 4.0}) {
     EXPECT_NEAR((f(t + 1e-4) - f(t - 1e-4)) / 2e-4,
@@ -28,7 +28,7 @@ TEST(BeamEndOnSpring, HasTheKnownPeak) {
 TEST(BeamEndOnSpring, SatisfiesItsIntegralEquation) {
   const BeamEndOnSpring beam(1.35, 1400.0, 2.6e7, 1.0);
   const double C = std::sqrt(2.0) / (std::pow(1.35, 0.75) * std::pow(1400.0, 0.25));
-  // The half integral of F at t; s = t - u^2 removes the singularity of the root.
+  // Computes the half integral of F at t. With s = t - u^2 the integrand has no singularity.
   constexpr int kIntervals = 1000;
   for (const double t : {10e-6, 50e-6, 90e-6}) {
     double sum = 0.0;
@@ -61,7 +61,7 @@ RigidImpact::Parameters impact(double W_tt, double W_tn, double W_nn) {
 }
 
 TEST(RigidImpact, BallThatSlidesThroughoutIsABilinearOscillator) {
-  // A free particle: W = 1/m, no coupling.
+  // W is that of a free particle, 1/m without coupling.
   const RigidImpact ball(impact(0.5, 0.0, 0.5));
   const double omega = std::sqrt(1e6 * 0.5);
   EXPECT_EQ(ball.mode(), "sC sR");

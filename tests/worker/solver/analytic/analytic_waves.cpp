@@ -7,7 +7,7 @@ namespace oblique::solver {
 double mittag_leffler_three_halves(double b, double z) {
   double sum = 0.0;
   double power = 1.0;
-  // Terms grow up to n of about |z|^(2/3) and then fall faster than exponentially.
+  // Terms grow until n is about |z|^(2/3), and then decrease faster than exponentially.
   for (int n = 0; n < 100; ++n) {
     sum += power / std::tgamma(1.5 * n + b);
     power *= z;
@@ -34,7 +34,7 @@ double BeamEndOnSpring::force_rate_N_s(double t_s) const {
 }
 
 double BeamEndOnSpring::peak_time_s() const {
-  // The time at which the argument is -1 lies before the first maximum.
+  // The first maximum is later than the time at which the argument is -1.
   const double scale_s = std::pow(k_N_m_ * C_, -2.0 / 3.0);
   double low = scale_s;
   double high = scale_s;

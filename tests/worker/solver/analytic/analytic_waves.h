@@ -15,7 +15,7 @@ class BeamEndOnSpring {
 
   double force_N(double t_s) const;
   double force_rate_N_s(double t_s) const;
-  /// The first maximum of the force.
+  /// Returns the time of the first maximum of the force.
   double peak_time_s() const;
   double peak_N() const { return force_N(peak_time_s()); }
 
@@ -27,7 +27,7 @@ class BeamEndOnSpring {
   double V0_m_s_;
 };
 
-/// E_{3/2,b}(z) by its series. Needs |z| <= 20, where cancellation costs at most seven digits.
+/// Returns E_{3/2,b}(z) by its series. For |z| <= 20 cancellation costs at most seven digits.
 double mittag_leffler_three_halves(double b, double z);
 
 /// End of a rod that moves along its axis at V0 and hits a spring of stiffness k at t = 0:

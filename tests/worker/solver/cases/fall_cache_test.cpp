@@ -33,7 +33,7 @@ std::vector<ModelParameters> models_with_E(std::size_t count) {
   return models;
 }
 
-/// A model whose fall fails: after some steps Newton's method does not converge.
+/// Returns a model whose fall fails: Newton's method does not converge after some steps.
 ModelParameters model_that_fails() {
   ModelParameters model = coarse_model();
   model.integrator = Integrator::kGeneralizedAlpha;

@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Models that differ only in parameters on which the fall does not depend.
+/// Returns models that differ only in parameters on which the fall does not depend.
 std::vector<ModelParameters> models_of_one_fall() {
   std::vector<ModelParameters> models(5, coarse_model());
   models[1].k_N_m = 1.3e7;
@@ -67,7 +67,7 @@ TEST(Falls, ReportTheirProgress) {
   const auto outcomes = solve_falls(chains);
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const double turn_m = outcomes[i].fallen->fall().largest_drop_m();
-    // Progress is reported at intervals, so the last report may be slightly below the end.
+    // Progress is reported at intervals, so the last report may be slightly below the largest drop.
     EXPECT_NEAR(chains[i]->fall_progress(), turn_m, 0.02 * turn_m) << i;
     EXPECT_EQ(Finger(chains[i]->model(), chains[i]).drop_so_far_m(), chains[i]->fall_progress());
   }
@@ -119,7 +119,7 @@ TEST(Falls, AFailingFallDoesNotAffectOthers) {
   models[1].E_Pa = -1.0;
   models[2].dt_fall_s = 1e-300;
   models[3].integrator = Integrator::kGeneralizedAlpha;
-  models[3].dt_fall_s = 0.025;  // after some steps Newton's method does not converge
+  models[3].dt_fall_s = 0.025;  // Newton's method does not converge after some steps
   const std::vector<FallOutcome> outcomes = solve_falls(models);
   EXPECT_TRUE(outcomes[0].fallen);
   EXPECT_THAT(outcomes[1].error, HasSubstr("E = -1"));

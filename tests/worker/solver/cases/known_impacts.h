@@ -6,9 +6,9 @@
 
 namespace oblique::solver {
 
-/// One impact of the preset `paper`, from an independent explicit solution converged in the step.
-/// Rounded: forces to 0.01 N, times of phases and contacts to 0.001 us, stick to 0.01 us, slide to
-/// 10 nm.
+/// One impact of the preset `paper`. The values are from an independent explicit solution with
+/// converged steps. Forces are rounded to 0.01 N, times of phases and contacts to 0.001 us, stick
+/// to 0.01 us, slide to 10 nm.
 struct KnownImpact {
   double H_m;
   double mu;
@@ -18,9 +18,9 @@ struct KnownImpact {
   double contact_us;
   std::string mode;
   std::size_t major_peaks;  ///< as published
-  double slide_mm;          ///< negative if not known
+  double slide_mm;          ///< negative if unknown
   double stick_us;
-  double ft_peak_N;  ///< negative if not known
+  double ft_peak_N;  ///< negative if unknown
 };
 
 inline const std::vector<KnownImpact>& known_impacts() {

@@ -12,13 +12,13 @@
 namespace oblique::solver {
 namespace {
 
-/// Allowed relative error at the default step, in addition to rounding of the known value.
+/// Relative error that the default step may cause, in addition to the rounding of the known value.
 constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
 constexpr double kTimeDigit_us = 0.0005;
 constexpr double kStickDigit_us = 0.005;
-/// Allowed error of instants, relative to the duration. Minima of the force are flat, so that the
-/// default tolerance 1e-5 moves the instant of a turn by up to 3.5 ns.
+/// Allowed errors of duration and stick, then of phases, relative to the duration. Minima of the
+/// force are flat, so the default tolerance of 1e-5 moves the instant of a turn by up to 3.5 ns.
 constexpr double kRelativeTime = 3e-6;
 constexpr double kRelativeInstant = 6e-6;
 constexpr double kSlideDigit_mm = 0.000005;
@@ -116,7 +116,7 @@ TEST(KnownImpacts, CloseTheEnergyBalanceToAMillionthOfTheExchangedWork) {
 }
 
 TEST(SolveConvergence, DefaultStepOnTheConvergedMeshGivesTheKnownConvergedImpacts) {
-  // n = 16, 32 and 48 agree to 2 N.
+  // Forces on meshes of 16, 32 and 48 elements agree within 2 N.
   const Finger finger{preset("converged")};
   const CaseResult slip = finger.solve(1.0, 0.4, 1.0);
   const CaseResult stick = finger.solve(1.0, 1.2, 1.0);

@@ -66,8 +66,8 @@ std::vector<CaseResult> solve_by(const LaneKernel& kernel) {
   return results;
 }
 
-/// Instruction sets differ in the number of lanes, and in whether multiply-adds round once or
-/// twice. Rounding errors grow in a contact, most if a state begins at a grazing event.
+/// Instruction sets differ in the number of lanes, and in whether a multiply-add rounds once or
+/// twice. A contact amplifies rounding errors, most of all if a state begins at a grazing event.
 TEST(LaneKernels, InstructionSetsDifferByAmplifiedRoundingOnly) {
   const auto kernels = runnable_lane_kernels();
   const std::vector<CaseResult> expected = solve_by(kernels.back());

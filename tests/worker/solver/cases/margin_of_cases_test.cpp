@@ -1,4 +1,4 @@
-// The margin of whole contacts is small near changes of the mode, and only there.
+// Tests that the margin of whole contacts is small only near changes of the mode.
 #include <random>
 #include <set>
 #include <string>
@@ -10,7 +10,7 @@
 namespace oblique::solver {
 namespace {
 
-/// Two frictions between which the mode changes, and the critical event below and above.
+/// Two coefficients of friction between which the mode changes, and the critical events at them.
 struct Change {
   double H_m;
   double e_star;
@@ -24,7 +24,7 @@ CaseResult solved(const Change& change, double mu) {
   return paper_finger().solve(change.H_m, mu, change.e_star);
 }
 
-/// The friction at which the mode changes.
+/// Returns the coefficient of friction at which the mode changes.
 double threshold(const Change& change) {
   double low = change.low_mu;
   double high = change.high_mu;
@@ -52,7 +52,7 @@ TEST(Margin, FallsLinearlyToZeroOnBothSidesOfAChangeOfMode) {
       const CaseResult far = solved(change, mu * (1.0 + side * 2.0 * kNear));
       EXPECT_EQ(*near.margin_event, side < 0.0 ? change.below : change.above);
       EXPECT_EQ(*far.margin_event, *near.margin_event);
-      // Of the size of the difference in friction.
+      // The margin is of the order of the relative difference in mu.
       EXPECT_GT(*near.margin, 0.03 * kNear);
       EXPECT_LT(*near.margin, 3.0 * kNear);
       EXPECT_NEAR(*far.margin / *near.margin, 2.0, 0.2);

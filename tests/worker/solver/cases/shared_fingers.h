@@ -4,13 +4,13 @@
 
 namespace oblique::solver {
 
-/// The preset `paper`, shared by all tests of a process because its fall takes half a second.
+/// The finger of the preset `paper`. All tests share it, because its fall takes half a second.
 inline const Finger& paper_finger() {
   static const Finger finger{preset("paper")};
   return finger;
 }
 
-/// The preset `paper` with few elements a link, whose fall is fast.
+/// Returns the preset `paper` with few elements per link, so that its fall is solved fast.
 inline ModelParameters coarse_model(int elements_per_link = 1) {
   ModelParameters model = preset("paper");
   model.elements_per_link = elements_per_link;

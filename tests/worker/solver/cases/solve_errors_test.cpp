@@ -37,7 +37,7 @@ std::string model_error(const std::function<void(ModelParameters&)>& change) {
   return message_of<InputError>([&] { Finger{model}; });
 }
 
-/// The error of solving a point of the coarse model after `change`.
+/// Returns the error of solving a point of the coarse model, modified by `change`.
 template <class Error = SolveError>
 std::string solve_error(const std::function<void(ModelParameters&)>& change, double e_star = 1.0) {
   ModelParameters model = coarse_model();
@@ -69,7 +69,7 @@ TEST(SolveErrors, AStepAboveTheStabilityLimitNamesTheLimit) {
               AllOf(HasSubstr("dt_fall = 0.001 s"), HasSubstr("stable up to 1.84")));
   EXPECT_THAT(solve_error<InputError>([](ModelParameters& m) { m.dt_s = 1e-3; }),
               AllOf(HasSubstr("dt = 0.001 s"), HasSubstr("stable up to 1.8")));
-  // The stiffer spring of restitution lowers the limit.
+  // The spring of restitution is stiffer and lowers the limit.
   ModelParameters model = coarse_model();
   model.dt_s = 1e-5;
   EXPECT_NO_THROW(Finger{model}.solve(0.5, 0.4, 1.0));
@@ -126,7 +126,7 @@ TEST(SolveErrors, TheContactFailsForStatesThatAreNotFiniteAndContactsWithoutEnd)
   const ContactParameters parameters{1e6, 1.2, 0.5, 1.0};
   Contact contact(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
   EXPECT_THROW(contact.judge({kNaN, 0.0, 1.0, -1.0}, {}), SolveError);
-  // A tip that sinks forever.
+  // This tip sinks forever.
   Contact sinking(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
   TipState tip{0.0, 0.0, 1.0, -1.0};
   const auto sink = [&] {

@@ -16,7 +16,7 @@ TEST(Impact, AVeryHeavyTipBouncesLikeItsMassAlone) {
   ModelParameters model = coarse_model();
   model.tip_mass_kg = kMass_kg;
   const CaseResult result = Finger{model}.solve(0.3, 0.0, 1.0);
-  // Half a period on the spring. Links of 1.7 kg and gravity change it by one percent.
+  // The contact lasts half a period on the spring, within one percent due to gravity and links.
   EXPECT_NEAR(result.duration_s, M_PI * std::sqrt(kMass_kg / model.k_N_m),
               0.03 * result.duration_s);
   EXPECT_NEAR(result.fn_peak_N, -result.vn_in_m_s * std::sqrt(kMass_kg * model.k_N_m),
@@ -38,8 +38,8 @@ TEST(Impact, WithoutHysteresisRestitutionLosesNoEnergy) {
 }
 
 TEST(Impact, TheLossInRestitutionIsTheSumOverAllCyclesBetweenTurns) {
-  // Compression on the slope k from F_a to F_b takes (F_b^2 - F_a^2)/2k; restitution on the slope
-  // k/e*^2 returns e*^2 of it.
+  // Compression from F_a to F_b along the slope k takes (F_b^2 - F_a^2)/2k. Restitution along the
+  // slope k/e*^2 returns e*^2 times that energy.
   const double e_star = 0.7;
   const CaseResult result = paper_finger().solve(1.0, 0.4, e_star);
   ASSERT_EQ(result.peaks.size(), 3U);
@@ -91,7 +91,7 @@ void expect_finite(const CaseResult& r) {
   }
 }
 
-/// Conditions that hold for every contact.
+/// Expects conditions that every contact fulfils.
 void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_GT(r.duration_s, 0.0);
   EXPECT_GT(r.impulse_n_Ns, 0.0);
@@ -105,7 +105,7 @@ void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_LT(r.energy.closure, worst_closure);
 }
 
-/// Phases alternate and fill the contact, peaks lie between phases, and stick intervals lie inside.
+/// Expects alternating phases that fill the contact, peaks between phases, and stick inside.
 void expect_in_order(const CaseResult& r) {
   ASSERT_EQ(r.phases.size(), 2 * r.peaks.size());
   double t_s = 0.0;
@@ -136,8 +136,8 @@ void expect_in_order(const CaseResult& r) {
   EXPECT_EQ(r.mode.back(), 'R');
 }
 
-/// A random point; in one of six points one value is extreme. H stays below the largest drop, where
-/// the tip has no speed.
+/// Returns a random point; in one of six points one value is extreme. H stays below the largest
+/// drop, at which the tip has no speed.
 Point random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);
@@ -209,8 +209,7 @@ TEST(SolveSweep, ResultsAreFinitePhysicalAndOrderedForRandomModels) {
       {.elements_per_link = 1, .tip_mass_kg = 1e-3},
       {.elements_per_link = 1, .k_N_m = 1e6},
       {.elements_per_link = 1, .k_N_m = 2.7e8},
-      // On a spring four hundred times as stiff as the default the step depends on that spring
-      // only.
+      // This spring is four hundred times as stiff as the default, so it alone determines the step.
       {.elements_per_link = 1, .k_N_m = 1e10, .worst_closure = 1e-3},
       {.elements_per_link = 1, .eta2 = 5.0},
       {.elements_per_link = 1, .eta2 = 0.3},

@@ -17,7 +17,7 @@
 namespace oblique::solver {
 namespace {
 
-/// Points of all kinds of impact, short and long, numbered from 0.
+/// Returns points of all kinds of impact, short and long, numbered from 0.
 std::vector<FingerPoint> points_of(const Finger& finger) {
   std::vector<FingerPoint> list;
   for (const double H_m : {0.3, 0.9, 1.0, 1.04}) {
@@ -89,7 +89,7 @@ TEST(SameBits, OnSeveralThreadsThatShareAFinger) {
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < by_thread.size(); ++i) {
     threads.emplace_back([&, i] {
-      // The first thread solves the fall.
+      // The thread that starts first solves the fall.
       by_thread[i] = i % 2 == 0 ? solved_together(list) : solved_one_by_one(list);
     });
   }
@@ -102,8 +102,8 @@ TEST(SameBits, OnSeveralThreadsThatShareAFinger) {
   }
 }
 
-/// Points in mixed order, numbered from 0: of models that share a fall, of models whose chains have
-/// the same shape, and of other models.
+/// Returns points numbered from 0. Some models share a fall, some have chains of the same shape,
+/// some have nothing in common.
 std::vector<FingerPoint> crowd() {
   std::vector<ModelParameters> models(8, coarse_model());
   models[1].k_N_m = 1.3e7;

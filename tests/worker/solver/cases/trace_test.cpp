@@ -11,7 +11,7 @@
 namespace oblique::solver {
 namespace {
 
-/// Accuracy of the instants of events.
+/// The solver locates events to within this time.
 constexpr double kLocated_s = 1e-13;
 
 struct Traced {
@@ -47,7 +47,7 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
     EXPECT_EQ(first.state[1], 'C');
     const TraceRow& last = t.rows.back();
     EXPECT_EQ(last.t_s, t.result.duration_s);
-    // Separation is located to 1e-13 s, on the spring of restitution.
+    // The tolerance is the change of the restitution spring's force in 1e-13 s.
     const double fn_N = kLocated_s * coarse_finger().model().k_N_m * std::abs(last.vn_m_s) /
                         (t.result.e_star * t.result.e_star);
     EXPECT_NEAR(last.fn_N, 0.0, fn_N);
@@ -66,7 +66,7 @@ TEST(Trace, ForcesStayInsideTheFrictionConeAndOnItInSlip) {
       EXPECT_LE(std::abs(row.ft_N), limit_N + 1e-6);
       if (row.state[0] == 's') {
         EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
-        // P stops at an instant located to 1e-13 s: forces of 1e4 N, accelerations of 1e4 m/s^2.
+        // P stops at an instant exact to 1e-13 s. With 1e4 N and 1e4 m/s^2 this allows 1e-5 W.
         EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction opposes the motion of P";
       }
     }
@@ -81,7 +81,7 @@ TEST(Trace, ForcesFollowFromDeformationsAndPositions) {
       EXPECT_NEAR(row.xP_m, row.x_m - row.ux_m, 1e-15);
       EXPECT_NEAR(row.uy_m, row.y_m + t.result.H_m, 1e-15);
     }
-    // Up to the first turn the normal force is that of the spring in compression.
+    // Until the first turn the normal force is the force of the compression spring.
     for (const TraceRow& row : t.rows) {
       if (row.state[1] == 'R') {
         break;
@@ -101,7 +101,7 @@ TEST(Trace, PIsAtRestInStickAndMovesWithItsVelocityInSlip) {
       const TraceRow& b = t.rows[i];
       slide_m += std::abs(b.xP_m - a.xP_m);
       if (a.state[0] == 'S') {
-        // When sliding begins, P is where the cone requires it, at an instant located to 1e-13 s.
+        // The start of sliding is exact to 1e-13 s, in which P moves by at most `end_m`.
         const double end_m = kLocated_s * (std::abs(b.vt_m_s) + cone * std::abs(b.vn_m_s));
         EXPECT_NEAR(b.xP_m, a.xP_m, b.state[0] == 'S' ? 1e-15 : end_m);
         EXPECT_EQ(a.vP_m_s, 0.0);
@@ -120,7 +120,7 @@ TEST(Trace, ImpulsesAreTheIntegralsOfTheForces) {
       impulse_n_Ns += half_s * (t.rows[i].fn_N + t.rows[i - 1].fn_N);
       impulse_t_Ns += half_s * (t.rows[i].ft_N + t.rows[i - 1].ft_N);
     }
-    // The trapezoidal rule errs by (omega h)^2/12 of the fastest motion seen.
+    // The trapezoidal rule has a relative error of (omega h)^2/12 for the frequency omega.
     EXPECT_NEAR(impulse_n_Ns, t.result.impulse_n_Ns, 5e-3 * t.result.impulse_n_Ns);
     EXPECT_NEAR(impulse_t_Ns, t.result.impulse_t_Ns, 5e-3 * t.result.impulse_n_Ns);
   }
@@ -135,8 +135,8 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
   }
   for (const Traced& t : many) {
     SCOPED_TRACE(t.result.mode);
-    // Rows at distinct instants, so that the two rows of an event count once. In 1e-11 s the force
-    // changes by 1e-4 N.
+    // Keeps rows at distinct instants, so that the two rows of an event count once. The force
+    // changes by 1e-4 N in 1e-11 s.
     std::vector<TraceRow> rows;
     for (const TraceRow& row : t.rows) {
       if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
@@ -200,7 +200,7 @@ TEST(Trace, MomentumChangesByTheImpulsesOfPinContactAndWeight) {
       impulse_y_Ns +=
           half_s * (a.reactions_N[1] + b.reactions_N[1] + a.fn_N + b.fn_N - 2.0 * weight_N);
       largest_Ns = std::max({largest_Ns, std::abs(impulse_x_Ns), std::abs(impulse_y_Ns)});
-      // The trapezoidal rule errs by (omega h)^2/12 of the fastest motion seen.
+      // The trapezoidal rule has a relative error of (omega h)^2/12 for the frequency omega.
       EXPECT_NEAR(b.momentum_x_Ns - first.momentum_x_Ns, impulse_x_Ns, 2e-2 * largest_Ns);
       EXPECT_NEAR(b.momentum_y_Ns - first.momentum_y_Ns, impulse_y_Ns, 2e-2 * largest_Ns);
     }
@@ -219,7 +219,7 @@ Traced with_shape(const ModelParameters& model) {
 TEST(Trace, ShapeIsThatOfAChainFromThePinToTheTip) {
   const ModelParameters model = coarse_model(2);
   for (const TraceRow& row : with_shape(model).rows) {
-    // Three links of two elements: seven nodes.
+    // Three links of two elements have seven nodes.
     ASSERT_EQ(row.nodes_m.size(), 14U);
     EXPECT_EQ(row.nodes_m[0], 0.0);
     EXPECT_EQ(row.nodes_m[1], 0.0);
@@ -245,8 +245,8 @@ TEST(Trace, PeaksOfTheReactionsAgreeWithTheRows) {
         largest_N = std::max(
             largest_N, std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
       }
-      // The peak may lie between two rows, higher by up to (omega h)^2/8 of the fastest motion,
-      // which is a large part of the reaction with one element a link.
+      // A peak between two rows can exceed them by the fraction (omega h)^2/8 of the fastest
+      // vibration, which is a large part of the reaction with one element per link.
       EXPECT_GT(t.result.reaction_peaks[joint].force_N, 0.998 * largest_N);
       EXPECT_LT(t.result.reaction_peaks[joint].force_N, 1.02 * largest_N);
     }
@@ -269,7 +269,7 @@ TraceWithFall traced_with_fall(const Finger& finger, bool with_fall = true) {
   return traced;
 }
 
-/// Falls by explicit steps, by collocation and by generalized-alpha.
+/// Fingers whose falls are solved by explicit steps, by collocation and by generalized-alpha.
 const std::vector<Finger>& fingers() {
   static const std::vector<Finger> list = [] {
     ModelParameters by_steps = coarse_model();

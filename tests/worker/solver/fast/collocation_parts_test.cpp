@@ -25,7 +25,7 @@ ElementConstants<double> constants() {
                            kMassPerLength);
 }
 
-/// A bent and stretched element.
+/// Returns a bent and stretched element.
 ElementCoordinates bent(double more) {
   ElementCoordinates q;
   q << 0.1, 0.9 + more, 0.21, 1.1, 0.05, 0.3, 0.12 - 0.1 * more, -0.2 + more;
@@ -37,7 +37,7 @@ TangentBlocks<double> tangent_of(const ElementCoordinates& q) {
   return element_tangent(pair(0), pair(1), pair(2), pair(3), constants());
 }
 
-/// Dense M + z K of two links with two differently bent elements each. Rows as in Chain.
+/// Dense matrix M + z K of two links with two different bent elements each, with rows as in Chain.
 struct DenseChain {
   static constexpr std::size_t kLinks = 2;
   static constexpr std::size_t kElements = 2;
@@ -148,7 +148,7 @@ TEST(GaussCollocation, DiagonalisesTheSquareOfItsMatrix) {
 }
 
 TEST(CollocationLanes, HalvingTheStepReducesTheErrorAThousandfold) {
-  // A chain so soft that the steps resolve all its vibrations.
+  // The chain is so soft that the steps resolve all its vibrations.
   ModelParameters model = preset("paper");
   model.elements_per_link = 1;
   model.E_Pa = 1e5;

@@ -19,7 +19,7 @@
 namespace oblique::solver {
 namespace {
 
-/// A coarse model with its fall, for solve_contacts().
+/// A coarse model with its fall, as input of solve_contacts().
 struct Coarse {
   ModelParameters model = coarse_model();
   Chain chain{model};
@@ -57,7 +57,7 @@ std::map<std::uint64_t, Outcome> solved(
   return outcomes;
 }
 
-/// Models whose chains have one shape and differ otherwise; one differs from the first in k only.
+/// Returns models whose chains differ but have one shape. The last and the first differ in k only.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());
@@ -67,10 +67,10 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
     models[2].I_m4 *= 1.3;
     models[3].rho_kg_m3 *= 0.9;
     models[3].A_m2 *= 1.1;
-    models[4].k_N_m *= 0.7;  // an equal copy of the chain of the first model
+    models[4].k_N_m *= 0.7;  // its chain equals that of the first model
     std::vector<std::unique_ptr<Coarse>> list;
     for (const ModelParameters& model : models) {
-      list.emplace_back(new Coarse{model});  // in place, because its members point to each other
+      list.emplace_back(new Coarse{model});  // not movable: members point to each other
     }
     return list;
   }();
@@ -167,7 +167,7 @@ TEST(LaneContacts, PeaksOfReactionsFromMomentaAgreeWithThoseFromAccelerations) {
     for (const double mu : {0.0, 0.4, 1.4}) {
       for (const double e_star : {1.0, 0.6, 0.1}) {
         ContactCase one = coarse().contact(cases.size(), cases.size() / 3, mu, e_star, touch);
-        // Steps that resolve the fast vibrations of a link with a single element.
+        // These steps resolve the fast vibrations of a link with a single element.
         one.steps = {0.25 * one.steps.compression_s, 0.25 * one.steps.restitution_s};
         cases.push_back(one);
       }

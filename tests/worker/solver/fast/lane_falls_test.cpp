@@ -34,7 +34,7 @@ FallRequest request_for(const Chain& chain, double accuracy = kAccuracy,
   return {&chain, nullptr, 0.0, accuracy, progress};
 }
 
-/// A chain with its fall, not movable.
+/// A chain with its fall. The type is not movable, because its members refer to each other.
 struct Fallen {
   explicit Fallen(const ModelParameters& model, double accuracy = kAccuracy)
       : chain(model), solved(solve(accuracy)), fall(*solved) {}
@@ -81,7 +81,7 @@ TEST(CollocationFall, TipHasTheKnownStateAtTheDropsOfThePaper) {
   expect_known_falls(paper().chain, paper().fall);
 }
 
-/// Largest differences of time [s] and velocity [m/s] from a fall in small explicit steps.
+/// Largest differences from a fall that was solved in small explicit steps.
 struct Difference {
   double time_s = 0.0;
   double velocity_m_s = 0.0;
@@ -106,7 +106,7 @@ TEST(CollocationFall, AgreesWithSmallStepsForSoftStiffLoadedAndSingleLinks) {
   ModelParameters soft = model_of(2);
   soft.E_Pa *= 1e-4;
   ModelParameters softest = model_of(2);
-  softest.E_Pa *= 1e-5;  // each link sags and swings
+  softest.E_Pa *= 1e-5;  // so soft that each link sags and swings
   ModelParameters stiff = model_of(2);
   stiff.E_Pa *= 100.0;
   ModelParameters loaded = model_of(2);
@@ -168,7 +168,7 @@ TEST(CollocationFall, TipIsAtRestAtTheLargestDrop) {
   EXPECT_LT(paper().tip_at(largest_m - 1e-9).vy_m_s, 0.0);
 }
 
-/// Different chains of one shape, more than any kernel has lanes.
+/// Returns different chains of one shape, more than any kernel has lanes.
 std::deque<Chain> different_chains() {
   std::deque<Chain> chains;
   for (int i = 0; i < 11; ++i) {
@@ -240,7 +240,7 @@ TEST(CollocationFall, InstructionSetsDifferByRoundingOnly) {
 }
 
 TEST(CollocationFall, AFailingFallDoesNotAffectOthers) {
-  // No step reaches an accuracy of 0.
+  // The second request has an accuracy of 0, which no step reaches.
   const Chain chain(model_of(1));
   const std::vector<FallRequest> requests{request_for(chain), request_for(chain, 0.0),
                                           request_for(chain)};

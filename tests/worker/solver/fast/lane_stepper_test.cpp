@@ -19,7 +19,7 @@ struct Shape {
   int elements_per_link;
 };
 
-/// A model of a given shape whose other parameters depend on `number`.
+/// Returns a chain of a given shape whose other parameters depend on `i`.
 Chain chain_number(std::size_t i, const Shape& shape) {
   const double more = static_cast<double>(i);
   ModelParameters model = preset("paper");
@@ -46,13 +46,13 @@ AffineContactForce<double> push_at_tip(const Chain& chain) {
   return force;
 }
 
-/// A stepper with one kernel, and the states of its lanes.
+/// Steps chains in the lanes of one kernel and returns their states.
 class Steps {
  public:
   Steps(const Chain& shape, const LaneKernel& kernel)
       : stepper_(shape.tables(), kernel), accept_(kernel.lanes, 1) {}
 
-  /// Puts a moving chain with a force at its tip into a lane.
+  /// Loads a moving chain with a force at its tip into a lane.
   void load(std::size_t lane, const Chain& chain) {
     ChainState state = chain.at_rest();
     state.v.row(1).setLinSpaced(0.0, -1.0);
@@ -66,7 +66,7 @@ class Steps {
       stepper_.settle(accept_);
     }
   }
-  /// State, integrals and reactions of a lane after a step.
+  /// Returns state, integrals and reactions of a lane after a step.
   std::vector<double> of(std::size_t lane, const Chain& chain) const {
     const std::size_t size = 2 * chain.tables().rows;
     std::vector<double> all(2 * size);
@@ -114,7 +114,7 @@ TEST(LaneStepper, ALaneHasTheSameBitsBesideOtherChainsAndBesideEqualChains) {
   }
 }
 
-/// The state of the reference, ExplicitMotion, after the same steps.
+/// Returns state and integrals of the reference, ExplicitMotion, after `steps` steps.
 std::vector<double> by_reference(const Chain& chain, int steps) {
   const ExplicitMotion motion(chain);
   ChainState state = chain.at_rest();
@@ -147,8 +147,9 @@ TEST(LaneStepper, AgreesWithTheReferenceToRounding) {
         const auto expected = by_reference(last, 20);
         const auto actual = steps.of(kernel.lanes - 1, last);
         for (std::size_t i = 0; i < expected.size(); ++i) {
-          // Rounding of the acceleration of a slope is about 2e-16 E/(rho l^3), 4e-4 1/s^2 at l =
-          // 25 mm. In the 2 us of these steps it changes rates, which are of order 1, by 1e-9.
+          // The acceleration of a slope has a rounding error of about 2e-16 E/(rho l^3), which is
+          // 4e-4 1/s^2 at l = 25 mm. In the 2 us of these steps it changes rates, which are of
+          // order 1, by 1e-9.
           EXPECT_NEAR(actual[i], expected[i], 1e-8 * std::max(1.0, std::abs(expected[i]))) << i;
         }
       }

@@ -10,7 +10,7 @@
 namespace oblique::solver {
 namespace {
 
-/// A result with one element in each list.
+/// Returns a result with one element in each list.
 CaseResult with_lists() {
   CaseResult result{};
   result.peaks = {{1e-5, 4000.0, 2000.0, true}};

@@ -21,8 +21,8 @@ struct Sample {
   Eigen::MatrixXd dense;
 };
 
-/// Random symmetric matrix of half-bandwidth 3 plus `diagonal` times the identity: positive
-/// definite if `diagonal` is large.
+/// Returns a random symmetric matrix of half-bandwidth 3 plus `diagonal` times the identity. It is
+/// positive definite if `diagonal` is large.
 Sample random_matrix(std::size_t rows, double diagonal, std::mt19937_64& generator) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   const auto n = static_cast<Eigen::Index>(rows);
@@ -62,7 +62,7 @@ TEST(BandedCholesky, SolvesAsADenseFactorisationDoes) {
 TEST(BandedCholesky, DetectsAMatrixThatIsNotPositiveDefinite) {
   std::mt19937_64 generator(2);
   for (int trial = 0; trial < 200; ++trial) {
-    // With a diagonal of about 1 and entries up to 1, some matrices are positive definite.
+    // This diagonal makes only some of the matrices positive definite.
     const Sample sample = random_matrix(6, 1.8, generator);
     const double smallest =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(sample.dense).eigenvalues().minCoeff();
@@ -99,7 +99,7 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesEvenWithZerosOnTheDiagonal) {
     for (std::size_t i = 0; i < rows; ++i) {
       for (std::size_t j = i < kBandwidth ? 0 : i - kBandwidth;
            j <= std::min(rows - 1, i + kBandwidth); ++j) {
-        // Every third diagonal entry is zero, as for a multiplier.
+        // Every third diagonal entry is zero, like the entry of a Lagrange multiplier.
         const double value = i == j && i % 3 == 2 ? 0.0 : uniform(generator);
         banded.add(i, j, value);
         dense(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = value;

@@ -19,7 +19,7 @@ const ElementConstants<double>& constants() {
   return of_element;
 }
 
-/// p_i, s_i, p_j, s_j; one column for each direction.
+/// Rows: position and slope of node i, then of node j. Columns: the two directions.
 using Nodes = Eigen::Matrix<double, 4, 2>;
 
 Nodes random_nodes(std::mt19937_64& generator) {
@@ -53,13 +53,13 @@ Nodes energy_gradient(const Nodes& q) {
   return elastic_gradient(q.transpose(), constants()).transpose();
 }
 
-/// Five-point central difference, exact for polynomials up to degree 4 such as the energy.
+/// Returns the derivative at 0 from five points, exact up to degree 4, the degree of the energy.
 template <class Function>
 std::invoke_result_t<Function, double> five_point_difference(const Function& f, double h) {
   return ((f(-2.0 * h) - f(2.0 * h)) + 8.0 * (f(h) - f(-h))) / (12.0 * h);
 }
 
-/// Hermite shape functions and their derivatives of order 0, 1, 2 at x.
+/// Returns the Hermite shape functions at x, or their derivatives of order 1 or 2.
 Eigen::RowVector4d shape(int order, double x) {
   const double l = kLength_m;
   const double z = x / l;
@@ -79,14 +79,14 @@ Eigen::RowVector4d shape(int order, double x) {
   }
 }
 
-/// Nodal values p_i, s_i, p_j, s_j of x^power.
+/// Returns the nodal values p_i, s_i, p_j, s_j of the function x^power.
 Eigen::Vector4d monomial(int power) {
   const auto x_to = [](double x, int n) { return n < 0 ? 0.0 : std::pow(x, n); };
   return {x_to(0.0, power), power * x_to(0.0, power - 1), x_to(kLength_m, power),
           power * x_to(kLength_m, power - 1)};
 }
 
-/// Integral over the element of the derivatives of x^a and x^b.
+/// Integrates the product of the derivatives of x^a and x^b over the element.
 double monomial_integral(int a, int b, int derivatives) {
   double factor = 1.0;
   for (int i = 0; i < derivatives; ++i) {
@@ -122,8 +122,8 @@ TEST(BeamElement, ElasticForceIsMinusTheGradientOfTheStrainEnergy) {
 TEST(BeamElement, RigidMotionsGiveNeitherForceNorEnergy) {
   for (const double angle_rad : {0.0, 0.3, 1.5707, 2.6, -3.0}) {
     const Nodes q = straight_nodes(angle_rad, 0.7, -1.2);
-    // Strains are differences of numbers of size 1, so forces vanish to EA times rounding, and
-    // energies to EA l times the square of rounding.
+    // Strains are differences of numbers of size 1. So rounding gives forces of EA times epsilon,
+    // and energies of EA l times epsilon squared.
     EXPECT_LT(energy_gradient(q).cwiseAbs().maxCoeff(), 1e-14 * kEA_N) << angle_rad;
     EXPECT_LT(energy(q), 1e-26 * kEA_N * kLength_m) << angle_rad;
   }
@@ -150,7 +150,7 @@ TEST(BeamElement, FiveGaussPointsGiveTheExactEnergy) {
       simpson += weight * 0.5 * (kEA_N * strain * strain + kEI_N_m2 * curvature_squared);
     }
     simpson *= kLength_m / kIntervals / 3.0;
-    // The error of Simpson's rule is the fourth power of the interval, 1e-14, times a derivative.
+    // Simpson's rule errs by the fourth power of the interval, 1e-14, times a fourth derivative.
     EXPECT_NEAR(energy(q), simpson, 1e-10 * energy(q));
   }
 }
@@ -194,7 +194,7 @@ TEST(BeamElement, TangentIsTheDerivativeOfTheElasticForceAndSymmetric) {
     for (int column = 0; column < 8; ++column) {
       Nodes direction = Nodes::Zero();
       direction(column / 2, column % 2) = 1.0;
-      // The force is a cubic polynomial, for which five points are exact.
+      // The force is a cubic polynomial, for which a difference of five points is exact.
       const Nodes derivative = five_point_difference(
           [&](double h) -> Nodes { return energy_gradient(q + h * direction); }, 0.01);
       const Eigen::Vector<double, 8> expected = derivative.transpose().reshaped();

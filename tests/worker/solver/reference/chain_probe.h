@@ -8,7 +8,8 @@
 
 namespace oblique::solver {
 
-/// Rows of positions, the pin first. Slopes lie between them, one at a node and two at a joint.
+/// Returns the rows of positions, the pin first. Other rows are slopes: one per node, two per
+/// joint.
 inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   std::vector<Eigen::Index> rows{0};
   const std::size_t links = model.lengths_m.size();
@@ -21,8 +22,8 @@ inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   return rows;
 }
 
-/// Dense matrices of a chain, computed from its energies and accelerations only. Row 0, the pin, is
-/// left out, so entry i belongs to row i + 1. Both directions share the mass matrix.
+/// Computes dense matrices of a chain from energies and accelerations alone. Entry i belongs to row
+/// i + 1, because row 0 is the fixed pin. Both directions have the same mass matrix.
 class ChainProbe {
  public:
   explicit ChainProbe(const Chain& chain) : chain_(chain) {
@@ -31,7 +32,7 @@ class ChainProbe {
     gravity_.resize(n, 2);
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j <= i; ++j) {
-        // T(i + j) - T(i) - T(j) = M_ij, and T(i) = M_ii/2.
+        // The kinetic energy T of unit velocities gives M_ij = T(i + j) - T(i) - T(j).
         const double entry =
             i == j ? 2.0 * kinetic({i, i}) : kinetic({i, j}) - kinetic({i, i}) - kinetic({j, j});
         mass_(i, j) = entry;
@@ -50,19 +51,19 @@ class ChainProbe {
   const Eigen::MatrixXd& mass() const { return mass_; }
   const Pairs& gravity() const { return gravity_; }
 
-  /// Accelerations of the free rows.
+  /// Returns the accelerations of all rows except the pin.
   Pairs accelerations(const Coordinates& q, double ft_N, double fn_N) const {
     Coordinates a(2, q.cols());
     chain_.accelerations(q.data(), ft_N, fn_N, a.data());
     return a.rightCols(mass_.rows()).transpose();
   }
 
-  /// -dU/dq, computed as M q'' - Q.
+  /// Returns the elastic force -dU/dq, computed as M q'' - Q.
   Pairs elastic_force(const Coordinates& q) const {
     return mass_ * accelerations(q, 0.0, 0.0) - gravity_;
   }
 
-  /// A randomly deformed state at rest, with the pin at the origin.
+  /// Returns the coordinates of a randomly deformed chain with the pin at the origin.
   Coordinates random_coordinates(std::mt19937_64& generator, double size) const {
     std::uniform_real_distribution<double> uniform(-size, size);
     Coordinates q = chain_.at_rest().q;

@@ -29,7 +29,7 @@ double length_m(const ModelParameters& model) {
   return std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
 }
 
-/// Rotates the straight chain about the pin.
+/// Returns the coordinates of the straight chain, rotated about the pin.
 Coordinates turned(const Chain& chain, double angle_rad) {
   Coordinates q = chain.at_rest().q;
   q.row(1) = std::sin(angle_rad) * q.row(0);
@@ -51,7 +51,7 @@ TEST(Chain, ElasticForceIsMinusTheGradientOfTheStrainEnergy) {
           moved(i) += h;
           return chain.strain_energy_J(moved);
         };
-        // The energy is a polynomial of degree 4, for which five points are exact.
+        // The energy is a polynomial of degree 4, for which a difference of five points is exact.
         const double h = 0.05;
         const double gradient =
             ((energy(-2 * h) - energy(2 * h)) + 8 * (energy(h) - energy(-h))) / (12 * h);
@@ -83,23 +83,23 @@ TEST(Chain, RigidRotationAboutThePinGivesNeitherForceNorEnergy) {
   for (const double angle_rad : {-1.5, -0.4, 0.9, 3.0}) {
     const Coordinates q = turned(chain, angle_rad);
     EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-    // Compared with 3.7e7 N at a strain of 1.
+    // A strain of 1 would give a force of 3.7e7 N.
     EXPECT_LT(probe.elastic_force(q).cwiseAbs().maxCoeff(), 1e-5);
   }
 }
 
 TEST(Chain, JointsRotateFreely) {
-  // Folding the outer one of two equal links stores no energy.
+  // Folding the outer link back onto the inner link, which is as long, stores no energy.
   ModelParameters model = preset("paper");
   model.lengths_m = {0.4, 0.4};
   model.elements_per_link = 1;
   const Chain chain(model);
   Coordinates q = chain.at_rest().q;
-  // Rows: pin, slope, slope at the joint, joint, slope after the joint, tip, slope.
+  // The rows are: pin, slope, slope at the joint, joint, slope after the joint, tip, slope.
   ASSERT_EQ(chain.rows(), 7);
   q.rightCols<3>() << 0.0, 0.4, 0.0, 1.0, 0.4, 1.0;
   EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-  // Rotating the slope before the joint instead bends the inner link.
+  // Rotating the slope before the joint bends the inner link, which stores energy.
   q.col(2) << 0.0, 1.0;
   EXPECT_GT(chain.strain_energy_J(q), 1.0);
 }
@@ -122,7 +122,7 @@ TEST(Chain, TurningAboutThePinItHasTheMomentOfInertiaOfARod) {
   model.tip_mass_kg = 0.3;
   const Chain chain(model);
   const double L = length_m(model);
-  // omega = 2 rad/s: velocities are the coordinates turned by a right angle, slopes included.
+  // At 2 rad/s, velocities are twice the coordinates rotated by a right angle, slopes included.
   const Coordinates v = 2.0 * turned(chain, 0.5 * M_PI);
   const double inertia = model.rho_kg_m3 * model.A_m2 * L * L * L / 3.0 + model.tip_mass_kg * L * L;
   EXPECT_NEAR(chain.kinetic_energy_J(v), 0.5 * inertia * 4.0, 1e-12 * inertia);
@@ -166,7 +166,7 @@ TEST(ChainFrequency, IsTheLargestEigenvalueOfTheNumericalJacobian) {
           jacobian.col(j) = Eigen::Map<const Eigen::VectorXd>(column.data(), size);
         }
         const double dense = std::sqrt(-jacobian.eigenvalues().real().minCoeff());
-        // The difference quotient of a cubic has an error of h^2, here 1e-8.
+        // The difference quotient of a cubic polynomial has an error of h^2 = 1e-8.
         EXPECT_NEAR(chain.highest_frequency_rad_s(stiffness_N_m), dense, 1e-6 * dense)
             << links << " links, n = " << n << ", k = " << stiffness_N_m;
       }
@@ -175,7 +175,7 @@ TEST(ChainFrequency, IsTheLargestEigenvalueOfTheNumericalJacobian) {
 }
 
 TEST(ChainFrequency, GivesTheKnownStabilityLimitsOfVerlet) {
-  // Delta t = 2/omega to the known digits, with the printed cross-section.
+  // The limit is 2/omega. The known values hold for the cross-section as printed in the paper.
   struct Known {
     int elements_per_link;
     double dt_s;

@@ -9,8 +9,8 @@
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 
-/// The constrained chain and generalized-alpha compared with the eliminated chain, which is the
-/// same system in other coordinates.
+/// Compares the constrained chain and generalized-alpha with the chain whose joints are eliminated.
+/// Both describe the same system in different coordinates.
 namespace oblique::solver {
 namespace {
 
@@ -57,8 +57,8 @@ TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedChain) {
 }
 
 TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
-  // For every displacement dq, dq . (Phi_qᵀ lambda) = lambda . Phi(dq): a joint exerts opposite
-  // forces on its two links, and only the pin exerts an external force.
+  // dq . (Phi_qᵀ lambda) = lambda . Phi(dq) for every displacement dq, because a joint exerts
+  // opposite forces on its two links. Only the pin exerts an external force.
   const ConstrainedChain chain(three_links());
   std::mt19937_64 generator(2);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);

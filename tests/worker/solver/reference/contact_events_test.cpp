@@ -18,7 +18,7 @@ using testing::ElementsAre;
 constexpr ContactParameters kParameters{1e6, 1.2, 0.5, 0.8};
 constexpr double kStep_s = 1e-4;
 
-/// A motion of the tip as functions of time from 0 to one step.
+/// Motion of the tip. Each function takes a time from 0 to the end of a step.
 struct TipMotion {
   std::function<double(double)> x;
   std::function<double(double)> y;
@@ -31,7 +31,7 @@ struct TipMotion {
   }
 };
 
-/// V_n = a + b z + c z^2 and V_t = 1 throughout, z in [0, 1] over the step.
+/// Returns a motion with V_t = 1 and V_n = a + b z + c z^2; z goes from 0 to 1 in the step.
 TipMotion with_normal_velocity(double a, double b, double c) {
   const double h = kStep_s;
   return {[](double t) { return t; },
@@ -58,7 +58,7 @@ ContactLaw sticking() {
   return ContactLaw(kParameters, {0.0, 0.0, 0.1, -1.0});
 }
 
-/// In restitution with F_n = 10 N at y = -1e-5.
+/// Returns a law in restitution, with F_n = 10 N at y = -1e-5.
 ContactLaw restitution(bool stick) {
   ContactLaw law = stick ? sticking() : slipping();
   law.turn({0.0, -1e-5, 1.0, 0.0});
@@ -92,7 +92,7 @@ TEST(ContactEvents, RatesAreTheDerivativesOfTheFunctionsDefinedByForces) {
       const auto value = [&](double z) {
         return event_function(law, event, motion.at(z), 1.0).value;
       };
-      // Forces are affine in time here, so that the difference quotient has only rounding errors.
+      // Forces are affine in time here, so the difference quotient has only rounding errors.
       EXPECT_NEAR(event_function(law, event, motion.at(0.5), 1.0).rate,
                   (value(1.0) - value(0.0)) / kStep_s, 1e-3);
     }
@@ -160,11 +160,11 @@ TEST(GuessEvent, ATurnIsWhereVnRisesThroughZero) {
 }
 
 TEST(GuessEvent, AForceThatFallsToZeroAlongACubicIsFoundExactly) {
-  // In restitution F_n = 10 N - k_n (y + 1e-5), k_n = 1e6/0.64; zero at y = -3.6e-6.
+  // In restitution F_n = 10 N - k_n (y + 1e-5) with k_n = 1e6/0.64, so F_n is zero at y = -3.6e-6.
   const ContactLaw law = restitution(false);
   const TipMotion motion = with_normal_velocity(0.03, 0.04, 0.03);
   const auto found = guess(law, ContactEvent::kSeparation, motion);
-  // It does not reach zero within this step ...
+  // F_n does not reach zero in this step ...
   EXPECT_FALSE(found);
   const TipMotion faster = with_normal_velocity(0.1, 0.04, 0.03);
   const auto separation = guess(law, ContactEvent::kSeparation, faster);
@@ -173,7 +173,7 @@ TEST(GuessEvent, AForceThatFallsToZeroAlongACubicIsFoundExactly) {
 }
 
 TEST(GuessEvent, AFunctionThatIsZeroThroughoutIsNoEvent) {
-  // A tip that never moves along the ground.
+  // The tip never moves along the ground.
   const TipMotion straight_down{[](double) { return 0.0; }, [](double t) { return -1e-5 - t; },
                                 [](double) { return 0.0; }, [](double) { return -1.0; }};
   ContactParameters smooth = kParameters;

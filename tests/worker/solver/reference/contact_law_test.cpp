@@ -12,7 +12,7 @@ namespace {
 constexpr ContactParameters kParameters{2.7e7, 1.25, 0.5, 0.7};
 constexpr TipState kTouch{0.6, -1.0, -3.0, -2.0};
 
-/// A law after `turns` turns, in slip or stick, with nonzero anchors.
+/// Returns a law in slip or stick after `turns` turns, with anchors that are not zero.
 ContactLaw law_after(int turns, bool stick) {
   TipState tip{0.6, -1.0, stick ? -0.5 : -3.0, -2.0};
   ContactLaw law(kParameters, tip);
@@ -49,7 +49,7 @@ TEST(ContactLaw, TouchBeginsInCompressionWithoutForces) {
 }
 
 TEST(ContactLaw, SticksAtTouchExactlyIfTheTipMovesSteeplyEnoughForTheFriction) {
-  // |V_t/V_n| < mu eta2 = 0.625.
+  // The tip sticks if |V_t/V_n| < mu eta2 = 0.625.
   EXPECT_TRUE(ContactLaw(kParameters, {0.0, 0.0, 0.6249, -1.0}).is_stick());
   EXPECT_TRUE(ContactLaw(kParameters, {0.0, 0.0, -0.6249, -1.0}).is_stick());
   EXPECT_FALSE(ContactLaw(kParameters, {0.0, 0.0, 0.625, -1.0}).is_stick());
@@ -100,7 +100,7 @@ TEST(ContactLaw, ForcesAreContinuousWhenPStartsToSlideInEitherDirection) {
     ContactLaw law(kParameters, {0.0, 0.0, -0.1 * side, -1.0});
     ASSERT_TRUE(law.is_stick());
     TipState tip{0.0, -1e-4, -0.1 * side, -1.0};
-    // Displaced until F_t = side mu F_n.
+    // Moves the tip until F_t = side mu F_n.
     tip.x_m = -side * kParameters.mu * law.fn_N(tip) / law.tangential_stiffness_N_m();
     const double fn_N = law.fn_N(tip);
     const double ft_N = law.ft_N(tip);
@@ -132,7 +132,7 @@ TEST(ContactLaw, RatesAreTheDerivativesOfTheForcesAlongTheMotion) {
       return TipState{tip.x_m + t_s * tip.vx_m_s, tip.y_m + t_s * tip.vy_m_s, tip.vx_m_s,
                       tip.vy_m_s};
     };
-    // Forces are affine in positions, so that the central difference has only rounding errors.
+    // Forces are affine in positions, so the central difference has only rounding errors.
     const double fn_rate = (law.fn_N(moved(h_s)) - law.fn_N(moved(-h_s))) / (2.0 * h_s);
     const double ft_rate = (law.ft_N(moved(h_s)) - law.ft_N(moved(-h_s))) / (2.0 * h_s);
     EXPECT_NEAR(law.fn_rate_N_s(tip), fn_rate, 1e-8 * kParameters.k_N_m);

@@ -16,14 +16,14 @@ namespace oblique::solver {
 namespace {
 
 constexpr ContactParameters kParameters{1e6, 1.25, 0.5, 1.0};
-/// F_t = -kTangential_N_m x in stick.
+/// Tangential stiffness in stick: F_t = -kTangential_N_m x.
 constexpr double kTangential_N_m = 1e6 / 1.25;
 
 constexpr TipState at(double x_m, double y_m) {
   return {x_m, y_m, 0.0, 0.0};
 }
 
-/// A contact that the test advances step by step: law, record and position of the tip.
+/// Advances a contact step by step: law, record and position of the tip.
 struct RecordedContact {
   explicit RecordedContact(double vt_in_m_s)
       : tip{0.0, 0.0, vt_in_m_s, -1.0}, law(kParameters, tip), record(law, tip) {}
@@ -76,7 +76,7 @@ TEST(ContactRecord, StickThroughATurnIsOneInterval) {
 TEST(ContactRecord, AStateOfZeroDurationIsNotInTheMode) {
   RecordedContact contact(kSliding_m_s);
   contact.step_to(at(1e-6, -1e-4));
-  contact.turn(1e-4);   // sR, of zero duration
+  contact.turn(1e-4);   // a phase sR of zero duration
   contact.stick(1e-4);  // SR
   contact.step_to(at(1e-6, 0.0));
   const CaseResult result = contact.finished(2e-4);
@@ -101,7 +101,7 @@ TEST(ContactRecord, TheTangentialForceOfAPeakIncludesAdjacentValleys) {
   RecordedContact contact(kSticking_m_s);
   contact.step_to(at(-4e-5, -1e-4));
   contact.turn(1e-4);
-  contact.step_to(at(-5e-5, -5e-5));  // the valley, with the largest |F_t|
+  contact.step_to(at(-5e-5, -5e-5));  // a minimum of F_n, where |F_t| is largest
   contact.turn(2e-4);
   contact.step_to(at(-1e-5, -8e-5));
   contact.turn(3e-4);
@@ -122,7 +122,7 @@ TEST(ContactRecord, ExchangedWorkIsTheSumOfAbsoluteValuesInBothDirections) {
   integrals.work_t = -0.375;
   contact.step_to(at(0.0, 0.0), integrals);
   const CaseResult result = contact.finished(2e-4);
-  // F_n = 1e6 N/m * 1e-3 m: half a joule in each direction, besides the tangential work.
+  // F_n of 1e6 N/m * 1e-3 m exchanges half a joule in each direction. The tangential work is added.
   EXPECT_DOUBLE_EQ(result.energy.exchanged_J, 0.5 + 0.5 + 0.25 + 0.375);
   EXPECT_DOUBLE_EQ(result.energy.friction_J, 0.125);
   EXPECT_NEAR(result.energy.restitution_J, 0.0, 1e-15);
@@ -190,15 +190,15 @@ TEST(WithoutRipples, TheRestAlternatesBeginsAndEndsWithAPeakAndContainsTheLarges
 
 constexpr double k_N_m = 1e6;
 constexpr double kEta2 = 1.25;
-constexpr double kStep_s = 0.97e-6;  // so that events lie inside steps
+constexpr double kStep_s = 0.97e-6;  // no event is at the end of a step
 
-/// Half a period in which V_n goes from -1 to 1 m/s.
+/// Returns the tip's state during half a period, in which V_n goes from -1 to 1 m/s.
 TipState half_period(double t_s, double vt_m_s) {
   constexpr double kRate = M_PI / 1e-4;
   return {vt_m_s * t_s, -std::sin(kRate * t_s) / kRate, vt_m_s, -std::cos(kRate * t_s)};
 }
 
-/// V_n rises from -1 m/s to `nearest` below zero within 50 us and falls back to -1 m/s.
+/// Returns a tip whose V_n rises from -1 m/s to -`nearest_m_s` in 50 us and falls back to -1 m/s.
 TipState grazing(double t_s, double nearest_m_s) {
   constexpr double kRate = 2.0 * M_PI / 1e-4;
   const double amplitude = 0.5 * (1.0 - nearest_m_s);
@@ -255,8 +255,8 @@ TEST(ContactMargin, AtTouchIsTheDistanceBetweenStickAndSlip) {
 }
 
 TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsOne) {
-  // It turns once and leaves at the speed of touch. Without friction P never sticks, so stick does
-  // not count.
+  // The contact turns once and ends at the speed of touch. Stick does not count, because P never
+  // sticks without friction.
   const Contact contact = followed([](double t_s) { return half_period(t_s, 1e-9); }, 0.0, 1e-3);
   ASSERT_TRUE(contact.finished());
   EXPECT_EQ(contact.margin().nearest(100.0).distance, 1.0);
@@ -264,7 +264,7 @@ TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsOne) {
 
 constexpr double kDuration_s = 3.0;
 
-/// Mean of sin over an interval, from its integral.
+/// Returns the mean of the sine over an interval.
 double mean_of_sine(double begin, double end) {
   return end > begin ? (std::cos(begin) - std::cos(end)) / (end - begin) : std::sin(begin);
 }
@@ -281,7 +281,7 @@ TEST(ReactionPeaks, MeansOverIntervalsGiveThePeakOfTheFunction) {
     add(peaks, t_s + kSpan_s, kSpan_s, 7.0 * mean_of_sine(t_s, t_s + kSpan_s));
   }
   const ReactionPeak peak = peaks.peaks().at(0);
-  // The mean is lower by (0.2)^2/24 = 1.7e-3; the remaining error is of order 4.
+  // Means are lower than the peak by (0.2)^2/24 = 1.7e-3. Corrected means have an error of order 4.
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 1e-4);
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 1e-3);
 }
@@ -290,7 +290,7 @@ TEST(ReactionPeaks, ValuesAtInstantsGiveThePeakBetweenThem) {
   ReactionPeaks peaks(1);
   for (double t_s = 0.0; t_s < kDuration_s; t_s += 0.2) {
     add(peaks, t_s, 0.0, 7.0 * std::sin(t_s));
-    add(peaks, t_s, 0.0, 7.0 * std::sin(t_s));  // both sides of an event
+    add(peaks, t_s, 0.0, 7.0 * std::sin(t_s));  // repeated, like the two rows of an event
   }
   const ReactionPeak peak = peaks.peaks().at(0);
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 2e-4);
@@ -322,7 +322,8 @@ TEST(ReactionPeaks, TheLargestOfSeveralPeaksCounts) {
 }
 
 TEST(ReactionPeaks, APeakBetweenInstantsCountsEvenIfAnInstantOfAnotherPeakIsHigher) {
-  // The instants contain the top of 1 - (t - 1)^2, but are 0.1 beside that of 1.005 - (t - 3.1)^2.
+  // The top of 1 - (t - 1)^2 is at an instant. The top of 1.005 - (t - 3.1)^2 is 0.1 from any
+  // instant.
   ReactionPeaks peaks(1);
   for (int i = 0; i <= 20; ++i) {
     const double t_s = 0.2 * i;

@@ -11,13 +11,13 @@
 #include "tests/worker/solver/reference/rigid_tip_motion.h"
 #include "worker/solver/reference/solve_contact.h"
 
-/// The contact with a rigid body, compared with the closed form.
+/// Compares the contact of a rigid body with its closed form.
 namespace oblique::solver {
 namespace {
 
 constexpr double k_N_m = 1e6;
 
-/// Time of one radian of the oscillation of 1 kg on the spring of compression.
+/// Time in which 1 kg on the spring of compression oscillates by one radian.
 const double radian_s = 1.0 / std::sqrt(k_N_m);
 
 RigidImpact::Parameters impact(double W_tt, double W_tn, double W_nn, double mu, double e_star,
@@ -36,7 +36,7 @@ CaseResult solved(const RigidImpact::Parameters& p, double step_radians = 2e-3,
                   const Tracing::Sink& trace = {}) {
   const RigidTipMotion motion(p.W_per_kg);
   const double dt_s = step_radians * radian_s;
-  // Restitution is 1/e* times faster.
+  // Oscillations in restitution are 1/e* times faster.
   return solve_contact(motion, {p.k_N_m, p.eta2, p.mu, p.e_star}, {dt_s, dt_s * p.e_star},
                        motion.moving(p.V0_m_s), {trace, false});
 }
@@ -49,7 +49,7 @@ double stick_s(const CaseResult& result) {
   return sum;
 }
 
-/// Local maxima of |F_t| in the closed form, by sampling.
+/// Returns the local maxima of |F_t| in the closed form, found by sampling.
 std::vector<double> tangential_maxima_N(const RigidImpact& exact) {
   constexpr int kSamples = 5000;
   std::vector<double> maxima_N;
@@ -66,7 +66,7 @@ std::vector<double> tangential_maxima_N(const RigidImpact& exact) {
   return maxima_N;
 }
 
-/// Step of 2e-3 rad, at which order 4 gives errors of 1e-11.
+/// Compares with the closed form at a step of 2e-3 rad, where order 4 gives errors of 1e-11.
 void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-9) {
   const RigidImpact exact(p);
   const CaseResult result = solved(p);
@@ -85,7 +85,7 @@ void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-
   const std::vector<double> maxima_N = tangential_maxima_N(exact);
   ASSERT_EQ(result.ft_peaks.size(), maxima_N.size());
   for (std::size_t i = 0; i < maxima_N.size(); ++i) {
-    // Samples locate kinks only to a 5000th of the duration.
+    // Sampling locates kinks of F_t only to a 5000th of the duration.
     EXPECT_NEAR(result.ft_peaks[i].ft_N, maxima_N[i], 2e-3 * force_N);
   }
   const Eigen::Vector2d impulse = p.W_per_kg.inverse() * (exact.velocity_out_m_s() - p.V0_m_s);
@@ -113,7 +113,7 @@ TEST(ContactOfARigidBody, AgreesWithTheClosedFormForRandomBodies) {
 }
 
 TEST(ContactOfARigidBody, SlidingStopsSticksAndReverses) {
-  // Coupling reverses the slip before separation.
+  // The tangential spring reverses the slip before separation.
   const auto p = impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0);
   std::vector<double> directions;
   solved(p, 2e-3, [&directions](const TraceRow& row) {
@@ -137,14 +137,14 @@ TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
   };
   for (const auto& p :
        {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0), impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
-    // The position of events within steps differs, so the ratio scatters around 16.
+    // Halving the step divides the error by about 16, depending on where events lie within steps.
     EXPECT_GT(error(p, 0.2) / error(p, 0.05), 11.3 * 11.3);
     EXPECT_GT(error(p, 0.1) / error(p, 0.025), 11.3 * 11.3);
   }
 }
 
 TEST(ContactOfARigidBody, ABallWithEqualStiffnessesSticksUntilSeparationOnTheFrictionCone) {
-  // Both forces reach zero together, so separation and both slips coincide. Separation comes first.
+  // Both forces reach zero together. Separation and both slips coincide; separation comes first.
   const auto p = impact(1.0, 0.0, 1.0, 2.0, 1.0, 0.5, -1.0, 1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "SC SR");
@@ -157,14 +157,14 @@ TEST(ContactOfARigidBody, ABallWithEqualStiffnessesSticksUntilSeparationOnTheFri
 }
 
 TEST(ContactOfARigidBody, ATurnAtTheEndOfSlidingComesFirstAndSlidingMayContinue) {
-  // V_t = V_n = 0 together. In restitution the relaxing tangential spring keeps P sliding if
-  // eta2/e*^2 > W_tt/W_nn; otherwise P sticks.
+  // V_t and V_n reach zero together. In restitution the relaxing tangential spring keeps P sliding
+  // if eta2/e*^2 > W_tt/W_nn; otherwise P sticks.
   const CaseResult driven = solved(impact(1.5, 0.0, 1.0, 0.4, 0.8, 0.6, -1.0));
   EXPECT_EQ(driven.mode, "sC sR");
   EXPECT_NEAR(driven.vt_out_m_s, 0.6 - 0.4 * 1.5 * 1.8, 1e-9);
   const CaseResult resting = solved(impact(1.5, 0.0, 1.0, 0.4, 1.0, 0.6, -1.0));
   EXPECT_GT(resting.stick_total_s, radian_s);
-  // Rounding may cause several turns within 1e-13 s: ripples without height.
+  // Rounding may cause several turns within 1e-13 s, which are ripples without height.
   EXPECT_EQ(std::count_if(resting.peaks.begin(), resting.peaks.end(),
                           [](const Peak& peak) { return peak.major; }),
             1);
@@ -182,7 +182,7 @@ TEST(ContactOfARigidBody, CoincidingEventsGiveTheLimitOfSuccessiveEvents) {
 }
 
 TEST(ContactOfARigidBody, WithoutFrictionPFollowsTheTip) {
-  // Coupling pulls the tip back, so P slides forwards, reverses and slides backwards.
+  // Coupling pulls the tip back. So P slides forwards, reverses and slides backwards.
   const auto p = impact(1.5, -0.8, 1.0, 0.0, 1.0, 0.5, -1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "sC sR");
@@ -190,7 +190,7 @@ TEST(ContactOfARigidBody, WithoutFrictionPFollowsTheTip) {
   EXPECT_EQ(result.ft_peak_N, 0.0);
   EXPECT_TRUE(result.ft_peaks.empty());
   EXPECT_EQ(result.impulse_t_Ns, 0.0);
-  // V_t = 0.5 - 0.8 (1 - cos(w t)): zero at cos = 0.375.
+  // V_t = 0.5 - 0.8 (1 - cos(w t)) is zero at cos(w t) = 0.375.
   const double z = std::acos(0.375);
   const auto x_m = [](double radians) {
     return radian_s * (0.5 * radians - 0.8 * (radians - std::sin(radians)));

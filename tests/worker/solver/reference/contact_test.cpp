@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-/// The contact with a tip that moves along a given path, whatever the forces.
+/// Tests the contact of a tip that moves along a given path, whatever the forces.
 namespace oblique::solver {
 namespace {
 
@@ -26,7 +26,7 @@ std::string state_of(const Contact& contact) {
   return {contact.law().is_stick() ? 'S' : 's', contact.law().is_compression() ? 'C' : 'R'};
 }
 
-/// Follows the path up to separation or `until_s` and returns the events.
+/// Follows the path until separation or `until_s`. Returns the events.
 std::vector<Event> followed(Contact& contact, const TipPath& path, double until_s) {
   std::vector<Event> events;
   while (!contact.finished() && contact.time_s() < until_s) {
@@ -60,10 +60,10 @@ TEST(Contact, AnAsymmetricCrossingInsideAStepIsLocated) {
   EXPECT_EQ(events[1].state, "sC");
 }
 
-/// Half a period in which both forces rise and fall together: in the middle the turn coincides with
-/// the extremum of F_t, and at the end separation coincides with both sides of the cone. The
-/// tangential motion leads by `lead_s`; `skew` changes the errors of the polynomials through a
-/// step.
+/// Returns a path in which both forces rise and fall together for half a period. In the middle, the
+/// turn coincides with the extremum of F_t. At the end, separation coincides with slip in both
+/// directions. The tangential motion leads by `lead_s`. `skew` changes the errors of the
+/// polynomials through a step.
 TipPath in_step(double lead_s, double skew = 0.0) {
   return [lead_s, skew](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
@@ -77,7 +77,7 @@ TipPath in_step(double lead_s, double skew = 0.0) {
 }
 
 TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
-  // Events less than 1e-12 s apart coincide, whichever is earlier.
+  // Events less than 1e-12 s apart count as simultaneous, whichever comes first.
   for (const double lead_s : {0.0, 4e-13, -4e-13}) {
     SCOPED_TRACE(lead_s);
     const TipPath path = in_step(lead_s);
@@ -95,8 +95,8 @@ TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
 }
 
 TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
-  // The polynomials through the first step that contains both put the extremum of F_t before the
-  // turn, so the extremum is located first; the turn is found only at the common instant.
+  // In the first step that contains both events, the polynomials place the extremum of F_t before
+  // the turn. So the extremum is located first, and the turn is found only at the common instant.
   struct Step {
     double skew;
     double h_s;
@@ -115,7 +115,7 @@ TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
 }
 
 TEST(Contact, ATurnAndAnExtremumAtTheSameInstantHappenOnceEach) {
-  // For any order of the polynomials' roots, and any distance due to rounding.
+  // This holds for any order of the polynomials' roots, and for any distance due to rounding.
   for (const double skew : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3}) {
     for (const double step_s : {0.6e-4, 0.7e-4, 0.9e-4, 1.1e-4}) {
       SCOPED_TRACE(skew);
@@ -145,7 +145,7 @@ TEST(Contact, ASlipThatRoundingPutsJustBeforeSeparationIsNotInTheMode) {
 }
 
 TEST(Contact, ARegimeOfZeroDurationIsNotInTheMode) {
-  // Both velocities reach zero together. The turn comes first, then P sticks.
+  // Both velocities reach zero together. The turn comes first, then stick begins.
   const TipPath path = [](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
     const double z = kRate * t_s;

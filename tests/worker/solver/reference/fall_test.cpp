@@ -114,7 +114,7 @@ TEST(Fall, TheLargestDropIsFoundWhereverItLiesInItsStep) {
   const FallOf fine(coarse_model(), 9e-6);
   const double largest_m = fine.fall.largest_drop_m();
   const double turn_s = fine.fall.state_at(largest_m).t_s;
-  // The turn lies early, in the middle and late in its step.
+  // These steps place the turn early, in the middle and late in a step.
   for (const double fraction : {0.01, 0.5, 0.99}) {
     SCOPED_TRACE(fraction);
     const FallOf one(coarse_model(), turn_s / (std::floor(turn_s / 9e-6) + fraction));
@@ -122,7 +122,7 @@ TEST(Fall, TheLargestDropIsFoundWhereverItLiesInItsStep) {
     const ChainState top = one.fall.state_at(one.fall.largest_drop_m());
     EXPECT_NEAR(-one.chain.tip(top).y_m, one.fall.largest_drop_m(), 1e-15);
     EXPECT_NEAR(top.t_s, turn_s, 1e-6) << "the instant is known to the square root of rounding";
-    // And just below it, on the way down.
+    // Just below the largest drop, the tip is on its way down.
     const ChainState below = one.fall.state_at(largest_m - 1e-9);
     EXPECT_LT(below.t_s, top.t_s);
     EXPECT_LT(one.chain.tip(below).vy_m_s, 0.0);

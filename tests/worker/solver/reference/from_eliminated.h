@@ -9,14 +9,14 @@
 
 namespace oblique::solver {
 
-/// A state of the eliminated chain of the same model, in the coordinates of `chain`.
+/// Converts a state of the eliminated chain of the same model to the coordinates of `chain`.
 inline ChainState from_eliminated(const ConstrainedChain& chain, const ChainState& eliminated) {
   ChainState state = chain.at_rest();
   state.t_s = eliminated.t_s;
-  // A link has a column for its multiplier and two for each node.
+  // Each link has one column for its multiplier and two columns per node.
   const auto links = static_cast<Eigen::Index>(chain.links());
   const Eigen::Index elements_per_link = (chain.rows() / links - 3) / 2;
-  std::size_t left = 0;  // row of the inner node's position in the eliminated chain
+  std::size_t left = 0;  // row of the element's inner node in the eliminated chain
   for (Eigen::Index link = 0; link < links; ++link) {
     for (Eigen::Index e = 0; e < elements_per_link; ++e) {
       const bool ends_at_joint = e + 1 == elements_per_link && link + 1 < links;

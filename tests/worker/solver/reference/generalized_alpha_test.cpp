@@ -27,7 +27,7 @@ ModelParameters coarse_model() {
   return model;
 }
 
-/// A contact that pushes the tip in both directions from its present position.
+/// Returns a contact force that acts on the tip in both directions, from its present position on.
 AffineContactForce<double> push_at(const TipState& tip) {
   AffineContactForce<double> force;
   force.fn0 = 3000.0;
@@ -40,7 +40,7 @@ AffineContactForce<double> push_at(const TipState& tip) {
   return force;
 }
 
-/// A bent, moving chain in the coordinates of both systems.
+/// The state of a bent, moving chain, once with eliminated joints and once with constraints.
 struct MovingChain {
   explicit MovingChain(const ModelParameters& parameters)
       : model(parameters), chain(model), motion(model) {
@@ -53,7 +53,7 @@ struct MovingChain {
     }
     constrained = from_eliminated(motion.chain(), state);
   }
-  /// Phi of positions or velocities: the largest gap at the pin and the joints.
+  /// Returns the largest gap Phi of positions or velocities at the pin and the joints.
   double largest_gap(const Coordinates& values) const {
     Coordinates gaps = Coordinates::Zero(2, motion.chain().rows());
     motion.chain().set_constraints(values, 1.0, gaps);
@@ -76,15 +76,15 @@ TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
   for (int i = 0; i < 200; ++i) {
     moving.motion.step(state, force, 1e-6, next);
     std::swap(state, next);
-    // Rounding of a coordinate of size 1.
+    // The tolerance is the rounding of a coordinate of size 1.
     ASSERT_LE(moving.largest_gap(state.q), 1e-15);
   }
   EXPECT_LE(moving.largest_gap(state.v), 1e-9);
 }
 
 TEST(GeneralizedAlpha, TheReactionAtThePinCarriesTheHangingChain) {
-  // The chain hangs straight down: O carries its weight, and each joint the weight below it. The
-  // links start unstretched, so that the reactions oscillate around these values.
+  // The chain hangs straight down. The pin O carries its weight, and each joint carries the weight
+  // below. The links start unstretched, so the reactions oscillate around these values.
   const ModelParameters model = preset("paper");
   const Chain chain(model);
   const GeneralizedAlphaMotion motion(model);
@@ -110,8 +110,8 @@ TEST(GeneralizedAlpha, TheReactionAtThePinCarriesTheHangingChain) {
   }
 }
 
-/// The fraction of an axial vibration of a link that is left after `steps` steps, each a hundred
-/// times too long to resolve it.
+/// Returns which fraction of an axial vibration of a link remains after `steps` steps. Each step is
+/// a hundred times too long to resolve the vibration.
 double stiff_vibration_left(double spectral_radius, int steps) {
   ModelParameters model = coarse_model();
   model.lengths_m = {0.4};
@@ -152,7 +152,7 @@ TEST(GeneralizedAlpha, AStepForWhichNewtonFailsIsASolveErrorWithItsTime) {
 }
 
 TEST(GeneralizedAlpha, StepsOfChangingLengthKeepTheOrder) {
-  // Steps change their length around events. Halving them must divide the error by four.
+  // Steps change their length around events. Half the length must give a quarter of the error.
   const auto error = [](int divisions) {
     MovingChain moving(coarse_model());
     const auto force = push_at(moving.chain.tip(moving.state));

@@ -14,19 +14,19 @@ namespace oblique::solver {
 struct KnownFall {
   double H_m;
   double t_s;
-  double x_m;  ///< NaN if not known
+  double x_m;  ///< NaN if unknown
   double vx_m_s;
   double vy_m_s;
 };
 
-/// An independent explicit solution of order 4 for the preset `paper`, converged to nine digits and
-/// rounded to the digits given here.
+/// States from an independent explicit solution of order 4 for the preset `paper`. They converged
+/// to nine digits and are rounded to the digits given here.
 inline constexpr std::array<KnownFall, 3> kKnownFalls{
     {{0.96, 0.42263713, 0.6273702, -5.23465, -5.34110},
      {1.00, 0.43018976, 0.5859693, -5.73783, -5.23380},
      {1.04, 0.43798758, 0.5389964, -6.31882, -4.99916}}};
 
-/// Expects the states of kKnownFalls in a fall of `chain`, to their digits.
+/// Expects that a fall of `chain` passes through the states of kKnownFalls, to all given digits.
 inline void expect_known_falls(const Chain& chain, const Fall& fall) {
   for (const KnownFall& known : kKnownFalls) {
     const ChainState state = fall.state_at(known.H_m);

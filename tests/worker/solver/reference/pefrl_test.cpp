@@ -17,7 +17,7 @@ struct Oscillator {
   double v = 0.0;
 };
 
-/// One step of q'' = -q.
+/// Advances the oscillator q'' = -q by one step.
 void step(double h, Oscillator& state) {
   for (std::size_t i = 0; i < Pefrl::kKicks; ++i) {
     state.q += Pefrl::drift[i] * h * state.v;
@@ -36,7 +36,7 @@ double largest_swing(double h, int steps) {
   return largest;
 }
 
-/// A bent, moving chain of two links, and the contact force of a stick phase on it.
+/// Provides a bent, moving chain of two links, on which the contact force of a stick phase acts.
 class PefrlOnAChain : public testing::Test {
  protected:
   PefrlOnAChain() {
@@ -142,7 +142,7 @@ TEST_F(PefrlOnAChain, SteppingBackReturnsToTheStart) {
     motion_->step(state, force_, -2e-6, back);
     std::swap(state, back);
   }
-  // Rounding of slopes of size 1, whose rates change by up to 1e6 per second.
+  // The tolerances allow rounding of slopes of size 1, whose rates change by up to 1e6 per second.
   EXPECT_LT(distance(state.q, start_.q), 1e-13);
   EXPECT_LT(distance(state.v, start_.v), 1e-7);
   EXPECT_LT(distance(state.v, start_.v), 1e-8 * distance(advance(4e-5, 20).state.v, start_.v));
@@ -188,7 +188,7 @@ TEST_F(PefrlOnAChain, ContactIntegralsAreTheIntegralsOfTheForceAlongThePath) {
     std::swap(state, next);
   }
   const auto integrals = advance(kDuration_s, kSteps).integrals;
-  // The error of the trapezoidal rule is (step / time scale of the motion)^2 = 1e-6.
+  // The trapezoidal rule has a relative error of (step / time scale of the motion)^2 = 1e-6.
   EXPECT_NEAR(integrals.impulse_n, trapezoid.impulse_n, 1e-5 * std::abs(trapezoid.impulse_n));
   EXPECT_NEAR(integrals.impulse_t, trapezoid.impulse_t, 1e-5 * std::abs(trapezoid.impulse_t));
   EXPECT_NEAR(integrals.work_t, trapezoid.work_t, 1e-5 * std::abs(trapezoid.work_t));

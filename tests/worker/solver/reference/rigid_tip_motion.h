@@ -9,8 +9,8 @@
 
 namespace oblique::solver {
 
-/// The smallest integrator for a contact: a rigid body with the inverse mass W at its tip,
-/// r'' = W (F_t, F_n), stepped by PEFRL.
+/// The simplest motion for a contact: a rigid body with the inverse mass W at its tip, r'' = W
+/// (F_t, F_n), integrated by PEFRL.
 class RigidTipMotion : public Motion {
  public:
   explicit RigidTipMotion(const Eigen::Matrix2d& W_per_kg)
