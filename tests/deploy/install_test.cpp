@@ -193,7 +193,7 @@ TEST(InstallTest, SettingsInInstalledConfigurationAreValid) {
   }
 }
 
-TEST(InstallTest, EditedConfigurationStays) {
+TEST(InstallTest, AnInstallKeepsEditedConfiguration) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("opt");
   ASSERT_EQ(install(folder, prefix, "server").exit_code, 0);
@@ -267,7 +267,7 @@ std::string expected_of_consumer() {
                      json["mode"].get<std::string>(), json["solver"]["version"].get<std::string>());
 }
 
-TEST(InstalledLibraryTest, AUsersProgramFindsItAndGetsTheBitsOfSolve) {
+TEST(InstalledLibraryTest, AUserProgramLinksTheLibraryAndGetsTheSameBitsAsSolve) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
   const std::string build = folder.file("build");
@@ -284,7 +284,7 @@ TEST(InstalledLibraryTest, AUsersProgramFindsItAndGetsTheBitsOfSolve) {
   EXPECT_EQ(run.out, expected_of_consumer() + "mu = -0.4 is not allowed: mu must be >= 0\n");
 }
 
-TEST(InstalledLibraryTest, PkgConfigFindsItWithoutDependencies) {
+TEST(InstalledLibraryTest, PkgConfigFindsTheLibraryWithoutDependencies) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
   const auto asked = run_tool(
@@ -297,7 +297,7 @@ TEST(InstalledLibraryTest, PkgConfigFindsItWithoutDependencies) {
                                Not(HasSubstr("made")), ::testing::EndsWith("-loblique \n")));
 }
 
-TEST(InstalledLibraryTest, ItsHeadersIncludeNothingButTheStandardLibraryAndEachOther) {
+TEST(InstalledLibraryTest, HeadersIncludeOnlyTheStandardLibraryAndEachOther) {
   const TemporaryFolder folder;
   const auto included = run_tool(folder, "sh",
                                  {"-c", "grep -rho '^#include .*' '" + installed_library(folder) +
@@ -309,7 +309,7 @@ TEST(InstalledLibraryTest, ItsHeadersIncludeNothingButTheStandardLibraryAndEachO
             "#include <oblique/solver/solve_many.h>\n#include <oblique/solver/trace.h>\n");
 }
 
-TEST(InstalledLibraryTest, ItExportsOnlyTheNamesOfItsHeaders) {
+TEST(InstalledLibraryTest, TheLibraryExportsOnlyTheNamesInItsHeaders) {
   const TemporaryFolder folder;
   const auto shown = run_tool(
       folder, "sh",

@@ -26,7 +26,7 @@ WorkerMessage results_message() {
   return message;
 }
 
-TEST(FramesTest, AMessageComesBackFromItsFrame) {
+TEST(FramesTest, AMessageIsTheSameAfterEncodingAndDecoding) {
   const WorkerMessage sent = results_message();
   WorkerMessage received;
   ASSERT_TRUE(decode(encode(sent), received));
@@ -132,7 +132,7 @@ TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedUnlessItIsATrace) {
   EXPECT_FALSE(is_worker_frame_within_limits(encode(message))) << "these are no rows";
 }
 
-TEST(FrameScanTest, ARecipeWithRoomForItsAxesPasses) {
+TEST(FrameScanTest, ARecipeWithoutPaddingPasses) {
   EXPECT_TRUE(is_unpadded_request(encode(submission())));
   ClientRequest query;
   query.mutable_query()->set_sql("SELECT 1");

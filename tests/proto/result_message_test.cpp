@@ -52,7 +52,7 @@ solver::CaseResult distinct_result() {
   return result;
 }
 
-TEST(PointResultTest, AResultComesBackFromItsFrame) {
+TEST(PointResultTest, AResultIsTheSameAfterEncodingAndDecoding) {
   const auto sent = distinct_result();
   PointResult message;
   ASSERT_TRUE(decode(encode(to_message(42, sent)), message));

@@ -78,7 +78,7 @@ TEST(Address, NeedsAValidPortAndBracketsAroundIpv6) {
   EXPECT_NE(address_error("tcp://::1:7601").find("brackets"), std::string::npos);
 }
 
-TEST(Address, NamesAHost) {
+TEST(Address, MayContainTheNameOfAHost) {
   EXPECT_EQ(host_of("tcp://127.0.0.1:7600"), "127.0.0.1");
   EXPECT_EQ(host_of("tcp://coordinator:7600"), "coordinator");
   EXPECT_EQ(host_of("tcp://[fe80::1%eth0]:7600"), "fe80::1%eth0");

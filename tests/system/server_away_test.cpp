@@ -70,7 +70,7 @@ TEST_F(ServerAwayTest, AServerThatNeverAnsweredIsNotWaitedFor) {
   }
 }
 
-TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
+TEST_F(ServerAwayTest, ASignalEndsWatchingWithTheExitCodeOfTheSignal) {
   for (const bool is_away : {false, true}) {
     std::vector<std::unique_ptr<Process>> clients;
     for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {

@@ -68,7 +68,7 @@ test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) 
   return test::run_oblique(words);
 }
 
-TEST(Answers, OfSeveralPartsAreJoined) {
+TEST(Answers, PartsOfOneAnswerAreJoined) {
   const ScriptedServer server(gives([](std::uint64_t id, std::uint64_t taken) {
     return std::vector{frame_of(id, chunk_of(taken + 1, {2}, taken == 3))};
   }));
@@ -80,7 +80,7 @@ TEST(Answers, OfSeveralPartsAreJoined) {
   }
 }
 
-TEST(Answers, ThatAreIncompleteEndWithOne) {
+TEST(Answers, AnIncompleteAnswerGivesExitCodeOne) {
   const auto error = [](std::uint64_t id, std::uint64_t) {
     protocol::ClientReply reply;
     reply.set_request_id(id);
@@ -113,7 +113,7 @@ TEST(Answers, ThatAreIncompleteEndWithOne) {
   }
 }
 
-TEST(Answers, ThatStopEndWithOne) {
+TEST(Answers, AnAnswerThatStopsArrivingGivesExitCodeOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
@@ -124,14 +124,14 @@ TEST(Answers, ThatStopEndWithOne) {
   EXPECT_THAT(csv.err, testing::HasSubstr("ended after 2 rows: nothing came from"));
 }
 
-TEST(Watch, EndsWithZeroForADoneStudyAndWithOneForACancelledOne) {
+TEST(Watch, ExitsWithZeroForADoneStudyAndWithOneForACancelledStudy) {
   EXPECT_EQ(ask(ScriptedServer(has_study("done")), {"watch", "s"}).exit_code, 0);
   const auto watch = ask(ScriptedServer(has_study("cancelled")), {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
   EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; `oblique resume` continues"));
 }
 
-TEST(Watch, ReportsFailedPointsWithReasonsAndEndsWithOne) {
+TEST(Watch, ReportsFailedPointsWithReasonsAndExitsWithOne) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     if (request.has_status()) {
@@ -193,7 +193,7 @@ std::vector<std::string> steering(const protocol::ClientRequest& request) {
   return {protocol::encode(reply)};
 }
 
-TEST(TextsOfAServer, CannotControlTheTerminal) {
+TEST(ServerText, CannotSendControlCodesToTheTerminal) {
   const ScriptedServer server(steering);
   const std::vector<std::vector<std::string>> all{{"status"},
                                                   {"status", "--format", "json"},

@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(JobsToSubmit, AreOnePerShareOfOpenPointsWithinLimitsMinusExistingJobs) {
+TEST(JobsToSubmit, AreOnePerHundredOpenPointsWithinLimitsMinusExistingJobs) {
   const struct {
     std::uint64_t open;
     std::size_t jobs;
@@ -48,7 +48,7 @@ TEST(JobsToSubmit, AreOnePerShareOfOpenPointsWithinLimitsMinusExistingJobs) {
   }
 }
 
-TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
+TEST(OpenPoints, IncludeOnlyRunningStudiesThatMoreWorkersCanHelp) {
   const struct {
     const char* state;
     std::uint64_t points;

@@ -78,7 +78,7 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   }
 }
 
-TEST(CommandLine, ConvergesWithTheModelOfThePointThatTheFilterKeeps) {
+TEST(CommandLine, ConvergeUsesTheModelOfThePointThatTheFilterKeeps) {
   const auto converged = [](const std::vector<std::string>& more) {
     std::vector<std::string> words{"converge", "--preset", "paper", "--H",   "0.9",
                                    "--mu",     "0.4",      "--e",   "1",     "--coarsest",
@@ -91,7 +91,7 @@ TEST(CommandLine, ConvergesWithTheModelOfThePointThatTheFilterKeeps) {
   EXPECT_EQ(converged({"--k", "1e7,2e7", "--where", "k > 1.5e7"}), converged({"--k", "2e7"}));
 }
 
-TEST(CommandLine, NotesTheErrorsOfACoarseMeshOnceOnStandardError) {
+TEST(CommandLine, WarnsOfTheErrorsOfACoarseMeshOnceOnStandardError) {
   const test::TemporaryFolder folder;
   const auto err_of = [&](std::vector<std::string> words) {
     words.insert(words.end(), {"--H", "0.6", "--mu", "0.4", "--e", "1"});
@@ -159,7 +159,7 @@ TEST(CommandLine, RepeatsAtMostEightyCharactersOfAWrongKey) {
   }
 }
 
-TEST(CommandLine, MissingThingsFailWithOneAndTheRemedy) {
+TEST(CommandLine, AMissingServerOrFileIsNamedAndGivesExitCodeOne) {
   const struct {
     const char* line;
     const char* says;
@@ -209,7 +209,7 @@ TEST(HelpText, WrapsSentences) {
             "one two\nthree four\nfive\n\nsix seven\neight\n");
 }
 
-TEST(HelpText, LeavesCommandsAndLongWordsWhole) {
+TEST(HelpText, DoesNotBreakCommandsOrLongWords) {
   const std::string help = "Examples:\n  oblique run a.toml   a study here\nabcdefghijklmnop\n";
   EXPECT_EQ(fitted_help(help, 12, 20), help);
 }

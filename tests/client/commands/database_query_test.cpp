@@ -81,7 +81,7 @@ TEST_F(DatabaseQuery, AModeThatNoPointHasIsReported) {
   EXPECT_EQ(ask({"query", "a", "--where", "mode == '" + mode + "'", "--format", "csv"}).err, "");
 }
 
-TEST_F(DatabaseQuery, AFileHasTheFormatOfItsEnding) {
+TEST_F(DatabaseQuery, TheFormatOfAnOutputFileFollowsFromItsExtension) {
   EXPECT_EQ(ask({"query", "a", "--select", "point", "--limit", "1", "--out", "x.csv"}).exit_code,
             0);
   std::ifstream file(folder_.path() / "x.csv");

@@ -52,7 +52,7 @@ class Plot : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Plot, WritesTheFormatOfTheEndingAndNeedsAFileInAPipe) {
+TEST_F(Plot, WritesTheFormatOfTheExtensionAndNeedsAFileIfOutputIsAPipe) {
   const auto unasked = plot({"a"});
   EXPECT_EQ(unasked.exit_code, 0) << unasked.err;
   EXPECT_THAT(unasked.out, AllOf(StartsWith("<?xml"), HasSubstr("a: fn"), HasSubstr("</svg>")));
@@ -73,7 +73,7 @@ TEST_F(Plot, WritesTheFormatOfTheEndingAndNeedsAFileInAPipe) {
   EXPECT_THAT(pipe.err, HasSubstr("--out FILE.svg"));
 }
 
-TEST_F(Plot, WithoutGnuplotNamesItsPackageAndTheScriptThatNeedsNone) {
+TEST_F(Plot, WithoutGnuplotNamesItsPackageAndTheFormatThatDoesNotNeedIt) {
   const auto without_gnuplot = [this](const std::string& out) {
     return test::Process(folder_, test::client_program(), {"plot", "a", "--out", out},
                          {{"PATH", "/nowhere"}})
@@ -103,7 +103,7 @@ TEST_F(Plot, ShowsAsciiInAPipe) {
   EXPECT_THAT(outcome.out, Not(HasSubstr("<svg")));
 }
 
-TEST_F(Plot, WithoutValuesReportsItOnStandardError) {
+TEST_F(Plot, ReportsMissingValuesOnStandardError) {
   const auto outcome =
       plot({"a", "--scatter", "mu,fn_peak_N", "--colour", "duration_s", "--where", "mu > 5"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -112,7 +112,7 @@ TEST_F(Plot, WithoutValuesReportsItOnStandardError) {
   EXPECT_THAT(plot({"a", "--histogram", "fn_peak_N"}).err, Not(HasSubstr("No point")));
 }
 
-TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
+TEST_F(Plot, AWrongFlagIsNamedWithTheAllowedValues) {
   struct Wrong {
     std::vector<std::string> arguments;
     std::string says;
@@ -166,7 +166,7 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
   EXPECT_THAT(same.err + same.out, Not(HasSubstr("stored")));
 }
 
-TEST_F(Plot, OfAServerHasTheShapesFromAWorker) {
+TEST_F(Plot, ShowsTheShapesThatAWorkerOfTheServerSolved) {
   const test::Server server(folder_, "oblique.db");
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
   const auto ask = [&](const std::string& more) {
@@ -182,7 +182,7 @@ TEST_F(Plot, OfAServerHasTheShapesFromAWorker) {
   EXPECT_EQ(here.out, there.out);
 }
 
-TEST_F(Plot, DrawsPanelsOfAPointOfNoStudy) {
+TEST_F(Plot, DrawsPanelsOfAPointThatBelongsToNoStudy) {
   const auto panel = [this](const std::string& name) {
     const auto outcome = plot({"--preset", "paper", "--H", "0.4", "--mu", "1.2", "--e", "1",
                                "--tip-mass", "0.001", "--panel", name});
@@ -197,7 +197,7 @@ TEST_F(Plot, DrawsPanelsOfAPointOfNoStudy) {
               HasSubstr("compression"));
 }
 
-TEST(PaperFigures, AreFiveFilesInOneFolder) {
+TEST(PaperFigures, AreWrittenAsFiveFilesInOneFolder) {
   const test::TemporaryFolder folder;
   const auto outcome = test::run_oblique(folder, {"paper", "--figures", "made/here"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

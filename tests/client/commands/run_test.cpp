@@ -120,7 +120,7 @@ TEST(Run, EstimatesErrorsOfAllPointsOrNone) {
   EXPECT_THAT(refused.err, HasSubstr("errors: stored true, given false"));
 }
 
-TEST(Run, OfAStudyPausedElsewhereNamesTheRemedyAndEndsWithOne) {
+TEST(Run, IfAnotherClientPausesTheStudyNamesTheRemedyAndExitsWithOne) {
   const test::TemporaryFolder folder;
   write_study(folder, 10'000'000);
   auto arguments = run_arguments();
@@ -208,7 +208,7 @@ mu = [0.2, 0.4, 0.6]
 e = 0.8
 )";
 
-TEST(Run, OfAStudyOfAnotherSolverEndsWithTheRemedies) {
+TEST(Run, IfTheStudyHasResultsOfAnotherSolverNamesTheRemedies) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "begun.toml") << kBegun;
   {

@@ -91,7 +91,7 @@ TEST_F(StudyChanges, AStudyIsDeletedAfterConfirmation) {
   EXPECT_EQ(run_study(2).exit_code, 0) << "the name is free";
 }
 
-TEST_F(StudyChanges, OfAMissingStudyFailAndNameIt) {
+TEST_F(StudyChanges, AChangeOfAMissingStudyFailsAndNamesTheStudy) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     EXPECT_TRUE(request.has_status()) << "nothing is changed";
     auto reply = reply_to(request);

@@ -77,7 +77,7 @@ class TraceCommand : public testing::Test {
   }
 };
 
-TEST_F(TraceCommand, APointSolvedInThisProcessEqualsTheStoredOne) {
+TEST_F(TraceCommand, APointSolvedAgainEqualsTheStoredPoint) {
   solve_study("models");
   solve_study("steps");
   for (const auto& [study, point] : {std::pair{"models", "0"}, {"models", "15"}, {"steps", "1"}}) {
@@ -96,7 +96,7 @@ TEST_F(TraceCommand, APointSolvedInThisProcessEqualsTheStoredOne) {
   EXPECT_EQ(all["trace"]["node6y_m"].size(), all["trace"]["state"].size());
 }
 
-TEST_F(TraceCommand, HasTheRowsOfSolve) {
+TEST_F(TraceCommand, WritesTheSameRowsAsSolve) {
   store_study("models");
   const auto trace = run({"trace", "models", "15", "--shape", "--out", "trace.csv"});
   EXPECT_EQ(trace.exit_code, 0) << trace.err;

@@ -110,7 +110,7 @@ CaseResult with_sticks(const std::vector<solver::StickInterval>& sticks) {
   return result;
 }
 
-TEST(LonePairs, AreChosenToBringTheOtherTimesClosest) {
+TEST(UnmatchedPairs, AreChosenSoThatTheOtherTimesAgreeBest) {
   using Pairs = std::vector<std::size_t>;
   EXPECT_EQ(lone_pairs({}, {}), Pairs{});
   EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0}, {1.1, 2.1, 3.1}), Pairs{});
@@ -204,7 +204,7 @@ TEST(Outputs, HaveOneOutputPerMajorPeakWithoutRipples) {
                                              "vn_out_m_s", "reaction_0_N", "reaction_1_N"}));
 }
 
-TEST(Outputs, AreTheSameQuantityUntilTheModesDiffer) {
+TEST(Outputs, AreComparableUntilTheModesDiffer) {
   const auto outputs = outputs_of(second_order(0.0));
   const auto mode_of = [&](const std::string& name) {
     return std::find_if(outputs.begin(), outputs.end(),
@@ -231,7 +231,7 @@ TEST(Convergence, FindsOrderAndLimitOfEveryOutput) {
   }
 }
 
-TEST(Convergence, ComparesOnlyOutputsWithTheSameModeBeforeThem) {
+TEST(Convergence, ComparesAnOutputOnlyIfTheModesBeforeItAgree) {
   // The coarsest mesh ends after one peak.
   auto coarsest = second_order(0.2);
   coarsest.major_mode = "SC SR sR";

@@ -73,7 +73,7 @@ TEST_F(RowOutputTest, AFileAppearsOnlyWhenItIsFinished) {
   EXPECT_EQ(files(), 1U);
 }
 
-TEST_F(RowOutputTest, ALinkStaysAndItsTargetIsReplaced) {
+TEST_F(RowOutputTest, ALinkIsKeptAndItsTargetIsReplaced) {
   namespace fs = std::filesystem;
   const std::string link = folder_.file("link.csv");
   for (const std::string target : {"target.csv", "not there yet.csv"}) {
@@ -91,7 +91,7 @@ TEST_F(RowOutputTest, ALinkStaysAndItsTargetIsReplaced) {
   }
 }
 
-TEST_F(RowOutputTest, ALinkToADeviceOrInACircleIsNotReplaced) {
+TEST_F(RowOutputTest, ALinkToADeviceOrToItselfIsNotReplaced) {
   namespace fs = std::filesystem;
   const std::string link = folder_.file("link.csv");
   fs::create_symlink("/dev/null", link);
@@ -128,7 +128,7 @@ TEST_F(RowOutputTest, AKilledProgramLeavesNoFile) {
   EXPECT_EQ(files(), 0U);
 }
 
-TEST_F(RowOutputTest, TheFormatFollowsFromTheFlagOrTheEnding) {
+TEST_F(RowOutputTest, TheFormatFollowsFromTheFlagOrTheExtension) {
   EXPECT_EQ(format_of_output("", ""), Format::kTable);
   EXPECT_EQ(format_of_output("", "/dev/null"), Format::kTable);
   EXPECT_EQ(format_of_output("", "", kCsvAndJson, Format::kCsv), Format::kCsv);
@@ -159,7 +159,7 @@ TEST_F(RowOutputTest, AFolderOrAFileThatCannotBeCreatedIsWrongUsage) {
   EXPECT_THROW(write(folder_.file("no/such.csv")), solver::InputError);
 }
 
-TEST_F(RowOutputTest, AFullDiskIsAnErrorAndNoFile) {
+TEST_F(RowOutputTest, AFullDiskIsAnErrorAndLeavesNoFile) {
   EXPECT_THROW(write("/dev/full"), std::runtime_error);
 }
 

@@ -57,7 +57,7 @@ PointHistory small_history() {
   return history;
 }
 
-TEST(PointSpans, ArePhasesFollowedByStick) {
+TEST(PointSpans, ListPhasesBeforeStickIntervals) {
   const auto spans = panel_of(small_history(), PointPanel::kForces).spans;
   ASSERT_EQ(spans.size(), 3U);
   EXPECT_EQ(spans[0].kind, Span::Kind::kCompression);

@@ -132,7 +132,7 @@ TEST_F(SourceTest, ReportsAWrongStatementAsWrongUsageForFilesAndServers) {
   EXPECT_THROW(source->query("SELECT 1"), ServerError);
 }
 
-TEST(ResultQuery, IsARequestOfTheSameParts) {
+TEST(ResultQuery, BecomesARequestWithTheSameClauses) {
   const auto plain = request_for({.study = "a"}).question();
   EXPECT_FALSE(plain.has_limit());
   EXPECT_TRUE(plain.select().empty());
@@ -145,7 +145,7 @@ TEST(ResultQuery, IsARequestOfTheSameParts) {
   EXPECT_EQ(full.limit(), 5U);
 }
 
-TEST(ResultQuery, EachFlagIsCheckedAndNamed) {
+TEST(ResultQuery, AnErrorNamesTheWrongFlag) {
   const auto refusal = [](const ResultQuery& query) -> std::string {
     try {
       check(query);

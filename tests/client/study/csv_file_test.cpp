@@ -54,7 +54,7 @@ TEST(CsvFile, TakesIntegratorsByName) {
 }
 
 // Line numbers count every line break of the file, also those in quoted fields.
-TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
+TEST(CsvFile, AnErrorNamesFileLineAndColumn) {
   EXPECT_THAT(csv_error("drop\n0.4\n0.x\n"),
               HasSubstr("measured.csv:3: column `drop`: \"0.x\" is not a number"));
   EXPECT_THAT(csv_error("drop,b\n0.4,\"\n\n\"\n,1\n"),

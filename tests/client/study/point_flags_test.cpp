@@ -97,7 +97,7 @@ TEST(PointFlags, TakeDistributionsInSamplesAndExpressions) {
   EXPECT_FALSE(block.axes(3).distribution().has_to());
 }
 
-TEST(PointFlags, TakeAxesSideBySide) {
+TEST(PointFlags, ZipPairsTheValuesOfAxes) {
   auto flags = flags_of({{"H", "0.5,0.6"}, {"mu", "0.4,0.4"}, {"length2", "0.3,0.4"}});
   flags.zip = true;
   const auto table = table_of(flags);
@@ -105,7 +105,7 @@ TEST(PointFlags, TakeAxesSideBySide) {
   EXPECT_EQ(table.model(table.point(0).model).lengths_m[1], 0.3);
 }
 
-TEST(PointFlags, ShapeTheModelWithOneValueAndMakeAnAxisOfSeveral) {
+TEST(PointFlags, SetAModelParameterByOneValueAndAnAxisBySeveral) {
   auto flags = flags_of({{"tip_mass", "0.01"}, {"k", "1e7,2e7"}, {"H", "0.5"}});
   flags.preset = "printed";
   flags.lengths = "0.4,0.3";
@@ -160,7 +160,7 @@ TEST(PointFlags, RefuseWrongValuesWithTheFlagAsItWasTyped) {
   }
 }
 
-TEST(PointFlags, NameOtherWrongFlags) {
+TEST(PointFlags, AWrongSampleOrFilterIsRefusedAndItsFlagIsNamed) {
   const struct {
     std::string PointFlags::*flag;
     const char* text;
@@ -194,7 +194,7 @@ TEST(PointFlags, NameOtherWrongFlags) {
   EXPECT_THAT(error_of(flags), HasSubstr("did you mean `normal`?"));
 }
 
-TEST(StudyFlags, NameTheSameStudyForTheSamePointsAndAnotherForOthers) {
+TEST(StudyFlags, GiveEqualPointsTheSameStudyNameAndOtherPointsAnother) {
   const auto name = [](const PointFlags& flags) {
     return name_of_recipe(recipe_of_flags(flags, pretended_reach()));
   };
@@ -226,7 +226,7 @@ TEST(StudyFlags, TakeAFileOrPointsAndNotBoth) {
   EXPECT_THROW(study(flags), solver::InputError);
 }
 
-TEST(StudyFlags, AskForErrorsOfPointsAndOfFiles) {
+TEST(StudyFlags, RequestEstimatedErrorsForFlagsAndForFiles) {
   StudyFlags flags;
   flags.points = flags_of({});
   const auto without = study_of_flags(flags, pretended_reach());

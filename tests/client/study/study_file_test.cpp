@@ -30,7 +30,7 @@ TEST(StudyFile, MultipliesAxesInsideABlockWithHSlowestAndEFastest) {
   EXPECT_EQ(table.point(4).H_m, 1.0);
 }
 
-TEST(StudyFile, RequestsErrorsByAKey) {
+TEST(StudyFile, TheKeyErrorsRequestsEstimatedErrors) {
   const auto asks = [](const std::string& head) {
     return protocol::PointTable(parsed(head + block_with("mu = 0.4")).recipe).wants_errors();
   };
@@ -93,7 +93,7 @@ std::string error_of_file(const std::string& path) {
   }
 }
 
-TEST(StudyFile, IsNamedIfItCannotBeRead) {
+TEST(StudyFile, AnUnreadableFileIsNamed) {
   const test::TemporaryFolder folder;
   const std::string empty = folder.file("empty.toml");
   { const std::ofstream file(empty); }
@@ -126,7 +126,7 @@ class StudyBesideAFile : public testing::Test {
   const test::TemporaryFolder folder_;
 };
 
-TEST_F(StudyBesideAFile, TakesAColumnAsAnAxis) {
+TEST_F(StudyBesideAFile, ACsvColumnBecomesAnAxis) {
   const auto points = table(block_with("mu = { csv = 'measured.csv', column = 'friction' }"));
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points.point(1).mu, 0.6);
@@ -134,7 +134,7 @@ TEST_F(StudyBesideAFile, TakesAColumnAsAnAxis) {
       << "the column that is called as the key";
 }
 
-TEST_F(StudyBesideAFile, TakesTheLinesAsPoints) {
+TEST_F(StudyBesideAFile, CsvLinesBecomePoints) {
   const auto points = table(
       "[[block]]\ncsv = 'measured.csv'\ncolumns = { H = 'drop', mu = 'friction' }\ne = 0.9\n");
   ASSERT_EQ(points.size(), 2U);
@@ -144,7 +144,7 @@ TEST_F(StudyBesideAFile, TakesTheLinesAsPoints) {
   EXPECT_EQ(points.point(1).e_star, 0.9);
 }
 
-TEST_F(StudyBesideAFile, NamesThePlaceInBothFiles) {
+TEST_F(StudyBesideAFile, AnErrorNamesThePlaceInStudyAndCsvFile) {
   const auto expect = [&](const std::string& text, const std::vector<std::string>& says) {
     for (const auto& part : says) {
       EXPECT_THAT(error(text), testing::HasSubstr(part));

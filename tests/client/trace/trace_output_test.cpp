@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-TEST(TracedFall, IsMovedOutOfTheTraceBeforeTheContact) {
+TEST(TakeFall, MovesTheRowsOfTheFallOutOfATrace) {
   const auto taken = [](std::size_t falling, std::size_t touching) {
     std::vector<solver::TraceRow> rows(falling + touching);
     for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -69,7 +69,7 @@ class KeyFileTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST(CurveKeyTest, AreFormattedAsByLibzmq) {
+TEST(CurveKeyTest, KeysAreFormattedAsByLibzmq) {
   const KeyPair pair = generate_key_pair();
   const std::string secret = z85(pair.secret_key.bytes());
   char text[kKeyCharacters + 1];
@@ -81,7 +81,7 @@ TEST(CurveKeyTest, AreFormattedAsByLibzmq) {
   EXPECT_EQ(public_key_of(pair.secret_key), pair.public_key);
 }
 
-TEST(CurveKeyTest, AreNotParsedFromInvalidText) {
+TEST(CurveKeyTest, InvalidTextIsNotParsedAsAKey) {
   const std::string good = z85(generate_key_pair().public_key);
   EXPECT_FALSE(parse_z85(""));
   EXPECT_FALSE(parse_z85(good.substr(1)));

@@ -185,7 +185,7 @@ TEST_F(ConfigurationTest, AWrongValueIsNamedWithItsPlace) {
   expect_refused({"--port", "80000"}, "program: --port: Value 80000");
 }
 
-TEST_F(ConfigurationTest, QuietIsTheShortFormOfALevel) {
+TEST_F(ConfigurationTest, QuietIsShortForALogLevel) {
   const std::string file = write("[log]\nlevel = \"debug\"\n");
   EXPECT_EQ(parse({"--config", file}), std::nullopt);
   EXPECT_EQ(options_.log.level, "debug");

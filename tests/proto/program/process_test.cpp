@@ -110,7 +110,7 @@ TEST(StopWithParent, TheProcessGetsSigtermWhenItsParentEnds) {
   EXPECT_EQ(stops_with(getppid()), std::pair(false, true)) << "it has ended";
 }
 
-TEST(StopSignals, TheFirstOfSeveralIsTheExitCode) {
+TEST(StopSignals, TheFirstOfSeveralSignalsDeterminesTheExitCode) {
   StopSignals stop;
   EXPECT_FALSE(stop.requested());
   EXPECT_FALSE(stop.wait(1ms));
@@ -132,7 +132,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
   std::signal(SIGHUP, before);
 }
 
-TEST(StopSignals, ItsEndRestoresSignalsAndDropsPendingOnes) {
+TEST(StopSignals, TheDestructorRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
     raise(SIGTERM);  // a pending SIGTERM would end this process below

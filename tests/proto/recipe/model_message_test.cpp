@@ -42,7 +42,7 @@ TEST(Canonical, TheTextOfAModelNeverChanges) {
             "spectral_radius=0.5 dt=1e-06 dt_fall=2e-06 tolerance=1e-06");
 }
 
-TEST(ModelMessageTest, AModelComesBackFromAFrame) {
+TEST(ModelMessageTest, AModelIsTheSameAfterEncodingAndDecoding) {
   std::vector<solver::ModelParameters> models{unusual_model()};
   for (const auto name : solver::preset_names()) {
     models.push_back(solver::preset(name));
@@ -69,14 +69,14 @@ TEST(Canonical, ZeroHasNoSignAndADefaultToleranceIsNotWritten) {
   EXPECT_EQ(canonical_model(model), text + " tolerance=1e-06");
 }
 
-TEST(Canonical, TheDigestOfARecipeNamesStudies) {
+TEST(Canonical, TheDigestOfARecipeNeverChanges) {
   EXPECT_EQ(sha256_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
       << "of FIPS 180-4";
   EXPECT_EQ(recipe_digest(recipe_of({kPoint})),
             "8344f39bccb110503a4c571f76d91034e47923dc20725c348e2c03a11a402663");
 }
 
-TEST(Canonical, ModelErrorsBlocksAndTheOrderOfAxesCount) {
+TEST(Canonical, TheDigestDependsOnModelErrorsBlocksAndTheOrderOfAxes) {
   const auto k = listed("k", {1e7, 2e7});
   const auto eta2 = listed("eta2", {1.0, 2.0});
   const auto with = [](std::vector<Axis> axes) {

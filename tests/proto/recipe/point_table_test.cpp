@@ -159,7 +159,7 @@ TEST(PointInputs, MayDifferInTheLastBitsAndAreStoredAsSent) {
   EXPECT_EQ(inputs_of(result, table).H_m, H_m);
 }
 
-TEST(PointInputs, ThatDifferByMoreAreRefused) {
+TEST(PointInputs, ThatDifferByMoreThanTheLastBitsAreRefused) {
   const PointTable table = table_of_lengths();
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -191,7 +191,7 @@ TEST(PointInputs, IncludeWholeNumbersAndLengthsOfTheModel) {
   }
 }
 
-TEST(PointInputs, AreComparedAlsoInTextsOfModels) {
+TEST(PointInputs, AreAlsoComparedInTheTextsOfModels) {
   const std::string own = canonical_model(solver::preset("paper"));
   const auto with = [&](const std::string& part, const std::string& other) {
     return std::string(own).replace(own.find(part), part.size(), other);
@@ -267,7 +267,7 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
 }
 
 // A third of 10^4 examined points pass; 0.02 is four standard deviations of that share.
-TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
+TEST(StudySize, EstimatesThePointsThatPassAFilterInALargeStudy) {
   const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
   const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");
   const auto size = size_of_blocks({plain, large});
@@ -280,7 +280,7 @@ TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
 }
 
 // The tolerance of 400 is more than four standard deviations of the estimate.
-TEST(StudySize, EstimatesTheFallsFromTenThousandPointsAboveThatNumber) {
+TEST(StudySize, EstimatesTheFallsOfALargeStudyFromTenThousandPoints) {
   const auto shared = size_of_blocks(
       {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});
   EXPECT_TRUE(shared.falls_estimated);

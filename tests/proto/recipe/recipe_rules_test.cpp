@@ -135,7 +135,7 @@ TEST(RecipeRules, ListsAndRangesHaveAllowedValues) {
   });
 }
 
-TEST(RecipeRules, ARangeIsRefusedExactlyWhenOneOfItsValuesIs) {
+TEST(RecipeRules, ARangeIsRefusedExactlyWhenOneOfItsValuesIsNotAllowed) {
   const solver::ParameterKey& key = *solver::find_model_key("elements_per_link");
   for (const double from : {1.0, 2.0, 7.0}) {
     for (const double to : {8.0, 13.0, 256.0}) {
@@ -223,7 +223,7 @@ TEST(RecipeRules, ARecipeTooLongForAWorkerIsRefused) {
   EXPECT_THROW(check_size(recipe), solver::InputError);
 }
 
-TEST(RecipeRules, ARecipeHasBlocksAndAModelInItsDomain) {
+TEST(RecipeRules, ARecipeNeedsBlocksAndAnAllowedModel) {
   EXPECT_THAT(refusal(recipe_of({})), HasSubstr("no block"));
   EXPECT_THAT(refusal(recipe_of_blocks({of_mu(kMu), of_mu(listed("mu", {-1}))})),
               StartsWith("block 2: mu = -1"));

@@ -78,7 +78,7 @@ std::size_t rows_of(const std::string& path) {
   return Reader(path).query("SELECT point FROM results", kNoLimits).rows.size();
 }
 
-TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
+TEST_F(ReadOnlyFolderTest, RowsOfTheFileAndOfTheLogAreRead) {
   for (const auto& [name, rows] : {std::pair{"alone", 2U}, std::pair{"with_log", 3U}}) {
     const std::string file = file_in(name);
     EXPECT_EXIT(as_stranger([&, expected = rows] { return rows_of(file) == expected; }),
@@ -87,7 +87,7 @@ TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
   }
 }
 
-TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
+TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkInAReadOnlyFolder) {
   const std::string file = file_in("with_log");
   const std::string copy = folder_.file("out/copy.db");
   const std::string saved = folder_.file("out/saved.db");

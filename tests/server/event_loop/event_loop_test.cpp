@@ -64,7 +64,7 @@ TEST_F(EventLoopTest, ResultsOfAnotherStudyAreReused) {
             protocol::Row{std::int64_t{20}});
 }
 
-TEST_F(EventLoopTest, ARestartedServerContinues) {
+TEST_F(EventLoopTest, ARestartedServerContinuesItsStudies) {
   {
     RunningServer server(path_);
     SimulatedClient client(server.client_endpoint());

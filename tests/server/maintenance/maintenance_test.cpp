@@ -72,7 +72,7 @@ TEST_F(MaintenanceTest, ACopyOfAnOpenDatabaseHasAllCommittedRows) {
       << "a copy is its owner's alone";
 }
 
-TEST_F(MaintenanceTest, OnlyOurDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) {
+TEST_F(MaintenanceTest, OnlyObliqueDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) {
   const std::string notes = folder_.file("notes.txt");
   std::ofstream(notes) << "not a database, and long enough to be sure of it";
   std::ofstream(folder_.file("empty.db"));
@@ -144,7 +144,7 @@ TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) 
   }
 }
 
-TEST_F(SalvageTest, ADamagedRowIsNotSavedButAStudyOrModelWithADamagedValueIsWithItsRows) {
+TEST_F(SalvageTest, DamagedResultsAreSkippedButStudiesAndModelsWithADamagedValueAreSaved) {
   close();
   auto others = rows_of(path_);
   others.erase(others.begin() + 3);
@@ -204,7 +204,7 @@ TEST_F(SalvageTest, ReusedResultsAreCountedAgainAndPointsThatAFilterLeavesOutAre
 
 // ---- Checks -------------------------------------------------------------------------------------
 
-TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
+TEST_F(MaintenanceTest, InputsThatDifferInTheLastBitsAreNoFault) {
   protocol::PointResult result = solved_point(5, *study_.table.get());
   result.set_mu(std::nextafter(result.mu(), 1.0));
   commit({results_of(study_, {result})});

@@ -131,7 +131,7 @@ TEST_F(MergeTest, StudiesOfSeveralDatabasesAreMergedWithAllRows) {
       << "equal workers are one";
 }
 
-TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndItIsDoneWhenNoneIsLeft) {
+TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndTheStudyIsDoneWhenNoPointIsOpen) {
   make("all", {{.end = 4}});
   make("one", {{.first = 4, .end = 7}});
   make("two", {{.first = 5, .end = 10}});
@@ -179,7 +179,7 @@ TEST_F(MergeTest, ASolvedRowReplacesAFailedOneButNotViceVersa) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ANameWithAnotherRecipeRefusesTheSourceUnlessAPrefixIsGiven) {
+TEST_F(MergeTest, AStudyOfTheSameNameWithAnotherRecipeIsRefusedUnlessAPrefixIsGiven) {
   make("all", {{.study = "a", .end = 1}});
   make("one", {{.study = "b", .end = 2}, {.study = "a", .table = table_of(11), .end = 5}});
   EXPECT_THAT(refusal("one"), AllOf(HasSubstr("a study called \"a\""), HasSubstr("block 1 differs"),
@@ -216,7 +216,7 @@ TEST_F(MergeTest, ASourceWithAnyFaultIsRefused) {
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
-TEST_F(MergeTest, TheSourceIsNotChangedAndItsStateIsCopied) {
+TEST_F(MergeTest, TheSourceIsNotChangedAndTheStateOfItsStudyIsCopied) {
   make("one", {{.end = 5}});
   by_hand(file("one"), "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
@@ -327,7 +327,7 @@ TEST_F(MergeTest, ASourceWhoseRowsWereChangedByHandIsMergedByItsRows) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ReusedResultsKeepTheNamesOfTheirSourceAndAreCounted) {
+TEST_F(MergeTest, ReusedResultsStillNameTheirSourceAndAreCounted) {
   make("one",
        {{.study = "a/b", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "c"}});
   {

@@ -168,7 +168,7 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   EXPECT_LE(std::find(first, bodies.end(), "second") - first, 2);
 }
 
-TEST_F(NetworkTest, APeerWithAnUntakenMessageIsNotRead) {
+TEST_F(NetworkTest, APeerIsNotReadUntilItsLastMessageIsTaken) {
   const auto flood = open_peer();
   const std::string frame = zmtp_frame(std::string(1 << 20, 'x'));
   std::size_t sent = 0;
@@ -182,7 +182,7 @@ TEST_F(NetworkTest, APeerWithAnUntakenMessageIsNotRead) {
   EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
 }
 
-TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndItIsReportedOnce) {
+TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndTheDisconnectIsReportedOnce) {
   const auto leaving = open_peer();
   leaving->send(zmtp_frame("first") + zmtp_frame("second") + zmtp_frame("last"));
   leaving->reset();
@@ -218,7 +218,7 @@ TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   run_until([&] { return network_.connections() == 0; });
 }
 
-TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected) {
+TEST_F(NetworkTest, PeersOfAnotherProtocolOrWithMessagesOfSeveralFramesAreDisconnected) {
   RawPeer stranger(network_.endpoint(open_));
   stranger.send("GET / HTTP/1.1\r\n\r\n");
   RawPeer in_parts(network_.endpoint(open_));
@@ -316,7 +316,7 @@ TEST_F(TightNetworkTest, TheSumOfUnreadOutputIsBounded) {
   EXPECT_FALSE(network_.take_disconnects().empty());
 }
 
-TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected) {
+TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithTheMostInputIsDisconnected) {
   const auto modest = open_peer();
   modest->send(zmtp_frame(std::string(1000, 'm')));
   const auto greedy = open_peer();
@@ -330,7 +330,7 @@ TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected)
   EXPECT_EQ(next().body, std::string(1000, 'm'));
 }
 
-TEST_F(TightNetworkTest, TheMostSilentConnectionMakesRoomUnlessAllAreActive) {
+TEST_F(TightNetworkTest, TheLongestSilentConnectionIsReplacedUnlessAllAreActive) {
   const auto quiet = open_peer();
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
@@ -453,9 +453,9 @@ TEST_F(NetworkTest, ForgedFramesEndTheirConnectionAndTheNextPeerIsServed) {
   });
 }
 
-class CrowdTest : public NetworkTest {
+class ManyPeersTest : public NetworkTest {
  protected:
-  CrowdTest() : NetworkTest({.handshakes = kMax}) {
+  ManyPeersTest() : NetworkTest({.handshakes = kMax}) {
     run_until([&] { return network_.connections() == kMax; });
   }
 
@@ -463,7 +463,7 @@ class CrowdTest : public NetworkTest {
   std::vector<std::unique_ptr<KeyedPeer>> crowd_ = keyed_peers(300);
 };
 
-TEST_F(CrowdTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
+TEST_F(ManyPeersTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
   for (const auto& peer : crowd_) {
     peer->say_hello();
   }
@@ -477,19 +477,19 @@ TEST_F(CrowdTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
   EXPECT_EQ(network_.connections(), crowd_.size());
 }
 
-TEST_F(CrowdTest, SilentPeersMakeRoomAfterAFractionOfTheirTime) {
+TEST_F(ManyPeersTest, SilentPeersAreReplacedAfterAFractionOfTheHandshakeTimeout) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
   run_until([&] { return refused(RefusalCause::kBound) == kMax; });
   EXPECT_EQ(network_.connections(), kMax);
 }
 
-class CrowdOfOneAddressTest : public NetworkTest {
+class ManyPeersOfOneAddressTest : public NetworkTest {
  protected:
   static constexpr std::size_t kMax = 16;
-  CrowdOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
+  ManyPeersOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
 };
 
-TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
+TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndNoOthers) {
   const auto crowd = keyed_peers(100, kElsewhere);
   run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMax; });
   EXPECT_EQ(network_.connections(), kMax);
@@ -511,7 +511,7 @@ class TightKeyedNetworkTest : public NetworkTest {
   TightKeyedNetworkTest() : NetworkTest({.connections = 7, .handshake_ms = 100}) {}
 };
 
-TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
+TEST_F(TightKeyedNetworkTest, AnAdmittedPeerIsNeverReplaced) {
   std::vector<std::unique_ptr<KeyedPeer>> peers(7);
   for (auto& peer : peers) {
     peer = admitted();
@@ -523,7 +523,7 @@ TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
   EXPECT_EQ(network_.connections(), 7U);
 }
 
-TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedWhateverItsStep) {
+TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedInEachOfItsSteps) {
   const auto peers = keyed_peers(2);  // the second peer stays silent
   peers[0]->say_hello();
   take_welcome(*peers[0]);

@@ -150,7 +150,7 @@ std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
   return columns;
 }
 
-TEST(UsualColumns, HaveEveryKeyWithSeveralValuesInTheStudyAndNoOther) {
+TEST(UsualColumns, ContainExactlyTheKeysThatVaryInTheStudy) {
   using protocol::listed;
   using protocol::recipe_of;
   const auto H = listed("H", {1});
@@ -308,7 +308,7 @@ TEST_F(PlanTest, UnitsFollowFromThoseOfColumns) {
   }
 }
 
-TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
+TEST_F(PlanTest, AGroupedQuerySelectsOnlyKeysOrAggregates) {
   const std::pair<const char*, const char*> right[] = {
       {"major_mode, count(*), avg(fn_peak_N)", "major_mode"},
       {"round(mu, 1) AS m, max(fn_peak_N)", "m"},
@@ -381,7 +381,7 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
   EXPECT_THAT(error(unknown), HasSubstr("no study called \"b\""));
 }
 
-TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedOnes) {
+TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedNumbers) {
   // SQLite 3.40 parses each of these texts as a neighbouring double.
   for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
     EXPECT_EQ(number(typed), std::stod(typed));

@@ -265,7 +265,7 @@ TEST_F(QueryPoolTest, ALongAnswerIsCompleteInLimitedChunks) {
   EXPECT_LT(answer.largest, (std::uint64_t{256} << 10U) + 4096);
 }
 
-TEST_F(QueryPoolTest, AClientThatConfirmsNothingGetsFourChunksAndLosesItsAnswerAfterTenSeconds) {
+TEST_F(QueryPoolTest, WithoutConfirmationAClientGetsFourChunksAndItsAnswerEndsAfterTenSeconds) {
   const auto ticket = ask(kLong);
   wait_for_chunks(ticket, kChunksAhead);
   take_all(ask("SELECT 1"));
@@ -281,7 +281,7 @@ TEST_F(QueryPoolTest, AClientThatConfirmsNothingGetsFourChunksAndLosesItsAnswerA
   EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("read no rows for 10 s"));
 }
 
-TEST_F(QueryPoolTest, AnAnswerHasALongestTime) {
+TEST_F(QueryPoolTest, AnAnswerEndsAtItsTimeLimit) {
   settings_.longest_answer_ms = 5000;
   const auto ticket = ask(kLong);
   wait_for_chunks(ticket, kChunksAhead);

@@ -41,7 +41,7 @@ class ReaderTest : public StoreFixture {
   protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows.at(0); }
 };
 
-TEST_F(ReaderTest, ValuesHaveTheirTypes) {
+TEST_F(ReaderTest, ValuesKeepTheirSqliteTypes) {
   const auto reply = Reader(path_).query(
       "SELECT 1 AS i, 0.5 AS r, CAST(x'c3a9' AS TEXT) AS t, NULL AS n, x'0aff' AS b,"
       " CAST(x'ff' AS TEXT), CAST(x'eda080' AS TEXT), 'SC' LIKE 'sC', 'SC' LIKE 'S%' ESCAPE '!'",

@@ -57,7 +57,7 @@ TEST(SchedulerPace, AMessageIsWeightedByItsPointsSoThatOneFallChangesThePaceLitt
   EXPECT_NEAR(static_cast<double>(next.count()), 0.1 / (0.299 / 1000), 5.0);
 }
 
-TEST(SchedulerPace, AnImplausiblyLongTimeIsCut) {
+TEST(SchedulerPace, AnImplausiblyLongTimeIsLimited) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;
   SchedulerBench bench(table_of(1'000'000), settings);
@@ -72,7 +72,7 @@ TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanes) {
   EXPECT_LT(third.count(), 4U) << "but not when they take minutes";
 }
 
-TEST(SchedulerPace, TheLastBatchesOfAStudyHaveAShortestDuration) {
+TEST(SchedulerPace, TheLastBatchesOfAStudyHaveAMinimumDuration) {
   SchedulerSettings settings = trusting();
   settings.shortest_batch_s = 0.01;
   SchedulerBench bench(table_of(1000), settings);
@@ -301,7 +301,7 @@ TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerExceptAFewSharedOnes) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 20'000U);
 }
 
-TEST(SchedulerFalls, ARestartedServerLeasesTheRest) {
+TEST(SchedulerFalls, ARestartedServerLeasesTheRemainingPoints) {
   SchedulerBench bench;
   const IntervalSet completed = every(3, 2'000);
   bench.feed(StudyAdded{1, sample(2'000, 50), completed});
@@ -312,7 +312,7 @@ TEST(SchedulerFalls, ARestartedServerLeasesTheRest) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 2'000U);
 }
 
-TEST(SchedulerFalls, PointsOfALostWorkerAreReturnedAndAFailedPointHasItsNumber) {
+TEST(SchedulerFalls, PointsOfALostWorkerAreLeasedAgainAndAFailedPointKeepsItsNumber) {
   SchedulerBench bench(sample(300, 4), trusting());
   const std::uint64_t failed = bench.join(1, 1).at(0).first_point();
   bench.feed(WorkerLeft{1});

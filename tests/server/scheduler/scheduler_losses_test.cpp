@@ -422,7 +422,7 @@ TEST_F(SuspectTest, RepeatedLossesOfOneProcessDoNotFailAPoint) {
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
 }
 
-TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherRisky) {
+TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherPointRisky) {
   prove(5, 2);
   for (WorkerId worker = 1; worker <= 5; ++worker) {
     bench_.feed(CreditGiven{worker, 2});
@@ -487,7 +487,7 @@ TEST(SchedulerSuspects, ThePartsOfASplitIntervalStaySuspect) {
   }
 }
 
-TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
+TEST(SchedulerSuspects, ABusyWorkerFinishesItsBatchesBeforeItGetsSuspectPoints) {
   SchedulerBench bench(table_of(100'000));
   bench.join(1, 1);
   bench.pass(3250);
@@ -514,7 +514,7 @@ TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
   EXPECT_TRUE(suspect_was_leased);
 }
 
-TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutAnswersGetsOnlyThree) {
+TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutResultsGetsOnlyThreeBatches) {
   prove(1, 1);
   auto effects = bench_.feed(CreditGiven{1, 1});
   int rounds = 0;

@@ -81,7 +81,7 @@ TEST_F(StallTest, PointsOfStalledWorkersAreNotSuspect) {
   }
 }
 
-TEST_F(StallTest, ItsLateResultsAreStoredOnce) {
+TEST_F(StallTest, LateResultsOfAStalledWorkerAreStoredOnce) {
   bench_.pass(kMinute_ms + 1000, {1});
   const auto again = bench_.join(2, 1);
   ASSERT_EQ(again.size(), 1U);
@@ -91,7 +91,7 @@ TEST_F(StallTest, ItsLateResultsAreStoredOnce) {
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
 
-TEST_F(StallTest, AWorkerThatStoresSomethingInTimeKeepsItsBatch) {
+TEST_F(StallTest, AWorkerThatDeliversAResultInTimeKeepsItsBatch) {
   for (std::uint64_t point = 0; point < 3; ++point) {
     bench_.pass(kMinute_ms - 1000, {1});
     bench_.feed(ResultsReceived{1, 1, batch_.lease, point + 1, false, 50.0, {{point, false}}});
@@ -218,7 +218,7 @@ TEST_F(StragglerTest, TheFirstAnswerWinsAndTheOtherWorkerIsReleased) {
   EXPECT_TRUE(late.at(0).accepted.empty()) << "what comes late is stored once only";
 }
 
-TEST_F(StragglerTest, TheStragglerMayWinToo) {
+TEST_F(StragglerTest, TheSlowWorkerMayAnswerFirst) {
   const SendBatch batch = second();
   answer(batch, {0}, false);
   const auto released = only<ReleaseBatch>(answer(batch_, {0, 1, 2, 3}, true));
@@ -237,7 +237,7 @@ TEST_F(StragglerTest, PointsStayLeasedWhileOneOfTheTwoWorkersHasThem) {
   EXPECT_EQ(batch.worker, 2U);
 }
 
-TEST_F(StragglerTest, AWorkerDoesNotGetItsOwnBatchTwiceNorAThirdWorkerOne) {
+TEST_F(StragglerTest, ABatchGoesToAtMostTwoDifferentWorkers) {
   second();
   bench_.feed(CreditGiven{1, 1});
   bench_.join(3, 1);
@@ -298,7 +298,7 @@ TEST_F(StragglerTest, ForgettingAFailureEndsALeaseThatContainsThePoint) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, again[0].count());
 }
 
-TEST_F(StragglerTest, ACancellationReturnsThePointsOfTwinLeases) {
+TEST_F(StragglerTest, ACancellationReturnsThePointsOfBothLeasesOfABatch) {
   second();
   ASSERT_EQ(bench_.scheduler.worker(2, bench_.now_ms).leased_points, batch_.count());
   EXPECT_EQ(only<WithdrawStudy>(bench_.feed(StudyCancelled{1})).size(), 2U);

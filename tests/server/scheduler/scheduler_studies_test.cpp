@@ -42,7 +42,7 @@ TEST(SchedulerShare, AStudyOfAHigherPriorityComesFirst) {
   EXPECT_EQ(shares(bench, 10).at(1), 10);
 }
 
-TEST(SchedulerShare, AStudyThatOpensLaterOrAgainDoesNotCatchUp) {
+TEST(SchedulerShare, AStudyThatOpensLaterOrAgainGetsNoExtraBatches) {
   for (const bool is_reopened : {false, true}) {
     SchedulerBench bench(table_of(1'000'000), trusting());
     StudyAdded other{2, table_of(1'000'000), {}};
@@ -117,7 +117,7 @@ TEST(SchedulerReuse, LeasedPointsAreReusedTooAndTheirBatchIsReleased) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), second.count() + 5);
 }
 
-TEST(SchedulerReuse, AHeldStudyCanBePausedCancelledAndReopened) {
+TEST(SchedulerReuse, AStudyCanBePausedCancelledAndReopenedDuringItsLookup) {
   SchedulerBench bench;
   bench.feed(held_study(10));
   EXPECT_THAT(bench.join(1, 4), IsEmpty());
@@ -227,7 +227,7 @@ TEST(SchedulerRemovalTest, ResultsOfADeletedStudyAreDroppedAndAcknowledged) {
       only<AcknowledgeResults>(bench.feed(ResultsStored{1, 1, stores[0].sequence, {}})).size(), 1U);
 }
 
-TEST(SchedulerRemovalTest, ResultsBeingWrittenAreAcknowledged) {
+TEST(SchedulerRemovalTest, ResultsThatAreBeingWrittenDuringADeletionAreAcknowledged) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   const auto store = only<StoreResults>(bench.solve(batch)).at(0);
@@ -237,7 +237,7 @@ TEST(SchedulerRemovalTest, ResultsBeingWrittenAreAcknowledged) {
   EXPECT_TRUE(only<StudyFinished>(effects).empty());
 }
 
-TEST(SchedulerRemovalTest, LossesOfItsPointsAreForgotten) {
+TEST(SchedulerRemovalTest, LossesOfPointsOfADeletedStudyAreForgotten) {
   SchedulerBench bench(table_of(1));
   // Six processes are lost with batches, so the scheduler stores losses for points of both studies.
   bench.feed(StudyAdded{2, table_of(1000), {}});

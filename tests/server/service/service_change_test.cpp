@@ -124,7 +124,7 @@ TEST_F(ServiceTest, AStudyThatIsDoneWhileAPauseIsWrittenStaysDone) {
   EXPECT_EQ(status_of("a").state(), "done") << "points handed out before are still stored";
 }
 
-TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
+TEST_F(ServiceTest, ARefusedChangeHasNoEffectAndTheStateIsStoredAgain) {
   submit("a");
   for (const auto change : {protocol::STUDY_CHANGE_PAUSE, protocol::STUDY_CHANGE_CANCEL}) {
     request(change_request("a", change));
@@ -327,7 +327,7 @@ TEST_F(ServiceGrowthTest, ADeletedStudyIsGoneAndItsNameIsFree) {
   EXPECT_THAT(last_error(), HasSubstr("study name \"a\" and study number do not match"));
 }
 
-TEST_F(ServiceGrowthTest, TheRecipeOfAStudyIsDescribed) {
+TEST_F(ServiceGrowthTest, DescribeReturnsTheRecipeOfAStudy) {
   submit("friction", 10);
   ClientRequest describe = client_request(7);
   describe.mutable_describe()->set_study("friction");

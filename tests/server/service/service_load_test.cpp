@@ -48,7 +48,7 @@ TEST_F(ServiceLoadTest, NoBatchIsSentWhileTheDiskIsFarBehind) {
   EXPECT_EQ(batches_sent(), 2U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerThatIsNotReadIsNotSilentAndGetsSignsOfLife) {
+TEST_F(ServiceLoadTest, WhileReadingIsPausedAWorkerIsNotLostAndGetsHeartbeatReplies) {
   ServiceSettings settings;
   settings.ledger.bytes = 1;
   begin(settings);
@@ -66,7 +66,7 @@ TEST_F(ServiceLoadTest, AWorkerThatIsNotReadIsNotSilentAndGetsSignsOfLife) {
   EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
 }
 
-TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotSilent) {
+TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotLost) {
   begin({});
   ports_.unheard = "worker";
   pass(10'000);
@@ -76,7 +76,7 @@ TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotSilent) {
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsSignsOfLife) {
+TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsHeartbeatReplies) {
   begin({});
   ports_.worker_messages.clear();
   for (std::uint64_t point = 900; point < 960; ++point) {

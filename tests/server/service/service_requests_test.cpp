@@ -59,7 +59,7 @@ TEST_F(ServiceTest, WaitingLongRequestsAreLimited) {
   EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
 }
 
-TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsNumber) {
+TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsRequestNumber) {
   std::string frame = protocol::encode(long_submission("a", kLongRequest));
   frame.back() = '\x7f';
   frame += '\x7f';
@@ -346,7 +346,7 @@ TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainBecauseItMayKillAWorker) {
 }
 
 TEST_F(ServiceTraceTest,
-       APointWithoutAnAnswerIsSolvedEachTimeItIsRequestedAndALongTraceSaysWhatWouldFit) {
+       AnUnsolvedPointIsSolvedAtEachRequestAndATooLongTraceNamesTheIntervalThatFits) {
   hello();
   ask(7, 3);
   auto trace = trace_of(orders()[0], "\2");
@@ -368,7 +368,7 @@ TEST_F(ServiceTraceTest,
   EXPECT_TRUE(orders().at(2).shape());
 }
 
-TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
+TEST_F(ServiceTraceTest, WithoutAWorkerATraceIsRefusedAtOnce) {
   ask(7, 3);
   EXPECT_THAT(last_error(), HasSubstr("no worker is connected"));
 }
@@ -393,7 +393,7 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
   }
 }
 
-TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
+TEST_F(ServiceTraceTest, ATraceIsCancelledWhenItsClientDisconnectsOrEndsItsRequest) {
   hello();
   ask(7, 3);
   ask(7, 3);  // repeated
@@ -468,7 +468,7 @@ TEST_F(ServiceTraceTest, ChecksOfPointsAreLimitedEvenIfTheirClientsAreGone) {
   EXPECT_THAT(last_error(), HasSubstr("damaged"));
 }
 
-TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
+TEST_F(ServiceTraceTest, AnInvalidTraceFailsTheRequestAndNothingElse) {
   hello();
   std::uint64_t asked = 0;
   const auto with = [&](const std::function<void(protocol::Trace&)>& change) {

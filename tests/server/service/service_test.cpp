@@ -71,7 +71,7 @@ TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
   EXPECT_EQ(last_reply().submit().points(), 20U);
 }
 
-TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
+TEST_F(ServiceTest, InvalidStudiesAreRefusedWithTheReason) {
   const auto error_of = [&](const auto& spoil) {
     ClientRequest message = submit_request("a");
     spoil(*message.mutable_submit());
@@ -270,7 +270,7 @@ TEST_F(ServiceTest, TextFromAWorkerCannotForgeLogLines) {
   EXPECT_THAT(ports_.lines.back(), HasSubstr("(a??[31mb, 1 threads) joins"));
 }
 
-TEST_F(ServiceTest, ALateHeartbeatRevealsALostConnection) {
+TEST_F(ServiceTest, AWorkerWithALateHeartbeatAndALostConnectionIsDropped) {
   submit("a");
   hello_and_credit();
   ports_.unreachable = "worker";
@@ -313,7 +313,7 @@ TEST_F(ServiceTest, TooLargeMessagesOfWorkersAreNotParsed) {
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, AWorkerGetsARowWithItsFirstResult) {
+TEST_F(ServiceTest, AWorkerIsStoredWithItsFirstResult) {
   submit("a", 4);
   for (int i = 0; i < 1000; ++i) {
     hello("worker " + std::to_string(i));

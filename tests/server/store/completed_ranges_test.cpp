@@ -29,7 +29,7 @@ class CompletedRangesTest : public StoreFixture {
   }
 };
 
-TEST_F(CompletedRangesTest, RetriedFailuresLeaveTheirRangeAndTheStudyStaysCounted) {
+TEST_F(CompletedRangesTest, RetriedFailuresAreRemovedFromTheirRangeAndTheStudyStaysMarkedAsCounted) {
   const auto study = study_of(9);
   commit({study, worker(1), solved(study, {0, 1, 2, 6, 7, 8}), failed(study, {3, 4, 5})});
   EXPECT_THAT(ranges(), ElementsAre("0+9"));

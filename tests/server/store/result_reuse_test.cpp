@@ -111,14 +111,14 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrTo
   }
 }
 
-TEST_F(SamePointsTest, PointsThatAreCompletedWithoutARowGetNone) {
+TEST_F(SamePointsTest, PointsCompletedWithoutARowGetNoCopiedRow) {
   by_hand("INSERT INTO completed_ranges VALUES (2, 2, 3)");
   IntervalSet others(0, 10);
   others.erase(2, 5);
   EXPECT_EQ(reused(), others) << "a condition leaves them out";
 }
 
-TEST_F(ResultReuseTest, ALookupThatEndedIsNotedInTheStudy) {
+TEST_F(ResultReuseTest, TheEndOfALookupIsStoredWithTheStudy) {
   commit({AddStudy{3, "c", table_of(10), "then", {}, "", true}});
   EXPECT_TRUE(store().studies().at(0).reuses);
   commit({EndReuse{3}});

@@ -27,7 +27,7 @@ using testing::SizeIs;
 
 using StoreTest = StoreFixture;
 
-TEST_F(StoreTest, CommittedRowsAreThereAfterReopening) {
+TEST_F(StoreTest, CommittedRowsSurviveReopening) {
   auto study = study_of(10);
   study.submitted_by = "alice";
   commit({study, worker(1), solved(study, {0, 1, 5}), failed(study, {7})});
@@ -69,7 +69,7 @@ TEST_F(StoreTest, AnEmptyDatabaseHasAnIdAndCountsStarts) {
   EXPECT_EQ(store().count_start(), 2U);
 }
 
-TEST_F(StoreTest, TheFirstResultOfAPointStays) {
+TEST_F(StoreTest, ASecondResultOfAPointDoesNotReplaceTheFirst) {
   const auto study = study_of(3);
   commit({study, worker(1), solved(study, {1})});
   auto other = solved_point(1);
@@ -141,7 +141,7 @@ TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
               ElementsAre("8|8|[0.4,0.4,0.4]"));
 }
 
-TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
+TEST_F(StoreTest, TheViewRunsShowsTheStudyItsModelAndTheWorker) {
   const auto study = study_of(3);
   commit({study, worker(1), solved(study, {1})});
   EXPECT_THAT(rows("SELECT study, mu, e, E_Pa, elements_per_link, worker_id, worker_name,"
@@ -255,7 +255,7 @@ class StudyDeletionTest : public StoreFixture {
   }
 };
 
-TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndARightChecksum) {
+TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndAValidChecksum) {
   add_solved(1, table_of(10));
   commit({SetStudyState{1, StudyState::kDone, "then"}});
   commit({GrowStudy{1, grown_table(), 2, "now"}, RenameStudy{1, "another name"}});
@@ -287,7 +287,7 @@ TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsAreDeletedInParts) 
   EXPECT_EQ(store().clear_away(10), ClearedAway::kAll);
 }
 
-TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinues) {
+TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinuesTheDeletion) {
   for (int steps = 0; steps < 8; ++steps) {
     const std::uint64_t id = static_cast<std::uint64_t>(2 * steps + 1);
     add_solved(id, table_of(20));

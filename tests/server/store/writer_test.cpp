@@ -277,7 +277,7 @@ TEST_F(WriterTest, ManyJobsShareATransactionAndStayInOrder) {
   EXPECT_EQ(count(Kind::kStored), kJobs);
 }
 
-TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
+TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedWhenTheWriterStops) {
   storage_.on_change = [this](const Change&) {
     storage_.is_interrupted.wait(false);
     throw StorageError("interrupted");
@@ -286,7 +286,7 @@ TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
   EXPECT_EQ(writer_.finish(), 1U) << "it is not durable";
 }
 
-TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsFailure) {
+TEST_F(WriterTest, AStoppingWriterTriesSeveralTimesToMergeTheLogAndReportsFailure) {
   storage_.merged_at = 1'000'000;
   writer_.submit(kept(1));
   EXPECT_EQ(writer_.finish(), 0U);

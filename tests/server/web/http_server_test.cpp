@@ -118,7 +118,7 @@ std::vector<std::unique_ptr<RawHttp>> silent_peers(const EchoServer& server, int
   return peers;
 }
 
-TEST(HttpServer, AnswersBothVersionsAndEndsTheConnection) {
+TEST(HttpServer, AnswersHttp10AndHttp11AndEndsTheConnection) {
   const EchoServer server;
   const std::string answer = RawHttp(server.url()).ask("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(status_of_answer(answer), 200);
@@ -129,7 +129,7 @@ TEST(HttpServer, AnswersBothVersionsAndEndsTheConnection) {
   EXPECT_EQ(body_of(head), "");
 }
 
-TEST(HttpServer, KeepsBrowsersFromUsingAnswersForAnythingElse) {
+TEST(HttpServer, SendsHeadersThatKeepBrowsersFromMisusingAnswers) {
   const EchoServer server;
   for (const std::string path : {"/", "/wrong", "/quiet"}) {
     RawHttp peer(server.url());
@@ -148,7 +148,7 @@ TEST(HttpServer, KeepsBrowsersFromUsingAnswersForAnythingElse) {
   }
 }
 
-TEST(HttpServer, RefusesWithASentence) {
+TEST(HttpServer, ARefusalContainsASentence) {
   const EchoServer server;
   const std::string rebound =
       RawHttp(server.url()).ask("GET / HTTP/1.1\r\nHost: evil.example:7602\r\n\r\n");
@@ -330,7 +330,7 @@ TEST(HttpServer, StopsWhileRequestsWait) {
   EXPECT_EQ(streaming->read_to_the_end(), "");
 }
 
-TEST(HttpServer, FailsToListenWithoutDescriptors) {
+TEST(HttpServer, ReportsAFailureToListenWithoutFreeDescriptors) {
   rlimit usual{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
   rlimit one = usual;

@@ -221,7 +221,7 @@ TEST(Health, IsGoodWhileTheEventLoopRuns) {
   EXPECT_EQ(health(1000, 8500).body, "the server's event loop has not run for 7.5 s\n");
 }
 
-TEST(Health, ReadinessHasTheReason) {
+TEST(Health, ReadinessGivesTheReasonIfTheServerIsNotReady) {
   constexpr double kPlenty = 1e12;
   EXPECT_EQ(readiness({}, kPlenty).status, 200U);
   EXPECT_EQ(readiness({}, std::numeric_limits<double>::quiet_NaN()).status, 200U);  // unknown
@@ -299,7 +299,7 @@ TEST_F(WebTest, ErrorsNameThePaths) {
   }
 }
 
-TEST(Web, AServerRunsWithoutHttpOnlyIfItMay) {
+TEST(Web, AServerRunsWithoutHttpOnlyIfHttpIsOptional) {
   const test::TemporaryFolder folder;
   const RunningServer first(folder.file("a.db"), {}, {}, {}, {}, anywhere());
   WebSettings taken = anywhere();

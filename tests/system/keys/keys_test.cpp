@@ -114,7 +114,7 @@ TEST_F(KeysTest, AValidKeyAtTheWrongPortIsRefusedWithAHint) {
   wait_until_said(worker, "or this is not its port for workers (by default 7601)");
 }
 
-TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwn) {
+TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwnKey) {
   Process server(folder_, server_program(),
                  {"--db", folder_.file("a.db"), "--worker-port", "0", "--client-port", "0"},
                  Environment{{"OBLIQUE_KEYS", key("client")}});

@@ -155,26 +155,26 @@ class BrokenLines : public StudyOnLan {
   }
 };
 
-TEST_F(BrokenLines, TheServersCableIsPulledForTenSeconds) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServersCableIsPulledForTenSeconds) {
   expect_completion_after([this] { pull_for(*server_host_, seconds(10)); });
 }
 
-TEST_F(BrokenLines, TheCableOfTheOnlyWorkerIsPulledForTenSeconds) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheCableOfTheOnlyWorkerIsPulledForTenSeconds) {
   expect_completion_after([this] { pull_for(*worker_hosts_[0], seconds(10)); }, 1);
 }
 
-TEST_F(BrokenLines, TheServersCableIsPulledForLessTimeThanALeaseLasts) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServersCableIsPulledForLessTimeThanALeaseLasts) {
   expect_completion_after([this] { pull_for(*server_host_, milliseconds(1500)); });
 }
 
-TEST_F(BrokenLines, FivePercentOfThePacketsAreLostInBothDirections) {
+TEST_F(BrokenLines, AStudyCompletesAlthoughFivePercentOfThePacketsAreLost) {
   for (const Host* host : {server_host_, worker_hosts_[0], worker_hosts_[1], client_host_}) {
     host->lose_percent(5);
   }
   expect_completion_after([] {});
 }
 
-TEST_F(BrokenLines, AWorkerIsCutOffSilentlyAndRestarted) {
+TEST_F(BrokenLines, AStudyCompletesAfterAWorkerIsCutOffSilentlyAndRestarted) {
   expect_completion_after([this] {
     worker_hosts_[0]->lose_everything();
     workers_[0]->send(SIGKILL);
@@ -184,7 +184,7 @@ TEST_F(BrokenLines, AWorkerIsCutOffSilentlyAndRestarted) {
   });
 }
 
-TEST_F(BrokenLines, TheServerIsCutOffSilentlyForTenSeconds) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServerIsCutOffSilentlyForTenSeconds) {
   expect_completion_after([this] {
     server_host_->lose_everything();
     std::this_thread::sleep_for(seconds(10));
@@ -192,7 +192,7 @@ TEST_F(BrokenLines, TheServerIsCutOffSilentlyForTenSeconds) {
   });
 }
 
-TEST_F(BrokenLines, TheServersMachineGoesDownSilentlyAndComesBack) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServersMachineGoesDownSilentlyAndComesBack) {
   expect_completion_after([this] {
     server_host_->pull_cable();
     server_->process().send(SIGKILL);
@@ -207,11 +207,11 @@ TEST_F(BrokenLines, TheServersMachineGoesDownSilentlyAndComesBack) {
 
 using ChangedAddresses = StudyOnLan;
 
-TEST_F(ChangedAddresses, TheMachineOfTheOnlyWorkerGetsAnotherAddress) {
+TEST_F(ChangedAddresses, AStudyCompletesAfterTheMachineOfTheOnlyWorkerGetsAnotherAddress) {
   expect_completion_after([this] { worker_hosts_[0]->renumber(13); }, 1);
 }
 
-TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
+TEST_F(ChangedAddresses, AStudyCompletesAfterTheClientsMachineGetsAnotherAddress) {
   start_server();
   client_ = client(submit_and_watch());
   const auto says = [this](const std::string& words) {
@@ -225,7 +225,7 @@ TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
   expect_completion_after([] {});
 }
 
-TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
+TEST_F(ChangedAddresses, AStudyCompletesAfterTheServersMachineGetsAnotherAddressUnderItsName) {
   lan_->set_addresses("coordinator", {server_host_->v4()});
   server_name_ = "coordinator";
   expect_completion_after([this] {
@@ -420,7 +420,7 @@ class ReadmeCommands : public StudyOnLan {
   TemporaryFolder elsewhere_;
 };
 
-TEST_F(ReadmeCommands, FiveOfThemLeadFromTheFirstKeyToTheFirstResultOfAnotherMachine) {
+TEST_F(ReadmeCommands, FiveCommandsLeadFromNewKeysToAResultOfAnotherMachine) {
   const std::string text = readme();
   std::ofstream(elsewhere_.file("first.toml")) << block_after(text, "## A study", "toml");
   const auto commands = commands_of(block_after(text, "## More than one machine", ""));

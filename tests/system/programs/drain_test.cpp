@@ -102,7 +102,7 @@ TEST_F(DrainTest, WaitsForRunningBatchesAndReportsThisToClientsAndSystemd) {
   EXPECT_NE(log.find(" drained: "), std::string::npos) << log;
 }
 
-TEST_F(DrainTest, ASecondSignalEndsItAtOnce) {
+TEST_F(DrainTest, ASecondSignalEndsADrainAtOnce) {
   submit();
   Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
   wait_until_leased();
@@ -113,7 +113,7 @@ TEST_F(DrainTest, ASecondSignalEndsItAtOnce) {
   EXPECT_EQ(server_.process().err().find(" drained: "), std::string::npos);
 }
 
-TEST_F(DrainTest, EndsAtOnceWithoutRunningBatches) {
+TEST_F(DrainTest, ADrainEndsAtOnceWithoutRunningBatches) {
   server_.process().send(SIGTERM);
   EXPECT_EQ(server_.process().wait(), 0);
   EXPECT_NE(server_.process().err().find(" drained: "), std::string::npos);

@@ -93,7 +93,7 @@ TEST_F(LeavingProgramTest, AWorkerExitsBeforeTheTimeOfUntil) {
   EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
 }
 
-TEST_F(LeavingProgramTest, AnIdleWorkerLeaves) {
+TEST_F(LeavingProgramTest, AWorkerExitsAfterItsLimitOfIdleTime) {
   Worker worker(folder_, server_.worker_url(), {"--idle-exit", "3"});
   EXPECT_EQ(worker.wait(), 0) << worker.err();
   EXPECT_NE(worker.err().find("no work for 3 s: leaving (--idle-exit)"), std::string::npos)

@@ -243,7 +243,7 @@ TEST_F(SlurmAutoscaleTest, JobsStartForAStudyAndEndByThemselvesWhenItIsDone) {
   EXPECT_NE(scaling.err().find("submitting 2 jobs"), std::string::npos) << scaling.err();
 }
 
-TEST_F(SlurmAutoscaleTest, AfterItIsStoppedItsJobsContinueAndTheNextAutoscalerCountsThem) {
+TEST_F(SlurmAutoscaleTest, JobsOfAStoppedAutoscalerContinueAndTheNextAutoscalerCountsThem) {
   {
     Process scaling(folder_, client_program(), autoscale({"--min", "2", "--max", "2"}),
                     environment());

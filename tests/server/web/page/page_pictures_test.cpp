@@ -165,7 +165,7 @@ TEST_F(PageStudyTest, BinsCountEveryPointOnce) {
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mu&xlog=1&x0=0"), 400);
 }
 
-TEST_F(PageStudyTest, TypedEndsAreInsideTheBins) {
+TEST_F(PageStudyTest, BinsIncludeTheRequestedEnds) {
   solve_grid();
   const std::string bins = "/api/studies/1/bins?x=mu&nx=2&";
   for (const std::string log : {"", "&xlog=1"}) {
@@ -179,7 +179,7 @@ TEST_F(PageStudyTest, TypedEndsAreInsideTheBins) {
   EXPECT_EQ(page_.numbers(bins + "x0=1e-300&x1=1e300&xlog=1").head["points"], 18);
 }
 
-TEST_F(PageStudyTest, BinsWithoutPointsHaveTheTypedEnds) {
+TEST_F(PageStudyTest, BinsWithoutPointsHaveTheRequestedEnds) {
   submit_grid();
   const std::string bins = "/api/studies/1/bins?x=fn_peak_N";
   EXPECT_EQ(page_.numbers(bins + "&x0=2").head["x"]["most"], 2);

@@ -37,7 +37,7 @@ TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   }
 }
 
-TEST(PageAccess, OnlyAViewOfAFileNamesItAndOnlyWithAccess) {
+TEST(PageAccess, OnlyAViewOfAFileShowsTheFileNameAndOnlyWithAccess) {
   EXPECT_EQ(PageServer().json("/api/session")["file"], "");
   WebSettings web = page_settings();
   web.page.is_of_file = true;
@@ -244,7 +244,7 @@ TEST_F(PageStudyTest, TheOverviewIsSentOnceAndThenAfterChanges) {
   EXPECT_EQ(now["studies_by_state"]["running"], 1);
 }
 
-TEST_F(PageStudyTest, AStudyIsItsRecipeAndColumns) {
+TEST_F(PageStudyTest, TheAnswerForAStudyHasItsRecipeAndColumns) {
   submit_grid();
   const json study = page_.json("/api/studies/1");
   EXPECT_EQ(study["name"], "grid");
@@ -266,7 +266,7 @@ TEST_F(PageStudyTest, AStudyIsItsRecipeAndColumns) {
   EXPECT_EQ(columns["mode"]["picture"], "categories");
 }
 
-TEST_F(PageStudyTest, StudiesAndWorkersAreListedAndOthersAreNotFound) {
+TEST_F(PageStudyTest, StudiesAndWorkersAreListedAndUnknownOnesAreNotFound) {
   submit_grid();
   EXPECT_EQ(page_.json("/api/studies")["studies"][0]["name"], "grid");
   EXPECT_EQ(page_.json("/api/studies?after=1")["studies"].size(), 0U);

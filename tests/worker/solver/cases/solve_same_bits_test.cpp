@@ -73,17 +73,17 @@ void expect_same_in_any_company(std::vector<FingerPoint> list) {
   }
 }
 
-TEST(SameBits, WhateverPointsWereSolvedBefore) {
+TEST(SameBits, DoNotDependOnThePointsSolvedBefore) {
   const auto list = points_of(Finger{coarse_model()});
   expect_same(solved_one_by_one({list.rbegin(), list.rend()}),
               solved_one_by_one(points_of(coarse_finger())));
 }
 
-TEST(SameBits, WhateverPointsAreInTheOtherLanes) {
+TEST(SameBits, DoNotDependOnThePointsInOtherLanes) {
   expect_same_in_any_company(points_of(coarse_finger()));
 }
 
-TEST(SameBits, OnSeveralThreadsThatShareAFinger) {
+TEST(SameBits, ResultFromThreadsThatShareAFinger) {
   const auto list = points_of(Finger{coarse_model()});
   std::vector<Results> by_thread(4);
   std::vector<std::thread> threads;
@@ -129,11 +129,11 @@ std::vector<FingerPoint> crowd() {
   return crowd;
 }
 
-TEST(SameBits, InAMixtureOfModels) {
+TEST(SameBits, ResultFromPointsOfMixedModels) {
   expect_same_in_any_company(crowd());
 }
 
-TEST(SameBits, WithOrWithoutATrace) {
+TEST(SameBits, ResultWithAndWithoutATrace) {
   int rows = 0;
   Tracing tracing;
   tracing.sink = [&rows](const TraceRow&) { ++rows; };
