@@ -109,7 +109,7 @@ TEST(InstallTest, EachPartHasOnlyItsProgramAndFiles) {
 
 TEST(InstallTest, EachPartHasTheManualPagesOfItsProgramWithTheDateOfTheTree) {
   if (!std::filesystem::exists(OBLIQUE_BUILD_FOLDER "/proto/program/manual/pages/made")) {
-    GTEST_SKIP() << "the pages are not built: there was no help2man";
+    GTEST_SKIP() << "the manual pages are not built because help2man is missing";
   }
   const TemporaryFolder folder;
   for (const std::string part : {"server", "worker", "client"}) {
@@ -224,7 +224,7 @@ TEST(PackagesTest, TheArchiveRunsWhereItIsUnpackedWithLibrariesOfItsOwn) {
   const TemporaryFolder folder;
   for (const std::string tool : {"patchelf", "dpkg-query"}) {
     if (!is_there(folder, tool)) {
-      GTEST_SKIP() << "there is no " << tool << " here";
+      GTEST_SKIP() << tool << " is not installed";
     }
   }
   const auto archives = packages(folder, "TGZ");
@@ -338,12 +338,12 @@ std::vector<std::string> installed_units(const TemporaryFolder& folder) {
 TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
   const TemporaryFolder folder;
   if (!is_there(folder, "systemd-analyze")) {
-    GTEST_SKIP() << "there is no systemd-analyze here";
+    GTEST_SKIP() << "systemd-analyze is not installed";
   }
   for (const auto& unit : installed_units(folder)) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
-    EXPECT_EQ(verified.err, "") << unit << ": what it ignores it prints and lets pass";
+    EXPECT_EQ(verified.err, "") << unit << ": systemd-analyze prints settings that it ignores";
     // The threshold is in tenths of systemd's exposure level. The access to network, local sockets
     // and threads that the programs need has the level 1.2.
     const auto judged =

@@ -49,7 +49,7 @@ def older(package, folder):
 def setUpModule():
     tools = ("dpkg-deb", "dpkg-shlibdeps", "deb-systemd-helper", "systemd-sysusers", "file")
     if missing := [tool for tool in tools if not shutil.which(tool)]:
-        raise unittest.SkipTest(f"there is no {missing[0]} here")
+        raise unittest.SkipTest(f"{missing[0]} is not installed")
     global FOLDER, PACKAGES, VERSION
     FOLDER = tempfile.TemporaryDirectory()
     PACKAGES = pack(pathlib.Path(FOLDER.name))
@@ -95,7 +95,7 @@ class Packages(unittest.TestCase):
 
     def test_the_python_module_depends_on_python_and_numpy_only(self):
         if "python3-oblique" not in PACKAGES:
-            self.skipTest("the Python module is not built here")
+            self.skipTest("the Python module is not built")
         self.assertRegex(field("python3-oblique", "Depends"), r"^python3 \(>= 3\.\d+\), python3 \(<< 3\.\d+\), python3-numpy, libc6")
         self.assertNotRegex(field("python3-oblique", "Depends"), "oblique|pandas")
         self.assertIn("/usr/lib/python3/dist-packages/oblique/__init__.py", files("python3-oblique"))
@@ -141,10 +141,10 @@ class Packages(unittest.TestCase):
 
     def test_lintian_has_no_errors_and_warns_of_nothing(self):
         if not shutil.which("lintian"):
-            self.skipTest("there is no lintian here")
+            self.skipTest("lintian is not installed")
         # Only release builds are shipped; builds with sanitizers or assertions differ from them.
         if "CMAKE_BUILD_TYPE:STRING=Release" not in (BUILD / "CMakeCache.txt").read_text():
-            self.skipTest("what is built is not what is shipped")
+            self.skipTest("only a release build is checked with lintian")
         run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
             "uses-no-compression-for-data-tarball", *PACKAGES.values())
 

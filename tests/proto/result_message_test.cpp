@@ -69,7 +69,7 @@ TEST(PointResultTest, AResultIsTheSameAfterEncodingAndDecoding) {
   EXPECT_EQ(received.phases.at(1).t0_s, 6.8e-5);
   EXPECT_FALSE(received.peaks.at(1).major);
   EXPECT_TRUE(received.peaks.at(2).major);
-  EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "every other member";
+  EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "the remaining members are equal";
 }
 
 TEST(PointResultTest, MissingOutputsStayMissing) {
@@ -157,7 +157,7 @@ TEST(PointResultTest, InvalidResultsAreRefused) {
   verbose.set_texts(0, std::string(65537, 'S'));
   EXPECT_THAT(fault_of(verbose), HasSubstr("too long"));
   EXPECT_THAT(fault_of(failed_point(0, std::string(65537, 'x'))), HasSubstr("too long"));
-  EXPECT_NE(fault_of(PointResult()), "") << "as one of an earlier protocol version would read";
+  EXPECT_NE(fault_of(PointResult()), "") << "an empty result is invalid";
 }
 
 }  // namespace

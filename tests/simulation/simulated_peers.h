@@ -447,10 +447,10 @@ class SimulatedClient {
       }
       if (reply.submit().points() != points_ ||
           (reply.submit().appended() != 0 && reply.submit().appended() != appended_)) {
-        throw Violation("a study of " + std::to_string(points_) + " points, of which " +
-                        std::to_string(appended_) + " were appended, is called one of " +
-                        std::to_string(reply.submit().points()) + " and " +
-                        std::to_string(reply.submit().appended()));
+        throw Violation("a study of " + std::to_string(points_) + " points, " +
+                        std::to_string(appended_) + " of them appended, is reported as " +
+                        std::to_string(reply.submit().points()) + " points, " +
+                        std::to_string(reply.submit().appended()) + " appended");
       }
       acknowledged_ = true;
       study_id_ = reply.submit().study_id();

@@ -308,7 +308,7 @@ class Simulation {
       }
       check_rows(client->mark(), results);
       if (study->state != server::StudyState::kDone) {
-        throw Violation(client->name() + " is complete and not done");
+        throw Violation(client->name() + " has all rows but is not done");
       }
       if (counts.leased != 0) {
         throw Violation("a lease of " + client->name() + " leaked");

@@ -26,7 +26,7 @@ class ServerAwayTest : public ::testing::Test {
   }
 
   static void wait_until_said(const Process& client, const std::string& words) {
-    wait_until("the client says: " + words,
+    wait_until("the client prints: " + words,
                [&] { return client.err().find(words) != std::string::npos; });
   }
 

@@ -98,7 +98,8 @@ TEST_F(ConversationTest, AnUnansweredHelloIsRepeatedAfterAPauseThatDoublesToTwoS
     pass(1);
     patience_ms = std::min<std::int64_t>(2 * patience_ms, 12'000);
     EXPECT_FALSE(has<Connect>());
-    EXPECT_EQ(has<Note>() && effects_of<Note>()[0].is_warning, backoff_ms == 50) << "warned once";
+    EXPECT_EQ(has<Note>() && effects_of<Note>()[0].is_warning, backoff_ms == 50)
+        << "the warning is logged once";
     EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + backoff_ms);
     pass(backoff_ms);
     EXPECT_TRUE(has<Connect>());

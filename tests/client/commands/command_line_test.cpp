@@ -101,7 +101,8 @@ TEST(CommandLine, WarnsOfTheErrorsOfACoarseMeshOnceOnStandardError) {
   EXPECT_THAT(err_of({"solve", "--preset", "paper", "--json"}), HasSubstr(note));
   EXPECT_THAT(err_of({"study", "check", "--preset", "paper", "--no-rate"}), HasSubstr(note));
   EXPECT_THAT(err_of({"run", "--preset", "paper"}), HasSubstr(note));
-  EXPECT_THAT(err_of({"run", "--preset", "paper"}), Not(HasSubstr(note))) << "it is there already";
+  EXPECT_THAT(err_of({"run", "--preset", "paper"}), Not(HasSubstr(note)))
+      << "an existing study gets no note";
   EXPECT_THAT(err_of({"plot", "--preset", "paper"}), Not(HasSubstr(note)));
   EXPECT_THAT(err_of({"solve"}), Not(HasSubstr("Note")));
   for (const auto& words :

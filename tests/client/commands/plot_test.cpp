@@ -66,7 +66,8 @@ TEST_F(Plot, WritesTheFormatOfTheExtensionAndNeedsAFileIfOutputIsAPipe) {
   const std::string png = file("a.png");
   EXPECT_THAT(png, StartsWith("\x89PNG"));
   ASSERT_GT(png.size(), 24U);
-  EXPECT_EQ(png.substr(16, 4), std::string("\x00\x00\x03\x20", 4)) << "two pixels for one";
+  EXPECT_EQ(png.substr(16, 4), std::string("\x00\x00\x03\x20", 4))
+      << "a PNG has two pixels per unit of size";
   const auto pipe = test::run_oblique(folder_, {"plot", "a"});
   EXPECT_EQ(pipe.exit_code, 2);
   EXPECT_EQ(pipe.out, "");
@@ -154,7 +155,8 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
   EXPECT_THAT(other.out, AllOf(HasSubstr("Point 0 of a"), HasSubstr("Shape of the finger")));
   EXPECT_THAT(other.err, HasSubstr("The point was solved again: differs from the stored row in "));
   EXPECT_THAT(other.err, HasSubstr("fn_peak_N"));
-  EXPECT_THAT(other.out, HasSubstr("differs from the stored row in")) << "in the picture too";
+  EXPECT_THAT(other.out, HasSubstr("differs from the stored row in"))
+      << "the plot shows the difference as well";
   const auto not_stored = plot({"a", "--point", "11"});
   EXPECT_EQ(not_stored.exit_code, 0) << not_stored.err;
   EXPECT_THAT(not_stored.err, Not(HasSubstr("stored")));
@@ -172,7 +174,7 @@ TEST_F(Plot, ShowsTheShapesThatAWorkerOfTheServerSolved) {
   const auto ask = [&](const std::string& more) {
     return plot({"a", "--point", "11", "--panel", "shape", "--server", server.client_url(), more});
   };
-  test::wait_until("the worker is there", [&] { return ask("--on-worker").exit_code == 0; });
+  test::wait_until("the server has a worker", [&] { return ask("--on-worker").exit_code == 0; });
   const auto there = ask("--on-worker");
   EXPECT_THAT(there.out, HasSubstr("at touch"));
   EXPECT_THAT(there.out, HasSubstr("at separation"));
@@ -192,7 +194,7 @@ TEST_F(Plot, DrawsPanelsOfAPointThatBelongsToNoStudy) {
   EXPECT_THAT(panel("forces"),
               AllOf(HasSubstr("Contact forces"), Not(HasSubstr("Shape of the finger"))));
   EXPECT_THAT(panel("shape"), AllOf(HasSubstr("0.1 m"), HasSubstr("0.2 m"), HasSubstr("0.3 m")))
-      << "the finger as it falls";
+      << "shapes during the fall are missing";
   EXPECT_THAT(plot({"a", "--point", "0", "--panel", "loop", "--show"}).out,
               HasSubstr("compression"));
 }

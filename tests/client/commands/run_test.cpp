@@ -58,7 +58,7 @@ void wait_until_at_work(const test::TemporaryFolder& folder, const test::Process
 
 void expect_gone(const std::vector<pid_t>& processes) {
   for (const pid_t pid : processes) {
-    EXPECT_EQ(kill(pid, 0), -1) << pid << " is still there";
+    EXPECT_EQ(kill(pid, 0), -1) << pid << " is still running";
   }
 }
 
@@ -135,13 +135,14 @@ TEST(Run, IfAnotherClientPausesTheStudyNamesTheRemedyAndExitsWithOne) {
   };
   const std::filesystem::path keys = word_after("admits the 3 keys of ");
   const std::vector<std::string> pause{"pause", "many", "--server", word_after("clients at ")};
-  EXPECT_EQ(test::run_oblique(folder, pause).exit_code, 1) << "others on this machine have no key";
+  EXPECT_EQ(test::run_oblique(folder, pause).exit_code, 1) << "a client without a key was accepted";
   auto with_key = pause;
   with_key.insert(with_key.end(), {"--keys", (keys.parent_path() / "client.key").string()});
   const auto paused = test::run_oblique(folder, with_key);
   EXPECT_EQ(paused.exit_code, 0) << paused.err;
   const auto outcome = program.outcome();
-  EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
+  EXPECT_FALSE(std::filesystem::exists(keys.parent_path()))
+      << "the keys were not deleted at the end of the run";
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(outcome.out, "");
   EXPECT_THAT(
@@ -167,7 +168,7 @@ TEST(Run, SolvesOnlyItsStudyAndDoesNotChangeOthers) {
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_EQ(solved(folder), before);
   EXPECT_NE(test::run_oblique(folder, {"status", "many"}).out.find("running"), std::string::npos)
-      << "nothing is paused in the database";
+      << "an interrupted run leaves its study running in the database";
 }
 
 TEST(Run, ContinuesWithRemainingWorkersAndEndsWithoutWorkersOrServer) {
@@ -228,7 +229,7 @@ TEST(Run, IfTheStudyHasResultsOfAnotherSolverNamesTheRemedies) {
   EXPECT_THAT(outcome.err, HasSubstr("its other 2 points"));
   EXPECT_THAT(outcome.err, HasSubstr("--name begun-"));
   EXPECT_THAT(test::run_oblique(folder, {"status"}).out, HasSubstr("0.1\n"))
-      << "a file says it as a server does";
+      << "`status` shows the solver version of the results";
 }
 
 }  // namespace

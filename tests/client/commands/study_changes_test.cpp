@@ -75,14 +75,15 @@ TEST_F(StudyChanges, AStudyIsDescribedAsAFileThatDefinesIt) {
   EXPECT_EQ(described.exit_code, 0) << described.err;
   std::ofstream(folder_.file("again.toml")) << described.out;
   const auto again = ask({"run", "again.toml"});
-  EXPECT_EQ(again.exit_code, 0) << "the same study, which is done: " << again.err;
+  EXPECT_EQ(again.exit_code, 0) << "the described study is the same study and is done: "
+                                << again.err;
   EXPECT_EQ(ask({"describe", "frictoin"}).exit_code, 1);
 }
 
 TEST_F(StudyChanges, AStudyIsDeletedAfterConfirmation) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto asked = ask({"delete", "friction"});
-  EXPECT_EQ(asked.exit_code, 2) << "nobody is there to be asked";
+  EXPECT_EQ(asked.exit_code, 2) << "without a terminal a deletion needs --yes";
   EXPECT_THAT(asked.err, HasSubstr("--yes"));
   EXPECT_EQ(ask({"delete", "friction", "--yes"}).out, "friction is deleted: 2 points, 2 results\n");
   EXPECT_THAT(ask({"studies"}).out, Not(HasSubstr("friction")));
@@ -93,7 +94,7 @@ TEST_F(StudyChanges, AStudyIsDeletedAfterConfirmation) {
 
 TEST_F(StudyChanges, AChangeOfAMissingStudyFailsAndNamesTheStudy) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
-    EXPECT_TRUE(request.has_status()) << "nothing is changed";
+    EXPECT_TRUE(request.has_status()) << "the client sent a request other than `status`";
     auto reply = reply_to(request);
     reply.mutable_status();
     return std::vector{protocol::encode(reply)};

@@ -35,7 +35,7 @@ TEST(StudyCheck, PrintsPointsBlocksModelsFallsTimeAndSize) {
   EXPECT_EQ(block["points"], 615);
   EXPECT_EQ(block["last"]["point"], 1649);
   EXPECT_EQ(block["last"]["mu"], 2.0);
-  EXPECT_GT(block["first"]["mu"], 0.25) << "the first that is left in";
+  EXPECT_GT(block["first"]["mu"], 0.25) << "`first` is the first point that the filter keeps";
   EXPECT_GT(json["time_s"], 0.0);
   EXPECT_GT(json["solved_points"], 0);
   EXPECT_GT(json["bytes"], 0.0);

@@ -110,7 +110,7 @@ TEST_F(TraceCommand, WritesTheSameRowsAsSolve) {
   const auto to_output = run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1",
                               "--elements-per-link", "2", "--trace-shape", "--trace", "-"});
   EXPECT_EQ(to_output.out, text_of("trace.csv"));
-  EXPECT_THAT(to_output.err, HasSubstr("contact ")) << "the summary";
+  EXPECT_THAT(to_output.err, HasSubstr("contact ")) << "the summary is missing";
 }
 
 TEST_F(TraceCommand, MissingPointsAndUnwritableFilesAreNamed) {
@@ -152,7 +152,7 @@ TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
     store.commit(changes);
   }
   const auto outcome = run({"trace", "made-up", "0", "--out", "x.csv"});
-  EXPECT_EQ(outcome.exit_code, 0) << "the trace is what was asked for";
+  EXPECT_EQ(outcome.exit_code, 0) << "a different stored row is no failure";
   EXPECT_THAT(outcome.err, HasSubstr("differs from the stored row"));
   EXPECT_THAT(outcome.err, HasSubstr("fn_peak_N"));
   EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now solved by "));
@@ -179,7 +179,7 @@ TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   EXPECT_THAT(here.err, HasSubstr("solved here, same as stored."));
 
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
-  test::wait_until("the worker is there", [&] {
+  test::wait_until("the server has a worker", [&] {
     return run({"workers", "--server", server.client_url()}).out.find("ann") != std::string::npos;
   });
   const auto there = ask({"models", "3"});
@@ -217,7 +217,7 @@ e = 0.9
   const test::Worker other(folder_, server.worker_url(), {"--threads", "1", "--name", "bob"});
   worker.send(SIGKILL);
   const auto outcome = trace.outcome();
-  EXPECT_EQ(outcome.exit_code, 0) << "another worker solves it: " << outcome.err;
+  EXPECT_EQ(outcome.exit_code, 0) << "another worker should solve the trace: " << outcome.err;
   EXPECT_THAT(outcome.out, StartsWith("t_s,"));
 }
 

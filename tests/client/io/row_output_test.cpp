@@ -58,7 +58,7 @@ class RowOutputTest : public testing::Test {
 };
 
 TEST_F(RowOutputTest, AFileAppearsOnlyWhenItIsFinished) {
-  std::ofstream(file_) << "of before";
+  std::ofstream(file_) << "old content";
   {
     RowOutput out({.format = Format::kCsv, .file = file_});
     out.print(row_);
@@ -79,13 +79,13 @@ TEST_F(RowOutputTest, ALinkIsKeptAndItsTargetIsReplaced) {
   for (const std::string target : {"target.csv", "not there yet.csv"}) {
     fs::create_directory(folder_.file("behind"));
     const std::string path = folder_.file("behind/" + target);
-    std::ofstream(folder_.file("behind/target.csv")) << "of before";
+    std::ofstream(folder_.file("behind/target.csv")) << "old content";
     fs::create_symlink("behind/" + target, link);
     write(link);
     EXPECT_TRUE(fs::is_symlink(link));
     EXPECT_FALSE(fs::is_symlink(path));
     EXPECT_EQ(contents(path), "a\n1\n");
-    EXPECT_EQ(files(), 2U) << "the link and the folder";
+    EXPECT_EQ(files(), 2U) << "expected only the link and the folder";
     fs::remove(link);
     fs::remove_all(folder_.file("behind"));
   }

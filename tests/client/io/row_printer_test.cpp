@@ -149,7 +149,7 @@ TEST(Table, FitsATerminalAndReportsWhatItLeavesOut) {
             "Left out to fit 40 columns (csv and json\nhave all): last\n");
   settings.width = 3;
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr("    1\n"))
-      << "a column stays, however narrow the terminal";
+      << "one column is shown even in a very narrow terminal";
   settings.width = 0;
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr(long_text));
 }

@@ -105,7 +105,7 @@ TEST(Cells, ShowTheMostFrequentTextWithCounts) {
   const auto gathered =
       gathered_in(answer, cells_around({1, 2, 3, 4}, false), cells_around({1}, false));
   EXPECT_THAT(gathered.cells.names, ElementsAre("SC", "rare", "SC", ""))
-      << "of equally many the first met";
+      << "of equally frequent texts the first is taken";
   EXPECT_EQ(gathered.cells.states[3], CellState::kNoValue);
   EXPECT_EQ(gathered.most_in_a_cell, 3U);
   EXPECT_THAT(gathered.points_of_name, ElementsAre(Pair("SC", 4U), Pair("rare", 2U)));
@@ -129,7 +129,7 @@ TEST(Cells, OfEqualSizeContainAllScatteredPoints) {
 TEST(AxisValues, AreThoseOfTheStudyAndOfAdditionalRows) {
   EXPECT_THAT(axis_values({1, 3}, numbers({2, 2, 3, kNone, 1})), ElementsAre(1, 2, 3));
   EXPECT_THAT(axis_values({0.3}, numbers({std::nextafter(0.3, 1.0)})), ElementsAre(0.3))
-      << "the same value, computed by another machine";
+      << "values that differ by rounding are one value";
 }
 
 TEST(GatheredLines, AreSortedAndHaveGapsForFailedAndUnsolvedPoints) {

@@ -294,7 +294,7 @@ TEST(Blocks, AreChosenByTheRequestedAxesAndValues) {
   EXPECT_EQ(number_for({.lines = "slide_m", .x = "H", .at = {"mu=0.4"}}), 1U);
   EXPECT_EQ(number_for({.lines = "slide_m", .at = {"e=0.8"}}), 3U);
   EXPECT_EQ(number_for({.block = "1"}), 1U);
-  EXPECT_EQ(number_for({.map = "slide_m", .x = "H", .y = "e"}), 0U) << "none has both";
+  EXPECT_EQ(number_for({.map = "slide_m", .x = "H", .y = "e"}), 0U) << "no block has both axes";
 }
 
 TEST(Blocks, AreAllDrawnIfNoneIsChosen) {
@@ -306,7 +306,7 @@ TEST(Blocks, AreAllDrawnIfNoneIsChosen) {
   EXPECT_THAT(all.find("H")->values, ElementsAre(0.9, 0.96, 1.0, 1.04, 1.1));
   const auto points =
       shape_of_study("[[block]]\nH = 1\nmu = 1\ne = 1\n[[block]]\nH = 1\nmu = 2\ne = 1\n");
-  EXPECT_FALSE(points.is_one_block) << "single points are no picture each";
+  EXPECT_FALSE(points.is_one_block) << "blocks of one point are drawn together";
 }
 
 TEST(Blocks, AnUnknownBlockIsRefused) {
@@ -405,7 +405,7 @@ TEST(DefaultPlot, DependsOnTheAxesOfTheStudy) {
   EXPECT_EQ(completed({.histogram = "e"}, grid()).map, "");
   const auto few =
       usual("[[block]]\nH = { from = 0.2, to = 1, count = 9 }\nmu = [0.4, 0.8]\ne = 1\n");
-  EXPECT_EQ(few.lines, "fn_peak_N") << "a line a value where an axis has few";
+  EXPECT_EQ(few.lines, "fn_peak_N") << "an axis of few values gives one line per value";
   EXPECT_EQ(few.x, "H");
   EXPECT_EQ(usual("[[block]]\nH = 0.5\nmu = 1\ne = 1\n").histogram, "fn_peak_N");
   const auto scattered = usual(

@@ -225,7 +225,7 @@ TEST(FollowedStudy, IsFollowedByItsNumberAfterARename) {
   source.held.set_name("other");
   EXPECT_EQ(followed.status(tell).name(), "other");
   EXPECT_EQ(followed.status(tell).name(), "other");
-  EXPECT_EQ(said, "first is now called other.") << "it is said once";
+  EXPECT_EQ(said, "first is now called other.") << "the new name is reported once";
   source.held.set_study_id(8);
   EXPECT_THROW(followed.status(tell), std::runtime_error) << "study 7 was deleted";
 }

@@ -202,7 +202,7 @@ TEST(StudyFlags, GiveEqualPointsTheSameStudyNameAndOtherPointsAnother) {
   EXPECT_NE(name(flags_of({})), name(flags_of({{"mu", "0.5"}})));
   auto on_paper = flags_of({});
   on_paper.preset = "paper";
-  EXPECT_EQ(name(on_paper), "sweep-8344f39b") << "the name stays for ever";
+  EXPECT_EQ(name(on_paper), "sweep-8344f39b") << "the name of a study must never change";
 }
 
 TEST(StudyFlags, TakeAFileOrPointsAndNotBoth) {
@@ -234,7 +234,7 @@ TEST(StudyFlags, RequestEstimatedErrorsForFlagsAndForFiles) {
   const auto with = study_of_flags(flags, pretended_reach());
   EXPECT_FALSE(without.recipe.errors());
   EXPECT_TRUE(with.recipe.errors());
-  EXPECT_NE(with.name, without.name) << "another study";
+  EXPECT_NE(with.name, without.name) << "a study with errors is a different study";
   flags.points = {};
   flags.file = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
   EXPECT_TRUE(study_of_flags(flags, pretended_reach()).recipe.errors());

@@ -19,7 +19,8 @@ TEST(Reach, AFallIsSolvedOnceForAllBlocksThatShareIt) {
   ReachChecker checker(pretended_drop_m);
   EXPECT_EQ(parse_study(text, "x.toml", std::ref(checker)).recipe.blocks_size(), 50);
   EXPECT_GT(checker.falls_solved(), 0U);
-  EXPECT_LE(checker.falls_solved(), 2U) << "on a coarse mesh and on the model's own";
+  EXPECT_LE(checker.falls_solved(), 2U)
+      << "one fall on a coarse mesh and one on the mesh of the model";
 }
 
 TEST(Reach, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
@@ -35,14 +36,14 @@ TEST(Reach, OnlyTheFirstFewFallsOfAStudyAreSolvedBeforehand) {
 TEST(Reach, ASmallDropIsCheckedOnACoarseMesh) {
   ReachChecker checker(pretended_drop_m);
   parse_study(block_with("H = 1.08"), "x.toml", std::ref(checker));
-  EXPECT_EQ(checker.falls_solved(), 0U) << "every finger reaches it";
+  EXPECT_EQ(checker.falls_solved(), 0U) << "no fall is needed for a drop that every finger reaches";
   parse_study(block_with("H = 1.1"), "x.toml", std::ref(checker));
   EXPECT_EQ(checker.falls_solved(), 1U);
   parse_study(block_with("H = 1.17"), "x.toml", std::ref(checker));
   EXPECT_EQ(checker.falls_solved(), 2U);
   EXPECT_THROW(parse_study(block_with("H = 1.18"), "x.toml", std::ref(checker)),
                solver::InputError);
-  EXPECT_EQ(checker.falls_solved(), 2U) << "it is remembered";
+  EXPECT_EQ(checker.falls_solved(), 2U) << "the fall of this model was solved again";
 }
 
 TEST(Reach, ADropThatDependsOnThePointIsNotChecked) {

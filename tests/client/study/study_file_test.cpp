@@ -131,7 +131,7 @@ TEST_F(StudyBesideAFile, ACsvColumnBecomesAnAxis) {
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points.point(1).mu, 0.6);
   EXPECT_EQ(table("[[block]]\nH = { csv = 'measured.csv' }\nmu = 1\ne = 1\n").point(0).H_m, 0.7)
-      << "the column that is called as the key";
+      << "the default is the column with the name of the key";
 }
 
 TEST_F(StudyBesideAFile, CsvLinesBecomePoints) {
@@ -139,7 +139,7 @@ TEST_F(StudyBesideAFile, CsvLinesBecomePoints) {
       "[[block]]\ncsv = 'measured.csv'\ncolumns = { H = 'drop', mu = 'friction' }\ne = 0.9\n");
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points.point(0).H_m, 0.5);
-  EXPECT_EQ(points.point(1).H_m, 0.5) << "a value may come twice";
+  EXPECT_EQ(points.point(1).H_m, 0.5) << "a value may be repeated";
   EXPECT_EQ(points.point(1).mu, 0.6);
   EXPECT_EQ(points.point(1).e_star, 0.9);
 }

@@ -84,7 +84,7 @@ TEST(ValueNotes, ReportThatARangeOfASampleIsAListOfValues) {
   EXPECT_EQ(value_notes("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
                                       "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
             "Note: mu takes 5 values; 0.1:1 draws any value between them.\n")
-      << "numbers of elements are drawn from a list alone";
+      << "numbers of elements can only be drawn from a list";
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
 }
 

@@ -23,7 +23,7 @@ void expect_refused(const std::vector<Wrong>& cases, Whole whole) {
     SCOPED_TRACE(text.substr(0, 100));
     try {
       parsed(whole(text), "study.toml");
-      ADD_FAILURE() << "accepted";
+      ADD_FAILURE() << "the invalid study file was accepted";
     } catch (const solver::InputError& error) {
       EXPECT_EQ(error.fields().place, "study.toml" + (place.empty() ? "" : ":" + place));
       EXPECT_THAT(error.what(), testing::HasSubstr(says));

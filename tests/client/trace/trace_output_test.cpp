@@ -34,7 +34,7 @@ TEST(TakeFall, MovesTheRowsOfTheFallOutOfATrace) {
 TEST(TraceOutput, NamesTheFlagOfAFileThatCannotBeWritten) {
   try {
     const TraceOutput output("/nowhere/t.csv", Format::kCsv, "--trace");
-    ADD_FAILURE() << "it is taken";
+    ADD_FAILURE() << "an unwritable file was accepted";
   } catch (const solver::InputError& error) {
     EXPECT_EQ(std::string(error.what()),
               "--trace /nowhere/t.csv cannot be written: No such file or directory");

@@ -129,5 +129,5 @@ export async function until(page, look, ...given) {
     if (found) return found;
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
-  throw new Error(`it did not come to: ${look}`, { cause });
+  throw new Error(`timeout while waiting for: ${look}`, { cause });
 }

@@ -88,7 +88,7 @@ TEST(CurveKeyTest, InvalidTextIsNotParsedAsAKey) {
   EXPECT_FALSE(parse_z85(good + "00000"));
   EXPECT_FALSE(parse_z85(good.substr(5) + std::string(5, '\0')));
   EXPECT_FALSE(parse_z85(std::string(40, '"')));
-  EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
+  EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "five digits exceed 32 bits";
 }
 
 TEST_F(KeyFileTest, IsReadAsWrittenAndOnlyItsOwnerMayReadIt) {
@@ -184,7 +184,7 @@ void expect_no_copy_in_a_core_dump(const SecretKey& key) {
 
 TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   if (!test::kAllMemoryMayBeRead) {
-    GTEST_SKIP() << "a sanitizer objects to reading all memory";
+    GTEST_SKIP() << "the sanitizer does not allow reading all memory";
   }
   const KeyFile made = worker_key();
   write_key_file(folder_.file("made.key"), made);
@@ -289,7 +289,8 @@ TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedIfEveryUserMayWriteOrReplaceI
   ASSERT_EQ(stat(path_.c_str(), &file), 0);
   EXPECT_EQ(file.st_mode & 07777U, 0640U);
   chmod(folder_.path().c_str(), 01777);
-  EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(2)) << "only owners replace files there";
+  EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(2))
+      << "in a sticky folder only owners can replace files";
   chmod(folder_.path().c_str(), 0777);
   EXPECT_THAT(error_of(text()),
               AllOf(HasSubstr("chmod o-w"), HasSubstr(folder_.path().string() + " has mode 0777")));

@@ -100,13 +100,14 @@ TEST_F(ConfigurationTest, FlagsOverrideTheEnvironmentWhichOverridesTheFile) {
   EXPECT_EQ(options_.connections, 5);
   EXPECT_FALSE(options_.loud);
   EXPECT_EQ(options_.listen, (std::vector<std::string>{"127.0.0.1", "::1"}));
-  EXPECT_EQ(options_.keys, "shared.key") << "of several programs";
+  EXPECT_EQ(options_.keys, "shared.key")
+      << "the value comes from the section shared by several programs";
   set("TEST_PROGRAM_KEYS", "own.key");
   set("TEST_PROGRAM_PORT", "");
   set("TEST_PROGRAM_SERVICE_HOST", "10.0.0.1");
   EXPECT_EQ(parse({"--config", file, "--listen", "::2"}), std::nullopt) << errors_;
   EXPECT_EQ(options_.keys, "own.key");
-  EXPECT_EQ(options_.port, 1) << "an empty variable and one of no setting are ignored";
+  EXPECT_EQ(options_.port, 1) << "empty variables and variables of unknown settings are ignored";
   EXPECT_EQ(options_.listen, std::vector<std::string>{"::2"}) << "a flag replaces the list";
 }
 

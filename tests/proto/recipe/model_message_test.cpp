@@ -26,7 +26,8 @@ TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedUnlessReadUnchecked) {
   EXPECT_EQ(from_message_unchecked(message).spectral_radius, 1.0);
   message = to_message(unusual_model());
   message.set_elements_per_link(4'000'000'000U);
-  EXPECT_THROW(from_message_unchecked(message), solver::InputError) << "no model could hold it";
+  EXPECT_THROW(from_message_unchecked(message), solver::InputError)
+      << "the number exceeds the range of the field";
 }
 
 // Databases store these texts. A changed text needs a new version in its first word and a new
@@ -71,7 +72,7 @@ TEST(Canonical, ZeroHasNoSignAndADefaultToleranceIsNotWritten) {
 
 TEST(Canonical, TheDigestOfARecipeNeverChanges) {
   EXPECT_EQ(sha256_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
-      << "of FIPS 180-4";
+      << "the value comes from FIPS 180-4";
   EXPECT_EQ(recipe_digest(recipe_of({kPoint})),
             "8344f39bccb110503a4c571f76d91034e47923dc20725c348e2c03a11a402663");
 }

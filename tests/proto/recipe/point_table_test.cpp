@@ -176,7 +176,8 @@ TEST(PointInputs, ThatDifferByMoreThanTheLastBitsAreRefused) {
   }
   PointResult result = result_of(2, table);
   result.set_mu(1e-300);
-  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("mu")) << "the study has 0";
+  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("mu"))
+      << "the point of the study has mu = 0";
 }
 
 TEST(PointInputs, IncludeWholeNumbersAndLengthsOfTheModel) {
@@ -229,7 +230,8 @@ TEST(PointInputs, MayBeMissingOnlyInAFailedPoint) {
   EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("with H = "));
   result.set_error("it never fell");
   EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
-  EXPECT_EQ(inputs_of(result, table).mu, table.point(3).mu) << "the study's own";
+  EXPECT_EQ(inputs_of(result, table).mu, table.point(3).mu)
+      << "missing inputs are taken from the study";
 }
 
 using testing::AllOf;
@@ -249,13 +251,13 @@ TEST(StudySize, CountsDifferentFallsExactlyUpToAHundredThousandPoints) {
   const auto drawn = size_of_blocks(
       {sampled({uniform("E", 6e10, 8e10), uniform("k", 1e7, 1e8), kSomeH, kSomeMu, kSomeE},
                SAMPLE_SOBOL, 100'000)});
-  EXPECT_EQ(drawn.falls, 100'000U) << "every E falls in its own way";
+  EXPECT_EQ(drawn.falls, 100'000U) << "each value of E needs its own fall";
   EXPECT_FALSE(drawn.falls_estimated);
   const auto several = size_of_blocks({sampled(
       {range("E", 6e10, 8e10, 21), uniform("k", 1e7, 1e8), kSomeH, uniform("mu", 0.1, 1), kSomeE},
       SAMPLE_LATIN_HYPERCUBE, 20'000)});
   EXPECT_EQ(several.models, 20'000U);
-  EXPECT_EQ(several.falls, 21U) << "k acts in contact alone";
+  EXPECT_EQ(several.falls, 21U) << "k acts only in contact";
 }
 
 TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
@@ -288,7 +290,7 @@ TEST(StudySize, EstimatesTheFallsOfALargeStudyFromTenThousandPoints) {
   const auto known = size_of_blocks({filtered(
       {listed("E", {6e10, 7e10, 8e10}), kSomeH, range("mu", 0.1, 1, 100'000), kSomeE}, "")});
   EXPECT_EQ(known.falls, 3U);
-  EXPECT_FALSE(known.falls_estimated) << "each was met many times";
+  EXPECT_FALSE(known.falls_estimated) << "each fall occurred many times, so the count is exact";
   EXPECT_EQ(known.examples.size(), 64U);
   const auto drawn = size_of_blocks(
       {sampled({uniform("E", 6e10, 8e10), kSomeH, kSomeMu, kSomeE}, SAMPLE_RANDOM, 1'000'000'000)});

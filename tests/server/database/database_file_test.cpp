@@ -116,7 +116,7 @@ TEST(FileSystemOf, AMissingPathHasTheFileSystemOfItsParent) {
   for (const char* type : {"ext4", "tmpfs", "overlay", "fuseblk", "fuse.mergerfs"}) {
     EXPECT_FALSE(is_network_file_system(type)) << type;
   }
-  EXPECT_EQ(network_disk_error("/dev/shm/oblique.db"), "") << "it is local";
+  EXPECT_EQ(network_disk_error("/dev/shm/oblique.db"), "") << "a local file has no network error";
 }
 
 }  // namespace

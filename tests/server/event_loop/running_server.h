@@ -257,7 +257,7 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
         return;
       }
     }
-    FAIL() << "the query does not begin";
+    FAIL() << "the query did not begin";
   }
   protocol::StudyStatus status(const std::string& name) {
     ClientRequest request;

@@ -69,7 +69,7 @@ TEST_F(MaintenanceTest, ACopyOfAnOpenDatabaseHasAllCommittedRows) {
   EXPECT_EQ(copy.database_id(), store().database_id());
   EXPECT_EQ(std::filesystem::status(copy_).permissions(),
             std::filesystem::perms::owner_read | std::filesystem::perms::owner_write)
-      << "a copy is its owner's alone";
+      << "only the owner may read and write a copy";
 }
 
 TEST_F(MaintenanceTest, OnlyObliqueDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) {
@@ -180,7 +180,7 @@ TEST_F(SalvageTest, ATableThatLostAColumnIsSavedWithoutItUnlessItsRowsNeedTheCol
   by_hand("ALTER TABLE results DROP COLUMN slide_m");
   const auto saved = salvage(path_, copy_);
   EXPECT_EQ(saved.studies, 1U);
-  EXPECT_EQ(saved.unreadable_places, 5U) << "a solved point has it";
+  EXPECT_EQ(saved.unreadable_places, 5U) << "a solved point has a slide";
   EXPECT_THAT(faults(copy_), IsEmpty());
 }
 
@@ -212,7 +212,7 @@ TEST_F(MaintenanceTest, InputsThatDifferInTheLastBitsAreNoFault) {
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
   Statement row(database.get(), "SELECT mu FROM results WHERE point = 5");
   ASSERT_TRUE(row.step());
-  EXPECT_EQ(row.real(0), result.mu()) << "as it was solved";
+  EXPECT_EQ(row.real(0), result.mu()) << "the row keeps the value that was solved";
 }
 
 TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheErrorHasTheRemedy) {
@@ -372,9 +372,9 @@ class OfflineStudyTest : public MaintenanceTest {
 
 TEST_F(OfflineStudyTest, AStudyIsRenamedUnlessTheNameIsInUseOrInvalid) {
   commit({study_of(10, 2, "b")});
-  EXPECT_THROW(rename_study(path_, 1, "c"), StorageError) << "a server works on it";
+  EXPECT_THROW(rename_study(path_, 1, "c"), StorageError) << "a server uses the database";
   EXPECT_THROW(delete_study(path_, 1), StorageError);
-  EXPECT_THROW(rename_study(copy_, 1, "c"), StorageError) << "there is no such file";
+  EXPECT_THROW(rename_study(copy_, 1, "c"), StorageError) << "the database does not exist";
   EXPECT_FALSE(std::filesystem::exists(copy_));
   close();
   rename_study(path_, 1, "friction");

@@ -122,13 +122,13 @@ TEST_F(MergeTest, StudiesOfSeveralDatabasesAreMergedWithAllRows) {
       "SELECT group_concat(quote(H) || quote(mu) || quote(fn_peak_N) || quote(closure) ||"
       " quote(peaks) || quote(reaction_peaks) || quote(steps) || quote(wall_s) || solved_at)"
       " FROM (SELECT * FROM runs WHERE study = 'b' ORDER BY point)";
-  EXPECT_EQ(text("all", outputs), text("one", outputs)) << "bit for bit";
+  EXPECT_EQ(text("all", outputs), text("one", outputs)) << "outputs must be copied bit for bit";
   const Merged again = merge("one");
   EXPECT_EQ(again.results_known, 13U);
-  EXPECT_EQ(again.studies_added + again.results_added, 0U) << "it was merged before";
+  EXPECT_EQ(again.studies_added + again.results_added, 0U) << "a second merge adds nothing";
   EXPECT_EQ(text("all", "SELECT (SELECT count(*) FROM models) || (SELECT count(*) FROM workers)"),
             "12")
-      << "equal workers are one";
+      << "equal models and equal workers are stored once";
 }
 
 TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndTheStudyIsDoneWhenNoPointIsOpen) {
@@ -266,7 +266,8 @@ TEST_F(MergeTest, AKilledMergeChangesNothingAndCanBeRepeated) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
   EXPECT_EQ(Store(file("all")).studies().size(), 1U);
   EXPECT_EQ(merge("one").results_added, 20'000U);
-  EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging")) << "nor a copy of the source";
+  EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging"))
+      << "the temporary copy of the source was not deleted";
 }
 
 TEST_F(MergeTest, AGrownStudyIsUnitedWithItsShorterVersion) {
@@ -289,7 +290,7 @@ TEST_F(MergeTest, AGrownStudyIsUnitedWithItsShorterVersion) {
     EXPECT_EQ(text("all", "SELECT state || points FROM studies WHERE name = '" + name + "'"),
               "running20");
     EXPECT_THAT(faults(file("all")), IsEmpty());
-    EXPECT_EQ(merge(name).results_added, 0U) << "merged again";
+    EXPECT_EQ(merge(name).results_added, 0U) << "a second merge adds nothing";
   }
 }
 

@@ -113,7 +113,7 @@ class AccessControlTest : public testing::Test {
 };
 
 TEST_F(AccessControlTest, AServerNeedsItsOwnKeyFileAndTheListBesideIt) {
-  EXPECT_THROW(control(), solver::InputError) << "there is no list";
+  EXPECT_THROW(control(), solver::InputError) << "a missing list of keys is an error";
   add("w");
   const AccessControl access = control();
   EXPECT_EQ(access.mode(), AccessMode::kKeys);

@@ -226,7 +226,8 @@ TEST_F(NetworkTest, PeersOfAnotherProtocolOrWithMessagesOfSeveralFramesAreDiscon
   in_parts.send(zmtp_frame("part", true));
   std::size_t ended = 0;
   run_until([&] { return (ended += network_.take_disconnects().size()) == 2; });
-  EXPECT_EQ(refused(RefusalCause::kFaulty), 1U) << "the other one was admitted before";
+  EXPECT_EQ(refused(RefusalCause::kFaulty), 1U)
+      << "a fault after admission does not count as a refused handshake";
   stranger.read_to_the_end();
   in_parts.read_to_the_end();
 }
@@ -486,7 +487,8 @@ TEST_F(ManyPeersTest, SilentPeersAreReplacedAfterAFractionOfTheHandshakeTimeout)
 class ManyPeersOfOneAddressTest : public NetworkTest {
  protected:
   static constexpr std::size_t kMax = 16;
-  ManyPeersOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
+  ManyPeersOfOneAddressTest()
+      : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
 };
 
 TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndNoOthers) {
@@ -497,13 +499,13 @@ TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndN
   expect_message(*other);
   now_ms_ += NetworkLimits().handshake_ms / 100;
   const auto second = admitted(kElsewhere);
-  EXPECT_EQ(network_.connections(), kMax + 1) << "in the place of one of the newest";
+  EXPECT_EQ(network_.connections(), kMax + 1) << "the peer replaced one of the newest handshakes";
   crowd[0]->say_hello();
   take_welcome(*crowd[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
   const auto silent = keyed_peers(1, kElsewhere);  // takes the place that `second` has left
   const auto third = admitted(kElsewhere);
-  EXPECT_EQ(crowd[0]->tcp.receive(), "") << "in the place of the oldest";
+  EXPECT_EQ(crowd[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";
 }
 
 class TightKeyedNetworkTest : public NetworkTest {

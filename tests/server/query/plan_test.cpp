@@ -127,7 +127,7 @@ TEST_F(PlanTest, AConditionCannotReachOtherStudies) {
   EXPECT_THAT(texts(of_other(question("DISTINCT study || study_id"))), ElementsAre("it's2"));
   edit("UPDATE studies SET recipe = x'ff'");
   EXPECT_THAT(texts(of_other(question("point", "mu > 0"))), ElementsAre("1", "2", "4"))
-      << "no ranges follow from a recipe that cannot be read";
+      << "an unreadable recipe gives no ranges";
 }
 
 TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
@@ -161,13 +161,13 @@ TEST(UsualColumns, ContainExactlyTheKeysThatVaryInTheStudy) {
                                      protocol::range("mu", 0, 1, 3), e}})),
               ElementsAre("mu", "E_Pa"));
   EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("H", {0.9}), mu, e}})), ElementsAre("H"))
-      << "from block to block";
+      << "H varies between blocks";
   EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("k", {1e7}), H, mu, e}})), ElementsAre("k"))
-      << "in one of the blocks";
+      << "k is set in only one of the blocks";
   EXPECT_THAT(usual_axes(recipe_of(
                   {{protocol::following("I", "A^2"), listed("length2", {0.3, 0.4}), H, mu, e}})),
               ElementsAre("I", "lengths_m"));
-  EXPECT_THAT(usual_axes({}), ElementsAre("H", "mu", "e")) << "of a recipe that cannot be read";
+  EXPECT_THAT(usual_axes({}), ElementsAre("H", "mu", "e")) << "an unreadable recipe";
 }
 
 TEST_F(PlanTest, FunctionsAggregateTheNumbersOfRows) {
@@ -188,8 +188,8 @@ TEST_F(PlanTest, CorrIsPearsonsCorrelationOfRowsWithBothValues) {
               1e-15);
   EXPECT_NEAR(number("corr(nullif(point, 9), nullif(point * point, 64))"),
               number("corr(point, point * point)", "point NOT IN (8, 9)"), 1e-15);
-  EXPECT_DOUBLE_EQ(number("corr(1e9 + point, -point)"), -1.0) << "without cancellation";
-  EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of them does not vary";
+  EXPECT_DOUBLE_EQ(number("corr(1e9 + point, -point)"), -1.0) << "large values caused cancellation";
+  EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of the values is constant";
 }
 
 TEST_F(PlanTest, ElementsEqualThoseOfTheListsInTheView) {

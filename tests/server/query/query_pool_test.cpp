@@ -92,7 +92,7 @@ class QueryPoolTest : public testing::Test {
   Answer wait_until(std::uint64_t ticket, const Condition& condition) {
     std::unique_lock lock(mutex_);
     if (!changed_.wait_for(lock, test::kHangLimit, [&] { return condition(answers_[ticket]); })) {
-      throw std::runtime_error("the pool reports nothing");
+      throw std::runtime_error("the query pool reported nothing in time");
     }
     return answers_[ticket];
   }
@@ -227,7 +227,7 @@ TEST_F(QueryPoolTest, AWaitingQueryStartsWhenACancelledOneEnds) {
   const auto running = ask(kDeaf, "one client");
   wait_for_start(running);
   const auto next = ask("SELECT 2", "one client");
-  EXPECT_EQ(number_of("SELECT 1"), 1) << "of another client";
+  EXPECT_EQ(number_of("SELECT 1"), 1) << "a query of another client is not delayed";
   EXPECT_FALSE(answer(next).runs);
   pool().cancel(running);
   EXPECT_EQ(wait_for_end(next).last_number, 2);
@@ -246,7 +246,7 @@ TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
 TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
   use_script("printf '\\377\\377\\377\\377\\0\\0\\0\\0'\nexec sleep 1000");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process of the query ended"))
-      << "its frame is too long";
+      << "the reader sent a too long frame";
   const std::string program = use_script("exit 3");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process of the query ended"));
   std::filesystem::remove(program);
@@ -346,7 +346,7 @@ TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
   ASSERT_TRUE(add("b", half));
   EXPECT_FALSE(add("c", std::string(1000, ' ')));
   queue_.remove(2);
-  EXPECT_TRUE(add("c", half)) << "b's query no longer waits";
+  EXPECT_TRUE(add("c", half)) << "the removed query takes no room";
   EXPECT_FALSE(add("d", half));
   start();
   EXPECT_TRUE(add("d", half)) << "running queries do not count";

@@ -65,7 +65,7 @@ TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStayCompleted) {
   IntervalSet completed(0, 10);
   bench.feed(StudyAdded{1, table_of(10), completed, 3});
   bench.feed(WorkerJoined{1, 1});
-  EXPECT_TRUE(shares(bench, 1).empty()) << "all is completed";
+  EXPECT_TRUE(shares(bench, 1).empty()) << "all points are completed";
   IntervalSet failures(2, 4);
   failures.insert(7);
   const auto batches = only<SendBatch>(bench.feed(FailuresForgotten{1, failures}));
@@ -167,7 +167,7 @@ TEST(SchedulerGrowthTest, AfterGrowthAWorkerGetsTheRecipeOnceBeforeItsNextBatch)
   EXPECT_TRUE(std::holds_alternative<DefineStudy>(old[0]));
   const auto further = bench.feed(CreditGiven{1, 1});
   EXPECT_GE(only<SendBatch>(further).at(0).first_point(), 10U);
-  EXPECT_TRUE(only<DefineStudy>(further).empty()) << "told once";
+  EXPECT_TRUE(only<DefineStudy>(further).empty()) << "the definition was sent twice";
 }
 
 TEST(SchedulerGrowthTest, ResultsOfAnEarlierBatchCountAfterGrowth) {

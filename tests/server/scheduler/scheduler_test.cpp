@@ -309,13 +309,13 @@ TEST(SchedulerTest, AReturnedSuspectPointStaysSuspect) {
   bench.feed(WorkerUnreachable{2});
   auto effects = bench.join_as("c", 3, 2);
   const auto probes = only<SendProbe>(effects);
-  ASSERT_EQ(probes.size(), 1U) << "it goes to proven workers only";
+  ASSERT_EQ(probes.size(), 1U) << "a returned suspect point goes only to proven workers";
   effects = bench.solve_probe(probes[0]);
   const auto batches = only<SendBatch>(effects);
   ASSERT_EQ(batches.size(), 1U);
   bench.feed(BatchesReturned{3, {batches[0].lease}});
   effects = bench.join_as("d", 4, 1);
-  EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker gets it";
+  EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker got the suspect point";
 }
 
 TEST(SchedulerTest, AReturnedProbeIsSentAgain) {

@@ -63,7 +63,8 @@ TEST_F(ServiceLoadTest, WhileReadingIsPausedAWorkerIsNotLostAndGetsHeartbeatRepl
   EXPECT_GE(signs, 5U);
   write_all();
   pass(10'000);
-  EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
+  EXPECT_EQ(service_->scheduler().workers(), 0U)
+      << "a worker that is silent while it is read is lost";
 }
 
 TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotLost) {
@@ -84,7 +85,7 @@ TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsHeartbeatReplies) {
     worker_says(results_of({point}));
     service_->tick(now_);
   }
-  EXPECT_GE(ports_.worker_messages.size(), 4U) << "one in 1.2 s";
+  EXPECT_GE(ports_.worker_messages.size(), 4U) << "expected one heartbeat reply every 1.2 s";
   EXPECT_LE(ports_.worker_messages.size(), 6U);
 }
 
@@ -172,8 +173,9 @@ TEST_F(WriteLedgerTest, EachWriteHasOneOutcome) {
   write_change();
   write_change();
   ASSERT_EQ(ports_.jobs.size(), 3U);
-  EXPECT_FALSE(ports_.jobs[0].answer_failure) << "results are tried until they are stored";
-  EXPECT_TRUE(ports_.jobs[1].answer_failure) << "a client waits";
+  EXPECT_FALSE(ports_.jobs[0].answer_failure)
+      << "writing results is repeated until they are stored";
+  EXPECT_TRUE(ports_.jobs[1].answer_failure) << "a client waits for the outcome";
   ledger_.end(ports_.jobs[1].ticket, std::nullopt, now_);
   ledger_.end(ports_.jobs[2].ticket, "the disk is full", now_);
   ledger_.end(ports_.jobs[0].ticket, std::nullopt, now_);
@@ -237,7 +239,7 @@ TEST_F(WriteLedgerTest, ResultsAndChangesOfClientsHaveSeparateLimits) {
   ledger_.write(
       AddStudy{1, "a", StudyTable(std::string(limits::kUnstoredBytesOfChanges, 'x'), 1), ""}, {},
       [](const std::string&, Instant) {});
-  EXPECT_FALSE(ledger_.has_room_for_changes()) << "recipes count, too";
+  EXPECT_FALSE(ledger_.has_room_for_changes()) << "recipes count as unstored bytes";
 }
 
 TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
@@ -250,7 +252,7 @@ TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
   EXPECT_TRUE(ledger_.holds_batches());
   EXPECT_EQ(ledger_.fault(), "the file was deleted");
   store_first();
-  EXPECT_EQ(outcomes_.size(), 1U) << "a late report";
+  EXPECT_EQ(outcomes_.size(), 1U) << "a late report has no effect";
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ TEST_F(ServiceTest, WaitingLongRequestsAreLimited) {
   EXPECT_THAT(last_error(), HasSubstr("try again later"));
   run_checks();
   request(long_submission("b", kLongRequest));
-  EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
+  EXPECT_EQ(ports_.checks.size(), 1U) << "finished checks make room for others";
 }
 
 TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsRequestNumber) {
@@ -403,7 +403,7 @@ TEST_F(ServiceTraceTest, ATraceIsCancelledWhenItsClientDisconnectsOrEndsItsReque
   end(7);
   EXPECT_EQ(cancels(), 1);
   ask(8, 4);
-  EXPECT_EQ(orders().size(), 1U) << "the worker has not said that it is free";
+  EXPECT_EQ(orders().size(), 1U) << "the worker has not yet declined its cancelled trace";
   worker_sends(declined(orders()[0]));
   EXPECT_EQ(orders().size(), 2U);
   service_->client_left("client");
@@ -421,7 +421,7 @@ TEST_F(ServiceTraceTest, AClientGetsStillWorkingEverySecondForItsTrace) {
   EXPECT_FALSE(ports_.replies[1].still_working().runs());
   ports_.unreachable = "client";
   pass(1000);
-  EXPECT_EQ(cancels(), 1) << "no word of it could be delivered";
+  EXPECT_EQ(cancels(), 1) << "the trace of an unreachable client is cancelled";
 }
 
 TEST_F(ServiceTraceTest, ATraceHasATimeLimit) {
@@ -462,7 +462,7 @@ TEST_F(ServiceTraceTest, ChecksOfPointsAreLimitedEvenIfTheirClientsAreGone) {
   EXPECT_THAT(last_error(), HasSubstr("too many traces"));
   ports_.replies.clear();
   run_checks();
-  EXPECT_TRUE(ports_.replies.empty()) << "nobody waits";
+  EXPECT_TRUE(ports_.replies.empty()) << "no client waits for a reply";
   ask(1, 3, "another");
   run_checks();
   EXPECT_THAT(last_error(), HasSubstr("damaged"));
@@ -541,7 +541,7 @@ TEST_F(ServiceTraceTest, AStoppingServerNotifiesWorkersAndRefusesRequests) {
   }
   const auto sent = ports_.worker_messages.size();
   credit(1);
-  EXPECT_EQ(ports_.worker_messages.size(), sent) << "no batch is sent";
+  EXPECT_EQ(ports_.worker_messages.size(), sent) << "a batch was sent";
 }
 
 }  // namespace

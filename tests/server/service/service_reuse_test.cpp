@@ -240,9 +240,9 @@ TEST_F(FilteredStudyTest, PointsAreValidatedOnTheCheckThread) {
   write_all();
   EXPECT_EQ(last_reply().submit().points(), 11U);
   EXPECT_EQ(status_of("filtered").points(), 11U);
-  EXPECT_EQ(status_of("filtered").left_out(), 0U) << "no worker has named any";
+  EXPECT_EQ(status_of("filtered").left_out(), 0U) << "no worker has reported left-out points yet";
   request(filtered_request("mu >"));
-  EXPECT_THAT(ports_.checks, IsEmpty()) << "refused at once";
+  EXPECT_THAT(ports_.checks, IsEmpty()) << "an invalid filter is refused without a check";
   EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 

@@ -41,7 +41,8 @@ TEST_F(ServiceTest, ClientsGetAnErrorWhenTheDatabaseStoresNothingForSeconds) {
   now_.steady_ms += 4999;
   service_->tick(now_);
   request(submit_request("b"));
-  EXPECT_EQ(ports_.replies.size(), replies) << "it may be stored in a moment";
+  EXPECT_EQ(ports_.replies.size(), replies)
+      << "the server waits some seconds for the database before it refuses";
   now_.steady_ms += 1;
   service_->tick(now_);
   request(submit_request("b"));
@@ -94,7 +95,7 @@ TEST_F(ServiceTest, InvalidStudiesAreRefusedWithTheReason) {
 
 TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
   credit(1);
-  EXPECT_TRUE(last_message().has_hello_again()) << "a stranger";
+  EXPECT_TRUE(last_message().has_hello_again()) << "an unknown worker";
   hello();
   EXPECT_EQ(last_message().welcome().worker_id(), 1U);
   EXPECT_EQ(last_message().welcome().database_id(), "db");
@@ -120,7 +121,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
   WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
   message.mutable_results()->set_batch_done(true);
   worker_says(message);
-  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
+  ASSERT_EQ(ports_.jobs.size(), 2U) << "expected one row of the worker and one of the results";
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
@@ -138,9 +139,9 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
   results.at(1).set_h_m(1.001 * results.at(1).h_m());
   results.at(2).set_reals(4, std::numeric_limits<double>::quiet_NaN());
   worker_says(message);
-  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
+  ASSERT_EQ(ports_.jobs.size(), 2U) << "expected one row of the worker and one of the results";
   const auto& change = std::get<AddResults>(ports_.jobs[1].change);
-  EXPECT_EQ(change.results.at(0).error(), "") << "another machine may round otherwise";
+  EXPECT_EQ(change.results.at(0).error(), "") << "inputs may differ by rounding";
   EXPECT_THAT(change.results.at(1).error(), HasSubstr("H = 1.00"));
   EXPECT_THAT(change.results.at(2).error(), HasSubstr("duration_s"));
   write_all();
@@ -235,7 +236,7 @@ TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
   again.mutable_submit()->set_priority(7);
   const std::size_t replies = ports_.replies.size();
   request(again);
-  EXPECT_EQ(ports_.replies.size(), replies) << "not before it is written";
+  EXPECT_EQ(ports_.replies.size(), replies) << "the reply was sent before the priority was stored";
   write_all();
   EXPECT_TRUE(last_reply().has_submit());
   EXPECT_EQ(status_of("a").priority(), 7);
@@ -302,7 +303,7 @@ TEST_F(ServiceTest, TooLargeMessagesOfWorkersAreNotParsed) {
     results.mutable_results()->add_results();
   }
   worker_says(heartbeat);
-  EXPECT_EQ(service_->bad_frames(), 1U) << "a stranger's";
+  EXPECT_EQ(service_->bad_frames(), 1U) << "a heartbeat of an unknown worker";
   for (const WorkerMessage& message : {heartbeat, results}) {
     hello();
     worker_says(message);
@@ -322,7 +323,7 @@ TEST_F(ServiceTest, AWorkerIsStoredWithItsFirstResult) {
   hello_and_credit();
   worker_says(results_of({0}));
   worker_says(results_of({0}));
-  ASSERT_EQ(ports_.jobs.size(), 3U) << "one row of the worker, and two messages";
+  ASSERT_EQ(ports_.jobs.size(), 3U) << "expected one row of the worker and two messages of results";
   EXPECT_EQ(std::get<AddWorker>(ports_.jobs[0].change).worker_id, 1001U);
   EXPECT_EQ(std::get<AddResults>(ports_.jobs[1].change).worker_id, 1001U);
 }

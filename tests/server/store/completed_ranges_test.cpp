@@ -29,7 +29,8 @@ class CompletedRangesTest : public StoreFixture {
   }
 };
 
-TEST_F(CompletedRangesTest, RetriedFailuresAreRemovedFromTheirRangeAndTheStudyStaysMarkedAsCounted) {
+TEST_F(CompletedRangesTest,
+       RetriedFailuresAreRemovedFromTheirRangeAndTheStudyStaysMarkedAsCounted) {
   const auto study = study_of(9);
   commit({study, worker(1), solved(study, {0, 1, 2, 6, 7, 8}), failed(study, {3, 4, 5})});
   EXPECT_THAT(ranges(), ElementsAre("0+9"));
@@ -125,9 +126,9 @@ TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
   again.left_out.insert(3, 7);
   commit({study, worker(1), solved(study, {3})});
   commit({again});
-  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "points 5 and 6";
+  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "points 5 and 6 are left out";
   commit({again});
-  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "they come again";
+  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "ranges that are reported again count once";
   EXPECT_THAT(ranges(), ElementsAre("3+4"));
 }
 

@@ -91,7 +91,7 @@ TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInStudyPointAndOrigin) {
   EXPECT_EQ(copies(2).at(3), "3 of a/3");
   EXPECT_THAT(faults(), IsEmpty());
   commit({RenameStudy{1, "c"}});
-  EXPECT_EQ(copies(2).at(3), "3 of a/3") << "the name when it was copied";
+  EXPECT_EQ(copies(2).at(3), "3 of a/3") << "a copied row keeps the name that its source had then";
 }
 
 TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrToADeletedStudy) {
@@ -115,7 +115,7 @@ TEST_F(SamePointsTest, PointsCompletedWithoutARowGetNoCopiedRow) {
   by_hand("INSERT INTO completed_ranges VALUES (2, 2, 3)");
   IntervalSet others(0, 10);
   others.erase(2, 5);
-  EXPECT_EQ(reused(), others) << "a condition leaves them out";
+  EXPECT_EQ(reused(), others) << "points outside the condition are not reused";
 }
 
 TEST_F(ResultReuseTest, TheEndOfALookupIsStoredWithTheStudy) {

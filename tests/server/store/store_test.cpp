@@ -87,7 +87,7 @@ TEST_F(StoreTest, AFailedTransactionKeepsNothing) {
   commit({solved(study, {0})});
   EXPECT_EQ(store().studies().at(0).completed.size(), 1U);
   EXPECT_THAT(rows("SELECT 1 FROM results JOIN models USING (model_id)"), ElementsAre("1"))
-      << "the model was rolled back, too";
+      << "the model was rolled back and is stored again";
 }
 
 TEST_F(StoreTest, TheStateOfAStudyIsKept) {
@@ -203,7 +203,8 @@ TEST_F(StoreTest, AStudyNumberIsNeverReused) {
   by_hand("DELETE FROM studies");
   EXPECT_EQ(store().last_study_id(), 3U);
   by_hand("UPDATE results SET study_id = 7");
-  EXPECT_EQ(store().last_study_id(), 7U) << "its rows would become those of the new study";
+  EXPECT_EQ(store().last_study_id(), 7U)
+      << "rows of study 7 would belong to a new study of this number";
 }
 
 TEST_F(StoreTest, AStudyThatWasChangedByHandIsRefusedWithTheRemedy) {
@@ -335,9 +336,9 @@ TEST_F(StudyDeletionTest, OrphanedModelsAndWorkersAreDeletedAtAStartAfterTheRows
   add_solved(3, table_with_k(2e7, 20));
   commit({DeleteStudy{1}, DeleteStudy{2}});
   reopen();
-  EXPECT_EQ(rows_in("models"), 2) << "rows are left";
+  EXPECT_EQ(rows_in("models"), 2) << "models of remaining rows are kept";
   clear_all(7);
-  EXPECT_EQ(rows_in("models"), 2) << "they may come into use again";
+  EXPECT_EQ(rows_in("models"), 2) << "unused models are deleted only at a start";
   reopen();
   EXPECT_EQ(rows_in("models"), 1);
   EXPECT_EQ(rows_in("workers"), 1);
@@ -345,7 +346,7 @@ TEST_F(StudyDeletionTest, OrphanedModelsAndWorkersAreDeletedAtAStartAfterTheRows
   EXPECT_EQ(number("SELECT has_orphans FROM about"), 0);
   add_solved(4, table_with_k(1e7, 3));
   EXPECT_EQ(rows_in("results JOIN models USING (model_id) WHERE k = 1e7"), 3)
-      << "a model that was deleted comes again";
+      << "a deleted model is stored again";
 }
 
 TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
@@ -489,7 +490,7 @@ TEST_F(StoreFilesTest, ARenamedDatabaseGetsAllAcknowledgedChangesWhenItsServerEn
 
 TEST_F(StoreFilesTest, ARunningQueryKeepsTheLogAndAnIdleReaderDoesNot) {
   add_result(0);
-  EXPECT_EQ(rows_of_copy("before.db"), 0) << "it is in the log";
+  EXPECT_EQ(rows_of_copy("before.db"), 0) << "the row is still in the log";
   const DatabaseHandle waits = open_database(path_, SQLITE_OPEN_READONLY);
   EXPECT_THAT(rows(waits.get(), "SELECT count(*) FROM results"), ElementsAre("1"));
   const DatabaseHandle reads = open_database(path_, SQLITE_OPEN_READONLY);

@@ -233,7 +233,7 @@ TEST(HttpServer, AnIdleConnectionEnds) {
   silent.read_to_the_end();
   halting.read_to_the_end();
   server.wake_until_in_progress(1);
-  EXPECT_FALSE(quiet->has_news()) << "it takes all that there is";
+  EXPECT_FALSE(quiet->has_news()) << "a stream whose client reads everything was ended";
 }
 
 TEST(HttpServer, ATooSlowTransferEnds) {
@@ -310,7 +310,8 @@ TEST(HttpServer, StreamsAreLimited) {
   const auto staying = begin(server, "/quiet");
   auto leaving = begin(server, "/quiet");
   EXPECT_EQ(status_of_answer(get(server.url(), "/quiet")), 503);
-  EXPECT_EQ(status_of_answer(get(server.url(), "/a")), 200) << "they take no room from others";
+  EXPECT_EQ(status_of_answer(get(server.url(), "/a")), 200)
+      << "streams take no room from other requests";
   leaving.reset();
   server.wake_until_in_progress(1);
   RawHttp next(server.url());

@@ -23,7 +23,7 @@ class RawHttp : public test::RawTcp {
     while (!all.ends_with(end)) {
       const std::string one = receive(0, 1);
       if (one.empty()) {
-        throw std::runtime_error("the server says no more than: " + all);
+        throw std::runtime_error("the connection ended after: " + all);
       }
       all += one;
     }

@@ -89,7 +89,7 @@ TEST_F(GrowthKillTest, AcknowledgedChangesSurviveAKillAtAnyTime) {
   EXPECT_EQ(client({"rename", victim, "stays"})->wait(), 0);
   kill_server_within(0);
   EXPECT_EQ(names(), (std::vector<std::string>{"grows", "stays"}));
-  wait_until("all is solved and cleared away", [&] {
+  wait_until("all points are solved and deleted rows are gone", [&] {
     return number("SELECT count(*) FROM studies WHERE state = 'done'") == 2 &&
            number(
                "SELECT count(*) FROM results WHERE study_id IN"

@@ -168,7 +168,7 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   wait_until_said(*worker, "welcomed as worker");
   ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
   wait_until_said(server_->process(), "revoked: late");
-  wait_until("the worker is told", [&] {
+  wait_until("the worker reports the refusal", [&] {
     const std::string said = worker->err();
     return said.find("did not accept this key", said.find("welcomed as worker")) !=
            std::string::npos;

@@ -354,7 +354,7 @@ TEST_F(PlainText, IsReadableOnTheNetworkWithoutKeys) {
 
 TEST_F(PlainText, IsNotReadableOnTheNetworkWithKeys) {
   const std::string bytes = captured();
-  ASSERT_THAT(bytes.find("CURVE"), Not(std::string::npos)) << "nothing was captured";
+  ASSERT_THAT(bytes.find("CURVE"), Not(std::string::npos)) << "no packets were captured";
   for (const std::string& words : revealing_texts_) {
     EXPECT_EQ(bytes.find(words), std::string::npos) << words;
   }
@@ -436,7 +436,7 @@ TEST_F(ReadmeCommands, FiveCommandsLeadFromNewKeysToAResultOfAnotherMachine) {
     last = process->outcome();
     ASSERT_EQ(last.exit_code, 0) << typed.command << "\n" << last.err;
   }
-  EXPECT_EQ(stay.size(), 2U) << "a server and a worker";
+  EXPECT_EQ(stay.size(), 2U) << "expected a server and a worker";
   EXPECT_THAT(last.out, HasSubstr("fn_peak_N"));
   EXPECT_THAT(last.out, HasSubstr("solved"));
 }

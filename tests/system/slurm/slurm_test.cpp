@@ -29,7 +29,7 @@ class SlurmTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (const auto objection = SlurmCluster::objection(); !objection.empty()) {
-      GTEST_SKIP() << "no Slurm here: " << objection;
+      GTEST_SKIP() << "Slurm cannot be used: " << objection;
     }
     cluster_.emplace(folder_);
     const auto made = run_oblique(folder_, {"keygen", folder_.file("keys")});
@@ -263,7 +263,7 @@ class SlurmCampaignTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (const auto objection = SlurmCluster::objection(); !objection.empty()) {
-      GTEST_SKIP() << "no Slurm here: " << objection;
+      GTEST_SKIP() << "Slurm cannot be used: " << objection;
     }
     for (const char* part : {"server", "worker", "client"}) {
       Process install(folder_, "/usr/bin/env",

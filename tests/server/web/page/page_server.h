@@ -40,7 +40,7 @@ struct Numbers {
   std::vector<Number> read(std::size_t from_byte, std::size_t count) const {
     std::vector<Number> numbers(count);
     if (from_byte + count * sizeof(Number) > bytes.size()) {
-      throw std::runtime_error("there are fewer numbers");
+      throw std::runtime_error("the answer contains fewer numbers than expected");
     }
     std::memcpy(numbers.data(), bytes.data() + from_byte, count * sizeof(Number));
     return numbers;
@@ -96,7 +96,7 @@ class PageServer {
     const std::string body = body_of(get(path));
     std::uint32_t length = 0;
     if (body.size() < sizeof length) {
-      throw std::runtime_error("the answer has no head: " + body);
+      throw std::runtime_error("the answer has no JSON header: " + body);
     }
     std::memcpy(&length, body.data(), sizeof length);
     return {nlohmann::json::parse(body.substr(sizeof length, length)),

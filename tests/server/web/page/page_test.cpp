@@ -365,7 +365,7 @@ TEST_F(PageStudyTest, AStudyIsCheckedBeforeItIsSubmitted) {
   EXPECT_EQ(all["models"], 1);
   EXPECT_EQ(all["falls"], 1);
   EXPECT_EQ(all["falls_estimated"], false);
-  EXPECT_EQ(all["bytes"], 11 * 970 + 600) << "as of oblique study check";
+  EXPECT_EQ(all["bytes"], 11 * 970 + 600) << "the same estimate as `oblique study check` gives";
   const json some = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "mu > 0.45")));
   EXPECT_EQ(some["points"], 6);
   const std::string wrong = check(R"("values":[-1])", "");
@@ -389,7 +389,7 @@ TEST_F(PageStudyTest, ADropAboveTheLengthIsRefusedAndAnUncertainOneIsReported) {
   EXPECT_EQ(reached_m(R"("from":0.1,"to":1.08,"count":9)"), json());
   EXPECT_DOUBLE_EQ(reached_m(R"("from":0.1,"to":1.19,"count":9)"), 1.08);
   EXPECT_DOUBLE_EQ(reached_m(R"("values":[0.75])", R"({"key":"links","values":[2,3]},)"), 0.72)
-      << "of the shortest finger";
+      << "the shortest finger limits the drop";
   EXPECT_DOUBLE_EQ(reached_m(R"("expression":"0.5 + 0.1 * e")"), 1.08);
 }
 
