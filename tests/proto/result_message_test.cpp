@@ -97,17 +97,17 @@ TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
 TEST(PointResultTest, ANumberThatCannotBeStoredIsDetectedInEveryField) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const PointResult sound = to_message(0, distinct_result());
-  for (const auto& [number, says] : {std::pair{kNotANumber, "is not a finite number"},
-                                     {kInfinity, "is not a finite number"},
-                                     {1e308, "too large to be stored"},
-                                     {-1.1e100, "too large to be stored"}}) {
+  for (const auto& [number, expected] : {std::pair{kNotANumber, "is not a finite number"},
+                                         {kInfinity, "is not a finite number"},
+                                         {1e308, "too large to be stored"},
+                                         {-1.1e100, "too large to be stored"}}) {
     int i = 0;
     solver::for_each_sent<double>(
-        [&, number = number, says = says](const auto& field, const auto& member) {
+        [&, number = number, expected = expected](const auto& field, const auto& member) {
           PointResult message = sound;
           message.set_reals(i++, number);
           const bool is_absent = member.may_be_absent && std::isnan(number);
-          EXPECT_THAT(fault_of(message), HasSubstr(is_absent ? "" : says)) << field.name;
+          EXPECT_THAT(fault_of(message), HasSubstr(is_absent ? "" : expected)) << field.name;
         });
     for (auto* (PointResult::*list)() :
          {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
@@ -115,7 +115,7 @@ TEST(PointResultTest, ANumberThatCannotBeStoredIsDetectedInEveryField) {
           &PointResult::mutable_reaction_peaks}) {
       PointResult message = sound;
       (message.*list)()->Set(1, number);
-      EXPECT_THAT(fault_of(message), HasSubstr(says));
+      EXPECT_THAT(fault_of(message), HasSubstr(expected));
     }
   }
   PointResult largest = sound;

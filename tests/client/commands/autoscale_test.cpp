@@ -140,8 +140,8 @@ TEST_F(Autoscale, SubmitsTheScriptForMissingJobs) {
   EXPECT_EQ(once.exit_code, 0) << once.err;
   EXPECT_THAT(once.err, HasSubstr("submitted job 4711\n"));
   EXPECT_EQ(submissions(), command + command);
-  std::ifstream asked(folder_.file("squeue.log"));
-  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(asked), {}),
+  std::ifstream squeue_log(folder_.file("squeue.log"));
+  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(squeue_log), {}),
               HasSubstr("--me --array --name=oblique@" + server_.client_url().substr(6)));
 }
 
@@ -189,7 +189,7 @@ TEST(AutoscaleFlags, ThatCannotWorkAreWrongUsage) {
   };
   const struct {
     std::vector<std::string> arguments;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {{"slurm"}, "--max is required"},
       {{"pbs", "--max", "1"}, "it must be slurm"},
@@ -198,10 +198,10 @@ TEST(AutoscaleFlags, ThatCannotWorkAreWrongUsage) {
       {{"slurm", "--max", "2", "--script", "jobs", "--sbatch-args", "--array=1-3"}, "is one job"},
       {{"slurm", "--max", "2", "--script", "jobs"}, "OBLIQUE_WORKER_SERVER is not set"},
   };
-  for (const auto& [arguments, says] : wrong) {
+  for (const auto& [arguments, expected] : wrong) {
     const auto outcome = outcome_of(arguments, {});
-    EXPECT_EQ(outcome.exit_code, 2) << says << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+    EXPECT_EQ(outcome.exit_code, 2) << expected << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
   const auto warned =
       outcome_of({"slurm", "--max", "2", "--script", "jobs", "--once", "--keys", "keys/reader.key"},

@@ -29,7 +29,7 @@ std::vector<std::string> words_of(const std::string& line) {
 TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   const struct {
     const char* line;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {"", "no command given"},
       {"solv", "unknown command `solv` (did you mean `solve`?)"},
@@ -69,11 +69,11 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {"solve --H 1 --mu 0.4 --e 1 --trace - --json", "both write to standard output"},
       {"solve --H 1 --mu 0.4 --e 1 --trace-shape", "--trace"},
   };
-  for (const auto& [words, says] : wrong) {
+  for (const auto& [words, expected] : wrong) {
     const auto outcome = test::run_oblique(words_of(words));
     EXPECT_EQ(outcome.exit_code, 2) << words << outcome.err;
     EXPECT_EQ(outcome.out, "") << words;
-    EXPECT_NE(outcome.err.find(says), std::string::npos) << words << outcome.err;
+    EXPECT_NE(outcome.err.find(expected), std::string::npos) << words << outcome.err;
     EXPECT_TRUE(outcome.err.starts_with("oblique")) << words << outcome.err;
   }
 }
@@ -120,7 +120,7 @@ TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
   std::ofstream(folder.path() / "pipe.toml") << "[[block]]\ncsv = 'pipe'\n";
   const struct {
     const char* line;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {"study check /dev/zero", "the study file /dev/zero cannot be read: it is a device"},
       {"study check pipe", "the study file pipe cannot be read: it is a pipe"},
@@ -133,10 +133,10 @@ TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
       {"backup saved.db --db pipe --salvage", "pipe is a pipe"},
       {"autoscale slurm --max 1 --script pipe", "the script pipe cannot be read"},
   };
-  for (const auto& [line, says] : wrong) {
+  for (const auto& [line, expected] : wrong) {
     const auto outcome = test::run_oblique(folder, words_of(line));
     EXPECT_NE(outcome.exit_code, 0) << line;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
   const auto doctor = test::run_oblique(folder, {"doctor", "--db", "./pipe"});
   EXPECT_NE(doctor.out.find("/pipe is a pipe"), std::string::npos) << doctor.out;
@@ -163,18 +163,18 @@ TEST(CommandLine, RepeatsAtMostEightyCharactersOfAWrongKey) {
 TEST(CommandLine, AMissingServerOrFileIsNamedAndGivesExitCodeOne) {
   const struct {
     const char* line;
-    const char* says;
+    const char* expected;
   } missing[] = {
       {"status --server tcp://127.0.0.1:1 --timeout 0.05",
        "no answer from tcp://127.0.0.1:1 within 0.05 s"},
       {"studies --db nowhere.db", "nowhere.db"},
       {"view nowhere.db", "there is no file nowhere.db"},
   };
-  for (const auto& [line, says] : missing) {
+  for (const auto& [line, expected] : missing) {
     const auto outcome = test::run_oblique(words_of(line));
     EXPECT_EQ(outcome.exit_code, 1) << line;
     EXPECT_EQ(outcome.out, "") << line;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
 }
 

@@ -51,12 +51,12 @@ test::Outcome parse(const Words& words) {
   return outcome;
 }
 
-void expect_wrong_usage(const Words& words, const std::string& says) {
+void expect_wrong_usage(const Words& words, const std::string& expected) {
   const auto outcome = parse(words);
   const std::string typed = PrintToString(words);
   EXPECT_EQ(outcome.exit_code, 2) << typed << outcome.err;
   EXPECT_EQ(outcome.out, "") << typed;
-  EXPECT_THAT(outcome.err, AllOf(StartsWith("oblique"), HasSubstr(says))) << typed;
+  EXPECT_THAT(outcome.err, AllOf(StartsWith("oblique"), HasSubstr(expected))) << typed;
 }
 
 /// A command, such as `study`, or a subcommand, such as `study check`.

@@ -116,7 +116,7 @@ TEST_F(Plot, ReportsMissingValuesOnStandardError) {
 TEST_F(Plot, AWrongFlagIsNamedWithTheAllowedValues) {
   struct Wrong {
     std::vector<std::string> arguments;
-    std::string says;
+    std::string expected;
     int exit_code = 2;
   };
   for (const Wrong& wrong :
@@ -143,9 +143,9 @@ TEST_F(Plot, AWrongFlagIsNamedWithTheAllowedValues) {
                           {{"--H", "0.5,1", "--mu", "1", "--e", "1"}, "one value per flag"},
                           {{"a", "--point", "12"}, "0 to 11", 1}}) {
     const auto outcome = plot(wrong.arguments);
-    EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.says << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(wrong.says));
-    EXPECT_EQ(outcome.out, "") << wrong.says;
+    EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.expected << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(wrong.expected));
+    EXPECT_EQ(outcome.out, "") << wrong.expected;
   }
 }
 
@@ -171,16 +171,17 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
 TEST_F(Plot, ShowsTheShapesThatAWorkerOfTheServerSolved) {
   const test::Server server(folder_, "oblique.db");
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
-  const auto ask = [&](const std::string& more) {
+  const auto plot_shape = [&](const std::string& more) {
     return plot({"a", "--point", "11", "--panel", "shape", "--server", server.client_url(), more});
   };
-  test::wait_until("the server has a worker", [&] { return ask("--on-worker").exit_code == 0; });
-  const auto there = ask("--on-worker");
+  test::wait_until("the server has a worker",
+                   [&] { return plot_shape("--on-worker").exit_code == 0; });
+  const auto there = plot_shape("--on-worker");
   EXPECT_THAT(there.out, HasSubstr("at touch"));
   EXPECT_THAT(there.out, HasSubstr("at separation"));
   EXPECT_THAT(there.out, HasSubstr("drop "));
   EXPECT_THAT(there.out, Not(HasSubstr("--local")));
-  const auto here = ask("--local");
+  const auto here = plot_shape("--local");
   EXPECT_EQ(here.out, there.out);
 }
 

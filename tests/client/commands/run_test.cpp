@@ -16,7 +16,7 @@
 #include "client/study/study_file.h"
 #include "server/query/reader.h"
 #include "server/store/store.h"
-#include "tests/client/study/pretended_fall.h"
+#include "tests/client/study/fake_reach.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
 
@@ -128,9 +128,9 @@ TEST(Run, IfAnotherClientPausesTheStudyNamesTheRemedyAndExitsWithOne) {
   test::Process program(folder, test::client_program(), arguments);
   wait_until_at_work(folder, program);
   // The log contains the server's address for clients and the folder of the keys.
-  const auto said = program.err();
-  const auto word_after = [&said](const std::string& words) {
-    const auto rest = said.substr(said.find(words) + words.size());
+  const auto output = program.err();
+  const auto word_after = [&output](const std::string& words) {
+    const auto rest = output.substr(output.find(words) + words.size());
     return rest.substr(0, rest.find_first_of(",;\n"));
   };
   const std::filesystem::path keys = word_after("admits the 3 keys of ");
@@ -213,7 +213,7 @@ TEST(Run, IfTheStudyHasResultsOfAnotherSolverNamesTheRemedies) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "begun.toml") << kBegun;
   {
-    const Study study = parse_study(kBegun, "begun.toml", pretended_reach());
+    const Study study = parse_study(kBegun, "begun.toml", fake_reach());
     const auto table = std::make_shared<const protocol::PointTable>(study.recipe);
     constexpr const char* kThen = "2024-01-01T00:00:00.000Z";
     server::Store((folder.path() / "oblique.db").string())

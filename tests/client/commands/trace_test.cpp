@@ -12,7 +12,7 @@
 
 #include "client/study/study_file.h"
 #include "server/store/store.h"
-#include "tests/client/study/pretended_fall.h"
+#include "tests/client/study/fake_reach.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
 
@@ -58,7 +58,7 @@ class TraceCommand : public testing::Test {
   /// Stores the study `name` in oblique.db without results.
   void store_study(const std::string& name) {
     write_file(name);
-    const Study study = parse_study(kStudies.at(name), name + ".toml", pretended_reach());
+    const Study study = parse_study(kStudies.at(name), name + ".toml", fake_reach());
     const auto table = std::make_shared<const protocol::PointTable>(study.recipe);
     server::Store store((folder_.path() / "oblique.db").string());
     store.commit(std::vector<server::Change>{
@@ -115,23 +115,24 @@ TEST_F(TraceCommand, WritesTheSameRowsAsSolve) {
 
 TEST_F(TraceCommand, MissingPointsAndUnwritableFilesAreNamed) {
   store_study("models");
-  const auto says = [&](std::vector<std::string> words, int exit_code, const char* sentence) {
+  const auto expect_error = [&](std::vector<std::string> words, int exit_code,
+                                const char* sentence) {
     words.insert(words.begin(), "trace");
     const auto outcome = run(words);
     EXPECT_EQ(outcome.exit_code, exit_code) << testing::PrintToString(words) << outcome.err;
     EXPECT_EQ(outcome.out, "");
     EXPECT_THAT(outcome.err, HasSubstr(sentence));
   };
-  says({"model", "0"}, 1, "no study called \"model\"");
-  says({"models", "16"}, 1, "its points are 0 to 15");
-  says({"models", "-1"}, 2, "POINT");
-  says({"models", "first"}, 2, "POINT");
-  says({"models"}, 2, "POINT");
-  says({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
-  says({"models", "0", "--out", "x.jsn"}, 2, "end the name in .csv");
-  says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
-  says({"models", "0", "--local", "--on-worker"}, 2, "--local");
-  says({"models", "0", "--every", "0"}, 2, "--every");
+  expect_error({"model", "0"}, 1, "no study called \"model\"");
+  expect_error({"models", "16"}, 1, "its points are 0 to 15");
+  expect_error({"models", "-1"}, 2, "POINT");
+  expect_error({"models", "first"}, 2, "POINT");
+  expect_error({"models"}, 2, "POINT");
+  expect_error({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
+  expect_error({"models", "0", "--out", "x.jsn"}, 2, "end the name in .csv");
+  expect_error({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
+  expect_error({"models", "0", "--local", "--on-worker"}, 2, "--local");
+  expect_error({"models", "0", "--every", "0"}, 2, "--every");
 }
 
 TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
@@ -166,15 +167,15 @@ TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
 TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   solve_study("models");
   const test::Server server(folder_, "oblique.db");
-  const auto ask = [&](std::vector<std::string> words) {
+  const auto run_trace = [&](std::vector<std::string> words) {
     words.insert(words.begin(), "trace");
     words.insert(words.end(), {"--server", server.client_url()});
     return run(words);
   };
-  const auto nobody = ask({"models", "3"});
+  const auto nobody = run_trace({"models", "3"});
   EXPECT_EQ(nobody.exit_code, 1);
   EXPECT_THAT(nobody.err, HasSubstr("no worker is connected"));
-  const auto here = ask({"models", "3", "--local", "--out", "here.csv"});
+  const auto here = run_trace({"models", "3", "--local", "--out", "here.csv"});
   EXPECT_EQ(here.exit_code, 0) << here.err;
   EXPECT_THAT(here.err, HasSubstr("solved here, same as stored."));
 
@@ -182,25 +183,26 @@ TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   test::wait_until("the server has a worker", [&] {
     return run({"workers", "--server", server.client_url()}).out.find("ann") != std::string::npos;
   });
-  const auto there = ask({"models", "3"});
+  const auto there = run_trace({"models", "3"});
   EXPECT_EQ(there.exit_code, 0) << there.err;
   EXPECT_THAT(there.err, HasSubstr("solved by worker ann ("));
   EXPECT_THAT(there.err, HasSubstr("same as stored."));
   EXPECT_EQ(there.out, text_of("here.csv"));
   for (const char* file : {"fall_here.csv", "fall_there.csv"}) {
     const bool is_here = file == std::string_view("fall_here.csv");
-    ask({"models", "3", "--shape", "--fall", is_here ? "--local" : "--on-worker", "--out", file});
+    run_trace(
+        {"models", "3", "--shape", "--fall", is_here ? "--local" : "--on-worker", "--out", file});
   }
   EXPECT_THAT(text_of("fall_here.csv"), testing::AllOf(StartsWith("t_s,"), HasSubstr(",falling,")));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
   // `--every 50` prints each 50th instant, ends of phases and the last instant.
-  const auto thinned = ask({"models", "3", "--every", "50"});
-  EXPECT_EQ(thinned.out, ask({"models", "3", "--every", "50", "--local"}).out);
+  const auto thinned = run_trace({"models", "3", "--every", "50"});
+  EXPECT_EQ(thinned.out, run_trace({"models", "3", "--every", "50", "--local"}).out);
   const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
   EXPECT_GT(lines(thinned.out), lines(there.out) / 50);
   EXPECT_LT(lines(thinned.out), lines(there.out) / 5);
-  EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
-  EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
+  EXPECT_THAT(run_trace({"model", "3"}).err, HasSubstr("no study called \"model\""));
+  EXPECT_THAT(run_trace({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
   // A trace succeeds although its worker is killed, because another worker joins.
   std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"

@@ -52,8 +52,8 @@ TEST(Connection, RefusesAnInvalidAddress) {
 
 TEST(Connection, StopsWaitingWhenKeepWaitingReturnsFalse) {
   const oblique::test::ReservedPort nobody;
-  int asked = 0;
-  Connection connection(at(nobody.url(), kLong_ms), [&asked] { return ++asked < 3; });
+  int calls = 0;
+  Connection connection(at(nobody.url(), kLong_ms), [&calls] { return ++calls < 3; });
   EXPECT_THROW(connection.workers(), Interrupted);
 }
 

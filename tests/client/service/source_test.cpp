@@ -219,13 +219,13 @@ TEST(FollowedStudy, IsFollowedByItsNumberAfterARename) {
   source.held.set_study_id(7);
   source.held.set_name("first");
   FollowedStudy followed(source, "first");
-  std::string said;
-  const Tell tell = [&said](const std::string& sentence) { said += sentence; };
+  std::string printed;
+  const Tell tell = [&printed](const std::string& sentence) { printed += sentence; };
   EXPECT_EQ(followed.status(tell).name(), "first");
   source.held.set_name("other");
   EXPECT_EQ(followed.status(tell).name(), "other");
   EXPECT_EQ(followed.status(tell).name(), "other");
-  EXPECT_EQ(said, "first is now called other.") << "the new name is reported once";
+  EXPECT_EQ(printed, "first is now called other.") << "the new name is reported once";
   source.held.set_study_id(8);
   EXPECT_THROW(followed.status(tell), std::runtime_error) << "study 7 was deleted";
 }

@@ -18,7 +18,7 @@ test("cells that do not meet the filter are greyed and counted, and the filter i
   const before = await imageOf(page);
   await web.write(page, web.whereField, "mu > 1 AND e = 1");
   await web.shows(page, ".gaps", /42 cells filtered out/);
-  await web.rowsSaid(page, /of 42 rows/);
+  await web.showsRowCount(page, /of 42 rows/);
   assert.notEqual(await imageOf(page), before);
   assert.equal(await web.fieldOf(page, "where"), "mu > 1 AND e = 1");
   assert.match(await web.textOf(page, ".commands code"), /--where 'mu > 1 AND e = 1'/);
@@ -33,7 +33,7 @@ test("errors in a condition appear beside its field", async () => {
   await web.shows(page, "#said-where", /did you mean `mu`\?/);
   assert.equal(await page.$eval(web.whereField, (one) => one.getAttribute("aria-invalid")), "true");
   await web.write(page, web.whereField, "");
-  await web.rowsSaid(page, /of 252 rows/);
+  await web.showsRowCount(page, /of 252 rows/);
   await web.write(page, web.markField, "mu >");
   await web.shows(page, "#said-mark", /./);
   assert.equal(await web.textOf(page, "p.said:not([id])"), "");
@@ -52,7 +52,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   await hasSelected(page, condition);
   assert.notEqual(await imageOf(page), before);
   const [[selected]] = await web.rowsOf(page, 1, { select: "count(*)", where: condition });
-  await web.rowsSaid(page, new RegExp(`of ${selected} rows`));
+  await web.showsRowCount(page, new RegExp(`of ${selected} rows`));
   await page.select(".controls select", "histogram");
   await web.shows(page, ".lines .legend", /selected/);
   await web.press(page, "Use selection as filter");
@@ -62,7 +62,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   assert.equal(await valueOf(page, web.markField), condition);
   assert.equal(await page.$eval(web.whereField, (one) => one.value), "");
   await web.press(page, "Clear");
-  await web.rowsSaid(page, /of 252 rows/);
+  await web.showsRowCount(page, /of 252 rows/);
   await page.close();
 });
 

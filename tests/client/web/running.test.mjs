@@ -45,6 +45,6 @@ test("points that were solved while a study was opened are shown", async () => {
     },
   });
   await web.until(page, () => document.querySelectorAll(".rows tbody tr").length === 25);
-  await web.rowsSaid(page, /of 252 rows/);
+  await web.showsRowCount(page, /of 252 rows/);
   await page.close();
 });

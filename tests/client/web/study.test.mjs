@@ -77,7 +77,7 @@ test("tables, maps and lines have the units of the tables of oblique, and the ta
   const page = await web.study(
     "#/study/1?pic=map&z=duration_s&x=mu&y=H&at=e@2&x0=2&x1=4&y0=1&y1=3",
   );
-  await web.rowsSaid(page, /of 27 rows/);
+  await web.showsRowCount(page, /of 27 rows/);
   const heads = await page.$$eval(".rows thead th", (all) => all.map((one) => one.textContent));
   const expected =
     "point,H [m],mu,e,duration_s [µs],fn_peak_N,ft_peak_N,slide_m [mm],stick_total_s [µs],major_mode";
@@ -192,12 +192,12 @@ test("a slider shows other values, and writes the address a few times, however f
 
 test("rows are turned a page at a time and sorted, by keys too, and the page is part of the address", async () => {
   const page = await web.study("#/study/1");
-  await web.rowsSaid(page, /^1 to 25 of 252 rows\.$/);
+  await web.showsRowCount(page, /^1 to 25 of 252 rows\.$/);
   await web.press(page, "Next");
-  await web.rowsSaid(page, /^26 to 50 of 252 rows\.$/);
+  await web.showsRowCount(page, /^26 to 50 of 252 rows\.$/);
   await web.until(page, () => location.hash.includes("page=2"));
   await web.write(page, web.whereField, "mu > 1"); // a new filter returns to the first page
-  await web.rowsSaid(page, /^1 to 25 of 126 rows/);
+  await web.showsRowCount(page, /^1 to 25 of 126 rows/);
   await page.evaluate(() =>
     [...document.querySelectorAll("th button")].find((one) => one.textContent === "mu").focus(),
   );
@@ -206,7 +206,7 @@ test("rows are turned a page at a time and sorted, by keys too, and the page is 
     await web.shows(page, `.rows th[aria-sort=${order}]`, /^mu/);
     assert.match(await page.evaluate(() => document.activeElement.textContent), /^mu/);
   }
-  await web.rowsSaid(page, /^1 to 25/);
+  await web.showsRowCount(page, /^1 to 25/);
   await page.close();
 });
 
@@ -292,7 +292,7 @@ test("a study with failed points shows their number and the reason, and lists th
   const why = /^Point 8 failed: H = 1\.19 m is not allowed.* 1\.179\d* m.*Show all 4$/;
   await web.shows(page, ".failure", why);
   await page.click(".failure a");
-  await web.rowsSaid(page, /^1 to 4 of 4 rows/);
+  await web.showsRowCount(page, /^1 to 4 of 4 rows/);
   assert.equal(await web.fieldOf(page, "where"), "error IS NOT NULL");
   assert.match(await web.textOf(page, ".rows thead"), /statuserror/);
   await page.close();

@@ -311,7 +311,7 @@ TEST_F(AuthorizedKeysTest, ErrorsNameTheLineOfAnInvalidOrRepeatedEntry) {
   const AuthorizedKey a = key_called("a");
   AuthorizedKey same_key = a;
   same_key.name = "b";
-  for (const auto& [text, line, says] : std::vector<std::array<std::string, 3>>{
+  for (const auto& [text, line, expected] : std::vector<std::array<std::string, 3>>{
            {entry(a) + entry(key_called("a")), "6", "already has a key called a"},
            {entry(a) + entry(same_key), "6", "already has the public key"},
            {entry(a) + "expires = 3\n", "6", "unknown key `expires`"},
@@ -320,7 +320,7 @@ TEST_F(AuthorizedKeysTest, ErrorsNameTheLineOfAnInvalidOrRepeatedEntry) {
            {"[[keys]]\n", "1", "unknown key `keys`"},
            {"key = 3\n", "1", "[[key]]"}}) {
     EXPECT_THAT(error_of(text),
-                AllOf(HasSubstr("authorized_keys.toml:" + line + ":"), HasSubstr(says)));
+                AllOf(HasSubstr("authorized_keys.toml:" + line + ":"), HasSubstr(expected)));
   }
 }
 

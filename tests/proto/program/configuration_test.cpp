@@ -63,12 +63,12 @@ class ConfigurationTest : public testing::Test {
     for (const std::string& word : words) {
       arguments.push_back(word.c_str());
     }
-    const std::ostringstream told;
-    auto* const before = std::cerr.rdbuf(told.rdbuf());
+    const std::ostringstream printed;
+    auto* const before = std::cerr.rdbuf(printed.rdbuf());
     const auto exit_code =
         configuration.parse(static_cast<int>(arguments.size()), arguments.data());
     std::cerr.rdbuf(before);
-    errors_ = told.str();
+    errors_ = printed.str();
     printed_ = exit_code ? "" : configuration.printed();
     return exit_code;
   }

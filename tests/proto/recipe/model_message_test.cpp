@@ -130,7 +130,7 @@ TEST(ModelInput, ErrorsHaveTheKeyAndTheInvalidValue) {
   const struct {
     ModelInput model;
     const char* key;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {{.values = {{"tip_mas", 1}}}, "tip_mas", "did you mean `tip_mass`"},
       {{.values = {{"rho", -1}}}, "rho", "rho = -1"},
@@ -141,13 +141,13 @@ TEST(ModelInput, ErrorsHaveTheKeyAndTheInvalidValue) {
       {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths cannot be combined"},
       {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths cannot be combined"},
   };
-  for (const auto& [model, key, says] : wrong) {
+  for (const auto& [model, key, expected] : wrong) {
     try {
       (void)model.model();
-      ADD_FAILURE() << says;
+      ADD_FAILURE() << expected;
     } catch (const solver::InputError& error) {
       EXPECT_EQ(error.fields().key, key);
-      EXPECT_THAT(error.what(), HasSubstr(says));
+      EXPECT_THAT(error.what(), HasSubstr(expected));
     }
   }
 }
@@ -164,9 +164,9 @@ TEST(StudyName, MayBeAnyVisibleText) {
 TEST(StudyName, IsRefusedAndShownEscapedIfItHasInvisibleCharacters) {
   for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
                            "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
-    const auto objection = study_name_error(name);
-    EXPECT_THAT(objection, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
-                                 testing::Not(HasSubstr(name))));
+    const auto name_error = study_name_error(name);
+    EXPECT_THAT(name_error, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
+                                  testing::Not(HasSubstr(name))));
   }
 }
 

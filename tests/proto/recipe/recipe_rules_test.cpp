@@ -73,8 +73,8 @@ Axis with_value(Axis axis, double value) {
 
 struct Refused {
   Block block;
-  std::string key = {};   ///< key of the error
-  std::string says = {};  ///< part of the message; empty if the block is allowed
+  std::string key = {};       ///< key of the error
+  std::string expected = {};  ///< part of the message; empty if the block is allowed
 };
 
 void expect_refusals(const std::vector<Refused>& blocks) {
@@ -86,8 +86,8 @@ void expect_refusals(const std::vector<Refused>& blocks) {
       error = refused.fields();
     }
     EXPECT_EQ(error.key, each.key) << each.block.DebugString();
-    EXPECT_EQ(error.text.empty(), each.says.empty()) << error.text << each.block.DebugString();
-    EXPECT_THAT(error.text, HasSubstr(each.says)) << each.block.DebugString();
+    EXPECT_EQ(error.text.empty(), each.expected.empty()) << error.text << each.block.DebugString();
+    EXPECT_THAT(error.text, HasSubstr(each.expected)) << each.block.DebugString();
   }
 }
 

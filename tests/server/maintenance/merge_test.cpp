@@ -210,7 +210,7 @@ TEST_F(MergeTest, ASourceWithAnyFaultIsRefused) {
         " (SELECT 0 UNION ALL SELECT x FROM t) SELECT x AS study_id FROM t"}) {
     const std::string source = "source" + std::to_string(++number);
     make(source, {{.study = "b", .end = 2}, {.end = 9}});
-    by_hand(file(source), change);
+    execute_sql(file(source), change);
     EXPECT_THROW(merge(source), StorageError) << change;
   }
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
@@ -218,7 +218,7 @@ TEST_F(MergeTest, ASourceWithAnyFaultIsRefused) {
 
 TEST_F(MergeTest, TheSourceIsNotChangedAndTheStateOfItsStudyIsCopied) {
   make("one", {{.end = 5}});
-  by_hand(file("one"), "UPDATE studies SET priority = 7");
+  execute_sql(file("one"), "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
   const auto bytes = [&] {
     std::ifstream stream(file("one"), std::ios::binary);
@@ -319,9 +319,9 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
 
 TEST_F(MergeTest, ASourceWhoseRowsWereChangedByHandIsMergedByItsRows) {
   make("one", {{.end = 10}});
-  by_hand(file("one"),
-          "DELETE FROM results WHERE point = 3;"
-          "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
+  execute_sql(file("one"),
+              "DELETE FROM results WHERE point = 3;"
+              "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
   merge("one");
   EXPECT_EQ(ranges("all"), "0+3,4+6");
   EXPECT_EQ(text("all", "SELECT group_concat(point) FROM results WHERE checksum IS NULL"), "1");

@@ -461,21 +461,21 @@ class ManyPeersTest : public NetworkTest {
   }
 
   static constexpr std::size_t kMax = 100;
-  std::vector<std::unique_ptr<KeyedPeer>> crowd_ = keyed_peers(300);
+  std::vector<std::unique_ptr<KeyedPeer>> peers_ = keyed_peers(300);
 };
 
 TEST_F(ManyPeersTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
-  for (const auto& peer : crowd_) {
+  for (const auto& peer : peers_) {
     peer->say_hello();
   }
-  for (const auto& peer : crowd_) {
+  for (const auto& peer : peers_) {
     take_welcome_and_initiate(*peer);
   }
-  for (const auto& peer : crowd_) {
+  for (const auto& peer : peers_) {
     static_cast<void>(received_by(*peer, 1));
   }
   EXPECT_EQ(all_refused(), 0U);
-  EXPECT_EQ(network_.connections(), crowd_.size());
+  EXPECT_EQ(network_.connections(), peers_.size());
 }
 
 TEST_F(ManyPeersTest, SilentPeersAreReplacedAfterAFractionOfTheHandshakeTimeout) {
@@ -492,20 +492,20 @@ class ManyPeersOfOneAddressTest : public NetworkTest {
 };
 
 TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndNoOthers) {
-  const auto crowd = keyed_peers(100, kElsewhere);
-  run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMax; });
+  const auto peers = keyed_peers(100, kElsewhere);
+  run_until([&] { return refused(RefusalCause::kBound) == peers.size() - kMax; });
   EXPECT_EQ(network_.connections(), kMax);
   const auto other = admitted();
   expect_message(*other);
   now_ms_ += NetworkLimits().handshake_ms / 100;
   const auto second = admitted(kElsewhere);
   EXPECT_EQ(network_.connections(), kMax + 1) << "the peer replaced one of the newest handshakes";
-  crowd[0]->say_hello();
-  take_welcome(*crowd[0]);
+  peers[0]->say_hello();
+  take_welcome(*peers[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
   const auto silent = keyed_peers(1, kElsewhere);  // takes the place that `second` has left
   const auto third = admitted(kElsewhere);
-  EXPECT_EQ(crowd[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";
+  EXPECT_EQ(peers[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";
 }
 
 class TightKeyedNetworkTest : public NetworkTest {

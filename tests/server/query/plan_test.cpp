@@ -45,7 +45,7 @@ class PlanTest : public StoreFixture {
   }
   void edit(const std::string& sql) {
     database_.reset();
-    by_hand(sql);
+    execute_sql(sql);
     open();
   }
 
@@ -75,17 +75,17 @@ class PlanTest : public StoreFixture {
     }
     return values;
   }
-  std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
-    return texts(plan(database_.get(), asked).sql);
+  std::vector<std::string> texts(const protocol::StudyQuery& query) const {
+    return texts(plan(database_.get(), query).sql);
   }
   /// Returns the output of EXPLAIN QUERY PLAN for a study query.
-  std::string steps_of(const protocol::StudyQuery& asked) const {
+  std::string steps_of(const protocol::StudyQuery& query) const {
     return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
-                                                                 plan(database_.get(), asked).sql),
+                                                                 plan(database_.get(), query).sql),
                                        "; "));
   }
-  double number(const protocol::StudyQuery& asked) const {
-    Statement statement(database_.get(), plan(database_.get(), asked).sql);
+  double number(const protocol::StudyQuery& query) const {
+    Statement statement(database_.get(), plan(database_.get(), query).sql);
     return statement.step() ? statement.real(0) : -1.0;
   }
   double number(const std::string& select, const std::string& where = {}) const {
@@ -95,9 +95,9 @@ class PlanTest : public StoreFixture {
     return plan(database_.get(), question(select)).columns.at(0);
   }
   /// Returns the error message, which is empty if the query is valid.
-  std::string error(const protocol::StudyQuery& asked) const {
+  std::string error(const protocol::StudyQuery& query) const {
     try {
-      plan(database_.get(), asked);
+      plan(database_.get(), query);
     } catch (const solver::InputError& error) {
       return error.what();
     }
@@ -341,7 +341,7 @@ TEST_F(PlanTest, AGroupedQuerySelectsOnlyKeysOrAggregates) {
 
 TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
   const struct {
-    protocol::StudyQuery asked;
+    protocol::StudyQuery query;
     const char* flag;
     const char* message;
   } wrong[] = {
@@ -361,8 +361,8 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
       {question("mu +"), "--select \"mu +\"", ""},
       {question("mu", "mu = = 1"), "--where", "near \"=\""},
       {question("mu", "", "", "mu DESC DESC"), "--order \"mu DESC DESC\"", ""}};
-  for (const auto& [asked, flag, message] : wrong) {
-    EXPECT_THAT(error(asked), AllOf(HasSubstr(flag), HasSubstr(message))) << asked.DebugString();
+  for (const auto& [query, flag, message] : wrong) {
+    EXPECT_THAT(error(query), AllOf(HasSubstr(flag), HasSubstr(message))) << query.DebugString();
   }
   for (const char* text : {"E > 1", "\"E\" > 1", "abs([E]) > 1", "e = 1 AND -E > 1"}) {
     EXPECT_THAT(error("mu", text), AllOf(HasSubstr("--where"), HasSubstr("write e, or E_Pa")))
@@ -396,7 +396,7 @@ TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedNumbers) {
 }
 
 /// Returns the error message for a condition, which is empty if the condition is allowed.
-std::string objection(const std::string& text) {
+std::string condition_error(const std::string& text) {
   try {
     check_sql_part("--where", text);
   } catch (const solver::InputError& error) {
@@ -413,7 +413,7 @@ TEST(SqlPart, ExpressionsAreAllowed) {
         "mu IS NOT DISTINCT FROM e", "\"mu\" > 1 AND [e] = 1 AND `k` > 2",
         "CASE WHEN mu > 1 THEN e ELSE H END > .5", "x'0aE1' = mode", "mode || ':x' = '?'",
         "mode->>'$[0]' = 1", "*", "count(*), max(mu) AS m", "mu DESC, e NULLS LAST"}) {
-    EXPECT_EQ(objection(text), "") << text;
+    EXPECT_EQ(condition_error(text), "") << text;
   }
 }
 
@@ -442,8 +442,8 @@ TEST(SqlPart, NothingCanChangeTheStatementAroundIt) {
       {"mu > 1 AND \xEF\xBB\xBFmu", "it has a byte-order mark"},
       {"mu > 1 AND (" + std::string(100'000, '1'), "--where \"mu > 1 AND (111"}};
   for (const auto& [text, message] : wrong) {
-    EXPECT_THAT(objection(text), HasSubstr(message)) << text;
-    EXPECT_LT(objection(text).size(), 1000U);
+    EXPECT_THAT(condition_error(text), HasSubstr(message)) << text;
+    EXPECT_LT(condition_error(text).size(), 1000U);
   }
 }
 

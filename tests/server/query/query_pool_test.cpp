@@ -38,7 +38,8 @@ using testing::AnyOf;
 using testing::HasSubstr;
 
 /// SQLite compares bytes for hours in this query, without checking for an interrupt.
-constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
+constexpr const char* kUninterruptible =
+    "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 /// The result has some megabytes, more than a reader sends before the client takes chunks.
 constexpr const char* kLong =
@@ -65,7 +66,7 @@ class QueryPoolTest : public testing::Test {
     // No query has this number; the call only makes the pool check its clock.
     pool().cancel(UINT64_MAX);
   }
-  std::uint64_t ask(const std::string& sql, const std::string& client = "") {
+  std::uint64_t submit(const std::string& sql, const std::string& client = "") {
     QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
     job.request.set_sql(sql);
     job.request.set_time_limit_ms(kTimeLimit_ms);
@@ -122,10 +123,10 @@ class QueryPoolTest : public testing::Test {
     std::filesystem::permissions(settings_.reader_program, std::filesystem::perms::owner_all);
     return settings_.reader_program;
   }
-  std::string error_of(const std::string& sql) { return take_all(ask(sql)).error; }
+  std::string error_of(const std::string& sql) { return take_all(submit(sql)).error; }
   /// Returns the first value of the only row.
   std::int64_t number_of(const std::string& sql) {
-    const Answer answer = take_all(ask(sql));
+    const Answer answer = take_all(submit(sql));
     EXPECT_EQ(answer.rows, 1U) << answer.error;
     return answer.last_number;
   }
@@ -175,7 +176,7 @@ TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledDuringItsStartRunsNoQuery) {
   close(ends[0]);
   const protocol::Descriptor request(memfd_create("query", MFD_CLOEXEC));
   protocol::QueryRequest query;
-  query.set_sql(kDeaf);
+  query.set_sql(kUninterruptible);
   ASSERT_TRUE(query.SerializeToFileDescriptor(request.number()));
   ASSERT_EQ(lseek(request.number(), 0, SEEK_SET), 0);
   const pid_t pid =
@@ -189,19 +190,19 @@ TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
   EXPECT_EQ(number_of("SELECT 5 AS five, 'x'"), 5);
   EXPECT_EQ(number_of("SELECT 7 /*" + std::string(900'000, 'x') + "*/"), 7);
   EXPECT_THAT(error_of("SELECT nothing"), HasSubstr("nothing"));
-  const Answer empty = take_all(ask("SELECT 1 WHERE 0"));
+  const Answer empty = take_all(submit("SELECT 1 WHERE 0"));
   EXPECT_EQ(empty.chunks, 1U);
   EXPECT_EQ(empty.rows, 0U);
 }
 
 TEST_F(QueryPoolTest, AQueryIsKilledAtItsDeadline) {
-  const auto deaf = ask(kDeaf);
-  wait_for_start(deaf);
+  const auto uninterruptible = submit(kUninterruptible);
+  wait_for_start(uninterruptible);
   advance_ms(kTimeLimit_ms - 1);
   EXPECT_EQ(number_of("SELECT 1"), 1);
-  EXPECT_FALSE(answer(deaf).ended);
+  EXPECT_FALSE(answer(uninterruptible).ended);
   advance_ms(1);
-  EXPECT_THAT(wait_for_end(deaf).error, HasSubstr("took more than 600 s"));
+  EXPECT_THAT(wait_for_end(uninterruptible).error, HasSubstr("took more than 600 s"));
   EXPECT_EQ(number_of("SELECT 1"), 1);
 }
 
@@ -224,9 +225,9 @@ TEST_F(QueryPoolTest, QueriesThatNeedTooMuchMemoryFailWithThatReason) {
 
 TEST_F(QueryPoolTest, AWaitingQueryStartsWhenACancelledOneEnds) {
   settings_.queue.most_running_each = 1;
-  const auto running = ask(kDeaf, "one client");
+  const auto running = submit(kUninterruptible, "one client");
   wait_for_start(running);
-  const auto next = ask("SELECT 2", "one client");
+  const auto next = submit("SELECT 2", "one client");
   EXPECT_EQ(number_of("SELECT 1"), 1) << "a query of another client is not delayed";
   EXPECT_FALSE(answer(next).runs);
   pool().cancel(running);
@@ -236,9 +237,9 @@ TEST_F(QueryPoolTest, AWaitingQueryStartsWhenACancelledOneEnds) {
 
 TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
   for (int i = 0; i < 4; ++i) {
-    wait_for_start(ask(kDeaf));
+    wait_for_start(submit(kUninterruptible));
   }
-  ask(kDeaf);
+  submit(kUninterruptible);
   pool().stop();
   EXPECT_FALSE(pool().submit({99, "late", {}}));
 }
@@ -256,7 +257,7 @@ TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
 }
 
 TEST_F(QueryPoolTest, ALongAnswerIsCompleteInLimitedChunks) {
-  const Answer answer = take_all(ask(kLong));
+  const Answer answer = take_all(submit(kLong));
   EXPECT_EQ(answer.error, "");
   EXPECT_EQ(answer.rows, 60'000U);
   EXPECT_EQ(answer.last_number, 60'000);
@@ -266,15 +267,15 @@ TEST_F(QueryPoolTest, ALongAnswerIsCompleteInLimitedChunks) {
 }
 
 TEST_F(QueryPoolTest, WithoutConfirmationAClientGetsFourChunksAndItsAnswerEndsAfterTenSeconds) {
-  const auto ticket = ask(kLong);
+  const auto ticket = submit(kLong);
   wait_for_chunks(ticket, kChunksAhead);
-  take_all(ask("SELECT 1"));
+  take_all(submit("SELECT 1"));
   EXPECT_EQ(answer(ticket).chunks, kChunksAhead);
   advance_ms(settings_.patience_ms - 1);
   pool().more(ticket, 1);
   wait_for_chunks(ticket, kChunksAhead + 1);
   advance_ms(settings_.patience_ms - 1);
-  take_all(ask("SELECT 1"));
+  take_all(submit("SELECT 1"));
   EXPECT_EQ(answer(ticket).chunks, kChunksAhead + 1);
   EXPECT_FALSE(answer(ticket).ended);
   advance_ms(1);
@@ -283,7 +284,7 @@ TEST_F(QueryPoolTest, WithoutConfirmationAClientGetsFourChunksAndItsAnswerEndsAf
 
 TEST_F(QueryPoolTest, AnAnswerEndsAtItsTimeLimit) {
   settings_.longest_answer_ms = 5000;
-  const auto ticket = ask(kLong);
+  const auto ticket = submit(kLong);
   wait_for_chunks(ticket, kChunksAhead);
   advance_ms(5000);
   EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("took more than 5 s"));

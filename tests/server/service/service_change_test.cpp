@@ -77,14 +77,14 @@ TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingIsAcknowledgedAndAllPeersAreNoti
 
   ports_.jobs.clear();
   ports_.worker_messages.clear();
-  worker_says(results_of({0}));
+  worker_sends(results_of({0}));
   credit(1);
   service_->tick(now_);
   EXPECT_TRUE(ports_.jobs.empty());
   EXPECT_TRUE(ports_.worker_messages.empty()) << "results were acknowledged without a database";
-  for (const auto& asked :
+  for (const auto& late_request :
        {submit_request("c"), change_request("a", protocol::STUDY_CHANGE_PAUSE)}) {
-    request(asked);
+    request(late_request);
     EXPECT_THAT(last_error(), HasSubstr("the file was deleted"));
   }
   EXPECT_EQ(status_of("a").waits_for(), "the file was deleted");
@@ -316,7 +316,7 @@ TEST_F(ServiceGrowthTest, ADeletedStudyIsGoneAndItsNameIsFree) {
   write_all();
   EXPECT_TRUE(last_reply().submit().created());
   EXPECT_EQ(last_reply().submit().study_id(), 2U);
-  worker_says(solved_before);
+  worker_sends(solved_before);
   ASSERT_EQ(ports_.jobs.size(), 1U);
   EXPECT_TRUE(std::get<AddResults>(ports_.jobs[0].change).results.empty());
   write_all();

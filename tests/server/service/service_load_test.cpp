@@ -40,7 +40,7 @@ TEST_F(ServiceLoadTest, NoBatchIsSentWhileTheDiskIsFarBehind) {
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
   for (std::uint64_t point = 900; point < 910; ++point) {
-    worker_says(results_of({point}));
+    worker_sends(results_of({point}));
   }
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
@@ -52,7 +52,7 @@ TEST_F(ServiceLoadTest, WhileReadingIsPausedAWorkerIsNotLostAndGetsHeartbeatRepl
   ServiceSettings settings;
   settings.ledger.bytes = 1;
   begin(settings);
-  worker_says(results_of({900}));
+  worker_sends(results_of({900}));
   ports_.worker_messages.clear();
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 1U);
@@ -69,10 +69,10 @@ TEST_F(ServiceLoadTest, WhileReadingIsPausedAWorkerIsNotLostAndGetsHeartbeatRepl
 
 TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotLost) {
   begin({});
-  ports_.unheard = "worker";
+  ports_.with_unread_input = "worker";
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 1U);
-  ports_.unheard.clear();
+  ports_.with_unread_input.clear();
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
@@ -82,7 +82,7 @@ TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsHeartbeatReplies) {
   ports_.worker_messages.clear();
   for (std::uint64_t point = 900; point < 960; ++point) {
     now_.steady_ms += 100;
-    worker_says(results_of({point}));
+    worker_sends(results_of({point}));
     service_->tick(now_);
   }
   EXPECT_GE(ports_.worker_messages.size(), 4U) << "expected one heartbeat reply every 1.2 s";
@@ -119,7 +119,7 @@ TEST_F(FloodedServiceTest, NoWorkerJoinsWhileTheDiskIsTooFarBehind) {
   message.mutable_results()->set_study_id(1);
   for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
     message.mutable_results()->set_sequence(sequence);
-    worker_says(message);
+    worker_sends(message);
   }
   hello("another");
   EXPECT_EQ(service_->scheduler().workers(), 1U);

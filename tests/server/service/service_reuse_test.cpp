@@ -249,7 +249,7 @@ TEST_F(FilteredStudyTest, PointsAreValidatedOnTheCheckThread) {
 TEST_F(FilteredStudyTest, TracesOfAFilteredStudyUseThePointNumbers) {
   submit_filtered();
   hello();
-  const auto ask = [&](std::uint64_t point) {
+  const auto trace_reply = [&](std::uint64_t point) {
     ports_.replies.clear();
     ClientRequest message = client_request(7);
     message.mutable_trace()->set_study("filtered");
@@ -258,9 +258,10 @@ TEST_F(FilteredStudyTest, TracesOfAFilteredStudyUseThePointNumbers) {
     request(message);
     return last_reply();
   };
-  EXPECT_NEAR(ask(9).trace().mu(), 0.9, 1e-12);
-  EXPECT_THAT(ask(3).error().message(), HasSubstr("point 3 is left out by the study's filter"));
-  EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
+  EXPECT_NEAR(trace_reply(9).trace().mu(), 0.9, 1e-12);
+  EXPECT_THAT(trace_reply(3).error().message(),
+              HasSubstr("point 3 is left out by the study's filter"));
+  EXPECT_THAT(trace_reply(11).error().message(), HasSubstr("its points are 0 to 10"));
 }
 
 TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
@@ -292,7 +293,7 @@ TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
     results.set_lease_id(last_message().batch().lease_id());
     results.set_batch_done(true);
     results.mutable_left_out()->Assign(numbers.begin(), numbers.end());
-    worker_says(message);
+    worker_sends(message);
     write_all();
     EXPECT_EQ(service_->scheduler().workers(), 0U);
     EXPECT_EQ(status_of("filtered").left_out(), 0U);

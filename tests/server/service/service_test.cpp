@@ -102,7 +102,7 @@ TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
   EXPECT_EQ(last_message().welcome().lost_after_ms(), 2800U);
   WorkerMessage message;
   message.mutable_heartbeat();
-  worker_says(message);
+  worker_sends(message);
   EXPECT_TRUE(last_message().has_heartbeat_reply());
 }
 
@@ -120,7 +120,7 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
   hello_and_credit();
   WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
   message.mutable_results()->set_batch_done(true);
-  worker_says(message);
+  worker_sends(message);
   ASSERT_EQ(ports_.jobs.size(), 2U) << "expected one row of the worker and one of the results";
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
@@ -138,7 +138,7 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
   results.at(0).set_h_m(std::nextafter(results.at(0).h_m(), 2.0));
   results.at(1).set_h_m(1.001 * results.at(1).h_m());
   results.at(2).set_reals(4, std::numeric_limits<double>::quiet_NaN());
-  worker_says(message);
+  worker_sends(message);
   ASSERT_EQ(ports_.jobs.size(), 2U) << "expected one row of the worker and one of the results";
   const auto& change = std::get<AddResults>(ports_.jobs[1].change);
   EXPECT_EQ(change.results.at(0).error(), "") << "inputs may differ by rounding";
@@ -155,7 +155,7 @@ TEST_F(ServiceTest, AWorkerWithWrongInputsIsNotProven) {
   protocol::PointResult& result = *message.mutable_results()->mutable_results(0);
   for (const bool is_right : {false, true}) {
     result.set_h_m(solved(0).h_m() * (is_right ? 1.0 : 1.001));
-    worker_says(message);
+    worker_sends(message);
     EXPECT_EQ(service_->scheduler().worker(1, now_.steady_ms).is_proven, is_right);
   }
 }
@@ -176,7 +176,7 @@ TEST_F(ServiceTest, StatusHasTheRateOfTheLastSeconds) {
   hello();
   std::vector<std::uint64_t> points(100);
   std::iota(points.begin(), points.end(), std::uint64_t{0});
-  worker_says(results_of(points));
+  worker_sends(results_of(points));
   write_all();
   now_.steady_ms += 500;
   const auto status = status_of("a");
@@ -197,12 +197,12 @@ WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver
 }
 
 TEST_F(ServiceTest, AWorkerWithAnotherSolverOrOtherOutputsIsRefusedWithTheReason) {
-  worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
+  worker_sends(hello_of(protocol::kProtocolVersion, "0.9"));
   EXPECT_THAT(last_message().refused().reason(), AllOf(HasSubstr("0.9"), HasSubstr("1.0")));
   for (const std::string& outputs : {std::string(), protocol::sent_outputs() + " new_N"}) {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
     message.mutable_hello()->set_outputs(outputs);
-    worker_says(message);
+    worker_sends(message);
     EXPECT_THAT(last_message().refused().reason(), HasSubstr("other outputs"));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);
@@ -250,7 +250,7 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
   const std::string own = fmt::format("version {}", protocol::kProtocolVersion);
   for (const std::uint32_t version :
        {0U, protocol::kProtocolVersion - 1, protocol::kProtocolVersion + 1, 77U}) {
-    worker_says(hello_of(version, "1.0"));
+    worker_sends(hello_of(version, "1.0"));
     EXPECT_THAT(last_message().refused().reason(),
                 HasSubstr(fmt::format("{}, but the worker has version {}", own, version)));
     ClientRequest message = submit_request("a");
@@ -267,7 +267,7 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
 TEST_F(ServiceTest, TextFromAWorkerCannotForgeLogLines) {
   WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
   message.mutable_hello()->set_name("a\n\x1b[31mb");
-  worker_says(message);
+  worker_sends(message);
   EXPECT_THAT(ports_.lines.back(), HasSubstr("(a??[31mb, 1 threads) joins"));
 }
 
@@ -302,11 +302,11 @@ TEST_F(ServiceTest, TooLargeMessagesOfWorkersAreNotParsed) {
   for (std::size_t i = 0; i <= protocol::kMaxResultsAMessage; ++i) {
     results.mutable_results()->add_results();
   }
-  worker_says(heartbeat);
+  worker_sends(heartbeat);
   EXPECT_EQ(service_->bad_frames(), 1U) << "a heartbeat of an unknown worker";
   for (const WorkerMessage& message : {heartbeat, results}) {
     hello();
-    worker_says(message);
+    worker_sends(message);
     EXPECT_TRUE(last_message().has_hello_again());
     EXPECT_EQ(service_->scheduler().workers(), 0U);
   }
@@ -321,8 +321,8 @@ TEST_F(ServiceTest, AWorkerIsStoredWithItsFirstResult) {
   }
   EXPECT_TRUE(ports_.jobs.empty());
   hello_and_credit();
-  worker_says(results_of({0}));
-  worker_says(results_of({0}));
+  worker_sends(results_of({0}));
+  worker_sends(results_of({0}));
   ASSERT_EQ(ports_.jobs.size(), 3U) << "expected one row of the worker and two messages of results";
   EXPECT_EQ(std::get<AddWorker>(ports_.jobs[0].change).worker_id, 1001U);
   EXPECT_EQ(std::get<AddResults>(ports_.jobs[1].change).worker_id, 1001U);
@@ -333,7 +333,7 @@ TEST_F(ServiceTest, WorkersThatReconnectAgainAndAgainDoNotFillTheLog) {
   goodbye.mutable_goodbye();
   for (int i = 0; i < 10'000; ++i) {
     hello("worker " + std::to_string(i));
-    worker_says(goodbye, "worker " + std::to_string(i));
+    worker_sends(goodbye, "worker " + std::to_string(i));
   }
   EXPECT_EQ(ports_.lines.size(), 20U);
   ports_.lines.clear();
@@ -376,7 +376,7 @@ class ProcessesTest : public ServiceTest {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
     message.mutable_hello()->set_name(name);
     message.mutable_hello()->set_process_id(process_id);
-    worker_says(message, identity);
+    worker_sends(message, identity);
   }
   /// Makes three new workers join, get batches and vanish.
   void let_newcomers_vanish() {

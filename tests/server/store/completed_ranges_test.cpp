@@ -49,7 +49,7 @@ TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsAreOpenAfterTheNext
   const auto other = study_of(9, 2, "b");
   commit({study, other, worker(1), solved(study, {0, 1, 2, 3}), failed(study, {8}),
           solved(other, {0, 1})});
-  by_hand("DELETE FROM results WHERE study_id = 1 AND point = 1");
+  execute_sql("DELETE FROM results WHERE study_id = 1 AND point = 1");
   commit({ForgetFailures{1, IntervalSet(8, 9), "now"}});
   commit({solved(study, {5})});
   EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0", "1"));
@@ -115,7 +115,7 @@ TEST_F(CompletedRangesTest, PointsThatAFilterLeavesOutAreExaminedAgainWhenRowsAr
   EXPECT_EQ(store().studies().at(0).completed.size(), 7U);
   EXPECT_EQ(store().studies().at(0).left_out, 4U);
   close();
-  by_hand("DELETE FROM results WHERE point = 5");
+  execute_sql("DELETE FROM results WHERE point = 5");
   EXPECT_EQ(store().studies().at(0).left_out, 0U);
   EXPECT_THAT(ranges(), ElementsAre("4+1", "8+1"));
 }
@@ -135,7 +135,7 @@ TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
 TEST_F(CompletedRangesTest, AResultCompletesAPointThatAlreadyHasARow) {
   const auto study = study_of(10);
   commit({study, worker(1), solved(study, {3, 4})});
-  by_hand("DELETE FROM completed_ranges");
+  execute_sql("DELETE FROM completed_ranges");
   commit({solved(study, {4})});
   EXPECT_THAT(ranges(), ElementsAre("4+1"));
 }

@@ -102,7 +102,7 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrTo
   IntervalSet expected(0, 10);
   std::uint64_t id = 3;
   for (const auto& [change, lost] : changes) {
-    by_hand(change);
+    execute_sql(change);
     expected.erase(lost.begin, lost.end);
     add(id, "another", points_);
     EXPECT_EQ(reuse_part(id, points_).points, expected) << change;
@@ -112,7 +112,7 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrTo
 }
 
 TEST_F(SamePointsTest, PointsCompletedWithoutARowGetNoCopiedRow) {
-  by_hand("INSERT INTO completed_ranges VALUES (2, 2, 3)");
+  execute_sql("INSERT INTO completed_ranges VALUES (2, 2, 3)");
   IntervalSet others(0, 10);
   others.erase(2, 5);
   EXPECT_EQ(reused(), others) << "points outside the condition are not reused";

@@ -180,7 +180,7 @@ TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
   execute_with(open_database(path_, SQLITE_OPEN_READWRITE).get(),
                "UPDATE studies SET recipe = ?, checksum = NULL WHERE study_id = 1",
                Blob{recipe.SerializeAsString()});
-  by_hand("UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 3");
+  execute_sql("UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 3");
   const auto studies = store().studies();
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].name, "b");
@@ -192,7 +192,7 @@ TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
 TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
   commit({study_of(3)});
   close();
-  by_hand("UPDATE studies SET recipe = x'ff', checksum = NULL");
+  execute_sql("UPDATE studies SET recipe = x'ff', checksum = NULL");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check")));
 }
 
@@ -200,9 +200,9 @@ TEST_F(StoreTest, AStudyNumberIsNeverReused) {
   const auto study = study_of(5, 2);
   commit({study, solved(study, {0}), study_of(5, 3, "b")});
   close();
-  by_hand("DELETE FROM studies");
+  execute_sql("DELETE FROM studies");
   EXPECT_EQ(store().last_study_id(), 3U);
-  by_hand("UPDATE results SET study_id = 7");
+  execute_sql("UPDATE results SET study_id = 7");
   EXPECT_EQ(store().last_study_id(), 7U)
       << "rows of study 7 would belong to a new study of this number";
 }
@@ -213,16 +213,16 @@ TEST_F(StoreTest, AStudyThatWasChangedByHandIsRefusedWithTheRemedy) {
   for (const char* change :
        {"study_id = 3", "points = 6", "recipe = x'ff'", "errors = 1", "created_at = ''"}) {
     const std::string where = " WHERE name = 'second'";
-    by_hand("CREATE TABLE before AS SELECT * FROM studies" + where);
-    by_hand(std::string("UPDATE studies SET ") + change + where);
+    execute_sql("CREATE TABLE before AS SELECT * FROM studies" + where);
+    execute_sql(std::string("UPDATE studies SET ") + change + where);
     EXPECT_THAT(refusal(), AllOf(HasSubstr("(\"second\")"), HasSubstr("SET checksum = NULL")))
         << change;
-    by_hand("DELETE FROM studies" + where +
-            "; INSERT INTO studies SELECT * FROM before; DROP TABLE before");
+    execute_sql("DELETE FROM studies" + where +
+                "; INSERT INTO studies SELECT * FROM before; DROP TABLE before");
     EXPECT_EQ(refusal(), "it opened");
   }
-  EXPECT_THROW(by_hand("UPDATE studies SET study_id = 0"), StorageError);
-  EXPECT_THROW(by_hand("UPDATE studies SET study_id = 9223372036854775807"), StorageError);
+  EXPECT_THROW(execute_sql("UPDATE studies SET study_id = 0"), StorageError);
+  EXPECT_THROW(execute_sql("UPDATE studies SET study_id = 9223372036854775807"), StorageError);
 }
 
 // ---- Studies that grow, are renamed or deleted --------------------------------------------------
@@ -387,14 +387,14 @@ class SchemaTest : public StoreFixture {
 };
 
 TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
-  by_hand("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
+  execute_sql("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
   const auto before = objects();
   ASSERT_EQ(before.size(), 9U);
   for (const std::string change :
        {"DROP VIEW runs", "DROP VIEW peaks", "DROP VIEW phases", "DROP VIEW stick_intervals",
         "DROP VIEW reaction_peaks", "DROP VIEW peaks; CREATE VIEW peaks AS SELECT 7 AS mine",
         "DROP TRIGGER row_deleted", "DROP INDEX failed_points", "DROP INDEX solved_points"}) {
-    by_hand(change);
+    execute_sql(change);
     EXPECT_EQ(refusal(), "it opened");
     EXPECT_EQ(objects(), before) << change;
   }
@@ -402,14 +402,15 @@ TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
 }
 
 TEST_F(SchemaTest, TriggersOfTheFileDoNotRunWithTheChangesOfAServer) {
-  by_hand("CREATE TRIGGER other AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END");
-  EXPECT_THROW(by_hand("UPDATE studies SET priority = 1"), StorageError);
+  execute_sql(
+      "CREATE TRIGGER other AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END");
+  EXPECT_THROW(execute_sql("UPDATE studies SET priority = 1"), StorageError);
   commit({SetPriority{1, 7}});
   EXPECT_THAT(rows("SELECT priority FROM studies"), ElementsAre("7"));
 }
 
 TEST_F(SchemaTest, AFileWithATableNamedLikeAViewIsRefusedUnchanged) {
-  by_hand("DROP VIEW runs; CREATE TABLE runs (mine)");
+  execute_sql("DROP VIEW runs; CREATE TABLE runs (mine)");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
   EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
 }
@@ -454,13 +455,13 @@ TEST_F(StoreFilesTest, ACommitDuringWhichTheFileIsDeletedIsNotAcknowledged) {
 }
 
 TEST_F(StoreFilesTest, NothingIsAcknowledgedAfterTheFileIsDeletedRenamedOrReplaced) {
-  const std::map<std::string, std::function<void()>> blows{
+  const std::map<std::string, std::function<void()>> changes{
       {"the database is deleted", [&] { fs::remove(path_); }},
       {"it is renamed", [&] { fs::rename(path_, folder_.file("elsewhere.db")); }},
       {"its folder is renamed",
        [&] { fs::rename(folder_.file("lab"), folder_.file("laboratory")); }},
       {"another database takes its name", [&] { fs::rename(other_, path_); }}};
-  for (const auto& [what, blow] : blows) {
+  for (const auto& [what, change] : changes) {
     close();
     for (const char* name : {"lab", "laboratory", "other.db", "elsewhere.db"}) {
       fs::remove_all(folder_.file(name));
@@ -469,7 +470,7 @@ TEST_F(StoreFilesTest, NothingIsAcknowledgedAfterTheFileIsDeletedRenamedOrReplac
     make_databases();
     add_result(0);
     EXPECT_NO_THROW(store().check()) << what;
-    blow();
+    change();
     EXPECT_THROW(store().check(), StorageGone) << what;
     EXPECT_THROW(add_result(1), StorageGone) << what;
     EXPECT_THROW(store().merge_log(), StorageGone) << what;

@@ -120,11 +120,11 @@ std::vector<std::unique_ptr<RawHttp>> silent_peers(const EchoServer& server, int
 
 TEST(HttpServer, AnswersHttp10AndHttp11AndEndsTheConnection) {
   const EchoServer server;
-  const std::string answer = RawHttp(server.url()).ask("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
+  const std::string answer = RawHttp(server.url()).exchange("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(status_of_answer(answer), 200);
   EXPECT_EQ(body_of(answer), "/a\n");
-  EXPECT_EQ(body_of(RawHttp(server.url()).ask("GET /b" + kEnd + "GET /c" + kEnd)), "/b\n");
-  const std::string head = RawHttp(server.url()).ask("HEAD /abc" + kEnd);
+  EXPECT_EQ(body_of(RawHttp(server.url()).exchange("GET /b" + kEnd + "GET /c" + kEnd)), "/b\n");
+  const std::string head = RawHttp(server.url()).exchange("HEAD /abc" + kEnd);
   EXPECT_THAT(head, HasSubstr("Content-Length: 5\r\n"));
   EXPECT_EQ(body_of(head), "");
 }
@@ -151,14 +151,14 @@ TEST(HttpServer, SendsHeadersThatKeepBrowsersFromMisusingAnswers) {
 TEST(HttpServer, ARefusalContainsASentence) {
   const EchoServer server;
   const std::string rebound =
-      RawHttp(server.url()).ask("GET / HTTP/1.1\r\nHost: evil.example:7602\r\n\r\n");
+      RawHttp(server.url()).exchange("GET / HTTP/1.1\r\nHost: evil.example:7602\r\n\r\n");
   EXPECT_EQ(status_of_answer(rebound), 403);
   EXPECT_THAT(body_of(rebound), HasSubstr("evil.example"));
   EXPECT_EQ(status_of_answer(get(server.url(), "/?a=b%00c")), 400);
-  EXPECT_EQ(status_of_answer(RawHttp(server.url()).ask("GET / HTTP/1.1\r\n\r\n")), 400);
+  EXPECT_EQ(status_of_answer(RawHttp(server.url()).exchange("GET / HTTP/1.1\r\n\r\n")), 400);
   const std::string post =
       RawHttp(server.url())
-          .ask(
+          .exchange(
               "POST / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
               "Content-Length: 3\r\n\r\nabc");
   EXPECT_EQ(status_of_answer(post), 405);
@@ -206,7 +206,7 @@ TEST(HttpServer, AnAddressAtItsConnectionLimitDoesNotAffectOthers) {
   limits.connections_of_one_address = 4;
   const EchoServer server(limits);
   const auto silent = silent_peers(server, 4, "127.0.0.2");
-  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").ask("GET /a" + kEnd), "");
+  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").exchange("GET /a" + kEnd), "");
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
 }
 
@@ -257,7 +257,7 @@ TEST(HttpServer, ATooSlowTransferEnds) {
   get(server.url(), "/a");  // this answer shows that all earlier connections were accepted
   server.let_pass(limits.idle);
   EXPECT_EQ(halting.read_to_the_end(), "");
-  EXPECT_EQ(body_of(uploading.front()->ask(std::string(8192, 'x'))), "/a\n");
+  EXPECT_EQ(body_of(uploading.front()->exchange(std::string(8192, 'x'))), "/a\n");
   uploading.back()->send("x");
   server.let_pass(std::chrono::seconds(2));
   EXPECT_EQ(uploading.back()->read_to_the_end(), "");

@@ -29,7 +29,7 @@ class RawHttp : public test::RawTcp {
     }
     return all;
   }
-  std::string ask(const std::string& bytes) {
+  std::string exchange(const std::string& bytes) {
     send(bytes);
     return read_to_the_end();
   }
@@ -41,7 +41,7 @@ class RawHttp : public test::RawTcp {
 };
 
 inline std::string get(const std::string& url, const std::string& path) {
-  return RawHttp(url).ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  return RawHttp(url).exchange("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
 }
 
 /// Returns the status of an HTTP answer, or 0 if the text is no answer.

@@ -31,7 +31,7 @@ class KeysTest : public ::testing::Test {
 
   std::string key(const std::string& name) const { return keys_ + "/" + name + ".key"; }
 
-  Outcome ask(std::vector<std::string> arguments, const std::string& key_file = "") const {
+  Outcome run_client(std::vector<std::string> arguments, const std::string& key_file = "") const {
     arguments.insert(arguments.end(), {"--server", server_->client_url()});
     if (!key_file.empty()) {
       arguments.insert(arguments.end(), {"--keys", key_file});
@@ -53,7 +53,7 @@ class KeysTest : public ::testing::Test {
   }
   /// Expects that a client with `key_file` is refused and prints a message with `words`.
   void expect_turned_away(const std::string& key_file, const std::string& words) const {
-    const Outcome outcome = ask({"status"}, key_file);
+    const Outcome outcome = run_client({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
     EXPECT_THAT(outcome.err, HasSubstr(words));
     EXPECT_THAT(outcome.err, Not(HasSubstr("no answer")));
@@ -71,15 +71,15 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
   const auto worker = worker_with(key("worker"));
   auto submit = kFewPoints;
   submit.emplace_back("--watch");
-  EXPECT_EQ(ask(submit, key("client")).exit_code, 0);
-  const Outcome read = ask({"query", "few", "--select", "mu,e,status"}, key("reader"));
+  EXPECT_EQ(run_client(submit, key("client")).exit_code, 0);
+  const Outcome read = run_client({"query", "few", "--select", "mu,e,status"}, key("reader"));
   EXPECT_EQ(read.exit_code, 0) << read.err;
   EXPECT_THAT(read.out, HasSubstr("solved"));
-  EXPECT_THAT(ask({"status", "--format", "json"}, key("reader")).out,
+  EXPECT_THAT(run_client({"status", "--format", "json"}, key("reader")).out,
               HasSubstr(R"("submitted_by":"client","access":"keys")"));
   auto another = kFewPoints;
   another[2] = "another";
-  const Outcome refused = ask(another, key("reader"));
+  const Outcome refused = run_client(another, key("reader"));
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.err, HasSubstr("has the role reader"));
 }
@@ -97,10 +97,10 @@ TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
   expect_turned_away(key("gone"), "not in the server's list");
   wait_until_said(server_->process(), "has the role worker, but this port is for clients");
   wait_until_said(server_->process(), "another public key of the server");
-  const Outcome seen = ask({"workers"}, key("reader"));
+  const Outcome seen = run_client({"workers"}, key("reader"));
   EXPECT_THAT(seen.err, AllOf(HasSubstr("refused since the server started: "),
                               HasSubstr("key of another role (1)")));
-  EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2)
+  EXPECT_EQ(run_client({"status"}, key("server")).exit_code, 2)
       << "a client must not use the server's key";
 }
 
@@ -126,7 +126,7 @@ TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwnKey) {
 
 TEST_F(KeysTest, AKeyFileReadableByOthersIsWrongUsageAndTheMessageHasTheRemedy) {
   std::filesystem::permissions(key("client"), std::filesystem::perms(0644));
-  const Outcome outcome = ask({"status"}, key("client"));
+  const Outcome outcome = run_client({"status"}, key("client"));
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("chmod 600 '" + key("client") + "'"));
 }
@@ -169,14 +169,14 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
   wait_until_said(server_->process(), "revoked: late");
   wait_until("the worker reports the refusal", [&] {
-    const std::string said = worker->err();
-    return said.find("did not accept this key", said.find("welcomed as worker")) !=
+    const std::string output = worker->err();
+    return output.find("did not accept this key", output.find("welcomed as worker")) !=
            std::string::npos;
   });
 }
 
 TEST_F(KeysTest, AWatchingClientReportsThatItsKeyIsRevoked) {
-  ASSERT_EQ(ask(kFewPoints, key("client")).exit_code, 0);
+  ASSERT_EQ(run_client(kFewPoints, key("client")).exit_code, 0);
   Process watching(folder_, client_program(),
                    {"watch", "few", "--server", server_->client_url(), "--keys", key("reader")});
   wait_until_said(watching, "waits for a worker");
@@ -227,10 +227,10 @@ TEST_F(KeysTest, TheSubfolderKeysIsUsedIfTheCurrentFolderHasNoKeys) {
 
 TEST_F(KeysTest, SubmittingAgainReportsTheNewPriority) {
   const auto worker = worker_with(key("worker"));
-  EXPECT_THAT(ask(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
+  EXPECT_THAT(run_client(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
   auto again = kFewPoints;
   again.insert(again.end(), {"--priority", "5", "--limit", "2"});
-  const Outcome outcome = ask(again, key("client"));
+  const Outcome outcome = run_client(again, key("client"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("its priority is now 5"));
   EXPECT_THAT(outcome.err, HasSubstr("More: oblique query few --server " + server_->client_url() +

@@ -214,13 +214,13 @@ TEST_F(ChangedAddresses, AStudyCompletesAfterTheMachineOfTheOnlyWorkerGetsAnothe
 TEST_F(ChangedAddresses, AStudyCompletesAfterTheClientsMachineGetsAnotherAddress) {
   start_server();
   client_ = client(submit_and_watch());
-  const auto says = [this](const std::string& words) {
+  const auto has_printed = [this](const std::string& words) {
     return client_->err().find(words) != std::string::npos;
   };
-  wait_until("the client watches", [&] { return says("waits for a worker"); });
+  wait_until("the client watches", [&] { return has_printed("waits for a worker"); });
   client_host_->renumber(15);
   const auto renumbered = std::chrono::steady_clock::now();
-  wait_until("the client receives replies again", [&] { return says("answers again"); });
+  wait_until("the client receives replies again", [&] { return has_printed("answers again"); });
   print_measured("the client receives replies again after", renumbered);
   expect_completion_after([] {});
 }
@@ -236,10 +236,10 @@ TEST_F(ChangedAddresses, AStudyCompletesAfterTheServersMachineGetsAnotherAddress
 
 TEST_F(ChangedAddresses, ANameWithoutAddressIsReported) {
   server_name_ = "nowhere";
-  const Outcome asked = client({"status", "--timeout", "0.2"})->outcome();
-  EXPECT_EQ(asked.exit_code, 1);
-  EXPECT_NE(asked.err.find("no address is known here for the name nowhere"), std::string::npos)
-      << asked.err;
+  const Outcome status = client({"status", "--timeout", "0.2"})->outcome();
+  EXPECT_EQ(status.exit_code, 1);
+  EXPECT_NE(status.err.find("no address is known here for the name nowhere"), std::string::npos)
+      << status.err;
 }
 
 using IPv6 = StudyOnLan;
@@ -327,12 +327,12 @@ class PlainText : public StudyOnLan {
     workers_.push_back(
         worker_on(*worker_hosts_[0]));  // the worker's first message contains its name, worker1
     using Words = std::vector<std::string>;
-    for (const Words& asked :
+    for (const Words& words :
          {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
                 "--mu", "1.2", "--e", "1"},
           Words{"query", "conspicuous", "--select", "fn_peak_N,mode", "--where", "e > 0.95"},
           Words{"sql", "SELECT count(*) FROM runs"}, Words{"workers"}}) {
-      const Outcome ran = client(asked)->outcome();
+      const Outcome ran = client(words)->outcome();
       EXPECT_EQ(ran.exit_code, 0) << ran.err;
     }
     return capture.bytes();

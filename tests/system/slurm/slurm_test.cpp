@@ -28,8 +28,9 @@ namespace {
 class SlurmTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (const auto objection = SlurmCluster::objection(); !objection.empty()) {
-      GTEST_SKIP() << "Slurm cannot be used: " << objection;
+    if (const auto unavailable_reason = SlurmCluster::unavailable_reason();
+        !unavailable_reason.empty()) {
+      GTEST_SKIP() << "Slurm cannot be used: " << unavailable_reason;
     }
     cluster_.emplace(folder_);
     const auto made = run_oblique(folder_, {"keygen", folder_.file("keys")});
@@ -262,8 +263,9 @@ TEST_F(SlurmAutoscaleTest, JobsOfAStoppedAutoscalerContinueAndTheNextAutoscalerC
 class SlurmCampaignTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (const auto objection = SlurmCluster::objection(); !objection.empty()) {
-      GTEST_SKIP() << "Slurm cannot be used: " << objection;
+    if (const auto unavailable_reason = SlurmCluster::unavailable_reason();
+        !unavailable_reason.empty()) {
+      GTEST_SKIP() << "Slurm cannot be used: " << unavailable_reason;
     }
     for (const char* part : {"server", "worker", "client"}) {
       Process install(folder_, "/usr/bin/env",

@@ -23,7 +23,7 @@ using testing::StartsWith;
 
 TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   const PageServer page;
-  const std::string answer = page.ask("GET", std::string("/?token=") + kTestToken, "");
+  const std::string answer = page.request("GET", std::string("/?token=") + kTestToken, "");
   EXPECT_EQ(status_of_answer(answer), 303);
   EXPECT_THAT(answer, HasSubstr("Location: /\r\n"));
   EXPECT_THAT(answer, HasSubstr("; Path=/; HttpOnly; SameSite=Strict\r\n"));
@@ -31,7 +31,7 @@ TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   EXPECT_EQ(page.json("/api/session")["may_change"], true);
   for (const std::string token :
        {"", "0", "0123456789abcdef0123456789abcdeg", "0123456789abcdef0123456789abcdef0", "%01"}) {
-    const std::string refused = page.ask("GET", "/?token=" + token, "");
+    const std::string refused = page.request("GET", "/?token=" + token, "");
     EXPECT_EQ(status_of_answer(refused), 403) << token;
     EXPECT_THAT(refused, Not(HasSubstr("Set-Cookie"))) << token;
   }
@@ -43,7 +43,7 @@ TEST(PageAccess, OnlyAViewOfAFileShowsTheFileNameAndOnlyWithAccess) {
   web.page.is_of_file = true;
   const PageServer page(web);
   EXPECT_EQ(page.json("/api/session")["file"], page.database());
-  EXPECT_EQ(nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")))["file"], "");
+  EXPECT_EQ(nlohmann::json::parse(body_of(page.request("GET", "/api/session", "")))["file"], "");
 }
 
 TEST(PageAccess, WithoutTheCookieNothingIsReadable) {
@@ -58,27 +58,29 @@ TEST(PageAccess, WithoutTheCookieNothingIsReadable) {
           right.substr(0, right.size() - 3) + "\r\n",
           "Cookie: oblique-1" + right.substr(right.find('=')),
           "Cookie: x" + right.substr(std::string("Cookie: ").size())}) {
-      const std::string answer = page.ask("GET", path, cookies);
+      const std::string answer = page.request("GET", path, cookies);
       EXPECT_EQ(status_of_answer(answer), 401) << path << ' ' << cookies;
       EXPECT_THAT(answer, HasSubstr("token")) << path;
     }
   }
-  EXPECT_EQ(nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")))["may_look"], false);
+  EXPECT_EQ(nlohmann::json::parse(body_of(page.request("GET", "/api/session", "")))["may_look"],
+            false);
   const std::string pair = right.substr(std::string("Cookie: ").size(), right.size() - 10);
   for (const std::string& cookies : {"Cookie: a=b; " + pair, "Cookie: " + pair + "; a=b",
                                      "Cookie: a;;  " + pair + ";", "cookie: a=b;" + pair}) {
-    EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", cookies + "\r\n")), 200) << cookies;
+    EXPECT_EQ(status_of_answer(page.request("GET", "/api/studies", cookies + "\r\n")), 200)
+        << cookies;
   }
 }
 
 TEST(PageAccess, ReadingMayBeAllowedWithoutTheToken) {
   const PageServer page(page_settings(true));
-  const auto session = nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")));
+  const auto session = nlohmann::json::parse(body_of(page.request("GET", "/api/session", "")));
   EXPECT_EQ(session["may_look"], true);
   EXPECT_EQ(session["may_change"], false);
-  EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", "")), 200);
-  EXPECT_EQ(status_of_answer(page.ask("POST", "/api/studies/1/pause",
-                                      "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
+  EXPECT_EQ(status_of_answer(page.request("GET", "/api/studies", "")), 200);
+  EXPECT_EQ(status_of_answer(page.request("POST", "/api/studies/1/pause",
+                                          "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
             401);
 }
 
@@ -117,7 +119,7 @@ TEST(PageAccess, WrongRequestsAreRefused) {
     rows.push_back({"GET", path, page.cookie_header(), 400});
   }
   for (const Row& row : rows) {
-    EXPECT_EQ(status_of_answer(page.ask(row.method, row.path, row.headers)), row.status)
+    EXPECT_EQ(status_of_answer(page.request(row.method, row.path, row.headers)), row.status)
         << row.method << ' ' << row.path << ' ' << row.headers;
   }
   EXPECT_EQ(status_of_answer(page.post("/api/studies", std::string(262'144, ' '))), 400);
@@ -140,7 +142,7 @@ TEST_F(PageStudyTest, ATraceIsCancelledWhenItsBrowserDisconnects) {
 TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
   const PageServer page;
   const auto type_of = [&](const std::string& path) {
-    const std::string answer = page.ask("GET", path, "");
+    const std::string answer = page.request("GET", path, "");
     EXPECT_EQ(status_of_answer(answer), 200) << path;
     EXPECT_THAT(answer, HasSubstr("Content-Encoding: gzip\r\n"));
     EXPECT_THAT(body_of(answer), StartsWith("\x1f\x8b"));
@@ -155,10 +157,11 @@ TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
   for (const PageFile& file : page_files()) {
     const std::string path(file.path);
     const std::string known = "If-None-Match: " + std::string(file.tag) + "\r\n";
-    const std::string answer = page.ask("GET", path, known);
+    const std::string answer = page.request("GET", path, known);
     EXPECT_EQ(status_of_answer(answer), 304) << path;
     EXPECT_EQ(body_of(answer), "") << path;
-    EXPECT_EQ(status_of_answer(page.ask("GET", path, "If-None-Match: \"other\"\r\n")), 200) << path;
+    EXPECT_EQ(status_of_answer(page.request("GET", path, "If-None-Match: \"other\"\r\n")), 200)
+        << path;
   }
 }
 

@@ -1,4 +1,4 @@
-#include "tests/bench/crowd/crowd.h"
+#include "tests/bench/load/load_generator.h"
 
 #include <sys/epoll.h>
 
@@ -54,9 +54,9 @@ protocol::WorkerHello hello_of(std::size_t number) {
   protocol::set_protocol(hello);
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
-  hello.set_name("crowd:" + std::to_string(number));
+  hello.set_name("load:" + std::to_string(number));
   hello.set_threads(1);
-  hello.set_process_id("crowd " + std::to_string(number));
+  hello.set_process_id("load " + std::to_string(number));
   return hello;
 }
 
@@ -66,9 +66,9 @@ protocol::PointResult solved_result() {
 
 }  // namespace
 
-class Crowd::Parts {
+class LoadGenerator::Parts {
  public:
-  explicit Parts(const CrowdSettings& settings)
+  explicit Parts(const LoadSettings& settings)
       : settings_(settings), result_(solved_result()), epoll_(epoll_create1(EPOLL_CLOEXEC)) {
     context_.set(zmq::ctxopt::max_sockets, 4 * static_cast<int>(settings.workers) + 64);
     for (std::size_t number = 0; number < settings.workers; ++number) {
@@ -83,7 +83,7 @@ class Crowd::Parts {
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
 
-  CrowdCounts counts() const { return {batches_, results_, messages_, connects_, welcomed_}; }
+  LoadCounts counts() const { return {batches_, results_, messages_, connects_, welcomed_}; }
 
  private:
   struct Job {
@@ -256,7 +256,7 @@ class Crowd::Parts {
     }
   }
 
-  CrowdSettings settings_;
+  LoadSettings settings_;
   protocol::PointResult result_;
   zmq::context_t context_;
   protocol::Descriptor epoll_;
@@ -275,10 +275,11 @@ std::size_t bytes_of_result() {
   return solved_result().ByteSizeLong();
 }
 
-Crowd::Crowd(const CrowdSettings& settings) : parts_(std::make_unique<Parts>(settings)) {}
-Crowd::~Crowd() = default;
+LoadGenerator::LoadGenerator(const LoadSettings& settings)
+    : parts_(std::make_unique<Parts>(settings)) {}
+LoadGenerator::~LoadGenerator() = default;
 
-CrowdCounts Crowd::counts() const {
+LoadCounts LoadGenerator::counts() const {
   return parts_->counts();
 }
 

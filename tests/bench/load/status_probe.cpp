@@ -1,4 +1,4 @@
-#include "tests/bench/crowd/status_probe.h"
+#include "tests/bench/load/status_probe.h"
 
 #include <algorithm>
 #include <cmath>
